@@ -1,0 +1,26 @@
+#include "base/error.h"
+
+#include <cmath>
+
+namespace stipple {
+
+void fail(ErrorCode code, const std::string& message) { throw Error(code, message); }
+
+void requireFinite(double value, const char* what) {
+  if (!std::isfinite(value)) {
+    fail(ErrorCode::kInvalidArgument,
+         std::string(what) + " is " + std::to_string(value) + "; it must be a finite number");
+  }
+}
+
+void requireFinite(const float* values, size_t count, size_t stride, const char* what) {
+  for (size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(values[i])) {
+      fail(ErrorCode::kInvalidArgument, std::string(what) + " " + std::to_string(i / stride) +
+                                            " holds " + std::to_string(values[i]) +
+                                            "; every value must be a finite number");
+    }
+  }
+}
+
+}  // namespace stipple

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace stipple {
+
+/// 64 well-mixed bits of a key: the finaliser of SplitMix64 (Steele, Lea, Flood, Fast Splittable
+/// Pseudorandom Number Generators, OOPSLA 2014).
+inline uint64_t mixBits(uint64_t x) {
+  x += 0x9e3779b97f4a7c15ull;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+  return x ^ (x >> 31);
+}
+
+/// What a keyed number is for; part of the key, so that two uses never share a number.
+enum class RandomUse : uint32_t {
+  kSystematicSplit = 1,
+  kProgressiveSplit = 2,
+  kLeafJitter = 3,
+  kSurfaceSample = 4,
+  kDecoder = 5,
+};
+
+/// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and
+/// on any thread.
+inline uint64_t keyedBits(uint64_t seed, RandomUse use, uint64_t index) {
+  return mixBits(mixBits(seed ^ (static_cast<uint64_t>(use) << 56)) ^ index);
+}
+
+/// Uniform double in [0, 1) from the upper 53 bits.
+inline double unitDouble(uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1.0p-53; }
+
+/// Uniform float in [0, 1) from 24 bits.
+inline float unitFloat(uint64_t bits) { return static_cast<float>(bits >> 40) * 0x1.0p-24f; }
+
+}  // namespace stipple

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+
+#include "base/progress.h"
+#include "data/splat_cloud.h"
+#include "density/anchor_sampling.h"
+#include "math/camera.h"
+
+namespace stipple {
+
+/// What a decoder turns into splats: the whole anchor set, in one call.
+struct DecodeRequest {
+  const AnchorSet* anchors = nullptr;
+  uint32_t gaussians_per_anchor = 1;  ///< K
+  double time = 0.0;                  ///< seconds; only decoders of moving splats read it
+  const Camera* camera = nullptr;     ///< only view-adaptive decoders read it
+  uint64_t seed = 0;
+  Progress* progress = nullptr;
+};
+
+enum class DecodeCost : uint32_t {
+  kInteractive = 0,  ///< fast enough to run while a slider moves
+  kJob = 1,          ///< seconds and more
+};
+
+class Decoder {
+ public:
+  virtual ~Decoder() = default;
+  /// anchors → anchors * K splats, in anchor order.
+  virtual SplatCloud decode(const DecodeRequest& request) const = 0;
+  virtual DecodeCost costHint() const = 0;
+};
+
+}  // namespace stipple

@@ -1,0 +1,528 @@
+/* Stipple: density-controlled Gaussian splats. The one public header, C99.
+ * SPDX-License-Identifier: GPL-3.0-or-later
+ *
+ * How to read this page
+ *   Every function returns a StippleStatus. On anything but STIPPLE_OK the outputs are untouched and
+ *   stipple_last_error_message() says, for this thread, what is wrong: the argument, the value seen and
+ *   the value allowed. No C++ exception leaves the library and it never ends the process.
+ *   Option structs start with struct_size; fill them with stipple_..._options_init first, then change
+ *   fields. A field counts as given if struct_size reaches its end, so old programs keep working.
+ *   Buffers belong to the caller, on both sides. Handles are counted: a job keeps what it uses alive,
+ *   so every stipple_..._free may be called at any time; NULL is allowed.
+ *   Handles may be used from any thread; one handle must not be used by two threads at once unless a
+ *   function says so. Read-only use (info, read, decode, render) of one handle by many threads is safe.
+ *
+ * Conventions
+ *   World: right-handed, metres, Z up. Camera: OpenCV frame (x right, y down, z forward), pixel
+ *   centres at +0.5, first row of a picture = top. Matrices: 16 numbers, row-major, column vectors.
+ *   Rotations: w,x,y,z. Scales: linear standard deviations. Opacity: 0..1.
+ *   Results never depend on the number of threads.
+ */
+#ifndef STIPPLE_STIPPLE_H
+#define STIPPLE_STIPPLE_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- version ----------------------------------------------------------------------------------- */
+
+/* Raised when a function or struct changes in a way that old callers cannot use. */
+#define STIPPLE_ABI_VERSION 1u
+
+/* The ABI version of the loaded library; compare with STIPPLE_ABI_VERSION before any other call. */
+uint32_t stipple_abi_version(void);
+/* "0.1.0"; lives as long as the library. */
+const char* stipple_version_string(void);
+
+/* ---- errors ------------------------------------------------------------------------------------ */
+
+typedef enum StippleStatus {
+  STIPPLE_OK = 0,
+  STIPPLE_ERROR_INVALID_ARGUMENT = 1,
+  STIPPLE_ERROR_OUT_OF_MEMORY = 2,
+  STIPPLE_ERROR_MEMORY_LIMIT = 3,     /* would need more than the context's memory limit */
+  STIPPLE_ERROR_IO = 4,               /* the system refused: missing, no permission, disk full */
+  STIPPLE_ERROR_FORMAT = 5,           /* a file's content is wrong */
+  STIPPLE_ERROR_UNSUPPORTED = 6,      /* right, but not something this version can do */
+  STIPPLE_ERROR_UNAVAILABLE = 7,      /* a part of the library cannot be loaded on this machine */
+  STIPPLE_ERROR_CANCELLED = 8,
+  STIPPLE_ERROR_BUFFER_TOO_SMALL = 9,
+  STIPPLE_ERROR_INTERNAL = 10
+} StippleStatus;
+
+/* Message of the last failed call of this thread; valid until the thread's next call. Never NULL. */
+const char* stipple_last_error_message(void);
+/* "STIPPLE_ERROR_IO" and so on; never NULL. */
+const char* stipple_status_name(StippleStatus status);
+
+/* ---- handles ----------------------------------------------------------------------------------- */
+
+typedef struct StippleContext StippleContext;
+typedef struct StippleCloud StippleCloud;       /* splats */
+typedef struct StippleMesh StippleMesh;         /* triangles with colours, being put together */
+typedef struct StippleDensity StippleDensity;   /* a probability density over an octree */
+typedef struct StippleModel StippleModel;       /* density and decoder: a source of splats */
+typedef struct StippleViews StippleViews;       /* cameras */
+typedef struct StippleRenderer StippleRenderer;
+typedef struct StippleVolume StippleVolume;     /* sparse voxels */
+typedef struct StippleImage StippleImage;
+typedef struct StippleJob StippleJob;           /* long work in the background */
+
+/* ---- context ----------------------------------------------------------------------------------- */
+
+typedef struct StippleContextOptions {
+  uint32_t struct_size;
+  uint32_t thread_count;        /* 0: as many as the machine has; at most 1024 */
+  uint64_t memory_limit_bytes;  /* 0: no limit. Large calls refuse before they allocate */
+} StippleContextOptions;
+
+void stipple_context_options_init(StippleContextOptions* options);
+/* options may be NULL (defaults). */
+StippleStatus stipple_context_create(const StippleContextOptions* options, StippleContext** context);
+void stipple_context_free(StippleContext* context);
+
+/* ---- jobs -------------------------------------------------------------------------------------- */
+
+typedef enum StippleJobState {
+  STIPPLE_JOB_RUNNING = 0,
+  STIPPLE_JOB_DONE = 1,
+  STIPPLE_JOB_FAILED = 2,    /* stipple_job_wait gives status and message */
+  STIPPLE_JOB_CANCELLED = 3
+} StippleJobState;
+
+typedef struct StippleJobProgress {
+  uint32_t struct_size;
+  uint32_t state;    /* StippleJobState */
+  double fraction;   /* 0..1 */
+  char stage[64];    /* short English text, ends with a zero */
+} StippleJobProgress;
+
+/* Never waits. In: progress->struct_size set. */
+StippleStatus stipple_job_poll(const StippleJob* job, StippleJobProgress* progress);
+/* Asks the work to stop soon; it then ends as cancelled. Does not wait. */
+StippleStatus stipple_job_cancel(StippleJob* job);
+/* Waits until the job has ended and returns its status (its error message becomes this thread's). */
+StippleStatus stipple_job_wait(StippleJob* job);
+/* Cancels a job that runs and waits for it: the caller's buffers are free afterwards. */
+void stipple_job_free(StippleJob* job);
+/* The result of a finished job, as a new handle. INVALID_ARGUMENT when the job made another kind of
+ * thing, or has not ended well. */
+StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model);
+StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud);
+StippleStatus stipple_job_volume(const StippleJob* job, StippleVolume** volume);
+
+/* ---- splat clouds ------------------------------------------------------------------------------ */
+
+typedef enum StippleColourSpace {
+  STIPPLE_COLOUR_DISPLAY = 0, /* srgb_rec709_display: trained splats; composited in display space */
+  STIPPLE_COLOUR_LINEAR = 1   /* lin_rec709_display: scene linear Rec.709 */
+} StippleColourSpace;
+
+typedef enum StippleAntialias {
+  STIPPLE_ANTIALIAS_CLASSIC = 0,
+  STIPPLE_ANTIALIAS_MIP = 1
+} StippleAntialias;
+
+typedef struct StippleCloudArrays {
+  uint32_t struct_size;
+  uint32_t sh_degree;      /* 0..4 */
+  uint32_t colour_space;   /* StippleColourSpace */
+  uint32_t antialias;      /* StippleAntialias */
+  uint64_t count;          /* N >= 0 */
+  const float* positions;  /* [N,3] metres */
+  const float* rotations;  /* [N,4] w,x,y,z; not zero (normalised on entry) */
+  const float* scales;     /* [N,3] linear standard deviations, metres, >= 0 */
+  const float* opacities;  /* [N] 0..1 */
+  const float* sh;         /* [N,(degree+1)^2,3] coefficient-major, colour fastest, DC first */
+} StippleCloudArrays;
+
+typedef struct StippleCloudInfo {
+  uint32_t struct_size;
+  uint32_t sh_degree;
+  uint32_t colour_space;
+  uint32_t antialias;
+  uint64_t count;
+  float bounds_min[3];  /* of the positions; 0 where count is 0 */
+  float bounds_max[3];
+} StippleCloudInfo;
+
+/* Any pointer may be NULL (not wanted). capacity: splats that every given buffer has room for. */
+typedef struct StippleCloudBuffers {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t capacity;
+  float* positions;
+  float* rotations;
+  float* scales;
+  float* opacities;
+  float* sh;
+} StippleCloudBuffers;
+
+/* Copies the arrays. Errors: INVALID_ARGUMENT for non-finite values, negative scales, opacities outside
+ * 0..1, zero quaternions. Cost: O(N). */
+StippleStatus stipple_cloud_create(StippleContext* context, const StippleCloudArrays* arrays,
+                                   StippleCloud** cloud);
+void stipple_cloud_free(StippleCloud* cloud);
+StippleStatus stipple_cloud_info(const StippleCloud* cloud, StippleCloudInfo* info);
+/* Errors: BUFFER_TOO_SMALL when capacity < count. */
+StippleStatus stipple_cloud_read(const StippleCloud* cloud, const StippleCloudBuffers* buffers);
+/* Reads a splat file (3DGS PLY). The format is told by its content. */
+StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8, StippleCloud** cloud);
+
+typedef struct StippleCloudSaveOptions {
+  uint32_t struct_size;
+  uint32_t ascii;  /* 1: PLY as text */
+} StippleCloudSaveOptions;
+void stipple_cloud_save_options_init(StippleCloudSaveOptions* options);
+/* Writes by the ending of the path (.ply), under a temporary name that is then renamed. */
+StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf8,
+                                 const StippleCloudSaveOptions* options);
+/* The cloud moved by a matrix: rotation, translation and uniform positive scale; harmonics are
+ * rotated with it. Errors: INVALID_ARGUMENT for shear, mirroring or uneven scale (beyond 1e-4). */
+StippleStatus stipple_cloud_transform(const StippleCloud* cloud, const double matrix[16],
+                                      StippleCloud** moved);
+
+typedef struct StippleCloudComparison {
+  uint32_t struct_size;
+  uint32_t same_order;     /* 1: same count and degree, compared splat by splat */
+  uint64_t count_a;
+  uint64_t count_b;
+  double max_position;     /* metres; the rest in the units of the attribute; 0 unless same_order */
+  double max_rotation;     /* radians, sign of the quaternion ignored */
+  double max_scale_ratio;  /* largest |ln(scale_a / scale_b)| */
+  double max_opacity;
+  double max_sh;
+} StippleCloudComparison;
+StippleStatus stipple_cloud_compare(const StippleCloud* a, const StippleCloud* b,
+                                    StippleCloudComparison* result);
+
+/* ---- meshes ------------------------------------------------------------------------------------ */
+
+#define STIPPLE_NO_INDEX UINT32_MAX
+
+typedef enum StippleMaterialColour {
+  STIPPLE_MATERIAL_CONSTANT = 0, /* base_colour */
+  STIPPLE_MATERIAL_TEXTURE = 1,  /* texture at the corner UVs */
+  STIPPLE_MATERIAL_CORNER = 2    /* corner_colours of the part */
+} StippleMaterialColour;
+
+typedef struct StippleMaterial {
+  uint32_t struct_size;
+  uint32_t colour;         /* StippleMaterialColour */
+  float base_colour[4];    /* scene linear, straight alpha */
+  uint32_t texture;        /* index given by stipple_mesh_add_texture, or STIPPLE_NO_INDEX */
+  uint32_t reserved;
+} StippleMaterial;
+
+/* Triangles of one object (or one instance of it). */
+typedef struct StippleMeshPart {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t vertex_count;
+  uint64_t triangle_count;
+  const float* positions;           /* [V,3] object space, metres */
+  const uint32_t* triangles;        /* [T,3] vertex indices */
+  const float* corner_normals;      /* [T,3,3] object space, or NULL: face normals */
+  const float* corner_uvs;          /* [T,3,2] v = 0 at the bottom of the picture, or NULL */
+  const float* corner_colours;      /* [T,3,4] scene linear, straight alpha, or NULL */
+  const uint32_t* triangle_materials; /* [T] indices given by stipple_mesh_add_material; NULL: grey */
+  double matrix[16];                /* object to world; invertible */
+} StippleMeshPart;
+
+typedef struct StippleMeshInfo {
+  uint32_t struct_size;
+  uint32_t material_count;
+  uint64_t vertex_count;
+  uint64_t triangle_count;
+  float bounds_min[3];
+  float bounds_max[3];
+} StippleMeshInfo;
+
+StippleStatus stipple_mesh_create(StippleContext* context, StippleMesh** mesh);
+void stipple_mesh_free(StippleMesh* mesh);
+/* pixels [height,width,channels] floats, row 0 = top, straight alpha, channels 3 or 4; srgb 1: display
+ * values (linearised when read), 0: scene linear. Out: index. */
+StippleStatus stipple_mesh_add_texture(StippleMesh* mesh, uint32_t width, uint32_t height,
+                                       uint32_t channels, const float* pixels, uint32_t srgb,
+                                       uint32_t* index);
+StippleStatus stipple_mesh_add_material(StippleMesh* mesh, const StippleMaterial* material,
+                                        uint32_t* index);
+/* Appends a part; any number of parts makes one mesh. Errors: INVALID_ARGUMENT for NaN vertices, vertex or
+ * material indices out of range, UVs or colours that a material needs and the part lacks. */
+StippleStatus stipple_mesh_add_part(StippleMesh* mesh, const StippleMeshPart* part);
+/* Reads glTF or GLB. Errors: UNAVAILABLE where libstipple_media cannot be loaded. */
+StippleStatus stipple_mesh_load(StippleContext* context, const char* path_utf8, StippleMesh** mesh);
+StippleStatus stipple_mesh_info(const StippleMesh* mesh, StippleMeshInfo* info);
+
+/* ---- density and anchors ----------------------------------------------------------------------- */
+
+typedef enum StippleAnchorOrder {
+  STIPPLE_ORDER_SYSTEMATIC = 0,  /* every child count is floor or ceil of its expectation */
+  STIPPLE_ORDER_PROGRESSIVE = 1  /* a smaller budget is a subset of a larger one, same seed */
+} StippleAnchorOrder;
+
+#define STIPPLE_MAX_ANCHORS (1u << 28)
+
+typedef struct StippleDensityInfo {
+  uint32_t struct_size;
+  uint32_t leaf_level;
+  uint64_t leaf_count;
+  double root_origin[3];  /* metres */
+  double root_side;
+} StippleDensityInfo;
+
+typedef struct StippleSampleOptions {
+  uint32_t struct_size;
+  uint32_t order;   /* StippleAnchorOrder */
+  uint64_t count;   /* 1..STIPPLE_MAX_ANCHORS; exactly this many come back */
+  uint64_t seed;
+} StippleSampleOptions;
+void stipple_sample_options_init(StippleSampleOptions* options);
+
+/* Any pointer may be NULL; each given buffer has room for options->count anchors. */
+typedef struct StippleAnchorBuffers {
+  uint32_t struct_size;
+  uint32_t reserved;
+  float* positions;   /* [P,3] metres, world of the density */
+  float* log_q;       /* [P] natural logarithm of the probability of the anchor's leaf */
+  uint64_t* leaves;   /* [P] Morton code, ascending */
+  uint64_t* ranks;    /* [P] budget from which on the anchor exists; progressive only */
+} StippleAnchorBuffers;
+
+/* positions [count,3] metres, weights [count] >= 0 or NULL (all 1); leaf_level 1..10. */
+StippleStatus stipple_density_from_points(StippleContext* context, const float* positions,
+                                          const float* weights, uint64_t count, uint32_t leaf_level,
+                                          StippleDensity** density);
+void stipple_density_free(StippleDensity* density);
+StippleStatus stipple_density_info(const StippleDensity* density, StippleDensityInfo* info);
+StippleStatus stipple_density_sample(const StippleDensity* density, const StippleSampleOptions* options,
+                                     const StippleAnchorBuffers* buffers);
+
+/* ---- models: sources of splats ----------------------------------------------------------------- */
+
+typedef struct StippleModelFromMeshOptions {
+  uint32_t struct_size;
+  uint32_t leaf_level;     /* 1..10, default 10 */
+  uint64_t sample_count;   /* surface samples, 1000..2^26; 0: chosen from the mesh */
+  uint64_t seed;
+  double detail_weight;    /* >= 0; 0: anchors uniform over the area; default 1 */
+} StippleModelFromMeshOptions;
+void stipple_model_from_mesh_options_init(StippleModelFromMeshOptions* options);
+
+typedef struct StippleModelInfo {
+  uint32_t struct_size;
+  uint32_t leaf_level;
+  uint64_t leaf_count;
+  uint64_t sample_count;
+  float bounds_min[3];
+  float bounds_max[3];
+} StippleModelInfo;
+
+typedef struct StippleDecodeOptions {
+  uint32_t struct_size;
+  uint32_t order;                 /* StippleAnchorOrder, default systematic */
+  uint64_t anchor_count;          /* P, 1..STIPPLE_MAX_ANCHORS, default 20,000 */
+  uint64_t seed;
+  uint32_t gaussians_per_anchor;  /* K, 1..32, default 1 */
+  uint32_t reserved;
+} StippleDecodeOptions;
+void stipple_decode_options_init(StippleDecodeOptions* options);
+
+/* Surface samples, density and decoder of a mesh, as a job (stipple_job_model). */
+StippleStatus stipple_model_from_mesh_start(StippleContext* context, const StippleMesh* mesh,
+                                            const StippleModelFromMeshOptions* options,
+                                            StippleJob** job);
+StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8, StippleModel** model);
+StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf8);
+void stipple_model_free(StippleModel* model);
+StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* info);
+StippleStatus stipple_model_density(const StippleModel* model, StippleDensity** density);
+/* P anchors, P*K splats. Fast enough to follow a slider (docs/methods/surface_splats.md has figures). */
+StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecodeOptions* options,
+                                   StippleCloud** cloud);
+/* The same as a job (stipple_job_cloud). */
+StippleStatus stipple_model_decode_start(const StippleModel* model, const StippleDecodeOptions* options,
+                                         StippleJob** job);
+StippleStatus stipple_model_decode_memory_bound(const StippleModel* model,
+                                                const StippleDecodeOptions* options, uint64_t* bytes);
+
+/* ---- cameras ----------------------------------------------------------------------------------- */
+
+typedef enum StippleCameraModel {
+  STIPPLE_CAMERA_PERSPECTIVE = 0,
+  STIPPLE_CAMERA_ORTHOGRAPHIC = 1
+} StippleCameraModel;
+
+typedef struct StippleCamera {
+  uint32_t struct_size;
+  uint32_t model;   /* StippleCameraModel */
+  uint32_t width;   /* pixels, 1..65536 */
+  uint32_t height;
+  double fx, fy;    /* perspective: pixels; orthographic: pixels per metre */
+  double cx, cy;    /* pixels, from the top left corner */
+  double world_to_camera[16]; /* rigid */
+  double near_plane;          /* metres */
+  double far_plane;
+} StippleCamera;
+
+/* Reads transforms.json (nerfstudio, NeRF-synthetic). */
+StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8, StippleViews** views);
+void stipple_views_free(StippleViews* views);
+StippleStatus stipple_views_count(const StippleViews* views, uint64_t* count);
+/* A file without sizes gives width and height 0: set them, with stipple_camera_resize, before use. */
+StippleStatus stipple_views_camera(const StippleViews* views, uint64_t index, StippleCamera* camera);
+/* The same view at another size: intrinsics scale with it. A camera of size 0 x 0 keeps its angle of view
+ * over the width. */
+StippleStatus stipple_camera_resize(StippleCamera* camera, uint32_t width, uint32_t height);
+
+/* ---- rendering --------------------------------------------------------------------------------- */
+
+typedef struct StippleInstance {
+  uint32_t struct_size;
+  uint32_t reserved;
+  const StippleCloud* cloud;
+  double matrix[16]; /* object to world; invertible */
+} StippleInstance;
+
+typedef enum StippleLowPass {
+  STIPPLE_LOW_PASS_FROM_CLOUD = 0,
+  STIPPLE_LOW_PASS_CLASSIC = 1,
+  STIPPLE_LOW_PASS_MIP = 2,
+  STIPPLE_LOW_PASS_NONE = 3
+} StippleLowPass;
+
+typedef enum StippleBlendSpace {
+  STIPPLE_BLEND_AS_TRAINED = 0,  /* composite the stored colours: equals web viewers */
+  STIPPLE_BLEND_SCENE_LINEAR = 1 /* linearise each splat, then composite */
+} StippleBlendSpace;
+
+typedef enum StippleOutputColour {
+  STIPPLE_OUTPUT_SCENE_LINEAR = 0, /* premultiplied scene linear, as Blender and EXR want it */
+  STIPPLE_OUTPUT_COMPOSITED = 1    /* the composited values as they are */
+} StippleOutputColour;
+
+typedef enum StippleRenderMethod {
+  STIPPLE_RENDER_TILED = 0,
+  STIPPLE_RENDER_REFERENCE = 1 /* double precision, every splat at every pixel: small pictures only */
+} StippleRenderMethod;
+
+typedef struct StippleRenderOptions {
+  uint32_t struct_size;
+  uint32_t method;          /* StippleRenderMethod */
+  uint32_t low_pass;        /* StippleLowPass */
+  uint32_t blend_space;     /* StippleBlendSpace */
+  uint32_t output_colour;   /* StippleOutputColour */
+  uint32_t sh_degree_limit; /* 0..4 */
+  uint32_t with_background; /* 1: composite over background, alpha becomes 1 */
+  uint32_t reserved;
+  double background[3];     /* in output_colour's space */
+} StippleRenderOptions;
+void stipple_render_options_init(StippleRenderOptions* options);
+
+/* Row 0 = top. Any pointer may be NULL. Must stay valid until the job has ended. */
+typedef struct StippleRenderBuffers {
+  uint32_t struct_size;
+  uint32_t reserved;
+  float* colour;        /* [H,W,4] premultiplied RGBA */
+  float* depth;         /* [H,W] expected planar z, metres; 1e10 where nothing is */
+  float* median_depth;  /* [H,W] planar z where transmittance passes 1/2; 1e10 where it does not */
+  uint32_t* counts;     /* [H,W] splats blended */
+} StippleRenderBuffers;
+
+StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer);
+void stipple_renderer_free(StippleRenderer* renderer);
+/* Renders instances [count] together. Clouds of different colour spaces in one picture:
+ * UNSUPPORTED with STIPPLE_BLEND_AS_TRAINED. count 0 gives an empty picture. */
+StippleStatus stipple_renderer_render_start(StippleRenderer* renderer, const StippleInstance* instances,
+                                            uint64_t count, const StippleCamera* camera,
+                                            const StippleRenderOptions* options,
+                                            const StippleRenderBuffers* buffers, StippleJob** job);
+StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
+                                            const StippleInstance* instances, uint64_t count,
+                                            const StippleCamera* camera, uint64_t* bytes);
+
+/* ---- volumes ----------------------------------------------------------------------------------- */
+
+typedef struct StippleVoxelizeOptions {
+  uint32_t struct_size;
+  uint32_t resolution;    /* voxels along the longest side where voxel_size is 0; default 256 */
+  double voxel_size;      /* metres; 0: from resolution */
+  double low_pass;        /* splats thinner than this share of a voxel are widened to it, with their optical
+                             depth kept; default 0.5; 0: none */
+  double cut_off_sigma;   /* default 4; <= 0: none */
+  double min_density;     /* per metre; lower extinction is not stored; default 0.001 */
+} StippleVoxelizeOptions;
+void stipple_voxelize_options_init(StippleVoxelizeOptions* options);
+
+typedef struct StippleVolumeInfo {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t brick_count;   /* of 8x8x8 voxels */
+  uint64_t active_voxel_count;
+  double voxel_size;      /* metres */
+  double bounds_min[3];   /* of the bricks, metres */
+  double bounds_max[3];
+  double max_density;     /* per metre */
+} StippleVolumeInfo;
+
+/* Extinction and scene linear colour, as a job (stipple_job_volume). */
+StippleStatus stipple_voxelize_start(StippleContext* context, const StippleInstance* instances,
+                                     uint64_t count, const StippleVoxelizeOptions* options,
+                                     StippleJob** job);
+StippleStatus stipple_voxelize_memory_bound(StippleContext* context, const StippleInstance* instances,
+                                            uint64_t count, const StippleVoxelizeOptions* options,
+                                            uint64_t* bytes);
+void stipple_volume_free(StippleVolume* volume);
+StippleStatus stipple_volume_info(const StippleVolume* volume, StippleVolumeInfo* info);
+/* OpenVDB file with the grids `density` and `color`. */
+StippleStatus stipple_volume_save(const StippleVolume* volume, const char* path_utf8);
+StippleStatus stipple_volume_load(StippleContext* context, const char* path_utf8, StippleVolume** volume);
+
+/* ---- pictures ---------------------------------------------------------------------------------- */
+
+typedef enum StippleTransfer {
+  STIPPLE_TRANSFER_LINEAR = 0, /* scene linear Rec.709 */
+  STIPPLE_TRANSFER_SRGB = 1    /* display sRGB */
+} StippleTransfer;
+
+typedef struct StippleImageInfo {
+  uint32_t struct_size;
+  uint32_t width;
+  uint32_t height;
+  uint32_t channels;
+  uint32_t transfer; /* StippleTransfer */
+  uint32_t reserved;
+} StippleImageInfo;
+
+typedef struct StippleImageComparison {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double psnr;        /* dB over all channels, peak 1; +infinity where equal */
+  double ssim;        /* mean over pixels and colour channels, 11x11 Gaussian window */
+  double max_error;
+  double mean_error;
+} StippleImageComparison;
+
+/* pixels [height,width,channels], row 0 = top, premultiplied alpha. channels 1, 3 or 4. */
+StippleStatus stipple_image_create(StippleContext* context, uint32_t width, uint32_t height,
+                                   uint32_t channels, uint32_t transfer, const float* pixels,
+                                   StippleImage** image);
+StippleStatus stipple_image_load(StippleContext* context, const char* path_utf8, StippleImage** image);
+void stipple_image_free(StippleImage* image);
+StippleStatus stipple_image_info(const StippleImage* image, StippleImageInfo* info);
+/* capacity: floats that pixels has room for. */
+StippleStatus stipple_image_read(const StippleImage* image, float* pixels, uint64_t capacity);
+/* By ending: .exr scene linear premultiplied, .png display sRGB straight alpha; values are converted
+ * between the two unless keep_values is 1. */
+StippleStatus stipple_image_save(const StippleImage* image, const char* path_utf8, uint32_t keep_values);
+/* Same size and channels; compared in display space. */
+StippleStatus stipple_image_compare(const StippleImage* a, const StippleImage* b,
+                                    StippleImageComparison* result);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* STIPPLE_STIPPLE_H */

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdio>
+#include <string>
+
+namespace stipple {
+
+/// A file that appears under its name only when it is whole: bytes go to a temporary name in the
+/// same folder, `commit` flushes and renames, the destructor removes what was not committed.
+/// Errors: kIo with the path and the system's reason (folder missing, no permission, disk full).
+class OutputFile {
+ public:
+  explicit OutputFile(const std::string& path);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  void write(const void* bytes, size_t count);
+  void commit();
+  /// The temporary name, for libraries that open files themselves (then `adopt` before commit).
+  const std::string& temporaryPath() const { return temporary_path_; }
+  /// Closes our handle, so that a library can write temporaryPath() itself.
+  void handOver();
+
+ private:
+  std::string path_;
+  std::string temporary_path_;
+  std::FILE* file_ = nullptr;
+  bool committed_ = false;
+};
+
+}  // namespace stipple

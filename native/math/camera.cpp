@@ -1,0 +1,65 @@
+#include "math/camera.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <string>
+
+#include "base/error.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr uint32_t kMaxSide = 65536;
+
+void requireRigid(const Mat4d& matrix) {
+  const Mat3d rotation = matrix.topLeftCorner<3, 3>();
+  // 1e-4: a matrix that went through float32 and a JSON file is off by about 1e-6.
+  const double error = (rotation * rotation.transpose() - Mat3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(error < 1e-4) || rotation.determinant() < 0) {
+    fail(ErrorCode::kInvalidArgument,
+         "camera.world_to_camera is not a rotation and a translation (it differs by " +
+             std::to_string(error) + " from orthonormal; at most 0.0001 is allowed)");
+  }
+  const Eigen::Matrix<double, 1, 4> last(0, 0, 0, 1);
+  if (matrix.row(3) != last) {
+    fail(ErrorCode::kInvalidArgument, "camera.world_to_camera must end with the row 0 0 0 1");
+  }
+}
+
+}  // namespace
+
+void validate(const Camera& camera) {
+  for (const uint32_t side : {camera.width, camera.height}) {
+    if (side < 1 || side > kMaxSide) {
+      fail(ErrorCode::kInvalidArgument, "camera is " + std::to_string(camera.width) + " x " +
+                                            std::to_string(camera.height) +
+                                            " pixels; each side must be 1 to 65536");
+    }
+  }
+  for (const double focal : {camera.fx, camera.fy}) {
+    if (!(focal > 0) || !std::isfinite(focal)) {
+      fail(ErrorCode::kInvalidArgument, "camera focal length is " + std::to_string(focal) +
+                                            " pixels; it must be positive and finite");
+    }
+  }
+  requireFinite(camera.cx, "camera.cx");
+  requireFinite(camera.cy, "camera.cy");
+  for (Eigen::Index i = 0; i < 16; ++i) {
+    requireFinite(camera.world_to_camera.data()[i], "camera.world_to_camera");
+  }
+  requireRigid(camera.world_to_camera);
+  const bool perspective = camera.model == CameraModel::kPerspective;
+  if (!(camera.far_plane > camera.near_plane) || (perspective && !(camera.near_plane > 0))) {
+    fail(ErrorCode::kInvalidArgument,
+         "camera near and far planes are " + std::to_string(camera.near_plane) + " and " +
+             std::to_string(camera.far_plane) + " m; 0 < near < far is needed");
+  }
+}
+
+Vec3d cameraCentre(const Camera& camera) {
+  const Mat3d rotation = camera.world_to_camera.topLeftCorner<3, 3>();
+  return -(rotation.transpose() * camera.world_to_camera.topRightCorner<3, 1>());
+}
+
+}  // namespace stipple

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "data/splat_cloud.h"
+#include "math/camera.h"
+#include "math/vec.h"
+
+namespace stipple {
+
+/// One placed cloud. Many instances are sorted and blended together.
+struct SplatInstance {
+  const SplatCloud* cloud = nullptr;
+  Mat4d object_to_world = Mat4d::Identity();  ///< invertible, affine (scale and shear allowed)
+};
+
+enum class LowPass : uint32_t {
+  kFromCloud = 0,  ///< the flag of each cloud
+  kClassic = 1,    ///< +0.3 px^2 on the diagonal of the projected covariance
+  kMip = 2,        ///< +0.1 px^2 with opacity compensation
+  kNone = 3,
+};
+
+enum class BlendSpace : uint32_t {
+  kAsTrained = 0,    ///< composite the colours as stored (display space for trained splats)
+  kSceneLinear = 1,  ///< linearise each display-space splat colour, then composite
+};
+
+/// Settings that change the picture; both the tiled and the reference renderer follow them.
+struct RenderOptions {
+  LowPass low_pass = LowPass::kFromCloud;
+  BlendSpace blend_space = BlendSpace::kAsTrained;
+  int sh_degree_limit = kMaxShDegree;  ///< harmonics above this degree are left out
+  double background[3] = {0, 0, 0};    ///< in the blending space; used under the final transmittance
+  bool with_background = false;        ///< true: background is composited and alpha becomes 1
+  bool with_depth = true;
+  bool with_median_depth = false;
+  bool with_counts = false;  ///< also the number of splats blended per pixel
+};
+
+/// Depth of pixels that nothing covers, metres (Blender's value for empty pixels).
+constexpr float kEmptyDepth = 1e10f;
+
+/// Row 0 is the top of the picture.
+struct RenderResult {
+  uint32_t width = 0;
+  uint32_t height = 0;
+  std::vector<float> colour;        ///< [H,W,4] premultiplied RGBA in the blending space
+  std::vector<float> depth;         ///< [H,W] expected planar z: sum(w z)/sum(w), metres
+  std::vector<float> median_depth;  ///< [H,W] planar z where transmittance passes 1/2, metres
+  std::vector<uint32_t> counts;     ///< [H,W]
+  uint64_t visible_count = 0;       ///< splats that passed culling
+};
+
+/// Tiled CPU renderer: culling, one depth sort, tiles in parallel.
+/// Same bits for any number of threads. Errors: kInvalidArgument for a camera or cloud that
+/// validate() refuses, a singular matrix.
+RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
+                         const RenderOptions& options, Progress* progress = nullptr);
+
+/// The definition of correct for the same settings: double precision, no tiles, no SIMD.
+/// Cost: O(pixels * splats); for tests and small pictures.
+struct ReferenceResult {
+  uint32_t width = 0;
+  uint32_t height = 0;
+  std::vector<double> colour;        ///< [H,W,4]
+  std::vector<double> depth;         ///< [H,W]
+  std::vector<double> median_depth;  ///< [H,W]
+  std::vector<uint32_t> counts;      ///< [H,W]
+};
+ReferenceResult renderReference(std::span<const SplatInstance> instances, const Camera& camera,
+                                const RenderOptions& options, Progress* progress = nullptr);
+
+}  // namespace stipple
