@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# Installs the Debian packages that building, running and testing Stipple takes. This is the one list
+# of them; the names are the same in Debian 12, Debian 13 and sid. Does nothing when all are there.
+set -euo pipefail
+
+packages=(
+  # Building.
+  g++ cmake ninja-build ccache pkgconf git
+  # The library: parallel loops, linear algebra, vector instructions, neighbour search.
+  libtbb-dev libeigen3-dev libhwy-dev libnanoflann-dev
+  # Files: JSON, volumes (OpenVDB's headers use Boost's), meshes, pictures. OpenImageIO's CMake
+  # package refers to its tools.
+  nlohmann-json3-dev libopenvdb-dev libboost-dev libtinygltf-dev libopenimageio-dev openimageio-tools
+  zlib1g-dev
+  # The command-line tool.
+  libcli11-dev
+  # Tests and benchmarks; readelf and nm look at what the libraries need and export.
+  libgtest-dev libgmock-dev libbenchmark-dev binutils python3-numpy python3-pytest
+  # Blender, with what it needs to draw without a screen.
+  blender libegl1 libegl-mesa0 libgl1-mesa-dri xvfb xauth
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
+  [ "$status" = installed ] || missing+=("$package")
+done
+if [ ${#missing[@]} -eq 0 ]; then
+  echo "Dependencies: all ${#packages[@]} packages are installed."
+  exit 0
+fi
+if ! command -v apt-get >/dev/null; then
+  echo "Dependencies: apt-get is not on this machine; install by other means: ${missing[*]}" >&2
+  exit 1
+fi
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "Dependencies: run this as root, or install sudo, to install: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+install() {
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get "$@" </dev/null
+}
+
+echo "Dependencies: installing ${#missing[@]} of ${#packages[@]} packages: ${missing[*]}"
+# The package lists of a fresh machine are empty, those of an old one may name files that are gone.
+if ! apt-get install --simulate --no-install-recommends "${missing[@]}" </dev/null >/dev/null 2>&1; then
+  install update
+fi
+if ! install install -y --no-install-recommends "${missing[@]}"; then
+  install update
+  install install -y --no-install-recommends "${missing[@]}"
+fi
+echo "Dependencies: installed."

@@ -1,0 +1,224 @@
+"""The rules of the project's structure. Each takes a folder (or a file) and gives a list of what breaks it.
+
+The folders' include table is read from docs/architecture.md, so the page and the law are one.
+"""
+import ast
+import os
+import pathlib
+import re
+import subprocess
+
+TOP_LEVEL = {'CMakeLists.txt', 'CMakePresets.json', 'LICENSE', 'README.md', '.gitignore', '.clang-format',
+             '.ci', 'native', 'addon', 'tests', 'blend-fixtures', 'docs'}
+
+# How a third-party header is recognised: package name of the table -> start of the included path.
+THIRD_PARTY = {
+    'oneTBB': r'(tbb|oneapi)/',
+    'Eigen': r'Eigen/',
+    'Highway': r'hwy/',
+    'nanoflann': r'nanoflann\.hpp',
+    'OpenVDB': r'(openvdb|Imath|OpenEXR)/',
+    'tinygltf': r'tiny_gltf\.h',
+    'OpenImageIO': r'OpenImageIO/',
+    'libwebp': r'webp/',
+    'nlohmann-json': r'nlohmann/',
+    'minizip': r'(minizip/|zip\.h|unzip\.h)',
+    'zlib': r'zlib\.h|zconf\.h',
+    'zstd': r'(zstd|zdict)(_errors)?\.h',
+    'CLI11': r'CLI/',
+    'Google Benchmark': r'benchmark/',
+}
+# Slow to compile, or large: one file of a folder is the only place that knows them.
+ONE_FILE_PER_FOLDER = ('OpenVDB', 'tinygltf', 'OpenImageIO')
+
+# Headers of ours whose purpose is to hand a package's types to every folder.
+CARRIERS = {'math/vec.h': {'Eigen'}}
+
+# C and POSIX headers with a '.h' or '/' in their name; C++'s own have neither.
+SYSTEM_HEADERS = re.compile(r'(stdint|stddef|dlfcn|unistd|fcntl|pthread|errno|signal|locale|fenv|xmmintrin|execinfo)\.h'
+                            r'|sys/(stat|mman|types|resource|wait|statvfs|ioctl)\.h|[a-z_0-9]+')
+
+SOURCE_ENDINGS = ('.cpp', '.h', '.c', '.py', '.sh', '.cmake', 'CMakeLists.txt')
+LINE_LIMIT = 600
+LONGER_ALLOWED = {'native/include/stipple/stipple.h'}  # one public header: it is the manual
+
+# Everything that only exists inside Blender.
+BLENDER_MODULES = {'bpy', 'bpy_extras', 'bpy_types', 'mathutils', 'gpu', 'gpu_extras', 'bgl', 'blf', 'bmesh',
+                   'bl_ui', 'bl_operators', 'rna_prop_ui', 'addon_utils', 'freestyle', 'idprop', 'imbuf', 'aud'}
+
+# What libstipple.so may ask of the machine, so that one file loads into every Blender.
+ALLOWED_NEEDED = re.compile(r'(libc|libm|libstdc\+\+|libgcc_s|libtbb|libhwy|ld-linux-[a-z0-9-]+)\.so(\.\d+)*')
+
+
+def project_files(root):
+    """Paths under root that belong to the project: what git has or would add; without git, everything."""
+    root = pathlib.Path(root)
+    listing = subprocess.run(['git', '-C', str(root), 'ls-files', '-z', '--cached', '--others', '--exclude-standard'],
+                             capture_output=True)
+    toplevel = subprocess.run(['git', '-C', str(root), 'rev-parse', '--show-toplevel'], capture_output=True, text=True)
+    if listing.returncode == 0 and toplevel.stdout.strip() == str(root.resolve()):
+        names = [os.fsdecode(name) for name in listing.stdout.split(b'\0') if name]
+        return sorted({name for name in names if (root / name).is_file()})
+    return sorted(str(path.relative_to(root)) for path in root.rglob('*') if path.is_file())
+
+
+def top_level_violations(root):
+    entries = {name.split('/')[0] for name in project_files(root)}
+    return [f'{entry}: not one of the top-level entries' for entry in sorted(entries - TOP_LEVEL)]
+
+
+def include_table(architecture):
+    """The table of docs/architecture.md: folder -> (folders it may include, packages it may include)."""
+    table = {}
+    for line in pathlib.Path(architecture).read_text(encoding='utf-8').splitlines():
+        cells = [cell.strip() for cell in line.split('|')[1:-1]]
+        if len(cells) != 4 or not re.fullmatch(r'`[a-z]+`', cells[0]):
+            continue
+        folders = re.findall(r'`([a-z./]+)`', cells[2])
+        packages = [name.strip() for name in cells[3].split(',') if name.strip()]
+        unknown = set(packages) - set(THIRD_PARTY)
+        if unknown:
+            raise ValueError(f'the include table names unknown packages: {sorted(unknown)}')
+        table[cells[0].strip('`')] = (set(folders), set(packages))
+    return table
+
+
+def includes(path):
+    """(line number, included path) of every #include of a file."""
+    text = path.read_text(encoding='utf-8', errors='replace')
+    for number, line in enumerate(text.splitlines(), 1):
+        match = re.match(r'\s*#\s*include\s+[<"]([^>"]+)[>"]', line)
+        if match:
+            yield number, match.group(1)
+
+
+def package_of(included):
+    return next((name for name, pattern in THIRD_PARTY.items() if re.match(pattern, included)), None)
+
+
+def include_violations(root, table):
+    """Includes of native/ that the table does not allow, and third-party headers that leave their folder."""
+    root = pathlib.Path(root)
+    found = []
+    users = {}             # (folder, package) -> files
+    third_party_headers = {}  # header of ours -> third-party packages in it
+    included_by = {}       # header of ours -> folders that include it
+    for name in project_files(root):
+        parts = name.split('/')
+        if parts[0] != 'native' or len(parts) < 3 or not name.endswith(('.cpp', '.h', '.c')):
+            continue
+        folder = parts[1]
+        if folder not in table:
+            found.append(f'{name}: native/{folder} is not in the table')
+            continue
+        folders, packages = table[folder]
+        for line, included in includes(root / name):
+            where = f'{name}:{line}: {included}'
+            package = package_of(included)
+            target = included.split('/')[0]
+            if package:
+                users.setdefault((folder, package), set()).add(name)
+                if name.endswith('.h'):
+                    third_party_headers.setdefault(included_name(name), set()).add(package)
+                if package not in packages:
+                    found.append(f'{where}: {folder} may not include {package}')
+            elif included == 'stipple/stipple.h':
+                if folder != 'include' and 'stipple.h' not in folders:
+                    found.append(f'{where}: {folder} may not include the public header')
+            elif target in table and '/' in included:
+                included_by.setdefault(included, set()).add(folder)
+                if target != folder and target not in folders:
+                    found.append(f'{where}: {folder} may not include {target}')
+            elif not SYSTEM_HEADERS.fullmatch(included):
+                found.append(f'{where}: neither ours, nor in the table, nor a known system header')
+    for (folder, package), files in sorted(users.items()):
+        if package in ONE_FILE_PER_FOLDER and len(files) > 1:
+            found.append(f'{package} is included by {len(files)} files of native/{folder}, at most 1 may: {sorted(files)}')
+    for header, packages in sorted(third_party_headers.items()):
+        outside = sorted(included_by.get(header, set()) - {header.split('/')[0]})
+        if outside and packages - CARRIERS.get(header, set()):
+            found.append(f'{header}: carries {sorted(packages)} into {outside}')
+    return found
+
+
+def included_name(name):
+    return name.removeprefix('native/').removeprefix('include/')
+
+
+def link_violations(cmake_lists, table):
+    """stipple_module(...) lines of native/CMakeLists.txt that link more than the table allows."""
+    found = []
+    text = pathlib.Path(cmake_lists).read_text(encoding='utf-8')
+    for name, arguments in re.findall(r'^stipple_module\((\w+)([^)]*)\)', text, re.M):
+        modules = re.search(r'\bMODULES\s+((?:[a-z]+\s*)+)', arguments)
+        linked = set(modules.group(1).split()) if modules else set()
+        if name not in table:
+            found.append(f'stipple_{name} is not in the table')
+        elif linked - table[name][0]:
+            found.append(f'stipple_{name} links {sorted(linked - table[name][0])}, which the table does not allow')
+    return found
+
+
+def blender_import_violations(folder):
+    """Imports of Blender's modules in the Python files of a folder, at any depth of the code."""
+    found = []
+    for path in sorted(pathlib.Path(folder).rglob('*.py')):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'), str(path))):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [node.module or '']
+            elif isinstance(node, ast.Call) and getattr(node.func, 'id', getattr(node.func, 'attr', '')) in (
+                    '__import__', 'import_module'):
+                names = [argument.value for argument in node.args[:1] if isinstance(argument, ast.Constant)]
+            found += [f'{path}:{node.lineno}: imports {name}' for name in names
+                      if str(name).split('.')[0] in BLENDER_MODULES]
+    return found
+
+
+def length_violations(root):
+    found = []
+    for name in project_files(root):
+        if name.endswith(SOURCE_ENDINGS) and name not in LONGER_ALLOWED:
+            lines = (pathlib.Path(root) / name).read_bytes().count(b'\n')
+            if lines > LINE_LIMIT:
+                found.append(f'{name}: {lines} lines, at most {LINE_LIMIT} are allowed')
+    return found
+
+
+def c99_violations(header, scratch):
+    """What a C99 compiler says about a header that is included on its own."""
+    source = pathlib.Path(scratch) / 'only_the_header.c'
+    source.write_text(f'#include "{pathlib.Path(header).resolve()}"\nint main(void) {{ return 0; }}\n', encoding='utf-8')
+    compiler = subprocess.run([os.environ.get('CC', 'cc'), '-std=c99', '-pedantic-errors', '-Wall', '-Wextra', '-Werror',
+                               '-fsyntax-only', str(source)], capture_output=True, text=True)
+    return compiler.stderr.splitlines() if compiler.returncode else []
+
+
+def needed_violations(library):
+    listing = subprocess.run(['readelf', '-d', '-W', str(library)], capture_output=True, text=True, check=True).stdout
+    needed = re.findall(r'\(NEEDED\).*\[(.+)\]', listing)
+    return [f'{library} needs {name}' for name in needed if not ALLOWED_NEEDED.fullmatch(name)]
+
+
+def exported_symbols(library):
+    listing = subprocess.run(['nm', '-D', '--defined-only', '--format=posix', str(library)],
+                             capture_output=True, text=True, check=True).stdout
+    return {line.split()[0].split('@')[0] for line in listing.splitlines() if line.split()[1:2] != ['A']}
+
+
+def export_violations(library):
+    return [f'{library} exports {name}' for name in sorted(exported_symbols(library)) if not name.startswith('stipple_')]
+
+
+def declared_functions(header):
+    """Names of the functions that the public header declares."""
+    text = re.sub(r'/\*.*?\*/', '', pathlib.Path(header).read_text(encoding='utf-8'), flags=re.S)
+    return set(re.findall(r'^\s*[A-Za-z][\w\s*]*?\b(stipple_\w+)\s*\(', text, re.M))
+
+
+def missing_exports(header, library):
+    exported = exported_symbols(library)
+    return [f'{name} is declared in {header} and not exported by {library}'
+            for name in sorted(declared_functions(header)) if name not in exported]
