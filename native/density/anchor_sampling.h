@@ -2,8 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
+#include "base/default_init_vector.h"
 #include "base/progress.h"
 #include "density/density_model.h"
 #include "density/octree_density.h"
@@ -22,26 +22,36 @@ struct AnchorSamplingOptions {
   uint64_t count = 1000;  ///< P, 1..2^28; exactly this many come back
   AnchorOrder order = AnchorOrder::kSystematic;
   uint64_t seed = 0;
-  bool with_ranks = false;  ///< progressive only: also give the budget from which each anchor exists
+  bool with_ranks = false;  ///< progressive only: also the budget from which each anchor exists
 };
 
 /// Anchors in Morton order of their leaves.
 struct AnchorSet {
-  std::vector<float> positions;  ///< [P,3] in the unit cube of the root
-  std::vector<float> log_q;      ///< [P] log probability of the anchor's leaf
-  std::vector<uint64_t> leaves;  ///< [P] Morton code of the leaf at the model's leaf level
-  std::vector<uint64_t> ranks;   ///< [P] smallest budget that holds the anchor, where asked for
+  DefaultInitVector<float> positions;  ///< [P,3] in [0,1)^3 of the root cube, multiples of 2^-24
+  DefaultInitVector<float> log_q;      ///< [P] log probability of the anchor's leaf
+  DefaultInitVector<uint64_t> leaves;  ///< [P] Morton code of the leaf at the model's leaf level
+  DefaultInitVector<uint64_t> ranks;   ///< [P] smallest budget that holds it, where asked for
   int leaf_level = 0;
 
   size_t size() const { return log_q.size(); }
 };
 
-/// Ancestral sampling. Same result for any number of threads.
+/// Bytes that sampleAnchors holds at most, the result included, without those of the model.
+uint64_t sampleMemoryBound(uint64_t count, bool with_ranks);
+
+/// Ancestral sampling: exactly options.count anchors. An OctreeDensity goes through precomputed
+/// tables, any other model level by level on the sampled frontier, with the same result.
+/// Errors: kInvalidArgument for a count outside 1..2^28, ranks in the systematic order, an
+/// OctreeDensity that was never built, a model whose numbers are not log-probabilities; kCancelled.
+/// Threads and determinism: parallel; same result for any number of threads.
+/// Cost: O(P + visited cells). Source: docs/methods/density_sampling.md.
 AnchorSet sampleAnchors(const DensityModel& model, const AnchorSamplingOptions& options,
                         Progress* progress = nullptr);
 
 /// The same with the random numbers of `source`, drawn in the order of the specification
-/// (per level one draw per parent in frontier order, then three per point): for recorded streams.
+/// (systematic: per level one draw per parent in frontier order, then three per point; progressive:
+/// per level and parent one draw per binary split with mass on both sides), on one thread: for
+/// recorded streams. A KeyedUniformSource gives the same leaves as its seed, but other positions.
 AnchorSet sampleAnchors(const DensityModel& model, const AnchorSamplingOptions& options,
                         UniformSource& source);
 
