@@ -13,7 +13,7 @@ namespace stipple {
 struct SurfaceAsset {
   std::array<double, 3> root_origin = {0, 0, 0};
   double root_side = 1.0;
-  std::vector<std::vector<uint64_t>> cells;          ///< per level
+  std::vector<std::vector<uint64_t>> cells;           ///< per level
   std::vector<std::vector<float>> log_probabilities;  ///< per level [cells, 8]
   PointSet surface;
   std::string settings_json = "{}";  ///< free for the caller (how the model was made)

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+
+#include "base/progress.h"
+#include "data/splat_cloud.h"
+
+namespace stipple {
+
+/// Reads a 3DGS PLY: any property order, number types, text or binary of either byte order, degrees
+/// 0 to 4; properties and elements that a splat does not need are passed over.
+SplatCloud readPlySplats(const std::string& path, Progress* progress);
+
+/// Writes x y z nx ny nz f_dc f_rest opacity scale rot, float32 (the order that the first 3DGS
+/// viewers take for granted), little-endian or as text.
+void writePlySplats(const SplatCloud& cloud, const std::string& path, bool ascii,
+                    Progress* progress);
+
+/// Comment keys that carry what the numbers alone do not say.
+constexpr char kPlyColourSpaceKey[] = "stipple_colour_space";
+constexpr char kPlyRenderModeKey[] = "SplatRenderMode:";
+constexpr char kColourSpaceDisplay[] = "srgb_rec709_display";
+constexpr char kColourSpaceLinear[] = "lin_rec709_display";
+
+/// Written for opacity 0 and scale 0, whose logit and logarithm are infinite: the sigmoid and the
+/// exponential of -104 are the smallest numbers that round to 0 in float32, so both come back as 0.
+constexpr float kPlyZero = -104.0f;
+/// Written for opacity 1: its sigmoid rounds to 1 in float32.
+constexpr float kPlyOpaque = 20.0f;
+/// The largest float32 whose exponential is a float32 too.
+constexpr float kPlyLargestLogScale = 88.72283f;
+
+}  // namespace stipple

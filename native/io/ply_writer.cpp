@@ -1,0 +1,130 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "io/output_file.h"
+#include "io/ply_file.h"
+
+namespace stipple {
+
+namespace {
+
+// Rows per task, and tasks per write to the file: 16 MB at degree 3.
+constexpr size_t kBlockRows = 4096;
+constexpr size_t kChunkRows = kBlockRows * 16;
+
+// nx ny nz are zero: no reader uses them, some count on their place.
+constexpr size_t kNormalCount = 3;
+
+size_t rowLength(const SplatCloud& cloud) {
+  return 3 + kNormalCount + cloud.shStride() + 1 + 3 + 4;
+}
+
+std::string header(const SplatCloud& cloud, bool ascii) {
+  std::string text =
+      std::string("ply\nformat ") + (ascii ? "ascii" : "binary_little_endian") + " 1.0\ncomment " +
+      kPlyRenderModeKey + (cloud.antialias == Antialias::kMip ? " mip" : " default") +
+      "\ncomment " + kPlyColourSpaceKey + " " +
+      (cloud.colour_space == ColourSpace::kLinear ? kColourSpaceLinear : kColourSpaceDisplay) +
+      "\nelement vertex " + std::to_string(cloud.size()) + "\n";
+  const auto property = [&text](const std::string& name) {
+    text += "property float " + name + "\n";
+  };
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
+  for (int i = 0; i < 3; ++i) property("f_dc_" + std::to_string(i));
+  for (size_t i = 0; i < cloud.shStride() - 3; ++i) property("f_rest_" + std::to_string(i));
+  property("opacity");
+  for (int i = 0; i < 3; ++i) property("scale_" + std::to_string(i));
+  for (int i = 0; i < 4; ++i) property("rot_" + std::to_string(i));
+  return text + "end_header\n";
+}
+
+float logit(float opacity) {
+  if (opacity <= 0.0f) return kPlyZero;
+  if (opacity >= 1.0f) return kPlyOpaque;
+  const double o = opacity;
+  return static_cast<float>(std::log(o) - std::log1p(-o));
+}
+
+float logScale(float scale) {
+  if (scale <= 0.0f) return kPlyZero;
+  return std::min(static_cast<float>(std::log(static_cast<double>(scale))), kPlyLargestLogScale);
+}
+
+/// One splat in the order of the header.
+void fillRow(const SplatCloud& cloud, size_t i, float* row) {
+  for (size_t k = 0; k < 3; ++k) *row++ = cloud.positions[i * 3 + k];
+  for (size_t k = 0; k < kNormalCount; ++k) *row++ = 0.0f;
+  const float* sh = &cloud.sh[i * cloud.shStride()];
+  const size_t coefficients = shCoefficientCount(cloud.sh_degree);
+  for (size_t k = 0; k < 3; ++k) *row++ = sh[k];
+  for (size_t channel = 0; channel < 3; ++channel) {
+    for (size_t k = 1; k < coefficients; ++k) *row++ = sh[k * 3 + channel];
+  }
+  *row++ = logit(cloud.opacities[i]);
+  for (size_t k = 0; k < 3; ++k) *row++ = logScale(cloud.scales[i * 3 + k]);
+  for (size_t k = 0; k < 4; ++k) *row++ = cloud.rotations[i * 4 + k];
+}
+
+/// The shortest text that gives each float32 back exactly.
+void appendText(const float* row, size_t length, std::string* text) {
+  char digits[32];
+  for (size_t k = 0; k < length; ++k) {
+    const auto [end, error] = std::to_chars(digits, digits + sizeof(digits), row[k]);
+    text->append(digits, end);
+    text->push_back(k + 1 == length ? '\n' : ' ');
+  }
+}
+
+void storeLittleEndian(const float* row, size_t length, char* bytes) {
+  for (size_t k = 0; k < length; ++k) {
+    uint32_t bits = 0;
+    std::memcpy(&bits, row + k, 4);
+    for (unsigned b = 0; b < 4; ++b) bytes[k * 4 + b] = static_cast<char>(bits >> (8 * b));
+  }
+}
+
+}  // namespace
+
+void writePlySplats(const SplatCloud& cloud, const std::string& path, bool ascii,
+                    Progress* progress) {
+  validate(cloud, "cloud");
+  OutputFile file(path);
+  const std::string head = header(cloud, ascii);
+  file.write(head.data(), head.size());
+
+  const size_t count = cloud.size();
+  const size_t length = rowLength(cloud);
+  std::vector<std::string> blocks(kChunkRows / kBlockRows);
+  for (size_t chunk = 0; chunk < count; chunk += kChunkRows) {
+    const size_t rows = std::min(kChunkRows, count - chunk);
+    parallelFor(rows, kBlockRows, [&](size_t begin, size_t end) {
+      std::string& block = blocks[begin / kBlockRows];
+      block.clear();
+      if (!ascii) block.resize((end - begin) * length * 4);
+      std::vector<float> row(length);
+      for (size_t i = begin; i < end; ++i) {
+        fillRow(cloud, chunk + i, row.data());
+        if (ascii) {
+          appendText(row.data(), length, &block);
+        } else {
+          storeLittleEndian(row.data(), length, &block[(i - begin) * length * 4]);
+        }
+      }
+    });
+    for (size_t b = 0; b < rangeCount(rows, kBlockRows); ++b) {
+      file.write(blocks[b].data(), blocks[b].size());
+    }
+    advance(progress, static_cast<double>(chunk + rows) / static_cast<double>(count),
+            "Writing splats");
+  }
+  file.commit();
+}
+
+}  // namespace stipple
