@@ -34,8 +34,8 @@ struct RenderOptions {
   LowPass low_pass = LowPass::kFromCloud;
   BlendSpace blend_space = BlendSpace::kAsTrained;
   int sh_degree_limit = kMaxShDegree;  ///< harmonics above this degree are left out
-  double background[3] = {0, 0, 0};    ///< in the blending space; used under the final transmittance
-  bool with_background = false;        ///< true: background is composited and alpha becomes 1
+  double background[3] = {0, 0, 0};  ///< in the blending space; used under the final transmittance
+  bool with_background = false;      ///< true: background is composited and alpha becomes 1
   bool with_depth = true;
   bool with_median_depth = false;
   bool with_counts = false;  ///< also the number of splats blended per pixel
@@ -60,6 +60,10 @@ struct RenderResult {
 /// validate() refuses, a singular matrix.
 RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
                          const RenderOptions& options, Progress* progress = nullptr);
+
+/// Upper bound of the bytes that renderTiled allocates, its result included.
+uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
+                           const RenderOptions& options);
 
 /// The definition of correct for the same settings: double precision, no tiles, no SIMD.
 /// Cost: O(pixels * splats); for tests and small pictures.

@@ -1,0 +1,79 @@
+#include <algorithm>
+#include <cmath>
+
+#include "splat/blend.h"
+#include "splat/cpu/tile_kernel.h"
+
+namespace stipple {
+
+namespace {
+
+bool near(float value, float threshold, float relative) {
+  return std::abs(value - threshold) < threshold * relative;
+}
+
+void finish(TilePixels& pixels, size_t i) {
+  pixels.cut[i] = kFinished;
+  --pixels.unfinished;
+}
+
+void finishInDoubt(TilePixels& pixels, size_t i) {
+  pixels.doubt[i] = 1.0f;
+  finish(pixels, i);
+}
+
+void blendPixel(const TileSplat& splat, float exponent, TileKernelOptions options,
+                TilePixels& pixels, size_t i) {
+  PixelBlend<float> pixel;
+  pixel.transmittance = pixels.transmittance[i];
+  pixel.has_median = pixels.median_depth[i] != kNoMedian;
+  const float alpha = std::min(static_cast<float>(kMaxAlpha), std::exp2(exponent));
+  const float next = pixel.transmittance * (1.0f - alpha);
+  if (near(next, static_cast<float>(kMinTransmittance), kFinishDoubt) ||
+      (options.with_extras && near(next, 0.5f, kMedianDoubt))) {
+    finishInDoubt(pixels, i);
+    return;
+  }
+  const bool had_median = pixel.has_median;
+  pixel.add(alpha, splat.colour, splat.depth);
+  if (pixel.finished) {
+    finish(pixels, i);
+    return;
+  }
+  pixels.transmittance[i] = pixel.transmittance;
+  pixels.red[i] += pixel.colour[0];
+  pixels.green[i] += pixel.colour[1];
+  pixels.blue[i] += pixel.colour[2];
+  if (options.with_depth) pixels.weighted_depth[i] += pixel.weighted_depth;
+  if (options.with_extras) {
+    if (pixel.has_median && !had_median) pixels.median_depth[i] = splat.depth;
+    pixels.count[i] += 1.0f;
+  }
+}
+
+}  // namespace
+
+void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions options,
+                     TilePixels& pixels) {
+  for (size_t s = 0; s < count && pixels.unfinished > 0; ++s) {
+    const TileSplat& splat = splats[s];
+    for (uint32_t y = splat.row_begin; y < splat.row_end; ++y) {
+      for (uint32_t x = 0; x < kTileSide; ++x) {
+        const size_t i = static_cast<size_t>(y) * kTileSide + x;
+        if (pixels.cut[i] == kFinished) continue;
+        const float column = static_cast<float>(x);
+        const float g0 = splat.g0 + splat.l00 * column;
+        const float g1 = splat.g1 + splat.l10 * column + splat.l11 * static_cast<float>(y);
+        const float exponent = splat.log2_opacity - (g0 * g0 + g1 * g1);
+        if (exponent <= kLog2MinAlpha - splat.doubt_low) continue;
+        if (exponent < kLog2MinAlpha + splat.doubt_high) {
+          finishInDoubt(pixels, i);
+        } else {
+          blendPixel(splat, exponent, options, pixels, i);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace stipple

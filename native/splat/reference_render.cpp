@@ -1,0 +1,98 @@
+#include <algorithm>
+#include <numeric>
+
+#include "splat/render.h"
+#include "splat/scene.h"
+
+// The definition of correct: every visible splat in order at every pixel, in double.
+
+namespace stipple {
+
+namespace {
+
+struct ReferenceSplat {
+  Projected<double> projected;
+  double colour[3];
+  uint32_t key;
+};
+
+std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene) {
+  std::vector<ReferenceSplat> splats;
+  for (const PlacedCloud& placed : scene.clouds) {
+    for (size_t i = 0; i < placed.cloud->size(); ++i) {
+      ReferenceSplat splat;
+      if (!projectSplat(scene, placed, i, splat.projected)) continue;
+      splatColour(scene, placed, i, splat.colour);
+      splat.key = depthKey(splat.projected.depth);
+      splats.push_back(splat);
+    }
+  }
+  std::stable_sort(splats.begin(), splats.end(),
+                   [](const ReferenceSplat& a, const ReferenceSplat& b) { return a.key < b.key; });
+  return splats;
+}
+
+}  // namespace
+
+ReferenceResult renderReference(std::span<const SplatInstance> instances, const Camera& camera,
+                                const RenderOptions& options, Progress* progress) {
+  const PlacedScene scene = placeScene(instances, camera, options);
+  advance(progress, 0.0, "Projecting splats");
+  const std::vector<ReferenceSplat> splats = visibleInOrder(scene);
+
+  ReferenceResult result;
+  result.width = camera.width;
+  result.height = camera.height;
+  const size_t pixel_count = static_cast<size_t>(camera.width) * camera.height;
+  result.colour.resize(pixel_count * 4);
+  if (options.with_depth) result.depth.resize(pixel_count);
+  if (options.with_median_depth) result.median_depth.resize(pixel_count);
+  if (options.with_counts) result.counts.resize(pixel_count);
+
+  std::vector<const ReferenceSplat*> row;
+  for (uint32_t y = 0; y < camera.height; ++y) {
+    advance(progress, static_cast<double>(y) / camera.height, "Rendering the reference");
+    const double py = y + 0.5;
+    // Leaving out splats beyond half_y, and below beyond half_x, cannot change the picture: their
+    // alpha there is under 1/255 and splatAlpha would skip them.
+    row.clear();
+    for (const ReferenceSplat& splat : splats) {
+      const Projected<double>& p = splat.projected;
+      if (std::abs(py - p.footprint.mean_y) <= p.half_y) row.push_back(&splat);
+    }
+    for (uint32_t x = 0; x < camera.width; ++x) {
+      const double px = x + 0.5;
+      PixelBlend<double> pixel;
+      for (const ReferenceSplat* splat : row) {
+        const Projected<double>& p = splat->projected;
+        const double dx = px - p.footprint.mean_x;
+        if (std::abs(dx) > p.half_x) continue;
+        const double alpha = splatAlpha(
+            p.footprint.opacity, halfSquaredDistance(p.footprint, dx, py - p.footprint.mean_y));
+        if (alpha > 0) pixel.add(alpha, splat->colour, p.depth);
+        if (pixel.finished) break;
+      }
+      const size_t i = static_cast<size_t>(y) * camera.width + x;
+      const double coverage = 1.0 - pixel.transmittance;
+      for (size_t c = 0; c < 3; ++c) {
+        result.colour[i * 4 + c] =
+            pixel.colour[c] +
+            (options.with_background ? pixel.transmittance * options.background[c] : 0.0);
+      }
+      result.colour[i * 4 + 3] = options.with_background ? 1.0 : coverage;
+      const double empty = static_cast<double>(kEmptyDepth);
+      if (options.with_depth) {
+        // Sum of w = 1 - T.
+        result.depth[i] = pixel.count > 0 ? pixel.weighted_depth / coverage : empty;
+      }
+      if (options.with_median_depth) {
+        result.median_depth[i] = pixel.has_median ? pixel.median_depth : empty;
+      }
+      if (options.with_counts) result.counts[i] = pixel.count;
+    }
+  }
+  advance(progress, 1.0, "Rendering the reference");
+  return result;
+}
+
+}  // namespace stipple

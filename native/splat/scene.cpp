@@ -1,0 +1,112 @@
+#include "splat/scene.h"
+
+#include <bit>
+#include <limits>
+#include <string>
+
+#include "base/error.h"
+#include "math/affine.h"
+
+namespace stipple {
+
+namespace {
+
+void validateOptions(const RenderOptions& options) {
+  if (options.sh_degree_limit < 0 || options.sh_degree_limit > kMaxShDegree) {
+    fail(ErrorCode::kInvalidArgument,
+         "sh_degree_limit is " + std::to_string(options.sh_degree_limit) + "; 0 to 4 is allowed");
+  }
+  if (static_cast<uint32_t>(options.low_pass) > static_cast<uint32_t>(LowPass::kNone)) {
+    fail(ErrorCode::kInvalidArgument, "low_pass is " +
+                                          std::to_string(static_cast<uint32_t>(options.low_pass)) +
+                                          "; 0 to 3 is allowed");
+  }
+  if (static_cast<uint32_t>(options.blend_space) >
+      static_cast<uint32_t>(BlendSpace::kSceneLinear)) {
+    fail(ErrorCode::kInvalidArgument,
+         "blend_space is " + std::to_string(static_cast<uint32_t>(options.blend_space)) +
+             "; 0 or 1 is allowed");
+  }
+  for (const double value : options.background) requireFinite(value, "background");
+}
+
+LowPass lowPassOf(const SplatCloud& cloud, LowPass chosen) {
+  if (chosen != LowPass::kFromCloud) return chosen;
+  return cloud.antialias == Antialias::kMip ? LowPass::kMip : LowPass::kClassic;
+}
+
+PlacedCloud place(const SplatInstance& instance, const Camera& camera,
+                  const RenderOptions& options) {
+  const SplatCloud& cloud = *instance.cloud;
+  const Mat3d to_view = linearPart(camera.world_to_camera);
+  const Mat3d object = linearPart(instance.object_to_world);
+  const Vec3d origin = translationPart(instance.object_to_world);
+  PlacedCloud placed;
+  placed.cloud = &cloud;
+  placed.linear = to_view * object;
+  placed.translation = to_view * origin + translationPart(camera.world_to_camera);
+  const Mat3d to_object = inverse(object);
+  placed.eye = camera.model == CameraModel::kPerspective
+                   ? Vec3d(to_object * (cameraCentre(camera) - origin))
+                   : Vec3d(to_object * to_view.row(2).transpose());
+  placed.first_index = 0;
+  placed.low_pass = lowPassOf(cloud, options.low_pass);
+  placed.sh_degree = std::min(cloud.sh_degree, options.sh_degree_limit);
+  placed.linearise = options.blend_space == BlendSpace::kSceneLinear &&
+                     cloud.colour_space == ColourSpace::kDisplay;
+  return placed;
+}
+
+}  // namespace
+
+PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& camera,
+                       const RenderOptions& options) {
+  validate(camera);
+  validateOptions(options);
+  PlacedScene scene;
+  scene.view = makeView<double>(camera);
+  const SplatCloud* checked = nullptr;
+  for (size_t i = 0; i < instances.size(); ++i) {
+    const SplatInstance& instance = instances[i];
+    const std::string name = "instance " + std::to_string(i);
+    if (!instance.cloud) fail(ErrorCode::kInvalidArgument, name + " has no cloud");
+    validateAffine(instance.object_to_world, (name + ": matrix").c_str());
+    // Many copies of one cloud usually follow each other.
+    if (instance.cloud != checked) validate(*instance.cloud, name.c_str());
+    checked = instance.cloud;
+    if (instance.cloud->size() == 0) continue;
+    if (options.blend_space == BlendSpace::kAsTrained && !scene.clouds.empty() &&
+        scene.clouds.front().cloud->colour_space != instance.cloud->colour_space) {
+      fail(ErrorCode::kUnsupported,
+           name +
+               " stores its colours in another space than the objects before it, which cannot "
+               "be composited as trained; choose scene linear blending");
+    }
+    PlacedCloud placed = place(instance, camera, options);
+    placed.first_index = scene.splat_count;
+    scene.splat_count += instance.cloud->size();
+    scene.clouds.push_back(placed);
+  }
+  if (scene.splat_count > std::numeric_limits<uint32_t>::max()) {
+    fail(ErrorCode::kUnsupported, "the picture holds " + std::to_string(scene.splat_count) +
+                                      " splats; at most 4294967295 can be drawn together");
+  }
+  return scene;
+}
+
+size_t cloudOfSplat(const PlacedScene& scene, uint64_t splat) {
+  const auto after = std::upper_bound(
+      scene.clouds.begin(), scene.clouds.end(), splat,
+      [](uint64_t value, const PlacedCloud& placed) { return value < placed.first_index; });
+  return static_cast<size_t>(after - scene.clouds.begin()) - 1;
+}
+
+uint32_t depthKey(double depth) {
+  // Held inside float32; the largest depths then tie and go by index.
+  constexpr double kLargest = static_cast<double>(std::numeric_limits<float>::max());
+  const float rounded = static_cast<float>(std::clamp(depth, -kLargest, kLargest)) + 0.0f;
+  const uint32_t bits = std::bit_cast<uint32_t>(rounded);
+  return (bits & 0x80000000u) ? ~bits : bits | 0x80000000u;
+}
+
+}  // namespace stipple

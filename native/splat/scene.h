@@ -1,0 +1,86 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "math/colour.h"
+#include "math/spherical_harmonics.h"
+#include "splat/projection.h"
+#include "splat/render.h"
+
+namespace stipple {
+
+/// An instance made ready for one camera.
+struct PlacedCloud {
+  const SplatCloud* cloud;
+  Mat3d linear;       ///< object to view
+  Vec3d translation;  ///< object to view, metres
+  /// Perspective: the camera's centre in object space. Orthographic: the viewing direction there.
+  Vec3d eye;
+  uint64_t first_index;  ///< of its splat 0 among all splats of the picture
+  LowPass low_pass;      ///< never kFromCloud
+  int sh_degree;
+  bool linearise;  ///< colours are stored for display and composited scene linear
+};
+
+/// Everything of a picture that does not depend on the pixel. Geometry is double in both renderers:
+/// then both decide alike which splats show, in which order and where they end, and only sums
+/// differ.
+struct PlacedScene {
+  View<double> view;
+  std::vector<PlacedCloud> clouds;
+  uint64_t splat_count = 0;
+};
+
+/// Checks everything that enters (camera, clouds, matrices, options) and places the instances.
+/// Errors: kInvalidArgument; kUnsupported for clouds of different colour spaces under
+/// BlendSpace::kAsTrained.
+PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& camera,
+                       const RenderOptions& options);
+
+/// Index into scene.clouds of the instance that owns the splat.
+size_t cloudOfSplat(const PlacedScene& scene, uint64_t splat);
+
+/// Projects splat `index` of its cloud.
+inline bool projectSplat(const PlacedScene& scene, const PlacedCloud& placed, size_t index,
+                         Projected<double>& out) {
+  const SplatCloud& cloud = *placed.cloud;
+  return project(scene.view, placed.linear, placed.translation, &cloud.positions[index * 3],
+                 &cloud.rotations[index * 4], &cloud.scales[index * 3], cloud.opacities[index],
+                 placed.low_pass, out);
+}
+
+/// Colour of a splat in the blending space: harmonics in the viewing direction, brought into object
+/// space, + 0.5, at least 0. Out: colour [3].
+template <typename T>
+void splatColour(const PlacedScene& scene, const PlacedCloud& placed, size_t index, T* colour) {
+  const SplatCloud& cloud = *placed.cloud;
+  const float* sh = &cloud.sh[index * cloud.shStride()];
+  T basis[25];
+  basis[0] = T(kShC0);
+  if (placed.sh_degree > 0) {
+    Vec3d direction = placed.eye;
+    if (scene.view.perspective) {
+      const float* position = &cloud.positions[index * 3];
+      direction = Vec3d(static_cast<double>(position[0]), static_cast<double>(position[1]),
+                        static_cast<double>(position[2])) -
+                  placed.eye;
+    }
+    // A splat within near..far is never at the camera's centre, so the length is not zero.
+    direction /= direction.norm();
+    harmonicBasis(placed.sh_degree, T(direction[0]), T(direction[1]), T(direction[2]), basis);
+  }
+  const size_t count = shCoefficientCount(placed.sh_degree);
+  for (size_t c = 0; c < 3; ++c) {
+    T sum = T(0.5);
+    for (size_t k = 0; k < count; ++k) sum += basis[k] * T(sh[k * 3 + c]);
+    sum = std::max(sum, T(0));
+    colour[c] = placed.linearise ? srgbToLinear(sum) : sum;
+  }
+}
+
+/// Sorting key of a depth: unsigned order = order of the depth rounded to float32. Both renderers
+/// sort by it, ties by splat index, so rounding cannot reorder splats between them.
+uint32_t depthKey(double depth);
+
+}  // namespace stipple
