@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stipple: Gaussian splats with their density under control."""
+
+bl_info = {
+    "name": "Stipple",
+    "description": "Gaussian splats with their density under control",
+    "author": "The Stipple authors",
+    "version": (0, 1, 0),
+    "blender": (3, 4, 0),
+    "location": "Add > Gaussian Splats, Object Data, File > Import/Export, render engine Stipple",
+    "category": "Object",
+}
+
+import bpy
+
+from . import engine, operators, panels, preferences, properties
+from .scene import sync
+
+_classes = preferences.classes + properties.classes + operators.classes + panels.classes + engine.classes
+
+
+def register():
+    for cls in _classes:
+        bpy.utils.register_class(cls)
+    properties.register()
+    panels.register()
+    sync.register()
+
+
+def unregister():
+    sync.unregister()
+    panels.unregister()
+    properties.unregister()
+    for cls in reversed(_classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splat clouds."""
+
+from ctypes import byref
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import invalid
+from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
+from .structs import (Antialias, ColourSpace, StippleCloudArrays, StippleCloudBuffers, StippleCloudComparison,
+                      StippleCloudInfo, StippleCloudSaveOptions)
+
+
+@dataclass
+class SplatArrays:
+    """Splats as arrays, float32; conventions of stipple.h."""
+
+    positions: np.ndarray  # [N,3] metres
+    rotations: np.ndarray  # [N,4] w,x,y,z
+    scales: np.ndarray     # [N,3] linear standard deviations
+    opacities: np.ndarray  # [N] 0..1
+    sh: np.ndarray         # [N,(degree+1)^2,3]
+    colour_space: int = ColourSpace.DISPLAY
+    antialias: int = Antialias.CLASSIC
+
+    @property
+    def count(self):
+        return len(self.positions)
+
+    @property
+    def sh_degree(self):
+        return sh_degree_of(self.sh.shape[1])
+
+
+def sh_degree_of(coefficient_count):
+    """The degree whose harmonics have this many coefficients: 1, 4, 9, 16, 25."""
+    for degree in range(5):
+        if (degree + 1) ** 2 == coefficient_count:
+            return degree
+    raise invalid(f'A splat has {coefficient_count} harmonic coefficients; allowed are 1, 4, 9, 16 and 25.')
+
+
+class Cloud(Handle):
+    free_function = 'stipple_cloud_free'
+
+    @classmethod
+    def create(cls, context, arrays):
+        positions = contiguous(arrays.positions)
+        count = len(positions)
+        fields = {'positions': (positions, (count, 3)), 'rotations': (contiguous(arrays.rotations), (count, 4)),
+                  'scales': (contiguous(arrays.scales), (count, 3)), 'opacities': (contiguous(arrays.opacities), (count,)),
+                  'sh': (contiguous(arrays.sh), (count, (arrays.sh_degree + 1) ** 2, 3))}
+        for name, (array, shape) in fields.items():
+            if array.shape != shape:
+                raise invalid(f'Splat array {name} has shape {array.shape}; allowed is {shape}.')
+        given = StippleCloudArrays(sh_degree=arrays.sh_degree, colour_space=int(arrays.colour_space),
+                                   antialias=int(arrays.antialias), count=count,
+                                   **{name: pointer_to(array) for name, (array, _) in fields.items()})
+        return cls(context.library, new_handle(context.library, 'stipple_cloud_create', context.pointer, byref(given)))
+
+    @classmethod
+    def load(cls, context, path):
+        return cls(context.library,
+                   new_handle(context.library, 'stipple_cloud_load', context.pointer, path_bytes(path)))
+
+    def info(self):
+        info = StippleCloudInfo()
+        self._check(self.library.stipple_cloud_info(self.pointer, byref(info)))
+        return info
+
+    def read(self):
+        """All splats as new arrays."""
+        info = self.info()
+        n, coefficients = info.count, (info.sh_degree + 1) ** 2
+        arrays = SplatArrays(np.empty((n, 3), np.float32), np.empty((n, 4), np.float32), np.empty((n, 3), np.float32),
+                             np.empty(n, np.float32), np.empty((n, coefficients, 3), np.float32),
+                             ColourSpace(info.colour_space), Antialias(info.antialias))
+        buffers = StippleCloudBuffers(capacity=n, positions=pointer_to(arrays.positions),
+                                      rotations=pointer_to(arrays.rotations), scales=pointer_to(arrays.scales),
+                                      opacities=pointer_to(arrays.opacities), sh=pointer_to(arrays.sh))
+        self._check(self.library.stipple_cloud_read(self.pointer, byref(buffers)))
+        return arrays
+
+    def save(self, path, ascii=False):
+        options = StippleCloudSaveOptions()
+        self.library.stipple_cloud_save_options_init(byref(options))
+        options.ascii = 1 if ascii else 0
+        self._check(self.library.stipple_cloud_save(self.pointer, path_bytes(path), byref(options)))
+
+    def transformed(self, matrix):
+        """The cloud moved by rotation, translation and uniform scale."""
+        return Cloud(self.library, new_handle(self.library, 'stipple_cloud_transform', self.pointer, matrix16(matrix)))
+
+    def compare(self, other):
+        result = StippleCloudComparison()
+        self._check(self.library.stipple_cloud_compare(self.pointer, other.pointer, byref(result)))
+        return result

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The context: threads and memory that native work may use."""
+
+from ctypes import byref
+
+from .errors import invalid
+from .handle import Handle, new_handle
+from .structs import StippleContextOptions
+
+
+class Context(Handle):
+    free_function = 'stipple_context_free'
+
+    def __init__(self, library, threads=0, memory_limit_bytes=0):
+        """threads 0: as many as the machine has. memory_limit_bytes 0: no limit."""
+        if not 0 <= threads <= 1024:
+            raise invalid(f'Threads is {threads}; allowed are 0 (automatic) to 1024.')
+        options = StippleContextOptions()
+        library.stipple_context_options_init(byref(options))
+        options.thread_count = threads
+        options.memory_limit_bytes = memory_limit_bytes
+        super().__init__(library, new_handle(library, 'stipple_context_create', byref(options)))
+
+    def version(self):
+        return self.library.stipple_version_string().decode()

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every function of stipple.h with its result and argument types; declared once, at load."""
+
+from ctypes import POINTER, c_char_p, c_double, c_float, c_int, c_uint32, c_uint64, c_void_p
+
+from . import structs as s
+
+_status = c_int  # an enum of C
+_handle = c_void_p
+_out_handle = POINTER(c_void_p)
+_path = c_char_p
+_matrix = POINTER(c_double)
+_floats = POINTER(c_float)
+
+
+def _to(struct):
+    return POINTER(struct)
+
+
+FUNCTIONS = {
+    # version and errors
+    'stipple_abi_version': (c_uint32, []),
+    'stipple_version_string': (c_char_p, []),
+    'stipple_last_error_message': (c_char_p, []),
+    'stipple_status_name': (c_char_p, [_status]),
+    # context
+    'stipple_context_options_init': (None, [_to(s.StippleContextOptions)]),
+    'stipple_context_create': (_status, [_to(s.StippleContextOptions), _out_handle]),
+    'stipple_context_free': (None, [_handle]),
+    # jobs
+    'stipple_job_poll': (_status, [_handle, _to(s.StippleJobProgress)]),
+    'stipple_job_cancel': (_status, [_handle]),
+    'stipple_job_wait': (_status, [_handle]),
+    'stipple_job_free': (None, [_handle]),
+    'stipple_job_model': (_status, [_handle, _out_handle]),
+    'stipple_job_cloud': (_status, [_handle, _out_handle]),
+    'stipple_job_volume': (_status, [_handle, _out_handle]),
+    # splat clouds
+    'stipple_cloud_create': (_status, [_handle, _to(s.StippleCloudArrays), _out_handle]),
+    'stipple_cloud_free': (None, [_handle]),
+    'stipple_cloud_info': (_status, [_handle, _to(s.StippleCloudInfo)]),
+    'stipple_cloud_read': (_status, [_handle, _to(s.StippleCloudBuffers)]),
+    'stipple_cloud_load': (_status, [_handle, _path, _out_handle]),
+    'stipple_cloud_save_options_init': (None, [_to(s.StippleCloudSaveOptions)]),
+    'stipple_cloud_save': (_status, [_handle, _path, _to(s.StippleCloudSaveOptions)]),
+    'stipple_cloud_transform': (_status, [_handle, _matrix, _out_handle]),
+    'stipple_cloud_compare': (_status, [_handle, _handle, _to(s.StippleCloudComparison)]),
+    # meshes
+    'stipple_mesh_create': (_status, [_handle, _out_handle]),
+    'stipple_mesh_free': (None, [_handle]),
+    'stipple_mesh_add_texture': (_status, [_handle, c_uint32, c_uint32, c_uint32, _floats, c_uint32,
+                                           POINTER(c_uint32)]),
+    'stipple_mesh_add_material': (_status, [_handle, _to(s.StippleMaterial), POINTER(c_uint32)]),
+    'stipple_mesh_add_part': (_status, [_handle, _to(s.StippleMeshPart)]),
+    'stipple_mesh_load': (_status, [_handle, _path, _out_handle]),
+    'stipple_mesh_info': (_status, [_handle, _to(s.StippleMeshInfo)]),
+    # density and anchors
+    'stipple_sample_options_init': (None, [_to(s.StippleSampleOptions)]),
+    'stipple_density_from_points': (_status, [_handle, _floats, _floats, c_uint64, c_uint32, _out_handle]),
+    'stipple_density_free': (None, [_handle]),
+    'stipple_density_info': (_status, [_handle, _to(s.StippleDensityInfo)]),
+    'stipple_density_sample': (_status, [_handle, _to(s.StippleSampleOptions), _to(s.StippleAnchorBuffers)]),
+    # models
+    'stipple_model_from_mesh_options_init': (None, [_to(s.StippleModelFromMeshOptions)]),
+    'stipple_decode_options_init': (None, [_to(s.StippleDecodeOptions)]),
+    'stipple_model_from_mesh_start': (_status, [_handle, _handle, _to(s.StippleModelFromMeshOptions), _out_handle]),
+    'stipple_model_load': (_status, [_handle, _path, _out_handle]),
+    'stipple_model_save': (_status, [_handle, _path]),
+    'stipple_model_free': (None, [_handle]),
+    'stipple_model_info': (_status, [_handle, _to(s.StippleModelInfo)]),
+    'stipple_model_density': (_status, [_handle, _out_handle]),
+    'stipple_model_decode': (_status, [_handle, _to(s.StippleDecodeOptions), _out_handle]),
+    'stipple_model_decode_start': (_status, [_handle, _to(s.StippleDecodeOptions), _out_handle]),
+    'stipple_model_decode_memory_bound': (_status, [_handle, _to(s.StippleDecodeOptions), POINTER(c_uint64)]),
+    # cameras
+    'stipple_views_load': (_status, [_handle, _path, _out_handle]),
+    'stipple_views_free': (None, [_handle]),
+    'stipple_views_count': (_status, [_handle, POINTER(c_uint64)]),
+    'stipple_views_camera': (_status, [_handle, c_uint64, _to(s.StippleCamera)]),
+    'stipple_camera_resize': (_status, [_to(s.StippleCamera), c_uint32, c_uint32]),
+    # rendering
+    'stipple_render_options_init': (None, [_to(s.StippleRenderOptions)]),
+    'stipple_renderer_create': (_status, [_handle, _out_handle]),
+    'stipple_renderer_free': (None, [_handle]),
+    'stipple_renderer_render_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
+                                                _to(s.StippleRenderOptions), _to(s.StippleRenderBuffers),
+                                                _out_handle]),
+    'stipple_renderer_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
+                                                POINTER(c_uint64)]),
+    # volumes
+    'stipple_voxelize_options_init': (None, [_to(s.StippleVoxelizeOptions)]),
+    'stipple_voxelize_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleVoxelizeOptions),
+                                         _out_handle]),
+    'stipple_voxelize_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64,
+                                                _to(s.StippleVoxelizeOptions), POINTER(c_uint64)]),
+    'stipple_volume_free': (None, [_handle]),
+    'stipple_volume_info': (_status, [_handle, _to(s.StippleVolumeInfo)]),
+    'stipple_volume_save': (_status, [_handle, _path]),
+    'stipple_volume_load': (_status, [_handle, _path, _out_handle]),
+    # pictures
+    'stipple_image_create': (_status, [_handle, c_uint32, c_uint32, c_uint32, c_uint32, _floats, _out_handle]),
+    'stipple_image_load': (_status, [_handle, _path, _out_handle]),
+    'stipple_image_free': (None, [_handle]),
+    'stipple_image_info': (_status, [_handle, _to(s.StippleImageInfo)]),
+    'stipple_image_read': (_status, [_handle, _floats, c_uint64]),
+    'stipple_image_save': (_status, [_handle, _path, c_uint32]),
+    'stipple_image_compare': (_status, [_handle, _handle, _to(s.StippleImageComparison)]),
+}
+
+
+def declare(library):
+    """Gives every function of a loaded library its types. Raises AttributeError for one that is missing."""
+    for name, (result, arguments) in FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype = result
+        function.argtypes = arguments

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finds and loads libstipple, and refuses one that does not fit."""
+
+import os
+from ctypes import CDLL, c_uint32
+from pathlib import Path
+
+from .declarations import declare
+from .errors import LibraryError
+from .structs import ABI_VERSION
+
+FILE_NAME = 'libstipple.so'
+ENVIRONMENT_VARIABLE = 'STIPPLE_LIBRARY'
+
+_loaded = {}
+
+
+def find(path=''):
+    """The library's file: the given one, else the environment's, else the one inside the add-on."""
+    if path:
+        return Path(path)
+    named = os.environ.get(ENVIRONMENT_VARIABLE)
+    if named:
+        return Path(named)
+    return Path(__file__).resolve().parent.parent / 'lib' / FILE_NAME
+
+
+def load(path=''):
+    """The library with its functions declared; loaded once per file.
+
+    Errors: LibraryError when the file is missing, cannot be loaded, or has another ABI version.
+    """
+    file = find(path)
+    known = _loaded.get(file)
+    if known is not None:
+        return known
+    if not file.is_file():
+        raise LibraryError(f"The Stipple library '{file}' is missing; install the add-on again or set the library's "
+                           "path in the add-on's preferences.")
+    try:
+        library = CDLL(str(file))
+    except OSError as error:
+        raise LibraryError(f"The Stipple library '{file}' cannot be loaded: {error}.") from None
+    try:
+        library.stipple_abi_version.restype = c_uint32
+        library.stipple_abi_version.argtypes = []
+        version = library.stipple_abi_version()
+    except AttributeError:
+        raise LibraryError(f"'{file}' is not a Stipple library: it has no function stipple_abi_version.") from None
+    if version != ABI_VERSION:
+        raise LibraryError(f"The Stipple library '{file}' has ABI version {version}; this add-on needs version "
+                           f"{ABI_VERSION}.")
+    try:
+        declare(library)
+    except AttributeError as error:
+        raise LibraryError(f"The Stipple library '{file}' says ABI version {version} but lacks a function: "
+                           f"{error}.") from None
+    _loaded[file] = library
+    return library

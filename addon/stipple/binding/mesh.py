@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Triangle meshes with colours, put together part by part."""
+
+from ctypes import byref, c_float, c_uint32
+
+import numpy as np
+
+from .errors import invalid
+from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
+from .structs import NO_INDEX, MaterialColour, StippleMaterial, StippleMeshInfo, StippleMeshPart
+
+
+class Mesh(Handle):
+    free_function = 'stipple_mesh_free'
+
+    @classmethod
+    def create(cls, context):
+        return cls(context.library, new_handle(context.library, 'stipple_mesh_create', context.pointer))
+
+    @classmethod
+    def load(cls, context, path):
+        return cls(context.library,
+                   new_handle(context.library, 'stipple_mesh_load', context.pointer, path_bytes(path)))
+
+    def add_texture(self, pixels, srgb):
+        """pixels [height,width,3 or 4], row 0 = top, straight alpha. Returns the index."""
+        pixels = contiguous(pixels)
+        height, width, channels = pixels.shape
+        index = c_uint32()
+        self._check(self.library.stipple_mesh_add_texture(self.pointer, width, height, channels, pointer_to(pixels),
+                                                          1 if srgb else 0, byref(index)))
+        return index.value
+
+    def add_material(self, colour=MaterialColour.CONSTANT, base_colour=(0.8, 0.8, 0.8, 1.0), texture=NO_INDEX):
+        """base_colour: scene linear, straight alpha. Returns the index."""
+        material = StippleMaterial(colour=int(colour), base_colour=(c_float * 4)(*base_colour), texture=texture)
+        index = c_uint32()
+        self._check(self.library.stipple_mesh_add_material(self.pointer, byref(material), byref(index)))
+        return index.value
+
+    def add_part(self, positions, triangles, matrix, corner_normals=None, corner_uvs=None, corner_colours=None,
+                 triangle_materials=None):
+        """Arrays as in StippleMeshPart; shapes [V,3], [T,3], [4,4], [T,3,3], [T,3,2], [T,3,4], [T]."""
+        positions = contiguous(positions)
+        triangles = contiguous(triangles, np.uint32)
+        count = len(triangles)
+        corners = {'corner_normals': (corner_normals, (count, 3, 3)), 'corner_uvs': (corner_uvs, (count, 3, 2)),
+                   'corner_colours': (corner_colours, (count, 3, 4))}
+        kept = {}
+        for name, (array, shape) in corners.items():
+            if array is None:
+                continue
+            if array.shape != shape:
+                raise invalid(f'Mesh array {name} has shape {array.shape}; allowed is {shape}.')
+            kept[name] = contiguous(array)
+        if triangle_materials is not None:
+            kept['triangle_materials'] = contiguous(triangle_materials, np.uint32)
+        part = StippleMeshPart(vertex_count=len(positions), triangle_count=count, positions=pointer_to(positions),
+                               triangles=pointer_to(triangles), matrix=matrix16(matrix),
+                               **{name: pointer_to(array) for name, array in kept.items()})
+        self._check(self.library.stipple_mesh_add_part(self.pointer, byref(part)))
+
+    def info(self):
+        info = StippleMeshInfo()
+        self._check(self.library.stipple_mesh_info(self.pointer, byref(info)))
+        return info

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Models: sources of splats at any budget."""
+
+from ctypes import byref, c_uint64
+from dataclasses import dataclass
+
+from .cloud import Cloud
+from .density import Density, check_anchor_count
+from .errors import invalid
+from .handle import Handle, new_handle, path_bytes
+from .job import Job
+from .structs import AnchorOrder, StippleDecodeOptions, StippleModelFromMeshOptions, StippleModelInfo
+
+MAX_GAUSSIANS_PER_ANCHOR = 32
+
+
+@dataclass(frozen=True)
+class DecodeSettings:
+    """What turns a model into splats; hashable, so that it can key a cache."""
+
+    anchors: int = 20_000
+    gaussians_per_anchor: int = 1
+    order: int = AnchorOrder.SYSTEMATIC
+    seed: int = 0
+
+    def check(self):
+        """Refuses what does not fit the library's unsigned fields."""
+        check_anchor_count(self.anchors)
+        if not 1 <= self.gaussians_per_anchor <= MAX_GAUSSIANS_PER_ANCHOR:
+            raise invalid(f'Gaussians per anchor is {self.gaussians_per_anchor}; allowed are 1 to '
+                          f'{MAX_GAUSSIANS_PER_ANCHOR}.')
+        if self.seed < 0:
+            raise invalid(f'Seed is {self.seed}; allowed are 0 and above.')
+
+
+class Model(Handle):
+    free_function = 'stipple_model_free'
+
+    @staticmethod
+    def from_mesh_start(context, mesh, detail_weight=1.0, seed=0, leaf_level=10, sample_count=0):
+        """A job whose model() is the result."""
+        if seed < 0:
+            raise invalid(f'Seed is {seed}; allowed are 0 and above.')
+        options = StippleModelFromMeshOptions()
+        context.library.stipple_model_from_mesh_options_init(byref(options))
+        options.detail_weight = detail_weight
+        options.seed = seed
+        options.leaf_level = leaf_level
+        options.sample_count = sample_count
+        return Job(context.library, new_handle(context.library, 'stipple_model_from_mesh_start', context.pointer,
+                                               mesh.pointer, byref(options)))
+
+    @classmethod
+    def load(cls, context, path):
+        return cls(context.library,
+                   new_handle(context.library, 'stipple_model_load', context.pointer, path_bytes(path)))
+
+    def save(self, path):
+        self._check(self.library.stipple_model_save(self.pointer, path_bytes(path)))
+
+    def info(self):
+        info = StippleModelInfo()
+        self._check(self.library.stipple_model_info(self.pointer, byref(info)))
+        return info
+
+    def density(self):
+        return Density(self.library, new_handle(self.library, 'stipple_model_density', self.pointer))
+
+    def decode(self, settings):
+        """The cloud of these settings; follows a slider."""
+        return Cloud(self.library, new_handle(self.library, 'stipple_model_decode', self.pointer,
+                                              byref(self._options(settings))))
+
+    def decode_start(self, settings):
+        """The same as a job (cloud())."""
+        return Job(self.library, new_handle(self.library, 'stipple_model_decode_start', self.pointer,
+                                            byref(self._options(settings))))
+
+    def decode_memory_bound(self, settings):
+        """Bytes that decoding needs at most."""
+        size = c_uint64()
+        self._check(self.library.stipple_model_decode_memory_bound(self.pointer, byref(self._options(settings)),
+                                                                   byref(size)))
+        return size.value
+
+    def _options(self, settings):
+        settings.check()
+        options = StippleDecodeOptions()
+        self.library.stipple_decode_options_init(byref(options))
+        options.order = int(settings.order)
+        options.anchor_count = settings.anchors
+        options.seed = settings.seed
+        options.gaussians_per_anchor = settings.gaussians_per_anchor
+        return options

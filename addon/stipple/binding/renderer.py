@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of splats."""
+
+from ctypes import byref, c_double, c_uint64
+
+import numpy as np
+
+from .handle import Handle, matrix16, new_handle, pointer_to
+from .job import Job
+from .structs import (BlendSpace, LowPass, OutputColour, RenderMethod, StippleInstance, StippleRenderBuffers,
+                      StippleRenderOptions)
+
+EMPTY_DEPTH = 1e10  # metres; what Blender also writes where nothing is
+
+
+def instance_array(instances):
+    """[(cloud, 4x4 object to world)] as the header's array."""
+    array = (StippleInstance * max(len(instances), 1))()
+    for entry, (cloud, matrix) in zip(array, instances):
+        entry.__init__(cloud=cloud.pointer, matrix=matrix16(matrix))
+    return array
+
+
+class RenderTask:
+    """A picture that is being made: poll, cancel or wait through `job`, then read the arrays."""
+
+    def __init__(self, job, colour, depth):
+        self.job = job
+        self.colour = colour  # [H,W,4] premultiplied, row 0 = top
+        self.depth = depth    # [H,W] metres, or None
+
+
+class Renderer(Handle):
+    free_function = 'stipple_renderer_free'
+
+    def __init__(self, context):
+        super().__init__(context.library, new_handle(context.library, 'stipple_renderer_create', context.pointer))
+
+    def options(self, blend_space=BlendSpace.AS_TRAINED, output_colour=OutputColour.SCENE_LINEAR,
+                low_pass=LowPass.FROM_CLOUD, method=RenderMethod.TILED, background=None):
+        """background: three values in output_colour's space, or None for a transparent picture."""
+        options = StippleRenderOptions()
+        self.library.stipple_render_options_init(byref(options))
+        options.blend_space, options.output_colour = int(blend_space), int(output_colour)
+        options.low_pass, options.method = int(low_pass), int(method)
+        if background is not None:
+            options.with_background = 1
+            options.background = (c_double * 3)(*background)
+        return options
+
+    def start(self, instances, camera, options, with_depth=True):
+        """Starts the picture of instances [(cloud, matrix)]; clouds must outlive the start only."""
+        shape = (camera.height, camera.width)
+        colour = np.empty(shape + (4,), np.float32)
+        depth = np.empty(shape, np.float32) if with_depth else None
+        buffers = StippleRenderBuffers(colour=pointer_to(colour), depth=pointer_to(depth))
+        array = instance_array(instances)
+        job = Job(self.library, new_handle(self.library, 'stipple_renderer_render_start', self.pointer, array,
+                                           len(instances), byref(camera), byref(options), byref(buffers)),
+                  keep=(colour, depth, buffers, array, [cloud for cloud, _ in instances]))
+        return RenderTask(job, colour, depth)
+
+    def memory_bound(self, instances, camera):
+        size = c_uint64()
+        self._check(self.library.stipple_renderer_memory_bound(self.pointer, instance_array(instances), len(instances),
+                                                               byref(camera), byref(size)))
+        return size.value

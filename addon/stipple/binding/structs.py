@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Enumerations and structs of stipple.h, field by field; tests/addon compares them with the header."""
+
+from ctypes import POINTER, Structure, c_char, c_double, c_float, c_uint32, c_uint64, c_void_p, sizeof
+from enum import IntEnum
+
+ABI_VERSION = 1
+MAX_ANCHORS = 1 << 28
+NO_INDEX = 0xFFFFFFFF
+
+_floats = POINTER(c_float)
+_matrix = c_double * 16
+
+
+class Status(IntEnum):
+    OK = 0
+    ERROR_INVALID_ARGUMENT = 1
+    ERROR_OUT_OF_MEMORY = 2
+    ERROR_MEMORY_LIMIT = 3
+    ERROR_IO = 4
+    ERROR_FORMAT = 5
+    ERROR_UNSUPPORTED = 6
+    ERROR_UNAVAILABLE = 7
+    ERROR_CANCELLED = 8
+    ERROR_BUFFER_TOO_SMALL = 9
+    ERROR_INTERNAL = 10
+
+
+class JobState(IntEnum):
+    RUNNING = 0
+    DONE = 1
+    FAILED = 2
+    CANCELLED = 3
+
+
+class ColourSpace(IntEnum):
+    DISPLAY = 0
+    LINEAR = 1
+
+
+class Antialias(IntEnum):
+    CLASSIC = 0
+    MIP = 1
+
+
+class MaterialColour(IntEnum):
+    CONSTANT = 0
+    TEXTURE = 1
+    CORNER = 2
+
+
+class AnchorOrder(IntEnum):
+    SYSTEMATIC = 0
+    PROGRESSIVE = 1
+
+
+class CameraModel(IntEnum):
+    PERSPECTIVE = 0
+    ORTHOGRAPHIC = 1
+
+
+class LowPass(IntEnum):
+    FROM_CLOUD = 0
+    CLASSIC = 1
+    MIP = 2
+    NONE = 3
+
+
+class BlendSpace(IntEnum):
+    AS_TRAINED = 0
+    SCENE_LINEAR = 1
+
+
+class OutputColour(IntEnum):
+    SCENE_LINEAR = 0
+    COMPOSITED = 1
+
+
+class RenderMethod(IntEnum):
+    TILED = 0
+    REFERENCE = 1
+
+
+class Transfer(IntEnum):
+    LINEAR = 0
+    SRGB = 1
+
+
+# Each enumeration: the C type and what its values' names start with.
+ENUMS = {
+    'StippleStatus': (Status, 'STIPPLE_'),
+    'StippleJobState': (JobState, 'STIPPLE_JOB_'),
+    'StippleColourSpace': (ColourSpace, 'STIPPLE_COLOUR_'),
+    'StippleAntialias': (Antialias, 'STIPPLE_ANTIALIAS_'),
+    'StippleMaterialColour': (MaterialColour, 'STIPPLE_MATERIAL_'),
+    'StippleAnchorOrder': (AnchorOrder, 'STIPPLE_ORDER_'),
+    'StippleCameraModel': (CameraModel, 'STIPPLE_CAMERA_'),
+    'StippleLowPass': (LowPass, 'STIPPLE_LOW_PASS_'),
+    'StippleBlendSpace': (BlendSpace, 'STIPPLE_BLEND_'),
+    'StippleOutputColour': (OutputColour, 'STIPPLE_OUTPUT_'),
+    'StippleRenderMethod': (RenderMethod, 'STIPPLE_RENDER_'),
+    'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
+}
+
+
+class _Sized(Structure):
+    """A struct whose first field is its size."""
+
+    def __init__(self, **fields):
+        super().__init__(**fields)
+        self.struct_size = sizeof(type(self))
+
+
+class StippleContextOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('thread_count', c_uint32), ('memory_limit_bytes', c_uint64)]
+
+
+class StippleJobProgress(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('state', c_uint32), ('fraction', c_double), ('stage', c_char * 64)]
+
+
+class StippleCloudArrays(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('sh_degree', c_uint32), ('colour_space', c_uint32),
+                ('antialias', c_uint32), ('count', c_uint64), ('positions', _floats), ('rotations', _floats),
+                ('scales', _floats), ('opacities', _floats), ('sh', _floats)]
+
+
+class StippleCloudInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('sh_degree', c_uint32), ('colour_space', c_uint32),
+                ('antialias', c_uint32), ('count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3)]
+
+
+class StippleCloudBuffers(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('capacity', c_uint64), ('positions', _floats),
+                ('rotations', _floats), ('scales', _floats), ('opacities', _floats), ('sh', _floats)]
+
+
+class StippleCloudSaveOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('ascii', c_uint32)]
+
+
+class StippleCloudComparison(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('same_order', c_uint32), ('count_a', c_uint64), ('count_b', c_uint64),
+                ('max_position', c_double), ('max_rotation', c_double), ('max_scale_ratio', c_double),
+                ('max_opacity', c_double), ('max_sh', c_double)]
+
+
+class StippleMaterial(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('colour', c_uint32), ('base_colour', c_float * 4),
+                ('texture', c_uint32), ('reserved', c_uint32)]
+
+
+class StippleMeshPart(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('vertex_count', c_uint64),
+                ('triangle_count', c_uint64), ('positions', _floats), ('triangles', POINTER(c_uint32)),
+                ('corner_normals', _floats), ('corner_uvs', _floats), ('corner_colours', _floats),
+                ('triangle_materials', POINTER(c_uint32)), ('matrix', _matrix)]
+
+
+class StippleMeshInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('material_count', c_uint32), ('vertex_count', c_uint64),
+                ('triangle_count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3)]
+
+
+class StippleDensityInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('leaf_count', c_uint64),
+                ('root_origin', c_double * 3), ('root_side', c_double)]
+
+
+class StippleSampleOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('order', c_uint32), ('count', c_uint64), ('seed', c_uint64)]
+
+
+class StippleAnchorBuffers(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('positions', _floats), ('log_q', _floats),
+                ('leaves', POINTER(c_uint64)), ('ranks', POINTER(c_uint64))]
+
+
+class StippleModelFromMeshOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('sample_count', c_uint64), ('seed', c_uint64),
+                ('detail_weight', c_double)]
+
+
+class StippleModelInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('leaf_count', c_uint64),
+                ('sample_count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3)]
+
+
+class StippleDecodeOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('order', c_uint32), ('anchor_count', c_uint64), ('seed', c_uint64),
+                ('gaussians_per_anchor', c_uint32), ('reserved', c_uint32)]
+
+
+class StippleCamera(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('model', c_uint32), ('width', c_uint32), ('height', c_uint32),
+                ('fx', c_double), ('fy', c_double), ('cx', c_double), ('cy', c_double), ('world_to_camera', _matrix),
+                ('near_plane', c_double), ('far_plane', c_double)]
+
+
+class StippleInstance(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('cloud', c_void_p), ('matrix', _matrix)]
+
+
+class StippleRenderOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('method', c_uint32), ('low_pass', c_uint32), ('blend_space', c_uint32),
+                ('output_colour', c_uint32), ('sh_degree_limit', c_uint32), ('with_background', c_uint32),
+                ('reserved', c_uint32), ('background', c_double * 3)]
+
+
+class StippleRenderBuffers(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour', _floats), ('depth', _floats),
+                ('median_depth', _floats), ('counts', POINTER(c_uint32))]
+
+
+class StippleVoxelizeOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('resolution', c_uint32), ('voxel_size', c_double),
+                ('low_pass', c_double), ('cut_off_sigma', c_double), ('min_density', c_double)]
+
+
+class StippleVolumeInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('brick_count', c_uint64),
+                ('active_voxel_count', c_uint64), ('voxel_size', c_double), ('bounds_min', c_double * 3),
+                ('bounds_max', c_double * 3), ('max_density', c_double)]
+
+
+class StippleImageInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('width', c_uint32), ('height', c_uint32), ('channels', c_uint32),
+                ('transfer', c_uint32), ('reserved', c_uint32)]
+
+
+class StippleImageComparison(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('psnr', c_double), ('ssim', c_double),
+                ('max_error', c_double), ('mean_error', c_double)]
+
+
+STRUCTS = {cls.__name__: cls for cls in _Sized.__subclasses__()}

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine Stipple: F12, animation and background.
+
+It decodes from the evaluated settings into native memory and never writes a datablock.
+"""
+
+import time
+
+import bpy
+
+from . import version
+from .binding.errors import CancelledError, StippleError
+from .binding.renderer import Renderer
+from .binding.structs import JobState
+from .scene import cameras, facts, instances, sources
+
+# How often a render looks whether it was cancelled.
+POLL_SECONDS = 0.01
+
+
+class STIPPLE_RE_engine(bpy.types.RenderEngine):
+    bl_idname = 'STIPPLE'
+    bl_label = "Stipple"
+    bl_use_preview = False
+    bl_use_eevee_viewport = True
+    bl_use_shading_nodes_custom = False
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        self.register_pass(scene, renderlayer, 'Combined', 4, 'RGBA', 'COLOR')
+        if renderlayer.use_pass_z:
+            self.register_pass(scene, renderlayer, 'Depth', 1, 'Z', 'VALUE')
+
+    def update(self, data=None, depsgraph=None):
+        """Decodes what the view layer shows, from the evaluated settings."""
+        self._instances = None
+        try:
+            self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
+        except StippleError as error:
+            self._fail(error)
+
+    def render(self, depsgraph):
+        if self._instances is None:
+            return
+        scene = depsgraph.scene
+        try:
+            picture = facts.picture_facts(scene, depsgraph.view_layer)
+            camera = cameras.camera_of(self.camera_override or scene.camera, scene.render, picture.border)
+            renderer = Renderer(sources.context())
+            options = renderer.options(blend_space=picture.blend_space, background=picture.background)
+            task = renderer.start(self._instances, camera, options, picture.with_depth)
+            self._wait(task.job)
+        except CancelledError:
+            return
+        except StippleError as error:
+            self._fail(error)
+            return
+        self._deliver(task, picture)
+
+    def _wait(self, job):
+        """Until the job ends; a cancel in Blender cancels it."""
+        while True:
+            state, fraction, stage = job.poll()
+            if state != JobState.RUNNING:
+                job.wait()
+                return
+            if self.test_break():
+                job.cancel()
+            self.update_stats('', stage)
+            self.update_progress(fraction)
+            time.sleep(POLL_SECONDS)
+
+    def _deliver(self, task, picture):
+        """Hands the picture over; Blender's first row is the bottom one."""
+        result = self.begin_result(0, 0, picture.border.width, picture.border.height)
+        passes = result.layers[0].passes
+        version.fill_pass(passes['Combined'], task.colour[::-1])
+        if task.depth is not None and 'Depth' in passes:
+            version.fill_pass(passes['Depth'], task.depth[::-1])
+        self.end_result(result)
+
+    def _warn(self, message):
+        self.report({'WARNING'}, message)
+
+    def _fail(self, error):
+        """One message; the render ends without a picture."""
+        self.error_set(str(error))
+        self.report({'ERROR'}, str(error))
+
+
+classes = (STIPPLE_RE_engine,)

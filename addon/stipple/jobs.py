@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators around native jobs.
+
+Called from a script or in background mode a job runs to its end at once. Called from the interface a
+timer polls it: Blender stays usable, the status bar shows the progress, Escape cancels, and the
+operator ends with one undo step.
+"""
+
+from .binding.errors import CancelledError, StippleError
+from .binding.structs import JobState
+
+POLL_SECONDS = 0.05
+
+
+class JobOperator:
+    """Mix-in. The operator gives start(context) → job (or None: nothing to wait for), then finish(context, job)."""
+
+    _timer = None
+    _job = None
+
+    def execute(self, context):
+        try:
+            job = self.start(context)
+            if job is not None:
+                job.wait()
+            self.finish(context, job)
+        except StippleError as error:
+            return self._failed(error)
+        return {'FINISHED'}
+
+    def run_in_window(self, context):
+        """What invoke() calls instead of execute()."""
+        try:
+            self._job = self.start(context)
+        except StippleError as error:
+            return self._failed(error)
+        if self._job is None:
+            return self._finish_in_window(context)
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(POLL_SECONDS, window=context.window)
+        manager.modal_handler_add(self)
+        manager.progress_begin(0, 100)
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context, event):
+        if event.type == 'ESC':
+            self._job.cancel()
+            return {'RUNNING_MODAL'}
+        if event.type != 'TIMER':
+            return {'PASS_THROUGH'}
+        state, fraction, stage = self._job.poll()
+        if state == JobState.RUNNING:
+            context.window_manager.progress_update(int(100 * fraction))
+            context.workspace.status_text_set(f'{self.bl_label}: {stage} {fraction:.0%} (Esc cancels)')
+            return {'PASS_THROUGH'}
+        self._leave_window(context)
+        return self._finish_in_window(context)
+
+    def cancel(self, context):
+        """Blender itself ends the operator, for instance when the window closes."""
+        if self._job is not None:
+            self._job.close()
+            self._leave_window(context)
+
+    def _finish_in_window(self, context):
+        job, self._job = self._job, None
+        try:
+            if job is not None:
+                job.wait()
+            self.finish(context, job)
+        except StippleError as error:
+            return self._failed(error)
+        return {'FINISHED'}
+
+    def _leave_window(self, context):
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+        self._timer = None
+
+    def _failed(self, error):
+        self.report({'INFO' if isinstance(error, CancelledError) else 'ERROR'}, str(error))
+        return {'CANCELLED'}

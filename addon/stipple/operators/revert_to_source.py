@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Throws edits by hand away and decodes the source again."""
+
+import bpy
+
+from ..binding.cloud import Cloud
+from ..jobs import JobOperator
+from ..scene import sources, splat_data, sync
+
+
+class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
+    """Drop the edits and make the splats again from their source file"""
+
+    bl_idname = 'stipple.revert_to_source'
+    bl_label = "Revert to Source"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.object
+        return splat_data.is_splat_object(obj) and obj.data.stipple.source != '' and context.mode == 'OBJECT'
+
+    def start(self, context):
+        data = context.object.data
+        path = sources.absolute_path(data.stipple.source, data)
+        if data.stipple.source_kind == 'MODEL':
+            cloud = sources.model(path).decode(sources.decode_settings(data.stipple))
+        else:
+            cloud = Cloud.load(sources.context(), path)
+        self._splats = cloud.read()
+        return None
+
+    def finish(self, context, _job):
+        data = context.object.data
+        data.stipple.edited = False
+        sync.write_decoded(data, self._splats)
+        self.report({'INFO'}, f"{self._splats.count:,} splats from their source")
+
+
+classes = (STIPPLE_OT_revert_to_source,)

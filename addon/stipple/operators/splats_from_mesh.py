@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Selected meshes become one splat object."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..binding.errors import invalid
+from ..binding.model import DecodeSettings, Model
+from ..binding.structs import AnchorOrder
+from ..jobs import JobOperator
+from ..properties import COLOR_SOURCES, ORDERS
+from ..scene import meshes, sources, splat_data, sync
+
+
+class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
+    """Make one object of Gaussian splats from the selected meshes and whatever they instance"""
+
+    bl_idname = 'stipple.splats_from_mesh'
+    bl_label = "Splats from Mesh"
+    bl_options = {'REGISTER', 'UNDO', 'PRESET'}
+
+    anchors: IntProperty(name="Anchor Budget", default=20000, soft_min=1, soft_max=1000000)
+    gaussians_per_anchor: IntProperty(name="Splats per Anchor", default=1, soft_min=1, soft_max=32)
+    detail_weight: FloatProperty(name="Detail Weight", description="How much texture detail and curvature attract "
+                                 "anchors, 0 for an even spread", default=1.0, soft_min=0.0, soft_max=4.0)
+    order: EnumProperty(name="Order", items=ORDERS)
+    seed: IntProperty(name="Seed", default=0, soft_min=0)
+    color_from: EnumProperty(name="Color From", items=COLOR_SOURCES)
+    hide_source: BoolProperty(name="Hide Source", description="Hide the meshes in the viewport and in renders",
+                              default=True)
+    source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
+                                "beside the .blend file", subtype='FILE_PATH', options={'SKIP_SAVE'})
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT'
+
+    def invoke(self, context, _event):
+        return self.run_in_window(context)
+
+    def start(self, context):
+        self._settings().check()
+        self._objects = meshes.source_objects(context.selected_objects)
+        if not self._objects:
+            raise invalid('No mesh is selected; select at least one object with faces.')
+        native = sources.context()
+        mesh = meshes.native_mesh(native, self._objects, context.evaluated_depsgraph_get(), self.color_from)
+        return Model.from_mesh_start(native, mesh, self.detail_weight, self.seed)
+
+    def finish(self, context, job):
+        model = job.model()
+        splats = model.decode(self._settings()).read()
+        active = context.view_layer.objects.active
+        name = (active if active in self._objects else self._objects[0]).name + ' Splats'
+        path = sources.save_model(model, sources.model_path_for(name, self.source_path), bool(self.source_path))
+        sources.remember_model(path, model)
+        obj = bpy.data.objects.new(name, splat_data.new_data(name))
+        stipple = obj.data.stipple
+        with sync.paused():
+            stipple.anchors, stipple.gaussians_per_anchor = self.anchors, self.gaussians_per_anchor
+            stipple.order, stipple.seed = self.order, self.seed
+            stipple.detail_weight, stipple.color_from = self.detail_weight, self.color_from
+            sources.attach_model(obj.data, path, self._objects)
+        sync.write_decoded(obj.data, splats)
+        context.collection.objects.link(obj)
+        self._select(context, obj)
+        self.report({'INFO'}, f"{splats.count:,} splats in '{obj.name}'")
+
+    def _settings(self):
+        return DecodeSettings(self.anchors, self.gaussians_per_anchor, AnchorOrder[self.order], self.seed)
+
+    def _select(self, context, obj):
+        for source in self._objects:
+            source.select_set(False)
+            if self.hide_source:
+                source.hide_set(True)
+                source.hide_render = True
+        obj.select_set(True)
+        context.view_layer.objects.active = obj
+
+
+classes = (STIPPLE_OT_splats_from_mesh,)

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splats that were edited by hand become their own source."""
+
+import bpy
+
+from ..jobs import JobOperator
+from ..scene import sources, splat_data, sync
+
+
+class STIPPLE_OT_use_as_new_source(JobOperator, bpy.types.Operator):
+    """Keep the edited splats: they are written to a file of their own, and have no budget any more"""
+
+    bl_idname = 'stipple.use_as_new_source'
+    bl_label = "Use as New Source"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return splat_data.is_splat_object(context.object) and context.mode == 'OBJECT'
+
+    def start(self, context):
+        obj = context.object
+        self._arrays = splat_data.read(obj.data)
+        self._path = sources.save_cloud(sources.cloud_from_data(obj.data), obj.name)
+        return None
+
+    def finish(self, context, _job):
+        data = context.object.data
+        stipple = data.stipple
+        with sync.paused():
+            stipple.source = sources.blend_path(self._path)
+            stipple.source_kind = 'CLOUD'
+            stipple.source_objects.clear()
+            stipple.source_changed = stipple.edited = False
+        sync.write(data, self._arrays, '')
+        self.report({'INFO'}, f"{self._arrays.count:,} splats are their own source now, in '{self._path}'")
+
+
+classes = (STIPPLE_OT_use_as_new_source,)

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Drawing only."""
+
+from . import data, menus, render
+
+classes = data.classes + render.classes + menus.classes
+
+
+def register():
+    menus.register()
+    render.register()
+
+
+def unregister():
+    render.unregister()
+    menus.unregister()

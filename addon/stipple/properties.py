@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of splat data and of scenes. Names are forever: files store them."""
+
+import bpy
+from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty,
+                       StringProperty)
+
+from .scene import sync
+
+_OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
+_CHANGEABLE = {'ANIMATABLE'}
+
+ORDERS = (('SYSTEMATIC', "Systematic", "Most even at every budget"),
+          ('PROGRESSIVE', "Progressive", "A smaller budget is a part of a larger one, so splats only appear"))
+COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: textures, color attributes, plain colors; "
+                  "other node trees are baked"),
+                 ('BAKED', "Baked Lighting", "Colors as lit by the scene, baked by Cycles"),
+                 ('ATTRIBUTE', "Attribute", "The active color attribute"))
+
+
+class STIPPLE_PG_source_object(bpy.types.PropertyGroup):
+    object: PointerProperty(name="Object", type=bpy.types.Object)
+
+
+class STIPPLE_PG_splats(bpy.types.PropertyGroup):
+    """On Mesh and PointCloud: splats are a cache of (source, settings)."""
+
+    source: StringProperty(name="Source", description="File that the splats are decoded from", subtype='FILE_PATH',
+                           override=_OVERRIDABLE)
+    source_kind: EnumProperty(name="Source Kind", items=(('NONE', "None", "The splats have no source"),
+                                                         ('MODEL', "Model", "Splats at any budget"),
+                                                         ('CLOUD', "Splats", "Splats as they are")), default='NONE')
+    # Limits are checked where the value is used, so that one beyond them is reported and not bent.
+    anchors: IntProperty(name="Anchor Budget", description="Number of places on the surface that get splats",
+                         default=20000, soft_min=1, soft_max=1000000, options=_CHANGEABLE, override=_OVERRIDABLE,
+                         update=sync.on_property_change)
+    anchors_render: IntProperty(name="Render Budget", description="Anchor budget of renders, 0 for the same as in the "
+                                "viewport", default=0, soft_min=0, soft_max=10000000, options=_CHANGEABLE,
+                                override=_OVERRIDABLE)
+    gaussians_per_anchor: IntProperty(name="Splats per Anchor", description="Number of splats that each anchor becomes",
+                                      default=1, soft_min=1, soft_max=32, options=_CHANGEABLE, override=_OVERRIDABLE,
+                                      update=sync.on_property_change)
+    order: EnumProperty(name="Order", description="How anchors are drawn from the density", items=ORDERS,
+                        options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
+    seed: IntProperty(name="Seed", description="Another seed gives another, equally good set of anchors", default=0,
+                      soft_min=0, options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
+    detail_weight: FloatProperty(name="Detail Weight", description="How much texture detail and curvature attract "
+                                 "anchors, 0 for an even spread. Takes effect with Update from Source", default=1.0,
+                                 min=0.0, soft_max=4.0, options=set(), override=_OVERRIDABLE)
+    color_from: EnumProperty(name="Color From", description="Where colors come from. Takes effect with Update from "
+                             "Source", items=COLOR_SOURCES, options=set(), override=_OVERRIDABLE)
+    # What the present source was made with, to say when the settings above differ.
+    source_detail_weight: FloatProperty(options={'HIDDEN'})
+    source_color_from: StringProperty(options={'HIDDEN'})
+    source_objects: CollectionProperty(type=STIPPLE_PG_source_object)
+    source_fingerprint: StringProperty(options={'HIDDEN'})
+    source_changed: BoolProperty(name="Source Changed", description="The mesh differs from the one that the splats were "
+                                 "made from", options={'HIDDEN'})
+    edited: BoolProperty(name="Edited", description="The splats were edited by hand", options={'HIDDEN'})
+
+
+class STIPPLE_PG_scene(bpy.types.PropertyGroup):
+    splat_color: EnumProperty(
+        name="Splat Color", description="Space in which splats are blended over each other",
+        items=(('AS_TRAINED', "As Trained", "Blend in display space, as splats are trained and web viewers show them"),
+               ('SCENE_LINEAR', "Scene Linear", "Blend light, as all other objects are")),
+        options=set(), override=_OVERRIDABLE)
+
+
+classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_scene)
+
+
+def register():
+    for owner in (bpy.types.Mesh, bpy.types.PointCloud):
+        owner.stipple = PointerProperty(name="Stipple", type=STIPPLE_PG_splats, override=_OVERRIDABLE)
+    bpy.types.Scene.stipple = PointerProperty(name="Stipple", type=STIPPLE_PG_scene, override=_OVERRIDABLE)
+
+
+def unregister():
+    del bpy.types.Scene.stipple
+    for owner in (bpy.types.PointCloud, bpy.types.Mesh):
+        del owner.stipple

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colours that only a renderer knows: baked by Cycles onto a temporary, triangulated copy.
+
+Every triangle gets its own right-angled corner of a square grid, so no UV map is needed and nothing
+bleeds from one triangle to another.
+"""
+
+import contextlib
+import math
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from .. import version
+from ..binding.errors import StippleError
+from ..binding.structs import Status
+from . import colour
+
+ATLAS = 'stipple_atlas'
+MAX_SIDE_PX = 4096
+# Small meshes get this many pixels along an atlas side; enough that a cube's faces stay sharp.
+MIN_SIDE_PX = 1024
+# Triangles keep this far from their cell's border, so that filtering never reaches a neighbour.
+INSET_PX = 1.5
+LIGHT_SAMPLES = 32
+
+
+class Baked:
+    """A triangulated copy with its atlas; bakes each kind when it is first asked for."""
+
+    def __init__(self, obj, uvs, side_px, kinds):
+        self.object = obj
+        self.mesh = obj.data
+        self.uvs = uvs  # [T,3,2]
+        self._side_px = side_px
+        self._kinds = kinds  # per slot, or None to bake every slot
+        self._images = {}
+
+    def image(self, kind):
+        """Pixels [side,side,3], row 0 = top, scene linear; kind: COMBINED, BAKE_EMIT or BAKE_DIFFUSE."""
+        if kind not in self._images:
+            self._images[kind] = self._bake(kind)
+        return self._images[kind]
+
+    def _bake(self, kind):
+        image = bpy.data.images.new('stipple_bake', self._side_px, self._side_px, alpha=True, float_buffer=True)
+        kept = list(self.mesh.materials)
+        made = []
+        try:
+            for slot in range(max(len(kept), 1)):
+                material = self._target_material(kept[slot] if kept else None, slot, kind, image)
+                made.append(material)
+                if slot < len(self.mesh.materials):
+                    self.mesh.materials[slot] = material
+                else:
+                    self.mesh.materials.append(material)
+            _run_cycles(self.object, kind)
+            values = np.empty(self._side_px * self._side_px * 4, np.float32)
+            image.pixels.foreach_get(values)
+            values = values.reshape(self._side_px, self._side_px, 4)[::-1, :, :3]
+            return np.ascontiguousarray(np.maximum(values, 0))
+        finally:
+            self.mesh.materials.clear()
+            for material in kept:
+                self.mesh.materials.append(material)
+            for material in made:
+                bpy.data.materials.remove(material)
+            bpy.data.images.remove(image)
+
+    def _target_material(self, material, slot, kind, image):
+        """A copy that bakes into the image; slots that this pass is not for become a plain colour."""
+        wanted = self._kinds is None or (slot < len(self._kinds) and self._kinds[slot].kind == kind)
+        if material is None or not wanted or not version.has_nodes(material):
+            copy = bpy.data.materials.new('stipple_bake')
+            version.use_nodes(copy)
+            copy.diffuse_color = colour.GREY if material is None else material.diffuse_color
+            shader = next(n for n in copy.node_tree.nodes if n.type == 'BSDF_PRINCIPLED')
+            shader.inputs['Base Color'].default_value = copy.diffuse_color
+        else:
+            copy = material.copy()
+        if kind == 'BAKE_EMIT' and wanted:
+            _emit_base_colour(copy)
+        nodes = copy.node_tree.nodes
+        target = nodes.new('ShaderNodeTexImage')
+        target.image = image
+        for node in nodes:
+            node.select = False
+        target.select = True
+        nodes.active = target
+        return copy
+
+
+@contextlib.contextmanager
+def baked(evaluated, matrix, kinds, depsgraph, hidden):
+    """A Baked of one evaluated object, or None where it has no triangle. Everything temporary is removed.
+
+    matrix: where it stands (light and object coordinates depend on it). hidden: objects that must not shade it.
+    """
+    if not hasattr(bpy.types.Scene, 'cycles'):
+        raise StippleError(f"Object '{evaluated.name}' needs baking, but the Cycles add-on is disabled; enable it or "
+                           'choose another color source.', Status.ERROR_UNAVAILABLE)
+    mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+    obj = None
+    shown = [o for o in hidden if not o.hide_render]
+    try:
+        materials = [s.material for s in evaluated.material_slots]
+        for slot, material in enumerate(materials):
+            if slot < len(mesh.materials) and evaluated.material_slots[slot].link == 'OBJECT':
+                mesh.materials[slot] = material
+        _triangulate(mesh)
+        if len(mesh.polygons) == 0:
+            yield None
+            return
+        side_px, uvs = _atlas(len(mesh.polygons))
+        render_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
+        layer = mesh.uv_layers.new(name=ATLAS, do_init=False)
+        if layer is None:
+            raise StippleError(f"Object '{evaluated.name}' has {len(mesh.uv_layers)} UV maps; at most 7 are allowed where "
+                               'colors have to be baked.', Status.ERROR_UNSUPPORTED)
+        version.set_loop_uvs(mesh.uv_layers[ATLAS], uvs)
+        mesh.uv_layers.active = mesh.uv_layers[ATLAS]
+        if render_uv is not None:
+            mesh.uv_layers[render_uv].active_render = True
+        obj = bpy.data.objects.new('stipple_bake', mesh)
+        obj.matrix_world = Matrix(matrix.tolist())
+        bpy.context.scene.collection.objects.link(obj)
+        for other in shown:
+            other.hide_render = True
+        yield Baked(obj, uvs, side_px, kinds)
+    finally:
+        for other in shown:
+            other.hide_render = False
+        if obj is not None:
+            bpy.data.objects.remove(obj)
+        bpy.data.meshes.remove(mesh)
+
+
+def _triangulate(mesh):
+    work = bmesh.new()
+    work.from_mesh(mesh)
+    bmesh.ops.triangulate(work, faces=work.faces[:])
+    work.to_mesh(mesh)
+    work.free()
+
+
+def _atlas(triangle_count):
+    """(side in pixels, UVs [T,3,2]): two triangles per square cell."""
+    cells = math.ceil(math.sqrt((triangle_count + 1) // 2))
+    # Six pixels hold the insets and a few texels of colour.
+    cell_px = min(max(MIN_SIDE_PX // cells, 6), MAX_SIDE_PX // cells)
+    if cell_px < 4:
+        raise StippleError(f'A mesh to be baked has {triangle_count:,} triangles; allowed are '
+                           f'{2 * (MAX_SIDE_PX // 4) ** 2:,}.', Status.ERROR_UNSUPPORTED)
+    side_px = cells * cell_px
+    index = np.arange(triangle_count)
+    cell = index // 2
+    origin = np.stack([cell % cells, cell // cells], 1) * float(cell_px)
+    inset = min(INSET_PX, cell_px / 4.0)
+    low, high = inset, cell_px - inset
+    # Both halves leave the diagonal: their right angles sit in opposite corners.
+    gap = inset
+    first = np.array([[low, low], [high - gap, low], [low, high - gap]])
+    second = np.array([[high, high], [low + gap, high], [high, low + gap]])
+    corners = np.where((index % 2 == 0)[:, None, None], first, second)
+    return side_px, ((origin[:, None, :] + corners) / side_px).astype(np.float32)
+
+
+def _emit_base_colour(material):
+    """Makes a material shine its base colour, so that an EMIT bake reads it without light."""
+    tree = material.node_tree
+    shader = colour.surface_shader(material)
+    socket = colour.colour_socket(shader) if shader is not None else None
+    if socket is None or shader.type == 'EMISSION':
+        return
+    emission = tree.nodes.new('ShaderNodeEmission')
+    if socket.is_linked:
+        tree.links.new(socket.links[0].from_socket, emission.inputs['Color'])
+    else:
+        emission.inputs['Color'].default_value = socket.default_value
+    output = next(n for n in tree.nodes if n.type == 'OUTPUT_MATERIAL' and n.is_active_output)
+    tree.links.new(emission.outputs[0], output.inputs['Surface'])
+
+
+def _run_cycles(obj, kind):
+    scene = bpy.context.scene
+    render, cycles = scene.render, scene.cycles
+    kept = (render.engine, cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling,
+            render.bake.use_selected_to_active, render.bake.use_clear, render.bake.margin)
+    render.engine = 'CYCLES'
+    cycles.samples = LIGHT_SAMPLES if kind == 'COMBINED' else 1
+    cycles.use_denoising = False
+    cycles.use_adaptive_sampling = False
+    render.bake.use_selected_to_active = False
+    options = {'type': 'COMBINED', 'pass_filter': {'DIRECT', 'INDIRECT', 'DIFFUSE', 'GLOSSY', 'TRANSMISSION', 'EMIT'}}
+    if kind == 'BAKE_EMIT':
+        options = {'type': 'EMIT'}
+    elif kind == 'BAKE_DIFFUSE':
+        options = {'type': 'DIFFUSE', 'pass_filter': {'COLOR'}}
+    try:
+        with bpy.context.temp_override(object=obj, active_object=obj, selected_objects=[obj],
+                                       selected_editable_objects=[obj]):
+            bpy.ops.object.bake(margin=1, use_clear=True, target='IMAGE_TEXTURES', save_mode='INTERNAL', **options)
+    except RuntimeError as error:
+        raise StippleError(f"Baking the colors failed: {str(error).strip()}.", Status.ERROR_INTERNAL) from None
+    finally:
+        (render.engine, cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling,
+         render.bake.use_selected_to_active, render.bake.use_clear, render.bake.margin) = kept

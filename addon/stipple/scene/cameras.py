@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender cameras as StippleCamera.
+
+Blender: OpenGL frame (y up, looks along -z), lens over sensor, shift in units of the fitted side.
+Stipple: OpenCV frame (y down, looks along +z), intrinsics in pixels from the top left corner.
+"""
+
+from ctypes import c_double
+
+import numpy as np
+
+from ..binding.errors import StippleError
+from ..binding.structs import CameraModel, Status, StippleCamera
+from .facts import Border, picture_size
+
+_OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+def camera_of(camera_object, render, border=None):
+    """The camera of a render, over the whole picture or a pixel border of it.
+
+    Errors: StippleError for a missing camera and for panoramic or custom ones.
+    """
+    if camera_object is None or camera_object.type != 'CAMERA':
+        raise StippleError('The scene has no camera; a perspective or orthographic camera is needed to render.',
+                           Status.ERROR_INVALID_ARGUMENT)
+    width, height = picture_size(render)
+    return from_parts(camera_object.data, camera_object.matrix_world, width, height, render.pixel_aspect_x,
+                      render.pixel_aspect_y, border, camera_object.name)
+
+
+def from_parts(camera, matrix_world, width, height, aspect_x=1.0, aspect_y=1.0, border=None, name=''):
+    """The same from a camera datablock, its matrix and a picture size in pixels."""
+    if camera.type not in {'PERSP', 'ORTHO'}:
+        raise StippleError(f"Camera '{name or camera.name}' is of type {camera.type}; allowed are perspective and "
+                           'orthographic cameras.', Status.ERROR_UNSUPPORTED)
+    # Blender measures in units of a pixel's width: a pixel is `pixel_height` of them high.
+    pixel_height = aspect_y / aspect_x
+    fit = camera.sensor_fit
+    if fit == 'AUTO':
+        fitted_side = 'HORIZONTAL' if aspect_x * width >= aspect_y * height else 'VERTICAL'
+    else:
+        fitted_side = fit
+    fitted = width if fitted_side == 'HORIZONTAL' else pixel_height * height
+    if camera.type == 'PERSP':
+        # With the fit AUTO the sensor's width goes along whichever side is longer.
+        sensor = camera.sensor_height if fit == 'VERTICAL' else camera.sensor_width
+        focal = camera.lens / sensor * fitted
+        model = CameraModel.PERSPECTIVE
+    else:
+        focal = fitted / camera.ortho_scale
+        model = CameraModel.ORTHOGRAPHIC
+    cx = 0.5 * width - camera.shift_x * fitted
+    cy = 0.5 * height + camera.shift_y * fitted / pixel_height
+    if border is None:
+        border = Border(0, 0, width, height)
+    result = StippleCamera(model=int(model), width=border.width, height=border.height, fx=focal, fy=focal / pixel_height,
+                           cx=cx - border.x, cy=cy - (height - border.y - border.height),
+                           world_to_camera=(c_double * 16)(*world_to_camera(matrix_world).reshape(16)),
+                           near_plane=camera.clip_start, far_plane=camera.clip_end)
+    return result
+
+
+def world_to_camera(matrix_world):
+    """[4,4] rigid; a camera's scale does not change its picture."""
+    matrix = np.array(matrix_world, np.float64)
+    axes = matrix[:3, :3]
+    matrix[:3, :3] = axes / np.linalg.norm(axes, axis=0)
+    return _OPENGL_TO_OPENCV @ np.linalg.inv(matrix)

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splat objects that a view layer shows, with their instances, as native clouds."""
+
+from .. import version
+from ..binding.errors import StippleError
+from . import sources, splat_data, sync
+
+
+def gather(depsgraph, mode, warn=lambda message: None):
+    """[(cloud, 4x4 object to world)]. Decodes from evaluated settings; writes no datablock.
+
+    mode: 'VIEWPORT' or 'RENDER', which budget. warn: called with a sentence per object that is left out.
+    """
+    clouds, found = {}, []
+    for entry in depsgraph.object_instances:
+        obj = entry.object
+        if not splat_data.is_splat_object(obj) or not (entry.show_self or entry.is_instance):
+            continue
+        if not getattr(obj, 'visible_camera', True):
+            continue
+        if obj.is_holdout:
+            warn(f"Splat object '{obj.name}' is a holdout, which splats do not support; it is left out.")
+            continue
+        matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
+        key = obj.data.as_pointer()
+        if key not in clouds:
+            clouds[key] = _cloud_of(obj, mode)
+        if clouds[key] is not None:
+            found.append((clouds[key], matrix))
+    return found
+
+
+def _cloud_of(obj, mode):
+    """Native splats of an evaluated object, or None for none."""
+    data, original = obj.data, obj.original.data
+    stipple = data.stipple
+    from_source = stipple.source_kind == 'MODEL' and not stipple.edited and not _has_modifiers(obj)
+    if from_source and not sync.is_edited(original):
+        settings = sources.decode_settings(stipple, mode)
+        try:
+            return sources.decode(sources.absolute_path(stipple.source, original), settings)
+        except StippleError as error:
+            raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
+    if splat_data.count(data) == 0:
+        return None
+    return sources.cloud_from_data(data)
+
+
+def _has_modifiers(obj):
+    return any(modifier.show_viewport or modifier.show_render for modifier in obj.modifiers)

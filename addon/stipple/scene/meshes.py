@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Evaluated Blender meshes as native meshes: modifiers, instances, any number of objects."""
+
+import contextlib
+import zlib
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from .. import version
+from ..binding.errors import StippleError, invalid
+from ..binding.mesh import Mesh
+from ..binding.structs import MaterialColour
+from . import bake, colour, splat_data
+
+MESH_LIKE = {'MESH', 'CURVE', 'SURFACE', 'META', 'FONT'}
+
+
+@dataclass
+class Triangles:
+    """One evaluated mesh as arrays; filled once however many instances it has."""
+
+    name: str
+    positions: np.ndarray   # [V,3] object space
+    triangles: np.ndarray   # [T,3]
+    normals: np.ndarray     # [T,3,3], or None for flat faces
+    material_index: np.ndarray  # [T] slot
+    materials: list         # per slot; None for an empty one
+    uvs: dict = field(default_factory=dict)      # map → [T,3,2]
+    colours: dict = field(default_factory=dict)  # attribute → [T,3,4]
+    render_uv: str = ''
+    active_colour: str = ''
+
+
+def source_objects(objects):
+    """The objects among these that splats can be made from."""
+    return [obj for obj in objects if (obj.type in MESH_LIKE and not splat_data.is_splat_object(obj))
+            or obj.instance_type != 'NONE']
+
+
+def native_mesh(context, objects, depsgraph, color_from):
+    """All triangles of the objects and of what they instance, with colours, as one native mesh.
+
+    Errors: StippleError that names the object: no faces, NaN vertices, a texture, UV map or colour attribute missing.
+    """
+    instances = list(_instances(objects, depsgraph))
+    mesh = Mesh.create(context)
+    materials = _Materials(mesh)
+    cache = {}
+    seen = set()
+    for owner, evaluated, matrix in instances:
+        key = evaluated.data.as_pointer() if color_from != 'BAKED' else (evaluated.data.as_pointer(), matrix.tobytes())
+        if key not in cache:
+            cache[key] = _prepared(evaluated, matrix, color_from, depsgraph, materials, objects)
+        part = cache[key]
+        if part is None:
+            continue
+        seen.add(owner)
+        try:
+            mesh.add_part(matrix=matrix, **part)
+        except StippleError as error:
+            raise StippleError(f"Object '{evaluated.name}': {error}", error.status) from None
+    for obj in objects:
+        if obj not in seen:
+            raise invalid(f"Object '{obj.name}' has no faces; at least one is needed to make splats.")
+    return mesh
+
+
+@contextlib.contextmanager
+def shown(context, objects):
+    """Makes hidden source objects evaluate; puts them back as they were."""
+    hidden = [(obj, obj.hide_get(), obj.hide_viewport) for obj in objects]
+    try:
+        for obj, _, _ in hidden:
+            obj.hide_viewport = False
+            obj.hide_set(False)
+        context.view_layer.update()
+        yield
+    finally:
+        for obj, was_hidden, was_disabled in hidden:
+            obj.hide_viewport = was_disabled
+            obj.hide_set(was_hidden)
+
+
+def fingerprint(objects):
+    """A short text that changes with the shape, placement and materials of source objects."""
+    value = 0
+    for obj in objects:
+        value = zlib.crc32(np.array(obj.matrix_world, np.float32), value)
+        mesh = obj.data
+        if isinstance(mesh, bpy.types.Mesh):
+            positions = np.empty(len(mesh.vertices) * 3, np.float32)
+            mesh.vertices.foreach_get('co', positions)
+            value = zlib.crc32(positions, value)
+            value = zlib.crc32(f'{len(mesh.loops)} {len(mesh.polygons)}'.encode(), value)
+        value = zlib.crc32(' '.join(s.material.name for s in obj.material_slots if s.material).encode(), value)
+        value = zlib.crc32(' '.join(f'{m.type}{m.show_viewport}' for m in obj.modifiers).encode(), value)
+    return f'{value:08x}'
+
+
+def _instances(objects, depsgraph):
+    """(owner among objects, evaluated object, [4,4]) of everything that the objects show."""
+    wanted = set(objects)
+    for entry in depsgraph.object_instances:
+        owner = entry.parent.original if entry.is_instance else entry.object.original
+        if owner not in wanted or not (entry.show_self or entry.is_instance):
+            continue
+        evaluated = entry.object
+        if evaluated.type in MESH_LIKE and not splat_data.is_splats(evaluated.data):
+            yield owner, evaluated, version.copy_of_evaluated_matrix(entry.matrix_world)
+
+
+def _prepared(evaluated, matrix, color_from, depsgraph, materials, objects):
+    """The arguments of add_part for one evaluated object, or None where it has no triangle."""
+    if color_from == 'BAKED':
+        kinds = None
+    else:
+        kinds = [colour.base_colour_of(m) for m in _materials_of(evaluated)]
+    if color_from != 'ATTRIBUTE' and (kinds is None or any(k.kind.startswith('BAKE') for k in kinds)):
+        with bake.baked(evaluated, matrix, kinds, depsgraph, objects) as result:
+            if result is None:
+                return None
+            read = _read(result.mesh, evaluated.name, _materials_of(evaluated))
+            return _with_colours(read, kinds or [], materials, color_from, result)
+    temporary = evaluated.to_mesh()
+    try:
+        if temporary is None:
+            return None
+        read = _read(temporary, evaluated.name, _materials_of(evaluated, temporary))
+    finally:
+        evaluated.to_mesh_clear()
+    if len(read.triangles) == 0:
+        return None
+    return _with_colours(read, [colour.base_colour_of(m) for m in read.materials], materials, color_from, None)
+
+
+def _materials_of(evaluated, mesh=None):
+    """Materials per slot: the evaluated data's, and the object's own where a slot says so."""
+    data = mesh if mesh is not None else evaluated.data
+    found = list(data.materials) if hasattr(data, 'materials') else []
+    for index, slot in enumerate(evaluated.material_slots):
+        if index >= len(found):
+            found.append(slot.material)
+        elif slot.link == 'OBJECT':
+            found[index] = slot.material
+    return found
+
+
+def _read(mesh, name, materials):
+    mesh.calc_loop_triangles()
+    triangle_count, loop_count = len(mesh.loop_triangles), len(mesh.loops)
+    loops = np.empty(triangle_count * 3, np.int32)
+    mesh.loop_triangles.foreach_get('loops', loops)
+    loops = loops.reshape(-1, 3)
+    vertices = np.empty(triangle_count * 3, np.int32)
+    mesh.loop_triangles.foreach_get('vertices', vertices)
+    vertices = vertices.reshape(-1, 3)
+    positions = np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.vertices.foreach_get('co', positions)
+    slots = np.empty(triangle_count, np.int32)
+    mesh.loop_triangles.foreach_get('material_index', slots)
+    result = Triangles(name, positions.reshape(-1, 3), vertices, version.corner_normals(mesh, loops, vertices), slots,
+                       materials)
+    for layer in mesh.uv_layers:
+        result.uvs[layer.name] = version.loop_uvs(layer, loop_count)[loops]
+        if layer.active_render:
+            result.render_uv = layer.name
+    for attribute in mesh.color_attributes:
+        values = np.empty(len(attribute.data) * 4, np.float32)
+        attribute.data.foreach_get('color', values)
+        index = vertices if attribute.domain == 'POINT' else loops
+        result.colours[attribute.name] = values.reshape(-1, 4)[index]
+    if len(mesh.color_attributes) and mesh.color_attributes.active_color is not None:
+        result.active_colour = mesh.color_attributes.active_color.name
+    return result
+
+
+def _with_colours(read, kinds, materials, color_from, baked):
+    """Chooses per triangle its material, UV and colour, as the native mesh wants them."""
+    count = len(read.triangles)
+    part = {'positions': read.positions, 'triangles': read.triangles, 'corner_normals': read.normals}
+    if color_from == 'ATTRIBUTE':
+        part['corner_colours'] = _attribute(read, '')
+        part['triangle_materials'] = np.full(count, materials.corner(), np.uint32)
+        return part
+    if baked is not None and color_from == 'BAKED':
+        part['corner_uvs'] = baked.uvs
+        part['triangle_materials'] = np.full(count, materials.baked(baked.image('COMBINED')), np.uint32)
+        return part
+    uvs = colours = None
+    baked_materials = {}
+    chosen = np.zeros(count, np.uint32)
+    slot_of = np.minimum(read.material_index, max(len(kinds) - 1, 0))
+    for slot in np.unique(slot_of):
+        mask = slot_of == slot
+        kind = kinds[slot] if len(kinds) else colour.BaseColour('CONSTANT')
+        material_name = read.materials[slot].name if len(kinds) and read.materials[slot] else 'none'
+        if kind.kind == 'CONSTANT':
+            chosen[mask] = materials.constant(kind.rgba)
+        elif kind.kind == 'CORNER':
+            values = _attribute(read, kind.attribute)
+            colours = values if colours is None else np.where(mask[:, None, None], values, colours)
+            chosen[mask] = materials.corner()
+        elif kind.kind == 'TEXTURE':
+            values = _uv(read, kind.uv_map, kind.image.name)
+            uvs = values if uvs is None else np.where(mask[:, None, None], values, uvs)
+            chosen[mask] = materials.texture(kind.image, material_name)
+        else:
+            uvs = baked.uvs if uvs is None else np.where(mask[:, None, None], baked.uvs, uvs)
+            if kind.kind not in baked_materials:
+                baked_materials[kind.kind] = materials.baked(baked.image(kind.kind))
+            chosen[mask] = baked_materials[kind.kind]
+    part.update(corner_uvs=uvs, corner_colours=colours, triangle_materials=chosen)
+    return part
+
+
+def _uv(read, name, image_name):
+    values = read.uvs.get(name or read.render_uv)
+    if values is None:
+        wanted = f"UV map '{name}'" if name else 'UV map'
+        raise invalid(f"Object '{read.name}' has no {wanted}, which image '{image_name}' needs; unwrap the object or "
+                      'choose another color source.')
+    return values
+
+
+def _attribute(read, name):
+    values = read.colours.get(name or read.active_colour)
+    if values is None:
+        wanted = f"color attribute '{name}'" if name else 'color attribute'
+        raise invalid(f"Object '{read.name}' has no {wanted}; add one or choose another color source.")
+    return values
+
+
+class _Materials:
+    """Native materials and textures, each made once."""
+
+    def __init__(self, mesh):
+        self._mesh = mesh
+        self._indices = {}
+
+    def constant(self, rgba):
+        return self._once(('constant', rgba), lambda: self._mesh.add_material(base_colour=rgba))
+
+    def corner(self):
+        return self._once('corner', lambda: self._mesh.add_material(MaterialColour.CORNER))
+
+    def texture(self, image, material_name):
+        def make():
+            pixels, srgb = colour.image_pixels(image, material_name)
+            return self._mesh.add_material(MaterialColour.TEXTURE, texture=self._mesh.add_texture(pixels, srgb))
+        return self._once(('image', image.name_full), make)
+
+    def baked(self, pixels):
+        texture = self._mesh.add_texture(pixels, srgb=False)
+        return self._mesh.add_material(MaterialColour.TEXTURE, texture=texture)
+
+    def _once(self, key, make):
+        if key not in self._indices:
+            self._indices[key] = make()
+        return self._indices[key]

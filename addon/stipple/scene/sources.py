@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sources of splats: the native context, models read from asset files, clouds decoded from them.
+
+Both caches are native memory, keyed by the file's identity and the settings. Nothing here writes
+Blender data.
+"""
+
+import filecmp
+import os
+import re
+from collections import OrderedDict
+
+import bpy
+
+from .. import preferences, version
+from ..binding import library
+from ..binding.cloud import Cloud
+from ..binding.context import Context
+from ..binding.errors import StippleError
+from ..binding.model import DecodeSettings, Model
+from ..binding.structs import AnchorOrder, Status
+from . import meshes, splat_data
+
+MODEL_SUFFIX = '.stipple.safetensors'
+_MAX_MODELS = 4
+# Splats kept decoded over all cached clouds; 60 bytes each, so 1.2 GB at most.
+_MAX_CACHED_SPLATS = 20_000_000
+
+_contexts = {}
+_models = OrderedDict()
+_clouds = OrderedDict()
+
+
+def context():
+    """The native context of the current preferences. Errors: LibraryError."""
+    chosen = preferences.get()
+    path, threads, limit = '', 0, 0
+    if chosen is not None:
+        path, threads, limit = bpy.path.abspath(chosen.library_path), chosen.threads, chosen.memory_limit << 20
+    key = (str(library.find(path)), threads, limit)
+    if key not in _contexts:
+        _contexts.clear()
+        _contexts[key] = Context(library.load(path), threads, limit)
+    return _contexts[key]
+
+
+def forget():
+    """Gives all native memory back."""
+    _clouds.clear()
+    _models.clear()
+    _contexts.clear()
+
+
+def absolute_path(source, owner=None):
+    """A source path of a datablock as the system wants it."""
+    return os.path.normpath(bpy.path.abspath(source, library=owner.library if owner is not None else None))
+
+
+def model(path):
+    """The model of an asset file, read once. Errors: StippleError for a missing or broken file."""
+    key = _file_key(path)
+    known = _models.get(key)
+    if known is None:
+        known = Model.load(context(), path)
+        remember_model(path, known)
+    _models.move_to_end(key)
+    return known
+
+
+def remember_model(path, loaded):
+    _models[_file_key(path)] = loaded
+    while len(_models) > _MAX_MODELS:
+        _models.popitem(last=False)
+
+
+def decode(path, settings):
+    """The cloud of a model at these settings; kept for the next picture."""
+    key = (_file_key(path), settings)
+    cloud = _clouds.get(key)
+    if cloud is None:
+        cloud = model(path).decode(settings)
+        _clouds[key] = cloud
+        total = sum(k[1].anchors * k[1].gaussians_per_anchor for k in _clouds)
+        while total > _MAX_CACHED_SPLATS and len(_clouds) > 1:
+            (_, old), _dropped = _clouds.popitem(last=False)
+            total -= old.anchors * old.gaussians_per_anchor
+    _clouds.move_to_end(key)
+    return cloud
+
+
+def decode_settings(stipple, mode='VIEWPORT'):
+    """The settings of a datablock as the binding takes them; mode 'RENDER' takes the render budget."""
+    anchors = stipple.anchors
+    if mode == 'RENDER' and stipple.anchors_render != 0:
+        anchors = stipple.anchors_render
+    return DecodeSettings(anchors, stipple.gaussians_per_anchor, AnchorOrder[stipple.order], stipple.seed)
+
+
+def cloud_from_data(data):
+    """The cloud of the attributes as they are."""
+    return Cloud.create(context(), splat_data.read(data))
+
+
+def model_path_for(name, given=''):
+    """Where the source of a new splat object goes: the given path, beside the saved file, else the cache folder."""
+    if given:
+        return absolute_path(given)
+    file_name = re.sub(r'[^\w.\- ]', '_', name) + MODEL_SUFFIX
+    if bpy.data.filepath:
+        return os.path.join(os.path.dirname(bpy.data.filepath), 'stipple', file_name)
+    return os.path.join(cache_folder(), file_name)
+
+
+def cache_folder():
+    chosen = preferences.get()
+    if chosen is not None and chosen.cache_folder:
+        return bpy.path.abspath(chosen.cache_folder)
+    return version.user_folder(__package__.rpartition('.')[0])
+
+
+def save_model(built, path, overwrite=False):
+    """Writes a model and returns its path. Another file of that name stays: the new one gets a number,
+    unless it is the same to the byte. Errors: StippleError for a folder that cannot be written."""
+    return _save(built.save, path, MODEL_SUFFIX, overwrite)
+
+
+def save_cloud(cloud, name):
+    """Writes splats as a source of their own, beside the other sources; returns the path."""
+    path = model_path_for(name)[:-len(MODEL_SUFFIX)] + '.ply'
+    return _save(cloud.save, path, '.ply', False)
+
+
+def _save(write, path, suffix, overwrite):
+    folder = os.path.dirname(path)
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise StippleError(f"The folder '{folder}' cannot be made: {error.strerror}.", Status.ERROR_IO) from None
+    if overwrite or not os.path.exists(path):
+        write(path)
+        return path
+    stem = path[:-len(suffix)] if path.endswith(suffix) else os.path.splitext(path)[0]
+    fresh = f'{stem}.{os.getpid()}.new{suffix}'
+    write(fresh)
+    try:
+        for number in range(1, 1000):
+            if not os.path.exists(path):
+                os.rename(fresh, path)
+                return path
+            if filecmp.cmp(fresh, path, shallow=False):
+                return path
+            path = f'{stem}.{number:03d}{suffix}'
+    finally:
+        if os.path.exists(fresh):
+            os.remove(fresh)
+    raise StippleError(f"'{stem}' has 1,000 numbered sources already; remove some of them.", Status.ERROR_IO)
+
+
+def attach_model(data, path, objects):
+    """Notes a model as the source of a datablock, with the meshes and settings that it was made from."""
+    stipple = data.stipple
+    stipple.source = blend_path(path)
+    stipple.source_kind = 'MODEL'
+    stipple.source_detail_weight = stipple.detail_weight
+    stipple.source_color_from = stipple.color_from
+    stipple.source_objects.clear()
+    for obj in objects:
+        stipple.source_objects.add().object = obj
+    stipple.source_fingerprint = meshes.fingerprint(objects)
+    stipple.source_changed = False
+    stipple.edited = False
+
+
+def blend_path(path):
+    """A path as it is stored: relative to the .blend where that is saved and on the same root."""
+    return bpy.path.relpath(path) if bpy.data.filepath else path
+
+
+def _file_key(path):
+    try:
+        status = os.stat(path)
+    except OSError as error:
+        raise StippleError(f"The splats' source '{path}' cannot be read: {error.strerror}.", Status.ERROR_IO) from None
+    return path, status.st_mtime_ns, status.st_size

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splats as Blender data.
+
+5.2 and later: a point cloud with the attributes of Blender's own splats. Before: a mesh of vertices
+with the same names. `rotation` is w,x,y,z; `radiance:base` holds the DC harmonics and the opacity;
+`radiance:sh_<i>` the other coefficients, one colour each.
+"""
+
+import zlib
+
+import bpy
+import numpy as np
+
+from .. import version
+from ..binding.cloud import SplatArrays, sh_degree_of
+from ..binding.errors import StippleError
+from ..binding.structs import Antialias, ColourSpace, Status
+
+LAYOUT_KEY = 'stipple_layout'
+LAYOUT = 1
+COLOUR_SPACE_KEY = 'stipple_colour_space'
+ANTIALIAS_KEY = 'stipple_antialias'
+_COLOUR_SPACES = {ColourSpace.DISPLAY: 'srgb_rec709_display', ColourSpace.LINEAR: 'lin_rec709_display'}
+_ANTIALIAS = {Antialias.CLASSIC: 'classic', Antialias.MIP: 'mip'}
+# Smallest scale that is stored, metres: viewers take logarithms, of which zero has none.
+MIN_SCALE = 1e-9
+
+
+def new_data(name):
+    """An empty splat datablock of the kind that this Blender holds splats in."""
+    data = bpy.data.pointclouds.new(name) if version.HAS_SIZED_POINT_CLOUDS else bpy.data.meshes.new(name)
+    data[LAYOUT_KEY] = LAYOUT
+    return data
+
+
+def is_splats(data):
+    """True for data that Stipple made; also for evaluated copies."""
+    return data is not None and isinstance(data, (bpy.types.Mesh, bpy.types.PointCloud)) and (
+        data.get(LAYOUT_KEY) is not None)
+
+
+def is_splat_object(obj):
+    return obj is not None and obj.type in {'MESH', 'POINTCLOUD'} and is_splats(obj.data)
+
+
+def count(data):
+    return len(data.vertices) if isinstance(data, bpy.types.Mesh) else len(data.points)
+
+
+def write(data, arrays):
+    """Replaces the splats of a datablock."""
+    if isinstance(data, bpy.types.Mesh) and data.is_editmode:
+        raise StippleError(f"'{data.name}' is in Edit Mode; leave it before its splats are written.",
+                           Status.ERROR_INVALID_ARGUMENT)
+    _resize(data, arrays.count)
+    if isinstance(data, bpy.types.Mesh):
+        data.vertices.foreach_set('co', _flat(arrays.positions))
+    else:
+        _set(data, 'position', 'FLOAT_VECTOR', arrays.positions)
+    _set(data, 'scale', 'FLOAT_VECTOR', np.maximum(arrays.scales, np.float32(MIN_SCALE)))
+    _set(data, 'rotation', version.ROTATION_TYPE, arrays.rotations)
+    base = np.empty((arrays.count, 4), np.float32)
+    base[:, :3] = arrays.sh[:, 0]
+    base[:, 3] = arrays.opacities
+    _set(data, 'radiance:base', version.BASE_TYPE, base)
+    rest = arrays.sh.shape[1] - 1
+    for i in range(rest):
+        _set(data, f'radiance:sh_{i}', 'FLOAT_VECTOR', arrays.sh[:, i + 1])
+    for name in [a.name for a in data.attributes if a.name.startswith('radiance:sh_')]:
+        if int(name.rpartition('_')[2]) >= rest:
+            data.attributes.remove(data.attributes[name])
+    data[LAYOUT_KEY] = LAYOUT
+    data[COLOUR_SPACE_KEY] = _COLOUR_SPACES[ColourSpace(arrays.colour_space)]
+    data[ANTIALIAS_KEY] = _ANTIALIAS[Antialias(arrays.antialias)]
+    if isinstance(data, bpy.types.Mesh):
+        data.update()
+    data.update_tag()
+
+
+def read(data):
+    """The splats of a datablock, original or evaluated. Errors: StippleError for attributes that are missing."""
+    n = count(data)
+    if isinstance(data, bpy.types.Mesh):
+        positions = np.empty(n * 3, np.float32)
+        data.vertices.foreach_get('co', positions)
+    else:
+        positions = _get(data, 'position', n, 3)
+    scales, rotations, base = _get(data, 'scale', n, 3), _get(data, 'rotation', n, 4), _get(data, 'radiance:base', n, 4)
+    base = base.reshape(n, 4)
+    rest = 0
+    while data.attributes.get(f'radiance:sh_{rest}') is not None:
+        rest += 1
+    sh_degree_of(rest + 1)
+    sh = np.empty((n, rest + 1, 3), np.float32)
+    sh[:, 0] = base[:, :3]
+    for i in range(rest):
+        sh[:, i + 1] = _get(data, f'radiance:sh_{i}', n, 3).reshape(n, 3)
+    return SplatArrays(positions.reshape(n, 3), rotations.reshape(n, 4), scales.reshape(n, 3), base[:, 3].copy(), sh,
+                       _key_of(_COLOUR_SPACES, data.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
+                       _key_of(_ANTIALIAS, data.get(ANTIALIAS_KEY), Antialias.CLASSIC))
+
+
+def fingerprint(data):
+    """A short text that changes with positions, shapes or colours."""
+    n = count(data)
+    value = zlib.crc32(str(n).encode())
+    if isinstance(data, bpy.types.Mesh):
+        positions = np.empty(n * 3, np.float32)
+        data.vertices.foreach_get('co', positions)
+        value = zlib.crc32(positions, value)
+    for attribute in data.attributes:
+        field = version.ATTRIBUTE_FIELDS.get(attribute.data_type)
+        if attribute.domain != 'POINT' or field is None or not (
+                attribute.name in {'position', 'scale', 'rotation'} or attribute.name.startswith('radiance:')):
+            continue
+        if attribute.name == 'position' and isinstance(data, bpy.types.Mesh):
+            continue
+        width = {'FLOAT': 1, 'FLOAT_VECTOR': 3}.get(attribute.data_type, 4)
+        values = np.empty(n * width, np.float32)
+        attribute.data.foreach_get(field, values)
+        value = zlib.crc32(values, value)
+    return f'{value:08x}'
+
+
+def _resize(data, n):
+    if count(data) == n:
+        return
+    if isinstance(data, bpy.types.Mesh):
+        data.clear_geometry()
+        data.vertices.add(n)
+    else:
+        data.resize(n)
+
+
+def _set(data, name, kind, values):
+    attribute = data.attributes.get(name)
+    if attribute is not None and (attribute.data_type != kind or attribute.domain != 'POINT'):
+        data.attributes.remove(attribute)
+        attribute = None
+    if attribute is None:
+        data.attributes.new(name, kind, 'POINT')
+    # Looked up again: references may be stale after new().
+    data.attributes[name].data.foreach_set(version.ATTRIBUTE_FIELDS[kind], _flat(values))
+
+
+def _get(data, name, n, width):
+    attribute = data.attributes.get(name)
+    if attribute is None:
+        raise StippleError(f"'{data.name}' has no attribute '{name}'; a splat object needs position, scale, rotation "
+                           'and radiance:base.', Status.ERROR_INVALID_ARGUMENT)
+    values = np.empty(n * width, np.float32)
+    attribute.data.foreach_get(version.ATTRIBUTE_FIELDS[attribute.data_type], values)
+    return values
+
+
+def _flat(values):
+    # foreach_set copies at once only from a flat, contiguous buffer of the plain format 'f'.
+    return np.ascontiguousarray(values, np.float32).reshape(-1).view(np.float32)
+
+
+def _key_of(table, text, default):
+    return next((key for key, value in table.items() if value == text), default)

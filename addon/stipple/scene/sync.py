@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keeps the stored splats equal to (source, settings).
+
+One function writes: sync(). It is called when a property changes, and by the handlers below: a
+property's update function is not called when the property is animated, undone or loaded.
+"""
+
+import logging
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..binding.errors import StippleError
+from . import meshes, sources, splat_data
+
+WRITTEN_KEY = 'stipple_written'
+FINGERPRINT_KEY = 'stipple_fingerprint'
+
+log = logging.getLogger('stipple')
+# What is wrong with a datablock, by name, for the panel; empty while all is well.
+problems = {}
+_state = {'paused': 0, 'rendering': False}
+
+
+class paused:
+    """While it lasts, changing settings does not decode (an operator sets several, then syncs once)."""
+
+    def __enter__(self):
+        _state['paused'] += 1
+
+    def __exit__(self, *_):
+        _state['paused'] -= 1
+
+
+def sync(obj, depsgraph, mode):
+    """Writes the attributes that an object's data should have now. Returns True where it wrote.
+
+    depsgraph: evaluated settings (animation, drivers) are read through it; None: the settings as they are.
+    mode: 'VIEWPORT' or 'RENDER'. Errors: StippleError, with the splats as they were.
+    """
+    data = obj.data
+    stipple = data.stipple
+    if stipple.source_kind != 'MODEL' or not stipple.source or stipple.edited:
+        return False
+    settings = sources.decode_settings(_evaluated(data, depsgraph), mode)
+    key = written_key(stipple, settings)
+    if data.get(WRITTEN_KEY) == key:
+        return False
+    settings.check()
+    if is_edited(data):
+        stipple.edited = True
+        raise StippleError(f"The splats of '{data.name}' were edited by hand; use them as a new source, or revert to "
+                           'the source, to change their settings.')
+    cloud = sources.model(sources.absolute_path(stipple.source, data)).decode(settings)
+    write(data, cloud.read(), key)
+    return True
+
+
+def write(data, arrays, key):
+    """Stores splats together with what they were made from."""
+    splat_data.write(data, arrays)
+    data[FINGERPRINT_KEY] = splat_data.fingerprint(data)
+    data[WRITTEN_KEY] = key
+
+
+def write_decoded(data, arrays):
+    """Stores splats that were decoded with the present settings."""
+    write(data, arrays, written_key(data.stipple, sources.decode_settings(data.stipple)))
+
+
+def written_key(stipple, settings):
+    """A text that is equal for equal splats."""
+    return f'{stipple.source}|{settings.anchors}|{settings.gaussians_per_anchor}|{int(settings.order)}|{settings.seed}'
+
+
+def copy_settings(old, new):
+    """All settings of one splat datablock to another, animation included."""
+    for name in old.stipple.bl_rna.properties.keys():
+        if name not in {'rna_type', 'name', 'source_objects'}:
+            setattr(new.stipple, name, getattr(old.stipple, name))
+    for entry in old.stipple.source_objects:
+        new.stipple.source_objects.add().object = entry.object
+    if old.animation_data is not None and old.animation_data.action is not None:
+        new.animation_data_create().action = old.animation_data.action
+
+
+def is_edited(data):
+    """True where the attributes are not the ones that were written last."""
+    known = data.get(FINGERPRINT_KEY)
+    return known is not None and known != splat_data.fingerprint(data)
+
+
+def on_property_change(stipple, _context):
+    """Update function of the settings: decodes at once."""
+    if _state['paused'] or _state['rendering']:
+        return
+    data = stipple.id_data
+    users = [obj for obj in bpy.data.objects if obj.data == data]
+    if users:
+        try_sync(users[0], None, 'VIEWPORT')
+
+
+def try_sync(obj, depsgraph, mode):
+    """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once."""
+    name = obj.data.name
+    try:
+        sync(obj, depsgraph, mode)
+        problems.pop(name, None)
+    except StippleError as error:
+        if problems.get(name) != str(error):
+            log.error('%s: %s', name, error)
+        problems[name] = str(error)
+
+
+def splat_objects():
+    """One object for every splat datablock that has users in this file."""
+    found = {}
+    for obj in bpy.data.objects:
+        if splat_data.is_splat_object(obj) and obj.data.stipple.source:
+            found.setdefault(obj.data.name_full, obj)
+    return found.values()
+
+
+def sync_all(depsgraph=None, mode='VIEWPORT'):
+    if _state['paused']:
+        return
+    for obj in list(splat_objects()):
+        try_sync(obj, depsgraph, mode)
+
+
+def _evaluated(data, depsgraph):
+    """The settings as animation and drivers have them."""
+    return data.stipple if depsgraph is None else data.evaluated_get(depsgraph).stipple
+
+
+def _needs_attributes(scene):
+    """The engine Stipple decodes for itself; every other one draws the stored attributes."""
+    return scene.render.engine != 'STIPPLE'
+
+
+@persistent
+def _frame_change_post(scene, depsgraph=None):
+    if _state['rendering'] and not _needs_attributes(scene):
+        return
+    sync_all(depsgraph, 'RENDER' if _state['rendering'] else 'VIEWPORT')
+
+
+@persistent
+def _render_init(_scene, _=None):
+    _state['rendering'] = True
+
+
+@persistent
+def _render_pre(scene, _=None):
+    _state['rendering'] = True
+    if _needs_attributes(scene):
+        sync_all(_animated_depsgraph(scene), 'RENDER')
+
+
+@persistent
+def _render_end(scene, _=None):
+    _state['rendering'] = False
+    if _needs_attributes(scene):
+        sync_all(_animated_depsgraph(scene), 'VIEWPORT')
+
+
+def _animated_depsgraph(_scene):
+    return bpy.context.evaluated_depsgraph_get()
+
+
+@persistent
+def _restored(*_):
+    """After undo, redo and loading: splats that do not fit their settings are decoded again."""
+    problems.clear()
+    _state['rendering'] = False
+    sync_all()
+
+
+@persistent
+def _depsgraph_update_post(scene, depsgraph):
+    """Notices when the mesh that splats were made from changes."""
+    if _state['rendering'] or not any(update.is_updated_geometry for update in depsgraph.updates):
+        return
+    changed = {update.id.original for update in depsgraph.updates
+               if update.is_updated_geometry and isinstance(update.id, bpy.types.Object)}
+    for obj in splat_objects():
+        stipple = obj.data.stipple
+        if stipple.source_changed or obj.data.library is not None:
+            continue
+        objects = [entry.object for entry in stipple.source_objects if entry.object is not None]
+        if changed.intersection(objects) and meshes.fingerprint(objects) != stipple.source_fingerprint:
+            stipple.source_changed = True
+
+
+_HANDLERS = (('frame_change_post', _frame_change_post), ('render_init', _render_init), ('render_pre', _render_pre),
+             ('render_complete', _render_end), ('render_cancel', _render_end), ('undo_post', _restored),
+             ('redo_post', _restored), ('load_post', _restored), ('depsgraph_update_post', _depsgraph_update_post))
+
+
+def register():
+    for name, function in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(function)
+
+
+def unregister():
+    for name, function in _HANDLERS:
+        handlers = getattr(bpy.app.handlers, name)
+        if function in handlers:
+            handlers.remove(function)
+    problems.clear()
+    sources.forget()

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every difference between Blender versions (3.4 to 5.x), in one place."""
+
+import os
+
+import bpy
+import numpy as np
+
+VERSION = bpy.app.version
+
+# Splat objects are point clouds where Python can size one, vertex meshes before.
+HAS_SIZED_POINT_CLOUDS = VERSION >= (5, 2, 0)
+HAS_NATIVE_SPLATS = VERSION >= (5, 3, 0)
+ROTATION_TYPE = 'QUATERNION' if VERSION >= (4, 0, 0) else 'FLOAT_COLOR'
+# Point clouds carry four plain floats as FLOAT4; on meshes FLOAT_COLOR is the only type with four.
+BASE_TYPE = 'FLOAT4' if HAS_SIZED_POINT_CLOUDS else 'FLOAT_COLOR'
+ATTRIBUTE_FIELDS = {'FLOAT': 'value', 'FLOAT_VECTOR': 'vector', 'FLOAT_COLOR': 'color', 'QUATERNION': 'value',
+                    'FLOAT4': 'value'}
+EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BLENDER_EEVEE'
+
+
+def user_folder(package):
+    """The folder in Blender's user resources where this add-on may write."""
+    if VERSION >= (4, 2, 0) and package.startswith('bl_ext.'):
+        return bpy.utils.extension_path_user(package, create=True)
+    return bpy.utils.user_resource('DATAFILES', path='stipple', create=True)
+
+
+def is_writable_folder(path):
+    return os.path.isdir(path) and os.access(path, os.W_OK)
+
+
+def session_uid(data):
+    """A number that stays with a datablock during this session, or 0 where Blender has none."""
+    return getattr(data, 'session_uid', 0)
+
+
+def corner_normals(mesh, loop_indices, triangle_vertices):
+    """Normals [T,3,3] of the triangle corners, or None where every face is flat."""
+    if VERSION >= (4, 1, 0):
+        if mesh.normals_domain == 'FACE':
+            return None
+        if mesh.normals_domain == 'POINT':
+            return _get(mesh.vertex_normals, 'vector', len(mesh.vertices), 3)[triangle_vertices]
+        return _get(mesh.corner_normals, 'vector', len(mesh.loops), 3)[loop_indices]
+    smooth = np.empty(len(mesh.polygons), np.bool_)
+    mesh.polygons.foreach_get('use_smooth', smooth)
+    if not mesh.has_custom_normals:
+        if not smooth.any():
+            return None
+        if smooth.all() and not mesh.use_auto_smooth:
+            return _get(mesh.vertices, 'normal', len(mesh.vertices), 3)[triangle_vertices]
+    mesh.calc_normals_split()
+    return _get(mesh.loops, 'normal', len(mesh.loops), 3)[loop_indices]
+
+
+def loop_uvs(layer, count):
+    """UVs [count,2] of a UV layer."""
+    if VERSION >= (3, 5, 0):
+        return _get(layer.uv, 'vector', count, 2)
+    return _get(layer.data, 'uv', count, 2)
+
+
+def set_loop_uvs(layer, uvs):
+    flat = np.ascontiguousarray(uvs, np.float32).reshape(-1)
+    if VERSION >= (3, 5, 0):
+        layer.uv.foreach_set('vector', flat)
+    else:
+        layer.data.foreach_set('uv', flat)
+
+
+def _get(collection, field, count, width):
+    array = np.empty(count * width, np.float32)
+    collection.foreach_get(field, array)
+    return array.reshape(count, width)
+
+
+def fill_pass(render_pass, array):
+    """Fills a render pass from float32 values, bottom row first."""
+    flat = np.ascontiguousarray(array, np.float32).reshape(-1)
+    if VERSION >= (4, 0, 0) or render_pass.channels == 1:
+        render_pass.rect.foreach_set(flat)
+        return
+    # Before 4.0 the length is checked in pixels while all channels are copied: a view of the first
+    # width*height floats of the whole, contiguous buffer passes.
+    pixel_count = len(render_pass.rect)
+    assert flat.size == pixel_count * render_pass.channels
+    render_pass.rect.foreach_set(flat[:pixel_count])
+
+
+def pixel_border(border_minimum, border_maximum, size):
+    """First and last+1 pixel of a render border along one side; Blender truncates single floats."""
+    low = int(np.float32(border_minimum) * np.float32(size))
+    high = int(np.float32(border_maximum) * np.float32(size))
+    return low, max(high, low + 1)
+
+
+def use_nodes(material):
+    """Gives a new material its node tree (5.x materials always have one)."""
+    if VERSION < (5, 0, 0):
+        material.use_nodes = True
+
+
+def has_nodes(material):
+    return material.node_tree is not None and (VERSION >= (5, 0, 0) or material.use_nodes)
+
+
+def copy_of_evaluated_matrix(matrix):
+    """Depsgraph iterators reuse their memory: values have to be taken at once."""
+    return np.array(matrix, np.float64)
