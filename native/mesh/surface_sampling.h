@@ -9,16 +9,16 @@
 namespace stipple {
 
 struct SurfaceSamplingOptions {
-  uint64_t count = 500000;    ///< samples; more of them follow detail closer, cost memory and time
-  double detail_weight = 1.0;  ///< >= 0; 0: anchors are uniform over the area; 1: places with texture
-                               ///< detail or curvature attract several times more
+  uint64_t count = 500000;     ///< samples; more of them follow detail closer, cost memory and time
+  double detail_weight = 1.0;  ///< >= 0; 0: anchors are uniform over the area; 1: places with
+                               ///< texture detail or curvature attract several times more
   uint64_t seed = 0;
 };
 
-/// Area-weighted, stratified samples of every triangle of a mesh, with normals (interpolated), colours
-/// (scene linear) and weights for the density (area times detail).
-/// Errors: kInvalidArgument for a mesh without area or a mesh that validate() refuses.
-/// Same result for any number of threads.
+/// Area-weighted, stratified samples of every triangle of a mesh, with normals (interpolated),
+/// colours (scene linear) and weights for the density (area times detail). Errors: kInvalidArgument
+/// for a mesh without area or a mesh that validate() refuses. Same result for any number of
+/// threads.
 PointSet sampleSurface(const TriMesh& mesh, const SurfaceSamplingOptions& options,
                        Progress* progress = nullptr);
 

@@ -1,0 +1,273 @@
+#include "mesh/surface_sampling.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "math/colour.h"
+
+namespace stipple {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Two triangles of a rectangle of width x height in z = 0, normal +z.
+TriMesh rectangle(float width, float height) {
+  TriMesh mesh;
+  mesh.positions = {0, 0, 0, width, 0, 0, width, height, 0, 0, height, 0};
+  mesh.triangles = {0, 1, 2, 0, 2, 3};
+  mesh.materials.resize(1);
+  return mesh;
+}
+
+void addRectangleUvs(TriMesh& mesh) {
+  mesh.corner_uvs = {0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 1};
+}
+
+PointSet sampled(const TriMesh& mesh, uint64_t count, double detail_weight = 0, uint64_t seed = 0) {
+  SurfaceSamplingOptions options;
+  options.count = count;
+  options.detail_weight = detail_weight;
+  options.seed = seed;
+  return sampleSurface(mesh, options);
+}
+
+TEST(SurfaceSampling, GivesExactlyTheCountWithTheWholeAreaSharedEqually) {
+  const PointSet set = sampled(rectangle(3, 2), 1000);
+  ASSERT_EQ(set.size(), 1000u);
+  double area = 0;
+  for (const float share : set.areas) area += static_cast<double>(share);
+  EXPECT_NEAR(area, 6.0, 6e-7 * 10);  // 1000 float roundings of 6e-3
+  EXPECT_EQ(set.weights, set.areas);
+}
+
+TEST(SurfaceSampling, LiesOnTheSurfaceAndFollowsItsArea) {
+  // One triangle of area 1.5 and one of 0.5: three quarters of the samples, one stratum off at
+  // most.
+  TriMesh mesh;
+  mesh.positions = {0, 0, 0, 3, 0, 0, 0, 1, 0, 0, 0, 5, 1, 0, 5, 0, 1, 5};
+  mesh.triangles = {0, 1, 2, 3, 4, 5};
+  mesh.materials.resize(1);
+  const PointSet set = sampled(mesh, 4000);
+  size_t low = 0;
+  for (size_t i = 0; i < set.size(); ++i) {
+    const float* p = &set.positions[i * 3];
+    if (p[2] == 0.0f) {
+      ++low;
+      EXPECT_LE(p[0] / 3 + p[1], 1 + 1e-6f);
+    } else {
+      EXPECT_EQ(p[2], 5.0f);
+      EXPECT_LE(p[0] + p[1], 1 + 1e-6f);
+    }
+    EXPECT_GE(p[0], 0.0f);
+    EXPECT_GE(p[1], 0.0f);
+  }
+  EXPECT_NEAR(static_cast<double>(low), 3000.0, 1.0);
+}
+
+TEST(SurfaceSampling, IsStratifiedInsideALargeTriangle) {
+  // 10,000 samples over 20 x 20 cells: independent draws would leave a standard deviation of 5 per
+  // cell of 25; a low-discrepancy set keeps far below half of it.
+  const PointSet set = sampled(rectangle(1, 1), 10000);
+  std::vector<double> cells(400, 0.0);
+  for (size_t i = 0; i < set.size(); ++i) {
+    const auto x = static_cast<size_t>(std::min(set.positions[i * 3] * 20, 19.0f));
+    const auto y = static_cast<size_t>(std::min(set.positions[i * 3 + 1] * 20, 19.0f));
+    cells[y * 20 + x] += 1;
+  }
+  double variance = 0;
+  for (const double cell : cells) variance += (cell - 25) * (cell - 25) / 400;
+  EXPECT_LT(std::sqrt(variance), 2.5);
+}
+
+TEST(SurfaceSampling, SkipsFacesWithoutArea) {
+  TriMesh mesh = rectangle(1, 1);
+  mesh.triangles = {0, 0, 1, 0, 1, 2, 1, 1, 1, 0, 2, 3, 3, 3, 3};
+  const PointSet set = sampled(mesh, 5000);
+  for (size_t i = 0; i < set.size(); ++i) {
+    ASSERT_TRUE(std::isfinite(set.positions[i * 3]));
+    ASSERT_EQ(set.normals[i * 3 + 2], 1.0f);
+  }
+}
+
+TEST(SurfaceSampling, InterpolatesCornerNormalsAndFallsBackOnFaces) {
+  TriMesh mesh = rectangle(1, 1);
+  EXPECT_EQ(sampled(mesh, 1).normals, (std::vector<float>{0, 0, 1}));
+  const float s = std::sqrt(0.5f);
+  for (int corner = 0; corner < 6; ++corner) {
+    mesh.corner_normals.insert(mesh.corner_normals.end(), {s, 0, s});
+  }
+  EXPECT_NEAR(sampled(mesh, 1).normals[0], s, 1e-6f);
+  mesh.corner_normals.assign(18, 0.0f);
+  EXPECT_EQ(sampled(mesh, 1).normals, (std::vector<float>{0, 0, 1}));
+}
+
+TEST(SurfaceSampling, ReadsConstantAndCornerColours) {
+  TriMesh mesh = rectangle(1, 1);
+  mesh.materials[0] = Material{MaterialColour::kConstant, {0.1f, 0.2f, 0.3f, 0.4f}, kNoTexture};
+  PointSet set = sampled(mesh, 10);
+  EXPECT_EQ(set.colours[0], 0.1f);
+  EXPECT_EQ(set.colours[2], 0.3f);
+  EXPECT_EQ(set.opacities[5], 0.4f);
+  // Red grows with x: the colour of a sample is its position.
+  mesh.materials[0].colour = MaterialColour::kCorner;
+  mesh.corner_colours = {0, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1};
+  set = sampled(mesh, 100);
+  for (size_t i = 0; i < set.size(); ++i) {
+    EXPECT_NEAR(set.colours[i * 3], set.positions[i * 3], 1e-6f);
+  }
+}
+
+TEST(SurfaceSampling, FiltersTexturesInSceneLinear) {
+  // A black and a white texel side by side, sRGB: between them the bilinear value is the linear
+  // mean, and the repeat wrap makes the left edge grey too.
+  TriMesh mesh = rectangle(1, 1);
+  addRectangleUvs(mesh);
+  mesh.materials[0].colour = MaterialColour::kTexture;
+  mesh.materials[0].texture = 0;
+  mesh.textures.push_back(Image{2, 1, 3, {0, 0, 0, 1, 1, 1}, Transfer::kSrgb});
+  const PointSet set = sampled(mesh, 400);
+  for (size_t i = 0; i < set.size(); ++i) {
+    const double x = static_cast<double>(set.positions[i * 3]);
+    // Distance to the white centre at 0.75, wrapped, in texels.
+    double distance = std::abs(x - 0.75);
+    distance = 2 * std::min(distance, 1 - distance);
+    EXPECT_NEAR(static_cast<double>(set.colours[i * 3]), 1 - distance, 2e-6);
+  }
+}
+
+TEST(SurfaceSampling, DecodesTheDisplayTransferOfATexture) {
+  TriMesh mesh = rectangle(1, 1);
+  addRectangleUvs(mesh);
+  mesh.materials[0].colour = MaterialColour::kTexture;
+  mesh.materials[0].texture = 0;
+  mesh.textures.push_back(Image{1, 1, 4, {0.5f, 0.25f, 0.02f, 0.75f}, Transfer::kSrgb});
+  const PointSet set = sampled(mesh, 1);
+  EXPECT_NEAR(static_cast<double>(set.colours[0]), srgbToLinear(0.5), 1e-6);
+  EXPECT_NEAR(static_cast<double>(set.colours[1]), srgbToLinear(0.25), 1e-6);
+  EXPECT_NEAR(static_cast<double>(set.colours[2]), srgbToLinear(0.02), 1e-6);
+  EXPECT_EQ(set.opacities[0], 0.75f);
+}
+
+TEST(SurfaceSampling, PutsRowZeroOfATextureAtTheTop) {
+  TriMesh mesh = rectangle(1, 1);
+  addRectangleUvs(mesh);
+  mesh.materials[0].colour = MaterialColour::kTexture;
+  mesh.materials[0].texture = 0;
+  Image image{1, 64, 3, {}, Transfer::kLinear};
+  for (int row = 0; row < 64; ++row) {
+    const float value = row < 32 ? 1.0f : 0.0f;
+    image.pixels.insert(image.pixels.end(), {value, value, value});
+  }
+  mesh.textures.push_back(image);
+  const PointSet set = sampled(mesh, 200);
+  for (size_t i = 0; i < set.size(); ++i) {
+    const float y = set.positions[i * 3 + 1];
+    if (std::abs(y - 0.5f) < 0.1f || y < 0.1f || y > 0.9f) continue;
+    EXPECT_EQ(set.colours[i * 3], y > 0.5f ? 1.0f : 0.0f);
+  }
+}
+
+TEST(SurfaceSampling, AveragesATextureFinerThanTheSamples) {
+  // A chequer of single texels, 200 samples on 65,536 texels: a single tap would be 0 or 1
+  // (standard deviation up to 0.5); eight bilinear taps keep within a third of it.
+  TriMesh mesh = rectangle(1, 1);
+  addRectangleUvs(mesh);
+  mesh.materials[0].colour = MaterialColour::kTexture;
+  mesh.materials[0].texture = 0;
+  Image image{256, 256, 1, {}, Transfer::kLinear};
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 256; ++x) image.pixels.push_back((x + y) % 2 == 0 ? 1.0f : 0.0f);
+  }
+  mesh.textures.push_back(image);
+  const PointSet set = sampled(mesh, 200);
+  double sum = 0, square = 0;
+  for (size_t i = 0; i < set.size(); ++i) {
+    const auto value = static_cast<double>(set.colours[i * 3]);
+    sum += value / 200;
+    square += value * value / 200;
+  }
+  EXPECT_NEAR(sum, 0.5, 0.05);
+  EXPECT_LT(std::sqrt(square - sum * sum), 0.17);
+}
+
+TEST(SurfaceSampling, GivesMoreWeightToTexturedAndCurvedPlaces) {
+  // Left half plain, right half a chequer of 16 periods.
+  TriMesh mesh = rectangle(1, 1);
+  addRectangleUvs(mesh);
+  mesh.materials[0].colour = MaterialColour::kTexture;
+  mesh.materials[0].texture = 0;
+  Image image{64, 64, 1, {}, Transfer::kSrgb};
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      image.pixels.push_back(x >= 32 && (x / 2 + y / 2) % 2 == 0 ? 1.0f : 0.0f);
+    }
+  }
+  mesh.textures.push_back(image);
+  const PointSet set = sampled(mesh, 20000, 1.0);
+  double plain = 0, chequered = 0;
+  for (size_t i = 0; i < set.size(); ++i) {
+    const float x = set.positions[i * 3];
+    EXPECT_GE(set.weights[i], set.areas[i]);
+    EXPECT_LE(set.weights[i], 5.0001f * set.areas[i]);
+    if (x > 0.1f && x < 0.4f) plain += static_cast<double>(set.weights[i]);
+    if (x > 0.6f && x < 0.9f) chequered += static_cast<double>(set.weights[i]);
+  }
+  EXPECT_NEAR(plain, 0.3, 0.003);     // detail 0: the weight is the area, ± one row of strata
+  EXPECT_GT(chequered, 4.0 * plain);  // variance 1/4 in display space is a detail of 0.99
+
+  // A fold of 90 degrees: weight next to the crease, none far from it.
+  TriMesh fold = rectangle(1, 1);
+  fold.positions = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1};
+  fold.triangles = {0, 1, 2, 0, 2, 3, 0, 3, 5, 0, 5, 4};
+  const PointSet folded = sampled(fold, 20000, 1.0);
+  float near_crease = 0, far = 0;
+  for (size_t i = 0; i < folded.size(); ++i) {
+    const float distance = std::max(folded.positions[i * 3], folded.positions[i * 3 + 2]);
+    const float gain = folded.weights[i] / folded.areas[i];
+    if (distance < 0.01f) near_crease = std::max(near_crease, gain);
+    if (distance > 0.1f) far = std::max(far, gain);
+  }
+  EXPECT_GT(near_crease, 3.0f);
+  EXPECT_LT(far, 1.001f);
+}
+
+TEST(SurfaceSampling, DependsOnTheSeedAndNotOnTheThreads) {
+  TriMesh mesh = rectangle(2, 1);
+  PointSet one, two;
+  withThreads(1, [&] { one = sampled(mesh, 30000, 1.0, 7); });
+  withThreads(2, [&] { two = sampled(mesh, 30000, 1.0, 7); });
+  EXPECT_EQ(one.positions, two.positions);
+  EXPECT_EQ(one.weights, two.weights);
+  EXPECT_NE(sampled(mesh, 30000, 1.0, 8).positions, one.positions);
+}
+
+TEST(SurfaceSampling, RefusesBadOptionsAndMeshes) {
+  const auto refusal = [](const TriMesh& mesh, uint64_t count, double weight) -> std::string {
+    try {
+      sampled(mesh, count, weight);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(refusal(rectangle(1, 1), 0, 0), HasSubstr("sample count is 0"));
+  EXPECT_THAT(refusal(rectangle(1, 1), 10, -1), HasSubstr("detail weight is -1"));
+  EXPECT_THAT(refusal(rectangle(1, 1), 10, std::nan("")), HasSubstr("detail weight is nan"));
+  EXPECT_THAT(refusal(rectangle(0, 1), 10, 0), HasSubstr("all faces have zero area"));
+  EXPECT_THAT(refusal(TriMesh{}, 10, 0), HasSubstr("0 triangles"));
+}
+
+TEST(SurfaceSampling, StopsWhenCancelled) {
+  Progress progress;
+  progress.cancel();
+  SurfaceSamplingOptions options;
+  EXPECT_THROW(sampleSurface(rectangle(1, 1), options, &progress), Error);
+}
+
+}  // namespace
+}  // namespace stipple
