@@ -93,6 +93,11 @@ def test_a_link_against_the_table_is_found(tmp_path):
     assert len(found) == 1 and "stipple_data links ['io']" in found[0]
 
 
+def test_the_binding_does_not_know_blender():
+    assert list((ROOT / 'addon' / 'stipple' / 'binding').glob('*.py')), 'the binding is where it should be'
+    assert rules.blender_import_violations(ROOT / 'addon' / 'stipple' / 'binding') == []
+
+
 @pytest.mark.parametrize('line', ['import bpy', 'import numpy, bpy.types', 'from bpy.props import IntProperty',
                                   'def f():\n    import mathutils', 'm = __import__("bpy")',
                                   'import importlib\nm = importlib.import_module("gpu.state")'])
