@@ -16,6 +16,8 @@ from . import meshes, sources, splat_data
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
 
+ENGINE = 'STIPPLE'
+
 log = logging.getLogger('stipple')
 # What is wrong with a datablock, by name, for the panel; empty while all is well.
 problems = {}
@@ -133,16 +135,17 @@ def _evaluated(data, depsgraph):
     return data.stipple if depsgraph is None else data.evaluated_get(depsgraph).stipple
 
 
-def _needs_attributes(scene):
-    """The engine Stipple decodes for itself; every other one draws the stored attributes."""
-    return scene.render.engine != 'STIPPLE'
-
-
 @persistent
-def _frame_change_post(scene, depsgraph=None):
-    if _state['rendering'] and not _needs_attributes(scene):
-        return
-    sync_all(depsgraph, 'RENDER' if _state['rendering'] else 'VIEWPORT')
+def _frame_change_post(scene, depsgraph):
+    """Blender evaluates once more after this where data was tagged, so writing here is in time for the frame.
+
+    A render brings its own depsgraph, in stills too; after it the viewport's comes again.
+    """
+    if depsgraph.mode == 'VIEWPORT':
+        sync_all(depsgraph, 'VIEWPORT')
+    elif scene.render.engine != ENGINE:
+        # The engine Stipple decodes for itself; every other one draws the stored attributes.
+        sync_all(depsgraph, 'RENDER')
 
 
 @persistent
@@ -151,21 +154,10 @@ def _render_init(_scene, _=None):
 
 
 @persistent
-def _render_pre(scene, _=None):
-    _state['rendering'] = True
-    if _needs_attributes(scene):
-        sync_all(_animated_depsgraph(scene), 'RENDER')
-
-
-@persistent
-def _render_end(scene, _=None):
+def _render_end(_scene, _=None):
+    """Gives the viewport its budget back: a still that was rendered in a window changes no frame."""
     _state['rendering'] = False
-    if _needs_attributes(scene):
-        sync_all(_animated_depsgraph(scene), 'VIEWPORT')
-
-
-def _animated_depsgraph(_scene):
-    return bpy.context.evaluated_depsgraph_get()
+    sync_all()
 
 
 @persistent
@@ -192,7 +184,7 @@ def _depsgraph_update_post(scene, depsgraph):
             stipple.source_changed = True
 
 
-_HANDLERS = (('frame_change_post', _frame_change_post), ('render_init', _render_init), ('render_pre', _render_pre),
+_HANDLERS = (('frame_change_post', _frame_change_post), ('render_init', _render_init),
              ('render_complete', _render_end), ('render_cancel', _render_end), ('undo_post', _restored),
              ('redo_post', _restored), ('load_post', _restored), ('depsgraph_update_post', _depsgraph_update_post))
 
