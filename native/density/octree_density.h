@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,8 @@
 namespace stipple {
 
 constexpr int kMaxLeafLevel = 10;
+
+struct SamplingTables;
 
 /// The cube in the world that the octree divides. World = origin + side * u, u in [0,1]^3.
 struct RootCube {
@@ -26,17 +29,25 @@ struct OctreeDensityOptions {
 class OctreeDensity final : public DensityModel {
  public:
   /// Builds the density whose leaf masses are the summed weights of the points in them.
-  /// In: positions [N,3] metres; weights [N] >= 0, at least one positive; the root cube is the
-  /// bounding cube of the points, grown by 1 % of its side (a single point gives a cube of 1 mm).
+  /// In: positions [N,3] metres, N < 2^32; weights [N] >= 0, at least one positive, or empty for
+  /// equal weights; the root cube is the bounding cube of the points, grown by 1 % of its side (a
+  /// single point gives a cube of 1 mm).
   /// Errors: kInvalidArgument for no points, a negative or non-finite value, all weights 0.
+  /// Threads and determinism: parallel; same result for any number of threads.
+  /// Cost: O(N); about 30 bytes per point while it runs.
   static OctreeDensity fromPoints(std::span<const float> positions, std::span<const float> weights,
                                   const OctreeDensityOptions& options);
   /// The density from stored arrays (an asset file). In: per level 0..leaf_level-1 the cells and
   /// their child log-probabilities, as `cells` and `logProbabilities` return them.
+  /// Errors: kInvalidArgument for a wrong number of levels or values, a root that is not a cube of
+  /// finite size, a log-probability outside [-700, 1e-4] other than -inf, probabilities of a cell
+  /// whose sum differs from 1 by more than 1e-4, cells that are not the children with mass, in
+  /// order.
   static OctreeDensity fromLevels(const RootCube& root, std::vector<std::vector<uint64_t>> cells,
                                   std::vector<std::vector<float>> log_probabilities);
 
   int leafLevel() const override { return leaf_level_; }
+  /// Cells without mass, stored or not, give eight times -inf.
   void childLogProbabilities(int level, std::span<const uint64_t> cells,
                              std::span<float> out) const override;
 
@@ -44,17 +55,24 @@ class OctreeDensity final : public DensityModel {
   size_t leafCount() const { return leaf_count_; }
   /// Parents at `level`, Morton-ordered.
   std::span<const uint64_t> cells(int level) const { return cells_[static_cast<size_t>(level)]; }
+  std::span<const std::vector<uint64_t>> cellsByLevel() const { return cells_; }
   /// [cells(level).size(), 8].
   std::span<const float> logProbabilities(int level) const {
     return log_probabilities_[static_cast<size_t>(level)];
   }
 
+  /// What the sampler reads in place of childLogProbabilities; null for a density never built.
+  const SamplingTables* samplingTables() const { return tables_.get(); }
+
  private:
+  OctreeDensity finished() &&;
+
   RootCube root_;
   int leaf_level_ = 0;
   size_t leaf_count_ = 0;
   std::vector<std::vector<uint64_t>> cells_;
   std::vector<std::vector<float>> log_probabilities_;
+  std::shared_ptr<const SamplingTables> tables_;  // immutable, shared by copies
 };
 
 }  // namespace stipple
