@@ -11,13 +11,14 @@ namespace stipple {
 
 struct VoxelizeOptions {
   double voxel_size = 0.0;  ///< metres; 0: from resolution
-  uint32_t resolution =
-      256;  ///< voxels along the longest side of the bounds, where voxel_size is 0
-  /// Footprint: splats thinner than a voxel are widened to this share of the voxel size along the
-  /// thin axis, keeping their optical depth. 0: no widening (tests of the formula).
+  /// Voxels along the longest side of the bounds, where voxel_size is 0.
+  uint32_t resolution = 256;
+  /// Axes thinner than this share of a voxel are widened to it. The shortest axis keeps the optical
+  /// depth through its face; the other two keep opacity times area. 0: no widening (tests of the
+  /// formula); then a splat with an axis of length 0 is refused.
   double low_pass = 0.5;
-  double cut_off_sigma =
-      4.0;                    ///< splats end at this Mahalanobis distance; <= 0: no cut-off (tests)
+  /// Splats end at this Mahalanobis distance; <= 0: no cut-off (tests).
+  double cut_off_sigma = 4.0;
   double min_density = 1e-3;  ///< per metre; lower extinction is not stored
 };
 

@@ -2,7 +2,6 @@
 // (one-sided Jacobi rotations for the axes of a splat).
 #include "splat/voxelize_splat.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,7 +11,9 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "math/affine.h"
 #include "math/colour.h"
+#include "math/covariance.h"
 #include "splat/voxelize_polylog.h"
 
 namespace stipple {
@@ -65,15 +66,7 @@ void checkInstances(std::span<const SplatInstance> instances) {
     const SplatInstance& instance = instances[i];
     const std::string name = "instance " + std::to_string(i);
     if (!instance.cloud) refuse(name + " has no cloud");
-    const Mat4d& m = instance.object_to_world;
-    if (!m.allFinite()) refuse(name + ": the matrix holds a value that is not finite");
-    if (m(3, 0) != 0 || m(3, 1) != 0 || m(3, 2) != 0 || m(3, 3) != 1) {
-      refuse(name + ": the last row of the matrix is not 0 0 0 1; an affine matrix is allowed");
-    }
-    const Mat3d linear = m.topLeftCorner<3, 3>();
-    if (linear.determinant() == 0) {
-      refuse(name + ": the matrix is singular (determinant 0); an invertible matrix is allowed");
-    }
+    validateAffine(instance.object_to_world, (name + ": the matrix").c_str());
     if (std::find(checked.begin(), checked.end(), instance.cloud) == checked.end()) {
       validate(*instance.cloud, name.c_str());
       checked.push_back(instance.cloud);
@@ -92,21 +85,26 @@ void checkInstances(std::span<const SplatInstance> instances) {
 // Columns: the scaled axes of a splat in the world. Their outer product is the covariance.
 Mat3d worldAxes(const SplatInstance& instance, size_t i) {
   const SplatCloud& cloud = *instance.cloud;
-  const float* q = &cloud.rotations[i * 4];
-  const float* s = &cloud.scales[i * 3];
-  Eigen::Quaterniond rotation(q[0], q[1], q[2], q[3]);
-  rotation.normalize();
-  const Mat3d linear = instance.object_to_world.topLeftCorner<3, 3>();
-  Mat3d axes = linear * rotation.toRotationMatrix();
-  for (int axis = 0; axis < 3; ++axis) axes.col(axis) *= static_cast<double>(s[axis]);
-  return axes;
+  return linearPart(instance.object_to_world) *
+         scaledAxes<double>(&cloud.rotations[i * 4], &cloud.scales[i * 3]);
 }
 
 Vec3d worldCentre(const SplatInstance& instance, size_t i) {
   const float* p = &instance.cloud->positions[i * 3];
   const Vec3d local(p[0], p[1], p[2]);
-  return instance.object_to_world.topLeftCorner<3, 3>() * local +
-         instance.object_to_world.topRightCorner<3, 1>();
+  return linearPart(instance.object_to_world) * local + translationPart(instance.object_to_world);
+}
+
+Vec3d cross(const Vec3d& a, const Vec3d& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+// A unit vector perpendicular to a unit vector.
+Vec3d perpendicular(const Vec3d& v) {
+  Eigen::Index smallest = 0;
+  v.cwiseAbs().minCoeff(&smallest);
+  const Vec3d axis = cross(v, Vec3d::Unit(smallest));
+  return axis / axis.norm();
 }
 
 struct PrincipalAxes {
@@ -150,11 +148,11 @@ PrincipalAxes principalAxes(Mat3d a) {
     middle = a.col(order[1]) / lengths[order[1]];
     middle -= longest * longest.dot(middle);
   }
-  if (middle.squaredNorm() < 0.25) middle = longest.unitOrthogonal();
+  if (middle.squaredNorm() < 0.25) middle = perpendicular(longest);
   middle.normalize();
   result.directions.col(2) = longest;
   result.directions.col(1) = middle;
-  result.directions.col(0) = longest.cross(middle);
+  result.directions.col(0) = cross(longest, middle);
   return result;
 }
 
