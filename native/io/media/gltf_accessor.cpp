@@ -1,0 +1,213 @@
+// Based on: The Khronos 3D Formats Working Group, glTF 2.0 Specification, section 3.6 (buffers,
+// accessors, sparse accessors, normalised integers).
+#include "io/media/gltf_accessor.h"
+
+#define TINYGLTF_NO_STB_IMAGE
+#define TINYGLTF_NO_STB_IMAGE_WRITE
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "base/error.h"
+
+namespace stipple::media {
+
+namespace {
+
+// An accessor without a buffer view is all zeros, so no file size bounds it.
+constexpr size_t kMaxZeroElements = size_t{1} << 26;
+
+[[noreturn]] void failHere(const std::string& what) {
+  fail(ErrorCode::kFormat, what);
+}
+
+const tinygltf::Accessor& accessorAt(const tinygltf::Model& model, int index,
+                                     const std::string& what) {
+  if (index < 0 || static_cast<size_t>(index) >= model.accessors.size()) {
+    failHere(what + " names accessor " + std::to_string(index) + "; the file has " +
+             std::to_string(model.accessors.size()));
+  }
+  return model.accessors[static_cast<size_t>(index)];
+}
+
+/// Bytes of `count` elements inside a buffer view, range checked.
+struct Range {
+  const unsigned char* first = nullptr;
+  size_t stride = 0;
+};
+
+Range rangeOf(const tinygltf::Model& model, int view_index, size_t offset, size_t count,
+              size_t element_bytes, const std::string& what) {
+  if (view_index < 0 || static_cast<size_t>(view_index) >= model.bufferViews.size()) {
+    failHere(what + " names buffer view " + std::to_string(view_index) + "; the file has " +
+             std::to_string(model.bufferViews.size()));
+  }
+  const tinygltf::BufferView& view = model.bufferViews[static_cast<size_t>(view_index)];
+  if (view.buffer < 0 || static_cast<size_t>(view.buffer) >= model.buffers.size()) {
+    failHere(what + " names buffer " + std::to_string(view.buffer) + "; the file has " +
+             std::to_string(model.buffers.size()));
+  }
+  const std::vector<unsigned char>& bytes = model.buffers[static_cast<size_t>(view.buffer)].data;
+  const size_t stride = view.byteStride != 0 ? view.byteStride : element_bytes;
+  if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset) {
+    failHere(what + " lies in a buffer view of " + std::to_string(view.byteLength) +
+             " bytes from byte " + std::to_string(view.byteOffset) + "; the buffer holds " +
+             std::to_string(bytes.size()));
+  }
+  // Compared by division, because count * stride of a damaged file may not fit.
+  const size_t room = view.byteLength;
+  const bool fits = count == 0 || (offset <= room && element_bytes <= room - offset &&
+                                   count - 1 <= (room - offset - element_bytes) / stride);
+  if (!fits || stride < element_bytes) {
+    failHere(what + " claims " + std::to_string(count) + " elements of " +
+             std::to_string(element_bytes) + " bytes, " + std::to_string(stride) +
+             " apart, from byte " + std::to_string(offset) + " of a buffer view of " +
+             std::to_string(room) + " bytes");
+  }
+  return {bytes.data() + view.byteOffset + (count == 0 ? 0 : offset), stride};
+}
+
+template <typename T>
+T load(const unsigned char* bytes) {
+  T value;
+  std::memcpy(&value, bytes, sizeof(T));
+  return value;
+}
+
+size_t componentBytes(int type, const std::string& what) {
+  const int bytes = tinygltf::GetComponentSizeInBytes(static_cast<uint32_t>(type));
+  if (bytes <= 0) failHere(what + " has the component type " + std::to_string(type));
+  return static_cast<size_t>(bytes);
+}
+
+float component(const unsigned char* bytes, int type, bool normalized) {
+  switch (type) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE: {
+      const float value = load<int8_t>(bytes);
+      return normalized ? std::max(value / 127.0f, -1.0f) : value;
+    }
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: {
+      const float value = load<uint8_t>(bytes);
+      return normalized ? value / 255.0f : value;
+    }
+    case TINYGLTF_COMPONENT_TYPE_SHORT: {
+      const float value = load<int16_t>(bytes);
+      return normalized ? std::max(value / 32767.0f, -1.0f) : value;
+    }
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: {
+      const float value = load<uint16_t>(bytes);
+      return normalized ? value / 65535.0f : value;
+    }
+    case TINYGLTF_COMPONENT_TYPE_INT:
+      return static_cast<float>(load<int32_t>(bytes));
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return static_cast<float>(load<uint32_t>(bytes));
+    case TINYGLTF_COMPONENT_TYPE_DOUBLE:
+      return static_cast<float>(load<double>(bytes));
+    default:
+      return load<float>(bytes);
+  }
+}
+
+uint32_t wholeNumber(const unsigned char* bytes, int type, const std::string& what) {
+  switch (type) {
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return load<uint8_t>(bytes);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return load<uint16_t>(bytes);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return load<uint32_t>(bytes);
+    default:
+      failHere(what + " has indices of component type " + std::to_string(type) +
+               "; unsigned bytes, shorts or ints are allowed");
+  }
+}
+
+void applySparse(const tinygltf::Model& model, const tinygltf::Accessor& accessor, size_t width,
+                 const std::string& what, std::vector<float>& values) {
+  const auto& sparse = accessor.sparse;
+  if (sparse.count < 0 || sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0) {
+    failHere(what + " has a sparse part of negative size");
+  }
+  const size_t count = static_cast<size_t>(sparse.count);
+  const size_t index_bytes = componentBytes(sparse.indices.componentType, what);
+  const size_t value_bytes = componentBytes(accessor.componentType, what);
+  const Range indices =
+      rangeOf(model, sparse.indices.bufferView, static_cast<size_t>(sparse.indices.byteOffset),
+              count, index_bytes, what);
+  const Range replaced =
+      rangeOf(model, sparse.values.bufferView, static_cast<size_t>(sparse.values.byteOffset), count,
+              value_bytes * width, what);
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t target =
+        wholeNumber(indices.first + i * indices.stride, sparse.indices.componentType, what);
+    if (target >= accessor.count) {
+      failHere(what + " replaces element " + std::to_string(target) + " of " +
+               std::to_string(accessor.count));
+    }
+    for (size_t c = 0; c < width; ++c) {
+      values[target * width + c] = component(replaced.first + i * replaced.stride + c * value_bytes,
+                                             accessor.componentType, accessor.normalized);
+    }
+  }
+}
+
+}  // namespace
+
+size_t accessorWidth(const tinygltf::Model& model, int accessor, const std::string& what) {
+  const int width = tinygltf::GetNumComponentsInType(
+      static_cast<uint32_t>(accessorAt(model, accessor, what).type));
+  return width > 0 ? static_cast<size_t>(width) : 0;
+}
+
+std::vector<float> readFloats(const tinygltf::Model& model, int index, size_t width,
+                              const std::string& what) {
+  const tinygltf::Accessor& accessor = accessorAt(model, index, what);
+  const size_t seen = accessorWidth(model, index, what);
+  if (seen != width) {
+    failHere(what + " has " + std::to_string(seen) + " components; " + std::to_string(width) +
+             " are needed");
+  }
+  const size_t bytes = componentBytes(accessor.componentType, what);
+  std::vector<float> values;
+  if (accessor.bufferView >= 0) {
+    const Range range = rangeOf(model, accessor.bufferView, accessor.byteOffset, accessor.count,
+                                bytes * width, what);
+    values.resize(accessor.count * width);
+    for (size_t i = 0; i < accessor.count; ++i) {
+      for (size_t c = 0; c < width; ++c) {
+        values[i * width + c] = component(range.first + i * range.stride + c * bytes,
+                                          accessor.componentType, accessor.normalized);
+      }
+    }
+  } else {
+    if (accessor.count > kMaxZeroElements) {
+      failHere(what + " claims " + std::to_string(accessor.count) +
+               " elements without data; at most " + std::to_string(kMaxZeroElements) +
+               " are allowed");
+    }
+    values.assign(accessor.count * width, 0.0f);
+  }
+  if (accessor.sparse.isSparse) applySparse(model, accessor, width, what, values);
+  return values;
+}
+
+std::vector<uint32_t> readIndices(const tinygltf::Model& model, int index,
+                                  const std::string& what) {
+  const tinygltf::Accessor& accessor = accessorAt(model, index, what);
+  const size_t bytes = componentBytes(accessor.componentType, what);
+  if (accessorWidth(model, index, what) != 1 || accessor.bufferView < 0 ||
+      accessor.sparse.isSparse) {
+    failHere(what + " must be plain numbers in a buffer view");
+  }
+  const Range range =
+      rangeOf(model, accessor.bufferView, accessor.byteOffset, accessor.count, bytes, what);
+  std::vector<uint32_t> values(accessor.count);
+  for (size_t i = 0; i < accessor.count; ++i) {
+    values[i] = wholeNumber(range.first + i * range.stride, accessor.componentType, what);
+  }
+  return values;
+}
+
+}  // namespace stipple::media

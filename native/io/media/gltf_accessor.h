@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace tinygltf {
+class Model;
+}
+
+namespace stipple::media {
+
+/// Values of an accessor as float: normalised integers become -1..1 or 0..1, sparse entries replace
+/// what they name. Every range is checked against its buffer.
+/// In: width, components per element that are needed; accessors with another number are kFormat.
+/// Out: [count, width].
+std::vector<float> readFloats(const tinygltf::Model& model, int accessor, size_t width,
+                              const std::string& what);
+
+/// Components per element of an accessor. Errors: kFormat if there is no such accessor.
+size_t accessorWidth(const tinygltf::Model& model, int accessor, const std::string& what);
+
+/// Vertex indices of a primitive.
+std::vector<uint32_t> readIndices(const tinygltf::Model& model, int accessor,
+                                  const std::string& what);
+
+}  // namespace stipple::media

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "data/tri_mesh.h"
+
+namespace tinygltf {
+class Model;
+}
+
+namespace stipple::media {
+
+/// How a glTF material is used by one primitive.
+struct MaterialUse {
+  uint32_t material = 0;  ///< index into TriMesh::materials
+  bool needs_uvs = false;
+  int uv_set = 0;
+  /// [2,3] rows: glTF texture coordinates → those of the picture (KHR_texture_transform).
+  double uv_matrix[6] = {1, 0, 0, 0, 1, 0};
+};
+
+/// Turns glTF materials into ours: factor, texture, alpha mode folded into one colour source.
+class MaterialReader {
+ public:
+  /// In: images, the undecoded bytes of each image; empty where the file was not found.
+  MaterialReader(const tinygltf::Model& model, const std::string& path,
+                 const std::vector<std::vector<unsigned char>>& images, TriMesh& mesh)
+      : model_(model), path_(path), images_(images), mesh_(mesh) {}
+
+  /// In: material, -1 for glTF's default; has_colours, whether the primitive has COLOR_0.
+  MaterialUse use(int material, bool has_colours);
+  /// Colour of a corner: COLOR_0 times the factor, alpha by the alpha mode.
+  void shade(int material, float* rgba) const;
+
+ private:
+  struct Base;
+  Base baseOf(int material) const;
+  uint32_t texture(int image, const Base& base);
+
+  const tinygltf::Model& model_;
+  const std::string& path_;
+  const std::vector<std::vector<unsigned char>>& images_;
+  TriMesh& mesh_;
+  std::map<std::pair<int, bool>, MaterialUse> uses_;
+  std::map<std::tuple<int, std::vector<double>, int, double>, uint32_t> textures_;
+};
+
+}  // namespace stipple::media

@@ -1,0 +1,374 @@
+// Based on: The Khronos 3D Formats Working Group, glTF 2.0 Specification, sections 3.5 (scenes and
+// node transforms) and 3.7 (primitives, strips and fans).
+#define TINYGLTF_NO_STB_IMAGE
+#define TINYGLTF_NO_STB_IMAGE_WRITE
+#include <tiny_gltf.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "io/media/gltf_accessor.h"
+#include "io/media/gltf_material.h"
+#include "io/media/media_calls.h"
+#include "math/vec.h"
+
+namespace stipple::media {
+
+namespace {
+
+constexpr int kMaxDepth = 1000;
+
+/// glTF is Y up and looks along +Z; here Z is up: (x, y, z) → (x, −z, y).
+Mat4d zUp() {
+  Mat4d matrix;
+  matrix << 1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1;
+  return matrix;
+}
+
+Mat4d localMatrix(const tinygltf::Node& node) {
+  Mat4d matrix = Mat4d::Identity();
+  if (node.matrix.size() == 16) {
+    // Column by column in the file.
+    for (int row = 0; row < 4; ++row) {
+      for (int column = 0; column < 4; ++column) {
+        matrix(row, column) = node.matrix[static_cast<size_t>(column * 4 + row)];
+      }
+    }
+    return matrix;
+  }
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  if (node.rotation.size() == 4) {
+    // x, y, z, w in the file.
+    rotation =
+        Eigen::Quaterniond(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]);
+    if (rotation.norm() > 0) rotation.normalize();
+  }
+  Vec3d scale(1, 1, 1);
+  if (node.scale.size() == 3) scale = Vec3d(node.scale[0], node.scale[1], node.scale[2]);
+  matrix.topLeftCorner<3, 3>() = rotation.toRotationMatrix() * scale.asDiagonal();
+  if (node.translation.size() == 3) {
+    matrix.topRightCorner<3, 1>() =
+        Vec3d(node.translation[0], node.translation[1], node.translation[2]);
+  }
+  return matrix;
+}
+
+/// Corners of the triangles of a primitive, three per triangle.
+std::vector<uint32_t> triangleCorners(const std::vector<uint32_t>& indices, int mode) {
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    std::vector<uint32_t> corners = indices;
+    corners.resize(corners.size() / 3 * 3);
+    return corners;
+  }
+  std::vector<uint32_t> corners;
+  for (size_t i = 0; i + 2 < indices.size(); ++i) {
+    if (mode == TINYGLTF_MODE_TRIANGLE_FAN) {
+      corners.insert(corners.end(), {indices[0], indices[i + 1], indices[i + 2]});
+    } else {
+      // Every second triangle of a strip is turned.
+      const size_t odd = i % 2;
+      corners.insert(corners.end(), {indices[i], indices[i + 1 + odd], indices[i + 2 - odd]});
+    }
+  }
+  return corners;
+}
+
+class GltfReader {
+ public:
+  explicit GltfReader(const std::string& path)
+      : path_(path), materials_(model_, path_, images_, mesh_) {}
+
+  TriMesh read() {
+    load();
+    requireExtensions();
+    const Mat4d root = zUp();
+    for (const int node : rootNodes()) visit(node, root, 0);
+    if (mesh_.triangles.empty()) {
+      fail(ErrorCode::kFormat, path_ + " holds no triangles in its scene; at least one is needed");
+    }
+    finishNormals();
+    if (!any_uvs_) mesh_.corner_uvs.clear();
+    if (!any_colours_) mesh_.corner_colours.clear();
+    return std::move(mesh_);
+  }
+
+ private:
+  void load() {
+    tinygltf::TinyGLTF loader;
+    // Images are only kept here; those that a base colour needs are decoded later.
+    loader.SetImageLoader(
+        [](tinygltf::Image*, const int index, std::string*, std::string*, int, int,
+           const unsigned char* bytes, int size, void* user) {
+          auto& images = *static_cast<std::vector<std::vector<unsigned char>>*>(user);
+          if (index < 0 || size < 0) return false;
+          images.resize(std::max(images.size(), static_cast<size_t>(index) + 1));
+          images[static_cast<size_t>(index)].assign(bytes, bytes + size);
+          return true;
+        },
+        &images_);
+    std::string error;
+    std::string warning;
+    std::string ending = std::filesystem::path(path_).extension().string();
+    std::transform(ending.begin(), ending.end(), ending.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const bool loaded = ending == ".glb"
+                            ? loader.LoadBinaryFromFile(&model_, &error, &warning, path_)
+                            : loader.LoadASCIIFromFile(&model_, &error, &warning, path_);
+    if (!loaded) {
+      fail(ErrorCode::kFormat,
+           path_ + " is not a valid glTF file: " + (error.empty() ? "no reason is given" : error));
+    }
+    images_.resize(model_.images.size());
+  }
+
+  void requireExtensions() const {
+    static const std::set<std::string> kKnown = {"KHR_texture_transform", "KHR_mesh_quantization",
+                                                 "KHR_materials_unlit", "EXT_texture_webp"};
+    for (const std::string& name : model_.extensionsRequired) {
+      if (kKnown.count(name) == 0) {
+        fail(ErrorCode::kUnsupported, path_ + " requires the glTF extension '" +
+                                          name.substr(0, 80) +
+                                          "', which is not supported; export the mesh without it");
+      }
+    }
+  }
+
+  std::vector<int> rootNodes() const {
+    const size_t scene = model_.defaultScene < 0 ? 0 : static_cast<size_t>(model_.defaultScene);
+    if (scene < model_.scenes.size()) return model_.scenes[scene].nodes;
+    std::set<int> children;
+    for (const tinygltf::Node& node : model_.nodes) {
+      children.insert(node.children.begin(), node.children.end());
+    }
+    std::vector<int> roots;
+    for (size_t i = 0; i < model_.nodes.size(); ++i) {
+      if (children.count(static_cast<int>(i)) == 0) roots.push_back(static_cast<int>(i));
+    }
+    return roots;
+  }
+
+  void visit(int index, const Mat4d& parent, int depth) {
+    if (index < 0 || static_cast<size_t>(index) >= model_.nodes.size()) {
+      fail(ErrorCode::kFormat, path_ + " names node " + std::to_string(index) + "; the file has " +
+                                   std::to_string(model_.nodes.size()));
+    }
+    // In a valid file every node has one parent; this also ends circles.
+    if (depth > kMaxDepth || ++visits_ > model_.nodes.size()) {
+      fail(ErrorCode::kFormat, path_ + ": node " + std::to_string(index) +
+                                   " has several parents or is its own ancestor");
+    }
+    const tinygltf::Node& node = model_.nodes[static_cast<size_t>(index)];
+    const Mat4d matrix = parent * localMatrix(node);
+    if (node.mesh >= 0) {
+      if (static_cast<size_t>(node.mesh) >= model_.meshes.size()) {
+        fail(ErrorCode::kFormat, path_ + " names mesh " + std::to_string(node.mesh) +
+                                     "; the file has " + std::to_string(model_.meshes.size()));
+      }
+      const tinygltf::Mesh& mesh = model_.meshes[static_cast<size_t>(node.mesh)];
+      for (size_t p = 0; p < mesh.primitives.size(); ++p) {
+        addPrimitive(
+            mesh.primitives[p], matrix,
+            path_ + ": mesh " + std::to_string(node.mesh) + ", primitive " + std::to_string(p));
+      }
+    }
+    for (const int child : node.children) visit(child, matrix, depth + 1);
+  }
+
+  static int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
+    const auto found = primitive.attributes.find(name);
+    return found == primitive.attributes.end() ? -1 : found->second;
+  }
+
+  void addPrimitive(const tinygltf::Primitive& primitive, const Mat4d& matrix,
+                    const std::string& what) {
+    const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+    // Points and lines have no surface.
+    if (mode < TINYGLTF_MODE_TRIANGLES || mode > TINYGLTF_MODE_TRIANGLE_FAN) return;
+    const int position = attribute(primitive, "POSITION");
+    if (position < 0) return;
+    const std::vector<float> positions = readFloats(model_, position, 3, what + ", POSITION");
+    const size_t count = positions.size() / 3;
+    requireFiniteHere(positions, 3, what + ", POSITION");
+    const size_t first = mesh_.vertexCount();
+    if (count >= UINT32_MAX - first) {
+      fail(ErrorCode::kUnsupported, path_ + " holds more than 4,294,967,295 vertices");
+    }
+
+    std::vector<uint32_t> indices;
+    if (primitive.indices >= 0) {
+      indices = readIndices(model_, primitive.indices, what + ", indices");
+      for (const uint32_t index : indices) {
+        if (index >= count) {
+          fail(ErrorCode::kFormat,
+               what + " uses vertex " + std::to_string(index) + " of " + std::to_string(count));
+        }
+      }
+    } else {
+      indices.resize(count);
+      for (size_t i = 0; i < count; ++i) indices[i] = static_cast<uint32_t>(i);
+    }
+    std::vector<uint32_t> corners = triangleCorners(indices, mode);
+    // A mirroring transform turns the triangles inside out; this turns them back.
+    if (matrix.topLeftCorner<3, 3>().determinant() < 0) {
+      for (size_t t = 0; t + 2 < corners.size(); t += 3) std::swap(corners[t + 1], corners[t + 2]);
+    }
+
+    for (size_t i = 0; i < count; ++i) {
+      const Eigen::Vector4d local(double(positions[i * 3]), double(positions[i * 3 + 1]),
+                                  double(positions[i * 3 + 2]), 1.0);
+      const Eigen::Vector4d world = matrix * local;
+      for (int axis = 0; axis < 3; ++axis) {
+        mesh_.positions.push_back(static_cast<float>(world[axis]));
+      }
+    }
+    for (const uint32_t corner : corners) {
+      mesh_.triangles.push_back(static_cast<uint32_t>(first + corner));
+    }
+    addNormals(primitive, matrix, corners, count, what);
+    addColours(primitive, corners, count, what);
+    const MaterialUse use =
+        materials_.use(primitive.material, attribute(primitive, "COLOR_0") >= 0);
+    addUvs(primitive, use, corners, count, what);
+    mesh_.triangle_materials.insert(mesh_.triangle_materials.end(), corners.size() / 3,
+                                    use.material);
+  }
+
+  void addNormals(const tinygltf::Primitive& primitive, const Mat4d& matrix,
+                  const std::vector<uint32_t>& corners, size_t count, const std::string& what) {
+    const int accessor = attribute(primitive, "NORMAL");
+    if (accessor < 0) {
+      mesh_.corner_normals.resize(mesh_.corner_normals.size() + corners.size() * 3, 0.0f);
+      return;
+    }
+    any_normals_ = true;
+    const std::vector<float> normals = readFloats(model_, accessor, 3, what + ", NORMAL");
+    requireCount(normals.size() / 3, count, what + ", NORMAL");
+    const Mat3d linear = matrix.topLeftCorner<3, 3>();
+    // The cofactor matrix is the inverse transpose up to a factor, and exists for flat scales too.
+    Mat3d cofactor;
+    cofactor.col(0) = linear.col(1).cross(linear.col(2));
+    cofactor.col(1) = linear.col(2).cross(linear.col(0));
+    cofactor.col(2) = linear.col(0).cross(linear.col(1));
+    if (linear.determinant() < 0) cofactor = -cofactor;
+    for (const uint32_t corner : corners) {
+      const Vec3d normal = cofactor * Vec3d(double(normals[corner * size_t{3}]),
+                                            double(normals[corner * size_t{3} + 1]),
+                                            double(normals[corner * size_t{3} + 2]));
+      const double length = normal.norm();
+      // Left at zero, the face's normal is put in at the end.
+      const bool usable = std::isfinite(length) && length > 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        mesh_.corner_normals.push_back(usable ? static_cast<float>(normal[axis] / length) : 0.0f);
+      }
+    }
+  }
+
+  void addColours(const tinygltf::Primitive& primitive, const std::vector<uint32_t>& corners,
+                  size_t count, const std::string& what) {
+    const int accessor = attribute(primitive, "COLOR_0");
+    if (accessor < 0) {
+      mesh_.corner_colours.resize(mesh_.corner_colours.size() + corners.size() * 4, 1.0f);
+      return;
+    }
+    any_colours_ = true;
+    const size_t width = accessorWidth(model_, accessor, what + ", COLOR_0") == 3 ? 3 : 4;
+    const std::vector<float> colours = readFloats(model_, accessor, width, what + ", COLOR_0");
+    requireCount(colours.size() / width, count, what + ", COLOR_0");
+    requireFiniteHere(colours, width, what + ", COLOR_0");
+    for (const uint32_t corner : corners) {
+      float rgba[4] = {1, 1, 1, 1};
+      std::copy_n(&colours[corner * width], width, rgba);
+      materials_.shade(primitive.material, rgba);
+      mesh_.corner_colours.insert(mesh_.corner_colours.end(), rgba, rgba + 4);
+    }
+  }
+
+  void addUvs(const tinygltf::Primitive& primitive, const MaterialUse& use,
+              const std::vector<uint32_t>& corners, size_t count, const std::string& what) {
+    if (!use.needs_uvs) {
+      mesh_.corner_uvs.resize(mesh_.corner_uvs.size() + corners.size() * 2, 0.0f);
+      return;
+    }
+    any_uvs_ = true;
+    const std::string name = "TEXCOORD_" + std::to_string(use.uv_set);
+    const int accessor = attribute(primitive, name);
+    if (accessor < 0) {
+      fail(ErrorCode::kFormat, what + " has a textured material but no " + name);
+    }
+    const std::vector<float> uvs = readFloats(model_, accessor, 2, what + ", " + name);
+    requireCount(uvs.size() / 2, count, what + ", " + name);
+    requireFiniteHere(uvs, 2, what + ", " + name);
+    const double* m = use.uv_matrix;
+    for (const uint32_t corner : corners) {
+      const double u = double(uvs[corner * size_t{2}]);
+      const double v = double(uvs[corner * size_t{2} + 1]);
+      mesh_.corner_uvs.push_back(static_cast<float>(m[0] * u + m[1] * v + m[2]));
+      // v = 0 is the top of the picture in glTF and its bottom here.
+      mesh_.corner_uvs.push_back(static_cast<float>(1.0 - (m[3] * u + m[4] * v + m[5])));
+    }
+  }
+
+  static void requireCount(size_t seen, size_t expected, const std::string& what) {
+    if (seen != expected) {
+      fail(ErrorCode::kFormat, what + " has " + std::to_string(seen) + " elements; " +
+                                   std::to_string(expected) + " vertices need one each");
+    }
+  }
+
+  static void requireFiniteHere(const std::vector<float>& values, size_t width,
+                                const std::string& what) {
+    try {
+      requireFinite(values.data(), values.size(), width, (what + " of vertex").c_str());
+    } catch (const Error& error) {
+      fail(ErrorCode::kFormat, error.what());
+    }
+  }
+
+  /// Corners without a normal of their own get that of their triangle.
+  void finishNormals() {
+    if (!any_normals_) {
+      mesh_.corner_normals.clear();
+      return;
+    }
+    const auto vertex = [this](size_t corner) {
+      const float* p = &mesh_.positions[mesh_.triangles[corner] * size_t{3}];
+      return Vec3d(double(p[0]), double(p[1]), double(p[2]));
+    };
+    for (size_t corner = 0; corner < mesh_.triangles.size(); ++corner) {
+      float* normal = &mesh_.corner_normals[corner * 3];
+      if (normal[0] != 0 || normal[1] != 0 || normal[2] != 0) continue;
+      const size_t t = corner / 3 * 3;
+      Vec3d face = (vertex(t + 1) - vertex(t)).cross(vertex(t + 2) - vertex(t));
+      // A triangle without area has no direction; up is as good as any.
+      if (!(face.norm() > 0)) face = Vec3d(0, 0, 1);
+      face.normalize();
+      for (int axis = 0; axis < 3; ++axis) normal[axis] = static_cast<float>(face[axis]);
+    }
+  }
+
+  std::string path_;
+  tinygltf::Model model_;
+  std::vector<std::vector<unsigned char>> images_;
+  TriMesh mesh_;
+  MaterialReader materials_;
+  size_t visits_ = 0;
+  bool any_normals_ = false;
+  bool any_uvs_ = false;
+  bool any_colours_ = false;
+};
+
+}  // namespace
+
+TriMesh readGltf(const std::string& path) {
+  return GltfReader(path).read();
+}
+
+}  // namespace stipple::media

@@ -1,0 +1,190 @@
+// Pictures through OpenImageIO. It would multiply and divide by alpha on its own, at 8 bits with
+// loss; it is told to leave the values alone, and the caller converts.
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "io/media/media_calls.h"
+
+namespace stipple::media {
+
+namespace {
+
+// 2^28 pixels of four float32 channels are 4 GiB.
+constexpr uint64_t kMaxPixels = uint64_t{1} << 28;
+
+/// Which channels of the file become grey, RGB or RGBA.
+std::vector<int> chooseChannels(const OIIO::ImageSpec& spec) {
+  const auto find = [&spec](const char* name) { return spec.channelindex(name); };
+  std::vector<int> chosen = {find("R"), find("G"), find("B")};
+  if (chosen[0] < 0 || chosen[1] < 0 || chosen[2] < 0) {
+    if (spec.nchannels <= 2) {
+      chosen = spec.nchannels == 1 ? std::vector<int>{0} : std::vector<int>{0, 0, 0};
+    } else {
+      chosen = {0, 1, 2};
+    }
+  }
+  const int alpha = spec.alpha_channel >= 0                        ? spec.alpha_channel
+                    : (spec.nchannels == 2 || spec.nchannels == 4) ? spec.nchannels - 1
+                                                                   : -1;
+  const bool separate = std::find(chosen.begin(), chosen.end(), alpha) == chosen.end();
+  if (alpha >= 0 && alpha < spec.nchannels && separate) {
+    if (chosen.size() == 1) chosen = {chosen[0], chosen[0], chosen[0]};
+    chosen.push_back(alpha);
+  }
+  return chosen;
+}
+
+DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
+  const OIIO::ImageSpec spec = input.spec();
+  const int64_t window[2] = {spec.full_width > 0 ? spec.full_width : spec.width,
+                             spec.full_height > 0 ? spec.full_height : spec.height};
+  for (const int64_t side : {window[0], window[1], int64_t{spec.width}, int64_t{spec.height}}) {
+    if (side < 1 || side > 65536) {
+      fail(ErrorCode::kFormat, name + " is " + std::to_string(window[0]) + " x " +
+                                   std::to_string(window[1]) +
+                                   " pixels; each side must be 1 to 65536");
+    }
+  }
+  const auto area = [](int64_t w, int64_t h) { return static_cast<uint64_t>(w * h); };
+  if (std::max(area(window[0], window[1]), area(spec.width, spec.height)) > kMaxPixels ||
+      spec.nchannels < 1 || spec.depth > 1) {
+    fail(ErrorCode::kFormat, name + " is " + std::to_string(window[0]) + " x " +
+                                 std::to_string(window[1]) + " pixels; at most " +
+                                 std::to_string(kMaxPixels) + " flat pixels can be read");
+  }
+
+  const std::vector<int> channels = chooseChannels(spec);
+  const int first = *std::min_element(channels.begin(), channels.end());
+  const int last = *std::max_element(channels.begin(), channels.end());
+  const size_t read_channels = static_cast<size_t>(last - first + 1);
+  const size_t width = static_cast<size_t>(spec.width);
+  const size_t height = static_cast<size_t>(spec.height);
+  std::vector<float> pixels(width * height * read_channels);
+  if (!input.read_image(0, 0, first, last + 1, OIIO::TypeDesc::FLOAT, pixels.data())) {
+    fail(ErrorCode::kFormat, name + " cannot be decoded: " + input.geterror());
+  }
+
+  DecodedImage image;
+  image.info.width = static_cast<uint32_t>(window[0]);
+  image.info.height = static_cast<uint32_t>(window[1]);
+  image.info.channels = static_cast<uint32_t>(channels.size());
+  image.info.is_display = spec.format.is_floating_point() ? 0 : 1;
+  const bool exr = std::string(input.format_name()) == "openexr";
+  // Told not to convert, readers of formats with straight alpha say so; EXR is premultiplied by
+  // definition, the rest (PNG foremost) is straight.
+  const bool says_straight = spec.get_int_attribute("oiio:UnassociatedAlpha", 0) != 0;
+  const bool tiff = std::string(input.format_name()) == "tiff";
+  image.info.alpha_is_associated = exr || (tiff && !says_straight) ? 1 : 0;
+  image.pixels.assign(static_cast<size_t>(window[0] * window[1]) * channels.size(), 0.0f);
+  // The data window may be smaller or larger than the picture.
+  for (size_t y = 0; y < height; ++y) {
+    const int64_t row = spec.y - spec.full_y + static_cast<int64_t>(y);
+    if (row < 0 || row >= window[1]) continue;
+    for (size_t x = 0; x < width; ++x) {
+      const int64_t column = spec.x - spec.full_x + static_cast<int64_t>(x);
+      if (column < 0 || column >= window[0]) continue;
+      const float* from = &pixels[(y * width + x) * read_channels];
+      float* to = &image.pixels[static_cast<size_t>(row * window[0] + column) * channels.size()];
+      for (size_t c = 0; c < channels.size(); ++c) to[c] = from[channels[c] - first];
+    }
+  }
+  return image;
+}
+
+OIIO::ImageSpec keepAlpha() {
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  return config;
+}
+
+/// The name under which OpenImageIO finds the reader of these bytes.
+const char* nameForBytes(const std::vector<unsigned char>& bytes) {
+  const auto starts = [&bytes](const char* magic, size_t length) {
+    return bytes.size() >= length && std::memcmp(bytes.data(), magic, length) == 0;
+  };
+  if (starts("\x89PNG", 4)) return "texture.png";
+  if (starts("\xff\xd8", 2)) return "texture.jpg";
+  if (starts("RIFF", 4)) return "texture.webp";
+  if (starts("BM", 2)) return "texture.bmp";
+  if (starts("GIF8", 4)) return "texture.gif";
+  return nullptr;
+}
+
+void write(const char* path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, const void* pixels) {
+  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(path);
+  if (!output) {
+    fail(ErrorCode::kUnsupported, std::string(path) + " cannot be written: " + OIIO::geterror());
+  }
+  if (!output->open(path, spec) || !output->write_image(type, pixels) || !output->close()) {
+    fail(ErrorCode::kIo, std::string(path) + " cannot be written: " + output->geterror());
+  }
+}
+
+OIIO::ImageSpec specFor(const StippleMediaImage& image, OIIO::TypeDesc type) {
+  OIIO::ImageSpec spec(static_cast<int>(image.width), static_cast<int>(image.height),
+                       static_cast<int>(image.channels), type);
+  if (image.channels == 1) spec.channelnames = {"Y"};
+  return spec;
+}
+
+}  // namespace
+
+DecodedImage decodeImageFile(const std::string& path) {
+  const OIIO::ImageSpec config = keepAlpha();
+  const auto input = OIIO::ImageInput::open(path, &config);
+  if (!input) {
+    fail(ErrorCode::kFormat, path + " is not a picture that can be read: " + OIIO::geterror());
+  }
+  return decode(*input, path);
+}
+
+DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std::string& name) {
+  const char* file_name = nameForBytes(bytes);
+  if (file_name == nullptr) {
+    fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF picture");
+  }
+  OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
+  const OIIO::ImageSpec config = keepAlpha();
+  const auto input = OIIO::ImageInput::open(file_name, &config, &memory);
+  if (!input) fail(ErrorCode::kFormat, name + " cannot be decoded: " + OIIO::geterror());
+  return decode(*input, name);
+}
+
+void stipple_media_image_read(const char* path, StippleMediaImage* image,
+                              const StippleMediaSink* sink, StippleMediaStatus* status) {
+  guard(path, status, [&] {
+    const DecodedImage decoded = decodeImageFile(path);
+    *image = decoded.info;
+    give(*sink, kMediaPixels, decoded.pixels);
+  });
+}
+
+void stipple_media_png_write(const char* path, const StippleMediaImage* image,
+                             const uint8_t* pixels, StippleMediaStatus* status) {
+  guard(path, status, [&] {
+    OIIO::ImageSpec spec = specFor(*image, OIIO::TypeDesc::UINT8);
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    spec.attribute("oiio:ColorSpace", "sRGB");
+    write(path, spec, OIIO::TypeDesc::UINT8, pixels);
+  });
+}
+
+void stipple_media_exr_write(const char* path, const StippleMediaImage* image, const float* pixels,
+                             StippleMediaStatus* status) {
+  guard(path, status, [&] {
+    OIIO::ImageSpec spec = specFor(*image, OIIO::TypeDesc::FLOAT);
+    spec.attribute("compression", "zip");
+    write(path, spec, OIIO::TypeDesc::FLOAT, pixels);
+  });
+}
+
+}  // namespace stipple::media

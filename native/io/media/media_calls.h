@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "data/tri_mesh.h"
+#include "io/media_table.h"
+
+namespace stipple::media {
+
+// The entries of the table. Nothing is thrown across it: each runs its work in `guard`.
+extern "C" {
+void stipple_media_image_read(const char* path, StippleMediaImage* image,
+                              const StippleMediaSink* sink, StippleMediaStatus* status);
+void stipple_media_png_write(const char* path, const StippleMediaImage* image,
+                             const uint8_t* pixels, StippleMediaStatus* status);
+void stipple_media_exr_write(const char* path, const StippleMediaImage* image, const float* pixels,
+                             StippleMediaStatus* status);
+void stipple_media_mesh_read(const char* path, const StippleMediaSink* sink,
+                             StippleMediaStatus* status);
+void stipple_media_volume_write(const char* path, const StippleMediaVolume* volume,
+                                StippleMediaStatus* status);
+void stipple_media_volume_read(const char* path, double* voxel_size, double* origin,
+                               const StippleMediaSink* sink, StippleMediaStatus* status);
+}
+
+/// Turns what `work` throws into a status; an exception of another library is a fault of the file,
+/// and its text follows the path.
+void report(StippleMediaStatus* status, int code, const std::string& message);
+void reportCurrentException(const char* path, StippleMediaStatus* status);
+template <typename Work>
+void guard(const char* path, StippleMediaStatus* status, const Work& work) {
+  status->code = 0;
+  status->message[0] = '\0';
+  try {
+    work();
+  } catch (...) {
+    reportCurrentException(path, status);
+  }
+}
+
+/// Hands an array to the caller. Errors: kOutOfMemory.
+void giveBytes(const StippleMediaSink& sink, uint32_t array, const void* data, size_t bytes);
+template <typename T>
+void give(const StippleMediaSink& sink, uint32_t array, const std::vector<T>& values) {
+  giveBytes(sink, array, values.data(), values.size() * sizeof(T));
+}
+/// Room for `bytes` bytes at the caller's. Errors: kOutOfMemory.
+void* allocate(const StippleMediaSink& sink, uint32_t array, size_t bytes);
+
+/// A picture as it is in its file or in memory.
+struct DecodedImage {
+  StippleMediaImage info{};
+  std::vector<float> pixels;
+};
+DecodedImage decodeImageFile(const std::string& path);
+/// In: name, what messages call it.
+DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std::string& name);
+
+/// The triangles of a glTF or GLB file.
+TriMesh readGltf(const std::string& path);
+
+}  // namespace stipple::media

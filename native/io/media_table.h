@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// The private table of calls between libstipple and libstipple_media: plain C data only, so that
+/// neither side sees an exception or a type of the other's libraries. Both are built together; the
+/// version guards against a file left over from another build.
+
+namespace stipple {
+
+constexpr uint32_t kMediaTableVersion = 1;
+
+extern "C" {
+
+/// What went wrong: code is an ErrorCode, 0 for success.
+struct StippleMediaStatus {
+  int32_t code;
+  char message[2000];
+};
+
+/// Takes arrays whose size only the reader knows. `allocate` returns room for `bytes` bytes of the
+/// array `array` (an enumerator of the reader), or null where there is no memory.
+struct StippleMediaSink {
+  void* user;
+  void* (*allocate)(void* user, uint32_t array, uint64_t bytes);
+};
+
+/// A picture as it is in its file.
+struct StippleMediaImage {
+  uint32_t width;
+  uint32_t height;
+  uint32_t channels;             ///< 1, 3 or 4
+  uint32_t is_display;           ///< 1: 8- or 16-bit display sRGB; 0: float, scene linear
+  uint32_t alpha_is_associated;  ///< 1: colours are multiplied by alpha
+};
+
+enum StippleMediaImageArray : uint32_t {
+  kMediaPixels = 0,  ///< float [height, width, channels]
+};
+
+/// One texture of a mesh; its pixels are the array kMediaTexturePixels + index.
+struct StippleMediaTexture {
+  uint32_t width;
+  uint32_t height;
+  uint32_t channels;
+};
+
+struct StippleMediaMaterial {
+  uint32_t colour;  ///< MaterialColour
+  float base_colour[4];
+  uint32_t texture;
+};
+
+enum StippleMediaMeshArray : uint32_t {
+  kMediaPositions = 0,          ///< float [V,3]
+  kMediaTriangles = 1,          ///< uint32 [T,3]
+  kMediaCornerNormals = 2,      ///< float [T,3,3] or empty
+  kMediaCornerUvs = 3,          ///< float [T,3,2] or empty
+  kMediaCornerColours = 4,      ///< float [T,3,4] or empty
+  kMediaTriangleMaterials = 5,  ///< uint32 [T]
+  kMediaMaterials = 6,          ///< StippleMediaMaterial
+  kMediaTextures = 7,           ///< StippleMediaTexture
+  kMediaTexturePixels = 8,      ///< + index: float, display sRGB, straight alpha
+};
+
+/// A volume to write. The arrays are the caller's.
+struct StippleMediaVolume {
+  double voxel_size;
+  double origin[3];
+  uint64_t brick_count;
+  const int32_t* bricks;  ///< [B,3]
+  const float* density;   ///< [B,512]
+  const float* colour;    ///< [B,512,3]
+};
+
+/// Of a volume that is read; the grid's frame goes to the last argument of volume_read.
+enum StippleMediaVolumeArray : uint32_t {
+  kMediaBricks = 0,
+  kMediaDensity = 1,
+  kMediaColour = 2,
+};
+
+struct StippleMediaTable {
+  uint32_t version;
+  void (*image_read)(const char* path, StippleMediaImage* image, const StippleMediaSink* sink,
+                     StippleMediaStatus* status);
+  /// 8-bit PNG. In: pixels [height, width, channels] display sRGB 0..255, straight alpha.
+  void (*png_write)(const char* path, const StippleMediaImage* image, const uint8_t* pixels,
+                    StippleMediaStatus* status);
+  /// Float32 EXR. In: pixels [height, width, channels] scene linear, premultiplied.
+  void (*exr_write)(const char* path, const StippleMediaImage* image, const float* pixels,
+                    StippleMediaStatus* status);
+  void (*mesh_read)(const char* path, const StippleMediaSink* sink, StippleMediaStatus* status);
+  void (*volume_write)(const char* path, const StippleMediaVolume* volume,
+                       StippleMediaStatus* status);
+  void (*volume_read)(const char* path, double* voxel_size, double* origin,
+                      const StippleMediaSink* sink, StippleMediaStatus* status);
+};
+
+/// The one function that libstipple_media exports: null for another version.
+typedef const StippleMediaTable* (*StippleMediaTableFunction)(uint32_t version);
+
+}  // extern "C"
+
+}  // namespace stipple

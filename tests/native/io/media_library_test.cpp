@@ -1,0 +1,85 @@
+#include "io/media_library.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "io/image_file.h"
+#include "io/mesh_file.h"
+#include "io/volume_file.h"
+#include "scratch_folder.h"
+
+namespace stipple {
+namespace {
+
+namespace fs = std::filesystem;
+
+class MediaLibrary : public ScratchFolder {
+ protected:
+  /// Runs one disabled test of this program from a copy of it in the scratch folder.
+  int runAlone(const std::string& test) {
+    fs::copy_file("/proc/self/exe", path("alone"), fs::copy_options::overwrite_existing);
+    const std::string command = path("alone") +
+                                " --gtest_also_run_disabled_tests --gtest_filter=" + test + " > " +
+                                path("log") + " 2>&1";
+    const int status = std::system(command.c_str());
+    const std::string log = load(path("log"));
+    EXPECT_NE(log.find("[  PASSED  ] 1 test"), std::string::npos) << log;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+};
+
+TEST_F(MediaLibrary, IsFoundBesideTheProgram) {
+  EXPECT_EQ(mediaTable().version, kMediaTableVersion);
+  EXPECT_EQ(&mediaTable(), &mediaTable());
+}
+
+// Run from a folder without the library, by the test below.
+TEST_F(MediaLibrary, DISABLED_SaysThatItIsMissing) {
+  Image image;
+  image.width = image.height = image.channels = 1;
+  image.pixels = {0.5f};
+  const auto unavailable = [](const auto& work) {
+    expectError(ErrorCode::kUnavailable, {"libstipple_media.so", "No such file"}, work);
+  };
+  unavailable([&] { writeImageFile(image, path("a.png")); });
+  unavailable([&] { readImageFile(store("b.png", "b")); });
+  unavailable([&] { readMeshFile(store("b.glb", "b")); });
+  unavailable([&] { readVolumeFile(store("b.vdb", "b")); });
+  SparseVolume volume;
+  volume.voxel_size = 1;
+  unavailable([&] { writeVolumeFile(volume, path("a.vdb")); });
+  EXPECT_FALSE(fs::exists(path("a.png")));
+  EXPECT_FALSE(fs::exists(path("a.vdb")));
+}
+
+TEST_F(MediaLibrary, IsUnavailableWhereItIsNotInstalled) {
+  EXPECT_EQ(runAlone("MediaLibrary.DISABLED_SaysThatItIsMissing"), 0);
+}
+
+TEST_F(MediaLibrary, DISABLED_SaysThatItIsDamaged) {
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    expectError(ErrorCode::kUnavailable, {"libstipple_media.so", "file too short"},
+                [] { mediaTable(); });
+  }
+}
+
+TEST_F(MediaLibrary, IsUnavailableWhereItCannotBeLoaded) {
+  store("libstipple_media.so", "not a library");
+  EXPECT_EQ(runAlone("MediaLibrary.DISABLED_SaysThatItIsDamaged"), 0);
+}
+
+TEST_F(MediaLibrary, ThrowsWhatACallReports) {
+  expectError(ErrorCode::kUnsupported, {"the reason"}, [] {
+    callMedia([](StippleMediaStatus* status) {
+      status->code = static_cast<int32_t>(ErrorCode::kUnsupported);
+      std::snprintf(status->message, sizeof(status->message), "the reason");
+    });
+  });
+}
+
+}  // namespace
+}  // namespace stipple
