@@ -8,8 +8,8 @@
 namespace stipple {
 
 /// Rotation matrix of a quaternion w,x,y,z of any non-zero length.
-template <typename T>
-Eigen::Matrix<T, 3, 3> rotationFromQuaternion(const float* wxyz) {
+template <typename T, typename Stored>
+Eigen::Matrix<T, 3, 3> rotationFromQuaternion(const Stored* wxyz) {
   T w = T(wxyz[0]), x = T(wxyz[1]), y = T(wxyz[2]), z = T(wxyz[3]);
   // Dividing by the largest component first keeps the squares inside the range of T.
   const T largest =

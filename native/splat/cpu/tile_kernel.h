@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "splat/cpu/tile_lists.h"
 
@@ -57,6 +58,20 @@ struct TileKernelOptions {
 /// Blends the splats in order into the tile; stops early once every pixel is finished.
 using TileKernel = void (*)(const TileSplat* splats, size_t count, TileKernelOptions options,
                             TilePixels& pixels);
+
+struct NamedTileKernel {
+  const char* target;  ///< "scalar", or Highway's name of an instruction set ("AVX2")
+  TileKernel kernel;
+};
+
+/// The kernel to use: the best for this processor, or the one that the environment variable
+/// STIPPLE_FORCE_TARGET names when it is first asked for (upper or lower case). Errors:
+/// kInvalidArgument where that names no kernel of tileKernels().
+TileKernel chosenTileKernel();
+
+/// Every kernel that is compiled and runs on this processor, "scalar" first. It changes Highway's
+/// global choice for a moment: for tests and for STIPPLE_FORCE_TARGET.
+std::vector<NamedTileKernel> tileKernels();
 
 /// The plain kernel, straight from splat/blend.h.
 void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions options,

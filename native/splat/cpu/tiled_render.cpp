@@ -193,7 +193,7 @@ RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera&
   result.visible_count = visible.order.size();
 
   const TileGrid grid(camera.width, camera.height);
-  const TileKernel kernel = blendTileScalar;
+  const TileKernel kernel = chosenTileKernel();
   std::atomic<size_t> finished_tiles{0};
   forEachTileGroup(visible, grid, progress, [&](const TileListGroup& group) {
     parallelFor(group.end_tile - group.first_tile, 1, [&](size_t begin, size_t end) {

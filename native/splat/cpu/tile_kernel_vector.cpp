@@ -1,0 +1,187 @@
+#include "splat/cpu/tile_kernel.h"
+
+// Lanes are pixels of one tile row. The same steps as tile_kernel_scalar.cpp with masks in place of
+// branches; products and sums are fused where the processor can, so targets differ by rounding.
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "splat/cpu/tile_kernel_vector.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "splat/blend.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace stipple {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Tag = hn::CappedTag<float, kTileSide>;
+using Vec = hn::Vec<Tag>;
+
+/// 2^x for x in -10..1, relative error below 3e-7: 2^f by its Taylor polynomial of degree 6 for
+/// |f| <= 1/2 (remainder (f ln 2)^7/7! = 1.2e-7), then f's whole part added to the exponent.
+HWY_INLINE Vec exp2Small(Tag d, Vec x) {
+  const hn::RebindToSigned<Tag> di;
+  const auto whole = hn::NearestInt(x);
+  const Vec f = hn::Sub(x, hn::ConvertTo(d, whole));
+  Vec p = hn::Set(d, 1.5403530393381610e-4f);
+  p = hn::MulAdd(p, f, hn::Set(d, 1.3333558146428443e-3f));
+  p = hn::MulAdd(p, f, hn::Set(d, 9.6181291076284772e-3f));
+  p = hn::MulAdd(p, f, hn::Set(d, 5.5504108664821580e-2f));
+  p = hn::MulAdd(p, f, hn::Set(d, 2.4022650695910072e-1f));
+  p = hn::MulAdd(p, f, hn::Set(d, 6.9314718055994531e-1f));
+  p = hn::MulAdd(p, f, hn::Set(d, 1.0f));
+  return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(whole)));
+}
+
+template <bool kDepth, bool kExtras>
+void blendSplats(const TileSplat* splats, size_t count, TilePixels& pixels) {
+  const Tag d;
+  const size_t lanes = hn::Lanes(d);
+  const Vec max_alpha = hn::Set(d, static_cast<float>(kMaxAlpha));
+  const Vec min_transmittance = hn::Set(d, static_cast<float>(kMinTransmittance));
+  const Vec finish_doubt = hn::Set(d, static_cast<float>(kMinTransmittance) * kFinishDoubt);
+  const Vec half = hn::Set(d, 0.5f);
+  const Vec median_doubt = hn::Set(d, 0.5f * kMedianDoubt);
+  const Vec finished = hn::Set(d, kFinished);
+  // A dead lane's exponent may be -1e12; exp2Small wants at least -10.
+  const Vec lowest = hn::Set(d, -9.0f);
+
+  for (size_t s = 0; s < count && pixels.unfinished > 0; ++s) {
+    const TileSplat& splat = splats[s];
+    const Vec low = hn::Set(d, kLog2MinAlpha - splat.doubt_low);
+    const Vec high = hn::Set(d, kLog2MinAlpha + splat.doubt_high);
+    const Vec l11 = hn::Set(d, splat.l11);
+    for (size_t column = 0; column < kTileSide; column += lanes) {
+      const Vec x = hn::Iota(d, static_cast<float>(column));
+      const Vec g0 = hn::MulAdd(hn::Set(d, splat.l00), x, hn::Set(d, splat.g0));
+      const Vec most = hn::NegMulAdd(g0, g0, hn::Set(d, splat.log2_opacity));
+      if (hn::AllFalse(d, hn::Gt(most, low))) continue;
+      const Vec g1_first = hn::MulAdd(hn::Set(d, splat.l10), x, hn::Set(d, splat.g1));
+      for (uint32_t y = splat.row_begin; y < splat.row_end; ++y) {
+        const size_t i = static_cast<size_t>(y) * kTileSide + column;
+        const Vec g1 = hn::MulAdd(l11, hn::Set(d, static_cast<float>(y)), g1_first);
+        const Vec exponent = hn::NegMulAdd(g1, g1, most);
+        const Vec cut = hn::Load(d, pixels.cut + i);
+        const auto touched = hn::And(hn::Gt(exponent, low), hn::Lt(cut, finished));
+        if (hn::AllFalse(d, touched)) continue;
+
+        const auto unclear = hn::And(touched, hn::Lt(exponent, high));
+        const auto shows = hn::AndNot(unclear, touched);
+        const Vec alpha = hn::Min(max_alpha, exp2Small(d, hn::Max(exponent, lowest)));
+        const Vec before = hn::Load(d, pixels.transmittance + i);
+        const Vec next = hn::NegMulAdd(before, alpha, before);
+        auto near = hn::Lt(hn::Abs(hn::Sub(next, min_transmittance)), finish_doubt);
+        if constexpr (kExtras) {
+          near = hn::Or(near, hn::Lt(hn::Abs(hn::Sub(next, half)), median_doubt));
+        }
+        const auto doubtful = hn::Or(unclear, hn::And(shows, near));
+        const auto ends = hn::Or(doubtful, hn::And(shows, hn::Lt(next, min_transmittance)));
+        const auto blends = hn::AndNot(ends, shows);
+
+        const Vec weight = hn::IfThenElseZero(blends, hn::Mul(before, alpha));
+        const auto accumulate = [&](float* plane, float value) {
+          hn::Store(hn::MulAdd(weight, hn::Set(d, value), hn::Load(d, plane + i)), d, plane + i);
+        };
+        hn::Store(hn::IfThenElse(blends, next, before), d, pixels.transmittance + i);
+        accumulate(pixels.red, splat.colour[0]);
+        accumulate(pixels.green, splat.colour[1]);
+        accumulate(pixels.blue, splat.colour[2]);
+        if constexpr (kDepth) accumulate(pixels.weighted_depth, splat.depth);
+        if constexpr (kExtras) {
+          const Vec median = hn::Load(d, pixels.median_depth + i);
+          const auto passes =
+              hn::And(blends, hn::And(hn::Lt(next, half), hn::Eq(median, hn::Set(d, kNoMedian))));
+          hn::Store(hn::IfThenElse(passes, hn::Set(d, splat.depth), median), d,
+                    pixels.median_depth + i);
+          const Vec counted = hn::IfThenElseZero(blends, hn::Set(d, 1.0f));
+          hn::Store(hn::Add(hn::Load(d, pixels.count + i), counted), d, pixels.count + i);
+        }
+        if (!hn::AllFalse(d, ends)) {
+          hn::Store(hn::IfThenElse(ends, finished, cut), d, pixels.cut + i);
+          const Vec doubt = hn::Load(d, pixels.doubt + i);
+          hn::Store(hn::IfThenElse(doubtful, hn::Set(d, 1.0f), doubt), d, pixels.doubt + i);
+          pixels.unfinished -= static_cast<uint32_t>(hn::CountTrue(d, ends));
+        }
+      }
+    }
+  }
+}
+
+void blendTile(const TileSplat* splats, size_t count, TileKernelOptions options,
+               TilePixels& pixels) {
+  if (options.with_extras) {
+    if (options.with_depth) {
+      blendSplats<true, true>(splats, count, pixels);
+    } else {
+      blendSplats<false, true>(splats, count, pixels);
+    }
+  } else if (options.with_depth) {
+    blendSplats<true, false>(splats, count, pixels);
+  } else {
+    blendSplats<false, false>(splats, count, pixels);
+  }
+}
+
+NamedTileKernel namedKernel() {
+  return {hwy::TargetName(HWY_TARGET), blendTile};
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stipple
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+#include <cctype>
+#include <cstdlib>
+#include <string>
+
+#include "base/error.h"
+
+namespace stipple {
+
+HWY_EXPORT(namedKernel);
+
+namespace {
+
+std::string lowerCase(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+TileKernel chooseTileKernel() {
+  const char* forced = std::getenv("STIPPLE_FORCE_TARGET");
+  if (!forced || !*forced) return HWY_DYNAMIC_DISPATCH(namedKernel)().kernel;
+  std::string names;
+  for (const NamedTileKernel& named : tileKernels()) {
+    if (lowerCase(named.target) == lowerCase(forced)) return named.kernel;
+    names += (names.empty() ? "" : ", ") + lowerCase(named.target);
+  }
+  fail(ErrorCode::kInvalidArgument,
+       "STIPPLE_FORCE_TARGET is \"" + std::string(forced) + "\"; this machine has " + names);
+}
+
+}  // namespace
+
+std::vector<NamedTileKernel> tileKernels() {
+  std::vector<NamedTileKernel> kernels = {{"scalar", blendTileScalar}};
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    kernels.push_back(HWY_DYNAMIC_DISPATCH(namedKernel)());
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  return kernels;
+}
+
+TileKernel chosenTileKernel() {
+  static const TileKernel kernel = chooseTileKernel();
+  return kernel;
+}
+
+}  // namespace stipple
+
+#endif  // HWY_ONCE

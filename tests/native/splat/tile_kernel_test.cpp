@@ -1,0 +1,118 @@
+#include "splat/cpu/tile_kernel.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <string>
+
+namespace stipple {
+namespace {
+
+struct Rng {
+  std::mt19937 random;
+  float operator()(float low, float high) {
+    return low + (high - low) * (static_cast<float>(random() >> 8) * 0x1.0p-24f);
+  }
+};
+
+std::vector<TileSplat> randomSplats(size_t count, float opacity_low, uint32_t seed) {
+  Rng uniform{std::mt19937(seed)};
+  std::vector<TileSplat> splats(count);
+  for (TileSplat& s : splats) {
+    s.l00 = uniform(0.05f, 0.6f);
+    s.l10 = uniform(-0.4f, 0.4f);
+    s.l11 = uniform(0.05f, 0.6f);
+    const float x = uniform(-2, 18);
+    const float y = uniform(-2, 18);
+    s.g0 = -s.l00 * x;
+    s.g1 = -s.l10 * x - s.l11 * y;
+    s.log2_opacity = std::log2(uniform(opacity_low, 1.0f));
+    s.doubt_low = s.doubt_high = 5e-5f;
+    for (float& c : s.colour) c = uniform(0, 1);
+    s.depth = uniform(1, 5);
+    s.row_begin = 0;
+    s.row_end = kTileSide;
+  }
+  return splats;
+}
+
+TilePixels emptyPixels() {
+  TilePixels pixels{};
+  for (uint32_t i = 0; i < kTilePixelCount; ++i) {
+    pixels.transmittance[i] = 1;
+    pixels.median_depth[i] = kNoMedian;
+    pixels.cut[i] = kLog2MinAlpha;
+  }
+  // Outside the picture: must stay untouched.
+  pixels.cut[kTilePixelCount - 1] = kFinished;
+  pixels.unfinished = kTilePixelCount - 1;
+  return pixels;
+}
+
+TEST(TileKernel, HasTheScalarOneAndAtLeastOneVectorTarget) {
+  const std::vector<NamedTileKernel> kernels = tileKernels();
+  ASSERT_GE(kernels.size(), 2u);
+  EXPECT_EQ(std::string(kernels.front().target), "scalar");
+}
+
+TEST(TileKernel, EveryTargetBlendsAsTheScalarOne) {
+  for (const float opacity_low : {0.005f, 0.3f, 0.9f}) {
+    for (const TileKernelOptions options :
+         {TileKernelOptions{false, false}, TileKernelOptions{true, false},
+          TileKernelOptions{false, true}, TileKernelOptions{true, true}}) {
+      const std::vector<TileSplat> splats = randomSplats(300, opacity_low, 11);
+      TilePixels expected = emptyPixels();
+      blendTileScalar(splats.data(), splats.size(), options, expected);
+      for (const NamedTileKernel& named : tileKernels()) {
+        SCOPED_TRACE(named.target);
+        TilePixels seen = emptyPixels();
+        named.kernel(splats.data(), splats.size(), options, seen);
+        size_t doubts_differ = 0;
+        for (uint32_t i = 0; i < kTilePixelCount; ++i) {
+          if (seen.doubt[i] != 0 || expected.doubt[i] != 0) {
+            doubts_differ += seen.doubt[i] != expected.doubt[i];
+            continue;
+          }
+          // Fused products and the polynomial change the last bits: 3e-7 per alpha, grown by at
+          // most 1/(1 - alpha) = 100 in T, whose own size is then 0.01.
+          EXPECT_NEAR(seen.transmittance[i], expected.transmittance[i], 1e-6);
+          EXPECT_NEAR(seen.red[i], expected.red[i], 5e-6);
+          EXPECT_NEAR(seen.green[i], expected.green[i], 5e-6);
+          EXPECT_NEAR(seen.blue[i], expected.blue[i], 5e-6);
+          EXPECT_NEAR(seen.weighted_depth[i], expected.weighted_depth[i], 2e-5);
+          EXPECT_EQ(seen.median_depth[i], expected.median_depth[i]);
+          EXPECT_EQ(seen.count[i], expected.count[i]);
+          EXPECT_EQ(seen.cut[i], expected.cut[i]);
+        }
+        // Only a pixel at the very rim of the doubtful band can fall in on one side and out on the
+        // other.
+        EXPECT_LE(doubts_differ, 2u);
+        EXPECT_EQ(seen.transmittance[kTilePixelCount - 1], 1.0f);
+      }
+    }
+  }
+}
+
+TEST(TileKernel, MarksPixelsWhereRoundingCouldDecide) {
+  // Exponent at column 0: exactly the threshold; at column 1: far from it.
+  TileSplat splat{};
+  splat.log2_opacity = 0;
+  splat.g0 = std::sqrt(-kLog2MinAlpha);
+  splat.l00 = -0.5f;
+  splat.doubt_low = splat.doubt_high = 1e-5f;
+  splat.row_end = 1;
+  for (const NamedTileKernel& named : tileKernels()) {
+    SCOPED_TRACE(named.target);
+    TilePixels pixels = emptyPixels();
+    named.kernel(&splat, 1, {true, true}, pixels);
+    EXPECT_EQ(pixels.doubt[0], 1.0f);
+    EXPECT_EQ(pixels.cut[0], kFinished);
+    EXPECT_EQ(pixels.doubt[1], 0.0f);
+    EXPECT_EQ(pixels.count[1], 1.0f);
+    EXPECT_EQ(pixels.unfinished, kTilePixelCount - 2);
+  }
+}
+
+}  // namespace
+}  // namespace stipple
