@@ -28,8 +28,9 @@ THIRD_PARTY = {
     'CLI11': r'CLI/',
     'Google Benchmark': r'benchmark/',
 }
-# Slow to compile, or large: one file of a folder is the only place that knows them.
-ONE_FILE_PER_FOLDER = ('OpenVDB', 'tinygltf', 'OpenImageIO')
+# A format's library is known to the files of that format only (benchmarks may measure against OpenVDB).
+FORMAT_FILES = {'OpenVDB': r'native/(io/media/volume_|bench/)', 'tinygltf': r'native/io/media/gltf_',
+                'OpenImageIO': r'native/io/media/image_'}
 
 # Headers of ours whose purpose is to hand a package's types to every folder.
 CARRIERS = {'math/vec.h': {'Eigen'}}
@@ -100,9 +101,8 @@ def include_violations(root, table):
     """Includes of native/ that the table does not allow, and third-party headers that leave their folder."""
     root = pathlib.Path(root)
     found = []
-    users = {}             # (folder, package) -> files
     third_party_headers = {}  # header of ours -> third-party packages in it
-    included_by = {}       # header of ours -> folders that include it
+    included_by = {}  # header of ours -> folders that include it
     for name in project_files(root):
         parts = name.split('/')
         if parts[0] != 'native' or len(parts) < 3 or not name.endswith(('.cpp', '.h', '.c')):
@@ -117,11 +117,12 @@ def include_violations(root, table):
             package = package_of(included)
             target = included.split('/')[0]
             if package:
-                users.setdefault((folder, package), set()).add(name)
                 if name.endswith('.h'):
                     third_party_headers.setdefault(included_name(name), set()).add(package)
                 if package not in packages:
                     found.append(f'{where}: {folder} may not include {package}')
+                elif not re.match(FORMAT_FILES.get(package, ''), name):
+                    found.append(f'{where}: {package} belongs in the files of its format')
             elif included == 'stipple/stipple.h':
                 if folder != 'include' and 'stipple.h' not in folders:
                     found.append(f'{where}: {folder} may not include the public header')
@@ -131,9 +132,6 @@ def include_violations(root, table):
                     found.append(f'{where}: {folder} may not include {target}')
             elif not SYSTEM_HEADERS.fullmatch(included):
                 found.append(f'{where}: neither ours, nor in the table, nor a known system header')
-    for (folder, package), files in sorted(users.items()):
-        if package in ONE_FILE_PER_FOLDER and len(files) > 1:
-            found.append(f'{package} is included by {len(files)} files of native/{folder}, at most 1 may: {sorted(files)}')
     for header, packages in sorted(third_party_headers.items()):
         outside = sorted(included_by.get(header, set()) - {header.split('/')[0]})
         if outside and packages - CARRIERS.get(header, set()):

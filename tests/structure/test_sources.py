@@ -78,12 +78,13 @@ def test_a_third_party_header_in_a_header_of_another_folder_is_found(tmp_path):
     assert rules.include_violations(tmp_path, table) == ["math/solve.h: carries ['Eigen'] into ['splat']"]
 
 
-def test_a_second_file_with_openvdb_is_found(tmp_path):
-    plant(tmp_path, {'native/io/media/volume.cpp': '#include <openvdb/openvdb.h>\n'})
+def test_a_format_library_outside_its_format_is_found(tmp_path):
+    plant(tmp_path, {'native/io/media/volume_media.cpp': '#include <openvdb/openvdb.h>\n'})
     table = rules.include_table(TABLE)
     assert rules.include_violations(tmp_path, table) == []
-    plant(tmp_path, {'native/io/media/sequence.cpp': '#include <openvdb/io/File.h>\n'})
-    assert 'OpenVDB is included by 2 files' in rules.include_violations(tmp_path, table)[0]
+    plant(tmp_path, {'native/io/splat_file.cpp': '#include <openvdb/openvdb.h>\n'})
+    assert rules.include_violations(tmp_path, table) == [
+        'native/io/splat_file.cpp:1: openvdb/openvdb.h: OpenVDB belongs in the files of its format']
 
 
 def test_a_link_against_the_table_is_found(tmp_path):
