@@ -1,0 +1,42 @@
+#pragma once
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <vector>
+
+namespace stipple::bench {
+
+/// Seconds that `work` takes.
+template <class Work>
+double secondsOf(const Work& work) {
+  const auto begin = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// Times `ours` and `reference` in turn, so that both meet the same machine, and reports the ratio
+/// of the best times as counter `ratio_<name>` beside `target_<name>`; the main program prints all
+/// such ratios in a table. The benchmark must use manual time. In: reference_work_per_ours: how
+/// much more the reference does in one call (points over points).
+template <class Ours, class Reference>
+void compare(benchmark::State& state, const std::string& name, double target, const Ours& ours,
+             const Reference& reference, double reference_work_per_ours = 1.0) {
+  double best_ours = 1e300;
+  double best_reference = 1e300;
+  for (auto step : state) {
+    (void)step;
+    best_reference = std::min(best_reference, secondsOf(reference));
+    const double seconds = secondsOf(ours);
+    best_ours = std::min(best_ours, seconds);
+    state.SetIterationTime(seconds);
+  }
+  state.counters["best_ms"] = 1e3 * best_ours;
+  state.counters["reference_ms"] = 1e3 * best_reference;
+  state.counters["ratio_" + name] = best_reference / best_ours / reference_work_per_ours;
+  state.counters["target_" + name] = target;
+}
+
+}  // namespace stipple::bench
