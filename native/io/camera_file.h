@@ -13,7 +13,14 @@ struct CameraView {
 };
 
 /// Reads cameras of a transforms.json (nerfstudio, NeRF-synthetic; OpenGL frames become OpenCV).
-/// Errors: kIo, kFormat (missing or wrong fields, distorted models), kUnsupported.
+/// Keys of a frame win over those of the file. Besides perspective cameras it knows ours:
+/// `"camera_model": "ORTHOGRAPHIC"` with `"ortho_scale"`, the metres across the picture's width.
+///
+/// A file without `w` and `h` (NeRF-synthetic) gives cameras of width and height 0, whose
+/// intrinsics are in units of the picture: fx = fy = 0.5 / tan(angle / 2), the focal length in
+/// widths (orthographic: 1 / ortho_scale, widths per metre), cx = cy = 0.5 of width and height.
+/// For a picture of w x h pixels: fx, fy and cx times w, cy times h.
+/// Errors: kIo, kFormat (missing or wrong fields, with the frame), kUnsupported (distorted models).
 std::vector<CameraView> readCameraFile(const std::string& path);
 
 }  // namespace stipple
