@@ -11,7 +11,8 @@ namespace stipple {
 void validateAffine(const Mat4d& matrix, const char* what) {
   for (Eigen::Index i = 0; i < 16; ++i) {
     const double value = matrix.data()[i];
-    if (!(std::abs(value) <= 1e15)) {
+    // isfinite first: comparing a NaN is an invalid operation where those are trapped.
+    if (!std::isfinite(value) || std::abs(value) > 1e15) {
       fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(value) +
                                             "; finite numbers up to 1e15 are allowed");
     }

@@ -11,6 +11,9 @@ namespace stipple {
 namespace {
 
 constexpr uint32_t kMaxSide = 65536;
+/// Limits that keep every product of the projection inside double; pictures need far less.
+constexpr double kMaxFocal = 1e9;
+constexpr double kMinNear = 1e-9;
 
 void requireRigid(const Mat4d& matrix) {
   const Mat3d rotation = matrix.topLeftCorner<3, 3>();
@@ -38,9 +41,9 @@ void validate(const Camera& camera) {
     }
   }
   for (const double focal : {camera.fx, camera.fy}) {
-    if (!(focal > 0) || !std::isfinite(focal)) {
+    if (!std::isfinite(focal) || focal <= 0 || focal > kMaxFocal) {
       fail(ErrorCode::kInvalidArgument, "camera focal length is " + std::to_string(focal) +
-                                            " pixels; it must be positive and finite");
+                                            " pixels; it must be positive and at most 1e9");
     }
   }
   requireFinite(camera.cx, "camera.cx");
@@ -49,11 +52,14 @@ void validate(const Camera& camera) {
     requireFinite(camera.world_to_camera.data()[i], "camera.world_to_camera");
   }
   requireRigid(camera.world_to_camera);
+  requireFinite(camera.near_plane, "camera.near_plane");
+  requireFinite(camera.far_plane, "camera.far_plane");
   const bool perspective = camera.model == CameraModel::kPerspective;
-  if (!(camera.far_plane > camera.near_plane) || (perspective && !(camera.near_plane > 0))) {
+  if (!(camera.far_plane > camera.near_plane) ||
+      (perspective && !(camera.near_plane >= kMinNear))) {
     fail(ErrorCode::kInvalidArgument,
          "camera near and far planes are " + std::to_string(camera.near_plane) + " and " +
-             std::to_string(camera.far_plane) + " m; 0 < near < far is needed");
+             std::to_string(camera.far_plane) + " m; 1e-9 <= near < far is needed");
   }
 }
 

@@ -23,8 +23,9 @@ struct Camera {
   double far_plane = 1e10;                    ///< metres along z
 };
 
-/// Refuses cameras that cannot make a picture: sizes of 0 or above 65,536, a non-positive or
-/// non-finite focal length, a matrix that is not a rotation and a translation, near >= far.
+/// Refuses cameras that cannot make a picture: sizes of 0 or above 65,536, a focal length that is
+/// not positive or above 1e9, numbers that are not finite, a matrix that is not a rotation and a
+/// translation, near >= far, a perspective near plane below 1e-9 m.
 void validate(const Camera& camera);
 
 /// Centre of the camera in the world (perspective), metres.

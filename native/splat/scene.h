@@ -51,7 +51,8 @@ inline bool projectSplat(const PlacedScene& scene, const PlacedCloud& placed, si
 }
 
 /// Colour of a splat in the blending space: harmonics in the viewing direction, brought into object
-/// space, + 0.5, at least 0. Out: colour [3].
+/// space, + 0.5, held to 0..1e12 (above, the linearised colour could leave float32). Out: colour
+/// [3].
 template <typename T>
 void splatColour(const PlacedScene& scene, const PlacedCloud& placed, size_t index, T* colour) {
   const SplatCloud& cloud = *placed.cloud;
@@ -74,7 +75,7 @@ void splatColour(const PlacedScene& scene, const PlacedCloud& placed, size_t ind
   for (size_t c = 0; c < 3; ++c) {
     T sum = T(0.5);
     for (size_t k = 0; k < count; ++k) sum += basis[k] * T(sh[k * 3 + c]);
-    sum = std::max(sum, T(0));
+    sum = std::clamp(sum, T(0), T(1e12));
     colour[c] = placed.linearise ? srgbToLinear(sum) : sum;
   }
 }

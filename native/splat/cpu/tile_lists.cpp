@@ -40,8 +40,8 @@ TileRange tilesBetween(double low, double high, uint32_t tile_count) {
 template <typename Visit>
 void forEachTileSpan(const VisibleSplat& splat, const TileGrid& grid, Visit visit) {
   const Footprint<double>& f = splat.footprint;
-  const double half_x = static_cast<double>(splat.half_x);
-  const double half_y = static_cast<double>(splat.half_y);
+  const double half_x = splat.half_x;
+  const double half_y = splat.half_y;
   const TileRange rows = tilesBetween(f.mean_y - half_y, f.mean_y + half_y, grid.rows);
   const TileRange columns = tilesBetween(f.mean_x - half_x, f.mean_x + half_x, grid.columns);
   if (columns.first > columns.last) return;

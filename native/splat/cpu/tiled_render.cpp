@@ -56,9 +56,8 @@ TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   out.doubt_high = largest > kMaxFloatReach ? kFinished : out.doubt_low;
   std::copy(splat.colour, splat.colour + 3, out.colour);
   out.depth = splat.depth;
-  const double half_y = static_cast<double>(splat.half_y);
-  out.row_begin = static_cast<uint32_t>(std::clamp(std::ceil(-dy - half_y), 0.0, kSide));
-  out.row_end = static_cast<uint32_t>(std::clamp(std::floor(-dy + half_y) + 1.0, 0.0, kSide));
+  out.row_begin = static_cast<uint32_t>(std::clamp(std::ceil(-dy - splat.half_y), 0.0, kSide));
+  out.row_end = static_cast<uint32_t>(std::clamp(std::floor(-dy + splat.half_y) + 1.0, 0.0, kSide));
   return out;
 }
 

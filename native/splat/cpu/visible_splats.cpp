@@ -21,8 +21,8 @@ VisibleSplat makeVisible(const PlacedScene& scene, const PlacedCloud& placed, si
                          const Projected<double>& projected) {
   VisibleSplat splat;
   splat.footprint = projected.footprint;
-  splat.half_x = static_cast<float>(std::min(projected.half_x, 1e30));
-  splat.half_y = static_cast<float>(std::min(projected.half_y, 1e30));
+  splat.half_x = projected.half_x;
+  splat.half_y = projected.half_y;
   splat.log2_opacity = static_cast<float>(std::log2(projected.footprint.opacity));
   splat.depth = static_cast<float>(std::min(projected.depth, 1e38));
   splatColour(scene, placed, index, splat.colour);

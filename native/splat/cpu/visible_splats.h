@@ -13,8 +13,8 @@ namespace stipple {
 /// corner in double and goes on in float, so a wide picture or a long needle loses no digits.
 struct VisibleSplat {
   Footprint<double> footprint;
-  float half_x;  ///< pixels, at most 1e30
-  float half_y;
+  double half_x;  ///< pixels, as in Projected
+  double half_y;
   float log2_opacity;
   float depth;      ///< view z, metres
   float colour[3];  ///< blending space

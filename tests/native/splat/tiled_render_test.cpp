@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "splat/projection.h"
 #include "splat/random_scene.h"
 
 namespace stipple {
@@ -102,6 +103,84 @@ TEST(TiledRender, MatchesTheReferenceForManyTurnedStretchedAndShearedInstances) 
     instances.push_back({i % 2 ? &a : &b, matrix});
   }
   expectEqual(renderBoth(instances, frontCamera(100, 80, 90, 4.0), everything()));
+}
+
+/// q/2 of splat i at the middle of a 1x1 picture.
+double halfDistanceAtTheMiddle(const SplatCloud& cloud, size_t i, const Camera& camera) {
+  Projected<double> p;
+  const float full = 1.0f;
+  const Mat3d turn = camera.world_to_camera.topLeftCorner<3, 3>();
+  const Vec3d move = camera.world_to_camera.topRightCorner<3, 1>();
+  if (!project<double>(makeView<double>(camera), turn, move, &cloud.positions[i * 3],
+                       &cloud.rotations[i * 4], &cloud.scales[i * 3], full, LowPass::kClassic, p)) {
+    return 1e9;
+  }
+  return halfSquaredDistance(p.footprint, 0.5 - p.footprint.mean_x, 0.5 - p.footprint.mean_y);
+}
+
+TEST(TiledRender, DecidesAsTheReferenceWhereAlphaIsAtItsThreshold) {
+  // Opacities chosen so that alpha at the pixel is 1/255 up to about 1e-7: float32 alone would
+  // decide about half of these splats at random, and each decides 1/255 of the colour.
+  const Camera camera = frontCamera(1, 1, 20, 3.0);
+  uint32_t shown = 0;
+  uint32_t all = 0;
+  for (uint32_t seed = 1; seed <= 20; ++seed) {
+    CloudRecipe recipe;
+    recipe.size_min = 0.2;
+    recipe.size_max = 0.6;
+    SplatCloud cloud = randomCloud(recipe, seed);
+    for (size_t i = 0; i < cloud.size(); ++i) {
+      const double half = halfDistanceAtTheMiddle(cloud, i, camera);
+      cloud.opacities[i] = half < 5.5 ? static_cast<float>(std::exp(half) / 255.0) : 0.0f;
+      all += half < 5.5;
+    }
+    const SplatInstance instance{&cloud};
+    const ReferenceResult reference = renderReference({&instance, 1}, camera, everything());
+    shown += reference.counts[0];
+    expectEqual(testing::compare(renderTiled({&instance, 1}, camera, everything()), reference));
+  }
+  // The cases are about evenly split, so that they do test something.
+  EXPECT_GT(shown, all / 5);
+  EXPECT_LT(shown, all * 4 / 5);
+}
+
+TEST(TiledRender, DecidesAsTheReferenceWhereTransmittanceIsAtItsThresholds) {
+  // A few splats, then one that brings T to 1e-4 (or to 1/2) up to the rounding of its opacity;
+  // what follows it shows, or not, and the median is its depth, or the next one's.
+  const Camera camera = frontCamera(1, 1, 20, 3.0);
+  for (const double threshold : {1e-4, 0.5}) {
+    uint32_t below = 0;
+    for (uint32_t seed = 1; seed <= 200; ++seed) {
+      CloudRecipe recipe;
+      recipe.count = 6;
+      recipe.size_min = 0.3;
+      recipe.size_max = 0.6;
+      SplatCloud cloud = randomCloud(recipe, seed);
+      double transmittance = 1;
+      for (size_t i = 0; i < cloud.size(); ++i) {
+        for (size_t axis = 0; axis < 3; ++axis) cloud.positions[i * 3 + axis] *= 0.1f;
+        cloud.positions[i * 3 + 1] = static_cast<float>(i) * 0.1f;
+        const double response = std::exp(-halfDistanceAtTheMiddle(cloud, i, camera));
+        if (i < 4) {
+          const float opacity = threshold < 0.1 ? 0.85f + 0.03f * cloud.opacities[i]
+                                                : 0.13f + 0.01f * cloud.opacities[i];
+          cloud.opacities[i] = opacity;
+        } else if (i == 4) {
+          cloud.opacities[i] = static_cast<float>((1 - threshold / transmittance) / response);
+        } else {
+          cloud.opacities[i] = 0.3f;
+        }
+        ASSERT_LE(cloud.opacities[i], 1.0f);
+        transmittance *= 1 - std::min(0.99, static_cast<double>(cloud.opacities[i]) * response);
+        if (i == 4) below += transmittance < threshold;
+      }
+      const SplatInstance instance{&cloud};
+      SCOPED_TRACE(::testing::Message() << "threshold " << threshold << " seed " << seed);
+      expectEqual(renderBoth({instance}, camera, everything()));
+    }
+    EXPECT_GT(below, 40u);
+    EXPECT_LT(below, 160u);
+  }
 }
 
 TEST(TiledRender, GivesTheSameBitsForOneAndTwoThreads) {
