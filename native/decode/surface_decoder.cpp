@@ -129,4 +129,13 @@ SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
   return cloud;
 }
 
+uint64_t SurfaceDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const {
+  // Per splat: the cloud (56 bytes), sites (36, twice while they are sorted), shapes (72), patch
+  // bounds and cell tables (at most 96), scratch of the balance (at most 64). Per sample: owner and
+  // member (8) and the coverage (16).
+  constexpr uint64_t kBytesPerSplat = 56 + 2 * 36 + 72 + 96 + 64;
+  constexpr uint64_t kBytesPerSample = 24;
+  return anchor_count * gaussians_per_anchor * kBytesPerSplat + surface_->size() * kBytesPerSample;
+}
+
 }  // namespace stipple
