@@ -153,7 +153,10 @@ DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std
     fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF picture");
   }
   OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
-  const OIIO::ImageSpec config = keepAlpha();
+  OIIO::ImageSpec config = keepAlpha();
+  // The readers look for the bytes in the configuration, not in open's own argument.
+  void* proxy = &memory;
+  config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
   const auto input = OIIO::ImageInput::open(file_name, &config, &memory);
   if (!input) fail(ErrorCode::kFormat, name + " cannot be decoded: " + OIIO::geterror());
   return decode(*input, name);
