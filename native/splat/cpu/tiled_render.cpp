@@ -1,13 +1,13 @@
+#include "splat/cpu/tiled_render.h"
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <iterator>
 
 #include "base/parallel.h"
-#include "splat/cpu/tile_kernel.h"
 #include "splat/cpu/tile_lists.h"
 #include "splat/cpu/visible_splats.h"
-#include "splat/render.h"
 #include "splat/scene.h"
 
 // Based on: Kerbl et al., 3D Gaussian Splatting, SIGGRAPH 2023 (tiles). Differs: one sort by depth
@@ -183,8 +183,9 @@ uint64_t resultBytes(const Camera& camera, const RenderOptions& options) {
 
 }  // namespace
 
-RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
-                         const RenderOptions& options, Progress* progress) {
+RenderResult renderTiledWith(TileKernel kernel, std::span<const SplatInstance> instances,
+                             const Camera& camera, const RenderOptions& options,
+                             Progress* progress) {
   const PlacedScene scene = placeScene(instances, camera, options);
   advance(progress, 0.0, "Projecting splats");
   const VisibleSplats visible = findVisibleSplats(scene, progress);
@@ -192,7 +193,6 @@ RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera&
   result.visible_count = visible.order.size();
 
   const TileGrid grid(camera.width, camera.height);
-  const TileKernel kernel = chosenTileKernel();
   std::atomic<size_t> finished_tiles{0};
   forEachTileGroup(visible, grid, progress, [&](const TileListGroup& group) {
     parallelFor(group.end_tile - group.first_tile, 1, [&](size_t begin, size_t end) {
@@ -214,6 +214,11 @@ RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera&
     });
   });
   return result;
+}
+
+RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
+                         const RenderOptions& options, Progress* progress) {
+  return renderTiledWith(chosenTileKernel(), instances, camera, options, progress);
 }
 
 uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,

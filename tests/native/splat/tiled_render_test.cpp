@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "splat/cpu/tiled_render.h"
 #include "splat/projection.h"
 #include "splat/random_scene.h"
 
@@ -70,6 +71,23 @@ TEST(TiledRender, MatchesTheReferenceForEveryDegreeLowPassAndCamera) {
                                           << static_cast<int>(low_pass));
         expectEqual(renderBoth({{&cloud}}, camera, options));
       }
+    }
+  }
+}
+
+TEST(TiledRender, MatchesTheReferenceOnEveryTarget) {
+  CloudRecipe recipe;
+  recipe.count = 2000;
+  recipe.degree = 1;
+  const SplatCloud cloud = randomCloud(recipe, 41);
+  const SplatInstance instance{&cloud};
+  const Camera camera = frontCamera(97, 67, 80, 3.0);
+  for (RenderOptions options : {RenderOptions{}, everything()}) {
+    const ReferenceResult reference = renderReference({&instance, 1}, camera, options);
+    for (const NamedTileKernel& named : tileKernels()) {
+      SCOPED_TRACE(named.target);
+      expectEqual(testing::compare(renderTiledWith(named.kernel, {&instance, 1}, camera, options),
+                                   reference));
     }
   }
 }
