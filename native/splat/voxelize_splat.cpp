@@ -156,13 +156,15 @@ PrincipalAxes principalAxes(Mat3d a) {
   return result;
 }
 
-// How many samples per voxel keep the sum over voxels within 2 % of the integral for o = 0.99. The
-// profile of a splat has a core of half width l sqrt(-2 ln o), from the square-root branch point of
-// Li_1/2; once the thinnest axis is averaged the next one only meets its logarithm, and so on.
+// How many samples per voxel keep the sum over voxels near the integral. The profile of a splat has
+// a core of half width l sqrt(-2 ln o), from the square-root branch point of Li_1/2; once the
+// thinnest axis is averaged the next one only meets the logarithm of it, and the last one less
+// still. With the spacings below the mass of a splat of half a voxel and o = 0.99 strays by 0.2 %
+// where it is flat and wide, and by 5 % where it is round (one sample: 16 % and 73 %).
 void chooseSamples(VoxelSplat& splat, const Vec3d& lengths, double minus_log_opacity) {
-  constexpr double kPerAxis[3] = {0.57, 0.28, 0.14};
-  // A faint splat is a plain Gaussian, which a spacing of two standard deviations integrates.
-  const double core = std::min(1.2, std::sqrt(2.0 * minus_log_opacity));
+  constexpr double kPerAxis[3] = {0.4, 0.2, 0.1};
+  // A faint splat is a plain Gaussian without a core; a spacing of 1.9 standard deviations does.
+  const double core = std::min(0.75, std::sqrt(2.0 * minus_log_opacity));
   for (int axis = 0; axis < 3; ++axis) {
     const double wanted = std::ceil(kPerAxis[axis] / (lengths[axis] * core));
     const double allowed = kVoxelMaxSamples[axis];
