@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "comparison.h"
+#include "bench/comparison.h"
 #include "density/anchor_sampling.h"
-#include "openvdb_scatter.h"
+#include "bench/openvdb_scatter.h"
 
 namespace stipple::bench {
 namespace {

@@ -1,4 +1,4 @@
-#include "openvdb_scatter.h"
+#include "bench/openvdb_scatter.h"
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/PointScatter.h>

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/parallel.h"
-#include "comparison.h"
+#include "bench/comparison.h"
 #include "splat/cpu/tiled_render.h"
 
 namespace stipple::bench {
