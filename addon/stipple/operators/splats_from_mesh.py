@@ -40,7 +40,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
 
     def start(self, context):
         self._settings().check()
-        self._objects = meshes.source_objects(context.selected_objects)
+        self._objects = meshes.source_objects(context.view_layer.objects.selected)
         if not self._objects:
             raise invalid('No mesh is selected; select at least one object with faces.')
         native = sources.context()
