@@ -10,7 +10,7 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "comparison.h"
+#include "bench/comparison.h"
 #include "splat/voxelize.h"
 #include "splat/voxelize_kernel.h"
 #include "splat/voxelize_splat.h"
