@@ -70,11 +70,12 @@ void floorOfValues(double values) {
   const std::vector<uint32_t> list(1024, 0);
   const auto count =
       static_cast<size_t>(std::ceil(values / static_cast<double>(list.size()) / kBrickVoxelCount));
+  const BrickKernel sum_brick = chosenBrickKernel();
   parallelFor(count, 4, [&](size_t begin, size_t end) {
     std::vector<float> density(kBrickVoxelCount);
     std::vector<float> colour(3 * kBrickVoxelCount);
     for (size_t i = begin; i < end; ++i) {
-      sumBrick({0, 0, 0}, splats, list, density.data(), colour.data());
+      sum_brick({0, 0, 0}, splats.data(), list.data(), list.size(), density.data(), colour.data());
       benchmark::DoNotOptimize(density.data());
     }
   });

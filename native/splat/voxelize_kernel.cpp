@@ -219,21 +219,64 @@ void sumBrickLanes(const BrickKey& brick, const VoxelSplat* splats, const uint32
 }
 
 }  // namespace
+
+NamedBrickKernel namedBrickKernel() {
+  return {hwy::TargetName(HWY_TARGET), sumBrickLanes};
+}
+
 }  // namespace stipple::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+
+#include <cctype>
+#include <cstdlib>
+#include <string>
+
+#include "base/error.h"
+
 namespace stipple {
 
+HWY_EXPORT(namedBrickKernel);
+
 namespace {
-HWY_EXPORT(sumBrickLanes);
+
+std::string lowerCase(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+BrickKernel chooseBrickKernel() {
+  const char* forced = std::getenv("STIPPLE_FORCE_TARGET");
+  if (!forced || !*forced) return HWY_DYNAMIC_DISPATCH(namedBrickKernel)().kernel;
+  std::string names;
+  for (const NamedBrickKernel& named : brickKernels()) {
+    if (lowerCase(named.target) == lowerCase(forced)) return named.kernel;
+    names += (names.empty() ? "" : ", ") + lowerCase(named.target);
+  }
+  fail(ErrorCode::kInvalidArgument,
+       "STIPPLE_FORCE_TARGET is \"" + std::string(forced) + "\"; this machine has " + names);
+}
+
 }  // namespace
 
-void sumBrick(const BrickKey& brick, std::span<const VoxelSplat> splats,
-              std::span<const uint32_t> list, float* density, float* colour) {
-  HWY_DYNAMIC_DISPATCH(sumBrickLanes)
-  (brick, splats.data(), list.data(), list.size(), density, colour);
+std::vector<NamedBrickKernel> brickKernels() {
+  std::vector<NamedBrickKernel> kernels = {{"scalar", sumBrickScalar}};
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    kernels.push_back(HWY_DYNAMIC_DISPATCH(namedBrickKernel)());
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  return kernels;
+}
+
+BrickKernel chosenBrickKernel() {
+  static const BrickKernel kernel = chooseBrickKernel();
+  return kernel;
 }
 
 }  // namespace stipple
+
 #endif  // HWY_ONCE
