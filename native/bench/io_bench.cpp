@@ -9,9 +9,10 @@
 #include <vector>
 
 #include "base/random.h"
+#include "bench/comparison.h"
 #include "io/splat_file.h"
 
-namespace stipple {
+namespace stipple::bench {
 namespace {
 
 constexpr size_t kSplats = 1000000;
@@ -66,52 +67,46 @@ std::vector<char> readWhole(const std::string& path) {
   return bytes;
 }
 
-void count(benchmark::State& state, size_t bytes) {
+void writeWhole(const std::string& path, const std::vector<char>& bytes) {
+  const File file(std::fopen(path.c_str(), "wb"));
+  std::fwrite(bytes.data(), 1, bytes.size(), file.get());
+}
+
+void finish(benchmark::State& state, size_t bytes) {
   state.SetBytesProcessed(static_cast<int64_t>(bytes) * state.iterations());
-  state.counters["splats"] = benchmark::Counter(static_cast<double>(kSplats),
-                                                benchmark::Counter::kIsIterationInvariantRate);
+  state.SetItemsProcessed(static_cast<int64_t>(kSplats) * state.iterations());
 }
 
 void plyRead(benchmark::State& state) {
   const std::string& path = scratchFile();
-  for (auto _ : state) benchmark::DoNotOptimize(readSplatFile(path));
-  count(state, readWhole(path).size());
-}
-
-void plyReadFloor(benchmark::State& state) {
-  const std::string& path = scratchFile();
   size_t bytes = 0;
-  for (auto _ : state) bytes = readWhole(path).size();
-  count(state, bytes);
+  compare(
+      state, "fread", 0.0, [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
+      [&] { bytes = readWhole(path).size(); });
+  finish(state, bytes);
 }
 
 void plyWrite(benchmark::State& state) {
   const std::string& path = scratchFile();
-  for (auto _ : state) writeSplatFile(cloud(), path, {});
-  count(state, readWhole(path).size());
+  const std::vector<char> bytes = readWhole(path);
+  const std::string floor_path = path + ".floor";
+  compare(
+      state, "fwrite", 0.0, [&] { writeSplatFile(cloud(), path, {}); },
+      [&] { writeWhole(floor_path, bytes); });
+  ::unlink(floor_path.c_str());
+  finish(state, bytes.size());
 }
 
-void plyWriteFloor(benchmark::State& state) {
-  const std::vector<char> bytes = readWhole(scratchFile());
-  const std::string path = scratchFile() + ".floor";
-  for (auto _ : state) {
-    const File file(std::fopen(path.c_str(), "wb"));
-    if (std::fwrite(bytes.data(), 1, bytes.size(), file.get()) != bytes.size()) {
-      state.SkipWithError("the file cannot be written");
-    }
-  }
-  ::unlink(path.c_str());
-  count(state, bytes.size());
-}
-
-// Wall time: the reader uses every thread, and fread waits in the kernel.
-BENCHMARK(plyRead)->Name("io.ply_read.1M")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(plyReadFloor)->Name("io.ply_read_fread.1M")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(plyWrite)->Name("io.ply_write.1M")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(plyWriteFloor)
-    ->Name("io.ply_write_fwrite.1M")
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+BENCHMARK(plyRead)
+    ->Name("io.ply_read.1M")
+    ->UseManualTime()
+    ->Iterations(8)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(plyWrite)
+    ->Name("io.ply_write.1M")
+    ->UseManualTime()
+    ->Iterations(8)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
-}  // namespace stipple
+}  // namespace stipple::bench

@@ -127,7 +127,10 @@ uint32_t wholeNumber(const unsigned char* bytes, int type, const std::string& wh
 void applySparse(const tinygltf::Model& model, const tinygltf::Accessor& accessor, size_t width,
                  const std::string& what, std::vector<float>& values) {
   const auto& sparse = accessor.sparse;
-  if (sparse.count < 0 || sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0) {
+  // Signed in one version of tinygltf, unsigned in the next.
+  const auto negative = [](auto number) { return static_cast<int64_t>(number) < 0; };
+  if (negative(sparse.count) || negative(sparse.indices.byteOffset) ||
+      negative(sparse.values.byteOffset)) {
     failHere(what + " has a sparse part of negative size");
   }
   const size_t count = static_cast<size_t>(sparse.count);
