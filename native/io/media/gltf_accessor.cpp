@@ -213,4 +213,11 @@ std::vector<uint32_t> readIndices(const tinygltf::Model& model, int index,
   return values;
 }
 
+std::vector<unsigned char> readView(const tinygltf::Model& model, int view,
+                                    const std::string& what) {
+  const Range range = rangeOf(model, view, 0, 0, 1, what);
+  const size_t length = model.bufferViews[static_cast<size_t>(view)].byteLength;
+  return std::vector<unsigned char>(range.first, range.first + length);
+}
+
 }  // namespace stipple::media
