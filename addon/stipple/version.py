@@ -17,6 +17,9 @@ BASE_TYPE = 'FLOAT4' if HAS_SIZED_POINT_CLOUDS else 'FLOAT_COLOR'
 ATTRIBUTE_FIELDS = {'FLOAT': 'value', 'FLOAT_VECTOR': 'vector', 'FLOAT_COLOR': 'color', 'QUATERNION': 'value',
                     'FLOAT4': 'value'}
 FLAT_COLOR_SHADER = 'FLAT_COLOR' if VERSION >= (4, 0, 0) else '3D_FLAT_COLOR'
+# Voxels by which Cycles and EEVEE draw an OpenVDB grid too far along each axis: older ones put a voxel's corner
+# where its centre belongs (measured with one splat: 3.4.1 and 4.3.2 half a voxel, 5.2.2 nothing).
+VOXEL_SHIFT = 0.5 if VERSION < (5, 0, 0) else 0.0
 EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BLENDER_EEVEE'
 
 

@@ -46,3 +46,21 @@ def test_object_matrix_is_in_the_volume(stipple, tmp_path):
     info = stipple.binding.volume.Volume.load(stipple.scene.sources.context(), str(tmp_path / 'a.vdb')).info()
     assert abs(info.voxel_size - 0.1) < 1e-6
     assert 7 < info.bounds_min[0] < 9.1 and 10.9 < info.bounds_max[0] < 13
+
+
+def test_volume_is_drawn_where_the_splats_are(stipple, tmp_path):
+    if not cycles_shows_volumes():
+        pytest.skip('Cycles of this build does not read OpenVDB files')
+    splats = scenes.make_splats(scenes.sphere(), anchors=2000)
+    assert bpy.ops.stipple.splats_to_volume(filepath=str(tmp_path / 'ball.vdb'), voxel_size=0.2) == {'FINISHED'}
+    splats.hide_render = True
+    scenes.camera((0, 0, 6), width=60, height=60, type='ORTHO', ortho_scale=3.0)
+    scene = bpy.context.scene
+    scene.render.engine = 'CYCLES'
+    scene.cycles.samples, scene.cycles.use_denoising = 32, False
+    scene.render.film_transparent = True
+    alpha = scenes.render_pixels(tmp_path)[..., 3]
+    y, x = np.mgrid[:60, :60] + 0.5
+    centroid = np.array([(alpha * x).sum(), (alpha * y).sum()]) / alpha.sum()
+    # 20 pixels are a metre, so half a voxel is 2 pixels; the anchors' own centroid is good to a twentieth of that.
+    np.testing.assert_allclose(centroid, (30.0, 30.0), atol=0.3)

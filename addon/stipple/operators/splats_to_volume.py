@@ -44,8 +44,8 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
         volume = job.volume()
         volume.save(self._path)
         name = os.path.splitext(os.path.basename(self._path))[0]
-        volumes.new_object(name, self._path, context.collection)
         info = volume.info()
+        volumes.new_object(name, self._path, context.collection, info.voxel_size)
         self.report({'INFO'}, f"{info.active_voxel_count:,} voxels of {info.voxel_size:.4g} m in '{self._path}'")
 
 
