@@ -54,7 +54,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         name = (active if active in self._objects else self._objects[0]).name + ' Splats'
         path = sources.save_model(model, sources.model_path_for(name, self.source_path), bool(self.source_path))
         sources.remember_model(path, model)
-        obj = bpy.data.objects.new(name, splat_data.new_data(name))
+        obj = splat_data.new_object(name, splat_data.new_data(name))
         stipple = obj.data.stipple
         with sync.paused():
             stipple.anchors, stipple.gaussians_per_anchor = self.anchors, self.gaussians_per_anchor

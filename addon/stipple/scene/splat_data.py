@@ -34,6 +34,23 @@ def new_data(name):
     return data
 
 
+def new_object(name, data):
+    """An object of splat data that the add-on draws; Blender draws its box."""
+    obj = bpy.data.objects.new(name, data)
+    if not bpy.app.background:
+        show_as_box(obj)
+    return obj
+
+
+def show_as_box(obj, box=True):
+    """Vertex meshes are drawn as black dots over everything: a box leaves room for the splats themselves.
+
+    Objects that the user gave another display type keep it.
+    """
+    if obj.type == 'MESH' and obj.display_type == ('TEXTURED' if box else 'BOUNDS'):
+        obj.display_type = 'BOUNDS' if box else 'TEXTURED'
+
+
 def is_splats(data):
     """True for data that Stipple made; also for evaluated copies."""
     return data is not None and isinstance(data, (bpy.types.Mesh, bpy.types.PointCloud)) and (
