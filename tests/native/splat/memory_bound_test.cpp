@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <new>
 
@@ -18,7 +20,7 @@ std::atomic<uint64_t> peak{0};
 /// Room before each block for its size, keeping malloc's alignment.
 constexpr size_t kHeader = 16;
 
-void* allocate(size_t size) {
+[[maybe_unused]] void* allocate(size_t size) {
   auto* block = static_cast<std::byte*>(std::malloc(size + kHeader));
   if (!block) throw std::bad_alloc();
   *reinterpret_cast<uint64_t*>(block) = size;
@@ -29,7 +31,7 @@ void* allocate(size_t size) {
   return block + kHeader;
 }
 
-void release(void* pointer) {
+[[maybe_unused]] void release(void* pointer) {
   if (!pointer) return;
   std::byte* block = static_cast<std::byte*>(pointer) - kHeader;
   held.fetch_sub(*reinterpret_cast<uint64_t*>(block));
@@ -38,6 +40,7 @@ void release(void* pointer) {
 
 }  // namespace
 
+#ifndef __SANITIZE_ADDRESS__  // which brings its own
 void* operator new(size_t size) {
   return allocate(size);
 }
@@ -56,6 +59,7 @@ void operator delete(void* pointer, size_t) noexcept {
 void operator delete[](void* pointer, size_t) noexcept {
   release(pointer);
 }
+#endif
 
 namespace stipple {
 namespace {
@@ -73,6 +77,9 @@ uint64_t peakOf(const SplatInstance& instance, const Camera& camera, const Rende
 }
 
 TEST(RenderMemoryBound, IsNeverExceeded) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the address sanitizer replaces the allocator that is counted here";
+#endif
   CloudRecipe small;
   small.count = 50000;
   small.size_max = 0.01;
