@@ -154,13 +154,14 @@ def test_panoramic_camera_is_one_error(square, tmp_path):
 
 
 def test_edited_attributes_are_rendered_as_they_are(square, tmp_path):
-    if not isinstance(square.data, bpy.types.Mesh):
-        pytest.skip('edits a mesh')
-    values = np.empty(len(square.data.vertices) * 3, np.float32)
-    square.data.vertices.foreach_get('co', values)
+    data = square.data
+    collection, field = (data.vertices, 'co') if isinstance(data, bpy.types.Mesh) else (
+        data.attributes['position'].data, 'vector')
+    values = np.empty(len(collection) * 3, np.float32)
+    collection.foreach_get(field, values)
     values[0::3] += 10.0
-    square.data.vertices.foreach_set('co', values)
-    square.data.update()
+    collection.foreach_set(field, values)
+    data.update_tag()
     assert scenes.render_pixels(tmp_path)[..., 3].max() == 0
 
 

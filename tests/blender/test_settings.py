@@ -108,21 +108,19 @@ def test_driven_budget_follows_the_frame(stipple, splats):
     assert count(stipple, splats) == 900
 
 
-def edit(obj):
-    values = np.empty(len(obj.data.vertices) * 3, np.float32)
-    obj.data.vertices.foreach_get('co', values)
-    values[:3] += 1.0
-    obj.data.vertices.foreach_set('co', values)
-    obj.data.update()
-
-
-def needs_mesh(obj):
-    if not isinstance(obj.data, bpy.types.Mesh):
-        pytest.skip('edits a mesh')
+def edit(obj, offset=1.0):
+    """Moves the first splat, as an artist would."""
+    data = obj.data
+    collection, field = (data.vertices, 'co') if isinstance(data, bpy.types.Mesh) else (
+        data.attributes['position'].data, 'vector')
+    values = np.empty(len(collection) * 3, np.float32)
+    collection.foreach_get(field, values)
+    values[:3] += offset
+    collection.foreach_set(field, values)
+    data.update_tag()
 
 
 def test_edits_by_hand_lock_the_slider_until_they_are_reverted(stipple, splats):
-    needs_mesh(splats)
     before = positions(stipple, splats)
     edit(splats)
     edited = positions(stipple, splats)
@@ -137,7 +135,6 @@ def test_edits_by_hand_lock_the_slider_until_they_are_reverted(stipple, splats):
 
 
 def test_edits_by_hand_can_become_the_source(stipple, splats, tmp_path):
-    needs_mesh(splats)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
     edit(splats)
     edited = positions(stipple, splats)

@@ -87,7 +87,7 @@ def fingerprint(objects):
     """A short text that changes with the shape, placement and materials of source objects."""
     value = 0
     for obj in objects:
-        value = zlib.crc32(np.array(obj.matrix_world, np.float32), value)
+        value = zlib.crc32(np.array(obj.matrix_world, np.float32).tobytes(), value)
         mesh = obj.data
         if isinstance(mesh, bpy.types.Mesh):
             positions = np.empty(len(mesh.vertices) * 3, np.float32)
