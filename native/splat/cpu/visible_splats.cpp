@@ -26,6 +26,7 @@ VisibleSplat makeVisible(const PlacedScene& scene, const PlacedCloud& placed, si
   splat.log2_opacity = static_cast<float>(std::log2(projected.footprint.opacity));
   splat.depth = static_cast<float>(std::min(projected.depth, 1e38));
   splatColour(scene, placed, index, splat.colour);
+  splat.index = static_cast<uint32_t>(placed.first_index + index);
   return splat;
 }
 

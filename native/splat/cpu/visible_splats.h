@@ -18,6 +18,7 @@ struct VisibleSplat {
   float log2_opacity;
   float depth;      ///< view z, metres
   float colour[3];  ///< blending space
+  uint32_t index;   ///< among all splats of the picture: PlacedCloud::first_index + its row
 };
 
 /// The splats that can show, in the order of blending: front to back by depthKey, ties by splat
