@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <functional>
 #include <limits>
 
 #include "base/parallel.h"
@@ -15,25 +13,30 @@ namespace stipple {
 namespace {
 
 constexpr size_t kGrain = 1024;
-constexpr float kMaxOpacity = 0.99f;
 /// Standard deviation of a splat over that of its patch. On a square pattern of side s a patch has
 /// s/√12; 2.3 of it is 0.66 s, where four splats leave 2 % open in the middle between them.
-constexpr float kPatchScale = 2.3f;
-constexpr float kMinPatchScale = 1.7f;
-constexpr float kMaxPatchScale = 3.6f;
+constexpr float kPatchScale = 2.25f;
+/// A patch that wraps half around a rod of radius r has mean (n·u)² = 1/2 across the rod; 0.48 of
+/// the size that a flat patch of its width would get keeps its flat splat from sticking out.
+constexpr double kCurvedTrim = 1.05;
 constexpr float kMaxAspect = 5.0f;
 /// Thickness over the smaller width: thin, yet several voxels can resolve it and it is seen
 /// edge-on.
 constexpr float kThickness = 0.1f;
 constexpr float kMaxThickness = 0.35f;
-constexpr float kTargetOpen = 0.012f;  ///< transmittance wanted at every sample inside
-constexpr float kCoverageRounds = 2;
+constexpr float kHeightScale = 1.5f;  ///< thickness over the standard deviation of heights
+/// Mean normal length of a patch from which on its splat may grow, and may grow fully: a flat splat
+/// on a curved patch sticks out at the silhouette.
+constexpr double kNoGrowth = 0.94;
+constexpr double kLeastGrowth = 0.0;
+constexpr double kFullGrowth = 0.985;
 
 struct Moments {
   double area = 0;
   double mean[3] = {0, 0, 0};  ///< about the site
   double normal[3] = {0, 0, 0};
   double second[6] = {0, 0, 0, 0, 0, 0};  ///< xx, xy, xz, yy, yz, zz about the site
+  double turns[6] = {0, 0, 0, 0, 0, 0};   ///< the same of the normals
   double colour[3] = {0, 0, 0};
   double opacity = 0;
 };
@@ -60,12 +63,22 @@ Moments patchMoments(const SurfaceIndex& index, const SurfacePatches& patches, c
     m.second[3] += area * d[1] * d[1];
     m.second[4] += area * d[1] * d[2];
     m.second[5] += area * d[2] * d[2];
+    const double n[3] = {static_cast<double>(index.normals[i * 3]),
+                         static_cast<double>(index.normals[i * 3 + 1]),
+                         static_cast<double>(index.normals[i * 3 + 2])};
+    m.turns[0] += area * n[0] * n[0];
+    m.turns[1] += area * n[0] * n[1];
+    m.turns[2] += area * n[0] * n[2];
+    m.turns[3] += area * n[1] * n[1];
+    m.turns[4] += area * n[1] * n[2];
+    m.turns[5] += area * n[2] * n[2];
     m.opacity += area * static_cast<double>(index.opacities[i]);
     m.area += area;
   }
   if (m.area > 0) {
     for (double& value : m.mean) value /= m.area;
     for (double& value : m.second) value /= m.area;
+    for (double& value : m.turns) value /= m.area;
     for (double& value : m.colour) value /= m.opacity + 1e-4 * m.area;
     m.opacity /= m.area;
   }
@@ -73,13 +86,15 @@ Moments patchMoments(const SurfaceIndex& index, const SurfacePatches& patches, c
 }
 
 /// Mean normal of a patch; that of the site where the patch folds so far that its normals cancel.
-void meanNormal(const Moments& m, const float* site_normal, float* out) {
+/// Returns the length of the mean of the unit normals: 1 for a flat patch.
+double meanNormal(const Moments& m, const float* site_normal, float* out) {
   const double length =
       std::sqrt(m.normal[0] * m.normal[0] + m.normal[1] * m.normal[1] + m.normal[2] * m.normal[2]);
   for (size_t axis = 0; axis < 3; ++axis) {
     out[axis] =
         length > 0.3 * m.area ? static_cast<float>(m.normal[axis] / length) : site_normal[axis];
   }
+  return length / m.area;
 }
 
 /// Middle of the patch, put on the tangent plane of the patch's sample nearest to it.
@@ -131,19 +146,8 @@ Eigen2 eigen2(double a, double b, double d) {
   return {half + radius, std::max(0.0, half - radius), x / length, y / length};
 }
 
-/// exp(−q/2), relative error below 3e-5; 0 beyond the renderer's cut-off (1/255).
-inline float response(float q) {
-  if (q > 11.1f) return 0.0f;
-  const float t = -0.72134752f * q;  // to base 2
-  const float whole = std::floor(t);
-  const float f = t - whole;
-  // 2^f on [0,1), minimax of degree 4.
-  const float p =
-      1.0000026f + f * (0.69300383f + f * (0.24144275f + f * (0.05201146f + f * 0.01353417f)));
-  return p * std::bit_cast<float>((static_cast<int32_t>(whole) + 127) << 23);
-}
+}  // namespace
 
-/// Writes the axes and standard deviations of shape i from a covariance in the frame of its normal.
 void setAxes(SplatShapes& shapes, size_t i, const TangentFrame& frame, double uu, double uv,
              double vv) {
   const Eigen2 e = eigen2(uu, uv, vv);
@@ -155,45 +159,6 @@ void setAxes(SplatShapes& shapes, size_t i, const TangentFrame& frame, double uu
   shapes.sigmas[i * 3] = first;
   shapes.sigmas[i * 3 + 1] = std::max(static_cast<float>(std::sqrt(e.second)), first / kMaxAspect);
 }
-
-/// Shapes around a cell as contiguous arrays: centre, tangent axes over their sigmas, normal.
-struct ShapeCandidates {
-  std::vector<uint32_t> site;
-  std::vector<float> data;  ///< [12][count]
-  size_t count = 0;
-
-  const float* row(size_t r) const { return &data[r * count]; }
-
-  void gather(const SurfaceSites& sites, const SplatShapes& shapes, uint64_t code) {
-    std::array<uint32_t, 27> around;
-    const CellTable& table = sites.cells[0];
-    const size_t cell_count = table.neighbours(code, around);
-    site.clear();
-    for (size_t c = 0; c < cell_count; ++c) {
-      for (uint32_t i = table.begin(around[c]); i < table.end(around[c]); ++i) site.push_back(i);
-    }
-    count = site.size();
-    data.resize(count * 12);
-    for (size_t k = 0; k < count; ++k) {
-      const size_t i = site[k];
-      const float* c = &shapes.centres[i * 3];
-      const float* n = &shapes.normals[i * 3];
-      const float* e = &shapes.majors[i * 3];
-      const float minor[3] = {n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2],
-                              n[0] * e[1] - n[1] * e[0]};
-      const float first = 1.0f / shapes.sigmas[i * 3];
-      const float second = 1.0f / shapes.sigmas[i * 3 + 1];
-      for (size_t axis = 0; axis < 3; ++axis) {
-        data[axis * count + k] = c[axis];
-        data[(3 + axis) * count + k] = e[axis] * first;
-        data[(6 + axis) * count + k] = minor[axis] * second;
-        data[(9 + axis) * count + k] = n[axis];
-      }
-    }
-  }
-};
-
-}  // namespace
 
 void centreSites(const SurfaceIndex& index, const SurfacePatches& patches, SurfaceSites& sites) {
   parallelFor(sites.size(), kGrain, [&](size_t first, size_t last) {
@@ -224,7 +189,8 @@ SplatShapes fitShapes(const SurfaceIndex& index, const SurfaceSites& sites,
   shapes.areas.resize(count);
   shapes.colours.resize(count * 3);
   shapes.opacities.resize(count);
-  shapes.supports.assign(count, 1.0f);
+  shapes.growths.assign(count, 1.0f);
+  shapes.borders.assign(count * 10, std::numeric_limits<float>::infinity());
   parallelFor(count, kGrain, [&](size_t first, size_t last) {
     for (size_t i = first; i < last; ++i) {
       const size_t begin = patches.begins[i], end = patches.begins[i + 1];
@@ -250,7 +216,9 @@ SplatShapes fitShapes(const SurfaceIndex& index, const SurfaceSites& sites,
         continue;
       }
       const Moments m = patchMoments(index, patches, site, begin, end);
-      meanNormal(m, &sites.normals[i * 3], normal);
+      const double straight = meanNormal(m, &sites.normals[i * 3], normal);
+      shapes.growths[i] = static_cast<float>(
+          std::clamp((straight - kNoGrowth) / (kFullGrowth - kNoGrowth), kLeastGrowth, 1.0));
       surfaceCentre(index, patches, m, site, normal, begin, end, centre);
       double covariance[6];
       const size_t rows[6] = {0, 0, 0, 1, 1, 2}, columns[6] = {0, 1, 2, 1, 2, 2};
@@ -259,13 +227,21 @@ SplatShapes fitShapes(const SurfaceIndex& index, const SurfaceSites& sites,
       }
       const TangentFrame frame(normal);
       const double scale = static_cast<double>(kPatchScale * kPatchScale);
-      setAxes(shapes, i, frame, scale * (quadratic(covariance, frame.u, frame.u) + grain),
-              scale * quadratic(covariance, frame.u, frame.v),
-              scale * (quadratic(covariance, frame.v, frame.v) + grain));
+      const double uu = scale * (quadratic(covariance, frame.u, frame.u) + grain);
+      const double uv = scale * quadratic(covariance, frame.u, frame.v);
+      const double vv = scale * (quadratic(covariance, frame.v, frame.v) + grain);
+      // Narrower in the direction in which the normals turn: S C S with S = 1 − trim · mean(n nᵀ).
+      const double s0 = 1 - kCurvedTrim * quadratic(m.turns, frame.u, frame.u);
+      const double s1 = -kCurvedTrim * quadratic(m.turns, frame.u, frame.v);
+      const double s2 = 1 - kCurvedTrim * quadratic(m.turns, frame.v, frame.v);
+      setAxes(shapes, i, frame, s0 * s0 * uu + 2 * s0 * s1 * uv + s1 * s1 * vv,
+              s0 * s1 * uu + (s0 * s2 + s1 * s1) * uv + s1 * s2 * vv,
+              s1 * s1 * uu + 2 * s1 * s2 * uv + s2 * s2 * vv);
       const auto height =
+          kHeightScale *
           static_cast<float>(std::sqrt(std::max(0.0, quadratic(covariance, normal, normal))));
-      const float width = shapes.sigmas[i * 3 + 1];
-      shapes.sigmas[i * 3 + 2] = std::clamp(height, kThickness * width, kMaxThickness * width);
+      const float minor = shapes.sigmas[i * 3 + 1];
+      shapes.sigmas[i * 3 + 2] = std::clamp(height, kThickness * minor, kMaxThickness * minor);
       shapes.areas[i] = static_cast<float>(m.area) * static_cast<float>(patches.stride);
       for (size_t c = 0; c < 3; ++c) {
         shapes.colours[i * 3 + c] = static_cast<float>(m.colour[c]);
@@ -274,88 +250,6 @@ SplatShapes fitShapes(const SurfaceIndex& index, const SurfaceSites& sites,
     }
   });
   return shapes;
-}
-
-void trimBorders(const SurfaceSites& sites, SplatShapes& shapes) {
-  // Reads the untrimmed shapes, writes new ones: independent of the order of the sites.
-  const SplatShapes before = shapes;
-  const CellTable& table = sites.cells[0];
-  parallelFor(table.size(), 64, [&](size_t first, size_t last) {
-    std::array<uint32_t, 27> around;
-    for (size_t cell = first; cell < last; ++cell) {
-      const size_t cell_count = table.neighbours(table.code(cell), around);
-      for (size_t i = table.begin(cell); i < table.end(cell); ++i) {
-        const float* c = &before.centres[i * 3];
-        const float* n = &before.normals[i * 3];
-        // A Gaussian window of one spacing over the patches' areas: 1 in the midst of the surface,
-        // 1/2 on a straight border; its mean offset points inwards.
-        const float width = sites.spacings[i];
-        const float factor = 1.0f / (width * width);
-        float mass = 0, offset[3] = {0, 0, 0};
-        for (size_t k = 0; k < cell_count; ++k) {
-          for (uint32_t j = table.begin(around[k]); j < table.end(around[k]); ++j) {
-            const float* q = &before.centres[size_t{j} * 3];
-            const float* m = &before.normals[size_t{j} * 3];
-            if (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] < -0.2f) continue;
-            const float d[3] = {q[0] - c[0], q[1] - c[1], q[2] - c[2]};
-            const float share =
-                before.areas[j] * response(factor * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
-            mass += share;
-            for (size_t axis = 0; axis < 3; ++axis) offset[axis] += share * d[axis];
-          }
-        }
-        const float support = std::min(1.0f, mass * factor * 0.15915494f);
-        shapes.supports[i] = support;
-      }
-    }
-  });
-}
-
-void balanceCoverage(const SurfaceIndex& index, const SurfaceSites& sites,
-                     const SurfacePatches& patches, SplatShapes& shapes, Progress* progress) {
-  std::vector<float> open(patches.sample_count);
-  for (int round = 0; round < kCoverageRounds; ++round) {
-    forSampleRuns(index, patches, sites.level, [&](size_t begin, size_t end, uint64_t code) {
-      if (progress) progress->throwIfCancelled();
-      thread_local ShapeCandidates near;
-      near.gather(sites, shapes, code);
-      for (size_t i = begin; i < end; ++i) {
-        const size_t sample = patches.sampleOf(i);
-        const float* p = &index.positions[sample * 3];
-        const float* n = &index.normals[sample * 3];
-        float transmittance = 1.0f;
-        for (size_t k = 0; k < near.count; ++k) {
-          const float d[3] = {p[0] - near.row(0)[k], p[1] - near.row(1)[k], p[2] - near.row(2)[k]};
-          const float a = d[0] * near.row(3)[k] + d[1] * near.row(4)[k] + d[2] * near.row(5)[k];
-          const float b = d[0] * near.row(6)[k] + d[1] * near.row(7)[k] + d[2] * near.row(8)[k];
-          const float q = a * a + b * b;
-          if (q > 11.1f) continue;
-          // Splats of other sheets do not close this one.
-          const float turn =
-              n[0] * near.row(9)[k] + n[1] * near.row(10)[k] + n[2] * near.row(11)[k];
-          if (turn < 0.3f) continue;
-          transmittance *= 1.0f - kMaxOpacity * response(q);
-        }
-        open[i] = transmittance;
-      }
-    });
-    parallelFor(sites.size(), kGrain, [&](size_t first, size_t last) {
-      for (size_t i = first; i < last; ++i) {
-        float worst = 0;
-        for (size_t k = patches.begins[i]; k < patches.begins[i + 1]; ++k) {
-          worst = std::max(worst, open[patches.members[k]]);
-        }
-        if (patches.begins[i] == patches.begins[i + 1]) continue;
-        float scale = 1.0f;
-        if (worst > kTargetOpen) {
-          scale = std::min(1.3f, std::pow(worst / kTargetOpen, 0.12f));
-        } else {
-          scale = std::max(0.9f, std::pow(worst / kTargetOpen, 0.05f));
-        }
-        for (size_t axis = 0; axis < 2; ++axis) shapes.sigmas[i * 3 + axis] *= scale;
-      }
-    });
-  }
 }
 
 }  // namespace stipple

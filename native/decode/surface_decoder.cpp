@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "decode/splat_shapes.h"
+#include "decode/surface_borders.h"
 #include "decode/surface_index.h"
 #include "decode/surface_sites.h"
 #include "math/colour.h"
@@ -19,9 +20,14 @@ namespace stipple {
 
 struct SurfaceDecoder::Index {
   SurfaceIndex samples;
+  SurfaceBorders borders;
 };
 
 namespace {
+
+/// Rounds of Lloyd's method where time permits more than one: the more regular the sites, the
+/// smaller the splats that close the surface.
+constexpr int kFewCentringRounds = 3;
 
 /// Unit quaternion w, x, y, z of the rotation whose columns are a, b, c.
 /// Based on: Shepperd, Quaternion from Rotation Matrix, 1978.
@@ -75,9 +81,6 @@ SplatCloud cloudOf(const SurfaceIndex& index, const SurfaceSites& sites,
                    const SplatShapes& shapes) {
   SplatCloud cloud;
   cloud.resize(sites.size());
-  // Most splats are about a pixel or smaller. The classic low-pass widens each of them at full opacity,
-  // which moves silhouettes outward by a pixel and gets worse with more splats; mip keeps their sum.
-  cloud.antialias = Antialias::kMip;
   const auto side = static_cast<float>(index.root.side);
   parallelFor(sites.size(), 1024, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
@@ -109,7 +112,9 @@ SurfaceDecoder::SurfaceDecoder(std::shared_ptr<const PointSet> surface, const Ro
   if (!surface_ || surface_->size() == 0) {
     fail(ErrorCode::kInvalidArgument, "surface decoder: 0 surface samples; at least 1 is needed");
   }
-  index_ = std::make_unique<const Index>(Index{makeSurfaceIndex(*surface_, root, leaf_level)});
+  SurfaceIndex samples = makeSurfaceIndex(*surface_, root, leaf_level);
+  SurfaceBorders borders = findBorders(samples);
+  index_ = std::make_unique<const Index>(Index{std::move(samples), std::move(borders)});
 }
 
 SurfaceDecoder::~SurfaceDecoder() = default;
@@ -120,25 +125,19 @@ SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
   const SurfaceIndex& index = index_->samples;
   advance(request.progress, 0.0, "Decoding the surface");
   SurfaceSites sites = projectAnchors(index, request);
-  centreSites(index, assignSamples(index, sites, request.progress), sites);
-  sortByCell(index, sites);
+  const int centring_rounds = sites.size() <= kFewSites ? kFewCentringRounds : 1;
+  for (int round = 0; round < centring_rounds; ++round) {
+    centreSites(index, assignSamples(index, sites, request.progress), sites);
+    sortByCell(index, sites);
+  }
   const SurfacePatches patches = assignSamples(index, sites, request.progress);
   advance(request.progress, 0.4, "Decoding the surface");
   SplatShapes shapes = fitShapes(index, sites, patches);
-  trimBorders(sites, shapes);
+  findNearBorders(index_->borders, sites, shapes);
   balanceCoverage(index, sites, patches, shapes, request.progress);
   SplatCloud cloud = cloudOf(index, sites, shapes);
   advance(request.progress, 1.0, "Decoding the surface");
   return cloud;
-}
-
-uint64_t SurfaceDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const {
-  // Per splat: the cloud (56 bytes), sites (36, twice while they are sorted), shapes (72), patch
-  // bounds and cell tables (at most 96), scratch of the balance (at most 64). Per sample: owner and
-  // member (8) and the coverage (16).
-  constexpr uint64_t kBytesPerSplat = 56 + 2 * 36 + 72 + 96 + 64;
-  constexpr uint64_t kBytesPerSample = 24;
-  return anchor_count * gaussians_per_anchor * kBytesPerSplat + surface_->size() * kBytesPerSample;
 }
 
 }  // namespace stipple

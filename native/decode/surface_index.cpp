@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "base/parallel.h"
 #include "math/morton.h"
@@ -20,6 +21,7 @@ uint64_t unitCubeCode(const float* position, int level) {
 
 SurfaceIndex makeSurfaceIndex(const PointSet& surface, const RootCube& root, int leaf_level) {
   constexpr size_t kGrain = 8192;
+  constexpr double kSideCells = double{uint32_t{1} << SurfaceIndex::kCodeLevel};
   const size_t count = surface.size();
   SurfaceIndex index;
   index.root = root;
@@ -35,7 +37,15 @@ SurfaceIndex makeSurfaceIndex(const PointSet& surface, const RootCube& root, int
   std::vector<uint64_t> codes(count);
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      codes[i] = unitCubeCode(unitPosition(i).data(), SurfaceIndex::kCodeLevel);
+      // The same arithmetic as the density's, so that a leaf with mass holds its samples here too.
+      uint32_t cell[3];
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const double x =
+            (static_cast<double>(surface.positions[i * 3 + axis]) - root.origin[axis]) *
+            (kSideCells / root.side);
+        cell[axis] = static_cast<uint32_t>(std::clamp(std::floor(x), 0.0, kSideCells - 1.0));
+      }
+      codes[i] = mortonEncode(cell[0], cell[1], cell[2]);
     }
   });
   const std::vector<uint32_t> order = sortedOrder(codes, SurfaceIndex::kCodeLevel * 3);

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <functional>
-#include <functional>
 #include <limits>
+#include <tuple>
 
 #include "base/parallel.h"
 #include "base/random.h"
@@ -19,12 +20,13 @@ constexpr size_t kAnchorGrain = 2048;
 constexpr size_t kRunGrain = 32;
 /// Samples per site that take part: enough for the second moments of a patch, few enough for a
 /// slider.
-constexpr size_t kSamplesPerSite = 8;
+constexpr size_t kSamplesPerSite = 5;
+constexpr size_t kManySamplesPerSite = 10;  ///< up to kFewSites sites, where time permits it
 constexpr size_t kMinSamples = 16384;
 /// A sample off the tangent plane by h counts as sqrt(1 + kOffPlane) h away.
 constexpr float kOffPlane = 15.0f;
 /// A site whose normal is turned by t counts as sqrt(kTurned) (1 − cos t) spacings farther.
-constexpr float kTurned = 2.0f;
+constexpr float kTurned = 4.0f;
 /// Samples farther than this (in spacings, with the penalties above) from every site belong to
 /// none: a part that got no anchor is not covered from another part.
 constexpr float kReach = 3.0f;
@@ -49,7 +51,8 @@ float squaredDistance(const float* a, const float* b) {
 size_t nearestSample(const SurfaceIndex& index, const float* anchor, uint64_t leaf,
                      int leaf_level) {
   constexpr size_t kFew = 32;
-  auto [begin, end] = samplesOfCell(index, leaf, leaf_level);
+  size_t begin = 0, end = 0;
+  std::tie(begin, end) = samplesOfCell(index, leaf, leaf_level);
   for (int level = leaf_level + 1; end - begin > kFew && level <= SurfaceIndex::kCodeLevel;
        ++level) {
     const auto [low, high] = samplesOfCell(index, unitCubeCode(anchor, level), level);
@@ -57,9 +60,8 @@ size_t nearestSample(const SurfaceIndex& index, const float* anchor, uint64_t le
     begin = low;
     end = high;
   }
-  if (begin == end) {
-    begin = begin > 4 ? begin - 4 : 0;
-    end = std::min(index.size(), end + 4);
+  for (int level = leaf_level - 1; begin == end && level >= 0; --level) {
+    std::tie(begin, end) = samplesOfCell(index, leaf >> (3 * (leaf_level - level)), level);
   }
   size_t best = begin;
   float best_distance = std::numeric_limits<float>::infinity();
@@ -80,10 +82,15 @@ int cellLevel(double spacing) {
   return static_cast<int>(std::clamp(level, 0.0, static_cast<double>(SurfaceIndex::kCodeLevel)));
 }
 
-/// Candidate sites around a cell, gathered into contiguous arrays.
+/// Candidate sites around a cell in blocks of contiguous rows x, y, z, nx, ny, nz, so that the
+/// compiler can vectorise over a block. The last block is padded with sites infinitely far away.
 struct Candidates {
+  static constexpr size_t kBlock = 16;
+  struct Block {
+    float rows[6][kBlock];
+  };
   std::vector<uint32_t> site;
-  std::vector<float> x, y, z, nx, ny, nz, cost;
+  std::vector<Block> blocks;
 
   void gather(const SurfaceSites& sites, const CellTable& table, uint64_t code) {
     std::array<uint32_t, 27> around;
@@ -93,40 +100,54 @@ struct Candidates {
       for (uint32_t i = table.begin(around[c]); i < table.end(around[c]); ++i) site.push_back(i);
     }
     const size_t count = site.size();
-    for (std::vector<float>* array : {&x, &y, &z, &nx, &ny, &nz, &cost}) array->resize(count);
+    blocks.resize((count + kBlock - 1) / kBlock);
     for (size_t i = 0; i < count; ++i) {
-      const float* p = &sites.positions[size_t{site[i]} * 3];
-      const float* n = &sites.normals[size_t{site[i]} * 3];
-      x[i] = p[0];
-      y[i] = p[1];
-      z[i] = p[2];
-      nx[i] = n[0];
-      ny[i] = n[1];
-      nz[i] = n[2];
+      Block& block = blocks[i / kBlock];
+      for (size_t axis = 0; axis < 3; ++axis) {
+        block.rows[axis][i % kBlock] = sites.positions[size_t{site[i]} * 3 + axis];
+        block.rows[3 + axis][i % kBlock] = sites.normals[size_t{site[i]} * 3 + axis];
+      }
+    }
+    for (size_t i = count; i < blocks.size() * kBlock; ++i) {
+      for (size_t row = 0; row < 6; ++row) blocks.back().rows[row][i % kBlock] = row < 3 ? 1e6f : 0;
     }
   }
 
-  /// The candidate of least cost for a sample, or size() if there is none.
-  std::pair<size_t, float> cheapest(const float* p, const float* n, float squared_spacing) {
-    const size_t count = site.size();
+  /// The candidate of least cost for a sample and its cost; no candidates: infinite cost.
+  std::pair<size_t, float> cheapest(const float* p, const float* n, float squared_spacing) const {
+    const float px = p[0], py = p[1], pz = p[2], nx = n[0], ny = n[1], nz = n[2];
     const float turn_cost = kTurned * squared_spacing;
-    for (size_t i = 0; i < count; ++i) {
-      const float dx = p[0] - x[i], dy = p[1] - y[i], dz = p[2] - z[i];
-      // Along the mean of both normals: on a smoothly curved sheet it is at right angles to the
-      // chord, on another sheet it is not.
-      const float along = 0.5f * (dx * (n[0] + nx[i]) + dy * (n[1] + ny[i]) + dz * (n[2] + nz[i]));
-      const float turn = 1.0f - (n[0] * nx[i] + n[1] * ny[i] + n[2] * nz[i]);
-      cost[i] = dx * dx + dy * dy + dz * dz + kOffPlane * along * along + turn_cost * turn * turn;
+    // One running minimum per lane, on the bits of the costs (floats that are not negative are
+    // ordered like their bits): the loop vectorises.
+    constexpr int32_t kInfinity = std::bit_cast<int32_t>(std::numeric_limits<float>::infinity());
+    int32_t least[kBlock], where[kBlock];
+    for (size_t k = 0; k < kBlock; ++k) {
+      least[k] = kInfinity;
+      where[k] = 0;
     }
-    size_t best = count;
-    float best_cost = std::numeric_limits<float>::infinity();
-    for (size_t i = 0; i < count; ++i) {
-      if (cost[i] < best_cost) {
-        best_cost = cost[i];
-        best = i;
+    for (size_t b = 0; b < blocks.size(); ++b) {
+      const Block& block = blocks[b];
+      const auto number = static_cast<int32_t>(b);
+      for (size_t k = 0; k < kBlock; ++k) {
+        const float dx = px - block.rows[0][k], dy = py - block.rows[1][k],
+                    dz = pz - block.rows[2][k];
+        const float mx = block.rows[3][k], my = block.rows[4][k], mz = block.rows[5][k];
+        // Along the mean of both normals: on a smoothly curved sheet it is at right angles to the
+        // chord, on another sheet it is not.
+        const float along = 0.5f * (dx * (nx + mx) + dy * (ny + my) + dz * (nz + mz));
+        const float turn = 1.0f - (nx * mx + ny * my + nz * mz);
+        const float cost =
+            dx * dx + dy * dy + dz * dz + kOffPlane * along * along + turn_cost * turn * turn;
+        const int32_t bits = std::bit_cast<int32_t>(cost);
+        where[k] = bits < least[k] ? number : where[k];
+        least[k] = bits < least[k] ? bits : least[k];
       }
     }
-    return {best, best_cost};
+    size_t lane = 0;
+    for (size_t k = 1; k < kBlock; ++k) {
+      if (least[k] < least[lane] || (least[k] == least[lane] && where[k] < where[lane])) lane = k;
+    }
+    return {static_cast<size_t>(where[lane]) * kBlock + lane, std::bit_cast<float>(least[lane])};
   }
 };
 
@@ -253,7 +274,9 @@ void forSampleRuns(const SurfaceIndex& index, const SurfacePatches& patches, int
 SurfacePatches assignSamples(const SurfaceIndex& index, const SurfaceSites& sites,
                              Progress* progress) {
   SurfacePatches patches;
-  const size_t wanted = std::max(kMinSamples, sites.size() * kSamplesPerSite);
+  const size_t wanted =
+      std::max(kMinSamples,
+               sites.size() * (sites.size() <= kFewSites ? kManySamplesPerSite : kSamplesPerSite));
   patches.stride = std::max<size_t>(1, index.size() / wanted);
   patches.sample_count = index.size() / patches.stride;
   patches.owners.resize(patches.sample_count);

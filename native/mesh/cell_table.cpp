@@ -25,10 +25,15 @@ CellTable::CellTable(std::span<const uint64_t> sorted_codes, int shift, int leve
     while (slots_[slot] != kNone) slot = (slot + 1) & mask_;
     slots_[slot] = static_cast<uint32_t>(cell);
   }
+  if (level <= kMaxBitmapLevel) {
+    occupied_.assign((size_t{1} << (3 * level)) / 64 + 1, 0);
+    for (const uint64_t code : codes_) occupied_[code / 64] |= uint64_t{1} << (code % 64);
+  }
 }
 
 uint32_t CellTable::find(uint64_t code) const {
   if (slots_.empty()) return kNone;
+  if (!occupied_.empty() && (occupied_[code / 64] >> (code % 64) & 1) == 0) return kNone;
   uint64_t slot = mixBits(code) & mask_;
   while (slots_[slot] != kNone) {
     if (codes_[slots_[slot]] == code) return slots_[slot];

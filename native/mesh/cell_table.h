@@ -13,6 +13,7 @@ namespace stipple {
 class CellTable {
  public:
   static constexpr uint32_t kNone = UINT32_MAX;
+  static constexpr int kMaxBitmapLevel = 8;
 
   CellTable() = default;
   /// In: sorted codes [N] at a level; cell of an element = code >> shift. `level` is that of the
@@ -32,6 +33,9 @@ class CellTable {
   std::vector<uint64_t> codes_;
   std::vector<uint32_t> begins_;
   std::vector<uint32_t> slots_;  ///< open addressing, power-of-two size, at most half full
+  /// One bit per cell of the whole grid, in Morton order, up to kMaxBitmapLevel (2 MB): most
+  /// lookups are of empty cells and end here.
+  std::vector<uint64_t> occupied_;
   uint64_t mask_ = 0;
   uint32_t side_ = 1;
 };

@@ -7,7 +7,6 @@ classes = data.classes + render.classes + menus.classes
 
 
 def register():
-    data.register()
     menus.register()
     render.register()
 
@@ -15,4 +14,3 @@ def register():
 def unregister():
     render.unregister()
     menus.unregister()
-    data.unregister()

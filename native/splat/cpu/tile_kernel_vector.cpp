@@ -124,9 +124,8 @@ void blendTile(const TileSplat* splats, size_t count, TileKernelOptions options,
   }
 }
 
-/// Highway's own one-lane target is not the plain kernel, which has the name "scalar".
 NamedTileKernel namedKernel() {
-  return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET), blendTile};
+  return {hwy::TargetName(HWY_TARGET), blendTile};
 }
 
 }  // namespace HWY_NAMESPACE
