@@ -13,7 +13,7 @@ bl_info = {
 
 import bpy
 
-from . import engine, operators, panels, preferences, properties
+from . import engine, operators, panels, preferences, properties, viewport
 from .scene import sync
 
 _classes = preferences.classes + properties.classes + operators.classes + panels.classes + engine.classes
@@ -25,9 +25,11 @@ def register():
     properties.register()
     panels.register()
     sync.register()
+    viewport.register()
 
 
 def unregister():
+    viewport.unregister()
     sync.unregister()
     panels.unregister()
     properties.unregister()

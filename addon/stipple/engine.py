@@ -13,6 +13,7 @@ from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
 from .binding.structs import JobState
 from .scene import cameras, facts, instances, sources
+from .viewport import ViewPicture
 
 # How often a render looks whether it was cancelled.
 POLL_SECONDS = 0.01
@@ -56,6 +57,27 @@ class STIPPLE_RE_engine(bpy.types.RenderEngine):
             return
         self._deliver(task, picture)
 
+    def view_update(self, context, depsgraph):
+        """Something in the scene of a 3D view has changed."""
+        if getattr(self, '_view', None) is None:
+            self._view = ViewPicture()
+        self._guarded(self._view.update, depsgraph, self._warn)
+
+    def view_draw(self, context, depsgraph):
+        if getattr(self, '_view', None) is None:
+            self.view_update(context, depsgraph)
+        if self._guarded(self._view.draw, self, context, depsgraph):
+            self.update_stats('', '')
+
+    def _guarded(self, call, *arguments):
+        """A view has nobody to raise to: what goes wrong is shown at its top."""
+        try:
+            call(*arguments)
+        except StippleError as error:
+            self.update_stats('', str(error))
+            return False
+        return True
+
     def _wait(self, job):
         """Until the job ends; a cancel in Blender cancels it."""
         while True:
@@ -63,11 +85,14 @@ class STIPPLE_RE_engine(bpy.types.RenderEngine):
             if state != JobState.RUNNING:
                 job.wait()
                 return
-            if self.test_break():
+            if self._cancelled():
                 job.cancel()
             self.update_stats('', stage)
             self.update_progress(fraction)
             time.sleep(POLL_SECONDS)
+
+    def _cancelled(self):
+        return self.test_break()
 
     def _deliver(self, task, picture):
         """Hands the picture over; Blender's first row is the bottom one."""

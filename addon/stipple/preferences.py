@@ -4,6 +4,8 @@
 import bpy
 from bpy.props import IntProperty, StringProperty
 
+from . import version
+
 
 class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
@@ -13,9 +15,9 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
     memory_limit: IntProperty(name="Memory Limit", description="Work that would need more memory than this many "
                               "mebibytes is refused before it starts, 0 for no limit", default=0, min=0)
     cache_folder: StringProperty(name="Cache Folder", description="Where sources of files that are not saved yet are "
-                                 "kept, empty for Blender's user folder", subtype='DIR_PATH')
+                                 "kept, empty for Blender's user folder", subtype='DIR_PATH', options=version.RELATIVE_PATH)
     library_path: StringProperty(name="Library", description="Path of libstipple.so, empty for the one inside the "
-                                 "add-on", subtype='FILE_PATH')
+                                 "add-on", subtype='FILE_PATH', options=version.RELATIVE_PATH)
 
     def draw(self, _context):
         layout = self.layout

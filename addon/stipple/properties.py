@@ -5,6 +5,7 @@ import bpy
 from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty,
                        StringProperty)
 
+from . import version
 from .scene import sync
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
@@ -26,7 +27,7 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     """On Mesh and PointCloud: splats are a cache of (source, settings)."""
 
     source: StringProperty(name="Source", description="File that the splats are decoded from", subtype='FILE_PATH',
-                           override=_OVERRIDABLE)
+                           options=version.RELATIVE_PATH, override=_OVERRIDABLE)
     source_kind: EnumProperty(name="Source Kind", items=(('NONE', "None", "The splats have no source"),
                                                          ('MODEL', "Model", "Splats at any budget"),
                                                          ('CLOUD', "Splats", "Splats as they are")), default='NONE')

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "comparison.h"
+#include "bench/comparison.h"
 #include "density/anchor_sampling.h"
-#include "openvdb_scatter.h"
+#include "bench/openvdb_scatter.h"
 
 namespace stipple::bench {
 namespace {
@@ -111,6 +111,15 @@ void twoThreadArithmetic(benchmark::State& state) {
       state, "one_thread", 0.0, [&] { work(2); }, [&] { work(1); });
 }
 
+void sampleAlone(benchmark::State& state, AnchorOrder order, uint64_t count) {
+  scene();
+  for (auto step : state) {
+    (void)step;
+    sampleOn(1, {.count = count, .order = order});
+  }
+  label(state, count);
+}
+
 void withRanks(benchmark::State& state, uint64_t count) {
   scene();
   for (auto step : state) {
@@ -158,6 +167,12 @@ const bool registered = [] {
                                  size.count)
         ->Unit(benchmark::kMillisecond);
   }
+  benchmark::RegisterBenchmark("density.sample_systematic.50k", sampleAlone,
+                               AnchorOrder::kSystematic, uint64_t{50000})
+      ->Unit(benchmark::kMillisecond);
+  benchmark::RegisterBenchmark("density.sample_progressive.50k", sampleAlone,
+                               AnchorOrder::kProgressive, uint64_t{50000})
+      ->Unit(benchmark::kMillisecond);
   benchmark::RegisterBenchmark("density.arithmetic.2threads", twoThreadArithmetic)
       ->UseManualTime()
       ->Iterations(24)

@@ -14,8 +14,8 @@ class OpenvdbScatter {
   /// In: leaves [N] Morton codes; probabilities [N] of the leaves, sum 1.
   OpenvdbScatter(const std::vector<uint64_t>& leaves, const std::vector<double>& probabilities);
   ~OpenvdbScatter();
-  /// Scatters about `count` points, positions kept as floats; returns how many.
-  size_t scatter(uint64_t count) const;
+  /// Scatters about `count` points into a list of floats that it keeps; returns how many.
+  size_t scatter(uint64_t count);
 
  private:
   struct Grid;

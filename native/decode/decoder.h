@@ -30,6 +30,8 @@ class Decoder {
   /// anchors → anchors * K splats, in anchor order.
   virtual SplatCloud decode(const DecodeRequest& request) const = 0;
   virtual DecodeCost costHint() const = 0;
+  /// Bytes that decode holds at most, the splats included, without the anchors.
+  virtual uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const = 0;
 };
 
 }  // namespace stipple

@@ -81,6 +81,9 @@ SplatCloud cloudOf(const SurfaceIndex& index, const SurfaceSites& sites,
                    const SplatShapes& shapes) {
   SplatCloud cloud;
   cloud.resize(sites.size());
+  // Most splats are about a pixel or smaller. The classic low-pass widens each of them at full opacity,
+  // which moves silhouettes outward by a pixel and gets worse with more splats; mip keeps their sum.
+  cloud.antialias = Antialias::kMip;
   const auto side = static_cast<float>(index.root.side);
   parallelFor(sites.size(), 1024, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
@@ -138,6 +141,15 @@ SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
   SplatCloud cloud = cloudOf(index, sites, shapes);
   advance(request.progress, 1.0, "Decoding the surface");
   return cloud;
+}
+
+uint64_t SurfaceDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const {
+  // Per splat: the cloud (56 bytes), sites (36, twice while they are sorted), shapes (72), patch
+  // bounds and cell tables (at most 96), scratch of the balance (at most 64). Per sample: owner and
+  // member (8) and the coverage (16).
+  constexpr uint64_t kBytesPerSplat = 56 + 2 * 36 + 72 + 96 + 64;
+  constexpr uint64_t kBytesPerSample = 24;
+  return anchor_count * gaussians_per_anchor * kBytesPerSplat + surface_->size() * kBytesPerSample;
 }
 
 }  // namespace stipple

@@ -42,12 +42,12 @@ AnchorSet makeAnchorSet(const DensityModel& model, const AnchorSamplingOptions& 
 
 uint64_t sampleMemoryBound(uint64_t count, bool with_ranks) {
   // Result: 3 + 1 floats and a leaf code. Two frontiers of at most one cell an anchor (code, count,
-  // log q), which std::vector may hold at twice their size while they grow, and leaf places.
+  // log q), and the places of the leaves.
   constexpr uint64_t kAnchor = 4 * sizeof(float) + sizeof(uint64_t);
-  constexpr uint64_t kFrontiers = 4 * (sizeof(uint64_t) + sizeof(uint32_t) + sizeof(double)) + 8;
+  constexpr uint64_t kFrontiers = 2 * (sizeof(uint64_t) + sizeof(uint32_t) + sizeof(double)) + 8;
   constexpr uint64_t kRanks = sizeof(uint64_t) + 2 * sizeof(uint32_t);
-  // Questions of the level-by-level sampler, huge-page rounding, small things.
-  constexpr uint64_t kFixed = uint64_t{16} << 20;
+  // Questions of the level-by-level sampler, tasks, rounding to huge pages.
+  constexpr uint64_t kFixed = uint64_t{24} << 20;
   return count * (kAnchor + kFrontiers + (with_ranks ? kRanks : 0)) + kFixed;
 }
 

@@ -17,7 +17,7 @@ std::array<double, 8> childProbabilities(const float* log_probabilities) {
     probabilities[k] = std::exp(static_cast<double>(log_probabilities[k]));
     total += probabilities[k];
   }
-  if (!(total > 0.0) || !std::isfinite(total)) {
+  if (!std::isfinite(total) || total <= 0.0) {
     std::string seen;
     for (size_t k = 0; k < 8; ++k) {
       seen += (k == 0 ? "" : ", ") + std::to_string(log_probabilities[k]);

@@ -25,10 +25,14 @@ struct Frontier {
   std::vector<uint32_t> counts;
   std::vector<double> log_q;
 
-  void clear() {
+  /// Empties it and makes room, so that growing never holds two copies.
+  void restart(size_t room) {
     cells.clear();
     counts.clear();
     log_q.clear();
+    cells.reserve(room);
+    counts.reserve(room);
+    log_q.reserve(room);
   }
 };
 
@@ -116,7 +120,7 @@ class LevelSampler {
     Frontier frontier{{0}, {static_cast<uint32_t>(options_.count)}, {0.0}};
     Frontier next;
     for (int level = 0; level < anchors.leaf_level; ++level) {
-      next.clear();
+      next.restart(std::min<size_t>(options_.count, 8 * frontier.cells.size()));
       size_t place = 0;
       for (size_t begin = 0; begin < frontier.cells.size(); begin += kQueryCells) {
         advance(progress_,

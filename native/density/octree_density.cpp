@@ -38,14 +38,14 @@ void requireDistribution(const float* log_probabilities, uint64_t cell, size_t l
   for (size_t k = 0; k < 8; ++k) {
     const float value = log_probabilities[k];
     if (value == kNothing) continue;
-    if (!(value >= kLowestLog && value <= static_cast<float>(kSumTolerance))) {
+    if (!std::isfinite(value) || value < kLowestLog || value > static_cast<float>(kSumTolerance)) {
       fail(ErrorCode::kInvalidArgument,
            "the log-probability of child " + std::to_string(k) + " of " + nameCell(cell, level) +
                " is " + std::to_string(value) + "; allowed is -inf or -700 to 0.0001");
     }
     sum += std::exp(static_cast<double>(value));
   }
-  if (!(std::abs(sum - 1.0) <= kSumTolerance)) {
+  if (std::abs(sum - 1.0) > kSumTolerance) {
     fail(ErrorCode::kInvalidArgument, "the child probabilities of " + nameCell(cell, level) +
                                           " sum to " + std::to_string(sum) +
                                           "; allowed is 1 within 0.0001");

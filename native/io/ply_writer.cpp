@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -15,8 +16,8 @@ namespace stipple {
 
 namespace {
 
-// Rows per task, and tasks per write to the file: 16 MB at degree 3.
-constexpr size_t kBlockRows = 4096;
+// Rows per task, and tasks per round of writing: 4 MB at degree 3.
+constexpr size_t kBlockRows = 1024;
 constexpr size_t kChunkRows = kBlockRows * 16;
 
 // nx ny nz are zero: no reader uses them, some count on their place.
@@ -83,6 +84,10 @@ void appendText(const float* row, size_t length, std::string* text) {
 }
 
 void storeLittleEndian(const float* row, size_t length, char* bytes) {
+  if constexpr (std::endian::native == std::endian::little) {
+    std::memcpy(bytes, row, length * sizeof(float));
+    return;
+  }
   for (size_t k = 0; k < length; ++k) {
     uint32_t bits = 0;
     std::memcpy(&bits, row + k, 4);
@@ -106,7 +111,7 @@ void writePlySplats(const SplatCloud& cloud, const std::string& path, bool ascii
     const size_t rows = std::min(kChunkRows, count - chunk);
     parallelFor(rows, kBlockRows, [&](size_t begin, size_t end) {
       std::string& block = blocks[begin / kBlockRows];
-      block.clear();
+      if (ascii) block.clear();
       if (!ascii) block.resize((end - begin) * length * 4);
       std::vector<float> row(length);
       for (size_t i = begin; i < end; ++i) {

@@ -120,16 +120,16 @@ SparseVolume voxelize(std::span<const SplatInstance> instances, const VoxelizeOp
   volume.bricks.resize(brick_count);
   volume.density.resize(brick_count * kBrickVoxelCount);
   volume.colour.resize(brick_count * kBrickVoxelCount * 3);
+  const BrickKernel sum_brick = chosenBrickKernel();
   std::atomic<uint64_t> pairs_done{0};
   parallelFor(brick_count, 4, [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     for (size_t i = begin; i < end; ++i) {
       const BrickKey& key = table.keys[i];
       volume.bricks[i] = {key[0] * kBrickSide, key[1] * kBrickSide, key[2] * kBrickSide};
-      const std::span<const uint32_t> list(table.splats.data() + table.offsets[i],
-                                           table.offsets[i + 1] - table.offsets[i]);
-      sumBrick(key, splats, list, &volume.density[i * kBrickVoxelCount],
-               &volume.colour[i * kBrickVoxelCount * 3]);
+      sum_brick(key, splats.data(), table.splats.data() + table.offsets[i],
+                table.offsets[i + 1] - table.offsets[i], &volume.density[i * kBrickVoxelCount],
+                &volume.colour[i * kBrickVoxelCount * 3]);
     }
     const uint64_t step = table.offsets[end] - table.offsets[begin];
     const uint64_t done = pairs_done.fetch_add(step, std::memory_order_relaxed) + step;

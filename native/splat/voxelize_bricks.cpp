@@ -53,7 +53,8 @@ void visitBricks(const VoxelSplat& splat, Visit&& visit) {
       for (int axis = 0; axis < 3; ++axis) {
         const double step = splat.to_unit(axis, 2) * kSide;
         const double bound = splat.reach + half[axis];
-        if (step == 0.0) {
+        // Dividing by less could overflow; over 2^29 bricks it moves nothing.
+        if (std::abs(step) < 1e-100) {
           if (std::abs(base[axis]) > bound) to = from - 1.0;
           continue;
         }

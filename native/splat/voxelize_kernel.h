@@ -1,17 +1,35 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <span>
+#include <vector>
 
 #include "splat/voxelize_bricks.h"
 
 namespace stipple {
 
 /// Extinction and extinction-weighted mean colour of the voxels of one brick, summed in the order
-/// of `list`. In: list: indices into splats. Out: density [512] per metre, colour [512,3] (0 where
-/// no splat reaches). Runs on the widest vectors of the machine; polylogHalf's relative error of
-/// the kernel is below 1e-5.
-void sumBrick(const BrickKey& brick, std::span<const VoxelSplat> splats,
-              std::span<const uint32_t> list, float* density, float* colour);
+/// of list [count], indices into splats. Out: density [512] per metre, colour [512,3] (0 where no
+/// splat reaches).
+using BrickKernel = void (*)(const BrickKey& brick, const VoxelSplat* splats, const uint32_t* list,
+                             size_t count, float* density, float* colour);
+
+struct NamedBrickKernel {
+  const char* target;  ///< "scalar", or Highway's name of an instruction set ("AVX2")
+  BrickKernel kernel;
+};
+
+/// The kernel to use: the best for this processor, or the one that the environment variable
+/// STIPPLE_FORCE_TARGET names when it is first asked for (upper or lower case). Errors:
+/// kInvalidArgument where that names no kernel of brickKernels().
+BrickKernel chosenBrickKernel();
+
+/// Every kernel that is compiled and runs on this processor, "scalar" first. It changes Highway's
+/// global choice for a moment: for tests and for STIPPLE_FORCE_TARGET.
+std::vector<NamedBrickKernel> brickKernels();
+
+/// The plain kernel: the formula in double.
+void sumBrickScalar(const BrickKey& brick, const VoxelSplat* splats, const uint32_t* list,
+                    size_t count, float* density, float* colour);
 
 }  // namespace stipple

@@ -30,6 +30,7 @@ constexpr double kMaxVoxelIndex = 2147483632.0;  // 2^31 - 16: a brick further s
 constexpr double kMinAxis = 1e-9;
 // exp(-86) is the last power that stays a normal float after the products of the kernel.
 constexpr double kMaxExponent = 86.0;
+constexpr double kMaxSigma = 13.12;  // sqrt(2 * 86): no splat reaches further
 
 std::string number(double value) {
   char text[32];
@@ -156,13 +157,15 @@ PrincipalAxes principalAxes(Mat3d a) {
   return result;
 }
 
-// How many samples per voxel keep the sum over voxels within 2 % of the integral for o = 0.99. The
-// profile of a splat has a core of half width l sqrt(-2 ln o), from the square-root branch point of
-// Li_1/2; once the thinnest axis is averaged the next one only meets its logarithm, and so on.
+// How many samples per voxel keep the sum over voxels near the integral. The profile of a splat has
+// a core of half width l sqrt(-2 ln o), from the square-root branch point of Li_1/2; once the
+// thinnest axis is averaged the next one only meets the logarithm of it, and the last one less
+// still. With the spacings below the mass of a splat of half a voxel and o = 0.99 strays by 0.2 %
+// where it is flat and wide, and by 5 % where it is round (one sample: 16 % and 73 %).
 void chooseSamples(VoxelSplat& splat, const Vec3d& lengths, double minus_log_opacity) {
-  constexpr double kPerAxis[3] = {0.57, 0.28, 0.14};
-  // A faint splat is a plain Gaussian, which a spacing of two standard deviations integrates.
-  const double core = std::min(1.2, std::sqrt(2.0 * minus_log_opacity));
+  constexpr double kPerAxis[3] = {0.4, 0.2, 0.1};
+  // A faint splat is a plain Gaussian without a core; a spacing of 1.9 standard deviations does.
+  const double core = std::min(0.75, std::sqrt(2.0 * minus_log_opacity));
   for (int axis = 0; axis < 3; ++axis) {
     const double wanted = std::ceil(kPerAxis[axis] / (lengths[axis] * core));
     const double allowed = kVoxelMaxSamples[axis];
@@ -196,10 +199,11 @@ bool prepareSplat(const SplatInstance& instance, size_t i, const VoxelizeOptions
     opacity *= principal.lengths[1] / widened[1] * (principal.lengths[2] / widened[2]);
     principal.lengths = widened;
     if (opacity <= 0) return false;
-  } else if (principal.lengths[0] < kMinAxis) {
+  }
+  if (principal.lengths[0] < kMinAxis) {
     refuse("splat " + std::to_string(i) + " is " + number(principal.lengths[0] * voxel_size) +
            " m thin, so its extinction has no finite value at a voxel size of " +
-           number(voxel_size) + " m; low_pass above 0, or an axis of at least " +
+           number(voxel_size) + " m; a larger low_pass, or an axis of at least " +
            number(kMinAxis * voxel_size) + " m, is needed");
   }
 
@@ -209,15 +213,12 @@ bool prepareSplat(const SplatInstance& instance, size_t i, const VoxelizeOptions
   // The floor is what rounding to float takes from the smallest density that is stored.
   double exponent = kMaxExponent;
   if (options.min_density > 0) {
-    exponent = std::min(exponent, std::log(amplitude / (options.min_density * 0x1.0p-24)));
+    exponent = std::min(
+        exponent, std::log(amplitude) - std::log(options.min_density) + 24.0 * std::numbers::ln2);
   }
-  double reach2 = 2.0 * (exponent - minus_log_opacity);
-  if (options.cut_off_sigma > 0) {
-    reach2 = std::min(reach2, options.cut_off_sigma * options.cut_off_sigma);
-  }
-  if (!(reach2 > 0)) return false;
-
-  splat.reach = std::sqrt(reach2);
+  if (!(exponent > minus_log_opacity)) return false;
+  splat.reach = std::sqrt(2.0 * (exponent - minus_log_opacity));
+  if (options.cut_off_sigma > 0) splat.reach = std::min(splat.reach, options.cut_off_sigma);
   splat.minus_log_opacity = static_cast<float>(minus_log_opacity);
   splat.amplitude = static_cast<float>(amplitude);
   readColour(cloud, i, splat.colour);
@@ -248,17 +249,27 @@ double chooseVoxelSize(std::span<const SplatInstance> instances, const VoxelizeO
   checkInstances(instances);
   double voxel_size = options.voxel_size;
   if (voxel_size == 0) {
-    const double sigma = options.cut_off_sigma > 0 ? options.cut_off_sigma : kBoundsSigma;
+    const double sigma =
+        options.cut_off_sigma > 0 ? std::min(options.cut_off_sigma, kMaxSigma) : kBoundsSigma;
     Vec3d low = Vec3d::Constant(std::numeric_limits<double>::infinity());
     Vec3d high = -low;
     for (const SplatInstance& instance : instances) {
-      for (size_t i = 0; i < instance.cloud->size(); ++i) {
-        if (instance.cloud->opacities[i] <= 0) continue;
-        const Vec3d extent = worldAxes(instance, i).rowwise().norm() * sigma;
-        const Vec3d centre = worldCentre(instance, i);
-        low = low.cwiseMin(centre - extent);
-        high = high.cwiseMax(centre + extent);
-      }
+      const SplatCloud& cloud = *instance.cloud;
+      std::vector<Vec3d> lows(rangeCount(cloud.size(), kGrain), low);
+      std::vector<Vec3d> highs(lows.size(), high);
+      parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+        Vec3d& range_low = lows[begin / kGrain];
+        Vec3d& range_high = highs[begin / kGrain];
+        for (size_t i = begin; i < end; ++i) {
+          if (cloud.opacities[i] <= 0) continue;
+          const Vec3d extent = worldAxes(instance, i).rowwise().norm() * sigma;
+          const Vec3d centre = worldCentre(instance, i);
+          range_low = range_low.cwiseMin(centre - extent);
+          range_high = range_high.cwiseMax(centre + extent);
+        }
+      });
+      for (const Vec3d& value : lows) low = low.cwiseMin(value);
+      for (const Vec3d& value : highs) high = high.cwiseMax(value);
     }
     const double side = (high - low).maxCoeff();
     if (!(side > 0) || !std::isfinite(side)) {

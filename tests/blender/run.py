@@ -42,7 +42,9 @@ def main():
     if blender is None:
         print(f"Blender '{options.blender}' is not installed.", file=sys.stderr)
         return 1
-    if not any(not a.startswith('-') for a in arguments):
+    # Blender runs in a folder of its own: paths of tests become absolute.
+    arguments = [str(Path(a).resolve()) if Path(a.partition('::')[0]).exists() else a for a in arguments]
+    if not any(str(HERE) in a for a in arguments):
         arguments.append(str(HERE))
     with tempfile.TemporaryDirectory(prefix='stipple-blender-') as folder:
         addons = Path(folder, 'user', 'scripts', 'addons')

@@ -48,9 +48,9 @@ def set_render(width, height, aspect_x=1.0, aspect_y=1.0):
     return render
 
 
-@pytest.mark.parametrize('kind,fit,size,aspect,shift', itertools.product(
+@pytest.mark.parametrize('kind,fit,size,aspect,shift', list(itertools.product(
     ('PERSP', 'ORTHO'), ('AUTO', 'HORIZONTAL', 'VERTICAL'), ((320, 180), (200, 300)), ((1.0, 1.0), (1.0, 1.5), (2.0, 1.0)),
-    ((0.0, 0.0), (0.3, -0.2))))
+    ((0.0, 0.0), (0.3, -0.2)))))
 def test_projection_equals_blenders(stipple, kind, fit, size, aspect, shift):
     obj = make_camera(type=kind, sensor_fit=fit, sensor_width=36.0, sensor_height=20.0, lens=42.0, ortho_scale=7.0,
                       shift_x=shift[0], shift_y=shift[1])

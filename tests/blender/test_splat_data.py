@@ -52,7 +52,7 @@ def test_base_holds_dc_and_opacity_in_this_order(stipple):
     arrays = make_arrays(stipple, count=2, degree=0)
     stipple.scene.splat_data.write(data, arrays)
     values = np.empty(8, np.float32)
-    field = 'value' if bpy.app.version >= (5, 2, 0) else 'color'
+    field = 'vector' if bpy.app.version >= (5, 2, 0) else 'color'
     data.attributes['radiance:base'].data.foreach_get(field, values)
     np.testing.assert_array_equal(values.reshape(2, 4)[:, :3], arrays.sh[:, 0])
     np.testing.assert_array_equal(values.reshape(2, 4)[:, 3], arrays.opacities)

@@ -31,7 +31,8 @@ RenderOptions everything(LowPass low_pass = LowPass::kClassic) {
   return options;
 }
 
-/// What the renderer promises (colour, alpha), and a ratio of float sums (depth).
+/// 1e-4 is what the renderer promises. For depth it is the division by 1 - T that costs
+/// digits: 1.5e-5 and more where only splats of alpha near 1/255 cover a pixel.
 RenderResult expectSound(const std::vector<SplatInstance>& instances, const Camera& camera,
                          const RenderOptions& options) {
   const RenderResult tiled = renderTiled(instances, camera, options);
@@ -39,8 +40,8 @@ RenderResult expectSound(const std::vector<SplatInstance>& instances, const Came
   const Difference difference =
       testing::compare(tiled, renderReference(instances, camera, options));
   EXPECT_LT(difference.colour, 1e-4);
-  EXPECT_LT(difference.depth, 1e-5);
-  EXPECT_LT(difference.median_depth, 1e-5);
+  EXPECT_LT(difference.depth, 1e-4);
+  EXPECT_LT(difference.median_depth, 1e-6);
   EXPECT_EQ(difference.count_mismatches, 0u);
   return tiled;
 }

@@ -220,3 +220,16 @@ def missing_exports(header, library):
     exported = exported_symbols(library)
     return [f'{name} is declared in {header} and not exported by {library}'
             for name in sorted(declared_functions(header)) if name not in exported]
+
+
+def broken_links(root):
+    """Relative links in Markdown pages to files that are not there."""
+    found = []
+    for name in project_files(root):
+        if name.endswith('.md'):
+            page = pathlib.Path(root) / name
+            for target in re.findall(r'\]\(([^)\s]+)\)', page.read_text(encoding='utf-8')):
+                file = target.split('#')[0]
+                if file and '://' not in target and not (page.parent / file).exists():
+                    found.append(f'{name}: {target}')
+    return found

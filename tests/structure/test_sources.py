@@ -135,3 +135,12 @@ def test_continuous_integration_runs_the_suite(tmp_path):
     ci = subprocess.run(['bash', '.ci/run'], cwd=tmp_path, env={'PATH': os.environ['PATH'], 'CI': 'true'},
                         stdin=subprocess.DEVNULL, capture_output=True, text=True)
     assert (ci.returncode, ci.stdout) == (7, 'the suite, 0 arguments\n')
+
+
+def test_links_between_pages_lead_somewhere():
+    assert rules.broken_links(ROOT) == []
+
+
+def test_a_broken_link_is_found(tmp_path):
+    plant(tmp_path, {'docs/a.md': '[b](b.md) [c](c.md#part) ![p](p.png) [web](https://example.org) [here](#top)\n', 'docs/b.md': ''})
+    assert rules.broken_links(tmp_path) == ['docs/a.md: c.md#part', 'docs/a.md: p.png']

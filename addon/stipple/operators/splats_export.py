@@ -34,7 +34,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         if not path.lower().endswith(ENDINGS):
             raise invalid(f"'{path}' has an ending that is no splat format; allowed is {', '.join(ENDINGS)}.")
         evaluated = context.object.evaluated_get(context.evaluated_depsgraph_get())
-        cloud = sources.cloud_from_data(evaluated.data)
+        cloud = sources.cloud_from_object(evaluated)
         if self.apply_transform:
             cloud = cloud.transformed(evaluated.matrix_world)
         cloud.save(path, self.ascii)

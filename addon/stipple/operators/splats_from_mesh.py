@@ -4,6 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from .. import version
 from ..binding.errors import invalid
 from ..binding.model import DecodeSettings, Model
 from ..binding.structs import AnchorOrder
@@ -29,7 +30,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
     hide_source: BoolProperty(name="Hide Source", description="Hide the meshes in the viewport and in renders",
                               default=True)
     source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
-                                "beside the .blend file", subtype='FILE_PATH', options={'SKIP_SAVE'})
+                                "beside the .blend file", subtype='FILE_PATH', options={'SKIP_SAVE'} | version.RELATIVE_PATH)
 
     @classmethod
     def poll(cls, context):
@@ -40,7 +41,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
 
     def start(self, context):
         self._settings().check()
-        self._objects = meshes.source_objects(context.selected_objects)
+        self._objects = meshes.source_objects(context.view_layer.objects.selected)
         if not self._objects:
             raise invalid('No mesh is selected; select at least one object with faces.')
         native = sources.context()
@@ -54,7 +55,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         name = (active if active in self._objects else self._objects[0]).name + ' Splats'
         path = sources.save_model(model, sources.model_path_for(name, self.source_path), bool(self.source_path))
         sources.remember_model(path, model)
-        obj = bpy.data.objects.new(name, splat_data.new_data(name))
+        obj = splat_data.new_object(name, splat_data.new_data(name))
         stipple = obj.data.stipple
         with sync.paused():
             stipple.anchors, stipple.gaussians_per_anchor = self.anchors, self.gaussians_per_anchor

@@ -37,11 +37,11 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
         data.stipple.source = sources.blend_path(bpy.path.abspath(self.filepath))
         data.stipple.source_kind = 'CLOUD'
         sync.write(data, self._splats, '')
-        obj = bpy.data.objects.new(name, data)
+        obj = splat_data.new_object(name, data)
         turn = {'Z': 0.0, '-Y': -1.5707963267948966, 'Y': 1.5707963267948966}[self.up_axis]
         obj.matrix_world = Matrix.Rotation(turn, 4, 'X')
         context.collection.objects.link(obj)
-        for other in context.selected_objects:
+        for other in list(context.view_layer.objects.selected):
             other.select_set(False)
         obj.select_set(True)
         context.view_layer.objects.active = obj

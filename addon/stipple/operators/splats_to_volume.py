@@ -29,23 +29,23 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
 
     @classmethod
     def poll(cls, context):
-        return any(splat_data.is_splat_object(obj) for obj in context.selected_objects)
+        return any(splat_data.is_splat_object(obj) for obj in context.view_layer.objects.selected)
 
     def start(self, context):
         self._path = bpy.path.abspath(self.filepath)
         if not self._path.lower().endswith('.vdb'):
             raise invalid(f"'{self._path}' does not end in .vdb, which a volume file must.")
         depsgraph = context.evaluated_depsgraph_get()
-        objects = [o.evaluated_get(depsgraph) for o in context.selected_objects if splat_data.is_splat_object(o)]
-        instances = [(sources.cloud_from_data(obj.data), obj.matrix_world) for obj in objects]
+        objects = [o.evaluated_get(depsgraph) for o in context.view_layer.objects.selected if splat_data.is_splat_object(o)]
+        instances = [(sources.cloud_from_object(obj), obj.matrix_world) for obj in objects]
         return Volume.voxelize_start(sources.context(), instances, self.resolution, self.voxel_size)
 
     def finish(self, context, job):
         volume = job.volume()
         volume.save(self._path)
         name = os.path.splitext(os.path.basename(self._path))[0]
-        volumes.new_object(name, self._path, context.collection)
         info = volume.info()
+        volumes.new_object(name, self._path, context.collection, info.voxel_size)
         self.report({'INFO'}, f"{info.active_voxel_count:,} voxels of {info.voxel_size:.4g} m in '{self._path}'")
 
 

@@ -21,7 +21,7 @@ class STIPPLE_OT_use_as_new_source(JobOperator, bpy.types.Operator):
     def start(self, context):
         obj = context.object
         self._arrays = splat_data.read(obj.data)
-        self._path = sources.save_cloud(sources.cloud_from_data(obj.data), obj.name)
+        self._path = sources.save_cloud(sources.cloud_from_object(obj), obj.name)
         return None
 
     def finish(self, context, _job):

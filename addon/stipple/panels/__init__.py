@@ -7,6 +7,7 @@ classes = data.classes + render.classes + menus.classes
 
 
 def register():
+    data.register()
     menus.register()
     render.register()
 
@@ -14,3 +15,4 @@ def register():
 def unregister():
     render.unregister()
     menus.unregister()
+    data.unregister()

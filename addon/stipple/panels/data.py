@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Object Data: source and budget of the splats."""
+"""Object Data: budget and source of the splats.
+
+The budget stands right under the datablock's name: a panel of its own would come after Vertex Groups,
+Shape Keys and all else that meshes have.
+"""
 
 import bpy
 
@@ -10,43 +14,15 @@ class _SplatPanel:
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
     bl_context = 'data'
+    bl_options = {'DEFAULT_CLOSED'}
 
     @classmethod
     def poll(cls, context):
         return splat_data.is_splat_object(context.object)
 
 
-class STIPPLE_PT_splats(_SplatPanel, bpy.types.Panel):
-    bl_label = "Gaussian Splats"
-    bl_order = -10
-
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        data = context.object.data
-        stipple = data.stipple
-        _draw_warnings(layout, data)
-        count = splat_data.count(data)
-        if stipple.source_kind != 'MODEL':
-            layout.label(text=f"{count:,} splats", icon='OUTLINER_DATA_POINTCLOUD')
-            return
-        column = layout.column()
-        column.enabled = not stipple.edited
-        single = stipple.gaussians_per_anchor == 1
-        column.prop(stipple, 'anchors', text="Splats" if single else "Anchor Budget")
-        column.prop(stipple, 'anchors_render', text="Render Splats" if single else "Render Budget")
-        if not single:
-            row = column.row()
-            row.alignment = 'RIGHT'
-            row.label(text=f"{count:,} splats")
-        column.prop(stipple, 'seed')
-        column.prop(stipple, 'order')
-
-
-class STIPPLE_PT_splats_source(_SplatPanel, bpy.types.Panel):
-    bl_label = "Source"
-    bl_parent_id = 'STIPPLE_PT_splats'
-    bl_options = {'DEFAULT_CLOSED'}
+class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
+    bl_label = "Splat Source"
 
     def draw(self, context):
         layout = self.layout
@@ -62,10 +38,8 @@ class STIPPLE_PT_splats_source(_SplatPanel, bpy.types.Panel):
         column.operator('stipple.update_from_source', icon='FILE_REFRESH')
 
 
-class STIPPLE_PT_splats_advanced(_SplatPanel, bpy.types.Panel):
-    bl_label = "Advanced"
-    bl_parent_id = 'STIPPLE_PT_splats'
-    bl_options = {'DEFAULT_CLOSED'}
+class STIPPLE_PT_advanced(_SplatPanel, bpy.types.Panel):
+    bl_label = "Splat Advanced"
 
     @classmethod
     def poll(cls, context):
@@ -77,33 +51,56 @@ class STIPPLE_PT_splats_advanced(_SplatPanel, bpy.types.Panel):
         stipple = context.object.data.stipple
         layout.enabled = not stipple.edited
         layout.prop(stipple, 'gaussians_per_anchor')
+        layout.prop(stipple, 'order')
+
+
+def _draw_budget(self, context):
+    obj = context.object
+    if not splat_data.is_splat_object(obj):
+        return
+    data = obj.data
+    stipple = data.stipple
+    box = self.layout.box()
+    box.use_property_split = True
+    box.label(text=f"{splat_data.count(data):,} Gaussian Splats", icon='OUTLINER_DATA_POINTCLOUD')
+    _draw_warnings(box, data)
+    if stipple.source_kind != 'MODEL':
+        return
+    column = box.column()
+    column.enabled = not stipple.edited
+    single = stipple.gaussians_per_anchor == 1
+    column.prop(stipple, 'anchors', text="Splats" if single else "Anchor Budget")
+    column.prop(stipple, 'anchors_render', text="Render")
+    column.prop(stipple, 'seed')
 
 
 def _draw_warnings(layout, data):
     stipple = data.stipple
     problem = sync.problems.get(data.name)
     if stipple.edited:
-        box = layout.box()
-        box.label(text="The splats were edited by hand", icon='LOCKED')
-        row = box.row()
-        row.operator('stipple.use_as_new_source')
-        row.operator('stipple.revert_to_source')
+        layout.label(text="Edited by hand", icon='LOCKED')
+        column = layout.column(align=True)
+        column.operator('stipple.use_as_new_source')
+        column.operator('stipple.revert_to_source')
     elif problem:
-        box = layout.box()
         for i, line in enumerate(_wrapped(problem)):
-            box.label(text=line, icon='ERROR' if i == 0 else 'BLANK1')
-    changed = stipple.source_changed or (len(stipple.source_objects) > 0 and (
-        stipple.source_detail_weight != stipple.detail_weight or stipple.source_color_from != stipple.color_from))
-    if changed and not stipple.edited:
-        box = layout.box()
-        box.label(text="The source mesh has changed" if stipple.source_changed else "The source settings have changed",
-                  icon='INFO')
-        box.operator('stipple.update_from_source', icon='FILE_REFRESH')
+            layout.label(text=line, icon='ERROR' if i == 0 else 'BLANK1')
+    elif stipple.source_changed:
+        _draw_update(layout, "Mesh has changed")
+    elif stipple.source_objects and (stipple.source_detail_weight != stipple.detail_weight
+                                     or stipple.source_color_from != stipple.color_from):
+        _draw_update(layout, "Source settings have changed")
     if bpy.ops.stipple.upgrade_to_point_cloud.poll():
         layout.operator('stipple.upgrade_to_point_cloud', icon='OUTLINER_DATA_POINTCLOUD')
 
 
-def _wrapped(text, width=52):
+def _draw_update(layout, text):
+    layout.label(text=text, icon='INFO')
+    layout.operator('stipple.update_from_source', icon='FILE_REFRESH')
+
+
+def _wrapped(text, width=34):
+    """Lines that fit a narrow Properties editor."""
     line = ''
     for word in text.split():
         if line and len(line) + len(word) + 1 > width:
@@ -114,4 +111,21 @@ def _wrapped(text, width=52):
         yield line
 
 
-classes = (STIPPLE_PT_splats, STIPPLE_PT_splats_source, STIPPLE_PT_splats_advanced)
+_HOSTS = ('DATA_PT_context_mesh', 'DATA_PT_context_pointcloud')
+
+
+def register():
+    for name in _HOSTS:
+        host = getattr(bpy.types, name, None)
+        if host is not None:
+            host.append(_draw_budget)
+
+
+def unregister():
+    for name in _HOSTS:
+        host = getattr(bpy.types, name, None)
+        if host is not None:
+            host.remove(_draw_budget)
+
+
+classes = (STIPPLE_PT_source, STIPPLE_PT_advanced)

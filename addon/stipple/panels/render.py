@@ -30,7 +30,7 @@ class STIPPLE_PT_render_splats(bpy.types.Panel):
         layout.prop(scene.stipple, 'splat_color')
         if scene.stipple.splat_color == 'AS_TRAINED' and not facts.uses_standard_view(scene):
             box = layout.box()
-            box.label(text=f"View transform {scene.view_settings.view_transform} changes these colors", icon='INFO')
+            box.label(text=f"{scene.view_settings.view_transform} view changes colors", icon='INFO')
             box.operator('stipple.use_standard_view')
 
 

@@ -25,16 +25,18 @@ MIN_SIDE_PX = 1024
 # Triangles keep this far from their cell's border, so that filtering never reaches a neighbour.
 INSET_PX = 1.5
 LIGHT_SAMPLES = 32
+# Light is smoother than colour, and costs LIGHT_SAMPLES times as much per pixel.
+LIGHT_SHRINK = 2
 
 
 class Baked:
     """A triangulated copy with its atlas; bakes each kind when it is first asked for."""
 
-    def __init__(self, obj, uvs, side_px, kinds):
+    def __init__(self, obj, uvs, side_px, cell_px, kinds):
         self.object = obj
         self.mesh = obj.data
         self.uvs = uvs  # [T,3,2]
-        self._side_px = side_px
+        self._side_px, self._cell_px = side_px, cell_px
         self._kinds = kinds  # per slot, or None to bake every slot
         self._images = {}
 
@@ -45,7 +47,10 @@ class Baked:
         return self._images[kind]
 
     def _bake(self, kind):
-        image = bpy.data.images.new('stipple_bake', self._side_px, self._side_px, alpha=True, float_buffer=True)
+        side = self._side_px
+        if kind == 'COMBINED' and self._cell_px >= 4 * LIGHT_SHRINK:
+            side //= LIGHT_SHRINK
+        image = bpy.data.images.new('stipple_bake', side, side, alpha=True, float_buffer=True)
         kept = list(self.mesh.materials)
         made = []
         try:
@@ -57,9 +62,9 @@ class Baked:
                 else:
                     self.mesh.materials.append(material)
             _run_cycles(self.object, kind)
-            values = np.empty(self._side_px * self._side_px * 4, np.float32)
+            values = np.empty(side * side * 4, np.float32)
             image.pixels.foreach_get(values)
-            values = values.reshape(self._side_px, self._side_px, 4)[::-1, :, :3]
+            values = values.reshape(side, side, 4)[::-1, :, :3]
             return np.ascontiguousarray(np.maximum(values, 0))
         finally:
             self.mesh.materials.clear()
@@ -113,7 +118,7 @@ def baked(evaluated, matrix, kinds, depsgraph, hidden):
         if len(mesh.polygons) == 0:
             yield None
             return
-        side_px, uvs = _atlas(len(mesh.polygons))
+        side_px, cell_px, uvs = _atlas(len(mesh.polygons))
         render_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
         layer = mesh.uv_layers.new(name=ATLAS, do_init=False)
         if layer is None:
@@ -128,7 +133,7 @@ def baked(evaluated, matrix, kinds, depsgraph, hidden):
         bpy.context.scene.collection.objects.link(obj)
         for other in shown:
             other.hide_render = True
-        yield Baked(obj, uvs, side_px, kinds)
+        yield Baked(obj, uvs, side_px, cell_px, kinds)
     finally:
         for other in shown:
             other.hide_render = False
@@ -146,7 +151,7 @@ def _triangulate(mesh):
 
 
 def _atlas(triangle_count):
-    """(side in pixels, UVs [T,3,2]): two triangles per square cell."""
+    """(side and cell in pixels, UVs [T,3,2]): two triangles per square cell."""
     cells = math.ceil(math.sqrt((triangle_count + 1) // 2))
     # Six pixels hold the insets and a few texels of colour.
     cell_px = min(max(MIN_SIDE_PX // cells, 6), MAX_SIDE_PX // cells)
@@ -164,7 +169,7 @@ def _atlas(triangle_count):
     first = np.array([[low, low], [high - gap, low], [low, high - gap]])
     second = np.array([[high, high], [low + gap, high], [high, low + gap]])
     corners = np.where((index % 2 == 0)[:, None, None], first, second)
-    return side_px, ((origin[:, None, :] + corners) / side_px).astype(np.float32)
+    return side_px, cell_px, ((origin[:, None, :] + corners) / side_px).astype(np.float32)
 
 
 def _emit_base_colour(material):

@@ -61,6 +61,31 @@ def from_parts(camera, matrix_world, width, height, aspect_x=1.0, aspect_y=1.0, 
     return result
 
 
+def from_view(region_data, width, height):
+    """The camera of a 3D view, at a picture size that has the view's proportions."""
+    window = np.array(region_data.window_matrix, np.float64)
+    view = np.array(region_data.view_matrix, np.float64)
+    perspective = window[3, 2] != 0
+    fx, fy = window[0, 0] * width / 2, window[1, 1] * height / 2
+    if perspective:
+        # x/w = (m00 x + m02 z) / -z: the third column moves the centre.
+        cx, cy = (1 - window[0, 2]) * width / 2, (1 + window[1, 2]) * height / 2
+        near = window[2, 3] / (window[2, 2] - 1)
+        far = window[2, 3] / (window[2, 2] + 1)
+    else:
+        cx, cy = (1 + window[0, 3]) * width / 2, (1 - window[1, 3]) * height / 2
+        near = (window[2, 3] + 1) / window[2, 2]
+        far = (window[2, 3] - 1) / window[2, 2]
+        # An orthographic view also sees what is behind its centre: step back until all is in front.
+        back = max(0.0, 1.0 - near)
+        view = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -back], [0, 0, 0, 1]]) @ view
+        near, far = near + back, far + back
+    model = CameraModel.PERSPECTIVE if perspective else CameraModel.ORTHOGRAPHIC
+    return StippleCamera(model=int(model), width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy,
+                         world_to_camera=(c_double * 16)(*(_OPENGL_TO_OPENCV @ view).reshape(16)), near_plane=near,
+                         far_plane=far)
+
+
 def world_to_camera(matrix_world):
     """[4,4] rigid; a camera's scale does not change its picture."""
     matrix = np.array(matrix_world, np.float64)

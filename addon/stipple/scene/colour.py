@@ -24,6 +24,7 @@ class BaseColour:
     image: object = None
     uv_map: str = ''     # '' for the layer that renders use
     attribute: str = ''  # '' for the active colour attribute
+    with_alpha: bool = False  # the image's alpha is the material's
 
 
 def base_colour_of(material):
@@ -41,15 +42,15 @@ def base_colour_of(material):
     if shader.type == 'EMISSION' and not _is_plain(shader.inputs['Strength'], 1.0):
         return BaseColour('BAKE_EMIT')
     if not socket.is_linked:
-        return BaseColour('CONSTANT', rgba=tuple(socket.default_value[:3]) + (1.0,))
+        return BaseColour('CONSTANT', rgba=tuple(socket.default_value[:3]) + (_constant_alpha(shader),))
     link = socket.links[0]
     node = link.from_node
     if node.type == 'RGB':
-        return BaseColour('CONSTANT', rgba=tuple(link.from_socket.default_value[:3]) + (1.0,))
+        return BaseColour('CONSTANT', rgba=tuple(link.from_socket.default_value[:3]) + (_constant_alpha(shader),))
     if node.type == 'TEX_IMAGE' and link.from_socket.name == 'Color' and node.image is not None:
         uv_map = _plain_uv_map(node)
         if uv_map is not None and _is_plain_image(node):
-            return BaseColour('TEXTURE', image=node.image, uv_map=uv_map)
+            return BaseColour('TEXTURE', image=node.image, uv_map=uv_map, with_alpha=_uses_alpha_of(shader, node))
     if node.type == 'VERTEX_COLOR' and link.from_socket.name == 'Color':
         return BaseColour('CORNER', attribute=node.layer_name)
     if node.type == 'ATTRIBUTE' and node.attribute_type == 'GEOMETRY' and link.from_socket.name == 'Color':
@@ -72,8 +73,11 @@ def colour_socket(shader):
     return shader.inputs[name] if name else None
 
 
-def image_pixels(image, material_name):
-    """(pixels [height,width,3] with row 0 = top, whether they are sRGB). Errors: StippleError for a missing file."""
+def image_pixels(image, material_name, with_alpha=False):
+    """(pixels [height,width,3 or 4] with row 0 = top, straight alpha; whether they are sRGB).
+
+    Errors: StippleError for a missing file.
+    """
     width, height = image.size
     if width == 0 or height == 0 or len(image.pixels) == 0:
         raise StippleError(f"Image '{image.name}' of material '{material_name}' cannot be read from "
@@ -87,8 +91,10 @@ def image_pixels(image, material_name):
     elif image.is_float and image.channels == 4 and image.alpha_mode != 'CHANNEL_PACKED':
         # Float images are associated: divide where there is alpha.
         alpha = values[..., 3:]
-        values = np.where(alpha > 0, values[..., :3] / np.where(alpha > 0, alpha, 1), values[..., :3])
-    return np.ascontiguousarray(values[..., :3]), not image.is_float and image.colorspace_settings.name in _SRGB
+        straight = np.where(alpha > 0, values[..., :3] / np.where(alpha > 0, alpha, 1), values[..., :3])
+        values = np.concatenate([straight, alpha], axis=2)
+    channels = 4 if with_alpha and values.shape[2] == 4 else 3
+    return np.ascontiguousarray(values[..., :channels]), not image.is_float and image.colorspace_settings.name in _SRGB
 
 
 def _is_plain_image(node):
@@ -108,6 +114,17 @@ def _plain_uv_map(node):
     if source.from_node.type == 'TEX_COORD' and source.from_socket.name == 'UV' and not source.from_node.from_instancer:
         return ''
     return None
+
+
+def _uses_alpha_of(shader, image_node):
+    alpha = shader.inputs.get('Alpha')
+    return (alpha is not None and alpha.is_linked and alpha.links[0].from_node == image_node
+            and alpha.links[0].from_socket.name == 'Alpha')
+
+
+def _constant_alpha(shader):
+    alpha = shader.inputs.get('Alpha')
+    return 1.0 if alpha is None or alpha.is_linked else alpha.default_value
 
 
 def _is_plain(socket, value):

@@ -3,6 +3,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from .. import version
 from ..binding.structs import BlendSpace
 
@@ -71,3 +73,8 @@ def uses_standard_view(scene):
     view = scene.view_settings
     return (view.view_transform == 'Standard' and view.look in {'None', ''} and view.exposure == 0.0
             and view.gamma == 1.0 and not view.use_curve_mapping)
+
+
+def display_colours(dc):
+    """Display values 0..1 of constant harmonics [N,3] (band 0 of the real harmonics: 1 / (2 sqrt pi))."""
+    return np.clip(0.5 + 0.28209479177387814 * dc, 0.0, 1.0)

@@ -43,7 +43,7 @@ def _cloud_of(obj, mode):
             raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
     if splat_data.count(data) == 0:
         return None
-    return sources.cloud_from_data(data)
+    return sources.cloud_from_object(obj)
 
 
 def _has_modifiers(obj):

@@ -87,7 +87,7 @@ def fingerprint(objects):
     """A short text that changes with the shape, placement and materials of source objects."""
     value = 0
     for obj in objects:
-        value = zlib.crc32(np.array(obj.matrix_world, np.float32), value)
+        value = zlib.crc32(np.array(obj.matrix_world, np.float32).tobytes(), value)
         mesh = obj.data
         if isinstance(mesh, bpy.types.Mesh):
             positions = np.empty(len(mesh.vertices) * 3, np.float32)
@@ -170,7 +170,10 @@ def _read(mesh, name, materials):
         values = np.empty(len(attribute.data) * 4, np.float32)
         attribute.data.foreach_get('color', values)
         index = vertices if attribute.domain == 'POINT' else loops
-        result.colours[attribute.name] = values.reshape(-1, 4)[index]
+        values = values.reshape(-1, 4)
+        # A colour attribute's alpha is not the material's.
+        values[:, 3] = 1
+        result.colours[attribute.name] = values[index]
     if len(mesh.color_attributes) and mesh.color_attributes.active_color is not None:
         result.active_colour = mesh.color_attributes.active_color.name
     return result
@@ -205,7 +208,7 @@ def _with_colours(read, kinds, materials, color_from, baked):
         elif kind.kind == 'TEXTURE':
             values = _uv(read, kind.uv_map, kind.image.name)
             uvs = values if uvs is None else np.where(mask[:, None, None], values, uvs)
-            chosen[mask] = materials.texture(kind.image, material_name)
+            chosen[mask] = materials.texture(kind.image, material_name, kind.with_alpha)
         else:
             uvs = baked.uvs if uvs is None else np.where(mask[:, None, None], baked.uvs, uvs)
             if kind.kind not in baked_materials:
@@ -245,11 +248,11 @@ class _Materials:
     def corner(self):
         return self._once('corner', lambda: self._mesh.add_material(MaterialColour.CORNER))
 
-    def texture(self, image, material_name):
+    def texture(self, image, material_name, with_alpha):
         def make():
-            pixels, srgb = colour.image_pixels(image, material_name)
+            pixels, srgb = colour.image_pixels(image, material_name, with_alpha)
             return self._mesh.add_material(MaterialColour.TEXTURE, texture=self._mesh.add_texture(pixels, srgb))
-        return self._once(('image', image.name_full), make)
+        return self._once(('image', image.name_full, with_alpha), make)
 
     def baked(self, pixels):
         texture = self._mesh.add_texture(pixels, srgb=False)

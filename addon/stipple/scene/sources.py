@@ -96,9 +96,9 @@ def decode_settings(stipple, mode='VIEWPORT'):
     return DecodeSettings(anchors, stipple.gaussians_per_anchor, AnchorOrder[stipple.order], stipple.seed)
 
 
-def cloud_from_data(data):
-    """The cloud of the attributes as they are."""
-    return Cloud.create(context(), splat_data.read(data))
+def cloud_from_object(obj):
+    """The cloud of an object's attributes as they are, evaluated where the object is."""
+    return Cloud.create(context(), splat_data.read(obj.data, obj.original.data))
 
 
 def model_path_for(name, given=''):

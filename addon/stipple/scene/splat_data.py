@@ -8,6 +8,7 @@ with the same names. `rotation` is w,x,y,z; `radiance:base` holds the DC harmoni
 
 import zlib
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -33,6 +34,23 @@ def new_data(name):
     return data
 
 
+def new_object(name, data):
+    """An object of splat data that the add-on draws; Blender draws its box."""
+    obj = bpy.data.objects.new(name, data)
+    if not bpy.app.background:
+        show_as_box(obj)
+    return obj
+
+
+def show_as_box(obj, box=True):
+    """Vertex meshes are drawn as black dots over everything: a box leaves room for the splats themselves.
+
+    Objects that the user gave another display type keep it.
+    """
+    if obj.type == 'MESH' and obj.display_type == ('TEXTURED' if box else 'BOUNDS'):
+        obj.display_type = 'BOUNDS' if box else 'TEXTURED'
+
+
 def is_splats(data):
     """True for data that Stipple made; also for evaluated copies."""
     return data is not None and isinstance(data, (bpy.types.Mesh, bpy.types.PointCloud)) and (
@@ -40,7 +58,8 @@ def is_splats(data):
 
 
 def is_splat_object(obj):
-    return obj is not None and obj.type in {'MESH', 'POINTCLOUD'} and is_splats(obj.data)
+    # Modifiers may drop custom properties from the evaluated data: the original has them.
+    return obj is not None and obj.type in {'MESH', 'POINTCLOUD'} and is_splats(obj.original.data)
 
 
 def count(data):
@@ -77,8 +96,12 @@ def write(data, arrays):
     data.update_tag()
 
 
-def read(data):
-    """The splats of a datablock, original or evaluated. Errors: StippleError for attributes that are missing."""
+def read(data, original=None):
+    """The splats of a datablock. original: the datablock that tells the colour space, where data is evaluated.
+
+    Errors: StippleError for attributes that are missing.
+    """
+    marked = data if original is None else original
     n = count(data)
     if isinstance(data, bpy.types.Mesh):
         positions = np.empty(n * 3, np.float32)
@@ -96,8 +119,8 @@ def read(data):
     for i in range(rest):
         sh[:, i + 1] = _get(data, f'radiance:sh_{i}', n, 3).reshape(n, 3)
     return SplatArrays(positions.reshape(n, 3), rotations.reshape(n, 4), scales.reshape(n, 3), base[:, 3].copy(), sh,
-                       _key_of(_COLOUR_SPACES, data.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
-                       _key_of(_ANTIALIAS, data.get(ANTIALIAS_KEY), Antialias.CLASSIC))
+                       _key_of(_COLOUR_SPACES, marked.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
+                       _key_of(_ANTIALIAS, marked.get(ANTIALIAS_KEY), Antialias.CLASSIC))
 
 
 def fingerprint(data):
@@ -126,7 +149,10 @@ def _resize(data, n):
     if count(data) == n:
         return
     if isinstance(data, bpy.types.Mesh):
-        data.clear_geometry()
+        # Not clear_geometry(): that also frees the datablock's animation and drivers.
+        empty = bmesh.new()
+        empty.to_mesh(data)
+        empty.free()
         data.vertices.add(n)
     else:
         data.resize(n)

@@ -165,7 +165,26 @@ def _restored(*_):
     """After undo, redo and loading: splats that do not fit their settings are decoded again."""
     problems.clear()
     _state['rendering'] = False
+    _show_boxes(True)
     sync_all()
+
+
+@persistent
+def _save_pre(*_):
+    """A file that is opened without the add-on shows the splats' centres."""
+    _show_boxes(False)
+
+
+@persistent
+def _save_post(*_):
+    _show_boxes(True)
+
+
+def _show_boxes(box):
+    if not bpy.app.background:
+        for obj in bpy.data.objects:
+            if splat_data.is_splat_object(obj):
+                splat_data.show_as_box(obj, box)
 
 
 @persistent
@@ -186,7 +205,8 @@ def _depsgraph_update_post(scene, depsgraph):
 
 _HANDLERS = (('frame_change_post', _frame_change_post), ('render_init', _render_init),
              ('render_complete', _render_end), ('render_cancel', _render_end), ('undo_post', _restored),
-             ('redo_post', _restored), ('load_post', _restored), ('depsgraph_update_post', _depsgraph_update_post))
+             ('redo_post', _restored), ('load_post', _restored), ('save_pre', _save_pre),
+             ('save_post', _save_post), ('depsgraph_update_post', _depsgraph_update_post))
 
 
 def register():

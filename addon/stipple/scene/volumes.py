@@ -8,8 +8,8 @@ from ..binding.errors import StippleError
 from ..binding.structs import Status
 
 
-def new_object(name, path, collection):
-    """A Volume object that shows an OpenVDB file with the grids `density` and `color`."""
+def new_object(name, path, collection, voxel_size):
+    """A Volume object that shows an OpenVDB file with the grids `density` and `color`; voxels in metres."""
     volume = bpy.data.volumes.new(name)
     volume.filepath = bpy.path.relpath(path) if bpy.data.filepath else path
     if not volume.grids.load():
@@ -18,6 +18,7 @@ def new_object(name, path, collection):
         raise StippleError(f"Blender cannot read the volume '{path}': {message}.", Status.ERROR_FORMAT)
     volume.materials.append(emission_absorption(name))
     obj = bpy.data.objects.new(name, volume)
+    obj.delta_location = (-version.VOXEL_SHIFT * voxel_size,) * 3
     collection.objects.link(obj)
     return obj
 

@@ -127,7 +127,10 @@ uint32_t wholeNumber(const unsigned char* bytes, int type, const std::string& wh
 void applySparse(const tinygltf::Model& model, const tinygltf::Accessor& accessor, size_t width,
                  const std::string& what, std::vector<float>& values) {
   const auto& sparse = accessor.sparse;
-  if (sparse.count < 0 || sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0) {
+  // Signed in one version of tinygltf, unsigned in the next.
+  const auto negative = [](auto number) { return static_cast<int64_t>(number) < 0; };
+  if (negative(sparse.count) || negative(sparse.indices.byteOffset) ||
+      negative(sparse.values.byteOffset)) {
     failHere(what + " has a sparse part of negative size");
   }
   const size_t count = static_cast<size_t>(sparse.count);
@@ -208,6 +211,13 @@ std::vector<uint32_t> readIndices(const tinygltf::Model& model, int index,
     values[i] = wholeNumber(range.first + i * range.stride, accessor.componentType, what);
   }
   return values;
+}
+
+std::vector<unsigned char> readView(const tinygltf::Model& model, int view,
+                                    const std::string& what) {
+  const Range range = rangeOf(model, view, 0, 0, 1, what);
+  const size_t length = model.bufferViews[static_cast<size_t>(view)].byteLength;
+  return std::vector<unsigned char>(range.first, range.first + length);
 }
 
 }  // namespace stipple::media

@@ -25,4 +25,8 @@ size_t accessorWidth(const tinygltf::Model& model, int accessor, const std::stri
 std::vector<uint32_t> readIndices(const tinygltf::Model& model, int accessor,
                                   const std::string& what);
 
+/// The bytes of a buffer view.
+std::vector<unsigned char> readView(const tinygltf::Model& model, int view,
+                                    const std::string& what);
+
 }  // namespace stipple::media

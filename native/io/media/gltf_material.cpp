@@ -6,6 +6,7 @@
 #define TINYGLTF_NO_STB_IMAGE_WRITE
 #include <tiny_gltf.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -109,6 +110,14 @@ uint32_t MaterialReader::texture(int image, const Base& base) {
   result.transfer = Transfer::kSrgb;
   result.pixels = std::move(decoded.pixels);
   const bool has_alpha = result.channels == 4;
+  if (has_alpha && decoded.info.alpha_is_associated != 0) {
+    for (size_t i = 0; i < result.pixelCount(); ++i) {
+      float* pixel = &result.pixels[i * 4];
+      for (size_t c = 0; c < 3 && pixel[3] > 0.0f; ++c) {
+        pixel[c] = std::min(pixel[c] / pixel[3], 1.0f);
+      }
+    }
+  }
   const size_t channels = result.channels;
   const bool plain = base.factor == std::vector<double>{1, 1, 1, 1};
   const bool keeps_alpha = has_alpha && base.alpha_mode == kBlend;

@@ -103,11 +103,14 @@ class GltfReader {
  private:
   void load() {
     tinygltf::TinyGLTF loader;
-    // Images are only kept here; those that a base colour needs are decoded later.
+    // Images are only kept here; those that a base colour needs are decoded later. The ranges of
+    // images inside the file's own buffers are not checked by tinygltf, so they are not touched
+    // yet.
     loader.SetImageLoader(
-        [](tinygltf::Image*, const int index, std::string*, std::string*, int, int,
+        [](tinygltf::Image* image, const int index, std::string*, std::string*, int, int,
            const unsigned char* bytes, int size, void* user) {
           auto& images = *static_cast<std::vector<std::vector<unsigned char>>*>(user);
+          if (image->bufferView >= 0) return true;
           if (index < 0 || size < 0) return false;
           images.resize(std::max(images.size(), static_cast<size_t>(index) + 1));
           images[static_cast<size_t>(index)].assign(bytes, bytes + size);
@@ -127,6 +130,11 @@ class GltfReader {
            path_ + " is not a valid glTF file: " + (error.empty() ? "no reason is given" : error));
     }
     images_.resize(model_.images.size());
+    for (size_t i = 0; i < images_.size(); ++i) {
+      if (model_.images[i].bufferView < 0) continue;
+      images_[i] =
+          readView(model_, model_.images[i].bufferView, path_ + ": image " + std::to_string(i));
+    }
   }
 
   void requireExtensions() const {

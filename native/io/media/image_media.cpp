@@ -78,12 +78,8 @@ DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
   image.info.height = static_cast<uint32_t>(window[1]);
   image.info.channels = static_cast<uint32_t>(channels.size());
   image.info.is_display = spec.format.is_floating_point() ? 0 : 1;
-  const bool exr = std::string(input.format_name()) == "openexr";
-  // Told not to convert, readers of formats with straight alpha say so; EXR is premultiplied by
-  // definition, the rest (PNG foremost) is straight.
-  const bool says_straight = spec.get_int_attribute("oiio:UnassociatedAlpha", 0) != 0;
-  const bool tiff = std::string(input.format_name()) == "tiff";
-  image.info.alpha_is_associated = exr || (tiff && !says_straight) ? 1 : 0;
+  // Readers that kept straight alpha, as told, say so; others (WebP in version 2.4) multiply.
+  image.info.alpha_is_associated = spec.get_int_attribute("oiio:UnassociatedAlpha", 0) != 0 ? 0 : 1;
   image.pixels.assign(static_cast<size_t>(window[0] * window[1]) * channels.size(), 0.0f);
   // The data window may be smaller or larger than the picture.
   for (size_t y = 0; y < height; ++y) {
@@ -153,7 +149,10 @@ DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std
     fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF picture");
   }
   OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
-  const OIIO::ImageSpec config = keepAlpha();
+  OIIO::ImageSpec config = keepAlpha();
+  // The readers look for the bytes in the configuration, not in open's own argument.
+  void* proxy = &memory;
+  config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
   const auto input = OIIO::ImageInput::open(file_name, &config, &memory);
   if (!input) fail(ErrorCode::kFormat, name + " cannot be decoded: " + OIIO::geterror());
   return decode(*input, name);

@@ -124,8 +124,9 @@ void blendTile(const TileSplat* splats, size_t count, TileKernelOptions options,
   }
 }
 
+/// Highway's own one-lane target is not the plain kernel, which has the name "scalar".
 NamedTileKernel namedKernel() {
-  return {hwy::TargetName(HWY_TARGET), blendTile};
+  return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET), blendTile};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -84,16 +84,15 @@ size_t chunkCount(size_t splats, size_t tiles) {
 void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progress* progress,
                       const std::function<void(const TileListGroup&)>& use) {
   const size_t tiles = grid.tileCount();
-  const std::vector<uint32_t>& order = visible.order;
-  const size_t chunks = chunkCount(order.size(), tiles);
-  const size_t chunk_size = std::max<size_t>(1, (order.size() + chunks - 1) / chunks);
+  const size_t chunks = chunkCount(visible.count, tiles);
+  const size_t chunk_size = std::max<size_t>(1, (visible.count + chunks - 1) / chunks);
 
   std::vector<uint32_t> counts(chunks * tiles, 0);  // [chunk][tile]
-  parallelFor(order.size(), chunk_size, [&](size_t begin, size_t end) {
+  parallelFor(visible.count, chunk_size, [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     uint32_t* count = &counts[begin / chunk_size * tiles];
     for (size_t i = begin; i < end; ++i) {
-      forEachTileSpan(visible.slots[order[i]], grid, [&](int64_t row, int64_t first, int64_t last) {
+      forEachTileSpan(visible.splats[i], grid, [&](int64_t row, int64_t first, int64_t last) {
         uint32_t* tile = count + static_cast<size_t>(row) * grid.columns;
         for (int64_t column = first; column <= last; ++column) ++tile[column];
       });
@@ -124,17 +123,17 @@ void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progre
       }
     }
     group.entries.resize(group.offsets.back());
-    parallelFor(order.size(), chunk_size, [&](size_t begin, size_t end) {
+    parallelFor(visible.count, chunk_size, [&](size_t begin, size_t end) {
       if (progress) progress->throwIfCancelled();
       uint64_t* cursor = &cursors[begin / chunk_size * group_tiles];
       for (size_t i = begin; i < end; ++i) {
-        const uint32_t slot = order[i];
-        forEachTileSpan(visible.slots[slot], grid, [&](int64_t row, int64_t first, int64_t last) {
+        const uint32_t splat = static_cast<uint32_t>(i);
+        forEachTileSpan(visible.splats[i], grid, [&](int64_t row, int64_t first, int64_t last) {
           const size_t row_start = static_cast<size_t>(row) * grid.columns;
           const size_t from = std::max(row_start + static_cast<size_t>(first), group.first_tile);
           const size_t to = std::min(row_start + static_cast<size_t>(last) + 1, group.end_tile);
           for (size_t tile = from; tile < to; ++tile) {
-            group.entries[cursor[tile - group.first_tile]++] = slot;
+            group.entries[cursor[tile - group.first_tile]++] = splat;
           }
         });
       }

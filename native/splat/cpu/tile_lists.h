@@ -27,7 +27,7 @@ struct TileGrid {
   size_t tileCount() const { return static_cast<size_t>(columns) * rows; }
 };
 
-/// Slots of the splats of tiles [first_tile, end_tile), each tile front to back.
+/// Indices of the visible splats of tiles [first_tile, end_tile), each tile front to back.
 struct TileListGroup {
   size_t first_tile = 0;
   size_t end_tile = 0;

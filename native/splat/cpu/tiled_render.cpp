@@ -1,13 +1,13 @@
+#include "splat/cpu/tiled_render.h"
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <iterator>
 
 #include "base/parallel.h"
-#include "splat/cpu/tile_kernel.h"
 #include "splat/cpu/tile_lists.h"
 #include "splat/cpu/visible_splats.h"
-#include "splat/render.h"
 #include "splat/scene.h"
 
 // Based on: Kerbl et al., 3D Gaussian Splatting, SIGGRAPH 2023 (tiles). Differs: one sort by depth
@@ -21,14 +21,15 @@ namespace stipple {
 namespace {
 
 constexpr size_t kBatchSize = 128;
+constexpr size_t kPrefetchDistance = 12;
 /// Above this size of |g|, float32 leaves too few digits (error of alpha up to about 1e-4): only
 /// splats thinner than a quarter of a pixel, which LowPass::kNone alone has.
 constexpr double kMaxFloatReach = 200.0;
 
 struct Tile {
-  uint32_t x0, y0;         ///< first pixel
-  uint32_t width, height;  ///< pixels inside the picture
-  std::span<const uint32_t> slots;
+  uint32_t x0, y0;                   ///< first pixel
+  uint32_t width, height;            ///< pixels inside the picture
+  std::span<const uint32_t> splats;  ///< indices of visible splats, front to back
 };
 
 TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
@@ -78,11 +79,11 @@ void clearPixels(const Tile& tile, TilePixels& pixels) {
 }
 
 /// A pixel as the reference blends it.
-PixelBlend<double> blendInDouble(const VisibleSplat* slots, const Tile& tile, double px,
+PixelBlend<double> blendInDouble(const VisibleSplat* visible, const Tile& tile, double px,
                                  double py) {
   PixelBlend<double> pixel;
-  for (const uint32_t slot : tile.slots) {
-    const VisibleSplat& splat = slots[slot];
+  for (const uint32_t index : tile.splats) {
+    const VisibleSplat& splat = visible[index];
     const Footprint<double>& f = splat.footprint;
     const double alpha =
         splatAlpha(f.opacity, halfSquaredDistance(f, px - f.mean_x, py - f.mean_y));
@@ -92,13 +93,13 @@ PixelBlend<double> blendInDouble(const VisibleSplat* slots, const Tile& tile, do
   return pixel;
 }
 
-void replaceDoubtful(const VisibleSplat* slots, const Tile& tile, TilePixels& pixels) {
+void replaceDoubtful(const VisibleSplat* visible, const Tile& tile, TilePixels& pixels) {
   for (uint32_t y = 0; y < tile.height; ++y) {
     for (uint32_t x = 0; x < tile.width; ++x) {
       const size_t i = static_cast<size_t>(y) * kTileSide + x;
       if (pixels.doubt[i] == 0.0f) continue;
       const PixelBlend<double> pixel =
-          blendInDouble(slots, tile, tile.x0 + x + 0.5, tile.y0 + y + 0.5);
+          blendInDouble(visible, tile, tile.x0 + x + 0.5, tile.y0 + y + 0.5);
       pixels.transmittance[i] = static_cast<float>(pixel.transmittance);
       pixels.red[i] = static_cast<float>(pixel.colour[0]);
       pixels.green[i] = static_cast<float>(pixel.colour[1]);
@@ -143,7 +144,7 @@ void writePixels(const Tile& tile, const TilePixels& pixels, const RenderOptions
   }
 }
 
-void renderTile(const VisibleSplat* slots, const Tile& tile, TileKernel kernel,
+void renderTile(const VisibleSplat* visible, const Tile& tile, TileKernel kernel,
                 const RenderOptions& options, RenderResult& result) {
   // Scratch of this thread: 9 KiB of pixels and 7 KiB of splats, in the first-level cache.
   TilePixels pixels;
@@ -151,14 +152,19 @@ void renderTile(const VisibleSplat* slots, const Tile& tile, TileKernel kernel,
   clearPixels(tile, pixels);
   const TileKernelOptions kernel_options = {options.with_depth,
                                             options.with_median_depth || options.with_counts};
-  for (size_t begin = 0; begin < tile.slots.size() && pixels.unfinished > 0; begin += kBatchSize) {
-    const size_t count = std::min(kBatchSize, tile.slots.size() - begin);
+  for (size_t begin = 0; begin < tile.splats.size() && pixels.unfinished > 0; begin += kBatchSize) {
+    const size_t count = std::min(kBatchSize, tile.splats.size() - begin);
     for (size_t i = 0; i < count; ++i) {
-      batch[i] = makeTileSplat(slots[tile.slots[begin + i]], tile);
+      // A tile's splats lie far apart, so each would wait for memory.
+      const size_t ahead = std::min(begin + i + kPrefetchDistance, tile.splats.size() - 1);
+      const VisibleSplat* next = &visible[tile.splats[ahead]];
+      __builtin_prefetch(next);
+      __builtin_prefetch(reinterpret_cast<const char*>(next + 1) - 1);
+      batch[i] = makeTileSplat(visible[tile.splats[begin + i]], tile);
     }
     kernel(batch, count, kernel_options, pixels);
   }
-  replaceDoubtful(slots, tile, pixels);
+  replaceDoubtful(visible, tile, pixels);
   writePixels(tile, pixels, options, result);
 }
 
@@ -183,16 +189,16 @@ uint64_t resultBytes(const Camera& camera, const RenderOptions& options) {
 
 }  // namespace
 
-RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
-                         const RenderOptions& options, Progress* progress) {
+RenderResult renderTiledWith(TileKernel kernel, std::span<const SplatInstance> instances,
+                             const Camera& camera, const RenderOptions& options,
+                             Progress* progress) {
   const PlacedScene scene = placeScene(instances, camera, options);
   advance(progress, 0.0, "Projecting splats");
   const VisibleSplats visible = findVisibleSplats(scene, progress);
   RenderResult result = makeResult(camera, options);
-  result.visible_count = visible.order.size();
+  result.visible_count = visible.count;
 
   const TileGrid grid(camera.width, camera.height);
-  const TileKernel kernel = chosenTileKernel();
   std::atomic<size_t> finished_tiles{0};
   forEachTileGroup(visible, grid, progress, [&](const TileListGroup& group) {
     parallelFor(group.end_tile - group.first_tile, 1, [&](size_t begin, size_t end) {
@@ -203,8 +209,8 @@ RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera&
         tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
         tile.width = std::min(kTileSide, grid.width - tile.x0);
         tile.height = std::min(kTileSide, grid.height - tile.y0);
-        tile.slots = group.tile(index);
-        renderTile(visible.slots.get(), tile, kernel, options, result);
+        tile.splats = group.tile(index);
+        renderTile(visible.splats.get(), tile, kernel, options, result);
         const size_t finished = finished_tiles.fetch_add(1, std::memory_order_relaxed) + 1;
         if (finished % grid.columns == 0) {
           advance(progress, static_cast<double>(finished) / static_cast<double>(grid.tileCount()),
@@ -214,6 +220,11 @@ RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera&
     });
   });
   return result;
+}
+
+RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
+                         const RenderOptions& options, Progress* progress) {
+  return renderTiledWith(chosenTileKernel(), instances, camera, options, progress);
 }
 
 uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,

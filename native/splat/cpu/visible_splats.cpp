@@ -26,6 +26,7 @@ VisibleSplat makeVisible(const PlacedScene& scene, const PlacedCloud& placed, si
   splat.log2_opacity = static_cast<float>(std::log2(projected.footprint.opacity));
   splat.depth = static_cast<float>(std::min(projected.depth, 1e38));
   splatColour(scene, placed, index, splat.colour);
+  splat.index = static_cast<uint32_t>(placed.first_index + index);
   return splat;
 }
 
@@ -83,31 +84,31 @@ VisibleSplats findVisibleSplats(const PlacedScene& scene, Progress* progress) {
   const size_t count = scene.splat_count;
   if (count == 0) return visible;
   // Without initialisation: pages of splats that are culled are never touched.
-  visible.slots = std::make_unique_for_overwrite<VisibleSplat[]>(count);
+  const auto slots = std::make_unique_for_overwrite<VisibleSplat[]>(count);
   const auto keyed = std::make_unique_for_overwrite<Keyed[]>(count);
   std::vector<size_t> filled(rangeCount(count, kProjectionGrain));
   parallelFor(count, kProjectionGrain, [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
-    filled[begin / kProjectionGrain] =
-        projectRange(scene, begin, end, visible.slots.get(), keyed.get());
+    filled[begin / kProjectionGrain] = projectRange(scene, begin, end, slots.get(), keyed.get());
   });
 
-  size_t visible_count = 0;
-  for (const size_t part : filled) visible_count += part;
+  for (const size_t part : filled) visible.count += part;
   std::vector<Keyed> sorted;
-  sorted.reserve(visible_count);
+  sorted.reserve(visible.count);
   for (size_t range = 0; range < filled.size(); ++range) {
     const Keyed* first = keyed.get() + range * kProjectionGrain;
     sorted.insert(sorted.end(), first, first + filled[range]);
   }
   sortByKey(sorted);
-  visible.order.reserve(visible_count);
-  for (const Keyed& item : sorted) visible.order.push_back(item.slot);
+  visible.splats = std::make_unique_for_overwrite<VisibleSplat[]>(visible.count);
+  parallelFor(visible.count, kProjectionGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) visible.splats[i] = slots[sorted[i].slot];
+  });
   return visible;
 }
 
 uint64_t visibleSplatsMemoryBound(uint64_t splat_count) {
-  return splat_count * (sizeof(VisibleSplat) + 3 * sizeof(Keyed) + sizeof(uint32_t)) +
+  return splat_count * (2 * sizeof(VisibleSplat) + 3 * sizeof(Keyed)) +
          rangeCount(splat_count, kProjectionGrain) * sizeof(size_t);
 }
 

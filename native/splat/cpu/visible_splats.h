@@ -1,8 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <vector>
 
 #include "base/progress.h"
 #include "splat/scene.h"
@@ -18,13 +18,14 @@ struct VisibleSplat {
   float log2_opacity;
   float depth;      ///< view z, metres
   float colour[3];  ///< blending space
+  uint32_t index;   ///< among all splats of the picture: PlacedCloud::first_index + its row
 };
 
-/// The splats that can show, in the order of blending.
+/// The splats that can show, in the order of blending: front to back by depthKey, ties by splat
+/// index. They lie in memory in that order too, since every later step walks them in it.
 struct VisibleSplats {
-  std::unique_ptr<VisibleSplat[]>
-      slots;                    ///< one per splat of the scene; only those in order are set
-  std::vector<uint32_t> order;  ///< slots, front to back (depthKey, ties by splat index)
+  std::unique_ptr<VisibleSplat[]> splats;
+  size_t count = 0;
 };
 
 /// Projects, culls and sorts. Same result for any number of threads. Cost: O(splats).

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <map>
 
+#include "anchor_expectations.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "density_fixtures.h"
-#include "math/morton.h"
 
 namespace stipple {
 namespace {
@@ -18,60 +18,12 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-constexpr AnchorOrder kBothOrders[] = {AnchorOrder::kSystematic, AnchorOrder::kProgressive};
-
-std::map<uint64_t, uint64_t> leafCounts(const AnchorSet& anchors) {
-  std::map<uint64_t, uint64_t> counts;
-  for (const uint64_t leaf : anchors.leaves) ++counts[leaf];
-  return counts;
-}
-
 void expectSameBits(const AnchorSet& a, const AnchorSet& b) {
   EXPECT_TRUE(a.positions == b.positions);
   EXPECT_TRUE(a.log_q == b.log_q);
   EXPECT_TRUE(a.leaves == b.leaves);
   EXPECT_TRUE(a.ranks == b.ranks);
   EXPECT_EQ(a.leaf_level, b.leaf_level);
-}
-
-/// The logarithms of the leaf probabilities, summed in double along the path.
-std::map<uint64_t, double> leafLogQ(const OctreeDensity& density) {
-  std::map<uint64_t, double> log_q{{0, 0.0}};
-  for (int level = 0; level < density.leafLevel(); ++level) {
-    std::map<uint64_t, double> next;
-    for (size_t i = 0; i < density.cells(level).size(); ++i) {
-      for (uint64_t k = 0; k < 8; ++k) {
-        const float log_p = density.logProbabilities(level)[8 * i + k];
-        if (log_p == kNoMass) continue;
-        next[density.cells(level)[i] << 3 | k] =
-            log_q.at(density.cells(level)[i]) + static_cast<double>(log_p);
-      }
-    }
-    log_q = std::move(next);
-  }
-  return log_q;
-}
-
-/// What holds for every anchor set: size, order, positions in their leaves, log q of the model.
-void expectValid(const OctreeDensity& density, const AnchorSet& anchors, uint64_t count) {
-  ASSERT_EQ(anchors.size(), count);
-  ASSERT_EQ(anchors.leaves.size(), count);
-  ASSERT_EQ(anchors.positions.size(), 3 * count);
-  EXPECT_EQ(anchors.leaf_level, density.leafLevel());
-  EXPECT_TRUE(std::is_sorted(anchors.leaves.begin(), anchors.leaves.end()));
-  const auto log_q = leafLogQ(density);
-  const double side = std::ldexp(1.0, density.leafLevel());
-  for (size_t i = 0; i < count; ++i) {
-    const auto leaf = log_q.find(anchors.leaves[i]);
-    ASSERT_NE(leaf, log_q.end()) << "an anchor in a leaf without mass";
-    ASSERT_EQ(anchors.log_q[i], static_cast<float>(leaf->second));
-    const auto cell = mortonDecode(anchors.leaves[i]);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const double position = static_cast<double>(anchors.positions[3 * i + axis]);
-      ASSERT_GE(position, cell[axis] / side);
-      ASSERT_LT(position, (cell[axis] + 1) / side);
-    }
-  }
 }
 
 /// Expects the child counts of every parent to be floor or ceil of n p. The rounding of n p itself
@@ -251,21 +203,6 @@ TEST(AnchorSampling, RefusesBudgetsAndOptionsOutOfRange) {
   EXPECT_THAT(refusal(OctreeDensity(), {}), HasSubstr("leaf level is 0"));
 }
 
-/// A model that answers every question with the same eight numbers.
-class ConstantModel final : public DensityModel {
- public:
-  ConstantModel(int leaf_level, std::array<float, 8> logs) : leaf_level_(leaf_level), logs_(logs) {}
-  int leafLevel() const override { return leaf_level_; }
-  void childLogProbabilities(int, std::span<const uint64_t> cells,
-                             std::span<float> out) const override {
-    for (size_t i = 0; i < 8 * cells.size(); ++i) out[i] = logs_[i % 8];
-  }
-
- private:
-  int leaf_level_;
-  std::array<float, 8> logs_;
-};
-
 TEST(AnchorSampling, RefusesAModelThatGivesNoDistribution) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   std::array<float, 8> none;
@@ -314,65 +251,7 @@ TEST(RecordedUniformSource, RefusesToRunOutAndNumbersOutsideTheUnitInterval) {
   }
 }
 
-TEST(StabilityAnchorSampling, OneLeafTakesEveryAnchor) {
-  const OctreeDensity density = OctreeDensity::fromPoints(std::vector<float>{1, 2, 3}, {}, {10});
-  for (const AnchorOrder order : kBothOrders) {
-    for (const uint64_t count : {1u, 100000u}) {
-      const AnchorSet anchors = sampleAnchors(density, {.count = count, .order = order});
-      expectValid(density, anchors, count);
-      EXPECT_EQ(anchors.log_q[0], 0.0f);
-    }
-  }
-}
-
-TEST(StabilityAnchorSampling, UniformOctreeFarBelowTheBudgetIsEven) {
-  // Eight full children everywhere, 512 leaves, 1000 anchors a leaf and 300 over.
-  const ConstantModel model(3, [] {
-    std::array<float, 8> logs;
-    logs.fill(std::log(0.125f));
-    return logs;
-  }());
-  for (const AnchorOrder order : kBothOrders) {
-    const AnchorSet anchors = sampleAnchors(model, {.count = 512300, .order = order, .seed = 2});
-    const auto counts = leafCounts(anchors);
-    ASSERT_EQ(counts.size(), 512u);
-    // Systematic: each level moves a child by less than one: below 1 + 1/8 + 1/64. Progressive:
-    // nine halvings, each off by less than one: below 2.
-    const double bound = order == AnchorOrder::kSystematic ? 1.15 : 2.0;
-    for (const auto& [leaf, count] : counts) {
-      EXPECT_NEAR(static_cast<double>(count), 512300.0 / 512, bound);
-    }
-  }
-}
-
-TEST(StabilityAnchorSampling, EmptyAndVanishingBranchesGetNoAnchor) {
-  // exp(-800) is 0 in double; exp(-60) is real mass, far below one anchor.
-  const ConstantModel model(10,
-                            {kNoMass, -800.0f, 0.0f, kNoMass, -60.0f, kNoMass, kNoMass, kNoMass});
-  for (const AnchorOrder order : kBothOrders) {
-    const AnchorSet anchors = sampleAnchors(model, {.count = 100000, .order = order});
-    for (const uint64_t leaf : anchors.leaves) {
-      for (int level = 0; level < 10; ++level) {
-        const uint64_t child = leaf >> (3 * level) & 7;
-        ASSERT_TRUE(child == 2 || child == 4);
-      }
-    }
-  }
-}
-
-TEST(StabilityAnchorSampling, HighestLeavesStayInTheUnitCube) {
-  const ConstantModel model(10, {kNoMass, kNoMass, kNoMass, kNoMass, kNoMass, kNoMass, kNoMass, 0});
-  const AnchorSet anchors = sampleAnchors(model, {.count = 200000});
-  const auto [low, high] = std::minmax_element(anchors.positions.begin(), anchors.positions.end());
-  EXPECT_GE(*low, 1023.0f / 1024.0f);
-  EXPECT_LT(*high, 1.0f);
-  // The largest number of a recorded stream, too, stays below the leaf's upper edge.
-  RecordedUniformSource source(std::vector<double>(13, 1.0 - 0x1.0p-53));
-  const AnchorSet edge = sampleAnchors(model, {.count = 1}, source);
-  for (const float value : edge.positions) EXPECT_EQ(value, 1.0f - 0x1.0p-24f);
-}
-
-TEST(StabilityAnchorSampling, MemoryStaysBelowItsBound) {
+TEST(AnchorSampling, MemoryStaysBelowItsBound) {
   // Checked where the arrays are known: the result and two frontiers of one cell an anchor.
   for (const uint64_t count : {uint64_t{1}, uint64_t{1000000}, kMaxAnchorCount}) {
     EXPECT_GE(sampleMemoryBound(count, false), count * (24 + 2 * 20));

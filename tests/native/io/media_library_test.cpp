@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -19,17 +20,21 @@ namespace fs = std::filesystem;
 
 class MediaLibrary : public ScratchFolder {
  protected:
-  /// Runs one disabled test of this program from a copy of it in the scratch folder.
-  int runAlone(const std::string& test) {
+  /// True in the copy of this program that `passesAlone` starts in a folder of its own.
+  static bool isAlone() { return std::getenv(kAlone) != nullptr; }
+  /// Runs the test of this name once more, in a copy of the program in the scratch folder.
+  void passesAlone(const std::string& test) {
     fs::copy_file("/proc/self/exe", path("alone"), fs::copy_options::overwrite_existing);
-    const std::string command = path("alone") +
-                                " --gtest_also_run_disabled_tests --gtest_filter=" + test + " > " +
-                                path("log") + " 2>&1";
+    const std::string command = std::string(kAlone) + "=1 " + path("alone") +
+                                " --gtest_filter=MediaLibrary." + test + " > " + path("log") +
+                                " 2>&1";
     const int status = std::system(command.c_str());
     const std::string log = load(path("log"));
     EXPECT_NE(log.find("[  PASSED  ] 1 test"), std::string::npos) << log;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << log;
   }
+
+  static constexpr char kAlone[] = "STIPPLE_TEST_ALONE";
 };
 
 TEST_F(MediaLibrary, IsFoundBesideTheProgram) {
@@ -37,8 +42,8 @@ TEST_F(MediaLibrary, IsFoundBesideTheProgram) {
   EXPECT_EQ(&mediaTable(), &mediaTable());
 }
 
-// Run from a folder without the library, by the test below.
-TEST_F(MediaLibrary, DISABLED_SaysThatItIsMissing) {
+TEST_F(MediaLibrary, IsUnavailableWhereItIsNotInstalled) {
+  if (!isAlone()) return passesAlone("IsUnavailableWhereItIsNotInstalled");
   Image image;
   image.width = image.height = image.channels = 1;
   image.pixels = {0.5f};
@@ -56,20 +61,15 @@ TEST_F(MediaLibrary, DISABLED_SaysThatItIsMissing) {
   EXPECT_FALSE(fs::exists(path("a.vdb")));
 }
 
-TEST_F(MediaLibrary, IsUnavailableWhereItIsNotInstalled) {
-  EXPECT_EQ(runAlone("MediaLibrary.DISABLED_SaysThatItIsMissing"), 0);
-}
-
-TEST_F(MediaLibrary, DISABLED_SaysThatItIsDamaged) {
+TEST_F(MediaLibrary, IsUnavailableWhereItIsDamaged) {
+  if (!isAlone()) {
+    store("libstipple_media.so", "not a library");
+    return passesAlone("IsUnavailableWhereItIsDamaged");
+  }
   for (int attempt = 0; attempt < 2; ++attempt) {
     expectError(ErrorCode::kUnavailable, {"libstipple_media.so", "file too short"},
                 [] { mediaTable(); });
   }
-}
-
-TEST_F(MediaLibrary, IsUnavailableWhereItCannotBeLoaded) {
-  store("libstipple_media.so", "not a library");
-  EXPECT_EQ(runAlone("MediaLibrary.DISABLED_SaysThatItIsDamaged"), 0);
 }
 
 TEST_F(MediaLibrary, ThrowsWhatACallReports) {

@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <random>
 #include <string>
+
+#include "base/error.h"
 
 namespace stipple {
 namespace {
@@ -92,6 +96,31 @@ TEST(TileKernel, EveryTargetBlendsAsTheScalarOne) {
       }
     }
   }
+}
+
+TEST(TileKernel, FollowsTheEnvironmentVariable) {
+  // In a process of its own each time: the choice is made once.
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  for (const NamedTileKernel& named : tileKernels()) {
+    EXPECT_EXIT(
+        {
+          setenv("STIPPLE_FORCE_TARGET", named.target, 1);
+          std::exit(chosenTileKernel() == named.kernel ? 7 : 1);
+        },
+        ::testing::ExitedWithCode(7), "")
+        << named.target;
+  }
+  EXPECT_EXIT(
+      {
+        setenv("STIPPLE_FORCE_TARGET", "abacus", 1);
+        try {
+          chosenTileKernel();
+        } catch (const Error& error) {
+          std::fputs(error.what(), stderr);
+          std::exit(7);
+        }
+      },
+      ::testing::ExitedWithCode(7), "abacus.*scalar");
 }
 
 TEST(TileKernel, MarksPixelsWhereRoundingCouldDecide) {

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <stipple/stipple.h>
+
+#include "math/camera.h"
+
+namespace stipple::api {
+
+/// The camera of the caller in the library's own terms; validate() is left to what uses it.
+Camera cameraFrom(const StippleCamera* camera);
+
+/// The other way round; struct_size is left to the caller.
+StippleCamera cameraTo(const Camera& camera);
+
+}  // namespace stipple::api

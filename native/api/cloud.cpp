@@ -1,0 +1,165 @@
+#include <cmath>
+
+#include "api/bounds.h"
+#include "api/guard.h"
+#include "api/handles.h"
+#include "base/parallel.h"
+#include "data/cloud_comparison.h"
+#include "io/splat_file.h"
+#include "splat/cloud_transform.h"
+
+using namespace stipple;
+using namespace stipple::api;
+
+namespace {
+
+void normaliseRotations(SplatCloud& cloud) {
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    float* q = &cloud.rotations[i * 4];
+    double squares = 0;
+    for (int k = 0; k < 4; ++k) squares += static_cast<double>(q[k]) * static_cast<double>(q[k]);
+    const double length = std::sqrt(squares);
+    for (int k = 0; k < 4; ++k) q[k] = static_cast<float>(static_cast<double>(q[k]) / length);
+  }
+}
+
+SplatCloud fromArrays(const StippleCloudArrays& arrays) {
+  if (arrays.sh_degree > static_cast<uint32_t>(kMaxShDegree)) {
+    fail(ErrorCode::kInvalidArgument,
+         "arrays->sh_degree is " + std::to_string(arrays.sh_degree) + "; 0 to 4 is allowed");
+  }
+  SplatCloud cloud;
+  cloud.sh_degree = static_cast<int>(arrays.sh_degree);
+  cloud.colour_space = enumValue<ColourSpace>(arrays.colour_space, 1, "arrays->colour_space");
+  cloud.antialias = enumValue<Antialias>(arrays.antialias, 1, "arrays->antialias");
+  const size_t count = arrays.count;
+  if (count > 0) {
+    cloud.positions.assign(&require(arrays.positions, "arrays->positions"),
+                           arrays.positions + count * 3);
+    cloud.rotations.assign(&require(arrays.rotations, "arrays->rotations"),
+                           arrays.rotations + count * 4);
+    cloud.scales.assign(&require(arrays.scales, "arrays->scales"), arrays.scales + count * 3);
+    cloud.opacities.assign(&require(arrays.opacities, "arrays->opacities"),
+                           arrays.opacities + count);
+    cloud.sh.assign(&require(arrays.sh, "arrays->sh"), arrays.sh + count * cloud.shStride());
+  }
+  validate(cloud, "splats");
+  normaliseRotations(cloud);
+  return cloud;
+}
+
+void copyTo(const std::vector<float>& values, float* out) {
+  if (out && !values.empty()) std::memcpy(out, values.data(), values.size() * sizeof(float));
+}
+
+}  // namespace
+
+extern "C" {
+
+StippleStatus stipple_cloud_create(StippleContext* context, const StippleCloudArrays* arrays,
+                                   StippleCloud** cloud) {
+  return guarded([&] {
+    require(context, "context");
+    require(cloud, "cloud");
+    const StippleCloudArrays given = complete(arrays, "arrays");
+    *cloud =
+        new StippleCloud{context->state, std::make_shared<const SplatCloud>(fromArrays(given))};
+  });
+}
+
+void stipple_cloud_free(StippleCloud* cloud) {
+  delete cloud;
+}
+
+StippleStatus stipple_cloud_info(const StippleCloud* cloud, StippleCloudInfo* info) {
+  return guarded([&] {
+    const SplatCloud& splats = *require(cloud, "cloud").cloud;
+    StippleCloudInfo out = {};
+    out.sh_degree = static_cast<uint32_t>(splats.sh_degree);
+    out.colour_space = static_cast<uint32_t>(splats.colour_space);
+    out.antialias = static_cast<uint32_t>(splats.antialias);
+    out.count = splats.size();
+    fillBounds(splats.positions, out.bounds_min, out.bounds_max);
+    deliver(info, out, "info");
+  });
+}
+
+StippleStatus stipple_cloud_read(const StippleCloud* cloud, const StippleCloudBuffers* buffers) {
+  return guarded([&] {
+    const SplatCloud& splats = *require(cloud, "cloud").cloud;
+    const StippleCloudBuffers out = complete(buffers, "buffers");
+    if (out.capacity < splats.size()) {
+      fail(ErrorCode::kBufferTooSmall, "buffers->capacity is " + std::to_string(out.capacity) +
+                                           " splats; " + std::to_string(splats.size()) +
+                                           " are needed");
+    }
+    copyTo(splats.positions, out.positions);
+    copyTo(splats.rotations, out.rotations);
+    copyTo(splats.scales, out.scales);
+    copyTo(splats.opacities, out.opacities);
+    copyTo(splats.sh, out.sh);
+  });
+}
+
+StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8,
+                                 StippleCloud** cloud) {
+  return guarded([&] {
+    require(context, "context");
+    require(cloud, "cloud");
+    const std::string path = &require(path_utf8, "path_utf8");
+    withThreads(context->state->thread_count, [&] {
+      *cloud =
+          new StippleCloud{context->state, std::make_shared<const SplatCloud>(readSplatFile(path))};
+    });
+  });
+}
+
+void stipple_cloud_save_options_init(StippleCloudSaveOptions* options) {
+  if (options) *options = StippleCloudSaveOptions{sizeof(StippleCloudSaveOptions), 0};
+}
+
+StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf8,
+                                 const StippleCloudSaveOptions* options) {
+  return guarded([&] {
+    require(cloud, "cloud");
+    const std::string path = &require(path_utf8, "path_utf8");
+    StippleCloudSaveOptions defaults;
+    stipple_cloud_save_options_init(&defaults);
+    const StippleCloudSaveOptions given = completed(options, defaults, "options");
+    SplatWriteOptions write;
+    write.ascii = enumValue<uint32_t>(given.ascii, 1, "options->ascii") == 1;
+    withThreads(cloud->context->thread_count, [&] { writeSplatFile(*cloud->cloud, path, write); });
+  });
+}
+
+StippleStatus stipple_cloud_transform(const StippleCloud* cloud, const double matrix[16],
+                                      StippleCloud** moved) {
+  return guarded([&] {
+    require(cloud, "cloud");
+    require(moved, "moved");
+    const Mat4d transform = Eigen::Map<const Mat4d>(&require(matrix, "matrix"));
+    *moved = new StippleCloud{
+        cloud->context, std::make_shared<const SplatCloud>(transformed(*cloud->cloud, transform))};
+  });
+}
+
+StippleStatus stipple_cloud_compare(const StippleCloud* a, const StippleCloud* b,
+                                    StippleCloudComparison* result) {
+  return guarded([&] {
+    const SplatCloud& first = *require(a, "a").cloud;
+    const SplatCloud& second = *require(b, "b").cloud;
+    const CloudComparison made = compare(first, second);
+    StippleCloudComparison out = {};
+    out.same_order = made.same_order ? 1 : 0;
+    out.count_a = first.size();
+    out.count_b = second.size();
+    out.max_position = made.max_position;
+    out.max_rotation = made.max_rotation;
+    out.max_scale_ratio = made.max_scale_ratio;
+    out.max_opacity = made.max_opacity;
+    out.max_sh = made.max_sh;
+    deliver(result, out, "result");
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,47 @@
+#include "api/guard.h"
+#include "api/handles.h"
+
+namespace stipple::api {
+
+void ContextState::requireMemory(uint64_t bytes, const char* what) const {
+  if (bytes > memory_limit_bytes) {
+    fail(ErrorCode::kMemoryLimit, std::string(what) + " would need up to " + std::to_string(bytes) +
+                                      " bytes; the memory limit is " +
+                                      std::to_string(memory_limit_bytes));
+  }
+}
+
+}  // namespace stipple::api
+
+using namespace stipple::api;
+
+extern "C" {
+
+void stipple_context_options_init(StippleContextOptions* options) {
+  if (options) *options = StippleContextOptions{sizeof(StippleContextOptions), 0, 0};
+}
+
+StippleStatus stipple_context_create(const StippleContextOptions* options,
+                                     StippleContext** context) {
+  return guarded([&] {
+    require(context, "context");
+    StippleContextOptions defaults;
+    stipple_context_options_init(&defaults);
+    const StippleContextOptions given = completed(options, defaults, "options");
+    if (given.thread_count > 1024) {
+      stipple::fail(stipple::ErrorCode::kInvalidArgument, "options->thread_count is " +
+                                                              std::to_string(given.thread_count) +
+                                                              "; 0 (all) to 1024 is allowed");
+    }
+    auto state = std::make_shared<ContextState>();
+    state->thread_count = given.thread_count;
+    if (given.memory_limit_bytes != 0) state->memory_limit_bytes = given.memory_limit_bytes;
+    *context = new StippleContext{std::move(state)};
+  });
+}
+
+void stipple_context_free(StippleContext* context) {
+  delete context;
+}
+
+}  // extern "C"

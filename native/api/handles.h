@@ -1,0 +1,75 @@
+#pragma once
+
+#include <stipple/stipple.h>
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "data/image.h"
+#include "data/sparse_volume.h"
+#include "data/splat_cloud.h"
+#include "data/tri_mesh.h"
+#include "decode/surface_model.h"
+#include "density/octree_density.h"
+#include "io/camera_file.h"
+
+namespace stipple::api {
+
+/// What a context carries; every handle made from it keeps a share.
+struct ContextState {
+  uint32_t thread_count = 0;
+  uint64_t memory_limit_bytes = UINT64_MAX;
+
+  /// Refuses work that needs more than the limit. In: what, as a noun for the message.
+  void requireMemory(uint64_t bytes, const char* what) const;
+};
+using Context = std::shared_ptr<const ContextState>;
+
+}  // namespace stipple::api
+
+/* A handle is a small object that holds shares; freeing it never takes away what a job uses. */
+
+struct StippleContext {
+  stipple::api::Context state;
+};
+
+struct StippleCloud {
+  stipple::api::Context context;
+  std::shared_ptr<const stipple::SplatCloud> cloud;
+};
+
+/// A mesh grows by its add functions until a job takes a share; later additions copy first.
+struct StippleMesh {
+  stipple::api::Context context;
+  std::shared_ptr<stipple::TriMesh> mesh;
+};
+
+struct StippleDensity {
+  stipple::api::Context context;
+  std::shared_ptr<const stipple::OctreeDensity> density;
+};
+
+struct StippleModel {
+  stipple::api::Context context;
+  stipple::SurfaceModel model;
+};
+
+struct StippleViews {
+  stipple::api::Context context;
+  std::vector<stipple::CameraView> views;
+};
+
+struct StippleRenderer {
+  stipple::api::Context context;
+};
+
+struct StippleVolume {
+  stipple::api::Context context;
+  std::shared_ptr<const stipple::SparseVolume> volume;
+};
+
+struct StippleImage {
+  stipple::api::Context context;
+  std::shared_ptr<const stipple::Image> image;
+};

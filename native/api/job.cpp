@@ -1,0 +1,125 @@
+#include "api/job.h"
+
+#include <cstdio>
+#include <utility>
+
+#include "api/guard.h"
+#include "base/parallel.h"
+
+namespace stipple::api {
+
+namespace {
+
+void run(StippleJob& job, JobWork work) {
+  JobResult result;
+  const StippleStatus status = guarded([&] {
+    withThreads(job.context->thread_count, [&] { result = work(job.progress); });
+    job.progress.throwIfCancelled();
+  });
+  const std::string message = stipple_last_error_message();
+  work = nullptr;  // the shares go before anybody hears that the job has ended
+  std::lock_guard<std::mutex> lock(job.mutex);
+  job.status = status;
+  job.message = message;
+  if (status == STIPPLE_OK) {
+    job.result = std::move(result);
+    job.state = STIPPLE_JOB_DONE;
+  } else {
+    job.state = status == STIPPLE_ERROR_CANCELLED ? STIPPLE_JOB_CANCELLED : STIPPLE_JOB_FAILED;
+  }
+  job.ended.notify_all();
+}
+
+/// The result of the wanted kind, or an error that says what the job is or did.
+template <typename T>
+const T& resultOf(const StippleJob& job, const char* kind) {
+  std::lock_guard<std::mutex> lock(job.mutex);
+  if (job.state != STIPPLE_JOB_DONE) {
+    fail(ErrorCode::kInvalidArgument,
+         "the job has not ended well; wait for it and look at its status before its result");
+  }
+  const T* value = std::get_if<T>(&job.result);
+  if (!value) fail(ErrorCode::kInvalidArgument, std::string("this job does not make a ") + kind);
+  return *value;
+}
+
+}  // namespace
+
+StippleJob* startJob(Context context, JobWork work) {
+  auto job = std::make_unique<StippleJob>();
+  job->context = std::move(context);
+  StippleJob* address = job.get();
+  job->thread =
+      std::thread([address, work = std::move(work)]() mutable { run(*address, std::move(work)); });
+  return job.release();
+}
+
+}  // namespace stipple::api
+
+using namespace stipple::api;
+
+StippleJob::~StippleJob() {
+  progress.cancel();
+  if (thread.joinable()) thread.join();
+}
+
+extern "C" {
+
+StippleStatus stipple_job_poll(const StippleJob* job, StippleJobProgress* progress) {
+  return guarded([&] {
+    require(job, "job");
+    StippleJobProgress out = {};
+    out.fraction = job->progress.fraction();
+    std::snprintf(out.stage, sizeof(out.stage), "%s", job->progress.stage().c_str());
+    {
+      std::lock_guard<std::mutex> lock(job->mutex);
+      out.state = job->state;
+    }
+    if (out.state == STIPPLE_JOB_DONE) out.fraction = 1.0;
+    deliver(progress, out, "progress");
+  });
+}
+
+StippleStatus stipple_job_cancel(StippleJob* job) {
+  return guarded([&] { require(job, "job").progress.cancel(); });
+}
+
+StippleStatus stipple_job_wait(StippleJob* job) {
+  StippleStatus ended = STIPPLE_OK;
+  const StippleStatus status = guarded([&] {
+    std::unique_lock<std::mutex> lock(require(job, "job").mutex);
+    job->ended.wait(lock, [&] { return job->state != STIPPLE_JOB_RUNNING; });
+    ended = job->status;
+    setLastError(job->message.c_str());
+  });
+  return status == STIPPLE_OK ? ended : status;
+}
+
+void stipple_job_free(StippleJob* job) {
+  delete job;
+}
+
+StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model) {
+  return guarded([&] {
+    const auto& made = resultOf<stipple::SurfaceModel>(require(job, "job"), "model");
+    require(model, "model") = new StippleModel{job->context, made};
+  });
+}
+
+StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud) {
+  return guarded([&] {
+    const auto& made =
+        resultOf<std::shared_ptr<const stipple::SplatCloud>>(require(job, "job"), "cloud");
+    require(cloud, "cloud") = new StippleCloud{job->context, made};
+  });
+}
+
+StippleStatus stipple_job_volume(const StippleJob* job, StippleVolume** volume) {
+  return guarded([&] {
+    const auto& made =
+        resultOf<std::shared_ptr<const stipple::SparseVolume>>(require(job, "job"), "volume");
+    require(volume, "volume") = new StippleVolume{job->context, made};
+  });
+}
+
+}  // extern "C"

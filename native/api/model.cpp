@@ -1,0 +1,228 @@
+#include <cmath>
+#include <utility>
+
+#include "api/bounds.h"
+#include "api/guard.h"
+#include "api/handles.h"
+#include "api/job.h"
+#include "base/parallel.h"
+#include "io/surface_asset.h"
+
+using namespace stipple;
+using namespace stipple::api;
+
+namespace {
+
+constexpr uint64_t kMinSampleCount = 1000;
+constexpr uint64_t kMaxSampleCount = uint64_t{1} << 26;
+constexpr uint32_t kMaxGaussiansPerAnchor = 32;
+
+SurfaceModelOptions modelOptions(const StippleModelFromMeshOptions& given) {
+  SurfaceModelOptions options;
+  if (given.leaf_level < 1 || given.leaf_level > static_cast<uint32_t>(kMaxLeafLevel)) {
+    fail(ErrorCode::kInvalidArgument,
+         "options->leaf_level is " + std::to_string(given.leaf_level) + "; 1 to 10 is allowed");
+  }
+  options.density.leaf_level = static_cast<int>(given.leaf_level);
+  if (given.sample_count != 0) {
+    if (given.sample_count < kMinSampleCount || given.sample_count > kMaxSampleCount) {
+      fail(ErrorCode::kInvalidArgument, "options->sample_count is " +
+                                            std::to_string(given.sample_count) +
+                                            "; 0 (automatic) or 1000 to 67108864 is allowed");
+    }
+    options.sampling.count = given.sample_count;
+  }
+  if (!(given.detail_weight >= 0) || !std::isfinite(given.detail_weight)) {
+    fail(ErrorCode::kInvalidArgument, "options->detail_weight is " +
+                                          std::to_string(given.detail_weight) +
+                                          "; 0 or more is allowed");
+  }
+  options.sampling.detail_weight = given.detail_weight;
+  options.sampling.seed = given.seed;
+  return options;
+}
+
+struct DecodeSettings {
+  AnchorSamplingOptions sampling;
+  uint32_t gaussians_per_anchor = 1;
+};
+
+DecodeSettings decodeSettings(const StippleDecodeOptions* options) {
+  StippleDecodeOptions defaults;
+  stipple_decode_options_init(&defaults);
+  const StippleDecodeOptions given = completed(options, defaults, "options");
+  DecodeSettings settings;
+  settings.sampling.count = given.anchor_count;
+  settings.sampling.order = enumValue<AnchorOrder>(given.order, 1, "options->order");
+  settings.sampling.seed = given.seed;
+  if (given.anchor_count < 1 || given.anchor_count > kMaxAnchorCount) {
+    fail(ErrorCode::kInvalidArgument, "options->anchor_count is " +
+                                          std::to_string(given.anchor_count) +
+                                          "; 1 to 268435456 is allowed");
+  }
+  if (given.gaussians_per_anchor < 1 || given.gaussians_per_anchor > kMaxGaussiansPerAnchor) {
+    fail(ErrorCode::kInvalidArgument, "options->gaussians_per_anchor is " +
+                                          std::to_string(given.gaussians_per_anchor) +
+                                          "; 1 to 32 is allowed");
+  }
+  settings.gaussians_per_anchor = given.gaussians_per_anchor;
+  return settings;
+}
+
+std::shared_ptr<const SplatCloud> decode(const SurfaceModel& model, const DecodeSettings& settings,
+                                         Progress* progress) {
+  const AnchorSet anchors = sampleAnchors(*model.density, settings.sampling, progress);
+  DecodeRequest request;
+  request.anchors = &anchors;
+  request.gaussians_per_anchor = settings.gaussians_per_anchor;
+  request.seed = settings.sampling.seed;
+  request.progress = progress;
+  return std::make_shared<const SplatCloud>(model.decoder->decode(request));
+}
+
+uint64_t decodeMemoryBound(const SurfaceModel& model, const DecodeSettings& settings) {
+  return sampleMemoryBound(settings.sampling.count, settings.sampling.with_ranks) +
+         model.decoder->memoryBound(settings.sampling.count, settings.gaussians_per_anchor);
+}
+
+SurfaceAsset toAsset(const SurfaceModel& model) {
+  SurfaceAsset asset;
+  const OctreeDensity& density = *model.density;
+  asset.root_origin = density.root().origin;
+  asset.root_side = density.root().side;
+  for (int level = 0; level < density.leafLevel(); ++level) {
+    const auto cells = density.cells(level);
+    const auto log_probabilities = density.logProbabilities(level);
+    asset.cells.emplace_back(cells.begin(), cells.end());
+    asset.log_probabilities.emplace_back(log_probabilities.begin(), log_probabilities.end());
+  }
+  asset.surface = *model.surface;
+  return asset;
+}
+
+SurfaceModel fromAsset(SurfaceAsset asset) {
+  RootCube root;
+  root.origin = asset.root_origin;
+  root.side = asset.root_side;
+  auto density = std::make_shared<const OctreeDensity>(
+      OctreeDensity::fromLevels(root, std::move(asset.cells), std::move(asset.log_probabilities)));
+  auto surface = std::make_shared<const PointSet>(std::move(asset.surface));
+  return surfaceModelFromParts(std::move(surface), std::move(density));
+}
+
+}  // namespace
+
+extern "C" {
+
+void stipple_model_from_mesh_options_init(StippleModelFromMeshOptions* options) {
+  if (!options) return;
+  *options = {};
+  options->struct_size = sizeof(StippleModelFromMeshOptions);
+  options->leaf_level = static_cast<uint32_t>(kMaxLeafLevel);
+  options->detail_weight = 1.0;
+}
+
+void stipple_decode_options_init(StippleDecodeOptions* options) {
+  if (!options) return;
+  *options = {};
+  options->struct_size = sizeof(StippleDecodeOptions);
+  options->order = STIPPLE_ORDER_SYSTEMATIC;
+  options->anchor_count = 20000;
+  options->gaussians_per_anchor = 1;
+}
+
+StippleStatus stipple_model_from_mesh_start(StippleContext* context, const StippleMesh* mesh,
+                                            const StippleModelFromMeshOptions* options,
+                                            StippleJob** job) {
+  return guarded([&] {
+    require(context, "context");
+    require(mesh, "mesh");
+    require(job, "job");
+    StippleModelFromMeshOptions defaults;
+    stipple_model_from_mesh_options_init(&defaults);
+    const SurfaceModelOptions settings = modelOptions(completed(options, defaults, "options"));
+    std::shared_ptr<const TriMesh> triangles = mesh->mesh;
+    *job = startJob(context->state, [triangles, settings](Progress& progress) -> JobResult {
+      return buildSurfaceModel(*triangles, settings, &progress);
+    });
+  });
+}
+
+StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8,
+                                 StippleModel** model) {
+  return guarded([&] {
+    require(context, "context");
+    require(model, "model");
+    const std::string path = &require(path_utf8, "path_utf8");
+    withThreads(context->state->thread_count, [&] {
+      *model = new StippleModel{context->state, fromAsset(readSurfaceAsset(path))};
+    });
+  });
+}
+
+StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf8) {
+  return guarded([&] {
+    writeSurfaceAsset(toAsset(require(model, "model").model), &require(path_utf8, "path_utf8"));
+  });
+}
+
+void stipple_model_free(StippleModel* model) {
+  delete model;
+}
+
+StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* info) {
+  return guarded([&] {
+    const SurfaceModel& parts = require(model, "model").model;
+    StippleModelInfo out = {};
+    out.leaf_level = static_cast<uint32_t>(parts.density->leafLevel());
+    out.leaf_count = parts.density->leafCount();
+    out.sample_count = parts.surface->size();
+    fillBounds(parts.surface->positions, out.bounds_min, out.bounds_max);
+    deliver(info, out, "info");
+  });
+}
+
+StippleStatus stipple_model_density(const StippleModel* model, StippleDensity** density) {
+  return guarded([&] {
+    require(model, "model");
+    require(density, "density") = new StippleDensity{model->context, model->model.density};
+  });
+}
+
+StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecodeOptions* options,
+                                   StippleCloud** cloud) {
+  return guarded([&] {
+    require(model, "model");
+    require(cloud, "cloud");
+    const DecodeSettings settings = decodeSettings(options);
+    model->context->requireMemory(decodeMemoryBound(model->model, settings), "this budget");
+    withThreads(model->context->thread_count, [&] {
+      *cloud = new StippleCloud{model->context, decode(model->model, settings, nullptr)};
+    });
+  });
+}
+
+StippleStatus stipple_model_decode_start(const StippleModel* model,
+                                         const StippleDecodeOptions* options, StippleJob** job) {
+  return guarded([&] {
+    require(model, "model");
+    require(job, "job");
+    const DecodeSettings settings = decodeSettings(options);
+    model->context->requireMemory(decodeMemoryBound(model->model, settings), "this budget");
+    const SurfaceModel parts = model->model;
+    *job = startJob(model->context, [parts, settings](Progress& progress) -> JobResult {
+      return decode(parts, settings, &progress);
+    });
+  });
+}
+
+StippleStatus stipple_model_decode_memory_bound(const StippleModel* model,
+                                                const StippleDecodeOptions* options,
+                                                uint64_t* bytes) {
+  return guarded([&] {
+    require(model, "model");
+    require(bytes, "bytes") = decodeMemoryBound(model->model, decodeSettings(options));
+  });
+}
+
+}  // extern "C"

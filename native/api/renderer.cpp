@@ -1,0 +1,148 @@
+#include <limits>
+#include <utility>
+
+#include "api/camera.h"
+#include "api/guard.h"
+#include "api/handles.h"
+#include "api/instances.h"
+#include "api/job.h"
+#include "base/parallel.h"
+#include "math/colour.h"
+
+using namespace stipple;
+using namespace stipple::api;
+
+namespace {
+
+struct RenderSettings {
+  RenderOptions options;
+  StippleRenderMethod method = STIPPLE_RENDER_TILED;
+  bool linearise = false;  ///< the composited values are display values and light is asked for
+};
+
+/// True when the composited values are display values.
+bool compositesInDisplaySpace(const Instances& instances, BlendSpace blend_space) {
+  return blend_space == BlendSpace::kAsTrained &&
+         (instances.list.empty() ||
+          instances.list.front().cloud->colour_space == ColourSpace::kDisplay);
+}
+
+RenderSettings renderSettings(const StippleRenderOptions* options, const Instances& instances) {
+  StippleRenderOptions defaults;
+  stipple_render_options_init(&defaults);
+  const StippleRenderOptions given = completed(options, defaults, "options");
+  RenderSettings settings;
+  settings.method = enumValue<StippleRenderMethod>(given.method, 1, "options->method");
+  settings.options.low_pass = enumValue<LowPass>(given.low_pass, 3, "options->low_pass");
+  settings.options.blend_space =
+      enumValue<BlendSpace>(given.blend_space, 1, "options->blend_space");
+  const auto output =
+      enumValue<StippleOutputColour>(given.output_colour, 1, "options->output_colour");
+  settings.options.sh_degree_limit =
+      enumValue<int>(given.sh_degree_limit, 4, "options->sh_degree_limit");
+  settings.options.with_background =
+      enumValue<uint32_t>(given.with_background, 1, "options->with_background") == 1;
+  settings.linearise = output == STIPPLE_OUTPUT_SCENE_LINEAR &&
+                       compositesInDisplaySpace(instances, settings.options.blend_space);
+  for (int c = 0; c < 3; ++c) {
+    requireFinite(given.background[c], "options->background");
+    settings.options.background[c] =
+        settings.linearise ? linearToSrgb(given.background[c]) : given.background[c];
+  }
+  return settings;
+}
+
+/// Premultiplied display values → premultiplied scene linear values, in place.
+void lineariseColour(float* colour, size_t pixel_count) {
+  parallelFor(pixel_count, 1 << 14, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      float* pixel = colour + i * 4;
+      const float alpha = pixel[3];
+      if (alpha <= 0.0f) continue;
+      for (int c = 0; c < 3; ++c) pixel[c] = srgbToLinear(pixel[c] / alpha) * alpha;
+    }
+  });
+}
+
+template <typename From, typename To>
+void copyTo(const std::vector<From>& values, To* out) {
+  if (!out) return;
+  for (size_t i = 0; i < values.size(); ++i) out[i] = static_cast<To>(values[i]);
+}
+
+template <typename Result>
+void deliverPicture(const Result& picture, const RenderSettings& settings,
+                    const StippleRenderBuffers& buffers) {
+  copyTo(picture.colour, buffers.colour);
+  copyTo(picture.depth, buffers.depth);
+  copyTo(picture.median_depth, buffers.median_depth);
+  copyTo(picture.counts, buffers.counts);
+  if (settings.linearise && buffers.colour) {
+    lineariseColour(buffers.colour, static_cast<size_t>(picture.width) * picture.height);
+  }
+}
+
+}  // namespace
+
+extern "C" {
+
+void stipple_render_options_init(StippleRenderOptions* options) {
+  if (!options) return;
+  *options = {};
+  options->struct_size = sizeof(StippleRenderOptions);
+  options->sh_degree_limit = static_cast<uint32_t>(kMaxShDegree);
+}
+
+StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer) {
+  return guarded([&] {
+    require(context, "context");
+    require(renderer, "renderer") = new StippleRenderer{context->state};
+  });
+}
+
+void stipple_renderer_free(StippleRenderer* renderer) {
+  delete renderer;
+}
+
+StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
+                                            const StippleInstance* instances, uint64_t count,
+                                            const StippleCamera* camera,
+                                            const StippleRenderOptions* options,
+                                            const StippleRenderBuffers* buffers, StippleJob** job) {
+  return guarded([&] {
+    require(renderer, "renderer");
+    require(job, "job");
+    Instances placed = instancesFrom(instances, count);
+    RenderSettings settings = renderSettings(options, placed);
+    const Camera view = cameraFrom(camera);
+    validate(view);
+    const StippleRenderBuffers out = complete(buffers, "buffers");
+    settings.options.with_depth = out.depth != nullptr;
+    settings.options.with_median_depth = out.median_depth != nullptr;
+    settings.options.with_counts = out.counts != nullptr;
+    renderer->context->requireMemory(renderMemoryBound(placed.list, view, settings.options),
+                                     "this picture");
+    *job = startJob(renderer->context, [placed = std::move(placed), settings, view,
+                                        out](Progress& progress) {
+      if (settings.method == STIPPLE_RENDER_REFERENCE) {
+        deliverPicture(renderReference(placed.list, view, settings.options, &progress), settings,
+                       out);
+      } else {
+        deliverPicture(renderTiled(placed.list, view, settings.options, &progress), settings, out);
+      }
+      return JobResult{};
+    });
+  });
+}
+
+StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
+                                            const StippleInstance* instances, uint64_t count,
+                                            const StippleCamera* camera, uint64_t* bytes) {
+  return guarded([&] {
+    require(renderer, "renderer");
+    const Instances placed = instancesFrom(instances, count);
+    require(bytes, "bytes") = renderMemoryBound(placed.list, cameraFrom(camera), RenderOptions{});
+  });
+}
+
+}  // extern "C"

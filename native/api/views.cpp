@@ -1,0 +1,106 @@
+#include "api/camera.h"
+#include "api/guard.h"
+#include "api/handles.h"
+#include "io/camera_file.h"
+
+namespace stipple::api {
+
+Camera cameraFrom(const StippleCamera* camera) {
+  const StippleCamera given = complete(camera, "camera");
+  Camera made;
+  made.model = enumValue<CameraModel>(given.model, 1, "camera->model");
+  made.width = given.width;
+  made.height = given.height;
+  made.fx = given.fx;
+  made.fy = given.fy;
+  made.cx = given.cx;
+  made.cy = given.cy;
+  made.world_to_camera = Eigen::Map<const Mat4d>(given.world_to_camera);
+  made.near_plane = given.near_plane;
+  made.far_plane = given.far_plane;
+  return made;
+}
+
+StippleCamera cameraTo(const Camera& camera) {
+  StippleCamera out = {};
+  out.model = static_cast<uint32_t>(camera.model);
+  out.width = camera.width;
+  out.height = camera.height;
+  out.fx = camera.fx;
+  out.fy = camera.fy;
+  out.cx = camera.cx;
+  out.cy = camera.cy;
+  Eigen::Map<Mat4d>(out.world_to_camera) = camera.world_to_camera;
+  out.near_plane = camera.near_plane;
+  out.far_plane = camera.far_plane;
+  return out;
+}
+
+}  // namespace stipple::api
+
+using namespace stipple;
+using namespace stipple::api;
+
+extern "C" {
+
+StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8,
+                                 StippleViews** views) {
+  return guarded([&] {
+    require(context, "context");
+    require(views, "views");
+    const std::string path = &require(path_utf8, "path_utf8");
+    *views = new StippleViews{context->state, readCameraFile(path)};
+  });
+}
+
+void stipple_views_free(StippleViews* views) {
+  delete views;
+}
+
+StippleStatus stipple_views_count(const StippleViews* views, uint64_t* count) {
+  return guarded([&] { require(count, "count") = require(views, "views").views.size(); });
+}
+
+StippleStatus stipple_views_camera(const StippleViews* views, uint64_t index,
+                                   StippleCamera* camera) {
+  return guarded([&] {
+    const auto& list = require(views, "views").views;
+    if (index >= list.size()) {
+      fail(ErrorCode::kInvalidArgument, "view " + std::to_string(index) +
+                                            " was asked for; the "
+                                            "file has " +
+                                            std::to_string(list.size()) + " views, counted from 0");
+    }
+    deliver(camera, cameraTo(list[index].camera), "camera");
+  });
+}
+
+StippleStatus stipple_camera_resize(StippleCamera* camera, uint32_t width, uint32_t height) {
+  return guarded([&] {
+    StippleCamera resized = complete(camera, "camera");
+    if (width < 1 || height < 1) {
+      fail(ErrorCode::kInvalidArgument, "the new size is " + std::to_string(width) + " x " +
+                                            std::to_string(height) +
+                                            "; each side must be at least 1");
+    }
+    if (resized.width == 0 || resized.height == 0) {
+      // The camera of a file without sizes: lengths in widths of the picture, axis in its middle.
+      resized.fx *= width;
+      resized.fy *= width;
+      resized.cx = 0.5 * width;
+      resized.cy = 0.5 * height;
+    } else {
+      const double scale_x = static_cast<double>(width) / resized.width;
+      const double scale_y = static_cast<double>(height) / resized.height;
+      resized.fx *= scale_x;
+      resized.cx *= scale_x;
+      resized.fy *= scale_y;
+      resized.cy *= scale_y;
+    }
+    resized.width = width;
+    resized.height = height;
+    deliver(camera, resized, "camera");
+  });
+}
+
+}  // extern "C"

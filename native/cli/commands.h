@@ -1,0 +1,21 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "cli/library.h"
+
+namespace stipple::cli {
+
+/// Each adds one subcommand to the tool; its callback does the work and throws Failure.
+void addInfo(CLI::App& app, const Context& context);
+void addConvert(CLI::App& app, const Context& context);
+void addDecode(CLI::App& app, const Context& context);
+void addRender(CLI::App& app, const Context& context);
+void addVoxelize(CLI::App& app, const Context& context);
+void addCompare(CLI::App& app, const Context& context);
+
+/// What a file holds, told by its ending.
+enum class FileKind { kSplats, kMesh, kModel, kViews, kVolume, kImage };
+FileKind fileKind(const std::string& path);
+
+}  // namespace stipple::cli

@@ -1,0 +1,66 @@
+#include <memory>
+
+#include "cli/commands.h"
+#include "cli/report.h"
+
+namespace stipple::cli {
+
+namespace {
+
+Report compareImages(const Context& context, const std::string& a, const std::string& b) {
+  const auto first = make<Image>(stipple_image_load, context.get(), a.c_str());
+  const auto second = make<Image>(stipple_image_load, context.get(), b.c_str());
+  auto result = sized<StippleImageComparison>();
+  check(stipple_image_compare(first.get(), second.get(), &result));
+  Report report;
+  report.add("psnr", result.psnr);
+  report.add("ssim", result.ssim);
+  report.add("max_error", result.max_error);
+  report.add("mean_error", result.mean_error);
+  return report;
+}
+
+Report compareClouds(const Context& context, const std::string& a, const std::string& b) {
+  const auto first = make<Cloud>(stipple_cloud_load, context.get(), a.c_str());
+  const auto second = make<Cloud>(stipple_cloud_load, context.get(), b.c_str());
+  auto result = sized<StippleCloudComparison>();
+  check(stipple_cloud_compare(first.get(), second.get(), &result));
+  Report report;
+  report.add("count_a", result.count_a);
+  report.add("count_b", result.count_b);
+  report.add("same_order", uint64_t{result.same_order});
+  report.add("max_position", result.max_position);
+  report.add("max_rotation", result.max_rotation);
+  report.add("max_scale_ratio", result.max_scale_ratio);
+  report.add("max_opacity", result.max_opacity);
+  report.add("max_sh", result.max_sh);
+  return report;
+}
+
+}  // namespace
+
+void addCompare(CLI::App& app, const Context& context) {
+  struct Arguments {
+    std::string a, b;
+    bool json = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "compare", "PSNR, SSIM and largest error of two pictures, or differences of two clouds");
+  command->add_option("a", arguments->a, "Picture or splat file")->required();
+  command->add_option("b", arguments->b, "Picture or splat file of the same kind")->required();
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->callback([arguments, &context] {
+    const FileKind kind = fileKind(arguments->a);
+    if (kind != fileKind(arguments->b) || (kind != FileKind::kImage && kind != FileKind::kSplats)) {
+      throw Failure("'" + arguments->a + "' and '" + arguments->b +
+                    "' cannot be compared; two pictures or two splat files are expected");
+    }
+    const Report report = kind == FileKind::kImage
+                              ? compareImages(context, arguments->a, arguments->b)
+                              : compareClouds(context, arguments->a, arguments->b);
+    report.print(arguments->json);
+  });
+}
+
+}  // namespace stipple::cli

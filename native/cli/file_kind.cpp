@@ -1,0 +1,26 @@
+#include <algorithm>
+#include <cctype>
+
+#include "cli/commands.h"
+
+namespace stipple::cli {
+
+FileKind fileKind(const std::string& path) {
+  const size_t dot = path.find_last_of("./");
+  std::string ending = dot == std::string::npos || path[dot] == '/' ? "" : path.substr(dot);
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".ply") return FileKind::kSplats;
+  if (ending == ".glb" || ending == ".gltf") return FileKind::kMesh;
+  if (ending == ".safetensors") return FileKind::kModel;
+  if (ending == ".json") return FileKind::kViews;
+  if (ending == ".vdb") return FileKind::kVolume;
+  for (const char* image : {".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}) {
+    if (ending == image) return FileKind::kImage;
+  }
+  throw Failure("'" + path + "' ends with '" + ending +
+                "'; .ply, .glb, .gltf, .stipple.safetensors, .json, .vdb, .png, .exr, .jpg, .tif "
+                "or .hdr is expected");
+}
+
+}  // namespace stipple::cli

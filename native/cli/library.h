@@ -1,0 +1,58 @@
+#pragma once
+
+#include <stipple/stipple.h>
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+namespace stipple::cli {
+
+/// What ends the tool with one line on stderr.
+struct Failure : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws Failure with the library's message unless status is STIPPLE_OK.
+inline void check(StippleStatus status) {
+  if (status != STIPPLE_OK) throw Failure(stipple_last_error_message());
+}
+
+template <typename T, void (*kFree)(T*)>
+struct Deleter {
+  void operator()(T* handle) const { kFree(handle); }
+};
+template <typename T, void (*kFree)(T*)>
+using Handle = std::unique_ptr<T, Deleter<T, kFree>>;
+
+using Context = Handle<StippleContext, stipple_context_free>;
+using Cloud = Handle<StippleCloud, stipple_cloud_free>;
+using Mesh = Handle<StippleMesh, stipple_mesh_free>;
+using Model = Handle<StippleModel, stipple_model_free>;
+using Views = Handle<StippleViews, stipple_views_free>;
+using Renderer = Handle<StippleRenderer, stipple_renderer_free>;
+using Volume = Handle<StippleVolume, stipple_volume_free>;
+using Image = Handle<StippleImage, stipple_image_free>;
+using Job = Handle<StippleJob, stipple_job_free>;
+
+/// Calls f(..., &pointer), checks, and takes the handle.
+template <typename Result, typename Function, typename... Arguments>
+Result make(Function function, Arguments... arguments) {
+  typename Result::pointer made = nullptr;
+  check(function(arguments..., &made));
+  return Result(made);
+}
+
+/// A struct of the header with its size set.
+template <typename T>
+T sized() {
+  T value = {};
+  value.struct_size = sizeof(T);
+  return value;
+}
+
+/// Waits for a job, with its progress on stderr: a bar on a terminal, else a line per stage.
+/// Ctrl-C cancels the job; nothing is left half written.
+void finish(const Job& job);
+
+}  // namespace stipple::cli

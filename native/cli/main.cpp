@@ -1,0 +1,55 @@
+#include <cstdio>
+#include <exception>
+
+#include "cli/commands.h"
+
+namespace {
+
+using namespace stipple::cli;
+
+int run(int argc, char** argv) {
+  if (stipple_abi_version() != STIPPLE_ABI_VERSION) {
+    throw Failure("libstipple has ABI version " + std::to_string(stipple_abi_version()) +
+                  "; this tool needs " + std::to_string(STIPPLE_ABI_VERSION));
+  }
+  CLI::App app("Stipple: density-controlled Gaussian splats", "stipple");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", stipple_version_string());
+  Context context;
+  uint32_t threads = 0;
+  app.add_option("--threads", threads, "0: as many as the machine has")->capture_default_str();
+  const auto create = [&] {
+    StippleContextOptions options;
+    stipple_context_options_init(&options);
+    options.thread_count = threads;
+    context =
+        make<Context>(stipple_context_create, const_cast<const StippleContextOptions*>(&options));
+  };
+  app.parse_complete_callback(create);
+  addInfo(app, context);
+  addConvert(app, context);
+  addDecode(app, context);
+  addRender(app, context);
+  addVoxelize(app, context);
+  addCompare(app, context);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& answer) {
+    return app.exit(answer);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "stipple: %s\n", error.what());
+    return 2;
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "stipple: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,66 @@
+#include <chrono>
+#include <memory>
+
+#include "cli/commands.h"
+#include "cli/report.h"
+
+namespace stipple::cli {
+
+namespace {
+
+struct Arguments {
+  std::string in, out;
+  double voxel_size = 0;
+  int64_t resolution = 256;
+};
+
+void voxelize(const Context& context, const Arguments& arguments) {
+  if (fileKind(arguments.out) != FileKind::kVolume) {
+    throw Failure("'" + arguments.out + "' is not a volume; .vdb is expected");
+  }
+  if (arguments.resolution < 1 || arguments.resolution > 65536) {
+    throw Failure("--resolution is " + std::to_string(arguments.resolution) +
+                  "; 1 to 65536 is allowed");
+  }
+  StippleVoxelizeOptions options;
+  stipple_voxelize_options_init(&options);
+  options.voxel_size = arguments.voxel_size;
+  options.resolution = static_cast<uint32_t>(arguments.resolution);
+  const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
+  auto instance = sized<StippleInstance>();
+  instance.cloud = cloud.get();
+  for (int i = 0; i < 4; ++i) instance.matrix[i * 5] = 1.0;
+  const auto start = std::chrono::steady_clock::now();
+  const auto job = make<Job>(stipple_voxelize_start, context.get(),
+                             const_cast<const StippleInstance*>(&instance), uint64_t{1},
+                             const_cast<const StippleVoxelizeOptions*>(&options));
+  finish(job);
+  const auto volume = make<Volume>(stipple_job_volume, job.get());
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  check(stipple_volume_save(volume.get(), arguments.out.c_str()));
+  auto info = sized<StippleVolumeInfo>();
+  check(stipple_volume_info(volume.get(), &info));
+  Report report;
+  report.add("active_voxels", info.active_voxel_count);
+  report.add("voxel_size", info.voxel_size);
+  report.add("max_density", info.max_density);
+  report.add("seconds", seconds);
+  report.print(false);
+}
+
+}  // namespace
+
+void addVoxelize(CLI::App& app, const Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("voxelize", "Splats to an OpenVDB volume");
+  command->add_option("in", arguments->in, "Splat file")->required();
+  command->add_option("out", arguments->out, "Volume (.vdb)")->required();
+  auto* size = command->add_option("--voxel-size", arguments->voxel_size, "Metres");
+  command->add_option("--resolution", arguments->resolution, "Voxels along the longest side")
+      ->capture_default_str()
+      ->excludes(size);
+  command->callback([arguments, &context] { voxelize(context, *arguments); });
+}
+
+}  // namespace stipple::cli

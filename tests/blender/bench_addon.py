@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measures what an artist waits for, and prints it against its target.
+
+    python3 tests/blender/run.py tests/blender/bench_addon.py -s
+
+Not a test of the suite: the names of its functions keep it out. Best of several runs, one process.
+"""
+
+import time
+
+import bpy
+import numpy as np
+
+import scenes
+
+
+def best_of(runs, action):
+    times = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        action()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def report(name, seconds, target):
+    print(f'{name}: {seconds * 1e3:.0f} ms, target {target * 1e3:.0f} ms, ratio {target / seconds:.2f}x', flush=True)
+
+
+def textured_ball(triangles):
+    """A smooth ball of about this many triangles with a 1024 px texture and a UV map."""
+    rings = int((triangles / 4) ** 0.5)
+    columns = 2 * rings
+    v, u = np.meshgrid(np.linspace(0.01, 0.99, rings + 1), np.linspace(0, 1, columns + 1), indexing='ij')
+    theta, phi = np.pi * v, 2 * np.pi * u
+    bumps = 1 + 0.05 * np.sin(9 * theta) * np.sin(7 * phi)
+    points = np.stack([bumps * np.sin(theta) * np.cos(phi), bumps * np.sin(theta) * np.sin(phi),
+                       bumps * np.cos(theta)], -1)
+    corner = np.arange(rings)[:, None] * (columns + 1) + np.arange(columns)
+    quads = np.stack([corner, corner + columns + 1, corner + columns + 2, corner + 1], -1).reshape(-1)
+    mesh = bpy.data.meshes.new('Ball')
+    mesh.vertices.add(points.size // 3)
+    mesh.vertices.foreach_set('co', points.astype(np.float32).reshape(-1))
+    mesh.loops.add(len(quads))
+    mesh.loops.foreach_set('vertex_index', quads.astype(np.int32))
+    mesh.polygons.add(len(quads) // 4)
+    mesh.polygons.foreach_set('loop_start', np.arange(0, len(quads), 4, dtype=np.int32))
+    if bpy.app.version < (4, 1, 0):
+        mesh.polygons.foreach_set('loop_total', np.full(len(quads) // 4, 4, np.int32))
+    mesh.polygons.foreach_set('use_smooth', np.ones(len(quads) // 4, np.bool_))
+    mesh.update(calc_edges=True)
+    layer = mesh.uv_layers.new(name='UVMap')
+    uvs = np.stack([u, v], -1).reshape(-1, 2)[quads].astype(np.float32).reshape(-1)
+    if bpy.app.version >= (3, 5, 0):
+        layer.uv.foreach_set('vector', uvs)
+    else:
+        layer.data.foreach_set('uv', uvs)
+    obj = scenes.link(bpy.data.objects.new('Ball', mesh))
+    image = bpy.data.images.new('noise', 1024, 1024)
+    image.pixels.foreach_set(np.random.default_rng(0).random(1024 * 1024 * 4, np.float32))
+    scenes.image_material('noise', image, obj)
+    return obj
+
+
+def test_slider_and_surface(stipple, tmp_path):
+    ball = textured_ball(500_000)
+    ball.data.calc_loop_triangles()
+    print(f'\n{len(ball.data.loop_triangles):,} triangles, Blender {bpy.app.version_string}')
+    path = str(tmp_path / 'ball.stipple.safetensors')
+
+    def make():
+        scenes.make_splats(ball, anchors=100_000, hide_source=False, source_path=path)
+
+    report('100 k anchors from 500 k triangles, with the transfer', best_of(3, make), 1.0)
+    settings = bpy.context.object.data.stipple
+    budgets = iter(range(50_001, 60_000))
+
+    def move():
+        settings.anchors = next(budgets)
+
+    report('slider move at 50 k anchors', best_of(10, move), 0.1)

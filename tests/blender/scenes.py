@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small scenes that several tests start from."""
+
+import bpy
+import numpy as np
+from mathutils import Euler
+
+
+def link(obj):
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def select(*objects):
+    bpy.context.view_layer.update()
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj in objects)
+    bpy.context.view_layer.objects.active = objects[0]
+
+
+def mesh_object(name, vertices, faces, uvs=None):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, [], faces)
+    if uvs is not None:
+        layer = mesh.uv_layers.new(name='UVMap')
+        for loop, uv in zip(layer.data, uvs):
+            loop.uv = uv
+    mesh.update()
+    return link(bpy.data.objects.new(name, mesh))
+
+
+def quad(name='Quad', size=2.0, offset=(0.0, 0.0, 0.0), with_uv=True):
+    """A square in the xy plane, facing up, centred at the offset."""
+    h = size / 2
+    x, y, z = offset
+    return mesh_object(name, [(x - h, y - h, z), (x + h, y - h, z), (x + h, y + h, z), (x - h, y + h, z)],
+                       [(0, 1, 2, 3)], [(0, 0), (1, 0), (1, 1), (0, 1)] if with_uv else None)
+
+
+def material(name, color=(0.8, 0.1, 0.1), obj=None):
+    """A Principled material with this base colour, in the object's next slot."""
+    result = bpy.data.materials.new(name)
+    if bpy.app.version < (5, 0, 0):
+        result.use_nodes = True
+    principled(result).inputs['Base Color'].default_value = (*color, 1.0)
+    if obj is not None:
+        obj.data.materials.append(result)
+    return result
+
+
+def principled(mat):
+    return next(n for n in mat.node_tree.nodes if n.type == 'BSDF_PRINCIPLED')
+
+
+def image_material(name, image, obj):
+    mat = material(name, obj=obj)
+    node = mat.node_tree.nodes.new('ShaderNodeTexImage')
+    node.image = image
+    mat.node_tree.links.new(node.outputs['Color'], principled(mat).inputs['Base Color'])
+    return mat
+
+
+def half_image(name='halves', left=(1.0, 0.0, 0.0), right=(0.0, 0.0, 1.0), side=64):
+    """Left half one colour, right half another."""
+    image = bpy.data.images.new(name, side, side)
+    pixels = np.ones((side, side, 4), np.float32)
+    pixels[:, :side // 2, :3] = left
+    pixels[:, side // 2:, :3] = right
+    image.pixels.foreach_set(pixels.reshape(-1))
+    return image
+
+
+def sphere(name='Sphere', segments=32, rings=16, radius=1.0):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=rings, radius=radius)
+    obj = bpy.context.object
+    obj.name = name
+    return obj
+
+
+def camera(location=(0.0, 0.0, 6.0), rotation=(0.0, 0.0, 0.0), width=64, height=64, **settings):
+    data = bpy.data.cameras.new('camera')
+    for key, value in settings.items():
+        setattr(data, key, value)
+    obj = link(bpy.data.objects.new('camera', data))
+    obj.location, obj.rotation_euler = location, Euler(rotation)
+    scene = bpy.context.scene
+    scene.camera = obj
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = width, height, 100
+    return obj
+
+
+def make_splats(*objects, **settings):
+    """Runs the operator on these objects and returns the splat object."""
+    select(*objects)
+    assert bpy.ops.stipple.splats_from_mesh(**settings) == {'FINISHED'}
+    return bpy.context.object
+
+
+def refuses(call, text):
+    """The one report of an operator that must fail; checks that it names the problem."""
+    try:
+        result = call()
+    except RuntimeError as error:
+        assert text in str(error), str(error)
+        return str(error)
+    raise AssertionError(f'{result} instead of an error with "{text}"')
+
+
+def colours_of(stipple, obj):
+    """Scene linear colours [N,3] of splats whose harmonics are display values."""
+    arrays = stipple.scene.splat_data.read(obj.data)
+    display = 0.5 + 0.28209479177387814 * arrays.sh[:, 0]
+    return np.where(display <= 0.04045, display / 12.92, ((np.maximum(display, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def render_pixels(tmp_path, name='picture'):
+    """F12 of this scene as [H,W,4] scene linear, premultiplied, row 0 = bottom."""
+    scene = bpy.context.scene
+    settings = scene.render.image_settings
+    if bpy.app.version >= (5, 0, 0):
+        settings.media_type = 'IMAGE'
+    settings.file_format = 'OPEN_EXR'
+    settings.color_depth, settings.color_mode = '32', 'RGBA'
+    settings.exr_codec = 'NONE'
+    scene.render.filepath = str(tmp_path / f'{name}.exr')
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath, check_existing=False)
+    width, height = image.size
+    values = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(values)
+    bpy.data.images.remove(image)
+    return values.reshape(height, width, 4)

@@ -1,0 +1,163 @@
+"""The command-line tool, from mesh to picture, and its one-line errors."""
+import json
+import math
+import os
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+
+TOOL = Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
+
+CUBE_TRIANGLES = [0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                  2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5]
+
+
+def run(*arguments, status=0):
+    result = subprocess.run([TOOL, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    assert result.returncode == status, (arguments, result.stdout, result.stderr)
+    return result
+
+
+def error(*arguments, status=1):
+    """The single line on stderr of a call that must fail."""
+    lines = run(*arguments, status=status).stderr.strip().splitlines()
+    assert len(lines) == 1 and lines[0].startswith('stipple: '), lines
+    return lines[0]
+
+
+def figures(*arguments):
+    return json.loads(run(*arguments, '--json').stdout)
+
+
+def write_cube_glb(path):
+    """A red unit cube, as the smallest GLB there is."""
+    positions = b''.join(struct.pack('<3f', *[0.5 if i >> axis & 1 else -0.5 for axis in range(3)])
+                         for i in range(8))
+    indices = struct.pack('<36H', *CUBE_TRIANGLES)
+    document = json.dumps({
+        'asset': {'version': '2.0'}, 'scene': 0, 'scenes': [{'nodes': [0]}], 'nodes': [{'mesh': 0}],
+        'materials': [{'pbrMetallicRoughness': {'baseColorFactor': [1.0, 0.0, 0.0, 1.0]}}],
+        'meshes': [{'primitives': [{'attributes': {'POSITION': 0}, 'indices': 1, 'material': 0}]}],
+        'buffers': [{'byteLength': len(positions) + len(indices)}],
+        'bufferViews': [{'buffer': 0, 'byteOffset': 0, 'byteLength': len(positions)},
+                        {'buffer': 0, 'byteOffset': len(positions), 'byteLength': len(indices)}],
+        'accessors': [{'bufferView': 0, 'componentType': 5126, 'count': 8, 'type': 'VEC3',
+                       'min': [-0.5] * 3, 'max': [0.5] * 3},
+                      {'bufferView': 1, 'componentType': 5123, 'count': 36, 'type': 'SCALAR'}],
+    }).encode()
+    document += b' ' * (-len(document) % 4)
+    binary = positions + indices
+    binary += b'\0' * (-len(binary) % 4)
+    chunks = (struct.pack('<II', len(document), 0x4E4F534A) + document
+              + struct.pack('<II', len(binary), 0x004E4942) + binary)
+    path.write_bytes(struct.pack('<III', 0x46546C67, 2, 12 + len(chunks)) + chunks)
+
+
+def write_camera(path, distance=3.0):
+    """A camera on the z axis that looks down at the origin."""
+    path.write_text(json.dumps({
+        'camera_model': 'PINHOLE', 'w': 96, 'h': 64, 'fl_x': 90.0, 'fl_y': 90.0, 'cx': 48.0, 'cy': 32.0,
+        'frames': [{'file_path': 'a.png', 'transform_matrix': [
+            [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, distance], [0, 0, 0, 1]]}]}))
+
+
+@pytest.fixture(scope='module')
+def scene(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('tool')
+    write_cube_glb(folder / 'cube.glb')
+    write_camera(folder / 'transforms.json')
+    run('decode', folder / 'cube.glb', folder / 'cube.ply', '--anchors', 5000)
+    return folder
+
+
+def test_info_describes_each_kind(scene):
+    assert figures('info', scene / 'cube.glb')['triangles'] == 12
+    splats = figures('info', scene / 'cube.ply')
+    assert splats['count'] == 5000 and splats['colour_space'] == 'srgb_rec709_display'
+    assert all(abs(value + 0.5) < 0.01 for value in splats['bounds_min'])
+    assert figures('info', scene / 'transforms.json')['count'] == 1
+
+
+def test_decode_gives_the_budget_times_k(scene):
+    run('decode', scene / 'cube.glb', scene / 'k4.ply', '--anchors', 250, '--gaussians-per-anchor', 4,
+        '--order', 'progressive', '--seed', 3)
+    assert figures('info', scene / 'k4.ply')['count'] == 1000
+
+
+def test_a_saved_model_decodes_to_the_same_splats(scene):
+    run('decode', scene / 'cube.glb', scene / 'cube.stipple.safetensors')
+    assert figures('info', scene / 'cube.stipple.safetensors')['kind'] == 'surface model'
+    run('decode', scene / 'cube.stipple.safetensors', scene / 'again.ply', '--anchors', 5000)
+    result = figures('compare', scene / 'cube.ply', scene / 'again.ply')
+    assert result['same_order'] == 1 and result['max_position'] == 0
+
+
+def test_convert_to_text_and_back_loses_only_rounding(scene):
+    run('convert', scene / 'cube.ply', scene / 'text.ply', '--ascii')
+    result = figures('compare', scene / 'cube.ply', scene / 'text.ply')
+    # exp and log in single precision: a few units in the last place.
+    assert result['max_position'] == 0 and result['max_scale_ratio'] < 1e-5 and result['max_sh'] < 1e-6
+
+
+def test_render_shows_a_red_cube_where_the_camera_looks(scene):
+    run('render', scene / 'cube.ply', '--camera', scene / 'transforms.json', '-o', scene / 'a.png')
+    run('render', scene / 'cube.ply', '--camera', scene / 'transforms.json', '-o', scene / 'a.exr')
+    info = figures('info', scene / 'a.png')
+    assert (info['width'], info['height'], info['channels']) == (96, 64, 4)
+    same = figures('compare', scene / 'a.png', scene / 'a.exr')
+    # The PNG has 8 bits: half a step, premultiplied, is 1/510; colour and alpha both round.
+    assert same['max_error'] < 1.1 / 255
+    run('render', scene / 'cube.ply', '--camera', scene / 'transforms.json', '-o', scene / 'double.exr',
+        '--accuracy', 'double')
+    assert figures('compare', scene / 'a.exr', scene / 'double.exr')['psnr'] > 70
+    write_camera(scene / 'moved.json', distance=4.0)
+    run('render', scene / 'cube.ply', '--camera', scene / 'moved.json', '-o', scene / 'moved.png')
+    assert figures('compare', scene / 'a.png', scene / 'moved.png')['psnr'] < 25
+
+
+def test_render_takes_sizes_and_several_files(scene):
+    run('render', scene / 'cube.ply', scene / 'k4.ply', '--camera', scene / 'transforms.json',
+        '--width', 48, '-o', scene / 'small.png', '--background', 1, 1, 1)
+    info = figures('info', scene / 'small.png')
+    assert (info['width'], info['height']) == (48, 32)
+
+
+def test_voxelize_writes_a_volume_with_the_bounds_of_the_splats(scene):
+    run('voxelize', scene / 'cube.ply', scene / 'cube.vdb', '--resolution', 48)
+    info = figures('info', scene / 'cube.vdb')
+    assert info['active_voxels'] > 48 * 48 * 5
+    assert info['bounds_min'][0] < -0.5 and math.isfinite(info['max_density'])
+
+
+@pytest.mark.parametrize('budget', [0, -5, 2 ** 28 + 1])
+def test_refuses_budgets_outside_the_range(scene, budget):
+    message = error('decode', scene / 'cube.glb', scene / 'never.ply', f'--anchors={budget}')
+    assert str(budget) in message and '268435456' in message
+    assert not (scene / 'never.ply').exists()
+
+
+def test_errors_are_one_line_and_lose_nothing(scene, tmp_path):
+    assert 'missing.ply' in error('info', tmp_path / 'missing.ply')
+    assert 'cube.xyz' in error('convert', scene / 'cube.ply', tmp_path / 'cube.xyz')
+    error('convert', scene / 'cube.ply', tmp_path / 'no' / 'folder' / 'a.ply')
+    kept = tmp_path / 'kept.ply'
+    kept.write_bytes((scene / 'cube.ply').read_bytes())
+    (tmp_path / 'broken.ply').write_bytes((scene / 'cube.ply').read_bytes()[:2000])
+    error('convert', tmp_path / 'broken.ply', kept)
+    assert kept.read_bytes() == (scene / 'cube.ply').read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ['broken.ply', 'kept.ply']
+    assert 'view 7' in error('render', scene / 'cube.ply', '--camera', scene / 'transforms.json',
+                             '--view', 7, '-o', tmp_path / 'a.png')
+    error('compare', scene / 'cube.ply', scene / 'transforms.json')
+    error('render', scene / 'cube.ply', status=2)
+
+
+def test_a_lying_header_is_refused_before_memory_is_taken(tmp_path):
+    header = 'ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\n'
+    header += ''.join(f'property float {name}\n' for name in (
+        'x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2', 'opacity', 'scale_0', 'scale_1', 'scale_2',
+        'rot_0', 'rot_1', 'rot_2', 'rot_3')) + 'end_header\n'
+    (tmp_path / 'liar.ply').write_bytes(header.encode() + bytes(56))
+    assert '1000000000000' in error('info', tmp_path / 'liar.ply')

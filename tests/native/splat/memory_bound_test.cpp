@@ -1,0 +1,108 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <new>
+
+#include "splat/random_scene.h"
+
+// Every allocation of this test binary is counted, so that the bound is held against what a
+// rendering really takes.
+
+namespace {
+
+std::atomic<uint64_t> held{0};
+std::atomic<uint64_t> peak{0};
+
+/// Room before each block for its size, keeping malloc's alignment.
+constexpr size_t kHeader = 16;
+
+[[maybe_unused]] void* allocate(size_t size) {
+  auto* block = static_cast<std::byte*>(std::malloc(size + kHeader));
+  if (!block) throw std::bad_alloc();
+  *reinterpret_cast<uint64_t*>(block) = size;
+  const uint64_t now = held.fetch_add(size) + size;
+  uint64_t seen = peak.load();
+  while (now > seen && !peak.compare_exchange_weak(seen, now)) {
+  }
+  return block + kHeader;
+}
+
+[[maybe_unused]] void release(void* pointer) {
+  if (!pointer) return;
+  std::byte* block = static_cast<std::byte*>(pointer) - kHeader;
+  held.fetch_sub(*reinterpret_cast<uint64_t*>(block));
+  std::free(block);
+}
+
+}  // namespace
+
+#ifndef __SANITIZE_ADDRESS__  // which brings its own
+void* operator new(size_t size) {
+  return allocate(size);
+}
+void* operator new[](size_t size) {
+  return allocate(size);
+}
+void operator delete(void* pointer) noexcept {
+  release(pointer);
+}
+void operator delete[](void* pointer) noexcept {
+  release(pointer);
+}
+void operator delete(void* pointer, size_t) noexcept {
+  release(pointer);
+}
+void operator delete[](void* pointer, size_t) noexcept {
+  release(pointer);
+}
+#endif
+
+namespace stipple {
+namespace {
+
+using testing::CloudRecipe;
+using testing::frontCamera;
+using testing::randomCloud;
+
+uint64_t peakOf(const SplatInstance& instance, const Camera& camera, const RenderOptions& options) {
+  const uint64_t before = held.load();
+  peak.store(before);
+  const RenderResult picture = renderTiled({&instance, 1}, camera, options);
+  EXPECT_EQ(picture.width, camera.width);
+  return peak.load() - before;
+}
+
+TEST(RenderMemoryBound, IsNeverExceeded) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the address sanitizer replaces the allocator that is counted here";
+#endif
+  CloudRecipe small;
+  small.count = 50000;
+  small.size_max = 0.01;
+  CloudRecipe covering;
+  covering.count = 3000;
+  covering.size_min = 3;
+  covering.size_max = 5;
+  RenderOptions everything;
+  everything.with_median_depth = true;
+  everything.with_counts = true;
+  for (const CloudRecipe& recipe : {small, covering}) {
+    const SplatCloud cloud = randomCloud(recipe, 1);
+    const SplatInstance instance{&cloud};
+    for (const Camera& camera : {frontCamera(33, 20, 30, 3), frontCamera(900, 700, 500, 3)}) {
+      const uint64_t bound = renderMemoryBound({&instance, 1}, camera, everything);
+      const uint64_t used = peakOf(instance, camera, everything);
+      // Progress texts, task functions: a few kilobytes that do not grow with the work.
+      EXPECT_LE(used, bound + 65536);
+      // A bound that is far off would refuse what fits; the lists' worst case is within 64 times.
+      EXPECT_GT(used, bound / 64);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stipple
