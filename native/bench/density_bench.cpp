@@ -8,8 +8,8 @@
 
 #include "base/parallel.h"
 #include "bench/comparison.h"
-#include "density/anchor_sampling.h"
 #include "bench/openvdb_scatter.h"
+#include "density/anchor_sampling.h"
 
 namespace stipple::bench {
 namespace {

@@ -1,74 +1,31 @@
 #include <benchmark/benchmark.h>
 
-#include <cmath>
-#include <map>
-#include <random>
 #include <string>
 
 #include "base/parallel.h"
 #include "bench/comparison.h"
+#include "bench/splat_floor.h"
+#include "bench/splat_scene.h"
 #include "splat/cpu/tiled_render.h"
 
 namespace stipple::bench {
 namespace {
 
-struct Case {
-  const char* name;
-  size_t splats;
-  uint32_t width, height;
-  int degree;
+// A fit's start, a picture, a large scene; and many splats of a few pixels, the hardest load for
+// everything around the blending loop. "small": about as many splats as pixels want; "large":
+// early in a fit, or a close view.
+constexpr SplatCase kCases[] = {
+    {"small.15k_256x464", 15000, 256, 464, 0, 1.0},
+    {"large.15k_256x464", 15000, 256, 464, 0, 3.0},
+    {"small.150k_800x800", 150000, 800, 800, 3, 1.0},
+    {"large.150k_800x800", 150000, 800, 800, 3, 3.0},
+    {"small.500k_1280x720", 500000, 1280, 720, 2, 1.0},
+    {"small.1M_1280x720", 1000000, 1280, 720, 2, 1.0},
+    {"large.1M_1280x720", 1000000, 1280, 720, 2, 4.0},
 };
+constexpr int kRepeats = 5;
 
-constexpr Case kCases[] = {{"15k_256x464", 15000, 256, 464, 0},
-                           {"150k_800x800", 150000, 800, 800, 3},
-                           {"1M_1280x720", 1000000, 1280, 720, 2}};
-
-/// Splats in a ball, as fitted scenes have them: flat-ish, many faint, log-normal sizes whose mean
-/// keeps about twenty splats in front of each pixel.
-SplatCloud ball(const Case& c) {
-  std::mt19937 random(1);
-  std::normal_distribution<float> normal;
-  std::uniform_real_distribution<float> uniform(0.0f, 1.0f);
-  SplatCloud cloud;
-  cloud.sh_degree = c.degree;
-  cloud.resize(c.splats);
-  const float size = 1.0f / std::sqrt(static_cast<float>(c.splats));
-  for (size_t i = 0; i < c.splats; ++i) {
-    float d[3] = {normal(random), normal(random), normal(random)};
-    const float length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-    const float radius = 0.4f + 0.6f * std::cbrt(uniform(random));
-    const float base = size * std::exp(0.6f * normal(random));
-    for (size_t axis = 0; axis < 3; ++axis) {
-      cloud.positions[i * 3 + axis] = radius * d[axis] / length;
-      cloud.scales[i * 3 + axis] = base * std::exp(0.5f * normal(random));
-    }
-    for (size_t k = 0; k < 4; ++k) cloud.rotations[i * 4 + k] = normal(random);
-    const float o = uniform(random);
-    cloud.opacities[i] = 0.02f + 0.97f * o * o;
-  }
-  for (float& value : cloud.sh) value = 0.3f * normal(random);
-  return cloud;
-}
-
-const SplatCloud& cloudOf(const Case& c) {
-  static std::map<std::string, SplatCloud> clouds;
-  const auto [found, is_new] = clouds.try_emplace(c.name);
-  if (is_new) found->second = ball(c);
-  return found->second;
-}
-
-Camera cameraOf(const Case& c) {
-  Camera camera;
-  camera.width = c.width;
-  camera.height = c.height;
-  camera.fx = camera.fy = 1.2 * std::min(c.width, c.height);
-  camera.cx = c.width / 2.0;
-  camera.cy = c.height / 2.0;
-  camera.world_to_camera(2, 3) = 2.6;
-  return camera;
-}
-
-void draw(const Case& c, TileKernel kernel, unsigned threads) {
+void draw(const SplatCase& c, TileKernel kernel, unsigned threads) {
   const SplatInstance instance{&cloudOf(c)};
   withThreads(threads, [&] {
     const RenderResult picture = renderTiledWith(kernel, {&instance, 1}, cameraOf(c), {});
@@ -76,7 +33,7 @@ void draw(const Case& c, TileKernel kernel, unsigned threads) {
   });
 }
 
-void label(benchmark::State& state, const Case& c) {
+void label(benchmark::State& state, const SplatCase& c) {
   state.SetItemsProcessed(static_cast<int64_t>(c.splats) * state.iterations());
   RenderOptions options;
   options.with_counts = true;
@@ -88,33 +45,90 @@ void label(benchmark::State& state, const Case& c) {
   state.counters["blended_per_pixel"] = blended / static_cast<double>(picture.counts.size());
 }
 
+/// The whole call over the blending loop alone on the same pair list, and the list over the exact
+/// one.
+void againstFloor(benchmark::State& state, const SplatCase& c) {
+  const SplatInstance instance{&cloudOf(c)};
+  draw(c, chosenTileKernel(), 2);
+  double best = 1e300;
+  for (auto step : state) {
+    (void)step;
+    const double seconds = secondsOf([&] { draw(c, chosenTileKernel(), 2); });
+    best = std::min(best, seconds);
+    state.SetIterationTime(seconds);
+  }
+  const BlendFloor floor =
+      measureBlendFloor({&instance, 1}, cameraOf(c), chosenTileKernel(), 2, kRepeats);
+  label(state, c);
+  const double pixels = static_cast<double>(c.width) * c.height;
+  state.counters["best_ms"] = 1e3 * best;
+  state.counters["floor_ms"] = 1e3 * floor.seconds;
+  state.counters["tested_per_pixel"] =
+      static_cast<double>(floor.listed_pairs) * kTilePixelCount / pixels;
+  state.counters["ratio_floor"] = best / floor.seconds;
+  state.counters["limit_floor"] = 2.0;
+  state.counters["ratio_exact_pairs"] =
+      static_cast<double>(floor.listed_pairs) / static_cast<double>(floor.exact_pairs);
+  state.counters["limit_exact_pairs"] = 1.01;
+  if (floor.missing_pairs > 0) state.SkipWithError("the pair list lacks pairs of the exact one");
+}
+
 /// Vector code against the plain scalar kernel; everything else is the same.
-void againstScalar(benchmark::State& state, const Case& c) {
+void againstScalar(benchmark::State& state, const SplatCase& c) {
   cloudOf(c);
   compare(
       state, "scalar", 0.0, [&] { draw(c, chosenTileKernel(), 2); },
       [&] { draw(c, blendTileScalar, 2); });
-  label(state, c);
 }
 
-void againstOneThread(benchmark::State& state, const Case& c) {
+/// The loop alone: AVX2 over the best instruction set, both on the same lists.
+void againstNarrow(benchmark::State& state, const SplatCase& c) {
+  const SplatInstance instance{&cloudOf(c)};
+  TileKernel narrow = nullptr;
+  for (const NamedTileKernel& named : tileKernels()) {
+    if (std::string(named.target) == "AVX2") narrow = named.kernel;
+  }
+  if (!narrow || narrow == chosenTileKernel()) {
+    state.SkipWithError("this processor has no wider instruction set than AVX2");
+    return;
+  }
+  double wide_ms = 1e300, narrow_ms = 1e300;
+  for (auto step : state) {
+    (void)step;
+    const auto best = [&](TileKernel kernel) {
+      return 1e3 * measureBlendFloor({&instance, 1}, cameraOf(c), kernel, 2, 2).seconds;
+    };
+    wide_ms = std::min(wide_ms, best(chosenTileKernel()));
+    narrow_ms = std::min(narrow_ms, best(narrow));
+    state.SetIterationTime(1e-3 * narrow_ms);
+  }
+  state.counters["best_ms"] = wide_ms;
+  state.counters["avx2_ms"] = narrow_ms;
+  state.counters["ratio_avx2_throughput"] = wide_ms / narrow_ms;
+  state.counters["target_avx2_throughput"] = 0.5;
+}
+
+void againstOneThread(benchmark::State& state, const SplatCase& c) {
   cloudOf(c);
   compare(
-      state, "one_thread", 0.0, [&] { draw(c, chosenTileKernel(), 2); },
+      state, "one_thread", 1.8, [&] { draw(c, chosenTileKernel(), 2); },
       [&] { draw(c, chosenTileKernel(), 1); });
 }
 
+void add(const std::string& name, void (*run)(benchmark::State&, const SplatCase&),
+         const SplatCase& c, int iterations) {
+  benchmark::RegisterBenchmark(name.c_str(), run, c)
+      ->UseManualTime()
+      ->Iterations(iterations)
+      ->Unit(benchmark::kMillisecond);
+}
+
 const bool registered = [] {
-  for (const Case& c : kCases) {
-    const std::string name = std::string("splat.forward.") + c.name;
-    benchmark::RegisterBenchmark(name.c_str(), againstScalar, c)
-        ->UseManualTime()
-        ->Iterations(3)
-        ->Unit(benchmark::kMillisecond);
-    benchmark::RegisterBenchmark((name + ".2_threads").c_str(), againstOneThread, c)
-        ->UseManualTime()
-        ->Iterations(3)
-        ->Unit(benchmark::kMillisecond);
+  for (const SplatCase& c : kCases) {
+    add(std::string("splat.forward_") + c.name, againstFloor, c, kRepeats);
+    add(std::string("splat.forward_2_threads_") + c.name, againstOneThread, c, kRepeats);
+    add(std::string("splat.forward_avx2_") + c.name, againstNarrow, c, 2);
+    add(std::string("splat.forward_scalar_") + c.name, againstScalar, c, 2);
   }
   return true;
 }();

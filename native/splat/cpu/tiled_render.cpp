@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <iterator>
 
 #include "base/parallel.h"
+#include "splat/cpu/tile.h"
 #include "splat/cpu/tile_lists.h"
 #include "splat/cpu/visible_splats.h"
 #include "splat/scene.h"
@@ -22,61 +22,6 @@ namespace {
 
 constexpr size_t kBatchSize = 128;
 constexpr size_t kPrefetchDistance = 12;
-/// Above this size of |g|, float32 leaves too few digits (error of alpha up to about 1e-4): only
-/// splats thinner than a quarter of a pixel, which LowPass::kNone alone has.
-constexpr double kMaxFloatReach = 200.0;
-
-struct Tile {
-  uint32_t x0, y0;                   ///< first pixel
-  uint32_t width, height;            ///< pixels inside the picture
-  std::span<const uint32_t> splats;  ///< indices of visible splats, front to back
-};
-
-TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
-  constexpr double kScale = 0.84932180028801904;  // sqrt(log2(e)/2)
-  constexpr double kSide = kTileSide;
-  const Footprint<double>& f = splat.footprint;
-  const double dx = tile.x0 + 0.5 - f.mean_x;
-  const double dy = tile.y0 + 0.5 - f.mean_y;
-  const double g0 = kScale * (f.l00 * dx);
-  const double g1 = kScale * (f.l10 * dx + f.l11 * dy);
-  const double l00 = kScale * f.l00;
-  const double l10 = kScale * f.l10;
-  const double l11 = kScale * f.l11;
-  TileSplat out;
-  out.g0 = static_cast<float>(g0);
-  out.g1 = static_cast<float>(g1);
-  out.l00 = static_cast<float>(l00);
-  out.l10 = static_cast<float>(l10);
-  out.l11 = static_cast<float>(l11);
-  out.log2_opacity = splat.log2_opacity;
-  // |g| <= 2.83 where alpha >= 1/255, and g is off by at most 4 roundings of its largest term.
-  const double largest =
-      std::abs(g0) + std::abs(g1) + (kSide - 1) * (std::abs(l00) + std::abs(l10) + std::abs(l11));
-  out.doubt_low = static_cast<float>(2e-6 * largest + 4e-6);
-  out.doubt_high = largest > kMaxFloatReach ? kFinished : out.doubt_low;
-  std::copy(splat.colour, splat.colour + 3, out.colour);
-  out.depth = splat.depth;
-  out.row_begin = static_cast<uint32_t>(std::clamp(std::ceil(-dy - splat.half_y), 0.0, kSide));
-  out.row_end = static_cast<uint32_t>(std::clamp(std::floor(-dy + splat.half_y) + 1.0, 0.0, kSide));
-  return out;
-}
-
-void clearPixels(const Tile& tile, TilePixels& pixels) {
-  std::fill(std::begin(pixels.transmittance), std::end(pixels.transmittance), 1.0f);
-  for (float* plane :
-       {pixels.red, pixels.green, pixels.blue, pixels.weighted_depth, pixels.count, pixels.doubt}) {
-    std::fill(plane, plane + kTilePixelCount, 0.0f);
-  }
-  std::fill(std::begin(pixels.median_depth), std::end(pixels.median_depth), kNoMedian);
-  for (uint32_t y = 0; y < kTileSide; ++y) {
-    for (uint32_t x = 0; x < kTileSide; ++x) {
-      const bool inside = x < tile.width && y < tile.height;
-      pixels.cut[y * kTileSide + x] = inside ? kLog2MinAlpha : kFinished;
-    }
-  }
-  pixels.unfinished = tile.width * tile.height;
-}
 
 /// A pixel as the reference blends it.
 PixelBlend<double> blendInDouble(const VisibleSplat* visible, const Tile& tile, double px,
@@ -204,12 +149,7 @@ RenderResult renderTiledWith(TileKernel kernel, std::span<const SplatInstance> i
     parallelFor(group.end_tile - group.first_tile, 1, [&](size_t begin, size_t end) {
       for (size_t index = group.first_tile + begin; index < group.first_tile + end; ++index) {
         if (progress) progress->throwIfCancelled();
-        Tile tile;
-        tile.x0 = static_cast<uint32_t>(index % grid.columns) * kTileSide;
-        tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
-        tile.width = std::min(kTileSide, grid.width - tile.x0);
-        tile.height = std::min(kTileSide, grid.height - tile.y0);
-        tile.splats = group.tile(index);
+        const Tile tile = tileOf(grid, index, group.tile(index));
         renderTile(visible.splats.get(), tile, kernel, options, result);
         const size_t finished = finished_tiles.fetch_add(1, std::memory_order_relaxed) + 1;
         if (finished % grid.columns == 0) {
