@@ -23,11 +23,14 @@ constexpr float kFadingBand = 0.3f;     ///< spacings from a border that need no
 constexpr float kSidewaysCost = 0.35f;  ///< of a border sample off the direction of its border
 constexpr float kOtherBorder = 0.7f;    ///< directions with a smaller cosine belong to two borders
 constexpr float kSameSheet = 0.3f;      ///< n·n' of splats that close a place together
-constexpr float kTargetOpen = 0.006f;   ///< transmittance wanted at every sample inside
-constexpr int kCoverageRounds = 2;      ///< one more for few sites
-/// A splat ends, at this many standard deviations, one spacing over an open border: 3 % of its
+constexpr float kTargetOpen = 0.0055f;   ///< transmittance wanted at every sample inside
+/// σ₁σ₂ over the area of the patch at which spread-out splats let 2 % of the light pass:
+/// −ln 0.02 / (0.99 · 2π).
+constexpr float kSmallMass = 0.63f;
+constexpr int kCoverageRounds = 2;  ///< one more for few sites
+/// A splat ends, at this many standard deviations, one spacing over an open border: 6 % of its
 /// opacity are left there. Over a crease, where two faces' splats add up, it ends closer.
-constexpr float kBorderSigmas = 2.5f;
+constexpr float kBorderSigmas = 2.35f;
 constexpr float kCreaseSigmas = 2.9f;
 
 /// exp(−q/2) for q >= 0, relative error below 1e-4 up to q = 40, constant (2e-9) beyond. Without
@@ -87,6 +90,19 @@ void keepWithinBorders(SplatShapes& shapes, size_t i) {
     // Standard deviation of the splat seen along the border.
     const float width = std::sqrt(a * a * s * s + b * b * t * t);
     if (width > border[4]) scaleAlong(shapes, i, border, border[4] / width);
+  }
+}
+
+/// Widens shape i until the surface stays closed where splats are smaller than a pixel and the mip
+/// low-pass spreads them evenly: there only the sum of their masses counts.
+void closeWhenSmall(SplatShapes& shapes, size_t i, float largest) {
+  float* sigma = &shapes.sigmas[i * 3];
+  const float wanted = kSmallMass * shapes.areas[i];
+  const float product = sigma[0] * sigma[1];
+  if (product >= wanted || product <= 0) return;
+  const float factor = 1 + shapes.growths[i] * (std::sqrt(wanted / product) - 1);
+  for (size_t axis = 0; axis < 2; ++axis) {
+    sigma[axis] = std::min(sigma[axis] * factor, std::max(sigma[axis], largest));
   }
 }
 
@@ -259,6 +275,7 @@ void balanceCoverage(const SurfaceIndex& index, const SurfaceSites& sites,
           // No splat grows beyond about its spacing: a hole that this leaves belongs to others.
           sigma = std::min(sigma * factor, std::max(sigma, largest));
         }
+        if (round + 1 == rounds) closeWhenSmall(shapes, i, largest);
         keepWithinBorders(shapes, i);
       }
     });

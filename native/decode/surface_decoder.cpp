@@ -81,8 +81,9 @@ SplatCloud cloudOf(const SurfaceIndex& index, const SurfaceSites& sites,
                    const SplatShapes& shapes) {
   SplatCloud cloud;
   cloud.resize(sites.size());
-  // Most splats are about a pixel or smaller. The classic low-pass widens each of them at full opacity,
-  // which moves silhouettes outward by a pixel and gets worse with more splats; mip keeps their sum.
+  // Most splats are about a pixel or smaller. The classic low-pass widens each of them at full
+  // opacity, which moves silhouettes outward by a pixel and gets worse with more splats; mip keeps
+  // their sum.
   cloud.antialias = Antialias::kMip;
   const auto side = static_cast<float>(index.root.side);
   parallelFor(sites.size(), 1024, [&](size_t begin, size_t end) {

@@ -13,7 +13,7 @@
 namespace stipple {
 
 /// Up to this many sites the decoder has time for a denser set of samples and one more round.
-constexpr size_t kFewSites = 12000;
+constexpr size_t kFewSites = 24000;
 
 /// The places where splats will lie, sorted by grid cell, in the unit cube.
 struct SurfaceSites {
