@@ -96,12 +96,6 @@ def write(data, arrays):
     data.update_tag()
 
 
-def empty(data):
-    """Removes the splats; settings and animation stay."""
-    _resize(data, 0)
-    data.update_tag()
-
-
 def read(data, original=None):
     """The splats of a datablock. original: the datablock that tells the colour space, where data is evaluated.
 
@@ -156,9 +150,9 @@ def _resize(data, n):
         return
     if isinstance(data, bpy.types.Mesh):
         # Not clear_geometry(): that also frees the datablock's animation and drivers.
-        nothing = bmesh.new()
-        nothing.to_mesh(data)
-        nothing.free()
+        empty = bmesh.new()
+        empty.to_mesh(data)
+        empty.free()
         data.vertices.add(n)
     else:
         data.resize(n)

@@ -19,9 +19,6 @@ FINGERPRINT_KEY = 'stipple_fingerprint'
 ENGINE = 'STIPPLE'
 
 log = logging.getLogger('stipple')
-# Splats that a slider has decoded and that are stored as soon as its undo step is taken:
-# {name of the datablock: (arrays, key)}.
-_waiting = {}
 # What is wrong with a datablock, by name, for the panel; empty while all is well.
 problems = {}
 _state = {'paused': 0, 'rendering': False}
@@ -37,12 +34,11 @@ class paused:
         _state['paused'] -= 1
 
 
-def sync(obj, depsgraph, mode, after_undo_step=False):
-    """Writes the attributes that an object's data should have now. Returns True where they change.
+def sync(obj, depsgraph, mode):
+    """Writes the attributes that an object's data should have now. Returns True where it wrote.
 
     depsgraph: evaluated settings (animation, drivers) are read through it; None: the settings as they are.
-    mode: 'VIEWPORT' or 'RENDER'. after_undo_step: decodes now, stores with the next depsgraph update.
-    Errors: StippleError, with the splats as they were.
+    mode: 'VIEWPORT' or 'RENDER'. Errors: StippleError, with the splats as they were.
     """
     data = obj.data
     stipple = data.stipple
@@ -50,45 +46,16 @@ def sync(obj, depsgraph, mode, after_undo_step=False):
         return False
     settings = sources.decode_settings(_evaluated(data, depsgraph), mode)
     key = written_key(stipple, settings)
-    waiting = _waiting.get(data.name_full)
-    if (waiting[1] if waiting else data.get(WRITTEN_KEY)) == key:
-        if after_undo_step and not waiting and not is_edited(data):
-            _take_out(data, splat_data.read(data), key)
+    if data.get(WRITTEN_KEY) == key:
         return False
     settings.check()
-    if not waiting and is_edited(data):
+    if is_edited(data):
         stipple.edited = True
         raise StippleError(f"The splats of '{data.name}' were edited by hand; use them as a new source, or revert to "
                            'the source, to change their settings.')
-    arrays = sources.model(sources.absolute_path(stipple.source, data)).decode(settings).read()
-    if after_undo_step:
-        _take_out(data, arrays, key)
-    else:
-        _waiting.pop(data.name_full, None)
-        write(data, arrays, key)
+    cloud = sources.model(sources.absolute_path(stipple.source, data)).decode(settings)
+    write(data, cloud.read(), key)
     return True
-
-
-def _take_out(data, arrays, key):
-    """Empties a datablock until store_waiting(): so undo steps hold settings and no splats.
-
-    Blender takes a slider's undo step after the property's update function and before the depsgraph's.
-    A million splats are 56 MB in every step; undo decodes them again instead.
-    """
-    splat_data.empty(data)
-    for name in (WRITTEN_KEY, FINGERPRINT_KEY):
-        if name in data:
-            del data[name]
-    _waiting[data.name_full] = (arrays, key)
-
-
-def store_waiting():
-    """Stores what sliders have decoded."""
-    while _waiting:
-        name, (arrays, key) = _waiting.popitem()
-        obj = next((o for o in splat_objects() if o.data.name_full == name), None)
-        if obj is not None:
-            write(obj.data, arrays, key)
 
 
 def write(data, arrays, key):
@@ -125,26 +92,21 @@ def is_edited(data):
     return known is not None and known != splat_data.fingerprint(data)
 
 
-def on_property_change(stipple, context):
+def on_property_change(stipple, _context):
     """Update function of the settings: decodes at once."""
     if _state['paused'] or _state['rendering']:
         return
     data = stipple.id_data
     users = [obj for obj in bpy.data.objects if obj.data == data]
     if users:
-        try_sync(users[0], None, 'VIEWPORT', _is_button(context))
+        try_sync(users[0], None, 'VIEWPORT')
 
 
-def _is_button(context):
-    """True where the user moves a slider: scripts find their splats stored when they look."""
-    return not bpy.app.background and context.area is not None and context.area.type in {'PROPERTIES', 'VIEW_3D'}
-
-
-def try_sync(obj, depsgraph, mode, after_undo_step=False):
+def try_sync(obj, depsgraph, mode):
     """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once."""
     name = obj.data.name
     try:
-        sync(obj, depsgraph, mode, after_undo_step)
+        sync(obj, depsgraph, mode)
         problems.pop(name, None)
     except StippleError as error:
         if problems.get(name) != str(error):
@@ -188,7 +150,6 @@ def _frame_change_post(scene, depsgraph):
 
 @persistent
 def _render_init(_scene, _=None):
-    store_waiting()
     _state['rendering'] = True
 
 
@@ -203,7 +164,6 @@ def _render_end(_scene, _=None):
 def _restored(*_):
     """After undo, redo and loading: splats that do not fit their settings are decoded again."""
     problems.clear()
-    _waiting.clear()
     _state['rendering'] = False
     _show_boxes(True)
     sync_all()
@@ -212,7 +172,6 @@ def _restored(*_):
 @persistent
 def _save_pre(*_):
     """A file that is opened without the add-on shows the splats' centres."""
-    store_waiting()
     _show_boxes(False)
 
 
@@ -230,8 +189,7 @@ def _show_boxes(box):
 
 @persistent
 def _depsgraph_update_post(scene, depsgraph):
-    """Stores what sliders have decoded, and notices when the mesh that splats were made from changes."""
-    store_waiting()
+    """Notices when the mesh that splats were made from changes."""
     if _state['rendering'] or not any(update.is_updated_geometry for update in depsgraph.updates):
         return
     changed = {update.id.original for update in depsgraph.updates
@@ -262,5 +220,4 @@ def unregister():
         if function in handlers:
             handlers.remove(function)
     problems.clear()
-    _waiting.clear()
     sources.forget()

@@ -1,0 +1,53 @@
+#include "splat/cpu/backward_sums.h"
+
+#include <algorithm>
+
+#include "base/parallel.h"
+
+namespace stipple {
+
+namespace {
+
+/// Ranges of splats that are added side by side. Each looks up its part of every tile's list, so
+/// more of them cost more searches.
+constexpr size_t kMostRanges = 64;
+constexpr size_t kLeastSplats = 1024;
+
+}  // namespace
+
+BackwardSums::BackwardSums(size_t visible_count, BackwardMode mode)
+    : visible_count_(visible_count),
+      field_count_(backwardFieldCount(mode)),
+      sums_(visible_count * field_count_, 0.0) {}
+
+void BackwardSums::add(const TileListGroup& group, size_t first_tile, size_t end_tile,
+                       const float* tile_sums) {
+  const size_t grain = std::max(kLeastSplats, (visible_count_ + kMostRanges - 1) / kMostRanges);
+  const uint64_t first_entry = group.offsets[first_tile - group.first_tile];
+  parallelFor(visible_count_, grain, [&](size_t begin, size_t end) {
+    for (size_t tile = first_tile; tile < end_tile; ++tile) {
+      // A tile lists its splats in increasing order.
+      const std::span<const uint32_t> splats = group.tile(tile);
+      const uint64_t tile_entry = group.offsets[tile - group.first_tile] - first_entry;
+      auto entry = static_cast<size_t>(
+          std::lower_bound(splats.begin(), splats.end(), static_cast<uint32_t>(begin)) -
+          splats.begin());
+      for (; entry < splats.size() && splats[entry] < end; ++entry) {
+        const float* from = tile_sums + (tile_entry + entry) * field_count_;
+        double* to = &sums_[splats[entry] * field_count_];
+        const size_t summed = std::min<size_t>(field_count_, kFieldLargestError);
+        for (size_t field = 0; field < summed; ++field)
+          to[field] += static_cast<double>(from[field]);
+        for (size_t field = summed; field < field_count_; ++field) {
+          to[field] = std::max(to[field], static_cast<double>(from[field]));
+        }
+      }
+    }
+  });
+}
+
+uint64_t BackwardSums::memoryBound(uint64_t visible_count, BackwardMode mode) {
+  return visible_count * backwardFieldCount(mode) * sizeof(double);
+}
+
+}  // namespace stipple

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "splat/cpu/tile_kernel_backward.h"
+#include "splat/render_backward.h"
+
+namespace stipple {
+
+/// The loss of a whole picture.
+struct PictureLoss {
+  const BackwardInput* input;
+  uint32_t width;  ///< pixels
+  bool with_background;
+  double background[3];
+  BackwardMode mode;
+};
+
+struct BackwardTile {
+  uint32_t x0, y0;                   ///< first pixel
+  uint32_t width, height;            ///< pixels inside the picture
+  std::span<const uint32_t> splats;  ///< indices of visible splats, front to back
+};
+
+/// Takes the splats off tiles, one tile after another; its memory does not grow with the tile.
+class TileBackward {
+ public:
+  TileBackward(const BackwardKernel& kernel, const VisibleSplat* visible, const PictureLoss& loss);
+
+  /// Out: sums [tile.splats.size()][backwardFieldCount(mode)], one entry per splat of the tile,
+  /// written whole. Adds dL/dbackground of the tile to `background` [3].
+  void run(const BackwardTile& tile, float* sums, double* background);
+
+  static uint64_t memoryBound();
+
+ private:
+  struct Blended {
+    uint32_t place;
+    bool held;
+    double alpha;
+    double g0, g1;
+  };
+  void clearPixels(const BackwardTile& tile);
+  size_t mark(const BackwardTile& tile);
+  void prepareTakeOff(const BackwardTile& tile, double* background);
+  void takeOff(const BackwardTile& tile, size_t used, float* sums);
+  void takeOffInDouble(const BackwardTile& tile, uint32_t x, uint32_t y, float* sums,
+                       double* background);
+  void makeBatch(const BackwardTile& tile, size_t batch);
+
+  const BackwardKernel& kernel_;
+  const VisibleSplat* visible_;
+  const PictureLoss& loss_;
+  std::unique_ptr<BackwardPixels> pixels_;
+  std::vector<BackwardSplat> splats_;  ///< a ring of the last batches
+  std::vector<Blended> blended_;       ///< one pixel in double
+};
+
+}  // namespace stipple

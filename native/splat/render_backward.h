@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "splat/render.h"
+
+namespace stipple {
+
+/// What the backward pass gets: the derivative of a scalar loss by the picture, and what the
+/// statistics need. All arrays are pictures of the camera's size, row 0 on top; empty where not
+/// used. Values must be finite and at most 1e5 in size.
+struct BackwardInput {
+  /// [H,W,4] dL/d(premultiplied R, G, B, alpha) of RenderResult::colour. With a background the
+  /// alpha of the picture is constant, so its derivative counts for nothing.
+  std::span<const float> colour_gradient;
+  /// [H,W,3] picture minus target in the blending space, before any clamp. Not empty: leave-one-out
+  /// contributions are wanted.
+  std::span<const float> residual;
+  /// [H,W] weight of each pixel in the contributions, >= 0; empty: 1.
+  std::span<const float> residual_weights;
+  /// [H,W] Not empty: edge-weighted blending weights are wanted.
+  std::span<const float> edge_weights;
+  /// [H,W] >= 0. Not empty: error contributions are wanted.
+  std::span<const float> errors;
+  bool with_blending_weights = false;
+  bool with_screen_gradients = false;
+};
+
+/// Derivatives by one cloud's stored values, in the frame of the object. Splats that do not show
+/// have zeros. An array that was not wanted is empty.
+struct SplatGradients {
+  std::vector<float> positions;  ///< [N,3]
+  std::vector<float> rotations;  ///< [N,4] by the stored quaternion, through its normalisation
+  std::vector<float> scales;     ///< [N,3]
+  std::vector<float> opacities;  ///< [N]
+  std::vector<float> sh;         ///< [N,(degree+1)^2,3]
+  /// [N] sum over pixels and channels of w (|R| - |R - dC|), dC = picture minus the picture without
+  /// the splat. Negative: the splat lowers the L1 error.
+  std::vector<float> contributions;
+  std::vector<float> blending_weights;  ///< [N] sum of T alpha
+  std::vector<float> edge_weights;      ///< [N] sum of edge weight times T alpha
+  /// [N,2] dL/d(projected centre), per pixel: multiply by half the picture's sides for the unit in
+  /// which thresholds of densification are usually given.
+  std::vector<float> screen_gradients;
+  std::vector<float> absolute_screen_gradients;  ///< [N,2] sum over pixels of |.| per axis
+  std::vector<float> screen_gradient_norms;      ///< [N] sum over pixels of the length
+  std::vector<float> errors;                     ///< [N] sum of error times T alpha
+  std::vector<float> largest_errors;             ///< [N] largest error times T alpha of one pixel
+};
+
+struct BackwardResult {
+  /// One per instance, in their order. Those of a cloud that is placed twice are to be added.
+  std::vector<SplatGradients> instances;
+  /// By a motion of the camera: x_camera' = x_camera + omega x x_camera + upsilon to first order,
+  /// that is world_to_camera' = exp(omega, upsilon) world_to_camera. Order: omega (radians),
+  /// upsilon (metres), both in the camera's frame.
+  std::array<double, 6> camera{};
+  std::array<double, 3> background{};  ///< zeros without a background
+  uint64_t visible_count = 0;
+};
+
+/// Derivatives of a loss by everything that renderTiled draws. It takes every decision (which
+/// splat shows at which pixel, where a pixel ends) as the renderers do; the clamp of alpha at 0.99
+/// and that of colours at 0 pass no derivative; the ends of a splat at alpha = 1/255 and the order
+/// of blending are taken as fixed.
+/// Same bits for any number of threads. Errors: those of renderTiled; kInvalidArgument where an
+/// array has another size than the picture or holds a value outside its range; kMemoryLimit where
+/// backwardMemoryBound is above memory_limit_bytes. Cost: O(pairs of tiles and splats).
+BackwardResult renderBackward(std::span<const SplatInstance> instances, const Camera& camera,
+                              const RenderOptions& options, const BackwardInput& input,
+                              uint64_t memory_limit_bytes = UINT64_MAX,
+                              Progress* progress = nullptr);
+
+/// Upper bound of the bytes that renderBackward allocates, its result included.
+uint64_t backwardMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
+                             const RenderOptions& options, const BackwardInput& input);
+
+}  // namespace stipple
