@@ -25,6 +25,10 @@ void parallelFor(size_t count, size_t grain, const std::function<void(size_t, si
       tbb::simple_partitioner());
 }
 
+size_t threadLimit() {
+  return static_cast<size_t>(std::max(1, tbb::this_task_arena::max_concurrency()));
+}
+
 void withThreads(unsigned thread_count, const std::function<void()>& body) {
   tbb::task_arena arena(thread_count == 0 ? tbb::task_arena::automatic
                                           : static_cast<int>(thread_count));

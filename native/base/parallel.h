@@ -13,6 +13,9 @@ void parallelFor(size_t count, size_t grain, const std::function<void(size_t, si
 /// Number of ranges parallelFor makes, and so of partial results to merge in order.
 inline size_t rangeCount(size_t count, size_t grain) { return (count + grain - 1) / grain; }
 
+/// The most threads that a parallelFor called from here uses.
+size_t threadLimit();
+
 /// Runs `body` with at most thread_count threads (0: as many as the machine has).
 void withThreads(unsigned thread_count, const std::function<void()>& body);
 
