@@ -10,6 +10,10 @@ import scenes
 
 RED = (0.8, 0.1, 0.05)
 
+# A quarter of the square's size: 200 splats a pixel, each of which the mip low-pass makes so faint that the cut-off at
+# 1/255 takes some of it. Closed surfaces have 0.98 where splats are larger.
+SMALL_SQUARE_ALPHA = 0.96
+
 
 @pytest.fixture
 def square():
@@ -109,7 +113,7 @@ def test_instances_and_duplicates_render_together(square, tmp_path):
         empty.instance_type, empty.instance_collection = 'COLLECTION', kept
         empty.matrix_world = Matrix.Translation((x, 0, 0))
     alpha = scenes.render_pixels(tmp_path)[..., 3]
-    np.testing.assert_array_equal(alpha[30, [12, 30, 48]] > 0.98, True)
+    np.testing.assert_array_equal(alpha[30, [12, 30, 48]] > SMALL_SQUARE_ALPHA, True)
     np.testing.assert_array_equal(alpha[30, [3, 21, 39, 57]] == 0, True)
 
 
@@ -229,4 +233,4 @@ def test_modifiers_are_rendered(square, tmp_path):
     array.use_relative_offset, array.use_constant_offset = False, True
     array.constant_offset_displace = (4.0, 0.0, 0.0)
     alpha = scenes.render_pixels(tmp_path)[..., 3]
-    assert alpha[30, 30] > 0.98 and alpha[30, 50] > 0.98 and alpha[30, 40] == 0
+    assert alpha[30, 30] > SMALL_SQUARE_ALPHA and alpha[30, 50] > SMALL_SQUARE_ALPHA and alpha[30, 40] == 0

@@ -97,23 +97,27 @@ class Baked:
         return copy
 
 
-@contextlib.contextmanager
-def baked(evaluated, matrix, kinds, depsgraph, hidden):
-    """A Baked of one evaluated object, or None where it has no triangle. Everything temporary is removed.
-
-    matrix: where it stands (light and object coordinates depend on it). hidden: objects that must not shade it.
-    """
+def copy_of(evaluated, depsgraph):
+    """A mesh of our own, with the materials that the evaluated object shows, to give to baked()."""
     if not hasattr(bpy.types.Scene, 'cycles'):
         raise StippleError(f"Object '{evaluated.name}' needs baking, but the Cycles add-on is disabled; enable it or "
                            'choose another color source.', Status.ERROR_UNAVAILABLE)
     mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+    for slot, shown in enumerate(evaluated.material_slots):
+        if slot < len(mesh.materials) and shown.link == 'OBJECT':
+            mesh.materials[slot] = shown.material.original if shown.material else None
+    return mesh
+
+
+@contextlib.contextmanager
+def baked(mesh, name, matrix, kinds, hidden):
+    """A Baked of a mesh of our own, or None where it has no triangle. Everything else temporary is removed.
+
+    matrix: where it stands (light and object coordinates depend on it). hidden: objects that must not shade it.
+    """
     obj = None
     shown = [o for o in hidden if not o.hide_render]
     try:
-        materials = [s.material for s in evaluated.material_slots]
-        for slot, material in enumerate(materials):
-            if slot < len(mesh.materials) and evaluated.material_slots[slot].link == 'OBJECT':
-                mesh.materials[slot] = material
         _triangulate(mesh)
         if len(mesh.polygons) == 0:
             yield None
@@ -122,7 +126,7 @@ def baked(evaluated, matrix, kinds, depsgraph, hidden):
         render_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
         layer = mesh.uv_layers.new(name=ATLAS, do_init=False)
         if layer is None:
-            raise StippleError(f"Object '{evaluated.name}' has {len(mesh.uv_layers)} UV maps; at most 7 are allowed where "
+            raise StippleError(f"Object '{name}' has {len(mesh.uv_layers)} UV maps; at most 7 are allowed where "
                                'colors have to be baked.', Status.ERROR_UNSUPPORTED)
         version.set_loop_uvs(mesh.uv_layers[ATLAS], uvs)
         mesh.uv_layers.active = mesh.uv_layers[ATLAS]
@@ -139,7 +143,6 @@ def baked(evaluated, matrix, kinds, depsgraph, hidden):
             other.hide_render = False
         if obj is not None:
             bpy.data.objects.remove(obj)
-        bpy.data.meshes.remove(mesh)
 
 
 def _triangulate(mesh):

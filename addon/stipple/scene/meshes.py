@@ -44,23 +44,25 @@ def native_mesh(context, objects, depsgraph, color_from):
 
     Errors: StippleError that names the object: no faces, NaN vertices, a texture, UV map or colour attribute missing.
     """
-    instances = list(_instances(objects, depsgraph))
     mesh = Mesh.create(context)
     materials = _Materials(mesh)
-    cache = {}
+    placed, shapes = [], {}
+    try:
+        _collect(objects, depsgraph, color_from, placed, shapes)
+        parts = {key: _part(shape, materials, color_from, objects) for key, shape in shapes.items()}
+    finally:
+        for shape in shapes.values():
+            if shape.to_bake is not None:
+                bpy.data.meshes.remove(shape.to_bake)
     seen = set()
-    for owner, evaluated, matrix in instances:
-        key = evaluated.data.as_pointer() if color_from != 'BAKED' else (evaluated.data.as_pointer(), matrix.tobytes())
-        if key not in cache:
-            cache[key] = _prepared(evaluated, matrix, color_from, depsgraph, materials, objects)
-        part = cache[key]
-        if part is None:
+    for owner, name, key, matrix in placed:
+        if parts[key] is None:
             continue
         seen.add(owner)
         try:
-            mesh.add_part(matrix=matrix, **part)
+            mesh.add_part(matrix=matrix, **parts[key])
         except StippleError as error:
-            raise StippleError(f"Object '{evaluated.name}': {error}", error.status) from None
+            raise StippleError(f"Object '{name}': {error}", error.status) from None
     for obj in objects:
         if obj not in seen:
             raise invalid(f"Object '{obj.name}' has no faces; at least one is needed to make splats.")
@@ -99,40 +101,65 @@ def fingerprint(objects):
     return f'{value:08x}'
 
 
-def _instances(objects, depsgraph):
-    """(owner among objects, evaluated object, [4,4]) of everything that the objects show."""
+@dataclass
+class _Shape:
+    """What one evaluated object shows, taken out of Blender: arrays, or a mesh of our own that has to be baked."""
+
+    name: str
+    matrix: np.ndarray      # of its first instance
+    kinds: list             # base colour per material slot; None to bake the light of all
+    read: Triangles = None  # None where there is no triangle
+    to_bake: bpy.types.Mesh = None
+
+
+def _collect(objects, depsgraph, color_from, placed, shapes):
+    """Everything that the objects show: adds (owner among objects, name, key, [4,4]) to placed, key: _Shape to shapes.
+
+    An instance's evaluated object lives for its turn of the iterator only, so all that is wanted of it is taken here,
+    before baking or anything else can evaluate the scene anew.
+    """
     wanted = set(objects)
     for entry in depsgraph.object_instances:
         owner = entry.parent.original if entry.is_instance else entry.object.original
         if owner not in wanted or not (entry.show_self or entry.is_instance):
             continue
         evaluated = entry.object
-        if evaluated.type in MESH_LIKE and not splat_data.is_splats(evaluated.data):
-            yield owner, evaluated, version.copy_of_evaluated_matrix(entry.matrix_world)
+        if evaluated.type not in MESH_LIKE or splat_data.is_splats(evaluated.data):
+            continue
+        matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
+        key = evaluated.data.as_pointer() if color_from != 'BAKED' else (evaluated.data.as_pointer(), matrix.tobytes())
+        if key not in shapes:
+            shapes[key] = _shape(evaluated, matrix, color_from, depsgraph)
+        placed.append((owner, evaluated.name, key, matrix))
 
 
-def _prepared(evaluated, matrix, color_from, depsgraph, materials, objects):
-    """The arguments of add_part for one evaluated object, or None where it has no triangle."""
-    if color_from == 'BAKED':
-        kinds = None
-    else:
-        kinds = [colour.base_colour_of(m) for m in _materials_of(evaluated)]
+def _shape(evaluated, matrix, color_from, depsgraph):
+    kinds = None if color_from == 'BAKED' else [colour.base_colour_of(m) for m in _materials_of(evaluated)]
     if color_from != 'ATTRIBUTE' and (kinds is None or any(k.kind.startswith('BAKE') for k in kinds)):
-        with bake.baked(evaluated, matrix, kinds, depsgraph, objects) as result:
-            if result is None:
-                return None
-            read = _read(result.mesh, evaluated.name, _materials_of(evaluated))
-            return _with_colours(read, kinds or [], materials, color_from, result)
+        return _Shape(evaluated.name, matrix, kinds, to_bake=bake.copy_of(evaluated, depsgraph))
     temporary = evaluated.to_mesh()
     try:
         if temporary is None:
-            return None
+            return _Shape(evaluated.name, matrix, kinds)
         read = _read(temporary, evaluated.name, _materials_of(evaluated, temporary))
     finally:
         evaluated.to_mesh_clear()
     if len(read.triangles) == 0:
+        return _Shape(evaluated.name, matrix, kinds)
+    return _Shape(evaluated.name, matrix, [colour.base_colour_of(m) for m in read.materials], read)
+
+
+def _part(shape, materials, color_from, objects):
+    """The arguments of add_part for a shape, or None where it has no triangle."""
+    if shape.to_bake is not None:
+        with bake.baked(shape.to_bake, shape.name, shape.matrix, shape.kinds, objects) as result:
+            if result is None:
+                return None
+            read = _read(result.mesh, shape.name, list(result.mesh.materials))
+            return _with_colours(read, shape.kinds or [], materials, color_from, result)
+    if shape.read is None:
         return None
-    return _with_colours(read, [colour.base_colour_of(m) for m in read.materials], materials, color_from, None)
+    return _with_colours(shape.read, shape.kinds, materials, color_from, None)
 
 
 def _materials_of(evaluated, mesh=None):
@@ -144,7 +171,8 @@ def _materials_of(evaluated, mesh=None):
             found.append(slot.material)
         elif slot.link == 'OBJECT':
             found[index] = slot.material
-    return found
+    # Originals outlive the next evaluation of the scene.
+    return [material.original if material else None for material in found]
 
 
 def _read(mesh, name, materials):
