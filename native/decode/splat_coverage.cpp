@@ -23,10 +23,10 @@ constexpr float kFadingBand = 0.3f;     ///< spacings from a border that need no
 constexpr float kSidewaysCost = 0.35f;  ///< of a border sample off the direction of its border
 constexpr float kOtherBorder = 0.7f;    ///< directions with a smaller cosine belong to two borders
 constexpr float kSameSheet = 0.3f;      ///< n·n' of splats that close a place together
-constexpr float kTargetOpen = 0.0055f;   ///< transmittance wanted at every sample inside
+constexpr float kTargetOpen = 0.0055f;  ///< transmittance wanted at every sample inside
 /// σ₁σ₂ over the area of the patch at which spread-out splats let 2 % of the light pass:
-/// −ln 0.02 / (0.99 · 2π).
-constexpr float kSmallMass = 0.63f;
+/// −ln 0.02 / (0.99 · 2π) = 0.63, and a little for the unevenness of the sites.
+constexpr float kSmallMass = 0.66f;
 constexpr int kCoverageRounds = 2;  ///< one more for few sites
 /// A splat ends, at this many standard deviations, one spacing over an open border: 6 % of its
 /// opacity are left there. Over a crease, where two faces' splats add up, it ends closer.
@@ -118,7 +118,7 @@ struct ShapeCandidates {
   void gather(const SurfaceSites& sites, const SplatShapes& shapes, uint64_t code) {
     std::array<uint32_t, 27> around;
     const CellTable& table = sites.cells[0];
-    const size_t cell_count = table.neighbours(code, around);
+    const size_t cell_count = sites.neighbours(code, around);
     size_t count = 0;
     for (size_t c = 0; c < cell_count; ++c) count += table.end(around[c]) - table.begin(around[c]);
     blocks.resize((count + kBlock - 1) / kBlock);

@@ -14,11 +14,12 @@ namespace {
 
 constexpr size_t kGrain = 1024;
 /// Standard deviation of a splat over that of its patch. On a square pattern of side s a patch has
-/// s/√12; 2.3 of it is 0.66 s, where four splats leave 2 % open in the middle between them.
-constexpr float kPatchScale = 2.25f;
-/// A patch that wraps half around a rod of radius r has mean (n·u)² = 1/2 across the rod; 0.48 of
+/// s/√12, and 2.15 of it is 0.62 s: a little less than closes it, since sizes are balanced
+/// afterwards.
+constexpr float kPatchScale = 2.15f;
+/// A patch that wraps half around a rod of radius r has mean (n·u)² = 1/2 across the rod; 0.45 of
 /// the size that a flat patch of its width would get keeps its flat splat from sticking out.
-constexpr double kCurvedTrim = 1.05;
+constexpr double kCurvedTrim = 1.1;
 constexpr float kMaxAspect = 5.0f;
 /// Thickness over the smaller width: thin, yet several voxels can resolve it and it is seen
 /// edge-on.
@@ -27,9 +28,9 @@ constexpr float kMaxThickness = 0.35f;
 constexpr float kHeightScale = 1.5f;  ///< thickness over the standard deviation of heights
 /// Mean normal length of a patch from which on its splat may grow, and may grow fully: a flat splat
 /// on a curved patch sticks out at the silhouette.
-constexpr double kNoGrowth = 0.94;
+constexpr double kNoGrowth = 0.943;
 constexpr double kLeastGrowth = 0.0;
-constexpr double kFullGrowth = 0.985;
+constexpr double kFullGrowth = 0.986;
 
 struct Moments {
   double area = 0;

@@ -28,6 +28,11 @@ namespace {
 /// Rounds of Lloyd's method where time permits more than one: the more regular the sites, the
 /// smaller the splats that close the surface.
 constexpr int kFewCentringRounds = 3;
+/// Samples per site that take part: enough for the middle and for the second moments of a patch,
+/// few enough for a slider.
+constexpr size_t kCentringSamples = 3;
+constexpr size_t kFewSamples = 10;
+constexpr size_t kManySamples = 4;
 
 /// Unit quaternion w, x, y, z of the rotation whose columns are a, b, c.
 /// Based on: Shepperd, Quaternion from Rotation Matrix, 1978.
@@ -129,12 +134,14 @@ SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
   const SurfaceIndex& index = index_->samples;
   advance(request.progress, 0.0, "Decoding the surface");
   SurfaceSites sites = projectAnchors(index, request);
-  const int centring_rounds = sites.size() <= kFewSites ? kFewCentringRounds : 1;
+  const bool few = sites.size() <= kFewSites;
+  const int centring_rounds = few ? kFewCentringRounds : 1;
   for (int round = 0; round < centring_rounds; ++round) {
-    centreSites(index, assignSamples(index, sites, request.progress), sites);
+    centreSites(index, assignSamples(index, sites, kCentringSamples, request.progress), sites);
     sortByCell(index, sites);
   }
-  const SurfacePatches patches = assignSamples(index, sites, request.progress);
+  const SurfacePatches patches =
+      assignSamples(index, sites, few ? kFewSamples : kManySamples, request.progress);
   advance(request.progress, 0.4, "Decoding the surface");
   SplatShapes shapes = fitShapes(index, sites, patches);
   findNearBorders(index_->borders, sites, shapes);
@@ -145,10 +152,11 @@ SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
 }
 
 uint64_t SurfaceDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const {
-  // Per splat: the cloud (56 bytes), sites (36, twice while they are sorted), shapes (72), patch
-  // bounds and cell tables (at most 96), scratch of the balance (at most 64). Per sample: owner and
-  // member (8) and the coverage (16).
-  constexpr uint64_t kBytesPerSplat = 56 + 2 * 36 + 72 + 96 + 64;
+  // Per splat: the cloud (56 bytes), sites (36, twice while they are sorted), shapes (112), patch
+  // bounds and cell tables (at most 96), neighbour lists (112 per cell, at most a cell per splat,
+  // twice while they are sorted), scratch of the balance (at most 64). Per sample: owner and member
+  // (8) and the coverage (16).
+  constexpr uint64_t kBytesPerSplat = 56 + 2 * 36 + 112 + 96 + 2 * 112 + 64;
   constexpr uint64_t kBytesPerSample = 24;
   return anchor_count * gaussians_per_anchor * kBytesPerSplat + surface_->size() * kBytesPerSample;
 }

@@ -18,10 +18,6 @@ namespace {
 
 constexpr size_t kAnchorGrain = 2048;
 constexpr size_t kRunGrain = 32;
-/// Samples per site that take part: enough for the second moments of a patch, few enough for a
-/// slider.
-constexpr size_t kSamplesPerSite = 5;
-constexpr size_t kManySamplesPerSite = 10;  ///< up to kFewSites sites, where time permits it
 constexpr size_t kMinSamples = 16384;
 /// A sample off the tangent plane by h counts as sqrt(1 + kOffPlane) h away.
 constexpr float kOffPlane = 15.0f;
@@ -94,7 +90,8 @@ struct Candidates {
 
   void gather(const SurfaceSites& sites, const CellTable& table, uint64_t code) {
     std::array<uint32_t, 27> around;
-    const size_t cell_count = table.neighbours(code, around);
+    const size_t cell_count =
+        &table == &sites.cells[0] ? sites.neighbours(code, around) : table.neighbours(code, around);
     site.clear();
     for (size_t c = 0; c < cell_count; ++c) {
       for (uint32_t i = table.begin(around[c]); i < table.end(around[c]); ++i) site.push_back(i);
@@ -250,7 +247,24 @@ void sortByCell(const SurfaceIndex& index, SurfaceSites& sites) {
   for (int step = 0; step < 3 && step <= sites.level; ++step) {
     sorted.cells.emplace_back(sorted_codes, 3 * step, sites.level - step);
   }
+  const CellTable& cells = sorted.cells[0];
+  sorted.around.resize(cells.size());
+  parallelFor(cells.size(), kRunGrain * 8, [&](size_t begin, size_t end) {
+    std::array<uint32_t, 27> around;
+    for (size_t cell = begin; cell < end; ++cell) {
+      const size_t cell_count = cells.neighbours(cells.code(cell), around);
+      sorted.around[cell][0] = static_cast<uint32_t>(cell_count);
+      std::copy_n(around.begin(), cell_count, sorted.around[cell].begin() + 1);
+    }
+  });
   sites = std::move(sorted);
+}
+
+size_t SurfaceSites::neighbours(uint64_t code, std::array<uint32_t, 27>& out) const {
+  const uint32_t cell = cells[0].find(code);
+  if (cell == CellTable::kNone) return cells[0].neighbours(code, out);
+  std::copy_n(around[cell].begin() + 1, around[cell][0], out.begin());
+  return around[cell][0];
 }
 
 void forSampleRuns(const SurfaceIndex& index, const SurfacePatches& patches, int level,
@@ -272,12 +286,10 @@ void forSampleRuns(const SurfaceIndex& index, const SurfacePatches& patches, int
 }
 
 SurfacePatches assignSamples(const SurfaceIndex& index, const SurfaceSites& sites,
-                             Progress* progress) {
+                             size_t samples_per_site, Progress* progress) {
   SurfacePatches patches;
-  const size_t wanted =
-      std::max(kMinSamples,
-               sites.size() * (sites.size() <= kFewSites ? kManySamplesPerSite : kSamplesPerSite));
-  patches.stride = std::max<size_t>(1, index.size() / wanted);
+  const size_t wanted = std::max(kMinSamples, sites.size() * samples_per_site);
+  patches.stride = std::max<size_t>(1, (index.size() + wanted / 2) / wanted);
   patches.sample_count = index.size() / patches.stride;
   patches.owners.resize(patches.sample_count);
   const float cell_side = 1.0f / static_cast<float>(uint32_t{1} << sites.level);

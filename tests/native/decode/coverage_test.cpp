@@ -69,7 +69,7 @@ void expectClosed(const char* name, const TriMesh& mesh, uint32_t per_anchor = 1
   const SurfaceModel model = buildSurfaceModel(mesh, options);
   double area = 0;
   for (const float share : model.surface->areas) area += static_cast<double>(share);
-  for (const uint64_t splats : {1000u, 4000u, 20000u, 100000u}) {
+  for (const uint64_t splats : {1000u, 4000u, 20000u, 50000u, 100000u}) {
     if (splats < 1000 * per_anchor) continue;  // budgets are of anchors
     for (const AnchorOrder order : {AnchorOrder::kSystematic, AnchorOrder::kProgressive}) {
       AnchorSamplingOptions sampling;
