@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "splat/blend.h"
 
@@ -95,6 +96,14 @@ T contributionOf(T signed_weight, T room, T colour_change) {
   return std::min(change, room - change);
 }
 
+/// sqrt(a^2 + b^2) for a, b >= 0 without squares that could leave the range of T.
+template <typename T>
+T lengthOf(T a, T b) {
+  const T larger = std::max(a, b);
+  const T ratio = std::min(a, b) / std::max(larger, std::numeric_limits<T>::min());
+  return larger * std::sqrt(T(1) + ratio * ratio);
+}
+
 /// Takes one splat off the pixel and adds to its sums [backwardFieldCount(mode)].
 template <typename T>
 void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardMode mode,
@@ -128,7 +137,7 @@ void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardMod
   sums[kFieldEdge] += weight * loss.edge;
   sums[kFieldAbsoluteX] += std::abs(by_x);
   sums[kFieldAbsoluteY] += std::abs(by_y);
-  sums[kFieldNorm] += std::sqrt(by_x * by_x + by_y * by_y);
+  sums[kFieldNorm] += lengthOf(std::abs(by_x), std::abs(by_y));
   sums[kFieldError] += weight * loss.error;
   sums[kFieldLargestError] = std::max(sums[kFieldLargestError], weight * loss.error);
 }

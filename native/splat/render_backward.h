@@ -12,7 +12,7 @@ namespace stipple {
 
 /// What the backward pass gets: the derivative of a scalar loss by the picture, and what the
 /// statistics need. All arrays are pictures of the camera's size, row 0 on top; empty where not
-/// used. Values must be finite and at most 1e5 in size.
+/// used. Values must be finite and at most 1e4 in size.
 struct BackwardInput {
   /// [H,W,4] dL/d(premultiplied R, G, B, alpha) of RenderResult::colour. With a background the
   /// alpha of the picture is constant, so its derivative counts for nothing.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "splat/scene_backward.h"
+
 // As in cpu/tiled_render.cpp, pixels in which float32 rounding could decide a threshold are found
 // by the kernel and done in double, so every decision is the renderer's.
 
@@ -217,7 +219,7 @@ void TileBackward::takeOffInDouble(const BackwardTile& tile, uint32_t x, uint32_
     stipple::takeOff(here, loss, loss_.mode, pixel, one);
     float* all = sums + blended.place * field_count;
     for (size_t field = 0; field < field_count; ++field) {
-      const float value = static_cast<float>(one[field]);
+      const float value = storedGradient(one[field]);
       all[field] = field == kFieldLargestError ? std::max(all[field], value) : all[field] + value;
     }
   }

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 HWY_BEFORE_NAMESPACE();
 namespace stipple {
@@ -39,6 +40,14 @@ HWY_INLINE Vec exp2Small(Tag d, Vec x) {
 
 HWY_INLINE float sumOfLanes(Tag d, Vec v) {
   return hn::GetLane(hn::SumOfLanes(d, v));
+}
+
+/// sqrt(a^2 + b^2) for a, b >= 0, as lengthOf in splat/blend_backward.h.
+HWY_INLINE Vec lengthOfLanes(Tag d, Vec a, Vec b) {
+  const Vec larger = hn::Max(a, b);
+  const Vec least = hn::Set(d, std::numeric_limits<float>::min());
+  const Vec ratio = hn::Div(hn::Min(a, b), hn::Max(larger, least));
+  return hn::Mul(larger, hn::Sqrt(hn::MulAdd(ratio, ratio, hn::Set(d, 1.0f))));
 }
 
 void markTile(BackwardSplat* splats, size_t count, int32_t first, BackwardPixels& pixels) {
@@ -199,7 +208,7 @@ void takeOffSplats(const BackwardSplat* splats, size_t count, int32_t first, Bac
           sum_edge = hn::MulAdd(weight, hn::Load(d, pixels.edge + i), sum_edge);
           sum_x = hn::Add(sum_x, by_x);
           sum_y = hn::Add(sum_y, by_y);
-          sum_norm = hn::Add(sum_norm, hn::Sqrt(hn::MulAdd(by_x, by_x, hn::Mul(by_y, by_y))));
+          sum_norm = hn::Add(sum_norm, lengthOfLanes(d, by_x, by_y));
           sum_error = hn::Add(sum_error, error);
           largest_error = hn::Max(largest_error, error);
         }

@@ -28,7 +28,7 @@ constexpr size_t kTileGrain = 4;
 constexpr size_t kSplatGrain = 2048;
 /// Largest derivative or weight that is accepted: with colours up to 6e28 (the largest that the
 /// renderer makes) every float32 product and sum of a tile stays below 3e38.
-constexpr double kLargestInput = 1e5;
+constexpr double kLargestInput = 1e4;
 
 void requirePicture(std::span<const float> values, size_t pixel_count, size_t channels, float least,
                     bool may_be_empty, const char* what) {
@@ -40,8 +40,9 @@ void requirePicture(std::span<const float> values, size_t pixel_count, size_t ch
              std::to_string(channels));
   }
   for (const float value : values) {
-    // Written so that NaN is refused.
-    if (value >= least && static_cast<double>(value) <= kLargestInput) continue;
+    if (std::isfinite(value) && value >= least && static_cast<double>(value) <= kLargestInput) {
+      continue;
+    }
     fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(value) + "; " +
                                           std::to_string(static_cast<double>(least)) + " to " +
                                           std::to_string(kLargestInput) + " is allowed");
