@@ -8,16 +8,15 @@ packages=(
   g++ cmake ninja-build ccache pkgconf git
   # The library: parallel loops, linear algebra, vector instructions, neighbour search.
   libtbb-dev libeigen3-dev libhwy-dev libnanoflann-dev
-  # Files: JSON, volumes (OpenVDB's headers use Boost's), meshes, pictures. OpenImageIO's CMake
-  # package refers to its tools.
+  # Files: JSON, volumes (OpenVDB's headers use Boost's), meshes, pictures. The quick
+  # start and the tests use OpenImageIO's tools too.
   nlohmann-json3-dev libopenvdb-dev libboost-dev libtinygltf-dev libopenimageio-dev openimageio-tools
-  zlib1g-dev
   # The command-line tool.
   libcli11-dev
   # Tests and benchmarks; readelf and nm look at what the libraries need and export.
   libgtest-dev libgmock-dev libbenchmark-dev binutils python3-numpy python3-pytest
   # Blender, with what it needs to draw without a screen.
-  blender libegl1 libegl-mesa0 libgl1-mesa-dri xvfb xauth
+  blender libegl1 libegl-mesa0 libgl1-mesa-dri
 )
 
 missing=()
