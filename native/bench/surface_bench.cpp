@@ -82,13 +82,14 @@ struct Points {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>,
                                                  Points, 3, uint32_t>;
 
+/// No target: the ratio is a yardstick for changes; the aim is absolute (a slider at 50,000).
 /// Anchors sampled and decoded, against building a tree over them and asking it for every anchor's
 /// nearest neighbour.
 void decode(benchmark::State& state) {
   const auto count = static_cast<uint64_t>(state.range(0));
   const AnchorSet fixed = anchorsOf(count);
   compare(
-      state, "nearest_neighbour", 0.08,
+      state, "nearest_neighbour", 0.0,
       [&] {
         const AnchorSet anchors = anchorsOf(count);
         DecodeRequest request;
