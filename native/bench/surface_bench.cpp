@@ -7,7 +7,7 @@
 #include <nanoflann.hpp>
 #include <numbers>
 
-#include "comparison.h"
+#include "bench/comparison.h"
 #include "decode/surface_model.h"
 
 namespace stipple::bench {
