@@ -5,9 +5,9 @@
 // that four blurs do instead of five, nothing cancels where the pictures agree, and three blurs
 // give the gradient (G is symmetric, so its transpose with zeros outside is itself).
 //
-// A tile streams through its rows. Its window of picture rows is kept in a ring; each new row gives
-// a row of statistics five rows up, its maps go to a second ring, and those give the gradient
-// another five rows up. Maps within five pixels of a tile are computed by both neighbours.
+// A tile streams through its rows, four at a time. A ring keeps its last picture rows; they give
+// the statistics five rows up, whose maps go to a second ring, and those give the gradient another
+// five rows up. Maps within five pixels of a tile are computed by both neighbours.
 
 #include "train/image_loss.h"
 
@@ -29,12 +29,13 @@ namespace stipple {
 namespace {
 
 // Tiles of about this size share little work with their neighbours (15 % of the maps), and their
-// rings (0.4 MB) stay in a core's second cache.
+// rings (0.5 MB) stay in a core's second cache.
 constexpr size_t kTileWidth = 256;
 constexpr size_t kTileHeight = 96;
-/// Rows in a ring, a power of two: a gradient row needs the picture 10 rows after it was read.
-constexpr size_t kRingRows = 16;
-static_assert(kRingRows > 3 * kBlurReach);
+/// Rows in a ring. When the maps of a block are done, 5 + 3 rows beyond it have been read; the
+/// gradient block that waits for them may begin 5 + 3 + 3 rows before their last.
+constexpr size_t kRingRows = 20;
+static_assert(kRingRows >= 2 * kBlurReach + 2 * kBlockRows);
 
 /// Rows of p and d reach 10 columns beyond the tile, rows of maps 5.
 constexpr size_t kPictureReach = 2 * kBlurReach;
@@ -47,10 +48,10 @@ struct TileScratch {
   Row sums[kRingRows][3];
   Row differences[kRingRows][3];
   Row maps[kRingRows][3][3];  ///< [row][channel][map]
-  Row statistics[4];
+  Row statistics[kBlockRows][4];
   Row errors;
-  Row blurred_maps[3];
-  Row gradient[3];
+  Row blurred_maps[3][kBlockRows];
+  Row gradient[kBlockRows][3];
   Row weights;
   Row zeros;
 };
@@ -125,15 +126,19 @@ class TilePass {
     size_t next_read = std::max(first_map, kBlurReach) - kBlurReach;
     size_t next_gradient = tile_.row_begin;
     bool usable = true;
-    for (size_t row = first_map; row < end_map; ++row) {
-      for (; next_read < std::min(height, row + kBlurReach + 1); ++next_read) {
+    for (size_t row = first_map; row < end_map; row += kBlockRows) {
+      const size_t end = std::min(end_map, row + kBlockRows);
+      for (; next_read < std::min(height, end + kBlurReach); ++next_read) {
         usable = readRow(next_read) && usable;
       }
-      mapRow(row);
+      mapRows(row, end);
       if (!with_gradient) continue;
-      const bool last = row + 1 == end_map;
-      while (next_gradient < tile_.row_end && (last || next_gradient + kBlurReach <= row)) {
-        gradientRow(next_gradient++, first_map, end_map);
+      // A block needs the maps of 5 rows beyond it, or as many as there are.
+      while (next_gradient < tile_.row_end) {
+        const size_t gradient_end = std::min(tile_.row_end, next_gradient + kBlockRows);
+        if (std::min(end_map, gradient_end + kBlurReach) > end) break;
+        gradientRows(next_gradient, gradient_end, first_map, end_map);
+        next_gradient = gradient_end;
       }
     }
     return usable;
@@ -184,47 +189,59 @@ class TilePass {
     return scratch_.weights.data();
   }
 
-  void mapRow(size_t row) {
-    const size_t height = task_.tiling.height;
+  /// The 14 rows that a block beginning at `row` is blurred from, zeros outside first..end.
+  template <class RowOf>
+  std::array<const float*, kBlockInputs> blockInputs(size_t row, size_t first, size_t end,
+                                                     const RowOf& rowOf) const {
+    std::array<const float*, kBlockInputs> rows;
+    for (size_t k = 0; k < kBlockInputs; ++k) {
+      const bool inside = row + k >= first + kBlurReach && row + k < end + kBlurReach;
+      rows[k] = inside ? rowOf(slot(row + k - kBlurReach)).data() : scratch_.zeros.data();
+    }
+    return rows;
+  }
+
+  /// SSIM and its maps of at most kBlockRows rows.
+  void mapRows(size_t begin, size_t end) {
+    const size_t readable = std::min(task_.tiling.height, end + kBlurReach);
+    for (size_t c = 0; c < 3; ++c) {
+      const auto sums =
+          blockInputs(begin, 0, readable, [&](size_t s) -> Row& { return scratch_.sums[s][c]; });
+      const auto differences = blockInputs(
+          begin, 0, readable, [&](size_t s) -> Row& { return scratch_.differences[s][c]; });
+      float* statistics[kBlockRows * 4];
+      for (size_t s = 0; s < kBlockRows * 4; ++s) {
+        statistics[s] = scratch_.statistics[s / 4][s % 4].data();
+      }
+      task_.kernel.blurStatistics(sums.data(), differences.data(), map_width_ + 2 * kBlurReach,
+                                  statistics);
+      for (size_t row = begin; row < end; ++row) mapRow(row, c, scratch_.statistics[row - begin]);
+    }
+  }
+
+  void mapRow(size_t row, size_t c, Row* statistics) {
     const bool own = row >= tile_.row_begin && row < tile_.row_end;
     const size_t own_left = tile_.column_begin - map_begin_;
     const size_t own_count = tile_.column_end - tile_.column_begin;
     const float* weights = weightsOf(row, map_begin_, map_end_ - map_begin_);
-    double* sums =
-        task_.row_sums + 2 * (tile_.column_begin / task_.tiling.tile_width * height + row);
-    if (own) sums[0] = sums[1] = 0;
-    for (size_t c = 0; c < 3; ++c) {
-      const float* sum_rows[kBlurTaps];
-      const float* difference_rows[kBlurTaps];
-      for (size_t k = 0; k < kBlurTaps; ++k) {
-        const bool inside = row + k >= kBlurReach && row + k - kBlurReach < height;
-        const size_t from = slot(row + k - kBlurReach);
-        sum_rows[k] = inside ? scratch_.sums[from][c].data() : scratch_.zeros.data();
-        difference_rows[k] = inside ? scratch_.differences[from][c].data() : scratch_.zeros.data();
-      }
-      float* statistics[4];
-      for (size_t s = 0; s < 4; ++s) statistics[s] = scratch_.statistics[s].data();
-      task_.kernel.blurStatistics(sum_rows, difference_rows, map_width_ + 2 * kBlurReach,
-                                  statistics);
-
-      const float* inputs[4];
-      for (size_t s = 0; s < 4; ++s) inputs[s] = statistics[s] + map_left_;
-      float* maps[3] = {};
-      if (task_.gradient.values) {
-        for (size_t m = 0; m < 3; ++m) {
-          maps[m] = scratch_.maps[slot(row)][c][m].data() + map_left_;
-        }
-      }
-      task_.kernel.evaluateSsim(inputs, weights, map_end_ - map_begin_, scratch_.errors.data(),
-                                maps);
-      if (maps[0]) clearMapMargins(scratch_.maps[slot(row)][c]);
-      if (!own) continue;
-      const float* own_weights = weights ? weights + own_left : nullptr;
-      sums[0] +=
-          task_.kernel.sumMagnitudes(scratch_.errors.data() + own_left, own_weights, own_count);
-      sums[1] += task_.kernel.sumMagnitudes(
-          scratch_.differences[slot(row)][c].data() + kPictureReach, own_weights, own_count);
+    const float* inputs[4];
+    for (size_t s = 0; s < 4; ++s) inputs[s] = statistics[s].data() + map_left_;
+    float* maps[3] = {};
+    if (task_.gradient.values) {
+      for (size_t m = 0; m < 3; ++m) maps[m] = scratch_.maps[slot(row)][c][m].data() + map_left_;
     }
+    task_.kernel.evaluateSsim(inputs, weights, map_end_ - map_begin_, scratch_.errors.data(), maps);
+    if (maps[0]) clearMapMargins(scratch_.maps[slot(row)][c]);
+    if (!own) return;
+    const size_t tile_column = tile_.column_begin / task_.tiling.tile_width;
+    double* sums = task_.row_sums + 2 * (tile_column * task_.tiling.height + row);
+    if (c == 0) sums[0] = sums[1] = 0;
+    const float* own_weights = weights ? weights + own_left : nullptr;
+    const Row& differences = scratch_.differences[slot(row)][c];
+    sums[0] +=
+        task_.kernel.sumMagnitudes(scratch_.errors.data() + own_left, own_weights, own_count);
+    sums[1] +=
+        task_.kernel.sumMagnitudes(differences.data() + kPictureReach, own_weights, own_count);
   }
 
   void clearMapMargins(Row* maps) {
@@ -234,30 +251,34 @@ class TilePass {
     }
   }
 
-  void gradientRow(size_t row, size_t first_map, size_t end_map) {
+  /// At most kBlockRows rows of the gradient.
+  void gradientRows(size_t begin, size_t end, size_t first_map, size_t end_map) {
     const size_t own_count = tile_.column_end - tile_.column_begin;
-    const float* weights = weightsOf(row, tile_.column_begin, own_count);
-    const float* gradient[3];
+    const size_t mapped = std::min(end_map, end + kBlurReach);
     for (size_t c = 0; c < 3; ++c) {
-      const float* blurred[3];
       for (size_t m = 0; m < 3; ++m) {
-        const float* rows[kBlurTaps];
-        for (size_t k = 0; k < kBlurTaps; ++k) {
-          const size_t from = row + k - kBlurReach;
-          const bool inside = row + k >= kBlurReach && from >= first_map && from < end_map;
-          rows[k] = inside ? scratch_.maps[slot(from)][c][m].data() : scratch_.zeros.data();
-        }
-        task_.kernel.blurColumns(rows, map_width_, scratch_.blurred_maps[m].data());
-        blurred[m] = scratch_.blurred_maps[m].data();
+        const auto maps = blockInputs(begin, first_map, mapped,
+                                      [&](size_t s) -> Row& { return scratch_.maps[s][c][m]; });
+        float* blurred[kBlockRows];
+        for (size_t r = 0; r < kBlockRows; ++r) blurred[r] = scratch_.blurred_maps[m][r].data();
+        task_.kernel.blurColumns(maps.data(), map_width_, blurred);
       }
-      task_.kernel.combineGradient(blurred, scratch_.sums[slot(row)][c].data() + kPictureReach,
-                                   scratch_.differences[slot(row)][c].data() + kPictureReach,
-                                   weights, own_count, task_.l1_scale, task_.ssim_scale,
-                                   scratch_.gradient[c].data());
-      gradient[c] = scratch_.gradient[c].data();
+      for (size_t row = begin; row < end; ++row) {
+        const float* blurred[3];
+        for (size_t m = 0; m < 3; ++m) blurred[m] = scratch_.blurred_maps[m][row - begin].data();
+        task_.kernel.combineGradient(blurred, scratch_.sums[slot(row)][c].data() + kPictureReach,
+                                     scratch_.differences[slot(row)][c].data() + kPictureReach,
+                                     weightsOf(row, tile_.column_begin, own_count), own_count,
+                                     task_.l1_scale, task_.ssim_scale,
+                                     scratch_.gradient[row - begin][c].data());
+      }
     }
-    task_.kernel.writePixels(gradient, own_count,
-                             task_.run(task_.gradient, row, tile_.column_begin));
+    for (size_t row = begin; row < end; ++row) {
+      const float* gradient[3];
+      for (size_t c = 0; c < 3; ++c) gradient[c] = scratch_.gradient[row - begin][c].data();
+      task_.kernel.writePixels(gradient, own_count,
+                               task_.run(task_.gradient, row, tile_.column_begin));
+    }
   }
 
   const Task& task_;

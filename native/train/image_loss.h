@@ -60,7 +60,7 @@ class ImageLoss {
   /// Errors: kInvalidArgument for lambda outside 0..1, a null picture, a colour that is not finite
   /// or beyond +-1e6, a weight that is negative or not finite; the gradient then has no meaning.
   /// Threads and determinism: tiles in parallel; the same bits for any number of threads.
-  /// Cost: O(pixels), seven separable blurs per channel; about 0.4 MB per thread. No allocation
+  /// Cost: O(pixels), seven separable blurs per channel; about 0.5 MB per thread. No allocation
   /// after the first call of a size and thread limit. Numbers: float32, sums float64.
   ImageLossValue evaluate(uint32_t width, uint32_t height, PictureView rendered, PictureView target,
                           const float* weights, GradientView gradient,

@@ -19,6 +19,11 @@ constexpr std::array<float, kBlurTaps> kBlurWindow = {
     2.1300553771e-01f, 2.6601172486e-01f, 2.1300553771e-01f, 1.0936068951e-01f,
     3.6000772128e-02f, 7.5987581352e-03f, 1.0283800845e-03f};
 
+/// Rows that one call blurs along columns: each row that is read serves several, else reading rows
+/// out of the second cache eleven times would take longer than the arithmetic.
+constexpr size_t kBlockRows = 4;
+constexpr size_t kBlockInputs = kBlockRows + kBlurTaps - 1;
+
 /// Floats that a kernel may read or write past the end of a working row: a vector's width.
 constexpr size_t kRowSlack = 64;
 
@@ -42,17 +47,18 @@ struct LossKernel {
   bool (*readPixels)(PixelRun<const float> rendered, PixelRun<const float> target_picture,
                      size_t count, float* const sums[3], float* const differences[3]);
 
-  /// Statistics blurred along columns, from 11 rows of p and of d.
+  /// Statistics of four rows blurred along columns, from 14 rows of p and of d: output row r is
+  /// centred on input row r + 5. Out: statistics[4 * row + statistic].
   void (*blurStatistics)(const float* const* sums, const float* const* differences, size_t count,
-                         float* const statistics[4]);
+                         float* const* statistics);
 
   /// Blurs the statistics along the row, output i centred on input i + 5, and evaluates SSIM: 1 -
   /// SSIM to `errors` and, unless maps[0] is null, the maps, times weights[i] where not null.
   void (*evaluateSsim)(const float* const statistics[4], const float* weights, size_t count,
                        float* errors, float* const maps[3]);
 
-  /// Eleven rows blurred along columns into one.
-  void (*blurColumns)(const float* const* rows, size_t count, float* out);
+  /// Fourteen rows blurred along columns into four.
+  void (*blurColumns)(const float* const* rows, size_t count, float* const* out);
 
   /// l1_scale w sign(d) - ssim_scale (G map0 + p G map1 + d G map2), G the blur along the row with
   /// output i centred on input i + 5. weights: null for 1.

@@ -54,12 +54,17 @@ float blurredAt(const Value& value) {
 }
 
 void blurStatistics(const float* const* sums, const float* const* differences, size_t count,
-                    float* const statistics[4]) {
-  for (size_t i = 0; i < count; ++i) {
-    statistics[0][i] = blurredAt([&](size_t k) { return sums[k][i]; });
-    statistics[1][i] = blurredAt([&](size_t k) { return differences[k][i]; });
-    statistics[2][i] = blurredAt([&](size_t k) { return sums[k][i] * sums[k][i]; });
-    statistics[3][i] = blurredAt([&](size_t k) { return differences[k][i] * differences[k][i]; });
+                    float* const* statistics) {
+  for (size_t row = 0; row < kBlockRows; ++row) {
+    const float* const* p = sums + row;
+    const float* const* d = differences + row;
+    float* const* out = statistics + 4 * row;
+    for (size_t i = 0; i < count; ++i) {
+      out[0][i] = blurredAt([&](size_t k) { return p[k][i]; });
+      out[1][i] = blurredAt([&](size_t k) { return d[k][i]; });
+      out[2][i] = blurredAt([&](size_t k) { return p[k][i] * p[k][i]; });
+      out[3][i] = blurredAt([&](size_t k) { return d[k][i] * d[k][i]; });
+    }
   }
 }
 
@@ -98,8 +103,12 @@ void evaluateSsim(const float* const statistics[4], const float* weights, size_t
   }
 }
 
-void blurColumns(const float* const* rows, size_t count, float* out) {
-  for (size_t i = 0; i < count; ++i) out[i] = blurredAt([&](size_t k) { return rows[k][i]; });
+void blurColumns(const float* const* rows, size_t count, float* const* out) {
+  for (size_t row = 0; row < kBlockRows; ++row) {
+    for (size_t i = 0; i < count; ++i) {
+      out[row][i] = blurredAt([&](size_t k) { return rows[row + k][i]; });
+    }
+  }
 }
 
 void combineGradient(const float* const blurred_maps[3], const float* sums,

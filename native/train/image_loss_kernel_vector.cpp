@@ -83,43 +83,44 @@ HWY_INLINE Vec usable(Tag d, Vec colour, hn::Mask<Tag>& bad) {
   return hn::IfThenZeroElse(beyond, colour);
 }
 
+/// p and d of one channel.
+HWY_INLINE void combine(Tag d, Vec rendered, Vec target, float* sum, float* difference,
+                        hn::Mask<Tag>& bad) {
+  const Vec x = usable(d, rendered, bad);
+  const Vec y = usable(d, target, bad);
+  hn::StoreU(hn::Add(x, y), d, sum);
+  hn::StoreU(hn::Sub(x, y), d, difference);
+}
+
 bool readPixels(PixelRun<const float> rendered, PixelRun<const float> target, size_t count,
                 float* const sums[3], float* const differences[3]) {
   const Tag d;
   const size_t lanes = hn::Lanes(d);
   auto bad = hn::MaskFromVec(hn::Zero(d));
-  const auto read = [&](PixelRun<const float> xs, PixelRun<const float> ys, size_t i, Vec p[3],
-                        Vec q[3]) HWY_ATTR {
-    Vec x[3], y[3];
-    loadPixels(d, xs, i, x[0], x[1], x[2]);
-    loadPixels(d, ys, i, y[0], y[1], y[2]);
-    for (size_t c = 0; c < 3; ++c) {
-      x[c] = usable(d, x[c], bad);
-      y[c] = usable(d, y[c], bad);
-      p[c] = hn::Add(x[c], y[c]);
-      q[c] = hn::Sub(x[c], y[c]);
-    }
-  };
-  Vec p[3], q[3];
+  Vec x0, x1, x2, y0, y1, y2;
   size_t i = 0;
   for (; i + lanes <= count; i += lanes) {
-    read(rendered, target, i, p, q);
-    for (size_t c = 0; c < 3; ++c) {
-      hn::StoreU(p[c], d, sums[c] + i);
-      hn::StoreU(q[c], d, differences[c] + i);
-    }
+    loadPixels(d, rendered, i, x0, x1, x2);
+    loadPixels(d, target, i, y0, y1, y2);
+    combine(d, x0, y0, sums[0] + i, differences[0] + i, bad);
+    combine(d, x1, y1, sums[1] + i, differences[1] + i, bad);
+    combine(d, x2, y2, sums[2] + i, differences[2] + i, bad);
   }
   if (i < count) {
     Tail x(rendered.layout), y(target.layout);
     copyPixels(from(rendered, i), x.run, count - i);
     copyPixels(from(target, i), y.run, count - i);
-    read(x.read(), y.read(), 0, p, q);
-    HWY_ALIGN float buffer[kRowSlack];
+    loadPixels(d, x.read(), 0, x0, x1, x2);
+    loadPixels(d, y.read(), 0, y0, y1, y2);
+    float sum[3][kRowSlack], difference[3][kRowSlack];
+    combine(d, x0, y0, sum[0], difference[0], bad);
+    combine(d, x1, y1, sum[1], difference[1], bad);
+    combine(d, x2, y2, sum[2], difference[2], bad);
     for (size_t c = 0; c < 3; ++c) {
-      hn::Store(p[c], d, buffer);
-      for (size_t k = i; k < count; ++k) sums[c][k] = buffer[k - i];
-      hn::Store(q[c], d, buffer);
-      for (size_t k = i; k < count; ++k) differences[c][k] = buffer[k - i];
+      for (size_t k = i; k < count; ++k) {
+        sums[c][k] = sum[c][k - i];
+        differences[c][k] = difference[c][k - i];
+      }
     }
   }
   return hn::AllFalse(d, bad);
@@ -139,30 +140,67 @@ HWY_INLINE Vec blurredAlongRow(Tag d, const float* row) {
   return blurredAt(d, [&](size_t k) HWY_ATTR { return hn::LoadU(d, row + k); });
 }
 
-/// Blurred values and blurred squares of eleven rows.
-HWY_INLINE void blurWithSquares(Tag d, const float* const* rows, size_t i, float* mean,
-                                float* squares) {
-  const Vec centre = hn::LoadU(d, rows[kBlurReach] + i);
-  const Vec weighted = hn::Mul(hn::Set(d, kBlurWindow[kBlurReach]), centre);
-  Vec sum = weighted;
-  Vec square_sum = hn::Mul(weighted, centre);
-  for (size_t k = 0; k < kBlurReach; ++k) {
-    const Vec weight = hn::Set(d, kBlurWindow[k]);
-    const Vec a = hn::LoadU(d, rows[k] + i);
-    const Vec b = hn::LoadU(d, rows[kBlurTaps - 1 - k] + i);
-    sum = hn::MulAdd(weight, hn::Add(a, b), sum);
-    square_sum = hn::MulAdd(weight, hn::MulAdd(a, a, hn::Mul(b, b)), square_sum);
+/// Adds an input row's share to the output row kOut of a block, if it has one.
+template <size_t kRow, size_t kOut>
+HWY_INLINE void addTap(Tag d, Vec value, Vec& sum) {
+  if constexpr (kRow >= kOut && kRow - kOut < kBlurTaps) {
+    sum = hn::MulAdd(hn::Set(d, kBlurWindow[kRow - kOut]), value, sum);
   }
-  hn::StoreU(sum, d, mean + i);
-  hn::StoreU(square_sum, d, squares + i);
+}
+
+template <size_t kRow>
+HWY_INLINE void addTaps(Tag d, Vec value, Vec& sum0, Vec& sum1, Vec& sum2, Vec& sum3) {
+  addTap<kRow, 0>(d, value, sum0);
+  addTap<kRow, 1>(d, value, sum1);
+  addTap<kRow, 2>(d, value, sum2);
+  addTap<kRow, 3>(d, value, sum3);
+}
+
+template <size_t kRow>
+HWY_INLINE void addRows(Tag d, const float* const* rows, size_t i, Vec& sum0, Vec& sum1, Vec& sum2,
+                        Vec& sum3) {
+  if constexpr (kRow < kBlockInputs) {
+    addTaps<kRow>(d, hn::LoadU(d, rows[kRow] + i), sum0, sum1, sum2, sum3);
+    addRows<kRow + 1>(d, rows, i, sum0, sum1, sum2, sum3);
+  }
+}
+
+template <size_t kRow>
+HWY_INLINE void addRowsAndSquares(Tag d, const float* const* rows, size_t i, Vec& sum0, Vec& sum1,
+                                  Vec& sum2, Vec& sum3, Vec& square0, Vec& square1, Vec& square2,
+                                  Vec& square3) {
+  if constexpr (kRow < kBlockInputs) {
+    const Vec value = hn::LoadU(d, rows[kRow] + i);
+    addTaps<kRow>(d, value, sum0, sum1, sum2, sum3);
+    addTaps<kRow>(d, hn::Mul(value, value), square0, square1, square2, square3);
+    addRowsAndSquares<kRow + 1>(d, rows, i, sum0, sum1, sum2, sum3, square0, square1, square2,
+                                square3);
+  }
+}
+
+/// One of p and d: its blurred values are statistic `first`, its blurred squares two further on.
+HWY_INLINE void blurWithSquares(Tag d, const float* const* rows, size_t i, float* const* statistics,
+                                size_t first) {
+  static_assert(kBlockRows == 4);
+  Vec sum0 = hn::Zero(d), sum1 = hn::Zero(d), sum2 = hn::Zero(d), sum3 = hn::Zero(d);
+  Vec square0 = hn::Zero(d), square1 = hn::Zero(d), square2 = hn::Zero(d), square3 = hn::Zero(d);
+  addRowsAndSquares<0>(d, rows, i, sum0, sum1, sum2, sum3, square0, square1, square2, square3);
+  hn::StoreU(sum0, d, statistics[first] + i);
+  hn::StoreU(sum1, d, statistics[4 + first] + i);
+  hn::StoreU(sum2, d, statistics[8 + first] + i);
+  hn::StoreU(sum3, d, statistics[12 + first] + i);
+  hn::StoreU(square0, d, statistics[first + 2] + i);
+  hn::StoreU(square1, d, statistics[4 + first + 2] + i);
+  hn::StoreU(square2, d, statistics[8 + first + 2] + i);
+  hn::StoreU(square3, d, statistics[12 + first + 2] + i);
 }
 
 void blurStatistics(const float* const* sums, const float* const* differences, size_t count,
-                    float* const statistics[4]) {
+                    float* const* statistics) {
   const Tag d;
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
-    blurWithSquares(d, sums, i, statistics[0], statistics[2]);
-    blurWithSquares(d, differences, i, statistics[1], statistics[3]);
+    blurWithSquares(d, sums, i, statistics, 0);
+    blurWithSquares(d, differences, i, statistics, 1);
   }
 }
 
@@ -219,11 +257,15 @@ void evaluateSsim(const float* const statistics[4], const float* weights, size_t
   }
 }
 
-void blurColumns(const float* const* rows, size_t count, float* out) {
+void blurColumns(const float* const* rows, size_t count, float* const* out) {
   const Tag d;
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
-    hn::StoreU(blurredAt(d, [&](size_t k) HWY_ATTR { return hn::LoadU(d, rows[k] + i); }), d,
-               out + i);
+    Vec sum0 = hn::Zero(d), sum1 = hn::Zero(d), sum2 = hn::Zero(d), sum3 = hn::Zero(d);
+    addRows<0>(d, rows, i, sum0, sum1, sum2, sum3);
+    hn::StoreU(sum0, d, out[0] + i);
+    hn::StoreU(sum1, d, out[1] + i);
+    hn::StoreU(sum2, d, out[2] + i);
+    hn::StoreU(sum3, d, out[3] + i);
   }
 }
 
