@@ -19,36 +19,6 @@ constexpr size_t kBatchesKept = 32;
 /// At least ln(1e-4)/ln(1 - 1/255): more splats cannot blend before a pixel ends.
 constexpr size_t kMostBlended = 2352;
 constexpr double kGScale = 0.84932180028801904;  // sqrt(log2(e)/2): g = this times L d
-constexpr double kMaxFloatReach = 200.0;         // as in tiled_render.cpp
-
-BackwardSplat makeBackwardSplat(const VisibleSplat& splat, const BackwardTile& tile) {
-  constexpr double kSide = kTileSide;
-  const Footprint<double>& f = splat.footprint;
-  const double dx = tile.x0 + 0.5 - f.mean_x;
-  const double dy = tile.y0 + 0.5 - f.mean_y;
-  const double g0 = kGScale * (f.l00 * dx);
-  const double g1 = kGScale * (f.l10 * dx + f.l11 * dy);
-  const double l00 = kGScale * f.l00;
-  const double l10 = kGScale * f.l10;
-  const double l11 = kGScale * f.l11;
-  BackwardSplat out;
-  out.g0 = static_cast<float>(g0);
-  out.g1 = static_cast<float>(g1);
-  out.l00 = static_cast<float>(l00);
-  out.l10 = static_cast<float>(l10);
-  out.l11 = static_cast<float>(l11);
-  out.log2_opacity = splat.log2_opacity;
-  // |g| <= 2.83 where alpha >= 1/255, and g is off by at most 4 roundings of its largest term.
-  const double largest =
-      std::abs(g0) + std::abs(g1) + (kSide - 1) * (std::abs(l00) + std::abs(l10) + std::abs(l11));
-  out.doubt_low = static_cast<float>(2e-6 * largest + 4e-6);
-  out.doubt_high = largest > kMaxFloatReach ? kFinished : out.doubt_low;
-  std::copy(splat.colour, splat.colour + 3, out.colour);
-  out.row_begin = static_cast<uint32_t>(std::clamp(std::ceil(-dy - splat.half_y), 0.0, kSide));
-  out.row_end = static_cast<uint32_t>(std::clamp(std::floor(-dy + splat.half_y) + 1.0, 0.0, kSide));
-  out.rows = 0;
-  return out;
-}
 
 double valueAt(std::span<const float> values, size_t index, double otherwise) {
   return values.empty() ? otherwise : static_cast<double>(values[index]);
@@ -103,7 +73,7 @@ uint64_t TileBackward::memoryBound() {
          kMostBlended * sizeof(Blended);
 }
 
-void TileBackward::clearPixels(const BackwardTile& tile) {
+void TileBackward::clearPixels(const Tile& tile) {
   BackwardPixels& pixels = *pixels_;
   std::fill(std::begin(pixels.transmittance), std::end(pixels.transmittance), 1.0f);
   std::fill(std::begin(pixels.doubt), std::end(pixels.doubt), 0.0f);
@@ -115,17 +85,17 @@ void TileBackward::clearPixels(const BackwardTile& tile) {
   pixels.unfinished = tile.width * tile.height;
 }
 
-void TileBackward::makeBatch(const BackwardTile& tile, size_t batch) {
+void TileBackward::makeBatch(const Tile& tile, size_t batch) {
   BackwardSplat* out = &splats_[batch % kBatchesKept * kBatchSize];
   const size_t begin = batch * kBatchSize;
   const size_t end = std::min(begin + kBatchSize, tile.splats.size());
   for (size_t i = begin; i < end; ++i) {
-    *out++ = makeBackwardSplat(visible_[tile.splats[i]], tile);
+    *out++ = {makeTileSplat(visible_[tile.splats[i]], tile), 0};
   }
 }
 
 /// Returns how many splats from the front were looked at before every pixel had ended.
-size_t TileBackward::mark(const BackwardTile& tile) {
+size_t TileBackward::mark(const Tile& tile) {
   size_t begin = 0;
   for (; begin < tile.splats.size() && pixels_->unfinished > 0; begin += kBatchSize) {
     const size_t batch = begin / kBatchSize;
@@ -137,7 +107,7 @@ size_t TileBackward::mark(const BackwardTile& tile) {
   return std::min(begin, tile.splats.size());
 }
 
-void TileBackward::prepareTakeOff(const BackwardTile& tile, double* background) {
+void TileBackward::prepareTakeOff(const Tile& tile, double* background) {
   BackwardPixels& pixels = *pixels_;
   for (uint32_t y = 0; y < tile.height; ++y) {
     for (uint32_t x = 0; x < tile.width; ++x) {
@@ -165,7 +135,7 @@ void TileBackward::prepareTakeOff(const BackwardTile& tile, double* background) 
   }
 }
 
-void TileBackward::takeOff(const BackwardTile& tile, size_t used, float* sums) {
+void TileBackward::takeOff(const Tile& tile, size_t used, float* sums) {
   const size_t field_count = backwardFieldCount(loss_.mode);
   const size_t batches = (used + kBatchSize - 1) / kBatchSize;
   for (size_t batch = batches; batch-- > 0;) {
@@ -184,7 +154,7 @@ void TileBackward::takeOff(const BackwardTile& tile, size_t used, float* sums) {
   }
 }
 
-void TileBackward::takeOffInDouble(const BackwardTile& tile, uint32_t x, uint32_t y, float* sums,
+void TileBackward::takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, float* sums,
                                    double* background) {
   blended_.clear();
   PixelBlend<double> blend;
@@ -225,7 +195,7 @@ void TileBackward::takeOffInDouble(const BackwardTile& tile, uint32_t x, uint32_
   }
 }
 
-void TileBackward::run(const BackwardTile& tile, float* sums, double* background) {
+void TileBackward::run(const Tile& tile, float* sums, double* background) {
   const size_t field_count = backwardFieldCount(loss_.mode);
   clearPixels(tile);
   const size_t used = mark(tile);

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "splat/cpu/tile.h"
 #include "splat/cpu/tile_kernel_backward.h"
 #include "splat/render_backward.h"
 
@@ -18,12 +19,6 @@ struct PictureLoss {
   BackwardMode mode;
 };
 
-struct BackwardTile {
-  uint32_t x0, y0;                   ///< first pixel
-  uint32_t width, height;            ///< pixels inside the picture
-  std::span<const uint32_t> splats;  ///< indices of visible splats, front to back
-};
-
 /// Takes the splats off tiles, one tile after another; its memory does not grow with the tile.
 class TileBackward {
  public:
@@ -31,7 +26,7 @@ class TileBackward {
 
   /// Out: sums [tile.splats.size()][backwardFieldCount(mode)], one entry per splat of the tile,
   /// written whole. Adds dL/dbackground of the tile to `background` [3].
-  void run(const BackwardTile& tile, float* sums, double* background);
+  void run(const Tile& tile, float* sums, double* background);
 
   static uint64_t memoryBound();
 
@@ -42,13 +37,12 @@ class TileBackward {
     double alpha;
     double g0, g1;
   };
-  void clearPixels(const BackwardTile& tile);
-  size_t mark(const BackwardTile& tile);
-  void prepareTakeOff(const BackwardTile& tile, double* background);
-  void takeOff(const BackwardTile& tile, size_t used, float* sums);
-  void takeOffInDouble(const BackwardTile& tile, uint32_t x, uint32_t y, float* sums,
-                       double* background);
-  void makeBatch(const BackwardTile& tile, size_t batch);
+  void clearPixels(const Tile& tile);
+  size_t mark(const Tile& tile);
+  void prepareTakeOff(const Tile& tile, double* background);
+  void takeOff(const Tile& tile, size_t used, float* sums);
+  void takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, float* sums, double* background);
+  void makeBatch(const Tile& tile, size_t batch);
 
   const BackwardKernel& kernel_;
   const VisibleSplat* visible_;

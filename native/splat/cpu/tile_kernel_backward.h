@@ -13,14 +13,8 @@
 
 namespace stipple {
 
-/// A splat as one tile sees it; the geometry is that of TileSplat.
-struct BackwardSplat {
-  float g0, g1;
-  float l00, l10, l11;
-  float log2_opacity;
-  float doubt_low, doubt_high;
-  float colour[3];
-  uint32_t row_begin, row_end;
+/// A splat as one tile sees it.
+struct BackwardSplat : TileSplat {
   uint32_t rows;  ///< bit y: some pixel of row y shows the splat; filled by `mark`
 };
 

@@ -115,16 +115,6 @@ class ScratchPool {
   std::vector<std::unique_ptr<TileBackward>> idle_;
 };
 
-BackwardTile tileOf(const TileGrid& grid, const TileListGroup& group, size_t index) {
-  BackwardTile tile;
-  tile.x0 = static_cast<uint32_t>(index % grid.columns) * kTileSide;
-  tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
-  tile.width = std::min(kTileSide, grid.width - tile.x0);
-  tile.height = std::min(kTileSide, grid.height - tile.y0);
-  tile.splats = group.tile(index);
-  return tile;
-}
-
 /// Takes the splats off every tile; returns dL/dbackground.
 std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, const VisibleSplats& visible,
                                    const TileGrid& grid, const PictureLoss& loss,
@@ -148,7 +138,7 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, const VisibleSp
         std::unique_ptr<TileBackward> scratch = pool.take();
         for (size_t tile = first + from; tile < first + to; ++tile) {
           const uint64_t entry = entriesBefore(tile) - entriesBefore(first);
-          scratch->run(tileOf(grid, group, tile), tile_sums.data() + entry * field_count,
+          scratch->run(tileOf(grid, tile, group.tile(tile)), tile_sums.data() + entry * field_count,
                        &backgrounds[tile * 3]);
         }
         pool.giveBack(std::move(scratch));
