@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "data/image.h"
@@ -13,6 +14,7 @@
 #include "decode/surface_model.h"
 #include "density/octree_density.h"
 #include "io/camera_file.h"
+#include "splat/render.h"
 
 namespace stipple::api {
 
@@ -25,6 +27,13 @@ struct ContextState {
   void requireMemory(uint64_t bytes, const char* what) const;
 };
 using Context = std::shared_ptr<const ContextState>;
+
+/// What a renderer keeps from one picture to the next; its jobs hold a share.
+struct RendererMemory {
+  std::mutex mutex;  ///< held while a job uses the rest
+  RenderWorkspace workspace;
+  RenderResult result;
+};
 
 }  // namespace stipple::api
 
@@ -62,6 +71,7 @@ struct StippleViews {
 
 struct StippleRenderer {
   stipple::api::Context context;
+  std::shared_ptr<stipple::api::RendererMemory> memory;
 };
 
 struct StippleVolume {

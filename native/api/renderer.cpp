@@ -82,6 +82,19 @@ void deliverPicture(const Result& picture, const RenderSettings& settings,
   }
 }
 
+/// In the renderer's own memory, or in new where another job of the same renderer is using that.
+void renderTiledTo(RendererMemory& memory, const Instances& placed, const Camera& view,
+                   const RenderSettings& settings, const StippleRenderBuffers& out,
+                   Progress& progress) {
+  const std::unique_lock<std::mutex> lock(memory.mutex, std::try_to_lock);
+  if (lock.owns_lock()) {
+    renderTiled(placed.list, view, settings.options, memory.workspace, memory.result, &progress);
+    deliverPicture(memory.result, settings, out);
+  } else {
+    deliverPicture(renderTiled(placed.list, view, settings.options, &progress), settings, out);
+  }
+}
+
 }  // namespace
 
 extern "C" {
@@ -96,7 +109,8 @@ void stipple_render_options_init(StippleRenderOptions* options) {
 StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer) {
   return guarded([&] {
     require(context, "context");
-    require(renderer, "renderer") = new StippleRenderer{context->state};
+    require(renderer, "renderer") =
+        new StippleRenderer{context->state, std::make_shared<RendererMemory>()};
   });
 }
 
@@ -122,13 +136,13 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     settings.options.with_counts = out.counts != nullptr;
     renderer->context->requireMemory(renderMemoryBound(placed.list, view, settings.options),
                                      "this picture");
-    *job = startJob(renderer->context, [placed = std::move(placed), settings, view,
-                                        out](Progress& progress) {
+    *job = startJob(renderer->context, [memory = renderer->memory, placed = std::move(placed),
+                                        settings, view, out](Progress& progress) {
       if (settings.method == STIPPLE_RENDER_REFERENCE) {
         deliverPicture(renderReference(placed.list, view, settings.options, &progress), settings,
                        out);
       } else {
-        deliverPicture(renderTiled(placed.list, view, settings.options, &progress), settings, out);
+        renderTiledTo(*memory, placed, view, settings, out, progress);
       }
       return JobResult{};
     });

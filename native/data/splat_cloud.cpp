@@ -1,5 +1,6 @@
 #include "data/splat_cloud.h"
 
+#include <bit>
 #include <string>
 
 #include "base/error.h"
@@ -26,17 +27,50 @@ void SplatCloud::resize(size_t count) {
   sh.resize(count * shStride());
 }
 
-void validate(const SplatCloud& cloud, const char* what) {
-  const std::string name(what);
+void validateSizes(const SplatCloud& cloud, const char* what) {
   const size_t count = cloud.size();
   if (cloud.sh_degree < 0 || cloud.sh_degree > kMaxShDegree) {
-    fail(ErrorCode::kInvalidArgument, name + ": harmonic degree is " +
+    fail(ErrorCode::kInvalidArgument, std::string(what) + ": harmonic degree is " +
                                           std::to_string(cloud.sh_degree) + "; 0 to 4 is allowed");
   }
   requireSize(cloud.positions.size(), count * 3, what, "positions");
   requireSize(cloud.rotations.size(), count * 4, what, "rotations");
   requireSize(cloud.scales.size(), count * 3, what, "scales");
   requireSize(cloud.sh.size(), count * cloud.shStride(), what, "sh");
+}
+
+bool rowsAreValid(const SplatCloud& cloud, size_t begin, size_t end) {
+  // Without branches, so that the compiler makes vector code.
+  uint32_t wrong = 0;
+  const auto requireFiniteRows = [&](const std::vector<float>& values, size_t stride) {
+    for (size_t i = begin * stride; i < end * stride; ++i) {
+      // Carries into the sign where the exponent is all ones: infinity or NaN.
+      wrong |= (std::bit_cast<uint32_t>(values[i]) & 0x7fffffffu) + 0x00800000u;
+    }
+  };
+  requireFiniteRows(cloud.positions, 3);
+  requireFiniteRows(cloud.rotations, 4);
+  requireFiniteRows(cloud.scales, 3);
+  requireFiniteRows(cloud.opacities, 1);
+  requireFiniteRows(cloud.sh, cloud.shStride());
+  if (wrong & 0x80000000u) return false;
+  uint32_t outside = 0;
+  for (size_t i = begin * 3; i < end * 3; ++i) outside |= cloud.scales[i] < 0.0f ? 1u : 0u;
+  for (size_t i = begin; i < end; ++i) {
+    outside |= cloud.opacities[i] < 0.0f ? 1u : 0u;
+    outside |= cloud.opacities[i] > 1.0f ? 1u : 0u;
+    const float* q = &cloud.rotations[i * 4];
+    const uint32_t bits = std::bit_cast<uint32_t>(q[0]) | std::bit_cast<uint32_t>(q[1]) |
+                          std::bit_cast<uint32_t>(q[2]) | std::bit_cast<uint32_t>(q[3]);
+    outside |= (bits & 0x7fffffffu) == 0 ? 1u : 0u;
+  }
+  return outside == 0;
+}
+
+void validate(const SplatCloud& cloud, const char* what) {
+  const std::string name(what);
+  const size_t count = cloud.size();
+  validateSizes(cloud, what);
   requireFinite(cloud.positions.data(), count * 3, 3, (name + ": position of splat").c_str());
   requireFinite(cloud.rotations.data(), count * 4, 4, (name + ": rotation of splat").c_str());
   requireFinite(cloud.scales.data(), count * 3, 3, (name + ": scale of splat").c_str());
@@ -56,9 +90,9 @@ void validate(const SplatCloud& cloud, const char* what) {
     }
     for (size_t axis = 0; axis < 3; ++axis) {
       if (cloud.scales[i * 3 + axis] < 0) {
-        fail(ErrorCode::kInvalidArgument,
-             name + ": scale of splat " + std::to_string(i) + " is " +
-                 std::to_string(cloud.scales[i * 3 + axis]) + " m; it must not be negative");
+        fail(ErrorCode::kInvalidArgument, name + ": scale of splat " + std::to_string(i) + " is " +
+                                              std::to_string(cloud.scales[i * 3 + axis]) +
+                                              " m; it must not be negative");
       }
     }
   }

@@ -30,8 +30,8 @@ struct SplatCloud {
   std::vector<float> rotations;  ///< [N,4] w,x,y,z, unit
   std::vector<float> scales;     ///< [N,3] linear standard deviations, metres, >= 0
   std::vector<float> opacities;  ///< [N] 0..1
-  std::vector<float> sh;  ///< [N,(degree+1)^2,3] coefficient-major, colour fastest, DC first
-  int sh_degree = 0;      ///< 0..kMaxShDegree; 3DGS basis and signs
+  std::vector<float> sh;         ///< [N,(degree+1)^2,3] coefficient-major, colour fastest, DC first
+  int sh_degree = 0;             ///< 0..kMaxShDegree; 3DGS basis and signs
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kClassic;
 
@@ -43,5 +43,12 @@ struct SplatCloud {
 /// Refuses clouds whose arrays disagree in size or hold values outside their range (non-finite
 /// anywhere, negative scale, opacity outside 0..1, zero quaternion). `what` names the cloud.
 void validate(const SplatCloud& cloud, const char* what);
+
+/// The part of validate() that reads no values: degree and array sizes.
+void validateSizes(const SplatCloud& cloud, const char* what);
+
+/// True where validate() finds nothing wrong with the values of splats [begin, end). In: a cloud
+/// that validateSizes() accepts.
+bool rowsAreValid(const SplatCloud& cloud, size_t begin, size_t end);
 
 }  // namespace stipple

@@ -78,29 +78,31 @@ struct CovarianceFactor {
 };
 
 template <typename T>
-CovarianceFactor<T> factorise(const Eigen::Matrix<T, 2, 3>& a, T variance) {
-  using Row = Eigen::Matrix<T, 1, 5>;
-  const T s = std::sqrt(variance);
-  Row x, y;
-  x << a(0, 0), a(0, 1), a(0, 2), s, T(0);
-  y << a(1, 0), a(1, 1), a(1, 2), T(0), s;
-  CovarianceFactor<T> factor;
-  factor.r00 = x.norm();
-  if (!(factor.r00 > T(0))) return {T(0), T(0), T(0)};
-  x /= factor.r00;
-  factor.r01 = x.dot(y);
-  factor.r11 = (y - factor.r01 * x).norm();
-  return factor;
+T pick(bool condition, T yes, T no) {
+  return condition ? yes : no;
 }
 
 /// Splats thinner than this in the picture, pixels, are not drawn; only LowPass::kNone has such.
 constexpr double kMinWidth = 1e-6;
 
-/// Room for rounding in every bound of where a splat shows, pixels. Bounds only save work: a pixel
-/// inside them is still decided by splatAlpha.
+/// What the projection reads of a splat.
 template <typename T>
-T boundMargin(T bound) {
-  return T(0.01) + T(1e-7) * std::abs(bound);
+struct SplatGeometry {
+  T position[3];  ///< object space
+  T rotation[4];  ///< w,x,y,z
+  T scales[3];
+  T opacity;
+};
+
+#include "splat/projection_steps-inl.h"
+
+template <typename T>
+CovarianceFactor<T> factorise(const Eigen::Matrix<T, 2, 3>& a, T variance) {
+  const T x[3] = {a(0, 0), a(0, 1), a(0, 2)};
+  const T y[3] = {a(1, 0), a(1, 1), a(1, 2)};
+  const CovarianceFactor<T> factor = factoriseRows(x, y, std::sqrt(variance));
+  if (!(factor.r00 > T(0))) return {T(0), T(0), T(0)};
+  return factor;
 }
 
 /// Projects splat (position [3] object space, rotation w,x,y,z, scales [3]) under the
@@ -111,53 +113,20 @@ bool project(const View<T>& view, const Eigen::Matrix<T, 3, 3>& linear,
              const Eigen::Matrix<T, 3, 1>& translation, const float* position,
              const float* rotation, const float* scales, float opacity, LowPass low_pass,
              Projected<T>& out) {
-  if (!(T(opacity) >= T(kMinAlpha))) return false;
-  const Eigen::Matrix<T, 3, 1> centre =
-      linear * Eigen::Matrix<T, 3, 1>(T(position[0]), T(position[1]), T(position[2])) + translation;
-  const T z = centre[2];
-  if (!(z >= view.near_plane && z <= view.far_plane)) return false;
-
-  const Eigen::Matrix<T, 3, 3> axes = linear * scaledAxes<T>(rotation, scales);
-  Eigen::Matrix<T, 2, 3> a;
-  Footprint<T>& footprint = out.footprint;
-  if (view.perspective) {
-    const T slope_x = centre[0] / z;
-    const T slope_y = centre[1] / z;
-    footprint.mean_x = view.fx * slope_x + view.cx;
-    footprint.mean_y = view.fy * slope_y + view.cy;
-    const T held_x = std::clamp(slope_x, view.slope_min[0], view.slope_max[0]);
-    const T held_y = std::clamp(slope_y, view.slope_min[1], view.slope_max[1]);
-    a.row(0) = (view.fx / z) * (axes.row(0) - held_x * axes.row(2));
-    a.row(1) = (view.fy / z) * (axes.row(1) - held_y * axes.row(2));
-  } else {
-    footprint.mean_x = view.fx * centre[0] + view.cx;
-    footprint.mean_y = view.fy * centre[1] + view.cy;
-    a.row(0) = view.fx * axes.row(0);
-    a.row(1) = view.fy * axes.row(1);
-  }
-
-  const CovarianceFactor<T> factor = factorise(a, lowPassVariance<T>(low_pass));
-  if (!(factor.r00 > T(kMinWidth) && factor.r11 > T(kMinWidth))) return false;
-  footprint.opacity = T(opacity);
-  if (low_pass == LowPass::kMip) {
-    const CovarianceFactor<T> sharp = factorise(a, T(0));
-    footprint.opacity *= (sharp.r00 / factor.r00) * (sharp.r11 / factor.r11);
-    if (!(footprint.opacity >= T(kMinAlpha))) return false;
-  }
-  footprint.l00 = T(1) / factor.r00;
-  footprint.l11 = T(1) / factor.r11;
-  footprint.l10 = -(factor.r01 / factor.r00) / factor.r11;
-
-  // q/2 <= ln(255 o) is an ellipse; its half sides are sqrt(2 ln(255 o)) standard deviations.
-  const T reach = std::sqrt(T(2) * std::log(footprint.opacity / T(kMinAlpha)));
-  const T sigma_y = std::sqrt(factor.r01 * factor.r01 + factor.r11 * factor.r11);
-  out.half_x = reach * factor.r00 + boundMargin(reach * factor.r00);
-  out.half_y = reach * sigma_y + boundMargin(reach * sigma_y);
-  out.depth = z;
-  return footprint.mean_x + out.half_x >= T(0.5) &&
-         footprint.mean_x - out.half_x <= view.width - T(0.5) &&
-         footprint.mean_y + out.half_y >= T(0.5) &&
-         footprint.mean_y - out.half_y <= view.height - T(0.5);
+  SplatGeometry<T> splat;
+  std::copy(position, position + 3, splat.position);
+  std::copy(rotation, rotation + 4, splat.rotation);
+  std::copy(scales, scales + 3, splat.scales);
+  splat.opacity = T(opacity);
+  if (!(splat.opacity >= T(kMinAlpha))) return false;
+  T centre[3];
+  placePoint(linear, translation, splat.position, centre);
+  if (!(centre[2] >= view.near_plane && centre[2] <= view.far_plane)) return false;
+  if (!(projectSteps(view, linear, centre, splat, low_pass, out) > T(kMinWidth))) return false;
+  const Footprint<T>& f = out.footprint;
+  return f.opacity >= T(kMinAlpha) && f.mean_x + out.half_x >= T(0.5) &&
+         f.mean_x - out.half_x <= view.width - T(0.5) && f.mean_y + out.half_y >= T(0.5) &&
+         f.mean_y - out.half_y <= view.height - T(0.5);
 }
 
 }  // namespace stipple

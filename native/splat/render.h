@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -61,7 +62,41 @@ struct RenderResult {
 RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
                          const RenderOptions& options, Progress* progress = nullptr);
 
-/// Upper bound of the bytes that renderTiled allocates, its result included.
+/// Memory of renderTiled that the next picture uses again: a second picture of the same size
+/// allocates nothing. One picture at a time.
+class RenderWorkspace {
+ public:
+  RenderWorkspace();
+  ~RenderWorkspace();
+  RenderWorkspace(RenderWorkspace&&) noexcept;
+  RenderWorkspace& operator=(RenderWorkspace&&) noexcept;
+
+  uint64_t bytes() const;  ///< held now
+
+  struct Arrays;
+  Arrays& arrays() { return *arrays_; }
+
+ private:
+  std::unique_ptr<Arrays> arrays_;
+};
+
+/// renderTiled into a result and a workspace that may have served before.
+void renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
+                 const RenderOptions& options, RenderWorkspace& workspace, RenderResult& result,
+                 Progress* progress = nullptr);
+
+/// Upper bounds of the bytes that renderTiled allocates, by what they grow with.
+struct RenderMemory {
+  uint64_t splat_bytes = 0;   ///< at most 200 per splat, and 9 MiB
+  uint64_t pixel_bytes = 0;   ///< at most 64 per pixel: counters of the tiles
+  uint64_t pair_bytes = 0;    ///< 4 per pair of splat and tile, at most 136 MB or 4 per splat
+  uint64_t result_bytes = 0;  ///< the picture itself
+  uint64_t other_bytes = 0;   ///< instances
+};
+RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera& camera,
+                          const RenderOptions& options);
+
+/// Their sum: upper bound of the bytes that renderTiled allocates, its result included.
 uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
                            const RenderOptions& options);
 

@@ -1,6 +1,7 @@
 #include "splat/scene.h"
 
 #include <bit>
+#include <cstdio>
 #include <limits>
 #include <string>
 
@@ -49,6 +50,7 @@ PlacedCloud place(const SplatInstance& instance, const Camera& camera,
   placed.eye = camera.model == CameraModel::kPerspective
                    ? Vec3d(to_object * (cameraCentre(camera) - origin))
                    : Vec3d(to_object * to_view.row(2).transpose());
+  placed.instance = 0;
   placed.first_index = 0;
   placed.low_pass = lowPassOf(cloud, options.low_pass);
   placed.sh_degree = std::min(cloud.sh_degree, options.sh_degree_limit);
@@ -57,23 +59,27 @@ PlacedCloud place(const SplatInstance& instance, const Camera& camera,
   return placed;
 }
 
+std::string nameOf(size_t instance) {
+  return "instance " + std::to_string(instance);
+}
+
 }  // namespace
 
-PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& camera,
-                       const RenderOptions& options) {
+void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& camera,
+                      const RenderOptions& options, PlacedScene& scene) {
   validate(camera);
   validateOptions(options);
-  PlacedScene scene;
   scene.view = makeView<double>(camera);
-  const SplatCloud* checked = nullptr;
+  scene.clouds.clear();
+  scene.splat_count = 0;
   for (size_t i = 0; i < instances.size(); ++i) {
     const SplatInstance& instance = instances[i];
-    const std::string name = "instance " + std::to_string(i);
+    const std::string name = nameOf(i);
     if (!instance.cloud) fail(ErrorCode::kInvalidArgument, name + " has no cloud");
-    validateAffine(instance.object_to_world, (name + ": matrix").c_str());
-    // Many copies of one cloud usually follow each other.
-    if (instance.cloud != checked) validate(*instance.cloud, name.c_str());
-    checked = instance.cloud;
+    char matrix_name[48];  // no string: drawing again allocates nothing
+    std::snprintf(matrix_name, sizeof(matrix_name), "%s: matrix", name.c_str());
+    validateAffine(instance.object_to_world, matrix_name);
+    validateSizes(*instance.cloud, name.c_str());
     if (instance.cloud->size() == 0) continue;
     if (options.blend_space == BlendSpace::kAsTrained && !scene.clouds.empty() &&
         scene.clouds.front().cloud->colour_space != instance.cloud->colour_space) {
@@ -83,6 +89,7 @@ PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& c
                "be composited as trained; choose scene linear blending");
     }
     PlacedCloud placed = place(instance, camera, options);
+    placed.instance = i;
     placed.first_index = scene.splat_count;
     scene.splat_count += instance.cloud->size();
     scene.clouds.push_back(placed);
@@ -90,6 +97,24 @@ PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& c
   if (scene.splat_count > std::numeric_limits<uint32_t>::max()) {
     fail(ErrorCode::kUnsupported, "the picture holds " + std::to_string(scene.splat_count) +
                                       " splats; at most 4294967295 can be drawn together");
+  }
+}
+
+void refuseCloud(const PlacedCloud& placed) {
+  validate(*placed.cloud, nameOf(placed.instance).c_str());
+  fail(ErrorCode::kInvalidArgument,
+       nameOf(placed.instance) + " changed while it was being drawn; it must stay as it is");
+}
+
+PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& camera,
+                       const RenderOptions& options) {
+  PlacedScene scene;
+  placeSceneUnread(instances, camera, options, scene);
+  const SplatCloud* checked = nullptr;
+  for (const PlacedCloud& placed : scene.clouds) {
+    // Many copies of one cloud usually follow each other.
+    if (placed.cloud != checked) validate(*placed.cloud, nameOf(placed.instance).c_str());
+    checked = placed.cloud;
   }
   return scene;
 }

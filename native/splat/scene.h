@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct PlacedCloud {
   Vec3d translation;  ///< object to view, metres
   /// Perspective: the camera's centre in object space. Orthographic: the viewing direction there.
   Vec3d eye;
+  size_t instance;       ///< of the caller's list
   uint64_t first_index;  ///< of its splat 0 among all splats of the picture
   LowPass low_pass;      ///< never kFromCloud
   int sh_degree;
@@ -38,6 +40,15 @@ struct PlacedScene {
 PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& camera,
                        const RenderOptions& options);
 
+/// The same into memory that may have held a scene, except that the splats' values are not read:
+/// whoever reads them first must hold each row to rowsAreValid, and call refuseCloud where one is
+/// not.
+void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& camera,
+                      const RenderOptions& options, PlacedScene& scene);
+
+/// Throws what placeScene would have thrown of this cloud.
+[[noreturn]] void refuseCloud(const PlacedCloud& placed);
+
 /// Index into scene.clouds of the instance that owns the splat.
 size_t cloudOfSplat(const PlacedScene& scene, uint64_t splat);
 
@@ -50,6 +61,13 @@ inline bool projectSplat(const PlacedScene& scene, const PlacedCloud& placed, si
                  placed.low_pass, out);
 }
 
+/// From the sum of the harmonics + 0.5 to the colour that is blended.
+template <typename T>
+T finishColour(const PlacedCloud& placed, T sum) {
+  sum = std::clamp(sum, T(0), T(1e12));
+  return placed.linearise ? srgbToLinear(sum) : sum;
+}
+
 /// Colour of a splat in the blending space: harmonics in the viewing direction, brought into object
 /// space, + 0.5, held to 0..1e12 (above, the linearised colour could leave float32). Out: colour
 /// [3].
@@ -60,23 +78,25 @@ void splatColour(const PlacedScene& scene, const PlacedCloud& placed, size_t ind
   T basis[25];
   basis[0] = T(kShC0);
   if (placed.sh_degree > 0) {
-    Vec3d direction = placed.eye;
-    if (scene.view.perspective) {
-      const float* position = &cloud.positions[index * 3];
-      direction = Vec3d(static_cast<double>(position[0]), static_cast<double>(position[1]),
-                        static_cast<double>(position[2])) -
-                  placed.eye;
+    double direction[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double eye = placed.eye[axis];
+      const size_t at = index * 3 + static_cast<size_t>(axis);
+      direction[axis] =
+          scene.view.perspective ? static_cast<double>(cloud.positions[at]) - eye : eye;
     }
     // A splat within near..far is never at the camera's centre, so the length is not zero.
-    direction /= direction.norm();
-    harmonicBasis(placed.sh_degree, T(direction[0]), T(direction[1]), T(direction[2]), basis);
+    const double inverse =
+        1.0 / std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] +
+                        direction[2] * direction[2]);
+    harmonicBasis(placed.sh_degree, T(direction[0] * inverse), T(direction[1] * inverse),
+                  T(direction[2] * inverse), basis);
   }
   const size_t count = shCoefficientCount(placed.sh_degree);
   for (size_t c = 0; c < 3; ++c) {
     T sum = T(0.5);
     for (size_t k = 0; k < count; ++k) sum += basis[k] * T(sh[k * 3 + c]);
-    sum = std::clamp(sum, T(0), T(1e12));
-    colour[c] = placed.linearise ? srgbToLinear(sum) : sum;
+    colour[c] = finishColour(placed, sum);
   }
 }
 

@@ -1,6 +1,7 @@
 #include "splat/cpu/tile_lists.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "base/parallel.h"
@@ -30,10 +31,12 @@ struct TileRange {
 TileRange tilesBetween(double low, double high, uint32_t tile_count) {
   constexpr double kSide = kTileSide;
   const double count = tile_count;
-  // Held in range as doubles: the ends may be far outside that of an integer.
-  const double first = std::clamp(std::ceil((low - (kSide - 0.5)) / kSide), 0.0, count);
-  const double last = std::clamp(std::floor((high - 0.5) / kSide), -1.0, count - 1.0);
-  return {static_cast<int64_t>(first), static_cast<int64_t>(last)};
+  // Held in range as doubles: the ends may be far outside that of an integer. Then whole parts by
+  // conversion, which is one instruction everywhere, unlike std::floor.
+  const double first = std::clamp((low - (kSide - 0.5)) / kSide, 0.0, count);
+  const double after = std::clamp((high - 0.5) / kSide + 1.0, 0.0, count);
+  const int64_t below = static_cast<int64_t>(first);
+  return {below + (static_cast<double>(below) < first ? 1 : 0), static_cast<int64_t>(after) - 1};
 }
 
 /// Calls visit(tile_row, first_column, last_column) for every tile row that the splat meets.
@@ -74,6 +77,26 @@ void forEachTileSpan(const VisibleSplat& splat, const TileGrid& grid, Visit visi
   }
 }
 
+/// Calls visit(tile_row, first_column, last_column) as forEachTileSpan, by the packed span.
+template <typename Visit>
+void forEachTileOf(const VisibleSplats& visible, size_t i, const TileGrid& grid, Visit visit) {
+  const TileSpan span = visible.spans[i];
+  if (span >= kWideSpan) {
+    forEachTileSpan(visible.splats[i], grid, [&](int64_t row, int64_t first, int64_t last) {
+      const size_t start = static_cast<size_t>(row) * grid.columns;
+      for (int64_t column = first; column <= last; ++column) {
+        visit(start + static_cast<size_t>(column));
+      }
+    });
+    return;
+  }
+  const size_t first = (span >> 48) * grid.columns + (span >> 32 & 0xffff);
+  for (uint32_t left = static_cast<uint32_t>(span); left != 0; left &= left - 1) {
+    const uint32_t bit = static_cast<uint32_t>(std::countr_zero(left));
+    visit(first + size_t{bit / kSpanColumns} * grid.columns + bit % kSpanColumns);
+  }
+}
+
 size_t chunkCount(size_t splats, size_t tiles) {
   const size_t wanted = std::clamp<size_t>(splats / kMinChunkSplats, 1, kMaxChunks);
   return std::clamp<size_t>(kMaxCounters / tiles, 1, wanted);
@@ -81,26 +104,50 @@ size_t chunkCount(size_t splats, size_t tiles) {
 
 }  // namespace
 
+TileSpan tileSpanOf(const VisibleSplat& splat, const TileGrid& grid) {
+  int64_t first_row = -1, first_column = 0;
+  bool fits = true;
+  uint32_t mask = 0;
+  // The first row need not begin leftmost: columns count from the box.
+  const double left = splat.footprint.mean_x - splat.half_x;
+  first_column = tilesBetween(left, left, grid.columns).last;
+  first_column = std::max<int64_t>(first_column, 0);
+  forEachTileSpan(splat, grid, [&](int64_t row, int64_t first, int64_t last) {
+    if (first_row < 0) first_row = row;
+    if (row - first_row >= kSpanRows || first < first_column ||
+        last - first_column >= kSpanColumns) {
+      fits = false;
+      return;
+    }
+    const uint32_t columns = ((2u << (last - first)) - 1u) << (first - first_column);
+    mask |= columns << static_cast<uint32_t>(row - first_row) * kSpanColumns;
+  });
+  if (!fits) return kWideSpan;
+  if (mask == 0) return 0;
+  return static_cast<uint64_t>(first_row) << 48 | static_cast<uint64_t>(first_column) << 32 | mask;
+}
+
 void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progress* progress,
+                      TileListMemory& memory,
                       const std::function<void(const TileListGroup&)>& use) {
   const size_t tiles = grid.tileCount();
   const size_t chunks = chunkCount(visible.count, tiles);
   const size_t chunk_size = std::max<size_t>(1, (visible.count + chunks - 1) / chunks);
 
-  std::vector<uint32_t> counts(chunks * tiles, 0);  // [chunk][tile]
-  parallelFor(visible.count, chunk_size, [&](size_t begin, size_t end) {
+  std::vector<uint32_t>& counts = memory.counts;
+  counts.assign(chunks * tiles, 0);
+  const auto count_chunk = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     uint32_t* count = &counts[begin / chunk_size * tiles];
     for (size_t i = begin; i < end; ++i) {
-      forEachTileSpan(visible.splats[i], grid, [&](int64_t row, int64_t first, int64_t last) {
-        uint32_t* tile = count + static_cast<size_t>(row) * grid.columns;
-        for (int64_t column = first; column <= last; ++column) ++tile[column];
-      });
+      forEachTileOf(visible, i, grid, [&](size_t tile) { ++count[tile]; });
     }
-  });
+  };
+  parallelFor(visible.count, chunk_size, std::cref(count_chunk));
 
-  TileListGroup group;
-  std::vector<uint64_t> cursors;  // [chunk][tile of the group]
+  TileListGroup& group = memory.group;
+  std::vector<uint64_t>& cursors = memory.cursors;
+  group.offsets.reserve(tiles + 1);
   for (group.first_tile = 0; group.first_tile < tiles; group.first_tile = group.end_tile) {
     group.offsets.assign(1, 0);
     group.end_tile = group.first_tile;
@@ -122,35 +169,38 @@ void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progre
         cursor += counts[chunk * tiles + group.first_tile + tile];
       }
     }
-    group.entries.resize(group.offsets.back());
-    parallelFor(visible.count, chunk_size, [&](size_t begin, size_t end) {
+    uint32_t* entries = group.entries.resize(group.offsets.back());
+    const auto list_chunk = [&](size_t begin, size_t end) {
       if (progress) progress->throwIfCancelled();
       uint64_t* cursor = &cursors[begin / chunk_size * group_tiles];
       for (size_t i = begin; i < end; ++i) {
         const uint32_t splat = static_cast<uint32_t>(i);
-        forEachTileSpan(visible.splats[i], grid, [&](int64_t row, int64_t first, int64_t last) {
-          const size_t row_start = static_cast<size_t>(row) * grid.columns;
-          const size_t from = std::max(row_start + static_cast<size_t>(first), group.first_tile);
-          const size_t to = std::min(row_start + static_cast<size_t>(last) + 1, group.end_tile);
-          for (size_t tile = from; tile < to; ++tile) {
-            group.entries[cursor[tile - group.first_tile]++] = splat;
-          }
+        forEachTileOf(visible, i, grid, [&](size_t tile) {
+          // One comparison: a tile before the group wraps around.
+          const size_t own = tile - group.first_tile;
+          if (own < group_tiles) entries[cursor[own]++] = splat;
         });
       }
-    });
+    };
+    parallelFor(visible.count, chunk_size, std::cref(list_chunk));
     use(group);
   }
 }
 
-uint64_t tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid) {
+void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progress* progress,
+                      const std::function<void(const TileListGroup&)>& use) {
+  TileListMemory memory;
+  forEachTileGroup(visible, grid, progress, memory, use);
+}
+
+TileListsBound tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid) {
   const uint64_t tiles = grid.tileCount();
   const uint64_t chunks = chunkCount(splat_count, tiles);
   const uint64_t all = splat_count * tiles;  // at most 2^32 * 2^24
   const uint64_t entries = std::min(all, std::max(splat_count, kGroupEntries));
-  // Twice: a vector that grows holds the old and the new array for a moment.
-  return 2 * (entries * sizeof(uint32_t) + chunks * tiles * sizeof(uint64_t) +
-              (tiles + 1) * sizeof(uint64_t)) +
-         chunks * tiles * sizeof(uint32_t);
+  // Pages of 2 MiB round up.
+  return {entries * sizeof(uint32_t) + (uint64_t{2} << 20),
+          chunks * tiles * (sizeof(uint64_t) + sizeof(uint32_t)) + (tiles + 1) * sizeof(uint64_t)};
 }
 
 }  // namespace stipple

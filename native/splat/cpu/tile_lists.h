@@ -10,34 +10,24 @@
 
 namespace stipple {
 
-constexpr uint32_t kTileSide = 16;
-constexpr uint32_t kTilePixelCount = kTileSide * kTileSide;
-
-struct TileGrid {
-  uint32_t width;  ///< pixels
-  uint32_t height;
-  uint32_t columns;  ///< tiles
-  uint32_t rows;
-
-  TileGrid(uint32_t picture_width, uint32_t picture_height)
-      : width(picture_width),
-        height(picture_height),
-        columns((picture_width + kTileSide - 1) / kTileSide),
-        rows((picture_height + kTileSide - 1) / kTileSide) {}
-  size_t tileCount() const { return static_cast<size_t>(columns) * rows; }
-};
-
 /// Indices of the visible splats of tiles [first_tile, end_tile), each tile front to back.
 struct TileListGroup {
   size_t first_tile = 0;
   size_t end_tile = 0;
   std::vector<uint64_t> offsets;  ///< [end_tile - first_tile + 1] into entries
-  std::vector<uint32_t> entries;
+  ReusedArray<uint32_t> entries;
 
   std::span<const uint32_t> tile(size_t index) const {
     const uint64_t begin = offsets[index - first_tile];
-    return {entries.data() + begin, offsets[index - first_tile + 1] - begin};
+    return {entries.get() + begin, offsets[index - first_tile + 1] - begin};
   }
+};
+
+/// What forEachTileGroup works with; kept for the next picture.
+struct TileListMemory {
+  std::vector<uint32_t> counts;   ///< [chunk][tile]
+  std::vector<uint64_t> cursors;  ///< [chunk][tile of the group]
+  TileListGroup group;
 };
 
 /// Lists the splats of every tile and hands them to `use`, a group of tiles at a time, so that the
@@ -48,7 +38,16 @@ struct TileListGroup {
 void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progress* progress,
                       const std::function<void(const TileListGroup&)>& use);
 
-/// Bytes that forEachTileGroup allocates at most.
-uint64_t tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid);
+/// The same in memory that may hold an earlier picture's lists.
+void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progress* progress,
+                      TileListMemory& memory, const std::function<void(const TileListGroup&)>& use);
+
+/// Bytes that forEachTileGroup allocates at most: for the pairs of splat and tile themselves, and
+/// for everything else.
+struct TileListsBound {
+  uint64_t pair_bytes;
+  uint64_t other_bytes;
+};
+TileListsBound tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid);
 
 }  // namespace stipple

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 
 #include "base/parallel.h"
 #include "splat/cpu/tile.h"
@@ -113,16 +114,14 @@ void renderTile(const VisibleSplat* visible, const Tile& tile, TileKernel kernel
   writePixels(tile, pixels, options, result);
 }
 
-RenderResult makeResult(const Camera& camera, const RenderOptions& options) {
-  RenderResult result;
+void prepareResult(const Camera& camera, const RenderOptions& options, RenderResult& result) {
   result.width = camera.width;
   result.height = camera.height;
   const size_t pixel_count = static_cast<size_t>(camera.width) * camera.height;
   result.colour.resize(pixel_count * 4);
-  if (options.with_depth) result.depth.resize(pixel_count);
-  if (options.with_median_depth) result.median_depth.resize(pixel_count);
-  if (options.with_counts) result.counts.resize(pixel_count);
-  return result;
+  result.depth.resize(options.with_depth ? pixel_count : 0);
+  result.median_depth.resize(options.with_median_depth ? pixel_count : 0);
+  result.counts.resize(options.with_counts ? pixel_count : 0);
 }
 
 uint64_t resultBytes(const Camera& camera, const RenderOptions& options) {
@@ -134,19 +133,37 @@ uint64_t resultBytes(const Camera& camera, const RenderOptions& options) {
 
 }  // namespace
 
-RenderResult renderTiledWith(TileKernel kernel, std::span<const SplatInstance> instances,
-                             const Camera& camera, const RenderOptions& options,
-                             Progress* progress) {
-  const PlacedScene scene = placeScene(instances, camera, options);
+RenderWorkspace::RenderWorkspace() : arrays_(std::make_unique<Arrays>()) {}
+RenderWorkspace::~RenderWorkspace() = default;
+RenderWorkspace::RenderWorkspace(RenderWorkspace&&) noexcept = default;
+RenderWorkspace& RenderWorkspace::operator=(RenderWorkspace&&) noexcept = default;
+
+uint64_t RenderWorkspace::bytes() const {
+  const VisibleSplats& visible = arrays_->visible;
+  const TileListMemory& lists = arrays_->lists;
+  return arrays_->scene.clouds.capacity() * sizeof(PlacedCloud) + visible.splats.bytes() +
+         visible.slots.bytes() + visible.items[0].bytes() + visible.items[1].bytes() +
+         (visible.filled.capacity() + visible.digits.capacity() + lists.counts.capacity()) *
+             sizeof(uint32_t) +
+         (lists.cursors.capacity() + lists.group.offsets.capacity()) * sizeof(uint64_t) +
+         lists.group.entries.bytes();
+}
+
+void renderTiledWith(TileKernel kernel, Projector projector,
+                     std::span<const SplatInstance> instances, const Camera& camera,
+                     const RenderOptions& options, RenderWorkspace& workspace, RenderResult& result,
+                     Progress* progress) {
+  auto& [scene, visible, lists] = workspace.arrays();
+  placeSceneUnread(instances, camera, options, scene);
   advance(progress, 0.0, "Projecting splats");
-  const VisibleSplats visible = findVisibleSplats(scene, progress);
-  RenderResult result = makeResult(camera, options);
+  findVisibleSplats(projector, scene, progress, visible);
+  prepareResult(camera, options, result);
   result.visible_count = visible.count;
 
   const TileGrid grid(camera.width, camera.height);
   std::atomic<size_t> finished_tiles{0};
-  forEachTileGroup(visible, grid, progress, [&](const TileListGroup& group) {
-    parallelFor(group.end_tile - group.first_tile, 1, [&](size_t begin, size_t end) {
+  const auto render_group = [&](const TileListGroup& group) {
+    const auto render_tiles = [&](size_t begin, size_t end) {
       for (size_t index = group.first_tile + begin; index < group.first_tile + end; ++index) {
         if (progress) progress->throwIfCancelled();
         const Tile tile = tileOf(grid, index, group.tile(index));
@@ -157,9 +174,27 @@ RenderResult renderTiledWith(TileKernel kernel, std::span<const SplatInstance> i
                   "Blending splats");
         }
       }
-    });
-  });
+    };
+    parallelFor(group.end_tile - group.first_tile, 1, std::cref(render_tiles));
+  };
+  forEachTileGroup(visible, grid, progress, lists, std::cref(render_group));
+}
+
+RenderResult renderTiledWith(TileKernel kernel, std::span<const SplatInstance> instances,
+                             const Camera& camera, const RenderOptions& options,
+                             Progress* progress) {
+  RenderWorkspace workspace;
+  RenderResult result;
+  renderTiledWith(kernel, chosenProjector(), instances, camera, options, workspace, result,
+                  progress);
   return result;
+}
+
+void renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
+                 const RenderOptions& options, RenderWorkspace& workspace, RenderResult& result,
+                 Progress* progress) {
+  renderTiledWith(chosenTileKernel(), chosenProjector(), instances, camera, options, workspace,
+                  result, progress);
 }
 
 RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
@@ -167,15 +202,28 @@ RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera&
   return renderTiledWith(chosenTileKernel(), instances, camera, options, progress);
 }
 
-uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
-                           const RenderOptions& options) {
+RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera& camera,
+                          const RenderOptions& options) {
   uint64_t splat_count = 0;
   for (const SplatInstance& instance : instances) {
     if (instance.cloud) splat_count += instance.cloud->size();
   }
-  return visibleSplatsMemoryBound(splat_count) +
-         tileListsMemoryBound(splat_count, TileGrid(camera.width, camera.height)) +
-         resultBytes(camera, options) + 2 * instances.size() * sizeof(PlacedCloud);
+  const TileListsBound lists =
+      tileListsMemoryBound(splat_count, TileGrid(camera.width, camera.height));
+  RenderMemory memory;
+  memory.splat_bytes = visibleSplatsMemoryBound(splat_count);
+  memory.pair_bytes = lists.pair_bytes;
+  memory.pixel_bytes = lists.other_bytes;
+  memory.result_bytes = resultBytes(camera, options);
+  memory.other_bytes = 2 * instances.size() * sizeof(PlacedCloud);
+  return memory;
+}
+
+uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
+                           const RenderOptions& options) {
+  const RenderMemory memory = renderMemory(instances, camera, options);
+  return memory.splat_bytes + memory.pixel_bytes + memory.pair_bytes + memory.result_bytes +
+         memory.other_bytes;
 }
 
 }  // namespace stipple

@@ -1,8 +1,8 @@
 #include "splat/cpu/visible_splats.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <bit>
+#include <functional>
 
 #include "base/parallel.h"
 
@@ -10,106 +10,182 @@ namespace stipple {
 
 namespace {
 
-constexpr size_t kProjectionGrain = 4096;
+/// Splats of one task; their inputs (up to 340 bytes each) stay in the second-level cache between
+/// the check of their values and the projection.
+constexpr size_t kRangeSplats = 2048;
+/// Chunks of the sort; more would cost more counters than two or a few dozen threads gain.
+constexpr size_t kSortChunks = 32;
+constexpr uint32_t kMaxDigitBits = 12;
+constexpr size_t kMaxDigits = size_t{1} << kMaxDigitBits;
 
-struct Keyed {
-  uint32_t key;
-  uint32_t slot;
-};
-
-VisibleSplat makeVisible(const PlacedScene& scene, const PlacedCloud& placed, size_t index,
-                         const Projected<double>& projected) {
-  VisibleSplat splat;
-  splat.footprint = projected.footprint;
-  splat.half_x = projected.half_x;
-  splat.half_y = projected.half_y;
-  splat.log2_opacity = static_cast<float>(std::log2(projected.footprint.opacity));
-  splat.depth = static_cast<float>(std::min(projected.depth, 1e38));
-  splatColour(scene, placed, index, splat.colour);
-  splat.index = static_cast<uint32_t>(placed.first_index + index);
-  return splat;
-}
-
-/// Projects splats [begin, end) into slots from `begin` on; their keys go to `keyed`, same places.
-/// Returns how many are visible.
-size_t projectRange(const PlacedScene& scene, size_t begin, size_t end, VisibleSplat* slots,
-                    Keyed* keyed) {
-  size_t filled = begin;
-  size_t cloud = cloudOfSplat(scene, begin);
-  for (size_t i = begin; i < end; ++i) {
-    while (i - scene.clouds[cloud].first_index >= scene.clouds[cloud].cloud->size()) ++cloud;
+/// Checks and projects splats [begin, end) into slots from `begin` on. Returns how many are
+/// visible.
+size_t projectRange(Projector project, const PlacedScene& scene, size_t begin, size_t end,
+                    VisibleSplat* slots, DepthItem* items) {
+  size_t slot = begin;
+  for (size_t cloud = cloudOfSplat(scene, begin); begin < end; ++cloud) {
     const PlacedCloud& placed = scene.clouds[cloud];
-    const size_t index = i - placed.first_index;
-    Projected<double> projected;
-    if (!projectSplat(scene, placed, index, projected)) continue;
-    slots[filled] = makeVisible(scene, placed, index, projected);
-    keyed[filled] = {depthKey(projected.depth), static_cast<uint32_t>(filled)};
-    ++filled;
+    const size_t first = begin - placed.first_index;
+    const size_t last = std::min(end - placed.first_index, placed.cloud->size());
+    if (!rowsAreValid(*placed.cloud, first, last)) refuseCloud(placed);
+    slot = project(scene, placed, first, last, slots, items, slot);
+    begin = placed.first_index + last;
   }
-  return filled - begin;
+  return slot;
 }
 
-/// Stable radix sort by key, 11 bits a pass; passes in which every key has the same digit are left
-/// out. The result is in `a`.
-void sortByKey(std::vector<Keyed>& a) {
-  constexpr uint32_t kBits = 11;
-  constexpr uint32_t kDigits = 1u << kBits;
-  std::vector<Keyed> b(a.size());
-  std::array<std::array<size_t, kDigits>, 3> counts{};
-  for (const Keyed& item : a) {
-    for (uint32_t pass = 0; pass < 3; ++pass) {
-      ++counts[pass][(item.key >> (pass * kBits)) & (kDigits - 1)];
+/// Stable radix sort of the items by their keys, least significant digit first. Keys are taken from
+/// the smallest on, so that a scene that is not deep needs two passes. Chunks are fixed, each
+/// counts its digits and then knows where its items go: the order does not depend on threads.
+class DepthSort {
+ public:
+  DepthSort(VisibleSplats& visible) : visible_(visible) {}
+
+  /// The sorted items; the other array of visible.items is free then.
+  DepthItem* run() {
+    const auto [lowest, highest] = keyRange();
+    const uint32_t bits = static_cast<uint32_t>(std::bit_width(highest - lowest));
+    if (bits == 0) {
+      // All alike: one pass that only closes the gaps between ranges.
+      pass(true, lowest, 0, 1);
+      return visible_.items[1].get();
+    }
+    const uint32_t passes = (bits + kMaxDigitBits - 1) / kMaxDigitBits;
+    const uint32_t digit_bits = (bits + passes - 1) / passes;
+    for (uint32_t i = 0; i < passes; ++i) pass(i == 0, lowest, i * digit_bits, digit_bits);
+    return visible_.items[passes % 2].get();
+  }
+
+ private:
+  struct KeyRange {
+    uint32_t lowest, highest;
+  };
+
+  KeyRange keyRange() const {
+    KeyRange range{UINT32_MAX, 0};
+    for (size_t r = 0; r < visible_.filled.size(); ++r) {
+      const DepthItem* item = visible_.items[0].get() + r * kRangeSplats;
+      for (size_t i = 0; i < visible_.filled[r]; ++i) {
+        const uint32_t key = static_cast<uint32_t>(item[i] >> 32);
+        range.lowest = std::min(range.lowest, key);
+        range.highest = std::max(range.highest, key);
+      }
+    }
+    if (range.lowest > range.highest) return {0, 0};
+    return range;
+  }
+
+  /// Calls use(first item, count) for the runs of items of one chunk: ranges with gaps between them
+  /// before the first pass, a plain part of the array after it.
+  template <typename Use>
+  void forEachRun(bool first_pass, const DepthItem* from, size_t chunk, Use use) const {
+    if (first_pass) {
+      const size_t ranges = visible_.filled.size();
+      for (size_t r = chunk * ranges / kSortChunks; r < (chunk + 1) * ranges / kSortChunks; ++r) {
+        use(from + r * kRangeSplats, visible_.filled[r]);
+      }
+    } else {
+      const size_t begin = chunk * visible_.count / kSortChunks;
+      use(from + begin, (chunk + 1) * visible_.count / kSortChunks - begin);
     }
   }
-  for (uint32_t pass = 0; pass < 3; ++pass) {
-    std::array<size_t, kDigits>& count = counts[pass];
-    if (*std::max_element(count.begin(), count.end()) == a.size()) continue;
-    size_t sum = 0;
-    for (size_t& slot : count) {
-      const size_t here = slot;
-      slot = sum;
-      sum += here;
+
+  void pass(bool first_pass, uint32_t lowest, uint32_t shift, uint32_t digit_bits) {
+    DepthItem* from = visible_.items[flipped_ ? 1 : 0].get();
+    DepthItem* to = visible_.items[flipped_ ? 0 : 1].get();
+    const size_t digit_count = size_t{1} << digit_bits;
+    const auto digitOf = [=](DepthItem item) {
+      return (static_cast<uint32_t>(item >> 32) - lowest) >> shift & (digit_count - 1);
+    };
+    uint32_t* digits = visible_.digits.data();
+    const auto count = [&](size_t begin, size_t end) {
+      for (size_t chunk = begin; chunk < end; ++chunk) {
+        uint32_t* counts = digits + chunk * digit_count;
+        std::fill(counts, counts + digit_count, 0u);
+        forEachRun(first_pass, from, chunk, [&](const DepthItem* item, size_t n) {
+          for (size_t i = 0; i < n; ++i) ++counts[digitOf(item[i])];
+        });
+      }
+    };
+    parallelFor(kSortChunks, 1, std::cref(count));
+    uint32_t sum = 0;
+    for (size_t digit = 0; digit < digit_count; ++digit) {
+      for (size_t chunk = 0; chunk < kSortChunks; ++chunk) {
+        const uint32_t here = digits[chunk * digit_count + digit];
+        digits[chunk * digit_count + digit] = sum;
+        sum += here;
+      }
     }
-    for (const Keyed& item : a) {
-      b[count[(item.key >> (pass * kBits)) & (kDigits - 1)]++] = item;
-    }
-    a.swap(b);
+    const auto move = [&](size_t begin, size_t end) {
+      for (size_t chunk = begin; chunk < end; ++chunk) {
+        uint32_t* places = digits + chunk * digit_count;
+        forEachRun(first_pass, from, chunk, [&](const DepthItem* item, size_t n) {
+          for (size_t i = 0; i < n; ++i) to[places[digitOf(item[i])]++] = item[i];
+        });
+      }
+    };
+    parallelFor(kSortChunks, 1, std::cref(move));
+    flipped_ = !flipped_;
   }
-}
+
+  VisibleSplats& visible_;
+  bool flipped_ = false;
+};
 
 }  // namespace
 
+void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* progress,
+                       VisibleSplats& visible) {
+  const size_t count = scene.splat_count;
+  visible.count = 0;
+  visible.spans = nullptr;
+  visible.splats.resize(0);
+  if (count == 0) return;
+  VisibleSplat* slots = visible.slots.resize(count);
+  DepthItem* items = visible.items[0].resize(count);
+  visible.items[1].resize(count);
+  visible.filled.resize(rangeCount(count, kRangeSplats));
+  visible.digits.resize(kSortChunks * kMaxDigits);
+  const auto project_range = [&](size_t begin, size_t end) {
+    if (progress) progress->throwIfCancelled();
+    const size_t after = projectRange(project, scene, begin, end, slots, items);
+    visible.filled[begin / kRangeSplats] = static_cast<uint32_t>(after - begin);
+  };
+  parallelFor(count, kRangeSplats, std::cref(project_range));
+
+  for (const uint32_t part : visible.filled) visible.count += part;
+  const DepthItem* sorted = DepthSort(visible).run();
+  TileSpan* spans = visible.items[sorted == items ? 1 : 0].get();
+  VisibleSplat* splats = visible.splats.resize(visible.count);
+  const TileGrid grid(static_cast<uint32_t>(scene.view.width),
+                      static_cast<uint32_t>(scene.view.height));
+  const auto gather = [&](size_t begin, size_t end) {
+    if (progress) progress->throwIfCancelled();
+    constexpr size_t kAhead = 16;
+    for (size_t i = begin; i < end; ++i) {
+      const VisibleSplat* next =
+          &slots[static_cast<uint32_t>(sorted[std::min(i + kAhead, end - 1)])];
+      __builtin_prefetch(next);
+      __builtin_prefetch(reinterpret_cast<const char*>(next + 1) - 1);
+      splats[i] = slots[static_cast<uint32_t>(sorted[i])];
+      spans[i] = tileSpanOf(splats[i], grid);
+    }
+  };
+  parallelFor(visible.count, kRangeSplats, std::cref(gather));
+  visible.spans = spans;
+}
+
 VisibleSplats findVisibleSplats(const PlacedScene& scene, Progress* progress) {
   VisibleSplats visible;
-  const size_t count = scene.splat_count;
-  if (count == 0) return visible;
-  // Without initialisation: pages of splats that are culled are never touched.
-  const auto slots = std::make_unique_for_overwrite<VisibleSplat[]>(count);
-  const auto keyed = std::make_unique_for_overwrite<Keyed[]>(count);
-  std::vector<size_t> filled(rangeCount(count, kProjectionGrain));
-  parallelFor(count, kProjectionGrain, [&](size_t begin, size_t end) {
-    if (progress) progress->throwIfCancelled();
-    filled[begin / kProjectionGrain] = projectRange(scene, begin, end, slots.get(), keyed.get());
-  });
-
-  for (const size_t part : filled) visible.count += part;
-  std::vector<Keyed> sorted;
-  sorted.reserve(visible.count);
-  for (size_t range = 0; range < filled.size(); ++range) {
-    const Keyed* first = keyed.get() + range * kProjectionGrain;
-    sorted.insert(sorted.end(), first, first + filled[range]);
-  }
-  sortByKey(sorted);
-  visible.splats = std::make_unique_for_overwrite<VisibleSplat[]>(visible.count);
-  parallelFor(visible.count, kProjectionGrain, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) visible.splats[i] = slots[sorted[i].slot];
-  });
+  findVisibleSplats(chosenProjector(), scene, progress, visible);
   return visible;
 }
 
 uint64_t visibleSplatsMemoryBound(uint64_t splat_count) {
-  return splat_count * (2 * sizeof(VisibleSplat) + 3 * sizeof(Keyed)) +
-         rangeCount(splat_count, kProjectionGrain) * sizeof(size_t);
+  // The last term: arrays on huge pages are rounded up.
+  return splat_count * (2 * sizeof(VisibleSplat) + 2 * sizeof(DepthItem)) +
+         rangeCount(splat_count, kRangeSplats) * sizeof(uint32_t) +
+         kSortChunks * kMaxDigits * sizeof(uint32_t) + 4 * (uint64_t{2} << 20);
 }
 
 }  // namespace stipple

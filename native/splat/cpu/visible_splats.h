@@ -2,34 +2,36 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <vector>
 
 #include "base/progress.h"
+#include "splat/cpu/reused_array.h"
+#include "splat/cpu/tile_grid.h"
 #include "splat/scene.h"
 
 namespace stipple {
 
-/// What the tiles need of one splat. The geometry stays double: a tile takes the difference to its
-/// corner in double and goes on in float, so a wide picture or a long needle loses no digits.
-struct VisibleSplat {
-  Footprint<double> footprint;
-  double half_x;  ///< pixels, as in Projected
-  double half_y;
-  float log2_opacity;
-  float depth;      ///< view z, metres
-  float colour[3];  ///< blending space
-  uint32_t index;   ///< among all splats of the picture: PlacedCloud::first_index + its row
-};
-
 /// The splats that can show, in the order of blending: front to back by depthKey, ties by splat
 /// index. They lie in memory in that order too, since every later step walks them in it.
 struct VisibleSplats {
-  std::unique_ptr<VisibleSplat[]> splats;
+  ReusedArray<VisibleSplat> splats;
+  const TileSpan* spans = nullptr;  ///< [count]; lies in one of `items`
   size_t count = 0;
+
+  // What finding them needs; kept for the next picture.
+  ReusedArray<VisibleSplat> slots;  ///< as projected, by range of splats
+  ReusedArray<DepthItem> items[2];
+  std::vector<uint32_t> filled;  ///< visible splats of each range
+  std::vector<uint32_t> digits;  ///< [chunk][digit] of the sort
 };
 
 /// Projects, culls and sorts. Same result for any number of threads. Cost: O(splats).
+/// Errors: as refuseCloud, for a scene of placeSceneUnread.
 VisibleSplats findVisibleSplats(const PlacedScene& scene, Progress* progress);
+
+/// The same with a given projector into memory that may hold an earlier picture's.
+void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* progress,
+                       VisibleSplats& visible);
 
 /// Bytes that findVisibleSplats allocates at most.
 uint64_t visibleSplatsMemoryBound(uint64_t splat_count);

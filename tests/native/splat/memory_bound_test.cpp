@@ -16,6 +16,7 @@ namespace {
 
 std::atomic<uint64_t> held{0};
 std::atomic<uint64_t> peak{0};
+std::atomic<uint64_t> calls{0};
 
 /// Room before each block for its size, keeping malloc's alignment.
 constexpr size_t kHeader = 16;
@@ -24,6 +25,7 @@ constexpr size_t kHeader = 16;
   auto* block = static_cast<std::byte*>(std::malloc(size + kHeader));
   if (!block) throw std::bad_alloc();
   *reinterpret_cast<uint64_t*>(block) = size;
+  calls.fetch_add(1);
   const uint64_t now = held.fetch_add(size) + size;
   uint64_t seen = peak.load();
   while (now > seen && !peak.compare_exchange_weak(seen, now)) {
@@ -101,6 +103,73 @@ TEST(RenderMemoryBound, IsNeverExceeded) {
       // A bound that is far off would refuse what fits; the lists' worst case is within 64 times.
       EXPECT_GT(used, bound / 64);
     }
+  }
+}
+
+TEST(RenderMemoryBound, StaysWithinItsShareOfEverySplatAndPixel) {
+  // Pages of 2 MiB and the sort's counters, whatever the size.
+  constexpr uint64_t kFixed = uint64_t{10} << 20;
+  for (const size_t count : {size_t{0}, size_t{1000}, size_t{10000000}}) {
+    SplatCloud cloud;
+    cloud.opacities.resize(count);
+    const SplatInstance instance{&cloud};
+    for (const Camera& camera : {frontCamera(1, 1, 1, 3), frontCamera(1280, 720, 500, 3),
+                                 frontCamera(8000, 6000, 500, 3)}) {
+      const RenderMemory memory = renderMemory({&instance, 1}, camera, {});
+      EXPECT_LE(memory.splat_bytes, count * 200 + kFixed);
+      EXPECT_LE(memory.pixel_bytes, uint64_t{camera.width} * camera.height * 64 + 4096);
+      EXPECT_EQ(memory.result_bytes, uint64_t{camera.width} * camera.height * 20);
+      EXPECT_EQ(memory.splat_bytes + memory.pixel_bytes + memory.pair_bytes + memory.result_bytes +
+                    memory.other_bytes,
+                renderMemoryBound({&instance, 1}, camera, {}));
+    }
+  }
+}
+
+TEST(RenderWorkspace, AllocatesNothingForASecondPictureOfTheSameSize) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the address sanitizer replaces the allocator that is counted here";
+#endif
+  CloudRecipe recipe;
+  recipe.count = 60000;
+  recipe.size_max = 0.02;
+  const SplatCloud cloud = randomCloud(recipe, 2);
+  const SplatInstance instance{&cloud};
+  const Camera camera = frontCamera(300, 200, 250, 3);
+  RenderWorkspace workspace;
+  RenderResult first, second;
+  renderTiled({&instance, 1}, camera, {}, workspace, first);
+  second = first;
+  std::fill(second.colour.begin(), second.colour.end(), -1.0f);
+  const uint64_t bytes = workspace.bytes();
+  const uint64_t before = calls.load();
+  renderTiled({&instance, 1}, camera, {}, workspace, second);
+  EXPECT_EQ(calls.load(), before);
+  EXPECT_EQ(workspace.bytes(), bytes);
+  EXPECT_EQ(first.colour, second.colour);
+  EXPECT_GT(bytes, first.visible_count * sizeof(float));
+}
+
+TEST(RenderWorkspace, DrawsAnotherSceneAsIfItWereNew) {
+  RenderWorkspace workspace;
+  RenderResult reused;
+  uint32_t seed = 0;
+  for (const size_t count : {size_t{5000}, size_t{20}, size_t{0}, size_t{9000}}) {
+    CloudRecipe recipe;
+    recipe.count = count;
+    const SplatCloud cloud = randomCloud(recipe, ++seed);
+    const SplatInstance instance{&cloud};
+    const Camera camera = frontCamera(20 + 40 * seed, 90 - 10 * seed, 60, 3);
+    RenderOptions options;
+    options.with_depth = seed % 2 == 0;
+    options.with_counts = seed % 2 == 1;
+    const RenderResult fresh = renderTiled({&instance, 1}, camera, options);
+    renderTiled({&instance, 1}, camera, options, workspace, reused);
+    EXPECT_EQ(reused.colour, fresh.colour);
+    EXPECT_EQ(reused.depth, fresh.depth);
+    EXPECT_EQ(reused.counts, fresh.counts);
+    EXPECT_EQ(reused.width, fresh.width);
+    EXPECT_EQ(reused.visible_count, fresh.visible_count);
   }
 }
 

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "splat/scene.h"
+
+namespace stipple {
+
+/// What the tiles need of one splat. The geometry stays double: a tile takes the difference to its
+/// corner in double and goes on in float, so a wide picture or a long needle loses no digits.
+struct VisibleSplat {
+  Footprint<double> footprint;
+  double half_x;  ///< pixels, as in Projected
+  double half_y;
+  float log2_opacity;
+  float depth;      ///< view z, metres
+  float colour[3];  ///< blending space
+  uint32_t index;   ///< among all splats of the picture: PlacedCloud::first_index + its row
+};
+
+/// Sorts as unsigned numbers: depthKey above, the splat's place in memory below.
+using DepthItem = uint64_t;
+
+inline DepthItem depthItem(double depth, size_t slot) {
+  return static_cast<uint64_t>(depthKey(depth)) << 32 | static_cast<uint32_t>(slot);
+}
+
+/// Projects rows [begin, end) of one cloud. The visible ones go to splats[slot] and items[slot],
+/// slot + 1, ...; returns the slot after the last.
+using Projector = size_t (*)(const PlacedScene& scene, const PlacedCloud& placed, size_t begin,
+                             size_t end, VisibleSplat* splats, DepthItem* items, size_t slot);
+
+struct NamedProjector {
+  const char* target;  ///< as NamedTileKernel::target
+  Projector project;
+};
+
+/// One splat after another; the vector targets give the same footprints, depths and colours, bit
+/// for bit, and bounds that differ by rounding.
+size_t projectScalar(const PlacedScene& scene, const PlacedCloud& placed, size_t begin, size_t end,
+                     VisibleSplat* splats, DepthItem* items, size_t slot);
+
+/// As chosenTileKernel() and tileKernels().
+Projector chosenProjector();
+std::vector<NamedProjector> projectors();
+
+}  // namespace stipple

@@ -1,0 +1,27 @@
+#include <algorithm>
+#include <cmath>
+
+#include "splat/cpu/projector.h"
+
+namespace stipple {
+
+size_t projectScalar(const PlacedScene& scene, const PlacedCloud& placed, size_t begin, size_t end,
+                     VisibleSplat* splats, DepthItem* items, size_t slot) {
+  for (size_t row = begin; row < end; ++row) {
+    Projected<double> projected;
+    if (!projectSplat(scene, placed, row, projected)) continue;
+    VisibleSplat& splat = splats[slot];
+    splat.footprint = projected.footprint;
+    splat.half_x = projected.half_x;
+    splat.half_y = projected.half_y;
+    splat.log2_opacity = static_cast<float>(std::log2(projected.footprint.opacity));
+    splat.depth = static_cast<float>(std::min(projected.depth, 1e38));
+    splatColour(scene, placed, row, splat.colour);
+    splat.index = static_cast<uint32_t>(placed.first_index + row);
+    items[slot] = depthItem(projected.depth, slot);
+    ++slot;
+  }
+  return slot;
+}
+
+}  // namespace stipple

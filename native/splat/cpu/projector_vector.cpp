@@ -1,0 +1,250 @@
+#include "splat/cpu/projector.h"
+
+// Lanes are splats, in double: the steps of splat/projection.h on a vector type, so every lane gets
+// the bits of the scalar code (no fused products). Harmonics go in float: their basis with lanes =
+// splats, their sums with lanes = colours.
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "splat/cpu/projector_vector.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "hwy/contrib/math/math-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace stipple {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Doubles = hn::CappedTag<double, 8>;
+using Floats = hn::Rebind<float, Doubles>;
+using Quad = hn::CappedTag<float, 4>;
+
+/// A vector that looks like a number to the templates of projection.h and spherical_harmonics.h.
+template <class D>
+struct Lanes {
+  using Scalar = hn::TFromD<D>;
+  hn::Vec<D> v;
+
+  Lanes() : v(hn::Zero(D())) {}
+  explicit Lanes(hn::Vec<D> vector) : v(vector) {}
+  explicit Lanes(double value) : v(hn::Set(D(), static_cast<Scalar>(value))) {}
+
+  friend HWY_INLINE Lanes operator+(Lanes a, Lanes b) { return Lanes(hn::Add(a.v, b.v)); }
+  friend HWY_INLINE Lanes operator-(Lanes a, Lanes b) { return Lanes(hn::Sub(a.v, b.v)); }
+  friend HWY_INLINE Lanes operator*(Lanes a, Lanes b) { return Lanes(hn::Mul(a.v, b.v)); }
+  friend HWY_INLINE Lanes operator/(Lanes a, Lanes b) { return Lanes(hn::Div(a.v, b.v)); }
+  friend HWY_INLINE Lanes operator-(Lanes a) { return Lanes(hn::Neg(a.v)); }
+  friend HWY_INLINE auto operator>(Lanes a, Lanes b) { return hn::Gt(a.v, b.v); }
+  friend HWY_INLINE auto operator>=(Lanes a, Lanes b) { return hn::Ge(a.v, b.v); }
+  friend HWY_INLINE Lanes sqrt(Lanes a) { return Lanes(hn::Sqrt(a.v)); }
+  friend HWY_INLINE Lanes abs(Lanes a) { return Lanes(hn::Abs(a.v)); }
+  friend HWY_INLINE Lanes min(Lanes a, Lanes b) { return Lanes(hn::Min(a.v, b.v)); }
+  friend HWY_INLINE Lanes max(Lanes a, Lanes b) { return Lanes(hn::Max(a.v, b.v)); }
+  friend HWY_INLINE Lanes log(Lanes a) { return Lanes(hn::Log(D(), a.v)); }
+  friend HWY_INLINE Lanes pick(hn::Mask<D> mask, Lanes yes, Lanes no) {
+    return Lanes(hn::IfThenElse(mask, yes.v, no.v));
+  }
+};
+
+using Double = Lanes<Doubles>;
+using Float = Lanes<Floats>;
+
+constexpr size_t kMaxLanes = 8;
+
+#include "math/harmonic_basis-inl.h"
+#include "splat/projection_steps-inl.h"
+
+HWY_INLINE Double promoted(hn::Vec<Floats> v) {
+  return Double(hn::PromoteTo(Doubles(), v));
+}
+
+/// The next lanes of splats, columns apart.
+HWY_INLINE SplatGeometry<Double> loadGeometry(const SplatCloud& cloud, size_t row) {
+  const Floats d;
+  SplatGeometry<Double> splat;
+  hn::Vec<Floats> a, b, c, e;
+  hn::LoadInterleaved3(d, &cloud.positions[row * 3], a, b, c);
+  splat.position[0] = promoted(a);
+  splat.position[1] = promoted(b);
+  splat.position[2] = promoted(c);
+  hn::LoadInterleaved4(d, &cloud.rotations[row * 4], a, b, c, e);
+  splat.rotation[0] = promoted(a);
+  splat.rotation[1] = promoted(b);
+  splat.rotation[2] = promoted(c);
+  splat.rotation[3] = promoted(e);
+  hn::LoadInterleaved3(d, &cloud.scales[row * 3], a, b, c);
+  splat.scales[0] = promoted(a);
+  splat.scales[1] = promoted(b);
+  splat.scales[2] = promoted(c);
+  splat.opacity = promoted(hn::LoadU(d, &cloud.opacities[row]));
+  return splat;
+}
+
+/// Harmonics in the direction of each lane. Out: basis [coefficient][lane]; lanes outside `shows`
+/// are finite.
+HWY_INLINE void directionBasis(const PlacedScene& scene, const PlacedCloud& placed,
+                               const Double* position, hn::Mask<Doubles> shows, float* basis) {
+  Double direction[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const Double eye(placed.eye[axis]);
+    direction[axis] = scene.view.perspective ? position[axis] - eye : eye;
+    direction[axis] = pick(shows, direction[axis], Double(1.0));
+  }
+  const Double inverse =
+      Double(1.0) /
+      sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
+  Float unit[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    unit[axis] = Float(hn::DemoteTo(Floats(), (direction[axis] * inverse).v));
+  }
+  Float values[25];
+  harmonicBasis(placed.sh_degree, unit[0], unit[1], unit[2], values);
+  const size_t count = shCoefficientCount(placed.sh_degree);
+  for (size_t k = 0; k < count; ++k) hn::Store(values[k].v, Floats(), basis + k * kMaxLanes);
+}
+
+/// As splatColour<float>. In: basis of this lane, kMaxLanes apart.
+HWY_INLINE void sumHarmonics(const PlacedCloud& placed, const float* sh, const float* basis,
+                             float* colour) {
+  float sums[4];
+  if constexpr (hn::MaxLanes(Quad()) == 4) {
+    const Quad d;
+    // Lanes 1..3 are the colours: each row is loaded with the number before it, which belongs to
+    // the splat, and none behind it, which may lie outside the array.
+    HWY_ALIGN const float first[4] = {0.0f, sh[0], sh[1], sh[2]};
+    auto sum = hn::Add(hn::Set(d, 0.5f), hn::Mul(hn::Set(d, kShC0), hn::Load(d, first)));
+    const size_t count = shCoefficientCount(placed.sh_degree);
+    for (size_t k = 1; k < count; ++k) {
+      sum = hn::Add(sum, hn::Mul(hn::Set(d, basis[k * kMaxLanes]), hn::LoadU(d, sh + k * 3 - 1)));
+    }
+    hn::StoreU(sum, d, sums);
+  } else {
+    const size_t count = shCoefficientCount(placed.sh_degree);
+    for (size_t c = 0; c < 3; ++c) {
+      float sum = 0.5f + kShC0 * sh[c];
+      for (size_t k = 1; k < count; ++k) sum += basis[k * kMaxLanes] * sh[k * 3 + c];
+      sums[c + 1] = sum;
+    }
+  }
+  for (size_t c = 0; c < 3; ++c) colour[c] = finishColour(placed, sums[c + 1]);
+}
+
+size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t begin, size_t end,
+                   VisibleSplat* splats, DepthItem* items, size_t slot) {
+  const Doubles d;
+  const size_t lanes = hn::Lanes(d);
+  const View<double>& view = scene.view;
+  const SplatCloud& cloud = *placed.cloud;
+  const size_t sh_stride = cloud.shStride();
+  HWY_ALIGN double columns[9][kMaxLanes];
+  HWY_ALIGN float log2_opacity[kMaxLanes];
+  HWY_ALIGN float depth[kMaxLanes];
+  HWY_ALIGN float basis[25 * kMaxLanes];
+  const Double one(1.0);
+
+  size_t row = begin;
+  for (; row + lanes <= end; row += lanes) {
+    SplatGeometry<Double> splat = loadGeometry(cloud, row);
+    Double centre[3];
+    placePoint(placed.linear, placed.translation, splat.position, centre);
+    auto shows =
+        hn::And(splat.opacity >= Double(kMinAlpha),
+                hn::And(centre[2] >= Double(view.near_plane), Double(view.far_plane) >= centre[2]));
+    if (hn::AllFalse(d, shows)) continue;
+    for (Double& value : centre) value = pick(shows, value, one);
+    Projected<Double> out;
+    const Double narrowest =
+        HWY_NAMESPACE::projectSteps(view, placed.linear, centre, splat, placed.low_pass, out);
+    const Footprint<Double>& f = out.footprint;
+    const Double half_pixel(0.5);
+    shows = hn::And(shows, hn::And(narrowest > Double(kMinWidth), f.opacity >= Double(kMinAlpha)));
+    shows = hn::And(shows, hn::And(f.mean_x + out.half_x >= half_pixel,
+                                   Double(view.width) - half_pixel >= f.mean_x - out.half_x));
+    shows = hn::And(shows, hn::And(f.mean_y + out.half_y >= half_pixel,
+                                   Double(view.height) - half_pixel >= f.mean_y - out.half_y));
+    if (hn::AllFalse(d, shows)) continue;
+
+    const Double fields[9] = {f.mean_x,  f.mean_y,   f.l00,      f.l10,    f.l11,
+                              f.opacity, out.half_x, out.half_y, out.depth};
+    for (size_t k = 0; k < 9; ++k) hn::Store(fields[k].v, d, columns[k]);
+    const Double log2e(1.4426950408889634);
+    const Double log2o = log(pick(shows, f.opacity, one)) * log2e;
+    hn::Store(hn::DemoteTo(Floats(), log2o.v), Floats(), log2_opacity);
+    const Double held = min(pick(shows, out.depth, one), Double(1e38));
+    hn::Store(hn::DemoteTo(Floats(), held.v), Floats(), depth);
+    if (placed.sh_degree > 0) directionBasis(scene, placed, splat.position, shows, basis);
+
+    HWY_ALIGN uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, shows, bits);
+    for (uint32_t left = bits[0]; left != 0; left &= left - 1) {
+      const size_t lane = static_cast<size_t>(__builtin_ctz(left));
+      VisibleSplat& visible = splats[slot];
+      visible.footprint = {columns[0][lane], columns[1][lane], columns[2][lane],
+                           columns[3][lane], columns[4][lane], columns[5][lane]};
+      visible.half_x = columns[6][lane];
+      visible.half_y = columns[7][lane];
+      visible.log2_opacity = log2_opacity[lane];
+      visible.depth = depth[lane];
+      sumHarmonics(placed, &cloud.sh[(row + lane) * sh_stride], basis + lane, visible.colour);
+      visible.index = static_cast<uint32_t>(placed.first_index + row + lane);
+      items[slot] = depthItem(columns[8][lane], slot);
+      ++slot;
+    }
+  }
+  return projectScalar(scene, placed, row, end, splats, items, slot);
+}
+
+NamedProjector namedProjector() {
+  return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET), projectRows};
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stipple
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+#include <strings.h>
+
+#include <cstdlib>
+
+namespace stipple {
+
+HWY_EXPORT(namedProjector);
+
+namespace {
+
+Projector chooseProjector() {
+  // A name that no target has is refused by chosenTileKernel.
+  if (const char* forced = std::getenv("STIPPLE_FORCE_TARGET")) {
+    for (const NamedProjector& named : projectors()) {
+      if (strcasecmp(named.target, forced) == 0) return named.project;
+    }
+  }
+  return HWY_DYNAMIC_DISPATCH(namedProjector)().project;
+}
+
+}  // namespace
+
+std::vector<NamedProjector> projectors() {
+  std::vector<NamedProjector> list = {{"scalar", projectScalar}};
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    list.push_back(HWY_DYNAMIC_DISPATCH(namedProjector)());
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  return list;
+}
+
+Projector chosenProjector() {
+  static const Projector projector = chooseProjector();
+  return projector;
+}
+
+}  // namespace stipple
+
+#endif  // HWY_ONCE

@@ -1,0 +1,165 @@
+#include "splat/cpu/tile_lists.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "bench/exact_tiles.h"
+#include "splat/random_scene.h"
+
+namespace stipple {
+namespace {
+
+using testing::CloudRecipe;
+using testing::frontCamera;
+using testing::randomCloud;
+
+struct Pairs {
+  uint64_t listed = 0;
+  uint64_t exact = 0;
+  uint64_t missing = 0;
+  uint64_t out_of_order = 0;
+};
+
+Pairs countPairs(const VisibleSplats& visible, const TileGrid& grid) {
+  std::vector<std::vector<uint32_t>> exact(grid.tileCount());
+  for (size_t i = 0; i < visible.count; ++i) {
+    const VisibleSplat& splat = visible.splats[i];
+    bench::forEachExactTile(splat.footprint, splat.half_x, splat.half_y, grid,
+                            [&](size_t tile) { exact[tile].push_back(static_cast<uint32_t>(i)); });
+  }
+  Pairs pairs;
+  size_t next_tile = 0;
+  forEachTileGroup(visible, grid, nullptr, [&](const TileListGroup& group) {
+    EXPECT_EQ(group.first_tile, next_tile);
+    next_tile = group.end_tile;
+    for (size_t tile = group.first_tile; tile < group.end_tile; ++tile) {
+      const std::span<const uint32_t> listed = group.tile(tile);
+      pairs.listed += listed.size();
+      pairs.exact += exact[tile].size();
+      for (size_t k = 1; k < listed.size(); ++k) pairs.out_of_order += listed[k] <= listed[k - 1];
+      for (const uint32_t splat : exact[tile]) {
+        pairs.missing += !std::binary_search(listed.begin(), listed.end(), splat);
+      }
+    }
+  });
+  EXPECT_EQ(next_tile, grid.tileCount());
+  return pairs;
+}
+
+TEST(TileLists, HoldEveryPairOfTheExactSetAndAtMostOneInAHundredMore) {
+  struct Kind {
+    double size_min, size_max;
+    size_t count;
+  };
+  // Sub-pixel, a few pixels, many tiles, needles through the whole picture.
+  for (const Kind& kind : {Kind{0.0005, 0.003, 20000}, Kind{0.005, 0.05, 20000},
+                           Kind{0.1, 1.0, 2000}, Kind{0.0005, 3.0, 2000}}) {
+    CloudRecipe recipe;
+    recipe.count = kind.count;
+    recipe.size_min = kind.size_min;
+    recipe.size_max = kind.size_max;
+    recipe.opacity_min = 0.003;
+    const SplatCloud cloud = randomCloud(recipe, 9);
+    const SplatInstance instance{&cloud};
+    const Camera camera = frontCamera(605, 411, 500, 3.0);
+    const PlacedScene scene = placeScene({&instance, 1}, camera, {});
+    const VisibleSplats visible = findVisibleSplats(scene, nullptr);
+    const Pairs pairs = countPairs(visible, TileGrid(camera.width, camera.height));
+    SCOPED_TRACE(::testing::Message() << "sizes " << kind.size_min << " to " << kind.size_max);
+    EXPECT_GT(pairs.exact, kind.count / 2);
+    EXPECT_EQ(pairs.missing, 0u);
+    EXPECT_EQ(pairs.out_of_order, 0u);
+    // The margin of 0.01 px in every bound is what the lists hold too much.
+    EXPECT_LE(static_cast<double>(pairs.listed), 1.01 * static_cast<double>(pairs.exact));
+  }
+}
+
+std::vector<VisibleSplat> projectWith(Projector projector, const PlacedScene& scene,
+                                      std::vector<DepthItem>& items) {
+  std::vector<VisibleSplat> splats(scene.splat_count);
+  items.resize(scene.splat_count);
+  size_t slot = 0;
+  for (const PlacedCloud& placed : scene.clouds) {
+    slot = projector(scene, placed, 0, placed.cloud->size(), splats.data(), items.data(), slot);
+  }
+  splats.resize(slot);
+  items.resize(slot);
+  return splats;
+}
+
+TEST(Projector, GivesTheSameBitsOnEveryTarget) {
+  Camera camera = frontCamera(200, 150, 180, 1.2);  // some splats behind, some outside
+  for (int degree = 0; degree <= kMaxShDegree; ++degree) {
+    for (const LowPass low_pass : {LowPass::kClassic, LowPass::kMip, LowPass::kNone}) {
+      CloudRecipe recipe;
+      recipe.count = 1003;  // no multiple of any lane count
+      recipe.degree = degree;
+      recipe.opacity_min = 0.001;
+      const SplatCloud cloud = randomCloud(recipe, 60 + static_cast<uint32_t>(degree));
+      const SplatInstance instance{&cloud};
+      camera.model = degree == 2 ? CameraModel::kOrthographic : CameraModel::kPerspective;
+      RenderOptions options;
+      options.low_pass = low_pass;
+      options.blend_space = degree == 1 ? BlendSpace::kSceneLinear : BlendSpace::kAsTrained;
+      const PlacedScene scene = placeScene({&instance, 1}, camera, options);
+      std::vector<DepthItem> expected_items, items;
+      const std::vector<VisibleSplat> expected = projectWith(projectScalar, scene, expected_items);
+      EXPECT_GT(expected.size(), 100u);
+      for (const NamedProjector& named : projectors()) {
+        SCOPED_TRACE(::testing::Message() << named.target << " degree " << degree);
+        const std::vector<VisibleSplat> seen = projectWith(named.project, scene, items);
+        ASSERT_EQ(seen.size(), expected.size());
+        EXPECT_EQ(items, expected_items);
+        for (size_t i = 0; i < seen.size(); ++i) {
+          EXPECT_EQ(
+              std::memcmp(&seen[i].footprint, &expected[i].footprint, sizeof(Footprint<double>)),
+              0);
+          EXPECT_EQ(std::memcmp(seen[i].colour, expected[i].colour, sizeof(seen[i].colour)), 0);
+          EXPECT_EQ(seen[i].depth, expected[i].depth);
+          EXPECT_EQ(seen[i].index, expected[i].index);
+          // Logarithms of two libraries, each good to a few units in the last place.
+          EXPECT_NEAR(seen[i].half_x, expected[i].half_x, 1e-12 * expected[i].half_x);
+          EXPECT_NEAR(seen[i].half_y, expected[i].half_y, 1e-12 * expected[i].half_y);
+          EXPECT_NEAR(seen[i].log2_opacity, expected[i].log2_opacity, 1e-6);
+        }
+      }
+    }
+  }
+}
+
+TEST(VisibleSplats, ComeInTheOrderOfAStableSortByDepth) {
+  // Several ranges of the sort's chunks, equal depths, one depth only, and a depth range that takes
+  // three passes.
+  for (const double stretch : {0.0, 1e-6, 1.0, 1e20}) {
+    CloudRecipe recipe;
+    recipe.count = 30000;
+    recipe.size_min = 0.2 * std::max(stretch, 1.0);
+    recipe.size_max = 0.3 * std::max(stretch, 1.0);
+    SplatCloud cloud = randomCloud(recipe, 4);
+    for (size_t i = 0; i < cloud.size(); ++i) {
+      const double random = std::abs(static_cast<double>(cloud.positions[i * 3 + 1]));
+      cloud.positions[i * 3 + 1] = static_cast<float>(
+          stretch < 1e10 ? stretch * std::round(random * 1e4) * 1e-4 : std::pow(stretch, random));
+      cloud.positions[i * 3] = cloud.positions[i * 3 + 2] = 0.0f;
+    }
+    const SplatInstance instance{&cloud};
+    Camera camera = frontCamera(64, 64, 60, 3.0);
+    camera.far_plane = 1e30;
+    const PlacedScene scene = placeScene({&instance, 1}, camera, {});
+    const VisibleSplats visible = findVisibleSplats(scene, nullptr);
+    ASSERT_GT(visible.count, 20000u);
+    size_t wrong = 0;
+    for (size_t i = 1; i < visible.count; ++i) {
+      const VisibleSplat& a = visible.splats[i - 1];
+      const VisibleSplat& b = visible.splats[i];
+      wrong += !(a.depth < b.depth || (a.depth == b.depth && a.index < b.index));
+    }
+    EXPECT_EQ(wrong, 0u) << "stretch " << stretch;
+  }
+}
+
+}  // namespace
+}  // namespace stipple
