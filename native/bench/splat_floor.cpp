@@ -23,9 +23,9 @@ uint64_t blendAllTiles(const VisibleSplats& visible, const TileGrid& grid, TileK
       thread_local std::vector<TileSplat> splats;
       for (size_t index = group.first_tile + begin; index < group.first_tile + end; ++index) {
         const Tile tile = tileOf(grid, index, group.tile(index));
-        splats.clear();
-        for (const uint32_t i : tile.splats)
-          splats.push_back(makeTileSplat(visible.splats[i], tile));
+        splats.resize(tile.splats.size());
+        float largest = 0;
+        makeTileSplats(visible.splats.get(), tile, 0, splats.size(), largest, splats.data());
         TilePixels pixels;
         clearPixels(tile, pixels);
         const auto start = std::chrono::steady_clock::now();

@@ -8,22 +8,9 @@ namespace stipple {
 
 namespace {
 
-/// Above this size of |g|, float32 leaves too few digits (error of alpha up to about 1e-4): only
-/// splats thinner than a quarter of a pixel, which LowPass::kNone alone has.
-constexpr double kMaxFloatReach = 200.0;
+constexpr size_t kPrefetchDistance = 12;
 
-}  // namespace
-
-Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats) {
-  Tile tile;
-  tile.x0 = static_cast<uint32_t>(index % grid.columns) * kTileSide;
-  tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
-  tile.width = std::min(kTileSide, grid.width - tile.x0);
-  tile.height = std::min(kTileSide, grid.height - tile.y0);
-  tile.splats = splats;
-  return tile;
-}
-
+/// With the splat's own size of g and l, held to kMaxFloatReach, as finish_doubt.
 TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   constexpr double kScale = 0.84932180028801904;  // sqrt(log2(e)/2)
   constexpr double kSide = kTileSide;
@@ -46,12 +33,51 @@ TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   const double largest =
       std::abs(g0) + std::abs(g1) + (kSide - 1) * (std::abs(l00) + std::abs(l10) + std::abs(l11));
   out.doubt_low = static_cast<float>(2e-6 * largest + 4e-6);
-  out.doubt_high = largest > kMaxFloatReach ? kFinished : out.doubt_low;
+  out.doubt_high = largest > static_cast<double>(kMaxFloatReach) ? kFinished : out.doubt_low;
+  out.finish_doubt = static_cast<float>(std::min(largest, static_cast<double>(kMaxFloatReach)));
   std::copy(splat.colour, splat.colour + 3, out.colour);
   out.depth = splat.depth;
-  out.row_begin = static_cast<uint32_t>(std::clamp(std::ceil(-dy - splat.half_y), 0.0, kSide));
-  out.row_end = static_cast<uint32_t>(std::clamp(std::floor(-dy + splat.half_y) + 1.0, 0.0, kSide));
+  // Whole parts by conversion, which is one instruction everywhere, unlike std::floor.
+  const double first = std::clamp(-dy - splat.half_y, 0.0, kSide);
+  out.row_begin = static_cast<uint32_t>(first);
+  out.row_begin += static_cast<double>(out.row_begin) < first ? 1 : 0;
+  out.row_end = static_cast<uint32_t>(std::clamp(-dy + splat.half_y + 1.0, 0.0, kSide));
   return out;
+}
+
+}  // namespace
+
+Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats) {
+  Tile tile;
+  tile.x0 = static_cast<uint32_t>(index % grid.columns) * kTileSide;
+  tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
+  tile.width = std::min(kTileSide, grid.width - tile.x0);
+  tile.height = std::min(kTileSide, grid.height - tile.y0);
+  tile.splats = splats;
+  return tile;
+}
+
+void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin, size_t count,
+                    float& largest, TileSplat* out) {
+  for (size_t i = 0; i < count; ++i) {
+    // A tile's splats lie far apart, so each would wait for memory.
+    const size_t ahead = std::min(begin + i + kPrefetchDistance, tile.splats.size() - 1);
+    const VisibleSplat* next = &visible[tile.splats[ahead]];
+    __builtin_prefetch(next);
+    __builtin_prefetch(reinterpret_cast<const char*>(next + 1) - 1);
+    out[i] = makeTileSplat(visible[tile.splats[begin + i]], tile);
+    largest = std::max(largest, out[i].finish_doubt);
+    out[i].finish_doubt = finishDoubt(largest, begin + i + 1);
+  }
+}
+
+double alphaInDouble(const VisibleSplat& splat, const Tile& tile, uint32_t x, uint32_t y) {
+  const Footprint<double>& f = splat.footprint;
+  const double dx = tile.x0 + x + 0.5 - f.mean_x;
+  const double dy = tile.y0 + y + 0.5 - f.mean_y;
+  // As the reference: the bounds are exact, and cheaper than an exponential.
+  if (std::abs(dx) > splat.half_x || std::abs(dy) > splat.half_y) return 0.0;
+  return splatAlpha(f.opacity, halfSquaredDistance(f, dx, dy));
 }
 
 void clearPixels(const Tile& tile, TilePixels& pixels) {

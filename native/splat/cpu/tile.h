@@ -17,8 +17,13 @@ struct Tile {
 /// Tile `index` of the grid with its list.
 Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats);
 
-/// The splat as the tile's kernel wants it.
-TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile);
+/// Splats begin .. begin + count of the tile's list as its kernel wants them. In and out: largest,
+/// 0 for the first call of a tile; carried from batch to batch for finishDoubt.
+void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin, size_t count,
+                    float& largest, TileSplat* out);
+
+/// Alpha of a splat of the list at pixel (x, y) of the tile, in double, as the reference has it.
+double alphaInDouble(const VisibleSplat& splat, const Tile& tile, uint32_t x, uint32_t y);
 
 /// Nothing blended yet; pixels outside the picture are finished.
 void clearPixels(const Tile& tile, TilePixels& pixels);

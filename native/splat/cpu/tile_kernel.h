@@ -19,6 +19,9 @@ struct TileSplat {
   /// threshold log2(1/255): there rounding could decide. doubt_high is huge for splats so thin that
   /// float32 cannot give their alpha at all.
   float doubt_low, doubt_high;
+  /// Relative distance to 1e-4 within which the end of a pixel is in doubt: finishDoubt of the
+  /// splats up to this one.
+  float finish_doubt;
   float colour[3];
   float depth;
   uint32_t row_begin, row_end;  ///< rows of the tile that the splat can touch
@@ -43,16 +46,32 @@ struct TilePixels {
 constexpr float kLog2MinAlpha = -7.9943534368588579f;  ///< log2(1/255)
 constexpr float kFinished = 1e30f;
 constexpr float kNoMedian = -1e38f;
-/// Relative distance to 1e-4 within which the end of a pixel is in doubt. The transmittance is off
-/// by less: at most 9.2/ln(255/254) = 2,350 factors round by 1.2e-7 each, and the errors of alpha,
-/// grown by alpha/(1 - alpha), add about 5e-4 (alpha near 0.99 has a small |g|, so a small error).
-constexpr float kFinishDoubt = 2e-3f;
-/// The same about T = 1/2 for the median depth, where fewer factors (177) have rounded.
+/// How far ln T may be off after `count` splats whose g, l and 15 l sum to at most `largest`, at
+/// most kMaxFloatReach, in one tile. Alpha is off by |g| 3.3e-7 largest + 1e-6, relative: g by 4
+/// roundings of largest, the exponent by 1e-6, 2^x by 3e-7. That moves ln T by alpha/(1 - alpha)
+/// times as much, which is r(alpha) times this splat's share of -ln T, which sums to 9.3; r |g| is
+/// at most 2.83 and r at most 21.5 (at alpha = 0.99). And each factor rounds, 1.2e-7; at most 2,350
+/// splats of 1/255 blend.
+constexpr float finishDoubt(float largest, size_t count) {
+  return 8.8e-6f * largest + 2.5e-4f + 1.2e-7f * static_cast<float>(count < 2350 ? count : 2350);
+}
+/// Above this size of |g|, float32 leaves too few digits: only splats thinner than a quarter of a
+/// pixel, which LowPass::kNone alone has.
+constexpr float kMaxFloatReach = 200.0f;
+/// Relative distance to 1/2 within which the median depth is in doubt: fewer factors (177) have
+/// rounded.
 constexpr float kMedianDoubt = 2e-4f;
+
+/// Alpha in double, 0 where the splat is skipped. In: context of TileKernelOptions; splat, its
+/// place in this call's list; pixel, row * kTileSide + column.
+using AlphaJudge = double (*)(const void* context, size_t splat, uint32_t pixel);
 
 struct TileKernelOptions {
   bool with_depth;
   bool with_extras;  ///< median depth and counts
+  /// Asked where rounding could decide whether a splat shows; nullptr: the pixel is in doubt then.
+  AlphaJudge judge = nullptr;
+  const void* judge_context = nullptr;
 };
 
 /// Blends the splats in order into the tile; stops early once every pixel is finished.

@@ -22,14 +22,13 @@ void finishInDoubt(TilePixels& pixels, size_t i) {
   finish(pixels, i);
 }
 
-void blendPixel(const TileSplat& splat, float exponent, TileKernelOptions options,
+void blendPixel(const TileSplat& splat, float alpha, const TileKernelOptions& options,
                 TilePixels& pixels, size_t i) {
   PixelBlend<float> pixel;
   pixel.transmittance = pixels.transmittance[i];
   pixel.has_median = pixels.median_depth[i] != kNoMedian;
-  const float alpha = std::min(static_cast<float>(kMaxAlpha), std::exp2(exponent));
   const float next = pixel.transmittance * (1.0f - alpha);
-  if (near(next, static_cast<float>(kMinTransmittance), kFinishDoubt) ||
+  if (near(next, static_cast<float>(kMinTransmittance), splat.finish_doubt) ||
       (options.with_extras && near(next, 0.5f, kMedianDoubt))) {
     finishInDoubt(pixels, i);
     return;
@@ -66,10 +65,14 @@ void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions op
         const float g1 = splat.g1 + splat.l10 * column + splat.l11 * static_cast<float>(y);
         const float exponent = splat.log2_opacity - (g0 * g0 + g1 * g1);
         if (exponent <= kLog2MinAlpha - splat.doubt_low) continue;
-        if (exponent < kLog2MinAlpha + splat.doubt_high) {
-          finishInDoubt(pixels, i);
+        if (exponent >= kLog2MinAlpha + splat.doubt_high) {
+          const float alpha = std::min(static_cast<float>(kMaxAlpha), std::exp2(exponent));
+          blendPixel(splat, alpha, options, pixels, i);
+        } else if (options.judge) {
+          const double alpha = options.judge(options.judge_context, s, static_cast<uint32_t>(i));
+          if (alpha > 0) blendPixel(splat, static_cast<float>(alpha), options, pixels, i);
         } else {
-          blendPixel(splat, exponent, options, pixels, i);
+          finishInDoubt(pixels, i);
         }
       }
     }

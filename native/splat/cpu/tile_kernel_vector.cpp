@@ -35,13 +35,28 @@ HWY_INLINE Vec exp2Small(Tag d, Vec x) {
   return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(whole)));
 }
 
+/// Puts the judge's alpha into the lanes of `unclear`. In: first, the pixel of lane 0.
+HWY_NOINLINE Vec judgedAlpha(Tag d, hn::Mask<Tag> unclear, Vec alpha, size_t splat, size_t first,
+                             const TileKernelOptions& options) {
+  HWY_ALIGN float values[kTileSide];
+  HWY_ALIGN float asked[kTileSide];
+  hn::Store(alpha, d, values);
+  hn::Store(hn::IfThenElseZero(unclear, hn::Set(d, 1.0f)), d, asked);
+  for (size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+    if (asked[lane] == 0.0f) continue;
+    values[lane] = static_cast<float>(
+        options.judge(options.judge_context, splat, static_cast<uint32_t>(first + lane)));
+  }
+  return hn::Load(d, values);
+}
+
 template <bool kDepth, bool kExtras>
-void blendSplats(const TileSplat* splats, size_t count, TilePixels& pixels) {
+void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions& options,
+                 TilePixels& pixels) {
   const Tag d;
   const size_t lanes = hn::Lanes(d);
   const Vec max_alpha = hn::Set(d, static_cast<float>(kMaxAlpha));
   const Vec min_transmittance = hn::Set(d, static_cast<float>(kMinTransmittance));
-  const Vec finish_doubt = hn::Set(d, static_cast<float>(kMinTransmittance) * kFinishDoubt);
   const Vec half = hn::Set(d, 0.5f);
   const Vec median_doubt = hn::Set(d, 0.5f * kMedianDoubt);
   const Vec finished = hn::Set(d, kFinished);
@@ -52,6 +67,7 @@ void blendSplats(const TileSplat* splats, size_t count, TilePixels& pixels) {
     const TileSplat& splat = splats[s];
     const Vec low = hn::Set(d, kLog2MinAlpha - splat.doubt_low);
     const Vec high = hn::Set(d, kLog2MinAlpha + splat.doubt_high);
+    const Vec finish_doubt = hn::Set(d, static_cast<float>(kMinTransmittance) * splat.finish_doubt);
     const Vec l11 = hn::Set(d, splat.l11);
     for (size_t column = 0; column < kTileSide; column += lanes) {
       const Vec x = hn::Iota(d, static_cast<float>(column));
@@ -67,9 +83,14 @@ void blendSplats(const TileSplat* splats, size_t count, TilePixels& pixels) {
         const auto touched = hn::And(hn::Gt(exponent, low), hn::Lt(cut, finished));
         if (hn::AllFalse(d, touched)) continue;
 
-        const auto unclear = hn::And(touched, hn::Lt(exponent, high));
-        const auto shows = hn::AndNot(unclear, touched);
-        const Vec alpha = hn::Min(max_alpha, exp2Small(d, hn::Max(exponent, lowest)));
+        auto unclear = hn::And(touched, hn::Lt(exponent, high));
+        auto shows = hn::AndNot(unclear, touched);
+        Vec alpha = hn::Min(max_alpha, exp2Small(d, hn::Max(exponent, lowest)));
+        if (HWY_UNLIKELY(!hn::AllFalse(d, unclear)) && options.judge) {
+          alpha = judgedAlpha(d, unclear, alpha, s, i, options);
+          shows = hn::Or(shows, hn::And(unclear, hn::Gt(alpha, hn::Zero(d))));
+          unclear = hn::AndNot(unclear, unclear);
+        }
         const Vec before = hn::Load(d, pixels.transmittance + i);
         const Vec next = hn::NegMulAdd(before, alpha, before);
         auto near = hn::Lt(hn::Abs(hn::Sub(next, min_transmittance)), finish_doubt);
@@ -113,14 +134,14 @@ void blendTile(const TileSplat* splats, size_t count, TileKernelOptions options,
                TilePixels& pixels) {
   if (options.with_extras) {
     if (options.with_depth) {
-      blendSplats<true, true>(splats, count, pixels);
+      blendSplats<true, true>(splats, count, options, pixels);
     } else {
-      blendSplats<false, true>(splats, count, pixels);
+      blendSplats<false, true>(splats, count, options, pixels);
     }
   } else if (options.with_depth) {
-    blendSplats<true, false>(splats, count, pixels);
+    blendSplats<true, false>(splats, count, options, pixels);
   } else {
-    blendSplats<false, false>(splats, count, pixels);
+    blendSplats<false, false>(splats, count, options, pixels);
   }
 }
 

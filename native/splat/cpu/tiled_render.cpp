@@ -12,9 +12,9 @@
 #include "splat/scene.h"
 
 // Based on: Kerbl et al., 3D Gaussian Splatting, SIGGRAPH 2023 (tiles). Differs: one sort by depth
-// followed by counting by tile; and pixels in which float32 rounding could decide a threshold (a
-// splat at alpha = 1/255, the end at T = 1e-4, the median at T = 1/2) are found by the kernel and
-// blended again in double, with the same numbers as the reference. So no threshold falls
+// followed by counting by tile; and where float32 rounding could decide a threshold, double does,
+// with the same numbers as the reference: alpha = 1/255 on the spot, the end at T = 1e-4 and the
+// median at T = 1/2 by blending the pixel again. So no threshold falls
 // differently in the two renderers and the rest differs by rounding only.
 
 namespace stipple {
@@ -22,17 +22,14 @@ namespace stipple {
 namespace {
 
 constexpr size_t kBatchSize = 128;
-constexpr size_t kPrefetchDistance = 12;
 
 /// A pixel as the reference blends it.
-PixelBlend<double> blendInDouble(const VisibleSplat* visible, const Tile& tile, double px,
-                                 double py) {
+PixelBlend<double> blendInDouble(const VisibleSplat* visible, const Tile& tile, uint32_t x,
+                                 uint32_t y) {
   PixelBlend<double> pixel;
   for (const uint32_t index : tile.splats) {
     const VisibleSplat& splat = visible[index];
-    const Footprint<double>& f = splat.footprint;
-    const double alpha =
-        splatAlpha(f.opacity, halfSquaredDistance(f, px - f.mean_x, py - f.mean_y));
+    const double alpha = alphaInDouble(splat, tile, x, y);
     if (alpha > 0) pixel.add(alpha, splat.colour, static_cast<double>(splat.depth));
     if (pixel.finished) break;
   }
@@ -44,8 +41,7 @@ void replaceDoubtful(const VisibleSplat* visible, const Tile& tile, TilePixels& 
     for (uint32_t x = 0; x < tile.width; ++x) {
       const size_t i = static_cast<size_t>(y) * kTileSide + x;
       if (pixels.doubt[i] == 0.0f) continue;
-      const PixelBlend<double> pixel =
-          blendInDouble(visible, tile, tile.x0 + x + 0.5, tile.y0 + y + 0.5);
+      const PixelBlend<double> pixel = blendInDouble(visible, tile, x, y);
       pixels.transmittance[i] = static_cast<float>(pixel.transmittance);
       pixels.red[i] = static_cast<float>(pixel.colour[0]);
       pixels.green[i] = static_cast<float>(pixel.colour[1]);
@@ -90,24 +86,35 @@ void writePixels(const Tile& tile, const TilePixels& pixels, const RenderOptions
   }
 }
 
+/// The batch that the kernel works on, for judgeAlpha.
+struct Judged {
+  const VisibleSplat* visible;
+  const Tile* tile;
+  size_t begin;
+};
+
+double judgeAlpha(const void* context, size_t splat, uint32_t pixel) {
+  const Judged& judged = *static_cast<const Judged*>(context);
+  const uint32_t index = judged.tile->splats[judged.begin + splat];
+  return alphaInDouble(judged.visible[index], *judged.tile, pixel % kTileSide, pixel / kTileSide);
+}
+
 void renderTile(const VisibleSplat* visible, const Tile& tile, TileKernel kernel,
                 const RenderOptions& options, RenderResult& result) {
   // Scratch of this thread: 9 KiB of pixels and 7 KiB of splats, in the first-level cache.
   TilePixels pixels;
   TileSplat batch[kBatchSize];
   clearPixels(tile, pixels);
-  const TileKernelOptions kernel_options = {options.with_depth,
-                                            options.with_median_depth || options.with_counts};
+  Judged judged{visible, &tile, 0};
+  TileKernelOptions kernel_options = {options.with_depth,
+                                      options.with_median_depth || options.with_counts};
+  kernel_options.judge = judgeAlpha;
+  kernel_options.judge_context = &judged;
+  float largest = 0;
   for (size_t begin = 0; begin < tile.splats.size() && pixels.unfinished > 0; begin += kBatchSize) {
     const size_t count = std::min(kBatchSize, tile.splats.size() - begin);
-    for (size_t i = 0; i < count; ++i) {
-      // A tile's splats lie far apart, so each would wait for memory.
-      const size_t ahead = std::min(begin + i + kPrefetchDistance, tile.splats.size() - 1);
-      const VisibleSplat* next = &visible[tile.splats[ahead]];
-      __builtin_prefetch(next);
-      __builtin_prefetch(reinterpret_cast<const char*>(next + 1) - 1);
-      batch[i] = makeTileSplat(visible[tile.splats[begin + i]], tile);
-    }
+    makeTileSplats(visible, tile, begin, count, largest, batch);
+    judged.begin = begin;
     kernel(batch, count, kernel_options, pixels);
   }
   replaceDoubtful(visible, tile, pixels);

@@ -33,6 +33,7 @@ std::vector<TileSplat> randomSplats(size_t count, float opacity_low, uint32_t se
     s.g1 = -s.l10 * x - s.l11 * y;
     s.log2_opacity = std::log2(uniform(opacity_low, 1.0f));
     s.doubt_low = s.doubt_high = 5e-5f;
+    s.finish_doubt = 2e-3f;
     for (float& c : s.colour) c = uniform(0, 1);
     s.depth = uniform(1, 5);
     s.row_begin = 0;
