@@ -58,6 +58,8 @@ constexpr float finishDoubt(float largest, size_t count) {
 /// Above this size of |g|, float32 leaves too few digits: only splats thinner than a quarter of a
 /// pixel, which LowPass::kNone alone has.
 constexpr float kMaxFloatReach = 200.0f;
+/// finishDoubt of the worst tile.
+constexpr float kFinishDoubt = finishDoubt(kMaxFloatReach, 2350);
 /// Relative distance to 1/2 within which the median depth is in doubt: fewer factors (177) have
 /// rounded.
 constexpr float kMedianDoubt = 2e-4f;

@@ -193,7 +193,7 @@ void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progre
   forEachTileGroup(visible, grid, progress, memory, use);
 }
 
-TileListsBound tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid) {
+TileListsBound tileListsBound(uint64_t splat_count, const TileGrid& grid) {
   const uint64_t tiles = grid.tileCount();
   const uint64_t chunks = chunkCount(splat_count, tiles);
   const uint64_t all = splat_count * tiles;  // at most 2^32 * 2^24
@@ -201,6 +201,11 @@ TileListsBound tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid) 
   // Pages of 2 MiB round up.
   return {entries * sizeof(uint32_t) + (uint64_t{2} << 20),
           chunks * tiles * (sizeof(uint64_t) + sizeof(uint32_t)) + (tiles + 1) * sizeof(uint64_t)};
+}
+
+uint64_t tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid) {
+  const TileListsBound bound = tileListsBound(splat_count, grid);
+  return bound.pair_bytes + bound.other_bytes;
 }
 
 }  // namespace stipple

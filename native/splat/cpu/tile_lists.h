@@ -48,6 +48,9 @@ struct TileListsBound {
   uint64_t pair_bytes;
   uint64_t other_bytes;
 };
-TileListsBound tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid);
+TileListsBound tileListsBound(uint64_t splat_count, const TileGrid& grid);
+
+/// Their sum.
+uint64_t tileListsMemoryBound(uint64_t splat_count, const TileGrid& grid);
 
 }  // namespace stipple

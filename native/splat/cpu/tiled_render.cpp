@@ -215,8 +215,7 @@ RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera
   for (const SplatInstance& instance : instances) {
     if (instance.cloud) splat_count += instance.cloud->size();
   }
-  const TileListsBound lists =
-      tileListsMemoryBound(splat_count, TileGrid(camera.width, camera.height));
+  const TileListsBound lists = tileListsBound(splat_count, TileGrid(camera.width, camera.height));
   RenderMemory memory;
   memory.splat_bytes = visibleSplatsMemoryBound(splat_count);
   memory.pair_bytes = lists.pair_bytes;
