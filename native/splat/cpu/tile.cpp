@@ -10,7 +10,18 @@ namespace {
 
 constexpr size_t kPrefetchDistance = 12;
 
-/// With the splat's own size of g and l, held to kMaxFloatReach, as finish_doubt.
+}  // namespace
+
+Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats) {
+  Tile tile;
+  tile.x0 = static_cast<uint32_t>(index % grid.columns) * kTileSide;
+  tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
+  tile.width = std::min(kTileSide, grid.width - tile.x0);
+  tile.height = std::min(kTileSide, grid.height - tile.y0);
+  tile.splats = splats;
+  return tile;
+}
+
 TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   constexpr double kScale = 0.84932180028801904;  // sqrt(log2(e)/2)
   constexpr double kSide = kTileSide;
@@ -43,18 +54,6 @@ TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   out.row_begin += static_cast<double>(out.row_begin) < first ? 1 : 0;
   out.row_end = static_cast<uint32_t>(std::clamp(-dy + splat.half_y + 1.0, 0.0, kSide));
   return out;
-}
-
-}  // namespace
-
-Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats) {
-  Tile tile;
-  tile.x0 = static_cast<uint32_t>(index % grid.columns) * kTileSide;
-  tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
-  tile.width = std::min(kTileSide, grid.width - tile.x0);
-  tile.height = std::min(kTileSide, grid.height - tile.y0);
-  tile.splats = splats;
-  return tile;
 }
 
 void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin, size_t count,

@@ -17,6 +17,10 @@ struct Tile {
 /// Tile `index` of the grid with its list.
 Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats);
 
+/// The splat as a kernel of the tile wants it; finish_doubt holds its own size of g and l, held to
+/// kMaxFloatReach.
+TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile);
+
 /// Splats begin .. begin + count of the tile's list as its kernel wants them. In and out: largest,
 /// 0 for the first call of a tile; carried from batch to batch for finishDoubt.
 void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin, size_t count,
