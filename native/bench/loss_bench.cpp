@@ -37,7 +37,7 @@ struct Pictures {
   std::vector<float> rendered, target, gradient;
 };
 
-const Pictures& picturesOf(const Size& size) {
+Pictures& picturesOf(const Size& size) {
   static std::map<std::string, Pictures> all;
   const auto [found, is_new] = all.try_emplace(size.name);
   if (is_new) {
@@ -56,10 +56,9 @@ const Pictures& picturesOf(const Size& size) {
 enum class Output { kValue, kGradient };
 
 void evaluate(ImageLoss& loss, const Size& size, unsigned threads, Output output) {
-  const Pictures& pictures = picturesOf(size);
-  const GradientView gradient = {
-      output == Output::kGradient ? const_cast<float*>(pictures.gradient.data()) : nullptr,
-      PixelLayout::kRgba};
+  Pictures& pictures = picturesOf(size);
+  const GradientView gradient = {output == Output::kGradient ? pictures.gradient.data() : nullptr,
+                                 PixelLayout::kRgba};
   withThreads(threads, [&] {
     benchmark::DoNotOptimize(
         loss.evaluate(size.width, size.height, {pictures.rendered.data(), PixelLayout::kRgba},
@@ -102,11 +101,11 @@ void blurFloor(size_t pixels, unsigned threads, size_t blurs) {
       (pixels * blurs + kFloorWidth * kFloorHeight - 1) / (kFloorWidth * kFloorHeight);
   withThreads(threads, [&] {
     parallelFor(tiles, 15, [](size_t begin, size_t end) {
-      thread_local std::vector<float> in((kFloorHeight + 10) * kFloorPitch, 0.5f);
-      thread_local std::vector<float> out(kFloorWidth);
+      alignas(64) thread_local float in[(kFloorHeight + 10) * kFloorPitch] = {};
+      alignas(64) thread_local float out[kFloorWidth];
       for (size_t i = begin; i < end; ++i) {
-        blurTile(in.data(), out.data());
-        benchmark::DoNotOptimize(out.data());
+        blurTile(in, out);
+        benchmark::DoNotOptimize(&out[0]);
         benchmark::ClobberMemory();
       }
     });

@@ -43,6 +43,42 @@ HWY_INLINE void stepLanes(Tag d, const AdamFactors& factors, Vec& p, Vec g, Vec&
   v = hn::IfThenElse(beyond, v, next_v);
 }
 
+/// The last elements, fewer than a vector. Short runs of visible rows consist of little else.
+HWY_INLINE void stepTail(Tag d, const AdamFactors& factors, size_t count, float* parameters,
+                         const float* gradients, float* first_moments, float* second_moments,
+                         hn::Mask<Tag>& unusable) {
+#if HWY_MEM_OPS_MIGHT_FAULT
+  HWY_ALIGN float buffer[4][hn::MaxLanes(d)] = {};
+  for (size_t k = 0; k < count; ++k) {
+    buffer[0][k] = parameters[k];
+    buffer[1][k] = gradients[k];
+    buffer[2][k] = first_moments[k];
+    buffer[3][k] = second_moments[k];
+  }
+  Vec p = hn::Load(d, buffer[0]);
+  Vec m = hn::Load(d, buffer[2]);
+  Vec v = hn::Load(d, buffer[3]);
+  stepLanes(d, factors, p, hn::Load(d, buffer[1]), m, v, unusable);
+  hn::Store(p, d, buffer[0]);
+  hn::Store(m, d, buffer[2]);
+  hn::Store(v, d, buffer[3]);
+  for (size_t k = 0; k < count; ++k) {
+    parameters[k] = buffer[0][k];
+    first_moments[k] = buffer[2][k];
+    second_moments[k] = buffer[3][k];
+  }
+#else
+  const auto live = hn::FirstN(d, count);
+  Vec p = hn::MaskedLoad(live, d, parameters);
+  Vec m = hn::MaskedLoad(live, d, first_moments);
+  Vec v = hn::MaskedLoad(live, d, second_moments);
+  stepLanes(d, factors, p, hn::MaskedLoad(live, d, gradients), m, v, unusable);
+  hn::BlendedStore(p, live, d, parameters);
+  hn::BlendedStore(m, live, d, first_moments);
+  hn::BlendedStore(v, live, d, second_moments);
+#endif
+}
+
 bool stepVector(const AdamFactors& factors, size_t count, float* parameters, const float* gradients,
                 float* first_moments, float* second_moments) {
   const Tag d;
@@ -58,28 +94,9 @@ bool stepVector(const AdamFactors& factors, size_t count, float* parameters, con
     hn::StoreU(m, d, first_moments + i);
     hn::StoreU(v, d, second_moments + i);
   }
-  if (i < count) {
-    const size_t rest = count - i;
-    HWY_ALIGN float buffer[4][hn::MaxLanes(d)] = {};
-    for (size_t k = 0; k < rest; ++k) {
-      buffer[0][k] = parameters[i + k];
-      buffer[1][k] = gradients[i + k];
-      buffer[2][k] = first_moments[i + k];
-      buffer[3][k] = second_moments[i + k];
-    }
-    Vec p = hn::Load(d, buffer[0]);
-    Vec m = hn::Load(d, buffer[2]);
-    Vec v = hn::Load(d, buffer[3]);
-    stepLanes(d, factors, p, hn::Load(d, buffer[1]), m, v, unusable);
-    hn::Store(p, d, buffer[0]);
-    hn::Store(m, d, buffer[2]);
-    hn::Store(v, d, buffer[3]);
-    for (size_t k = 0; k < rest; ++k) {
-      parameters[i + k] = buffer[0][k];
-      first_moments[i + k] = buffer[2][k];
-      second_moments[i + k] = buffer[3][k];
-    }
-  }
+  if (i < count)
+    stepTail(d, factors, count - i, parameters + i, gradients + i, first_moments + i,
+             second_moments + i, unusable);
   return hn::AllFalse(d, unusable);
 }
 
