@@ -10,19 +10,8 @@ namespace {
 
 constexpr size_t kPrefetchDistance = 12;
 
-}  // namespace
-
-Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats) {
-  Tile tile;
-  tile.x0 = static_cast<uint32_t>(index % grid.columns) * kTileSide;
-  tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
-  tile.width = std::min(kTileSide, grid.width - tile.x0);
-  tile.height = std::min(kTileSide, grid.height - tile.y0);
-  tile.splats = splats;
-  return tile;
-}
-
-TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
+[[gnu::always_inline]] inline void fillTileSplat(const VisibleSplat& splat, const Tile& tile,
+                                                 TileSplat& out) {
   constexpr double kScale = 0.84932180028801904;  // sqrt(log2(e)/2)
   constexpr double kSide = kTileSide;
   const Footprint<double>& f = splat.footprint;
@@ -33,7 +22,6 @@ TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   const double l00 = kScale * f.l00;
   const double l10 = kScale * f.l10;
   const double l11 = kScale * f.l11;
-  TileSplat out;
   out.g0 = static_cast<float>(g0);
   out.g1 = static_cast<float>(g1);
   out.l00 = static_cast<float>(l00);
@@ -53,6 +41,23 @@ TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   out.row_begin = static_cast<uint32_t>(first);
   out.row_begin += static_cast<double>(out.row_begin) < first ? 1 : 0;
   out.row_end = static_cast<uint32_t>(std::clamp(-dy + splat.half_y + 1.0, 0.0, kSide));
+}
+
+}  // namespace
+
+Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats) {
+  Tile tile;
+  tile.x0 = static_cast<uint32_t>(index % grid.columns) * kTileSide;
+  tile.y0 = static_cast<uint32_t>(index / grid.columns) * kTileSide;
+  tile.width = std::min(kTileSide, grid.width - tile.x0);
+  tile.height = std::min(kTileSide, grid.height - tile.y0);
+  tile.splats = splats;
+  return tile;
+}
+
+TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
+  TileSplat out;
+  fillTileSplat(splat, tile, out);
   return out;
 }
 
@@ -64,7 +69,7 @@ void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin,
     const VisibleSplat* next = &visible[tile.splats[ahead]];
     __builtin_prefetch(next);
     __builtin_prefetch(reinterpret_cast<const char*>(next + 1) - 1);
-    out[i] = makeTileSplat(visible[tile.splats[begin + i]], tile);
+    fillTileSplat(visible[tile.splats[begin + i]], tile, out[i]);
     largest = std::max(largest, out[i].finish_doubt);
     out[i].finish_doubt = finishDoubt(largest, begin + i + 1);
   }

@@ -19,8 +19,8 @@ namespace {
 constexpr uint64_t kGroupEntries = 1u << 25;
 /// Counters of all (chunk, tile) pairs together.
 constexpr size_t kMaxCounters = size_t{1} << 24;
-constexpr size_t kMaxChunks = 64;
-constexpr size_t kMinChunkSplats = 4096;
+constexpr size_t kMaxChunks = 32;
+constexpr size_t kMinChunkSplats = 2048;
 
 /// Tiles whose pixel centres meet [low, high] pixels, as first..last; empty: first > last.
 struct TileRange {

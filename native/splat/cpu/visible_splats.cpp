@@ -13,8 +13,9 @@ namespace {
 /// Splats of one task; their inputs (up to 340 bytes each) stay in the second-level cache between
 /// the check of their values and the projection.
 constexpr size_t kRangeSplats = 2048;
-/// Chunks of the sort; more would cost more counters than two or a few dozen threads gain.
-constexpr size_t kSortChunks = 32;
+/// Chunks of the sort: each has a counter per digit, which are summed on one thread.
+constexpr size_t kMaxSortChunks = 16;
+constexpr size_t kMinChunkItems = 32768;
 constexpr uint32_t kMaxDigitBits = 12;
 constexpr size_t kMaxDigits = size_t{1} << kMaxDigitBits;
 
@@ -39,7 +40,9 @@ size_t projectRange(Projector project, const PlacedScene& scene, size_t begin, s
 /// counts its digits and then knows where its items go: the order does not depend on threads.
 class DepthSort {
  public:
-  DepthSort(VisibleSplats& visible) : visible_(visible) {}
+  explicit DepthSort(VisibleSplats& visible)
+      : visible_(visible),
+        chunks_(std::clamp<size_t>(visible.count / kMinChunkItems, 1, kMaxSortChunks)) {}
 
   /// The sorted items; the other array of visible.items is free then.
   DepthItem* run() {
@@ -81,12 +84,12 @@ class DepthSort {
   void forEachRun(bool first_pass, const DepthItem* from, size_t chunk, Use use) const {
     if (first_pass) {
       const size_t ranges = visible_.filled.size();
-      for (size_t r = chunk * ranges / kSortChunks; r < (chunk + 1) * ranges / kSortChunks; ++r) {
+      for (size_t r = chunk * ranges / chunks_; r < (chunk + 1) * ranges / chunks_; ++r) {
         use(from + r * kRangeSplats, visible_.filled[r]);
       }
     } else {
-      const size_t begin = chunk * visible_.count / kSortChunks;
-      use(from + begin, (chunk + 1) * visible_.count / kSortChunks - begin);
+      const size_t begin = chunk * visible_.count / chunks_;
+      use(from + begin, (chunk + 1) * visible_.count / chunks_ - begin);
     }
   }
 
@@ -107,10 +110,10 @@ class DepthSort {
         });
       }
     };
-    parallelFor(kSortChunks, 1, std::cref(count));
+    parallelFor(chunks_, 1, std::cref(count));
     uint32_t sum = 0;
     for (size_t digit = 0; digit < digit_count; ++digit) {
-      for (size_t chunk = 0; chunk < kSortChunks; ++chunk) {
+      for (size_t chunk = 0; chunk < chunks_; ++chunk) {
         const uint32_t here = digits[chunk * digit_count + digit];
         digits[chunk * digit_count + digit] = sum;
         sum += here;
@@ -124,11 +127,12 @@ class DepthSort {
         });
       }
     };
-    parallelFor(kSortChunks, 1, std::cref(move));
+    parallelFor(chunks_, 1, std::cref(move));
     flipped_ = !flipped_;
   }
 
   VisibleSplats& visible_;
+  size_t chunks_;
   bool flipped_ = false;
 };
 
@@ -145,7 +149,7 @@ void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* pr
   DepthItem* items = visible.items[0].resize(count);
   visible.items[1].resize(count);
   visible.filled.resize(rangeCount(count, kRangeSplats));
-  visible.digits.resize(kSortChunks * kMaxDigits);
+  visible.digits.resize(kMaxSortChunks * kMaxDigits);
   const auto project_range = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     const size_t after = projectRange(project, scene, begin, end, slots, items);
@@ -185,7 +189,7 @@ uint64_t visibleSplatsMemoryBound(uint64_t splat_count) {
   // The last term: arrays on huge pages are rounded up.
   return splat_count * (2 * sizeof(VisibleSplat) + 2 * sizeof(DepthItem)) +
          rangeCount(splat_count, kRangeSplats) * sizeof(uint32_t) +
-         kSortChunks * kMaxDigits * sizeof(uint32_t) + 4 * (uint64_t{2} << 20);
+         kMaxSortChunks * kMaxDigits * sizeof(uint32_t) + 4 * (uint64_t{2} << 20);
 }
 
 }  // namespace stipple
