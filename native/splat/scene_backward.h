@@ -43,17 +43,18 @@ inline Vec3d splatColourBackward(const PlacedScene& scene, const PlacedCloud& pl
     harmonicBasisGradient(placed.sh_degree, direction[0], direction[1], direction[2], slopes);
   }
   const size_t count = shCoefficientCount(placed.sh_degree);
-  Vec3d by_direction = Vec3d::Zero();
+  double by_basis[25] = {};
   for (size_t c = 0; c < 3; ++c) {
     double sum = 0.5;
     for (size_t k = 0; k < count; ++k) sum += basis[k] * static_cast<double>(sh[k * 3 + c]);
     if (!(sum > 0.0 && sum < 1e12)) continue;
     const double by_sum = by_colour[c] * (placed.linearise ? srgbToLinearSlope(sum) : 1.0);
     for (size_t k = 0; k < count; ++k) by_sh[k * 3 + c] = storedGradient(by_sum * basis[k]);
-    for (size_t k = 1; k < count; ++k) {
-      const double factor = by_sum * static_cast<double>(sh[k * 3 + c]);
-      by_direction += factor * Vec3d(slopes[k][0], slopes[k][1], slopes[k][2]);
-    }
+    for (size_t k = 1; k < count; ++k) by_basis[k] += by_sum * static_cast<double>(sh[k * 3 + c]);
+  }
+  Vec3d by_direction = Vec3d::Zero();
+  for (size_t k = 1; k < count; ++k) {
+    by_direction += by_basis[k] * Vec3d(slopes[k][0], slopes[k][1], slopes[k][2]);
   }
   by_direction -= direction * direction.dot(by_direction);
   return by_direction / length;

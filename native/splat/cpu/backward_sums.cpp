@@ -46,6 +46,11 @@ void BackwardSums::add(const TileListGroup& group, size_t first_tile, size_t end
   });
 }
 
+bool BackwardSums::isTouched(size_t visible) const {
+  const double* sums = of(visible);
+  return std::any_of(sums, sums + field_count_, [](double sum) { return sum != 0.0; });
+}
+
 uint64_t BackwardSums::memoryBound(uint64_t visible_count, BackwardMode mode) {
   return visible_count * backwardFieldCount(mode) * sizeof(double);
 }

@@ -21,6 +21,9 @@ class BackwardSums {
 
   const double* of(size_t visible) const { return &sums_[visible * field_count_]; }
 
+  /// Whether some sum is not 0: many splats in view are hidden by others.
+  bool isTouched(size_t visible) const;
+
   static uint64_t memoryBound(uint64_t visible_count, BackwardMode mode);
 
  private:

@@ -1,7 +1,9 @@
 #include "splat/cpu/tiled_backward.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -26,6 +28,7 @@ namespace {
 constexpr uint64_t kHeldEntries = 1u << 20;
 constexpr size_t kTileGrain = 4;
 constexpr size_t kSplatGrain = 2048;
+constexpr uint32_t kNotVisible = std::numeric_limits<uint32_t>::max();
 /// Largest derivative or weight that is accepted: with colours up to 6e28 (the largest that the
 /// renderer makes) every float32 product and sum of a tile stays below 3e38.
 constexpr double kLargestInput = 1e4;
@@ -39,10 +42,20 @@ void requirePicture(std::span<const float> values, size_t pixel_count, size_t ch
              " values; the picture has " + std::to_string(pixel_count) + " pixels of " +
              std::to_string(channels));
   }
+  const auto good = [least](float value) {
+    // By bits: infinity and NaN are above the largest, and comparing NaN would raise a trap.
+    const bool in_range = (std::bit_cast<uint32_t>(value) & 0x7fffffffu) <=
+                          std::bit_cast<uint32_t>(static_cast<float>(kLargestInput));
+    return in_range && value >= least;
+  };
+  bool all_good = true;
   for (const float value : values) {
-    if (std::isfinite(value) && value >= least && static_cast<double>(value) <= kLargestInput) {
-      continue;
-    }
+    all_good &= (std::bit_cast<uint32_t>(value) & 0x7fffffffu) <=
+                std::bit_cast<uint32_t>(static_cast<float>(kLargestInput));
+  }
+  if (all_good && least < 0.0f) return;
+  for (const float value : values) {
+    if (good(value)) continue;
     fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(value) + "; " +
                                           std::to_string(static_cast<double>(least)) + " to " +
                                           std::to_string(kLargestInput) + " is allowed");
@@ -282,11 +295,19 @@ BackwardResult renderBackwardWith(const BackwardKernel& kernel,
   for (const PlacedCloud& placed : scene.clouds) {
     taken.normal_to_view.push_back(inverse(placed.linear).transpose());
   }
-  std::vector<std::array<double, 6>> cameras(rangeCount(visible.count, kSplatGrain));
+  // In the order of the clouds: attributes and derivatives are then read and written in a row.
+  std::vector<uint32_t> place_of(scene.splat_count, kNotVisible);
   parallelFor(visible.count, kSplatGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      place_of[visible.splats[i].index] = static_cast<uint32_t>(i);
+    }
+  });
+  std::vector<std::array<double, 6>> cameras(rangeCount(scene.splat_count, kSplatGrain));
+  parallelFor(scene.splat_count, kSplatGrain, [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     for (size_t i = begin; i < end; ++i) {
-      takeBack(taken, visible.splats[i].index, sums.of(i), result.instances,
+      if (place_of[i] == kNotVisible || !sums.isTouched(place_of[i])) continue;
+      takeBack(taken, static_cast<uint32_t>(i), sums.of(place_of[i]), result.instances,
                cameras[begin / kSplatGrain].data());
     }
   });
@@ -321,6 +342,7 @@ uint64_t backwardMemoryBound(std::span<const SplatInstance> instances, const Cam
          grid.tileCount() * 3 * sizeof(double) +
          threads * (TileBackward::memoryBound() + sizeof(TileBackward)) +
          rangeCount(splat_count, kSplatGrain) * sizeof(std::array<double, 6>) +
+         splat_count * sizeof(uint32_t) +
          instances.size() * (2 * sizeof(PlacedCloud) + 2 * sizeof(Mat3d) + 2 * sizeof(size_t));
 }
 
