@@ -28,6 +28,7 @@ namespace {
 constexpr uint64_t kHeldEntries = 1u << 20;
 constexpr size_t kTileGrain = 4;
 constexpr size_t kSplatGrain = 2048;
+constexpr size_t kPrefetchDistance = 8;
 constexpr uint32_t kNotVisible = std::numeric_limits<uint32_t>::max();
 /// Largest derivative or weight that is accepted: with colours up to 6e28 (the largest that the
 /// renderer makes) every float32 product and sum of a tile stays below 3e38.
@@ -306,6 +307,9 @@ BackwardResult renderBackwardWith(const BackwardKernel& kernel,
   parallelFor(scene.splat_count, kSplatGrain, [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     for (size_t i = begin; i < end; ++i) {
+      // The sums lie in the order of depth, so each would wait for memory.
+      const uint32_t ahead = place_of[std::min(i + kPrefetchDistance, end - 1)];
+      if (ahead != kNotVisible) __builtin_prefetch(sums.of(ahead));
       if (place_of[i] == kNotVisible || !sums.isTouched(place_of[i])) continue;
       takeBack(taken, static_cast<uint32_t>(i), sums.of(place_of[i]), result.instances,
                cameras[begin / kSplatGrain].data());

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "splat/backward_cases.h"
 #include "splat/random_scene.h"
 
 // Every allocation of this test binary is counted, so that the bound is held against what a
@@ -170,6 +171,43 @@ TEST(RenderWorkspace, DrawsAnotherSceneAsIfItWereNew) {
     EXPECT_EQ(reused.counts, fresh.counts);
     EXPECT_EQ(reused.width, fresh.width);
     EXPECT_EQ(reused.visible_count, fresh.visible_count);
+  }
+}
+
+TEST(BackwardMemoryBound, IsNeverExceeded) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the address sanitizer replaces the allocator that is counted here";
+#endif
+  CloudRecipe small;
+  small.count = 50000;
+  small.size_max = 0.01;
+  small.degree = 1;
+  CloudRecipe covering;
+  covering.count = 3000;
+  covering.size_min = 3;
+  covering.size_max = 5;
+  for (const CloudRecipe& recipe : {small, covering}) {
+    const SplatCloud cloud = randomCloud(recipe, 2);
+    const SplatInstance instance{&cloud};
+    for (const Camera& camera : {frontCamera(33, 20, 30, 3), frontCamera(500, 400, 300, 3)}) {
+      const size_t pixels = testing::pixelCount(camera);
+      const std::vector<float> gradient(pixels * 4, 1.0f);
+      const std::vector<float> residual(pixels * 3, 0.1f);
+      for (const bool everything : {false, true}) {
+        BackwardInput input;
+        input.colour_gradient = gradient;
+        if (everything) input.residual = residual;
+        input.with_blending_weights = input.with_screen_gradients = everything;
+        const uint64_t bound = backwardMemoryBound({&instance, 1}, camera, {}, input);
+        const uint64_t before = held.load();
+        peak.store(before);
+        const BackwardResult result = renderBackward({&instance, 1}, camera, {}, input, bound);
+        const uint64_t used = peak.load() - before;
+        EXPECT_GT(result.visible_count, 0u);
+        EXPECT_LE(used, bound + 65536);
+        EXPECT_GT(used, bound / 64);
+      }
+    }
   }
 }
 
