@@ -66,9 +66,7 @@ void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin,
   for (size_t i = 0; i < count; ++i) {
     // A tile's splats lie far apart, so each would wait for memory.
     const size_t ahead = std::min(begin + i + kPrefetchDistance, tile.splats.size() - 1);
-    const VisibleSplat* next = &visible[tile.splats[ahead]];
-    __builtin_prefetch(next);
-    __builtin_prefetch(reinterpret_cast<const char*>(next + 1) - 1);
+    prefetchSplat(&visible[tile.splats[ahead]]);
     fillTileSplat(visible[tile.splats[begin + i]], tile, out[i]);
     largest = std::max(largest, out[i].finish_doubt);
     out[i].finish_doubt = finishDoubt(largest, begin + i + 1);

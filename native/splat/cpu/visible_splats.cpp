@@ -167,10 +167,7 @@ void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* pr
     if (progress) progress->throwIfCancelled();
     constexpr size_t kAhead = 16;
     for (size_t i = begin; i < end; ++i) {
-      const VisibleSplat* next =
-          &slots[static_cast<uint32_t>(sorted[std::min(i + kAhead, end - 1)])];
-      __builtin_prefetch(next);
-      __builtin_prefetch(reinterpret_cast<const char*>(next + 1) - 1);
+      prefetchSplat(&slots[static_cast<uint32_t>(sorted[std::min(i + kAhead, end - 1)])]);
       splats[i] = slots[static_cast<uint32_t>(sorted[i])];
       spans[i] = tileSpanOf(splats[i], grid);
     }
