@@ -8,7 +8,7 @@ namespace stipple {
 
 namespace {
 
-constexpr size_t kPrefetchDistance = 12;
+constexpr size_t kPrefetchDistance = 24;
 
 [[gnu::always_inline]] inline void fillTileSplat(const VisibleSplat& splat, const Tile& tile,
                                                  TileSplat& out) {

@@ -165,7 +165,7 @@ void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* pr
                       static_cast<uint32_t>(scene.view.height));
   const auto gather = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
-    constexpr size_t kAhead = 16;
+    constexpr size_t kAhead = 32;
     for (size_t i = begin; i < end; ++i) {
       prefetchSplat(&slots[static_cast<uint32_t>(sorted[std::min(i + kAhead, end - 1)])]);
       splats[i] = slots[static_cast<uint32_t>(sorted[i])];
