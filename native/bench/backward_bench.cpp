@@ -48,8 +48,10 @@ void takeOffAll(const SplatCase& c, const BackwardKernel& kernel, const Backward
                 unsigned threads) {
   const SplatInstance instance{&cloudOf(c)};
   withThreads(threads, [&] {
-    const BackwardResult result =
-        renderBackwardWith(kernel, {&instance, 1}, cameraOf(c), {}, input);
+    // As in training: the memory of the last step serves the next.
+    static BackwardWorkspace workspace;
+    static BackwardResult result;
+    renderBackwardWith(kernel, {&instance, 1}, cameraOf(c), {}, input, workspace, result);
     benchmark::DoNotOptimize(result.camera.data());
   });
 }
@@ -57,7 +59,9 @@ void takeOffAll(const SplatCase& c, const BackwardKernel& kernel, const Backward
 void draw(const SplatCase& c) {
   const SplatInstance instance{&cloudOf(c)};
   withThreads(2, [&] {
-    const RenderResult picture = renderTiled({&instance, 1}, cameraOf(c), {});
+    static RenderWorkspace workspace;
+    static RenderResult picture;
+    renderTiled({&instance, 1}, cameraOf(c), {}, workspace, picture);
     benchmark::DoNotOptimize(picture.colour.data());
   });
 }

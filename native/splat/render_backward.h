@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -74,6 +75,28 @@ BackwardResult renderBackward(std::span<const SplatInstance> instances, const Ca
                               const RenderOptions& options, const BackwardInput& input,
                               uint64_t memory_limit_bytes = UINT64_MAX,
                               Progress* progress = nullptr);
+
+/// Memory of renderBackward that the next call uses again: a second call of the same size
+/// allocates nothing. One call at a time.
+class BackwardWorkspace {
+ public:
+  BackwardWorkspace();
+  ~BackwardWorkspace();
+  BackwardWorkspace(BackwardWorkspace&&) noexcept;
+  BackwardWorkspace& operator=(BackwardWorkspace&&) noexcept;
+
+  struct Arrays;
+  Arrays& arrays() { return *arrays_; }
+
+ private:
+  std::unique_ptr<Arrays> arrays_;
+};
+
+/// renderBackward into a result and a workspace that may have served before.
+void renderBackward(std::span<const SplatInstance> instances, const Camera& camera,
+                    const RenderOptions& options, const BackwardInput& input,
+                    BackwardWorkspace& workspace, BackwardResult& result,
+                    uint64_t memory_limit_bytes = UINT64_MAX, Progress* progress = nullptr);
 
 /// Upper bound of the bytes that renderBackward allocates, its result included.
 uint64_t backwardMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,

@@ -1,6 +1,7 @@
 #include "splat/cpu/backward_sums.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "base/parallel.h"
 
@@ -12,19 +13,25 @@ namespace {
 /// more of them cost more searches.
 constexpr size_t kMostRanges = 64;
 constexpr size_t kLeastSplats = 1024;
+constexpr size_t kClearedAtOnce = 16384;  // splats
 
 }  // namespace
 
-BackwardSums::BackwardSums(size_t visible_count, BackwardMode mode)
-    : visible_count_(visible_count),
-      field_count_(backwardFieldCount(mode)),
-      sums_(visible_count * field_count_, 0.0) {}
+void BackwardSums::reset(size_t visible_count, BackwardMode mode) {
+  visible_count_ = visible_count;
+  field_count_ = backwardFieldCount(mode);
+  double* sums = sums_.resize(visible_count * field_count_);
+  parallelFor(visible_count_, kClearedAtOnce, [&](size_t begin, size_t end) {
+    std::fill(sums + begin * field_count_, sums + end * field_count_, 0.0);
+  });
+}
 
 void BackwardSums::add(const TileListGroup& group, size_t first_tile, size_t end_tile,
                        const float* tile_sums) {
   const size_t grain = std::max(kLeastSplats, (visible_count_ + kMostRanges - 1) / kMostRanges);
   const uint64_t first_entry = group.offsets[first_tile - group.first_tile];
-  parallelFor(visible_count_, grain, [&](size_t begin, size_t end) {
+  // By reference where it is handed over: a std::function of a large capture allocates.
+  const auto add_range = [&](size_t begin, size_t end) {
     for (size_t tile = first_tile; tile < end_tile; ++tile) {
       // A tile lists its splats in increasing order.
       const std::span<const uint32_t> splats = group.tile(tile);
@@ -43,7 +50,8 @@ void BackwardSums::add(const TileListGroup& group, size_t first_tile, size_t end
         }
       }
     }
-  });
+  };
+  parallelFor(visible_count_, grain, std::ref(add_range));
 }
 
 bool BackwardSums::isTouched(size_t visible) const {

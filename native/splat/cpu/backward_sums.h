@@ -1,9 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "splat/blend_backward.h"
+#include "splat/cpu/reused_array.h"
 #include "splat/cpu/tile_lists.h"
 
 namespace stipple {
@@ -13,23 +13,26 @@ namespace stipple {
 /// result does not depend on the threads.
 class BackwardSums {
  public:
-  BackwardSums(size_t visible_count, BackwardMode mode);
+  /// Zeros for this many splats, in memory that may hold an earlier picture's.
+  void reset(size_t visible_count, BackwardMode mode);
 
   /// Adds tiles [first_tile, end_tile) of the group. In: tile_sums [entries of those
   /// tiles][fields].
   void add(const TileListGroup& group, size_t first_tile, size_t end_tile, const float* tile_sums);
 
-  const double* of(size_t visible) const { return &sums_[visible * field_count_]; }
+  const double* of(size_t visible) const { return sums_.get() + visible * field_count_; }
 
   /// Whether some sum is not 0: many splats in view are hidden by others.
   bool isTouched(size_t visible) const;
 
+  uint64_t bytes() const { return sums_.bytes(); }
+
   static uint64_t memoryBound(uint64_t visible_count, BackwardMode mode);
 
  private:
-  size_t visible_count_;
-  size_t field_count_;
-  std::vector<double> sums_;  ///< [visible][fields]
+  size_t visible_count_ = 0;
+  size_t field_count_ = 0;
+  ReusedArray<double> sums_;  ///< [visible][fields]
 };
 
 }  // namespace stipple

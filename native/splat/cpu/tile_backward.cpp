@@ -58,14 +58,16 @@ PixelBackward<double> startBehind(const PictureLoss& picture, const PixelLoss<do
 
 }  // namespace
 
-TileBackward::TileBackward(const BackwardKernel& kernel, const VisibleSplat* visible,
-                           const PictureLoss& loss)
-    : kernel_(kernel),
-      visible_(visible),
-      loss_(loss),
-      pixels_(std::make_unique<BackwardPixels>()),
-      splats_(kBatchSize * kBatchesKept) {
+TileBackward::TileBackward()
+    : pixels_(std::make_unique<BackwardPixels>()), splats_(kBatchSize * kBatchesKept) {
   blended_.reserve(kMostBlended);
+}
+
+void TileBackward::begin(const BackwardKernel& kernel, const VisibleSplat* visible,
+                         const PictureLoss& loss) {
+  kernel_ = &kernel;
+  visible_ = visible;
+  loss_ = &loss;
 }
 
 uint64_t TileBackward::memoryBound() {
@@ -100,9 +102,9 @@ size_t TileBackward::mark(const Tile& tile) {
   for (; begin < tile.splats.size() && pixels_->unfinished > 0; begin += kBatchSize) {
     const size_t batch = begin / kBatchSize;
     makeBatch(tile, batch);
-    kernel_.mark(&splats_[batch % kBatchesKept * kBatchSize],
-                 std::min(kBatchSize, tile.splats.size() - begin), static_cast<int32_t>(begin),
-                 *pixels_);
+    kernel_->mark(&splats_[batch % kBatchesKept * kBatchSize],
+                  std::min(kBatchSize, tile.splats.size() - begin), static_cast<int32_t>(begin),
+                  *pixels_);
   }
   return std::min(begin, tile.splats.size());
 }
@@ -117,13 +119,13 @@ void TileBackward::prepareTakeOff(const Tile& tile, double* background) {
         continue;
       }
       const PixelLoss<double> loss =
-          lossAt(loss_, static_cast<size_t>(tile.y0 + y) * loss_.width + tile.x0 + x);
+          lossAt(*loss_, static_cast<size_t>(tile.y0 + y) * loss_->width + tile.x0 + x);
       const double transmittance = static_cast<double>(pixels.transmittance[i]);
-      const PixelBackward<double> pixel = startBehind(loss_, loss, transmittance);
+      const PixelBackward<double> pixel = startBehind(*loss_, loss, transmittance);
       for (size_t c = 0; c < 4; ++c) pixels.gradient[c][i] = static_cast<float>(loss.gradient[c]);
       pixels.behind[i] = static_cast<float>(pixel.behind);
       for (size_t c = 0; c < 3; ++c) background[c] += transmittance * loss.gradient[c];
-      if (loss_.mode == BackwardMode::kGradients) continue;
+      if (loss_->mode == BackwardMode::kGradients) continue;
       for (size_t c = 0; c < 3; ++c) {
         pixels.colour_behind[c][i] = static_cast<float>(pixel.colour_behind[c]);
         pixels.signed_weight[c][i] = static_cast<float>(loss.signed_weight[c]);
@@ -136,7 +138,7 @@ void TileBackward::prepareTakeOff(const Tile& tile, double* background) {
 }
 
 void TileBackward::takeOff(const Tile& tile, size_t used, float* sums) {
-  const size_t field_count = backwardFieldCount(loss_.mode);
+  const size_t field_count = backwardFieldCount(loss_->mode);
   const size_t batches = (used + kBatchSize - 1) / kBatchSize;
   for (size_t batch = batches; batch-- > 0;) {
     BackwardSplat* splats = &splats_[batch % kBatchesKept * kBatchSize];
@@ -149,8 +151,8 @@ void TileBackward::takeOff(const Tile& tile, size_t used, float* sums) {
         if (splats[i].row_end <= splats[i].row_begin) splats[i].rows = 0;
       }
     }
-    kernel_.take_off(splats, count, static_cast<int32_t>(begin), loss_.mode, *pixels_,
-                     sums + begin * field_count);
+    kernel_->take_off(splats, count, static_cast<int32_t>(begin), loss_->mode, *pixels_,
+                      sums + begin * field_count);
   }
 }
 
@@ -174,10 +176,10 @@ void TileBackward::takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, flo
   }
 
   const PixelLoss<double> loss =
-      lossAt(loss_, static_cast<size_t>(tile.y0 + y) * loss_.width + tile.x0 + x);
+      lossAt(*loss_, static_cast<size_t>(tile.y0 + y) * loss_->width + tile.x0 + x);
   for (size_t c = 0; c < 3; ++c) background[c] += blend.transmittance * loss.gradient[c];
-  PixelBackward<double> pixel = startBehind(loss_, loss, blend.transmittance);
-  const size_t field_count = backwardFieldCount(loss_.mode);
+  PixelBackward<double> pixel = startBehind(*loss_, loss, blend.transmittance);
+  const size_t field_count = backwardFieldCount(loss_->mode);
   for (size_t k = blended_.size(); k-- > 0;) {
     const Blended& blended = blended_[k];
     const VisibleSplat& splat = visible_[tile.splats[blended.place]];
@@ -186,7 +188,7 @@ void TileBackward::takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, flo
                                  kGScale * f.l00, kGScale * f.l10, kGScale * f.l11, {}};
     std::copy(splat.colour, splat.colour + 3, here.colour);
     double one[kStatisticsFieldCount] = {};
-    stipple::takeOff(here, loss, loss_.mode, pixel, one);
+    stipple::takeOff(here, loss, loss_->mode, pixel, one);
     float* all = sums + blended.place * field_count;
     for (size_t field = 0; field < field_count; ++field) {
       const float value = storedGradient(one[field]);
@@ -196,7 +198,7 @@ void TileBackward::takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, flo
 }
 
 void TileBackward::run(const Tile& tile, float* sums, double* background) {
-  const size_t field_count = backwardFieldCount(loss_.mode);
+  const size_t field_count = backwardFieldCount(loss_->mode);
   clearPixels(tile);
   const size_t used = mark(tile);
   prepareTakeOff(tile, background);

@@ -22,7 +22,10 @@ struct PictureLoss {
 /// Takes the splats off tiles, one tile after another; its memory does not grow with the tile.
 class TileBackward {
  public:
-  TileBackward(const BackwardKernel& kernel, const VisibleSplat* visible, const PictureLoss& loss);
+  TileBackward();
+
+  /// Of which picture the next tiles are; all three must outlive them.
+  void begin(const BackwardKernel& kernel, const VisibleSplat* visible, const PictureLoss& loss);
 
   /// Out: sums [tile.splats.size()][backwardFieldCount(mode)], one entry per splat of the tile,
   /// written whole. Adds dL/dbackground of the tile to `background` [3].
@@ -44,9 +47,9 @@ class TileBackward {
   void takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, float* sums, double* background);
   void makeBatch(const Tile& tile, size_t batch);
 
-  const BackwardKernel& kernel_;
-  const VisibleSplat* visible_;
-  const PictureLoss& loss_;
+  const BackwardKernel* kernel_ = nullptr;
+  const VisibleSplat* visible_ = nullptr;
+  const PictureLoss* loss_ = nullptr;
   std::unique_ptr<BackwardPixels> pixels_;
   std::vector<BackwardSplat> splats_;  ///< a ring of the last batches
   std::vector<Blended> blended_;       ///< one pixel in double

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -49,12 +50,13 @@ void requirePicture(std::span<const float> values, size_t pixel_count, size_t ch
                           std::bit_cast<uint32_t>(static_cast<float>(kLargestInput));
     return in_range && value >= least;
   };
-  bool all_good = true;
+  // The top bit of the difference is set where a value is above the largest.
+  constexpr uint32_t kLargestBits = std::bit_cast<uint32_t>(static_cast<float>(kLargestInput));
+  uint32_t above = 0;
   for (const float value : values) {
-    all_good &= (std::bit_cast<uint32_t>(value) & 0x7fffffffu) <=
-                std::bit_cast<uint32_t>(static_cast<float>(kLargestInput));
+    above |= kLargestBits - (std::bit_cast<uint32_t>(value) & 0x7fffffffu);
   }
-  if (all_good && least < 0.0f) return;
+  if (!(above & 0x80000000u) && least < 0.0f) return;
   for (const float value : values) {
     if (good(value)) continue;
     fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(value) + "; " +
@@ -103,41 +105,30 @@ void forEachArray(const SplatCloud& cloud, const BackwardInput& input, const Use
   }
 }
 
-/// One kept TileBackward per thread that is at work.
-class ScratchPool {
- public:
-  ScratchPool(const BackwardKernel& kernel, const VisibleSplat* visible, const PictureLoss& loss)
-      : kernel_(kernel), visible_(visible), loss_(loss) {}
-
-  std::unique_ptr<TileBackward> take() {
-    const std::lock_guard lock(mutex_);
-    if (idle_.empty()) return std::make_unique<TileBackward>(kernel_, visible_, loss_);
-    std::unique_ptr<TileBackward> one = std::move(idle_.back());
-    idle_.pop_back();
-    return one;
+void clearUnwanted(const BackwardInput& input, SplatGradients& gradients) {
+  if (input.residual.empty()) gradients.contributions.clear();
+  if (!input.with_blending_weights) gradients.blending_weights.clear();
+  if (input.edge_weights.empty()) gradients.edge_weights.clear();
+  if (!input.with_screen_gradients) {
+    gradients.screen_gradients.clear();
+    gradients.absolute_screen_gradients.clear();
+    gradients.screen_gradient_norms.clear();
   }
-  void giveBack(std::unique_ptr<TileBackward> one) {
-    const std::lock_guard lock(mutex_);
-    idle_.push_back(std::move(one));
+  if (input.errors.empty()) {
+    gradients.errors.clear();
+    gradients.largest_errors.clear();
   }
-
- private:
-  const BackwardKernel& kernel_;
-  const VisibleSplat* visible_;
-  const PictureLoss& loss_;
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<TileBackward>> idle_;
-};
+}
 
 /// Takes the splats off every tile; returns dL/dbackground.
-std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, const VisibleSplats& visible,
-                                   const TileGrid& grid, const PictureLoss& loss,
-                                   BackwardSums& sums, Progress* progress) {
-  ScratchPool pool(kernel, visible.splats.get(), loss);
+std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, const TileGrid& grid,
+                                   const PictureLoss& loss, BackwardWorkspace::Arrays& arrays,
+                                   Progress* progress) {
+  const VisibleSplats& visible = arrays.forward.visible;
   const size_t field_count = backwardFieldCount(loss.mode);
-  std::vector<float> tile_sums;
-  std::vector<double> backgrounds(grid.tileCount() * 3, 0.0);
-  forEachTileGroup(visible, grid, progress, [&](const TileListGroup& group) {
+  arrays.backgrounds.assign(grid.tileCount() * 3, 0.0);
+  // By reference where they are handed over: a std::function of a large capture allocates.
+  const auto take_off_group = [&](const TileListGroup& group) {
     const auto entriesBefore = [&](size_t tile) { return group.offsets[tile - group.first_tile]; };
     for (size_t first = group.first_tile; first < group.end_tile;) {
       size_t end = first + 1;
@@ -145,26 +136,29 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, const VisibleSp
              entriesBefore(end + 1) - entriesBefore(first) <= kHeldEntries) {
         ++end;
       }
-      const size_t needed = (entriesBefore(end) - entriesBefore(first)) * field_count;
-      if (tile_sums.size() < needed) tile_sums = std::vector<float>(needed);
-      parallelFor(end - first, kTileGrain, [&](size_t from, size_t to) {
+      const uint64_t entries = entriesBefore(end) - entriesBefore(first);
+      float* tile_sums = arrays.tile_sums.resize(entries * field_count);
+      const auto take_off_tiles = [&](size_t from, size_t to) {
         if (progress) progress->throwIfCancelled();
-        std::unique_ptr<TileBackward> scratch = pool.take();
+        std::unique_ptr<TileBackward> scratch = arrays.scratch.take();
+        scratch->begin(kernel, visible.splats.get(), loss);
         for (size_t tile = first + from; tile < first + to; ++tile) {
           const uint64_t entry = entriesBefore(tile) - entriesBefore(first);
-          scratch->run(tileOf(grid, tile, group.tile(tile)), tile_sums.data() + entry * field_count,
-                       &backgrounds[tile * 3]);
+          scratch->run(tileOf(grid, tile, group.tile(tile)), tile_sums + entry * field_count,
+                       &arrays.backgrounds[tile * 3]);
         }
-        pool.giveBack(std::move(scratch));
-      });
-      sums.add(group, first, end, tile_sums.data());
+        arrays.scratch.giveBack(std::move(scratch));
+      };
+      parallelFor(end - first, kTileGrain, std::ref(take_off_tiles));
+      arrays.sums.add(group, first, end, tile_sums);
       first = end;
       advance(progress, static_cast<double>(first) / static_cast<double>(grid.tileCount()),
               "Taking splats off");
     }
-  });
+  };
+  forEachTileGroup(visible, grid, progress, arrays.forward.lists, std::ref(take_off_group));
   std::array<double, 3> total{};
-  for (size_t i = 0; i < backgrounds.size(); ++i) total[i % 3] += backgrounds[i];
+  for (size_t i = 0; i < arrays.backgrounds.size(); ++i) total[i % 3] += arrays.backgrounds[i];
   return total;
 }
 
@@ -172,9 +166,8 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, const VisibleSp
 struct Taken {
   const PlacedScene& scene;
   const BackwardInput& input;
-  BackwardMode mode;
-  std::vector<size_t> instance_of;    ///< [scene.clouds.size()]
-  std::vector<Mat3d> normal_to_view;  ///< [scene.clouds.size()] transposed inverse of linear
+  const std::vector<size_t>& instance_of;
+  const std::vector<Mat3d>& normal_to_view;
 };
 
 void storeStatistics(const BackwardInput& input, const double* sums, const Vec2d& mean,
@@ -257,11 +250,32 @@ uint64_t resultBytes(std::span<const SplatInstance> instances, const BackwardInp
 
 }  // namespace
 
-BackwardResult renderBackwardWith(const BackwardKernel& kernel,
-                                  std::span<const SplatInstance> instances, const Camera& camera,
-                                  const RenderOptions& options, const BackwardInput& input,
-                                  uint64_t memory_limit_bytes, Progress* progress) {
-  const PlacedScene scene = placeScene(instances, camera, options);
+std::unique_ptr<TileBackward> TileScratch::take() {
+  const std::lock_guard lock(mutex_);
+  if (idle_.empty()) return std::make_unique<TileBackward>();
+  std::unique_ptr<TileBackward> one = std::move(idle_.back());
+  idle_.pop_back();
+  return one;
+}
+
+void TileScratch::giveBack(std::unique_ptr<TileBackward> one) {
+  const std::lock_guard lock(mutex_);
+  idle_.push_back(std::move(one));
+}
+
+BackwardWorkspace::BackwardWorkspace() : arrays_(std::make_unique<Arrays>()) {}
+BackwardWorkspace::~BackwardWorkspace() = default;
+BackwardWorkspace::BackwardWorkspace(BackwardWorkspace&&) noexcept = default;
+BackwardWorkspace& BackwardWorkspace::operator=(BackwardWorkspace&&) noexcept = default;
+
+void renderBackwardWith(const BackwardKernel& kernel, std::span<const SplatInstance> instances,
+                        const Camera& camera, const RenderOptions& options,
+                        const BackwardInput& input, BackwardWorkspace& workspace,
+                        BackwardResult& result, uint64_t memory_limit_bytes, Progress* progress) {
+  BackwardWorkspace::Arrays& arrays = workspace.arrays();
+  PlacedScene& scene = arrays.forward.scene;
+  VisibleSplats& visible = arrays.forward.visible;
+  placeSceneUnread(instances, camera, options, scene);
   validateInput(camera, input);
   const uint64_t needed = backwardMemoryBound(instances, camera, options, input);
   if (needed > memory_limit_bytes) {
@@ -270,13 +284,13 @@ BackwardResult renderBackwardWith(const BackwardKernel& kernel,
                                       std::to_string(memory_limit_bytes) + " are allowed");
   }
   advance(progress, 0.0, "Projecting splats");
-  const VisibleSplats visible = findVisibleSplats(scene, progress);
+  findVisibleSplats(chosenProjector(), scene, progress, visible);
 
-  BackwardResult result;
   result.visible_count = visible.count;
   result.instances.resize(instances.size());
   for (size_t i = 0; i < instances.size(); ++i) {
     const SplatCloud& cloud = *instances[i].cloud;
+    clearUnwanted(input, result.instances[i]);
     forEachArray(cloud, input, [&](std::vector<float> SplatGradients::*array, size_t per_splat) {
       (result.instances[i].*array).assign(cloud.size() * per_splat, 0.0f);
     });
@@ -284,42 +298,65 @@ BackwardResult renderBackwardWith(const BackwardKernel& kernel,
 
   PictureLoss loss{&input, camera.width, options.with_background, {}, modeOf(input)};
   std::copy(options.background, options.background + 3, loss.background);
-  BackwardSums sums(visible.count, loss.mode);
+  arrays.sums.reset(visible.count, loss.mode);
   result.background =
-      takeOffTiles(kernel, visible, TileGrid(camera.width, camera.height), loss, sums, progress);
+      takeOffTiles(kernel, TileGrid(camera.width, camera.height), loss, arrays, progress);
   if (!options.with_background) result.background = {};
 
-  Taken taken{scene, input, loss.mode, {}, {}};
+  arrays.instance_of.clear();
+  arrays.normal_to_view.clear();
   for (size_t i = 0; i < instances.size(); ++i) {
-    if (instances[i].cloud->size() > 0) taken.instance_of.push_back(i);
+    if (instances[i].cloud->size() > 0) arrays.instance_of.push_back(i);
   }
   for (const PlacedCloud& placed : scene.clouds) {
-    taken.normal_to_view.push_back(inverse(placed.linear).transpose());
+    arrays.normal_to_view.push_back(inverse(placed.linear).transpose());
   }
+  const Taken taken{scene, input, arrays.instance_of, arrays.normal_to_view};
   // In the order of the clouds: attributes and derivatives are then read and written in a row.
-  std::vector<uint32_t> place_of(scene.splat_count, kNotVisible);
+  uint32_t* place_of = arrays.place_of.resize(scene.splat_count);
+  std::fill(place_of, place_of + scene.splat_count, kNotVisible);
   parallelFor(visible.count, kSplatGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       place_of[visible.splats[i].index] = static_cast<uint32_t>(i);
     }
   });
-  std::vector<std::array<double, 6>> cameras(rangeCount(scene.splat_count, kSplatGrain));
-  parallelFor(scene.splat_count, kSplatGrain, [&](size_t begin, size_t end) {
+  arrays.cameras.assign(rangeCount(scene.splat_count, kSplatGrain), {});
+  const auto take_back = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     for (size_t i = begin; i < end; ++i) {
       // The sums lie in the order of depth, so each would wait for memory.
       const uint32_t ahead = place_of[std::min(i + kPrefetchDistance, end - 1)];
-      if (ahead != kNotVisible) __builtin_prefetch(sums.of(ahead));
-      if (place_of[i] == kNotVisible || !sums.isTouched(place_of[i])) continue;
-      takeBack(taken, static_cast<uint32_t>(i), sums.of(place_of[i]), result.instances,
-               cameras[begin / kSplatGrain].data());
+      if (ahead != kNotVisible) __builtin_prefetch(arrays.sums.of(ahead));
+      if (place_of[i] == kNotVisible || !arrays.sums.isTouched(place_of[i])) continue;
+      takeBack(taken, static_cast<uint32_t>(i), arrays.sums.of(place_of[i]), result.instances,
+               arrays.cameras[begin / kSplatGrain].data());
     }
-  });
-  for (const std::array<double, 6>& part : cameras) {
+  };
+  parallelFor(scene.splat_count, kSplatGrain, std::ref(take_back));
+  result.camera = {};
+  for (const std::array<double, 6>& part : arrays.cameras) {
     for (size_t k = 0; k < 6; ++k) result.camera[k] += part[k];
   }
   advance(progress, 1.0, "Taking splats off");
+}
+
+BackwardResult renderBackwardWith(const BackwardKernel& kernel,
+                                  std::span<const SplatInstance> instances, const Camera& camera,
+                                  const RenderOptions& options, const BackwardInput& input,
+                                  uint64_t memory_limit_bytes, Progress* progress) {
+  BackwardWorkspace workspace;
+  BackwardResult result;
+  renderBackwardWith(kernel, instances, camera, options, input, workspace, result,
+                     memory_limit_bytes, progress);
   return result;
+}
+
+void renderBackward(std::span<const SplatInstance> instances, const Camera& camera,
+                    const RenderOptions& options, const BackwardInput& input,
+                    BackwardWorkspace& workspace, BackwardResult& result,
+                    uint64_t memory_limit_bytes, Progress* progress) {
+  renderBackwardWith(chosenBackwardKernel(), instances, camera, options, input, workspace, result,
+                     memory_limit_bytes, progress);
 }
 
 BackwardResult renderBackward(std::span<const SplatInstance> instances, const Camera& camera,

@@ -1,11 +1,49 @@
 #pragma once
 
+#include <array>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "splat/cpu/backward_sums.h"
+#include "splat/cpu/reused_array.h"
+#include "splat/cpu/tile_backward.h"
 #include "splat/cpu/tile_kernel_backward.h"
+#include "splat/cpu/tiled_render.h"
 #include "splat/render_backward.h"
 
 namespace stipple {
 
+/// Scratch of tiles: one for every thread that was at work at the same time.
+class TileScratch {
+ public:
+  std::unique_ptr<TileBackward> take();
+  void giveBack(std::unique_ptr<TileBackward> one);
+  uint64_t bytes() const { return idle_.size() * TileBackward::memoryBound(); }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<TileBackward>> idle_;
+};
+
+struct BackwardWorkspace::Arrays {
+  RenderWorkspace::Arrays forward;
+  BackwardSums sums;
+  ReusedArray<float> tile_sums;     ///< [held entries][fields]
+  ReusedArray<uint32_t> place_of;   ///< [splats] place among the visible ones
+  std::vector<double> backgrounds;  ///< [tiles][3]
+  std::vector<std::array<double, 6>> cameras;
+  std::vector<size_t> instance_of;    ///< [clouds of the scene]
+  std::vector<Mat3d> normal_to_view;  ///< [clouds of the scene] transposed inverse of linear
+  TileScratch scratch;
+};
+
 /// renderBackward with a kernel of backwardKernels(): for tests and benchmarks that compare them.
+void renderBackwardWith(const BackwardKernel& kernel, std::span<const SplatInstance> instances,
+                        const Camera& camera, const RenderOptions& options,
+                        const BackwardInput& input, BackwardWorkspace& workspace,
+                        BackwardResult& result, uint64_t memory_limit_bytes = UINT64_MAX,
+                        Progress* progress = nullptr);
 BackwardResult renderBackwardWith(const BackwardKernel& kernel,
                                   std::span<const SplatInstance> instances, const Camera& camera,
                                   const RenderOptions& options, const BackwardInput& input,
