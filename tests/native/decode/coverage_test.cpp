@@ -135,6 +135,12 @@ TEST(SurfaceCoverage, ClosesSuzanneWithFourGaussiansPerAnchor) {
   expectClosed("4 each", test::loadObj(STIPPLE_TEST_DATA "/suzanne.obj"), 4);
 }
 
+TEST(SurfaceCoverage, ClosesSurfacesWhoseDetailAttractsAnchors) {
+  // The default weight: local spacings differ by the square root of the density's range.
+  expectClosed("suz w=1", test::loadObj(STIPPLE_TEST_DATA "/suzanne.obj"), 1, 1.0);
+  expectClosed("cube w=1", test::cube(2, {0, 0, 0}), 1, 1.0);
+}
+
 TEST(SurfaceCoverage, MeasuresAHoleAndAFringe) {
   // The measure itself: a picture with one open pixel deep inside and a fringe 1.5 spacings wide.
   constexpr uint32_t kSize = 64;
