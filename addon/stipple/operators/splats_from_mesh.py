@@ -50,11 +50,14 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
 
     def finish(self, context, job):
         model = job.model()
-        splats = model.decode(self._settings()).read()
+        # Decoding and writing the source go on side by side; a budget that is refused is refused before the file.
+        decoding = model.decode_start(self._settings())
         active = context.view_layer.objects.active
         name = (active if active in self._objects else self._objects[0]).name + ' Splats'
         path = sources.save_model(model, sources.model_path_for(name, self.source_path), bool(self.source_path))
         sources.remember_model(path, model)
+        decoding.wait()
+        splats = decoding.cloud().read()
         obj = splat_data.new_object(name, splat_data.new_data(name))
         stipple = obj.data.stipple
         with sync.paused():
