@@ -13,6 +13,8 @@
 #include <bit>
 #include <limits>
 
+#include "splat/cpu/exp2-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace stipple {
 namespace HWY_NAMESPACE {
@@ -22,21 +24,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::CappedTag<float, kTileSide>;
 using Vec = hn::Vec<Tag>;
 using IntTag = hn::RebindToSigned<Tag>;
-
-/// 2^x for x in -10..1, relative error below 3e-7, as in tile_kernel_vector.cpp.
-HWY_INLINE Vec exp2Small(Tag d, Vec x) {
-  const IntTag di;
-  const auto whole = hn::NearestInt(x);
-  const Vec f = hn::Sub(x, hn::ConvertTo(d, whole));
-  Vec p = hn::Set(d, 1.5403530393381610e-4f);
-  p = hn::MulAdd(p, f, hn::Set(d, 1.3333558146428443e-3f));
-  p = hn::MulAdd(p, f, hn::Set(d, 9.6181291076284772e-3f));
-  p = hn::MulAdd(p, f, hn::Set(d, 5.5504108664821580e-2f));
-  p = hn::MulAdd(p, f, hn::Set(d, 2.4022650695910072e-1f));
-  p = hn::MulAdd(p, f, hn::Set(d, 6.9314718055994531e-1f));
-  p = hn::MulAdd(p, f, hn::Set(d, 1.0f));
-  return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(whole)));
-}
 
 HWY_INLINE float sumOfLanes(Tag d, Vec v) {
   return hn::GetLane(hn::SumOfLanes(d, v));

@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include "splat/blend.h"
+#include "splat/cpu/exp2-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stipple {
@@ -18,22 +19,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Tag = hn::CappedTag<float, kTileSide>;
 using Vec = hn::Vec<Tag>;
-
-/// 2^x for x in -10..1, relative error below 3e-7: 2^f by its Taylor polynomial of degree 6 for
-/// |f| <= 1/2 (remainder (f ln 2)^7/7! = 1.2e-7), then f's whole part added to the exponent.
-HWY_INLINE Vec exp2Small(Tag d, Vec x) {
-  const hn::RebindToSigned<Tag> di;
-  const auto whole = hn::NearestInt(x);
-  const Vec f = hn::Sub(x, hn::ConvertTo(d, whole));
-  Vec p = hn::Set(d, 1.5403530393381610e-4f);
-  p = hn::MulAdd(p, f, hn::Set(d, 1.3333558146428443e-3f));
-  p = hn::MulAdd(p, f, hn::Set(d, 9.6181291076284772e-3f));
-  p = hn::MulAdd(p, f, hn::Set(d, 5.5504108664821580e-2f));
-  p = hn::MulAdd(p, f, hn::Set(d, 2.4022650695910072e-1f));
-  p = hn::MulAdd(p, f, hn::Set(d, 6.9314718055994531e-1f));
-  p = hn::MulAdd(p, f, hn::Set(d, 1.0f));
-  return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(whole)));
-}
 
 /// Puts the judge's alpha into the lanes of `unclear`. In: first, the pixel of lane 0.
 HWY_NOINLINE Vec judgedAlpha(Tag d, hn::Mask<Tag> unclear, Vec alpha, size_t splat, size_t first,
