@@ -12,7 +12,7 @@ namespace stipple {
 /// rotation, applied to every splat; exact up to rounding.
 class HarmonicRotation {
  public:
-  /// In: a rotation matrix (det +1).
+  /// In: an orthogonal matrix: a rotation, or one that mirrors (then f'(R d) = f(d) as well).
   explicit HarmonicRotation(const Mat3d& rotation);
   /// In and out: coefficients [(degree+1)^2,3], degree 0..4.
   void apply(int degree, float* coefficients) const;

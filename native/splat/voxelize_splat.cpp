@@ -1,5 +1,3 @@
-// Based on: Hestenes, Inversion of matrices by biorthogonalization and related results, SIAM 1958
-// (one-sided Jacobi rotations for the axes of a splat).
 #include "splat/voxelize_splat.h"
 
 #include <algorithm>
@@ -14,6 +12,7 @@
 #include "math/affine.h"
 #include "math/colour.h"
 #include "math/covariance.h"
+#include "math/principal_axes.h"
 #include "splat/voxelize_polylog.h"
 
 namespace stipple {
@@ -96,64 +95,23 @@ Vec3d worldCentre(const SplatInstance& instance, size_t i) {
   return linearPart(instance.object_to_world) * local + translationPart(instance.object_to_world);
 }
 
-Vec3d cross(const Vec3d& a, const Vec3d& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-// A unit vector perpendicular to a unit vector.
-Vec3d perpendicular(const Vec3d& v) {
-  Eigen::Index smallest = 0;
-  v.cwiseAbs().minCoeff(&smallest);
-  const Vec3d axis = cross(v, Vec3d::Unit(smallest));
-  return axis / axis.norm();
-}
-
-struct PrincipalAxes {
+struct SplatAxes {
   Mat3d directions;  // columns, orthonormal, by growing length
   Vec3d lengths;     // standard deviations
 };
 
-// The principal axes of a covariance A A^T from A itself: forming the product would lose the thin
-// axes of needles (1e6 : 1 squares to 1e12).
-PrincipalAxes principalAxes(Mat3d a) {
-  const double largest = a.cwiseAbs().maxCoeff();
-  if (largest > 0) a /= largest;
-  bool rotated = true;
-  for (int sweep = 0; sweep < 30 && rotated; ++sweep) {
-    rotated = false;
-    for (const auto& [p, q] : {std::array{0, 1}, std::array{0, 2}, std::array{1, 2}}) {
-      const double alpha = a.col(p).squaredNorm();
-      const double beta = a.col(q).squaredNorm();
-      const double gamma = a.col(p).dot(a.col(q));
-      if (std::abs(gamma) <= 1e-15 * std::sqrt(alpha * beta)) continue;
-      rotated = true;
-      const double zeta = (beta - alpha) / (2.0 * gamma);
-      const double t = std::copysign(1.0, zeta) / (std::abs(zeta) + std::hypot(1.0, zeta));
-      const double c = 1.0 / std::hypot(1.0, t);
-      const Vec3d column = a.col(p);
-      a.col(p) = c * (column - t * a.col(q));
-      a.col(q) = c * (t * column + a.col(q));
-    }
-  }
+// From A itself, not from the covariance A A^T: the product would lose the thin axes of needles
+// (1e6 : 1 squares to 1e12).
+SplatAxes axesByLength(const Mat3d& a) {
+  const PrincipalAxes found = principalAxes(a);
   std::array<int, 3> order = {0, 1, 2};
-  const Vec3d lengths(a.col(0).norm(), a.col(1).norm(), a.col(2).norm());
   std::stable_sort(order.begin(), order.end(),
-                   [&](int x, int y) { return lengths[x] < lengths[y]; });
-  PrincipalAxes result;
-  for (int i = 0; i < 3; ++i) result.lengths[i] = lengths[order[static_cast<size_t>(i)]] * largest;
-  // From the longest axis down; an axis of length 0 gets any perpendicular direction.
-  Vec3d longest = Vec3d::UnitX();
-  if (lengths[order[2]] > 0) longest = a.col(order[2]) / lengths[order[2]];
-  Vec3d middle = Vec3d::Zero();
-  if (lengths[order[1]] > 0) {
-    middle = a.col(order[1]) / lengths[order[1]];
-    middle -= longest * longest.dot(middle);
+                   [&](int x, int y) { return found.lengths[x] < found.lengths[y]; });
+  SplatAxes result;
+  for (int i = 0; i < 3; ++i) {
+    result.directions.col(i) = found.axes.col(order[static_cast<size_t>(i)]);
+    result.lengths[i] = found.lengths[order[static_cast<size_t>(i)]];
   }
-  if (middle.squaredNorm() < 0.25) middle = perpendicular(longest);
-  middle.normalize();
-  result.directions.col(2) = longest;
-  result.directions.col(1) = middle;
-  result.directions.col(0) = cross(longest, middle);
   return result;
 }
 
@@ -193,7 +151,7 @@ bool prepareSplat(const SplatInstance& instance, size_t i, const VoxelizeOptions
     refuse("splat " + std::to_string(i) +
            " is not finite once its instance's matrix is applied; smaller values are needed");
   }
-  PrincipalAxes principal = principalAxes(axes);
+  SplatAxes principal = axesByLength(axes);
   if (options.low_pass > 0) {
     const Vec3d widened = principal.lengths.cwiseMax(options.low_pass);
     opacity *= principal.lengths[1] / widened[1] * (principal.lengths[2] / widened[2]);

@@ -60,12 +60,38 @@ def test_transform_is_applied_on_request(stipple, tmp_path):
                                rtol=1e-4)
 
 
-def test_shear_cannot_be_applied(stipple, tmp_path):
+@pytest.mark.parametrize('scale', [(1, 2, 1), (-1, 1, 1), (-0.5, 2, 3)])
+def test_uneven_and_mirrored_objects_are_applied(stipple, tmp_path, scale):
+    arrays = make_arrays(stipple, degree=1)
+    write_ply(stipple, tmp_path / 'in.ply', arrays)
+    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
+    bpy.context.object.scale = scale
+    bpy.context.view_layer.update()
+    assert bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply')) == {'FINISHED'}
+    out = stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(), str(tmp_path / 'out.ply')).read()
+    m = np.diag(scale).astype(float)
+    for i in range(len(arrays.positions)):
+        expected = m @ covariance(arrays, i) @ m.T
+        # PLY stores logarithms of scales in single precision.
+        np.testing.assert_allclose(covariance(out, i), expected, atol=1e-5 * np.linalg.norm(expected))
+    np.testing.assert_allclose(out.positions, arrays.positions * np.float32(scale), rtol=1e-6)
+
+
+def covariance(arrays, i):
+    w, x, y, z = (float(v) for v in arrays.rotations[i])
+    turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    axes = turn * arrays.scales[i].astype(float)
+    return axes @ axes.T
+
+
+def test_a_flattened_object_cannot_be_applied(stipple, tmp_path):
     write_ply(stipple, tmp_path / 'in.ply', make_arrays(stipple, degree=0))
     bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
-    bpy.context.object.scale = (1, 2, 1)
+    bpy.context.object.scale = (1, 0, 1)
     bpy.context.view_layer.update()
-    scenes.refuses(lambda: bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply')), 'scale')
+    scenes.refuses(lambda: bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply')), 'singular')
     assert not (tmp_path / 'out.ply').exists()
 
 

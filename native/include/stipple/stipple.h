@@ -180,8 +180,10 @@ void stipple_cloud_save_options_init(StippleCloudSaveOptions* options);
 /* Writes by the ending of the path (.ply), under a temporary name that is then renamed. */
 StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf8,
                                  const StippleCloudSaveOptions* options);
-/* The cloud moved by a matrix: rotation, translation and uniform positive scale; harmonics are
- * rotated with it. Errors: INVALID_ARGUMENT for shear, mirroring or uneven scale (beyond 1e-4). */
+/* The cloud moved by an affine matrix: covariances become M C M^T, harmonics turn (and mirror) with the
+ * orthogonal part of M's polar decomposition. Pictures equal those of an instance with that matrix, except
+ * that colours above degree 0 do not follow uneven scale and shear. Errors: INVALID_ARGUMENT for a matrix
+ * that is singular or not affine. */
 StippleStatus stipple_cloud_transform(const StippleCloud* cloud, const double matrix[16],
                                       StippleCloud** moved);
 
