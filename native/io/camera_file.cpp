@@ -5,10 +5,12 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "base/error.h"
+#include "io/colmap_cameras.h"
 #include "io/input_file.h"
 
 namespace stipple {
@@ -203,9 +205,7 @@ class FrameReader {
   std::string name_;
 };
 
-}  // namespace
-
-std::vector<CameraView> readCameraFile(const std::string& path) {
+std::vector<CameraView> readTransforms(const std::string& path) {
   const std::string text = readTextFile(path, kMaxFileBytes);
   Json file;
   try {
@@ -224,6 +224,26 @@ std::vector<CameraView> readCameraFile(const std::string& path) {
     views.push_back(FrameReader(path, file, frames[i], i).read());
   }
   return views;
+}
+
+}  // namespace
+
+std::vector<CameraView> readCameraFile(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) {
+    const fs::path transforms = fs::path(path) / "transforms.json";
+    if (fs::exists(transforms, ignored)) return readTransforms(transforms.string());
+  }
+  if (const std::optional<std::string> model = findColmapModel(path)) {
+    return readColmapCameras(*model);
+  }
+  if (fs::is_directory(path, ignored)) {
+    fail(ErrorCode::kFormat, path +
+                                 " holds no cameras: transforms.json, or images.bin or images.txt "
+                                 "of COLMAP (there or in sparse/0) is needed");
+  }
+  return readTransforms(path);
 }
 
 }  // namespace stipple

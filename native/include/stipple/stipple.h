@@ -370,7 +370,9 @@ typedef struct StippleCamera {
   double far_plane;
 } StippleCamera;
 
-/* Reads transforms.json (nerfstudio, NeRF-synthetic). */
+/* Reads transforms.json (nerfstudio, NeRF-synthetic) or a COLMAP model. path_utf8: a file, or a folder
+ * with transforms.json, else with images.bin or images.txt in it or in sparse/0. Distorted cameras are
+ * STIPPLE_ERROR_UNSUPPORTED. */
 StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8, StippleViews** views);
 void stipple_views_free(StippleViews* views);
 StippleStatus stipple_views_count(const StippleViews* views, uint64_t* count);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <string>
 
 #include "scratch_folder.h"
@@ -129,7 +130,9 @@ TEST_F(CameraFile, SaysWhatIsWrong) {
       "[[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}",
       {"rotation"});
   expectError(ErrorCode::kIo, {"No such file"}, [&] { readCameraFile(path("missing.json")); });
-  expectError(ErrorCode::kIo, {"folder"}, [&] { readCameraFile(folder_.string()); });
+  std::filesystem::create_directory(path("empty"));
+  expectError(ErrorCode::kFormat, {"empty", "holds no cameras"},
+              [&] { readCameraFile(path("empty")); });
 }
 
 }  // namespace
