@@ -54,6 +54,7 @@ struct RenderResult {
   std::vector<float> median_depth;  ///< [H,W] planar z where transmittance passes 1/2, metres
   std::vector<uint32_t> counts;     ///< [H,W]
   uint64_t visible_count = 0;       ///< splats that passed culling
+  uint64_t number = 0;              ///< of this drawing, another for every call; 0: none
 };
 
 /// Tiled CPU renderer: culling, one depth sort, tiles in parallel.
@@ -72,6 +73,10 @@ class RenderWorkspace {
   RenderWorkspace& operator=(RenderWorkspace&&) noexcept;
 
   uint64_t bytes() const;  ///< held now
+
+  /// Whether pictures drawn from now on leave behind what renderBackward needs to go on from them:
+  /// at most 12 bytes per pixel of whole tiles more. Off at first.
+  void keepForBackward(bool keep);
 
   struct Arrays;
   Arrays& arrays() { return *arrays_; }

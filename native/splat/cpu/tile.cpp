@@ -93,6 +93,7 @@ void clearPixels(const Tile& tile, TilePixels& pixels) {
     for (uint32_t x = 0; x < kTileSide; ++x) {
       const bool inside = x < tile.width && y < tile.height;
       pixels.cut[y * kTileSide + x] = inside ? kLog2MinAlpha : kFinished;
+      pixels.end[y * kTileSide + x] = inside ? kNeverEnded : 0;
     }
   }
   pixels.unfinished = tile.width * tile.height;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "splat/cpu/tile_lists.h"
@@ -40,8 +41,12 @@ struct TilePixels {
   alignas(64) float cut[kTilePixelCount];
   /// Not 0: float32 cannot decide this pixel; it is blended again in double.
   alignas(64) float doubt[kTilePixelCount];
+  /// Place in the tile's list of the splat that ended the pixel and was not blended.
+  alignas(64) int32_t end[kTilePixelCount];
   uint32_t unfinished;  ///< pixels whose cut is not kFinished
 };
+
+constexpr int32_t kNeverEnded = std::numeric_limits<int32_t>::max();
 
 constexpr float kLog2MinAlpha = -7.9943534368588579f;  ///< log2(1/255)
 constexpr float kFinished = 1e30f;
@@ -74,6 +79,7 @@ struct TileKernelOptions {
   /// Asked where rounding could decide whether a splat shows; nullptr: the pixel is in doubt then.
   AlphaJudge judge = nullptr;
   const void* judge_context = nullptr;
+  int32_t first = 0;  ///< place of this call's first splat in the tile's list
 };
 
 /// Blends the splats in order into the tile; stops early once every pixel is finished.

@@ -12,31 +12,32 @@ bool near(float value, float threshold, float relative) {
   return std::abs(value - threshold) < threshold * relative;
 }
 
-void finish(TilePixels& pixels, size_t i) {
+void finish(TilePixels& pixels, size_t i, int32_t place) {
   pixels.cut[i] = kFinished;
+  pixels.end[i] = place;
   --pixels.unfinished;
 }
 
-void finishInDoubt(TilePixels& pixels, size_t i) {
+void finishInDoubt(TilePixels& pixels, size_t i, int32_t place) {
   pixels.doubt[i] = 1.0f;
-  finish(pixels, i);
+  finish(pixels, i, place);
 }
 
 void blendPixel(const TileSplat& splat, float alpha, const TileKernelOptions& options,
-                TilePixels& pixels, size_t i) {
+                TilePixels& pixels, size_t i, int32_t place) {
   PixelBlend<float> pixel;
   pixel.transmittance = pixels.transmittance[i];
   pixel.has_median = pixels.median_depth[i] != kNoMedian;
   const float next = pixel.transmittance * (1.0f - alpha);
   if (near(next, static_cast<float>(kMinTransmittance), splat.finish_doubt) ||
       (options.with_extras && near(next, 0.5f, kMedianDoubt))) {
-    finishInDoubt(pixels, i);
+    finishInDoubt(pixels, i, place);
     return;
   }
   const bool had_median = pixel.has_median;
   pixel.add(alpha, splat.colour, splat.depth);
   if (pixel.finished) {
-    finish(pixels, i);
+    finish(pixels, i, place);
     return;
   }
   pixels.transmittance[i] = pixel.transmittance;
@@ -56,6 +57,7 @@ void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions op
                      TilePixels& pixels) {
   for (size_t s = 0; s < count && pixels.unfinished > 0; ++s) {
     const TileSplat& splat = splats[s];
+    const int32_t place = options.first + static_cast<int32_t>(s);
     for (uint32_t y = splat.row_begin; y < splat.row_end; ++y) {
       for (uint32_t x = 0; x < kTileSide; ++x) {
         const size_t i = static_cast<size_t>(y) * kTileSide + x;
@@ -67,12 +69,12 @@ void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions op
         if (exponent <= kLog2MinAlpha - splat.doubt_low) continue;
         if (exponent >= kLog2MinAlpha + splat.doubt_high) {
           const float alpha = std::min(static_cast<float>(kMaxAlpha), std::exp2(exponent));
-          blendPixel(splat, alpha, options, pixels, i);
+          blendPixel(splat, alpha, options, pixels, i, place);
         } else if (options.judge) {
           const double alpha = options.judge(options.judge_context, s, static_cast<uint32_t>(i));
-          if (alpha > 0) blendPixel(splat, static_cast<float>(alpha), options, pixels, i);
+          if (alpha > 0) blendPixel(splat, static_cast<float>(alpha), options, pixels, i, place);
         } else {
-          finishInDoubt(pixels, i);
+          finishInDoubt(pixels, i, place);
         }
       }
     }

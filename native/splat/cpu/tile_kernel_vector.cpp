@@ -106,6 +106,9 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
         }
         if (!hn::AllFalse(d, ends)) {
           hn::Store(hn::IfThenElse(ends, finished, cut), d, pixels.cut + i);
+          const hn::RebindToSigned<Tag> di;
+          hn::BlendedStore(hn::Set(di, options.first + static_cast<int32_t>(s)),
+                           hn::RebindMask(di, ends), di, pixels.end + i);
           const Vec doubt = hn::Load(d, pixels.doubt + i);
           hn::Store(hn::IfThenElse(doubtful, hn::Set(d, 1.0f), doubt), d, pixels.doubt + i);
           pixels.unfinished -= static_cast<uint32_t>(hn::CountTrue(d, ends));

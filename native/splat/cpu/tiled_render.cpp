@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <functional>
 
@@ -54,6 +55,11 @@ void replaceDoubtful(const VisibleSplat* visible, const Tile& tile, TilePixels& 
   }
 }
 
+float expectedDepth(const TilePixels& pixels, size_t i) {
+  const float coverage = 1.0f - pixels.transmittance[i];
+  return coverage > 0 ? pixels.weighted_depth[i] / coverage : kEmptyDepth;
+}
+
 void writePixels(const Tile& tile, const TilePixels& pixels, const RenderOptions& options,
                  RenderResult& result) {
   const float background[3] = {static_cast<float>(options.background[0]),
@@ -75,7 +81,7 @@ void writePixels(const Tile& tile, const TilePixels& pixels, const RenderOptions
         colour[3] = 1.0f;
       }
       if (options.with_depth) {
-        result.depth[out] = coverage > 0 ? pixels.weighted_depth[i] / coverage : kEmptyDepth;
+        result.depth[out] = expectedDepth(pixels, i);
       }
       if (options.with_median_depth) {
         const float median = pixels.median_depth[i];
@@ -99,8 +105,22 @@ double judgeAlpha(const void* context, size_t splat, uint32_t pixel) {
   return alphaInDouble(judged.visible[index], *judged.tile, pixel % kTileSide, pixel / kTileSide);
 }
 
-void renderTile(const VisibleSplat* visible, const Tile& tile, TileKernel kernel,
-                const RenderOptions& options, RenderResult& result) {
+/// What `kept` holds of tile `index`.
+void keepTile(size_t index, const TilePixels& pixels, KeptPicture& kept) {
+  const size_t first = index * kTilePixelCount;
+  std::copy_n(pixels.transmittance, kTilePixelCount, kept.transmittance.get() + first);
+  int32_t* ends = kept.ends.get() + first;
+  for (size_t i = 0; i < kTilePixelCount; ++i) {
+    ends[i] = pixels.doubt[i] != 0.0f ? kInDoubt : pixels.end[i];
+  }
+  if (!kept.with_depth) return;
+  float* depth = kept.depth.get() + first;
+  for (size_t i = 0; i < kTilePixelCount; ++i) depth[i] = expectedDepth(pixels, i);
+}
+
+/// Out: result and kept, where not null.
+void renderTile(const VisibleSplat* visible, const Tile& tile, size_t index, TileKernel kernel,
+                const RenderOptions& options, RenderResult* result, KeptPicture* kept) {
   // Scratch of this thread: 9 KiB of pixels and 7 KiB of splats, in the first-level cache.
   TilePixels pixels;
   TileSplat batch[kBatchSize];
@@ -115,10 +135,12 @@ void renderTile(const VisibleSplat* visible, const Tile& tile, TileKernel kernel
     const size_t count = std::min(kBatchSize, tile.splats.size() - begin);
     makeTileSplats(visible, tile, begin, count, largest, batch);
     judged.begin = begin;
+    kernel_options.first = static_cast<int32_t>(begin);
     kernel(batch, count, kernel_options, pixels);
   }
   replaceDoubtful(visible, tile, pixels);
-  writePixels(tile, pixels, options, result);
+  if (result) writePixels(tile, pixels, options, *result);
+  if (kept) keepTile(index, pixels, *kept);
 }
 
 void prepareResult(const Camera& camera, const RenderOptions& options, RenderResult& result) {
@@ -153,19 +175,83 @@ uint64_t RenderWorkspace::bytes() const {
          (visible.filled.capacity() + visible.digits.capacity() + lists.counts.capacity()) *
              sizeof(uint32_t) +
          (lists.cursors.capacity() + lists.group.offsets.capacity()) * sizeof(uint64_t) +
-         lists.group.entries.bytes();
+         lists.group.entries.bytes() + arrays_->kept.bytes();
 }
 
-void renderTiledWith(TileKernel kernel, Projector projector,
-                     std::span<const SplatInstance> instances, const Camera& camera,
-                     const RenderOptions& options, RenderWorkspace& workspace, RenderResult& result,
-                     Progress* progress) {
-  auto& [scene, visible, lists] = workspace.arrays();
+void RenderWorkspace::keepForBackward(bool keep) {
+  arrays_->kept.wanted = keep;
+}
+
+uint64_t KeptPicture::bytes() const {
+  return clouds.capacity() * sizeof(const SplatCloud*) + transmittance.bytes() + ends.bytes() +
+         depth.bytes();
+}
+
+uint64_t keptPictureBound(const TileGrid& grid, bool with_depth, size_t instance_count) {
+  const uint64_t pixels = grid.tileCount() * kTilePixelCount;
+  return pixels * (sizeof(float) + sizeof(int32_t) + (with_depth ? sizeof(float) : 0)) +
+         2 * instance_count * sizeof(const SplatCloud*) +
+         3 * (uint64_t{2} << 20);  // arrays on huge pages are rounded up
+}
+
+uint64_t fingerprintOf(const PlacedScene& scene, const VisibleSplats& visible) {
+  constexpr size_t kSamples = 32;
+  uint64_t sum = visible.count;
+  const auto mix = [&sum](const float* values, size_t count) {
+    for (size_t k = 0; k < count; ++k) {
+      sum = (sum ^ std::bit_cast<uint32_t>(values[k])) * 0x9e3779b97f4a7c15u;
+      sum ^= sum >> 32;
+    }
+  };
+  for (size_t i = 0; i < std::min(kSamples, visible.count); ++i) {
+    const uint32_t splat = visible.splats[i * visible.count / kSamples % visible.count].index;
+    const PlacedCloud& placed = scene.clouds[cloudOfSplat(scene, splat)];
+    const size_t row = splat - placed.first_index;
+    const SplatCloud& cloud = *placed.cloud;
+    if (row >= cloud.size()) return ~sum;  // fewer splats than were drawn
+    mix(&cloud.positions[row * 3], 3);
+    mix(&cloud.rotations[row * 4], 4);
+    mix(&cloud.scales[row * 3], 3);
+    mix(&cloud.opacities[row], 1);
+    mix(&cloud.sh[row * cloud.shStride()], 3);
+  }
+  return sum;
+}
+
+namespace {
+
+void prepareKept(std::span<const SplatInstance> instances, const Camera& camera,
+                 const RenderOptions& options, RenderWorkspace::Arrays& arrays) {
+  KeptPicture& kept = arrays.kept;
+  const size_t pixels = TileGrid(camera.width, camera.height).tileCount() * kTilePixelCount;
+  kept.width = camera.width;
+  kept.height = camera.height;
+  kept.with_background = options.with_background;
+  kept.with_depth = options.with_depth;
+  std::copy(options.background, options.background + 3, kept.background);
+  kept.clouds.clear();
+  for (const SplatInstance& instance : instances) kept.clouds.push_back(instance.cloud);
+  kept.fingerprint = fingerprintOf(arrays.scene, arrays.visible);
+  kept.transmittance.resize(pixels);
+  kept.ends.resize(pixels);
+  kept.depth.resize(options.with_depth ? pixels : 0);
+}
+
+/// Draws into `result` and keeps what `kept` wants, where not null.
+void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInstance> instances,
+               const Camera& camera, const RenderOptions& options, RenderWorkspace& workspace,
+               RenderResult* result, KeptPicture* kept, Progress* progress) {
+  static std::atomic<uint64_t> pictures{0};
+  auto& [scene, visible, lists, last] = workspace.arrays();
+  last.number = 0;  // also where this fails on the way
   placeSceneUnread(instances, camera, options, scene);
   advance(progress, 0.0, "Projecting splats");
   findVisibleSplats(projector, scene, progress, visible);
-  prepareResult(camera, options, result);
-  result.visible_count = visible.count;
+  if (kept) prepareKept(instances, camera, options, workspace.arrays());
+  if (result) {
+    prepareResult(camera, options, *result);
+    result->visible_count = visible.count;
+  }
 
   const TileGrid grid(camera.width, camera.height);
   std::atomic<size_t> finished_tiles{0};
@@ -174,7 +260,7 @@ void renderTiledWith(TileKernel kernel, Projector projector,
       for (size_t index = group.first_tile + begin; index < group.first_tile + end; ++index) {
         if (progress) progress->throwIfCancelled();
         const Tile tile = tileOf(grid, index, group.tile(index));
-        renderTile(visible.splats.get(), tile, kernel, options, result);
+        renderTile(visible.splats.get(), tile, index, kernel, options, result, kept);
         const size_t finished = finished_tiles.fetch_add(1, std::memory_order_relaxed) + 1;
         if (finished % grid.columns == 0) {
           advance(progress, static_cast<double>(finished) / static_cast<double>(grid.tileCount()),
@@ -185,6 +271,27 @@ void renderTiledWith(TileKernel kernel, Projector projector,
     parallelFor(group.end_tile - group.first_tile, 1, std::cref(render_tiles));
   };
   forEachTileGroup(visible, grid, progress, lists, std::cref(render_group));
+  const uint64_t number = pictures.fetch_add(1, std::memory_order_relaxed) + 1;
+  if (result) result->number = number;
+  if (kept) kept->number = number;
+}
+
+}  // namespace
+
+void renderTiledWith(TileKernel kernel, Projector projector,
+                     std::span<const SplatInstance> instances, const Camera& camera,
+                     const RenderOptions& options, RenderWorkspace& workspace, RenderResult& result,
+                     Progress* progress) {
+  KeptPicture& kept = workspace.arrays().kept;
+  drawTiles(kernel, projector, instances, camera, options, workspace, &result,
+            kept.wanted ? &kept : nullptr, progress);
+}
+
+void blendTiledWith(TileKernel kernel, Projector projector,
+                    std::span<const SplatInstance> instances, const Camera& camera,
+                    const RenderOptions& options, RenderWorkspace& workspace, Progress* progress) {
+  drawTiles(kernel, projector, instances, camera, options, workspace, nullptr,
+            &workspace.arrays().kept, progress);
 }
 
 RenderResult renderTiledWith(TileKernel kernel, std::span<const SplatInstance> instances,

@@ -7,12 +7,47 @@
 
 namespace stipple {
 
+/// What a backward pass needs of the picture that was drawn last, beside the scene, its splats and
+/// lists. Pixels lie tile by tile, each [kTilePixelCount].
+struct KeptPicture {
+  bool wanted = false;
+  uint64_t number = 0;  ///< RenderResult::number; 0: nothing usable is here
+  uint32_t width = 0;   ///< pixels
+  uint32_t height = 0;
+  bool with_background = false;
+  bool with_depth = false;
+  double background[3] = {};
+  std::vector<const SplatCloud*> clouds;  ///< of the instances
+  uint64_t fingerprint = 0;               ///< fingerprintOf the clouds as they were drawn
+  ReusedArray<float> transmittance;       ///< behind the last splat
+  /// As TilePixels::end; kInDoubt where the pixel was blended again in double.
+  ReusedArray<int32_t> ends;
+  ReusedArray<float> depth;  ///< as RenderResult::depth, if with_depth
+
+  uint64_t bytes() const;
+};
+
+constexpr int32_t kInDoubt = -1;
+
 /// What RenderWorkspace holds.
 struct RenderWorkspace::Arrays {
   PlacedScene scene;
   VisibleSplats visible;
   TileListMemory lists;
+  KeptPicture kept;
 };
+
+/// Of values of some visible splats: a step of training changes all of them, so it tells whether
+/// the clouds are still those that were drawn. Cost: a few dozen splats.
+uint64_t fingerprintOf(const PlacedScene& scene, const VisibleSplats& visible);
+
+/// Bytes of KeptPicture at most.
+uint64_t keptPictureBound(const TileGrid& grid, bool with_depth, size_t instance_count);
+
+/// renderTiledWith that hands out no picture and keeps what a backward pass needs.
+void blendTiledWith(TileKernel kernel, Projector projector,
+                    std::span<const SplatInstance> instances, const Camera& camera,
+                    const RenderOptions& options, RenderWorkspace& workspace, Progress* progress);
 
 /// renderTiled with a kernel of tileKernels() and a projector of projectors(): for tests and
 /// benchmarks that compare them.
