@@ -25,6 +25,9 @@ struct ContextState {
 
   /// Refuses work that needs more than the limit. In: what, as a noun for the message.
   void requireMemory(uint64_t bytes, const char* what) const;
+
+  /// Refuses a picture that needs more than the limit, or than this machine has.
+  void requireMemory(const RenderMemory& memory, const Camera& camera) const;
 };
 using Context = std::shared_ptr<const ContextState>;
 

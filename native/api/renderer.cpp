@@ -134,8 +134,7 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     settings.options.with_depth = out.depth != nullptr;
     settings.options.with_median_depth = out.median_depth != nullptr;
     settings.options.with_counts = out.counts != nullptr;
-    renderer->context->requireMemory(renderMemoryBound(placed.list, view, settings.options),
-                                     "this picture");
+    renderer->context->requireMemory(renderMemory(placed.list, view, settings.options), view);
     *job = startJob(renderer->context, [memory = renderer->memory, placed = std::move(placed),
                                         settings, view, out](Progress& progress) {
       if (settings.method == STIPPLE_RENDER_REFERENCE) {

@@ -97,7 +97,12 @@ struct RenderMemory {
   uint64_t pair_bytes = 0;    ///< 4 per pair of splat and tile, at most 136 MB or 4 per splat
   uint64_t result_bytes = 0;  ///< the picture itself
   uint64_t other_bytes = 0;   ///< instances
+
+  uint64_t sum() const {
+    return splat_bytes + pixel_bytes + pair_bytes + result_bytes + other_bytes;
+  }
 };
+/// Errors: kInvalidArgument for a camera that validate() refuses.
 RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera& camera,
                           const RenderOptions& options);
 

@@ -98,7 +98,8 @@ void renderBackward(std::span<const SplatInstance> instances, const Camera& came
                     BackwardWorkspace& workspace, BackwardResult& result,
                     uint64_t memory_limit_bytes = UINT64_MAX, Progress* progress = nullptr);
 
-/// Upper bound of the bytes that renderBackward allocates, its result included.
+/// Upper bound of the bytes that renderBackward allocates, its result included. Errors:
+/// kInvalidArgument for a camera that validate() refuses.
 uint64_t backwardMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
                              const RenderOptions& options, const BackwardInput& input);
 

@@ -43,7 +43,8 @@ typedef enum StippleStatus {
   STIPPLE_OK = 0,
   STIPPLE_ERROR_INVALID_ARGUMENT = 1,
   STIPPLE_ERROR_OUT_OF_MEMORY = 2,
-  STIPPLE_ERROR_MEMORY_LIMIT = 3,     /* would need more than the context's memory limit */
+  STIPPLE_ERROR_MEMORY_LIMIT = 3,     /* would need more than the context's memory limit; a picture: or
+                                         than the machine has */
   STIPPLE_ERROR_IO = 4,               /* the system refused: missing, no permission, disk full */
   STIPPLE_ERROR_FORMAT = 5,           /* a file's content is wrong */
   STIPPLE_ERROR_UNSUPPORTED = 6,      /* right, but not something this version can do */
@@ -439,7 +440,9 @@ typedef struct StippleRenderBuffers {
 StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer);
 void stipple_renderer_free(StippleRenderer* renderer);
 /* Renders instances [count] together. Clouds of different colour spaces in one picture:
- * UNSUPPORTED with STIPPLE_BLEND_AS_TRAINED. count 0 gives an empty picture. */
+ * UNSUPPORTED with STIPPLE_BLEND_AS_TRAINED. count 0 gives an empty picture.
+ * Errors of the start: INVALID_ARGUMENT for a camera, matrix or option outside its range; MEMORY_LIMIT,
+ * with the numbers, before anything is allocated. */
 StippleStatus stipple_renderer_render_start(StippleRenderer* renderer, const StippleInstance* instances,
                                             uint64_t count, const StippleCamera* camera,
                                             const StippleRenderOptions* options,

@@ -368,6 +368,7 @@ BackwardResult renderBackward(std::span<const SplatInstance> instances, const Ca
 
 uint64_t backwardMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
                              const RenderOptions&, const BackwardInput& input) {
+  validate(camera);
   uint64_t splat_count = 0;
   for (const SplatInstance& instance : instances) {
     if (instance.cloud) splat_count += instance.cloud->size();

@@ -322,6 +322,7 @@ RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera
   for (const SplatInstance& instance : instances) {
     if (instance.cloud) splat_count += instance.cloud->size();
   }
+  validate(camera);
   const TileListsBound lists = tileListsBound(splat_count, TileGrid(camera.width, camera.height));
   RenderMemory memory;
   memory.splat_bytes = visibleSplatsMemoryBound(splat_count);
@@ -334,9 +335,7 @@ RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera
 
 uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
                            const RenderOptions& options) {
-  const RenderMemory memory = renderMemory(instances, camera, options);
-  return memory.splat_bytes + memory.pixel_bytes + memory.pair_bytes + memory.result_bytes +
-         memory.other_bytes;
+  return renderMemory(instances, camera, options).sum();
 }
 
 }  // namespace stipple
