@@ -135,6 +135,21 @@ TEST(BackwardStability, AtTheNearPlane) {
   expectSoundForEveryLowPass(cloud, camera);
 }
 
+TEST(BackwardStability, AMillionUnitsFromTheOrigin) {
+  CloudRecipe recipe;
+  recipe.count = 200;
+  recipe.degree = 2;
+  SplatCloud cloud = randomCloud(recipe, 8);
+  Camera camera = frontCamera(40, 40, 33, 3);
+  const Vec3d away(1e6, -1e6, 1e6);
+  const Mat3d turn = camera.world_to_camera.topLeftCorner<3, 3>();
+  camera.world_to_camera.topRightCorner<3, 1>() -= turn * away;
+  for (size_t i = 0; i < cloud.positions.size(); ++i) {
+    cloud.positions[i] += static_cast<float>(away[static_cast<int>(i % 3)]);
+  }
+  expectSoundForEveryLowPass(cloud, camera);
+}
+
 TEST(BackwardStability, AlphaTowardsOneAndTransmittanceTowardsZero) {
   for (const float opacity : {0.98f, 0.99f, std::nextafter(0.99f, 1.0f), 1.0f}) {
     SCOPED_TRACE(opacity);
@@ -233,18 +248,41 @@ TEST(BackwardStability, EveryKernelKeepsDeadLanesQuiet) {
 TEST(BackwardStability, RefusesWhatIsNotFinite) {
   const Camera camera = frontCamera(8, 8, 8, 3);
   const SplatCloud good = oneSplat(0.1f, 0.5f);
-  for (const float bad :
-       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
-    std::vector<float> gradient(pixelCount(camera) * 4, 1.0f);
-    BackwardInput input;
-    input.colour_gradient = gradient;
-    SplatCloud cloud = good;
-    cloud.scales[1] = bad;
-    const SplatInstance broken{&cloud};
-    EXPECT_THROW(renderBackward({&broken, 1}, camera, {}, input), Error);
-    gradient.back() = bad;
-    const SplatInstance instance{&good};
+  const size_t n = pixelCount(camera);
+  const std::vector<float> ones(n * 4, 1.0f);
+  const auto inputOf = [&](const std::vector<float>& values) {
+    const std::span<const float> all = values;
+    return BackwardInput{all, all.first(n * 3), all.first(n), all.first(n), all.first(n), true,
+                         true};
+  };
+  const auto refused = [&](const SplatCloud& cloud, const BackwardInput& input) {
+    const SplatInstance instance{&cloud};
     EXPECT_THROW(renderBackward({&instance, 1}, camera, {}, input), Error);
+  };
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+        -std::numeric_limits<float>::infinity()}) {
+    for (std::vector<float> SplatCloud::*array :
+         {&SplatCloud::positions, &SplatCloud::rotations, &SplatCloud::scales,
+          &SplatCloud::opacities, &SplatCloud::sh}) {
+      SplatCloud cloud = good;
+      (cloud.*array).back() = bad;
+      refused(cloud, inputOf(ones));
+    }
+    std::vector<float> broken = ones;
+    broken[n / 2] = bad;  // inside every picture
+    const BackwardInput bad_input = inputOf(broken);
+    for (std::span<const float> BackwardInput::*picture :
+         {&BackwardInput::colour_gradient, &BackwardInput::residual,
+          &BackwardInput::residual_weights, &BackwardInput::edge_weights, &BackwardInput::errors}) {
+      BackwardInput input = inputOf(ones);
+      input.*picture = bad_input.*picture;
+      refused(good, input);
+    }
+    RenderOptions options;
+    options.background[2] = static_cast<double>(bad);
+    const SplatInstance instance{&good};
+    EXPECT_THROW(renderBackward({&instance, 1}, camera, options, inputOf(ones)), Error);
   }
 }
 

@@ -214,6 +214,20 @@ TEST(Backward, MatchesDifferencesUnderAnOrthographicCamera) {
   judge(scene, 2, 4);
 }
 
+TEST(Backward, MatchesDifferencesOfTheHighestHarmonicsUnderAnOrthographicCamera) {
+  for (const LowPass low_pass : {LowPass::kClassic, LowPass::kMip, LowPass::kNone}) {
+    SCOPED_TRACE(static_cast<int>(low_pass));
+    Scene scene = oneCloud(smallCloud(8, 4, 55));
+    scene.camera.model = CameraModel::kOrthographic;
+    scene.camera.fx = 9;
+    scene.camera.fy = 8;
+    scene.options.low_pass = low_pass;
+    scene.options.with_background = true;
+    std::fill(scene.options.background, scene.options.background + 3, 0.75);
+    judge(scene, 3, 11);
+  }
+}
+
 TEST(Backward, MatchesDifferencesThroughTheLinearisationOfColours) {
   Scene scene = oneCloud(smallCloud(12, 1, 60));
   scene.options.blend_space = BlendSpace::kSceneLinear;
@@ -287,36 +301,6 @@ TEST(Backward, DoesNotDependOnTheLengthOfAQuaternion) {
     EXPECT_NEAR(along, 0, 1e-6 * largestOf(one.rotations));
   }
   EXPECT_EQ(one.positions, other.positions);
-}
-
-TEST(Backward, GivesTheSameBitsForAnyNumberOfThreads) {
-  testing::CloudRecipe recipe;
-  recipe.count = 6000;
-  recipe.degree = 1;
-  const SplatCloud cloud = randomCloud(recipe, 120);
-  const Camera camera = frontCamera(150, 110, 110, 3);
-  const std::vector<float> weights = randomWeights(pixelCount(camera) * 4, 11);
-  const std::vector<float> residual = randomWeights(pixelCount(camera) * 3, 12);
-  const SplatInstance instance{&cloud};
-  BackwardInput input;
-  input.colour_gradient = weights;
-  input.residual = residual;
-  input.errors = std::span(residual).first(0);
-  input.with_screen_gradients = true;
-  BackwardResult results[2];
-  for (unsigned threads : {1u, 2u}) {
-    withThreads(threads, [&] {
-      results[threads - 1] = renderBackward({&instance, 1}, camera, {}, input);
-    });
-  }
-  const SplatGradients& one = results[0].instances[0];
-  const SplatGradients& two = results[1].instances[0];
-  for (const NamedArray& array : kArrays) EXPECT_EQ(one.*array.gradient, two.*array.gradient);
-  EXPECT_EQ(one.contributions, two.contributions);
-  EXPECT_EQ(one.absolute_screen_gradients, two.absolute_screen_gradients);
-  EXPECT_EQ(results[0].camera, results[1].camera);
-  EXPECT_EQ(results[0].background, results[1].background);
-  EXPECT_GT(largestOf(one.positions), 0);
 }
 
 }  // namespace
