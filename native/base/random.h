@@ -22,6 +22,7 @@ enum class RandomUse : uint32_t {
   kLeafJitter = 3,
   kSurfaceSample = 4,
   kDecoder = 5,
+  kGroundPlane = 6,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and

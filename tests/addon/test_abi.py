@@ -4,7 +4,7 @@
 import ctypes
 import re
 import subprocess
-from ctypes import POINTER, c_char_p, c_double, c_float, c_int, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, c_char_p, c_double, c_float, c_int, c_uint32, c_uint64, c_uint8, c_void_p
 
 import pytest
 
@@ -81,7 +81,8 @@ def ctype_of(text, enums):
     """The ctypes type that a C type of the header must have."""
     plain = {'void': None, 'constchar*': c_char_p, 'uint32_t': c_uint32, 'uint64_t': c_uint64,
              'constfloat*': POINTER(c_float), 'float*': POINTER(c_float), 'constdouble*': POINTER(c_double),
-             'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64)}
+             'double*': POINTER(c_double), 'double': c_double, 'uint32_t*': POINTER(c_uint32),
+             'uint64_t*': POINTER(c_uint64), 'uint8_t*': POINTER(c_uint8), 'constuint8_t*': POINTER(c_uint8)}
     if text in plain:
         return plain[text]
     if text in enums:

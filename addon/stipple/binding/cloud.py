@@ -89,7 +89,7 @@ class Cloud(Handle):
         self._check(self.library.stipple_cloud_save(self.pointer, path_bytes(path), byref(options)))
 
     def transformed(self, matrix):
-        """The cloud moved by rotation, translation and uniform scale."""
+        """The cloud moved by any 4x4 matrix that can be inverted; harmonics turn along."""
         return Cloud(self.library, new_handle(self.library, 'stipple_cloud_transform', self.pointer, matrix16(matrix)))
 
     def compare(self, other):

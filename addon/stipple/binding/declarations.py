@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every function of stipple.h with its result and argument types; declared once, at load."""
 
-from ctypes import POINTER, c_char_p, c_double, c_float, c_int, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, c_char_p, c_double, c_float, c_int, c_uint32, c_uint64, c_uint8, c_void_p
 
 from . import structs as s
 
@@ -10,7 +10,9 @@ _handle = c_void_p
 _out_handle = POINTER(c_void_p)
 _path = c_char_p
 _matrix = POINTER(c_double)
+_doubles = POINTER(c_double)
 _floats = POINTER(c_float)
+_mask = POINTER(c_uint8)
 
 
 def _to(struct):
@@ -87,6 +89,20 @@ FUNCTIONS = {
                                                 _out_handle]),
     'stipple_renderer_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                 POINTER(c_uint64)]),
+    # editing splat clouds
+    'stipple_cloud_select_box': (_status, [_handle, _matrix, c_uint32, _mask, c_uint64, POINTER(c_uint64)]),
+    'stipple_cloud_select_mesh_start': (_status, [_handle, _matrix, _handle, c_uint32, _mask, c_uint64,
+                                                  POINTER(c_uint64), _out_handle]),
+    'stipple_floater_options_init': (None, [_to(s.StippleFloaterOptions)]),
+    'stipple_cloud_select_floaters_start': (_status, [_handle, _to(s.StippleFloaterOptions), _mask, c_uint64,
+                                                      _to(s.StippleFloaterReport), _out_handle]),
+    'stipple_cloud_keep': (_status, [_handle, _mask, c_uint64, _out_handle]),
+    'stipple_cloud_merge': (_status, [_to(s.StippleInstance), c_uint64, _out_handle]),
+    'stipple_ground_plane_options_init': (None, [_to(s.StippleGroundPlaneOptions)]),
+    'stipple_cloud_ground_plane': (_status, [_handle, _matrix, _to(s.StippleGroundPlaneOptions),
+                                             _to(s.StippleGroundPlane)]),
+    'stipple_level_points': (_status, [_doubles, _doubles, _doubles]),
+    'stipple_scale_points': (_status, [_doubles, c_double, _doubles]),
     # volumes
     'stipple_voxelize_options_init': (None, [_to(s.StippleVoxelizeOptions)]),
     'stipple_voxelize_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleVoxelizeOptions),

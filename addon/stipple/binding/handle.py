@@ -2,14 +2,15 @@
 """Owners of native handles, and numpy arrays as C pointers."""
 
 import os
-from ctypes import POINTER, byref, c_double, c_float, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, byref, c_double, c_float, c_uint32, c_uint64, c_uint8, c_void_p
 
 import numpy as np
 
 from .errors import check
 
 _POINTERS = {np.dtype(np.float32): POINTER(c_float), np.dtype(np.float64): POINTER(c_double),
-             np.dtype(np.uint32): POINTER(c_uint32), np.dtype(np.uint64): POINTER(c_uint64)}
+             np.dtype(np.uint8): POINTER(c_uint8), np.dtype(np.uint32): POINTER(c_uint32),
+             np.dtype(np.uint64): POINTER(c_uint64)}
 
 
 class Handle:

@@ -81,6 +81,11 @@ class RenderMethod(IntEnum):
     REFERENCE = 1
 
 
+class Side(IntEnum):
+    INSIDE = 0
+    OUTSIDE = 1
+
+
 class Transfer(IntEnum):
     LINEAR = 0
     SRGB = 1
@@ -99,6 +104,7 @@ ENUMS = {
     'StippleBlendSpace': (BlendSpace, 'STIPPLE_BLEND_'),
     'StippleOutputColour': (OutputColour, 'STIPPLE_OUTPUT_'),
     'StippleRenderMethod': (RenderMethod, 'STIPPLE_RENDER_'),
+    'StippleSide': (Side, 'STIPPLE_SIDE_'),
     'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
 }
 
@@ -210,6 +216,29 @@ class StippleRenderOptions(_Sized):
 class StippleRenderBuffers(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour', _floats), ('depth', _floats),
                 ('median_depth', _floats), ('counts', POINTER(c_uint32))]
+
+
+class StippleFloaterOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('by_opacity', c_uint32), ('by_size', c_uint32),
+                ('by_connectivity', c_uint32), ('min_opacity', c_double), ('max_size', c_double),
+                ('radius', c_double), ('min_group_count', c_uint64)]
+
+
+class StippleFloaterReport(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('faint', c_uint64), ('large', c_uint64),
+                ('isolated', c_uint64), ('kept', c_uint64), ('group_count', c_uint64), ('max_size', c_double),
+                ('radius', c_double), ('min_group_count', c_uint64)]
+
+
+class StippleGroundPlaneOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('up', c_double * 3), ('max_tilt', c_double),
+                ('tolerance', c_double), ('seed', c_uint64)]
+
+
+class StippleGroundPlane(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('normal', c_double * 3), ('offset', c_double),
+                ('matrix', _matrix), ('considered_count', c_uint64), ('inlier_count', c_uint64),
+                ('tolerance', c_double)]
 
 
 class StippleVoxelizeOptions(_Sized):

@@ -451,6 +451,96 @@ StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
                                             const StippleInstance* instances, uint64_t count,
                                             const StippleCamera* camera, uint64_t* bytes);
 
+/* ---- editing splat clouds ---------------------------------------------------------------------- */
+
+/* Masks say for each splat of a cloud 1 (keep) or 0. They are the caller's, [mask_count] bytes where mask_count
+ * must be the cloud's count, compose by AND, and go into a cloud by stipple_cloud_keep. */
+
+typedef enum StippleSide {
+  STIPPLE_SIDE_INSIDE = 0, /* keep what is inside */
+  STIPPLE_SIDE_OUTSIDE = 1
+} StippleSide;
+
+/* By the centres of splats. cloud_to_box: affine and invertible, into the frame in which the box is the cube
+ * from -1 to 1. Out: mask; kept_count, or NULL. */
+StippleStatus stipple_cloud_select_box(const StippleCloud* cloud, const double cloud_to_box[16], uint32_t side,
+                                       uint8_t* mask, uint64_t mask_count, uint64_t* kept_count);
+/* By the winding number of a mesh (>= 1/2 is inside): closed or nearly closed, faces either way, parts may
+ * overlap. cloud_to_mesh: affine and invertible, into the world of the mesh. mask and kept_count must stay
+ * valid until the job has ended; they are written at its end. */
+StippleStatus stipple_cloud_select_mesh_start(const StippleCloud* cloud, const double cloud_to_mesh[16],
+                                              const StippleMesh* mesh, uint32_t side, uint8_t* mask,
+                                              uint64_t mask_count, uint64_t* kept_count, StippleJob** job);
+
+typedef struct StippleFloaterOptions {
+  uint32_t struct_size;
+  uint32_t by_opacity;       /* 1: the rule is on (default), 0: off; each looks at what those before left */
+  uint32_t by_size;
+  uint32_t by_connectivity;
+  double min_opacity;        /* 0..1, default 0.02; fainter splats go */
+  double max_size;           /* metres, largest standard deviation; 0 (default): from the cloud's own sizes */
+  double radius;             /* metres; splats this near hang together; 0 (default): from their distances */
+  uint64_t min_group_count;  /* smaller groups go, the largest stays; 0 (default): N / 1000, 10 to 1000 */
+} StippleFloaterOptions;
+void stipple_floater_options_init(StippleFloaterOptions* options);
+
+typedef struct StippleFloaterReport {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t faint;            /* found by opacity */
+  uint64_t large;            /* of the rest, by size */
+  uint64_t isolated;         /* of the rest, by connectivity */
+  uint64_t kept;             /* the four add up to the cloud's count */
+  uint64_t group_count;
+  double max_size;           /* as used; 0 where the rule was off */
+  double radius;
+  uint64_t min_group_count;
+} StippleFloaterReport;
+
+/* mask: 0 for floaters. mask and report (struct_size set, or NULL) must stay valid until the job has ended;
+ * they are written at its end. Cost: O(N log N). */
+StippleStatus stipple_cloud_select_floaters_start(const StippleCloud* cloud,
+                                                  const StippleFloaterOptions* options, uint8_t* mask,
+                                                  uint64_t mask_count, StippleFloaterReport* report,
+                                                  StippleJob** job);
+/* The splats whose mask is not 0, in their order, bit for bit. */
+StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask, uint64_t mask_count,
+                                 StippleCloud** kept);
+/* One cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity keeps
+ * every bit), harmonics padded to the highest degree. Errors: UNSUPPORTED where colour spaces or antialias
+ * flags differ. */
+StippleStatus stipple_cloud_merge(const StippleInstance* instances, uint64_t count, StippleCloud** merged);
+
+typedef struct StippleGroundPlaneOptions {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double up[3];      /* roughly upwards in the world, default 0 0 1; 0 0 0: unknown */
+  double max_tilt;   /* radians between up and the plane's normal, default pi/4, up to pi/2 */
+  double tolerance;  /* metres from the plane; 0 (default): 0.5 % of the cloud's extent */
+  uint64_t seed;
+} StippleGroundPlaneOptions;
+void stipple_ground_plane_options_init(StippleGroundPlaneOptions* options);
+
+typedef struct StippleGroundPlane {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double normal[3];            /* unit, upwards; points p of the plane have normal . p = offset */
+  double offset;
+  double matrix[16];           /* rigid: levels the plane to z = 0 by the smallest turn */
+  uint64_t considered_count;   /* splats that were looked at, at most 50,000 */
+  uint64_t inlier_count;       /* of those, in the plane */
+  double tolerance;            /* as used */
+} StippleGroundPlane;
+
+/* The plane that most of the surface lies in with little below it, by random samples (the same for a seed).
+ * cloud_to_world: the frame of `up` and of the result. Errors: INVALID_ARGUMENT where no plane is found. */
+StippleStatus stipple_cloud_ground_plane(const StippleCloud* cloud, const double cloud_to_world[16],
+                                         const StippleGroundPlaneOptions* options, StippleGroundPlane* plane);
+/* Rigid matrix that levels the plane through three points [3,3] to z = 0, `up` upwards. */
+StippleStatus stipple_level_points(const double points[9], const double up[3], double matrix[16]);
+/* Uniform scale about the origin that makes the distance of two points [2,3] the given length, metres. */
+StippleStatus stipple_scale_points(const double points[6], double length, double matrix[16]);
+
 /* ---- volumes ----------------------------------------------------------------------------------- */
 
 typedef struct StippleVoxelizeOptions {

@@ -1,0 +1,107 @@
+#include "splat/cloud_selection.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "splat/random_scene.h"
+
+namespace stipple {
+namespace {
+
+using testing::CloudRecipe;
+using testing::randomCloud;
+
+TEST(CloudSelection, BoxHoldsItsFacesAndNothingBeyond) {
+  SplatCloud cloud = testing::oneSplat(1, 1);
+  cloud.resize(4);
+  cloud.positions = {1, -1, 1, 1.0001f, 0, 0, 0, 0, 0, 0, 0, -1.0001f};
+  for (size_t i = 0; i < 4; ++i) cloud.rotations[i * 4] = 1;
+  EXPECT_EQ(insideBox(cloud, Mat4d::Identity()), (std::vector<uint8_t>{1, 0, 1, 0}));
+}
+
+TEST(CloudSelection, TurnedBoxSelectsByDistancesAlongItsAxes) {
+  CloudRecipe recipe;
+  recipe.count = 5000;
+  const SplatCloud cloud = randomCloud(recipe, 3);
+  Eigen::Affine3d box = Eigen::Translation3d(0.2, -0.1, 0.3) *
+                        Eigen::AngleAxisd(0.8, Vec3d(1, 1, 0).normalized()) *
+                        Eigen::Scaling(0.5, 0.2, 0.9);
+  const Mat4d cloud_to_box = box.inverse().matrix();
+  const std::vector<uint8_t> mask = insideBox(cloud, cloud_to_box);
+  size_t inside = 0;
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    const Vec3d d =
+        Vec3d(cloud.positions[i * 3], cloud.positions[i * 3 + 1], cloud.positions[i * 3 + 2]) -
+        box.translation();
+    bool expected = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3d half = box.linear().col(axis);
+      expected &= std::abs(d.dot(half.normalized())) <= half.norm();
+    }
+    EXPECT_EQ(mask[i] == 1, expected) << i;
+    inside += mask[i];
+  }
+  EXPECT_GT(inside, 100u);
+}
+
+TEST(CloudSelection, KeepsRowsBitForBitInTheirOrder) {
+  CloudRecipe recipe;
+  recipe.count = 9;
+  recipe.degree = 2;
+  recipe.antialias = Antialias::kMip;
+  recipe.colour_space = ColourSpace::kLinear;
+  const SplatCloud cloud = randomCloud(recipe, 1);
+  const std::vector<uint8_t> mask = {0, 1, 0, 0, 1, 255, 0, 0, 1};
+  const SplatCloud left = kept(cloud, mask);
+  ASSERT_EQ(left.size(), 4u);
+  EXPECT_EQ(left.antialias, cloud.antialias);
+  EXPECT_EQ(left.colour_space, cloud.colour_space);
+  const size_t rows[] = {1, 4, 5, 8};
+  const size_t stride = cloud.shStride();
+  ASSERT_EQ(left.sh.size(), 4 * stride);
+  for (size_t k = 0; k < 4; ++k) {
+    const size_t i = rows[k];
+    EXPECT_EQ(left.opacities[k], cloud.opacities[i]);
+    for (size_t c = 0; c < 3; ++c) EXPECT_EQ(left.positions[k * 3 + c], cloud.positions[i * 3 + c]);
+    for (size_t c = 0; c < 3; ++c) EXPECT_EQ(left.scales[k * 3 + c], cloud.scales[i * 3 + c]);
+    for (size_t c = 0; c < 4; ++c) EXPECT_EQ(left.rotations[k * 4 + c], cloud.rotations[i * 4 + c]);
+    for (size_t c = 0; c < stride; ++c)
+      EXPECT_EQ(left.sh[k * stride + c], cloud.sh[i * stride + c]);
+  }
+}
+
+TEST(CloudSelection, TakesNoneAndAll) {
+  const SplatCloud cloud = randomCloud({}, 1);
+  EXPECT_EQ(kept(cloud, std::vector<uint8_t>(cloud.size(), 0)).size(), 0u);
+  EXPECT_EQ(kept(cloud, std::vector<uint8_t>(cloud.size(), 1)).sh, cloud.sh);
+  EXPECT_TRUE(insideBox(SplatCloud{}, Mat4d::Identity()).empty());
+}
+
+TEST(CloudSelection, RefusesMasksOfAnotherLengthAndSingularBoxes) {
+  const SplatCloud cloud = randomCloud({}, 1);
+  EXPECT_THROW(kept(cloud, std::vector<uint8_t>(cloud.size() - 1, 1)), Error);
+  Mat4d flat = Mat4d::Identity();
+  flat(1, 1) = 0;
+  EXPECT_THROW(insideBox(cloud, flat), Error);
+}
+
+TEST(CloudSelection, SameForAnyNumberOfThreads) {
+  CloudRecipe recipe;
+  recipe.count = 40000;
+  const SplatCloud cloud = randomCloud(recipe, 7);
+  Mat4d half = Mat4d::Identity();
+  half(0, 0) = 2;
+  std::vector<uint8_t> one, two;
+  SplatCloud few, many;
+  withThreads(1, [&] { few = kept(cloud, one = insideBox(cloud, half)); });
+  withThreads(2, [&] { many = kept(cloud, two = insideBox(cloud, half)); });
+  EXPECT_EQ(one, two);
+  EXPECT_EQ(few.positions, many.positions);
+}
+
+}  // namespace
+}  // namespace stipple
