@@ -25,17 +25,16 @@ void ContextState::requireMemory(uint64_t bytes, const char* what) const {
   }
 }
 
-void ContextState::requireMemory(const RenderMemory& memory, const Camera& camera) const {
+void ContextState::requirePictureMemory(uint64_t bytes, const std::string& what,
+                                        uint64_t pair_bytes) const {
   const uint64_t machine = machineMemory();
-  const uint64_t bytes = memory.sum();
   if (bytes <= std::min(machine, memory_limit_bytes)) return;
   const std::string allowed = memory_limit_bytes <= machine
                                   ? "the memory limit is " + std::to_string(memory_limit_bytes)
                                   : "this machine has " + std::to_string(machine);
-  fail(ErrorCode::kMemoryLimit,
-       "this picture of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
-           " pixels would need up to " + std::to_string(bytes) + " bytes, " +
-           std::to_string(memory.pair_bytes) + " of them for pairs of splat and tile; " + allowed);
+  fail(ErrorCode::kMemoryLimit, what + " would need up to " + std::to_string(bytes) + " bytes, " +
+                                    std::to_string(pair_bytes) +
+                                    " of them for pairs of splat and tile; " + allowed);
 }
 
 }  // namespace stipple::api

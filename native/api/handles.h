@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "data/image.h"
@@ -14,7 +15,7 @@
 #include "decode/surface_model.h"
 #include "density/octree_density.h"
 #include "io/camera_file.h"
-#include "splat/render.h"
+#include "splat/render_backward.h"
 
 namespace stipple::api {
 
@@ -26,8 +27,9 @@ struct ContextState {
   /// Refuses work that needs more than the limit. In: what, as a noun for the message.
   void requireMemory(uint64_t bytes, const char* what) const;
 
-  /// Refuses a picture that needs more than the limit, or than this machine has.
-  void requireMemory(const RenderMemory& memory, const Camera& camera) const;
+  /// Refuses a picture, or its derivative, that needs more than the limit or than this machine has.
+  /// In: what, as a noun with its numbers; pair_bytes: of those, for pairs of splat and tile.
+  void requirePictureMemory(uint64_t bytes, const std::string& what, uint64_t pair_bytes) const;
 };
 using Context = std::shared_ptr<const ContextState>;
 
@@ -36,6 +38,8 @@ struct RendererMemory {
   std::mutex mutex;  ///< held while a job uses the rest
   RenderWorkspace workspace;
   RenderResult result;
+  BackwardWorkspace backward_workspace;
+  BackwardResult backward_result;
 };
 
 }  // namespace stipple::api

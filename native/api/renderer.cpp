@@ -1,4 +1,3 @@
-#include <limits>
 #include <utility>
 
 #include "api/camera.h"
@@ -6,6 +5,7 @@
 #include "api/handles.h"
 #include "api/instances.h"
 #include "api/job.h"
+#include "api/render_settings.h"
 #include "base/parallel.h"
 #include "math/colour.h"
 
@@ -13,44 +13,6 @@ using namespace stipple;
 using namespace stipple::api;
 
 namespace {
-
-struct RenderSettings {
-  RenderOptions options;
-  StippleRenderMethod method = STIPPLE_RENDER_TILED;
-  bool linearise = false;  ///< the composited values are display values and light is asked for
-};
-
-/// True when the composited values are display values.
-bool compositesInDisplaySpace(const Instances& instances, BlendSpace blend_space) {
-  return blend_space == BlendSpace::kAsTrained &&
-         (instances.list.empty() ||
-          instances.list.front().cloud->colour_space == ColourSpace::kDisplay);
-}
-
-RenderSettings renderSettings(const StippleRenderOptions* options, const Instances& instances) {
-  StippleRenderOptions defaults;
-  stipple_render_options_init(&defaults);
-  const StippleRenderOptions given = completed(options, defaults, "options");
-  RenderSettings settings;
-  settings.method = enumValue<StippleRenderMethod>(given.method, 1, "options->method");
-  settings.options.low_pass = enumValue<LowPass>(given.low_pass, 3, "options->low_pass");
-  settings.options.blend_space =
-      enumValue<BlendSpace>(given.blend_space, 1, "options->blend_space");
-  const auto output =
-      enumValue<StippleOutputColour>(given.output_colour, 1, "options->output_colour");
-  settings.options.sh_degree_limit =
-      enumValue<int>(given.sh_degree_limit, 4, "options->sh_degree_limit");
-  settings.options.with_background =
-      enumValue<uint32_t>(given.with_background, 1, "options->with_background") == 1;
-  settings.linearise = output == STIPPLE_OUTPUT_SCENE_LINEAR &&
-                       compositesInDisplaySpace(instances, settings.options.blend_space);
-  for (int c = 0; c < 3; ++c) {
-    requireFinite(given.background[c], "options->background");
-    settings.options.background[c] =
-        settings.linearise ? linearToSrgb(given.background[c]) : given.background[c];
-  }
-  return settings;
-}
 
 /// Premultiplied display values → premultiplied scene linear values, in place.
 void lineariseColour(float* colour, size_t pixel_count) {
@@ -134,7 +96,9 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     settings.options.with_depth = out.depth != nullptr;
     settings.options.with_median_depth = out.median_depth != nullptr;
     settings.options.with_counts = out.counts != nullptr;
-    renderer->context->requireMemory(renderMemory(placed.list, view, settings.options), view);
+    const RenderMemory memory = renderMemory(placed.list, view, settings.options);
+    renderer->context->requirePictureMemory(memory.sum(), "this picture of " + sizeText(view),
+                                            memory.pair_bytes);
     *job = startJob(renderer->context, [memory = renderer->memory, placed = std::move(placed),
                                         settings, view, out](Progress& progress) {
       if (settings.method == STIPPLE_RENDER_REFERENCE) {

@@ -21,6 +21,10 @@ Camera cameraFrom(const StippleCamera* camera) {
   return made;
 }
 
+std::string sizeText(const Camera& camera) {
+  return std::to_string(camera.width) + " x " + std::to_string(camera.height) + " pixels";
+}
+
 StippleCamera cameraTo(const Camera& camera) {
   StippleCamera out = {};
   out.model = static_cast<uint32_t>(camera.model);

@@ -103,6 +103,17 @@ FUNCTIONS = {
                                              _to(s.StippleGroundPlane)]),
     'stipple_level_points': (_status, [_doubles, _doubles, _doubles]),
     'stipple_scale_points': (_status, [_doubles, c_double, _doubles]),
+    # differentiable rendering
+    'stipple_renderer_backward_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
+                                                  _to(s.StippleRenderOptions), _to(s.StippleBackwardInput),
+                                                  _to(s.StippleSplatGradients), _to(s.StippleBackwardResult),
+                                                  _out_handle]),
+    'stipple_renderer_backward_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
+                                                         _to(s.StippleBackwardInput), _to(s.StippleSplatGradients),
+                                                         POINTER(c_uint64)]),
+    'stipple_image_loss_options_init': (None, [_to(s.StippleImageLossOptions)]),
+    'stipple_image_loss': (_status, [_handle, c_uint32, c_uint32, _floats, _floats, _floats,
+                                     _to(s.StippleImageLossOptions), _to(s.StippleImageLoss), _floats]),
     # volumes
     'stipple_voxelize_options_init': (None, [_to(s.StippleVoxelizeOptions)]),
     'stipple_voxelize_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleVoxelizeOptions),

@@ -241,6 +241,34 @@ class StippleGroundPlane(_Sized):
                 ('tolerance', c_double)]
 
 
+class StippleBackwardInput(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour_gradient', _floats), ('residual', _floats),
+                ('residual_weights', _floats), ('edge_weights', _floats), ('errors', _floats)]
+
+
+class StippleSplatGradients(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('capacity', c_uint64), ('positions', _floats),
+                ('rotations', _floats), ('scales', _floats), ('opacities', _floats), ('sh', _floats),
+                ('contributions', _floats), ('blending_weights', _floats), ('edge_weights', _floats),
+                ('screen_gradients', _floats), ('absolute_screen_gradients', _floats),
+                ('screen_gradient_norms', _floats), ('errors', _floats), ('largest_errors', _floats)]
+
+
+class StippleBackwardResult(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('camera', c_double * 6), ('background', c_double * 3),
+                ('visible_count', c_uint64)]
+
+
+class StippleImageLossOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('rendered_channels', c_uint32), ('target_channels', c_uint32),
+                ('reserved', c_uint32), ('ssim_share', c_double)]
+
+
+class StippleImageLoss(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('loss', c_double), ('l1', c_double),
+                ('ssim', c_double)]
+
+
 class StippleVoxelizeOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('resolution', c_uint32), ('voxel_size', c_double),
                 ('low_pass', c_double), ('cut_off_sigma', c_double), ('min_density', c_double)]

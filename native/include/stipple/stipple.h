@@ -541,6 +541,108 @@ StippleStatus stipple_level_points(const double points[9], const double up[3], d
 /* Uniform scale about the origin that makes the distance of two points [2,3] the given length, metres. */
 StippleStatus stipple_scale_points(const double points[6], double length, double matrix[16]);
 
+/* ---- differentiable rendering ------------------------------------------------------------------- */
+
+/* The derivative of a scalar loss by the picture, and what statistics need. Pictures of the camera's
+ * size, row 0 = top; NULL where not wanted. Values are finite and at most 1e4 in size. */
+typedef struct StippleBackwardInput {
+  uint32_t struct_size;
+  uint32_t reserved;
+  const float* colour_gradient;  /* [H,W,4] dL/d(premultiplied R,G,B,alpha); needed. With a background alpha
+                                    is constant, so its derivative counts for nothing */
+  const float* residual;         /* [H,W,3] picture minus target, for contributions */
+  const float* residual_weights; /* [H,W] >= 0, weight of each pixel in contributions; NULL: 1 */
+  const float* edge_weights;     /* [H,W] for edge_weights */
+  const float* errors;           /* [H,W] >= 0, for errors and largest_errors */
+} StippleBackwardInput;
+
+/* What the loss changes by the stored values of one instance's cloud, in the object's own space. Any
+ * pointer may be NULL: not wanted. Splats that do not show have zeros. A cloud that is placed twice has
+ * two of these: their sum is its derivative. */
+typedef struct StippleSplatGradients {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t capacity;          /* splats that every given buffer has room for */
+  float* positions;           /* [N,3] per metre */
+  float* rotations;           /* [N,4] by the stored unit quaternion, through its normalisation: tangent */
+  float* scales;              /* [N,3] per metre */
+  float* opacities;           /* [N] */
+  float* sh;                  /* [N,(degree+1)^2,3] */
+  /* Statistics, each only where its buffer is given; N numbers unless stated. They cost time. */
+  float* contributions;       /* L1 error of the picture minus the error without the splat: sum over pixels and
+                                 channels of w (|R| - |R - dC|), R = residual; < 0: it is useful */
+  float* blending_weights;    /* sum over pixels of T alpha */
+  float* edge_weights;        /* sum of edge weight times T alpha */
+  float* screen_gradients;    /* [N,2] dL/d(projected centre), per pixel */
+  float* absolute_screen_gradients; /* [N,2] sum over pixels of its absolute value per axis */
+  float* screen_gradient_norms;     /* sum over pixels of its length */
+  float* errors;              /* sum of error times T alpha */
+  float* largest_errors;      /* largest error times T alpha of one pixel */
+} StippleSplatGradients;
+
+typedef struct StippleBackwardResult {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double camera[6];      /* by a motion x' = x + omega x x + upsilon in the camera's frame: omega (radians),
+                            then upsilon (metres); world_to_camera' = exp(omega, upsilon) world_to_camera */
+  double background[3];  /* zeros without a background */
+  uint64_t visible_count;
+} StippleBackwardResult;
+
+/* Derivatives of a loss by everything that stipple_renderer_render_start draws of the same arguments, as a
+ * job. The clamps of alpha at 0.99 and of colours at 0 pass no derivative; where a splat ends (alpha =
+ * 1/255), where a pixel ends and the order of blending are taken as fixed.
+ * In: gradients [count], one per instance; result may be NULL. The pictures and buffers must stay valid
+ * until the job has ended.
+ * Errors of the start: those of drawing; INVALID_ARGUMENT for STIPPLE_RENDER_REFERENCE, for an output that is
+ * converted after compositing (choose STIPPLE_OUTPUT_COMPOSITED), for a statistic without its picture;
+ * BUFFER_TOO_SMALL; MEMORY_LIMIT before anything is allocated. Of the job: INVALID_ARGUMENT for a value
+ * outside its range. Nothing is written unless the job ends well.
+ * Threads and determinism: the same bits for any number of threads. Cost: about twice drawing, and up to
+ * half as much again with every statistic. docs/methods/rasterization.md, docs/methods/leave_one_out.md. */
+StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer, const StippleInstance* instances,
+                                              uint64_t count, const StippleCamera* camera,
+                                              const StippleRenderOptions* options,
+                                              const StippleBackwardInput* input,
+                                              const StippleSplatGradients* gradients,
+                                              StippleBackwardResult* result, StippleJob** job);
+/* Bytes that it allocates at most, beside the caller's buffers. */
+StippleStatus stipple_renderer_backward_memory_bound(const StippleRenderer* renderer,
+                                                     const StippleInstance* instances, uint64_t count,
+                                                     const StippleCamera* camera,
+                                                     const StippleBackwardInput* input,
+                                                     const StippleSplatGradients* gradients,
+                                                     uint64_t* bytes);
+
+typedef struct StippleImageLossOptions {
+  uint32_t struct_size;
+  uint32_t rendered_channels; /* 3 or 4, default 4; a fourth, alpha, takes no part and its gradient is 0 */
+  uint32_t target_channels;   /* 3 or 4, default 3 */
+  uint32_t reserved;
+  double ssim_share;          /* lambda, 0..1, default 0.2 */
+} StippleImageLossOptions;
+void stipple_image_loss_options_init(StippleImageLossOptions* options);
+
+typedef struct StippleImageLoss {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double loss; /* (1 - lambda) l1 + lambda (1 - ssim) */
+  double l1;   /* weighted mean of |rendered - target| over pixels and colour channels */
+  double ssim; /* 11x11 Gaussian window of sigma 1.5, which reads zeros outside the picture */
+} StippleImageLoss;
+
+/* The loss of trained splats and its exact gradient, on this thread and the context's others.
+ * In: rendered, target [H,W,channels] as composited, about 0..1 (at most 1e6 in size), row 0 = top; weights
+ * [H,W] >= 0, or NULL: 1. Out: value; gradient [H,W,rendered_channels] dL/d(rendered), or NULL: not wanted,
+ * for less than half the time; it may not overlap the pictures.
+ * Errors: INVALID_ARGUMENT for sides outside 1..65536 and for values outside their range; the gradient's
+ * buffer then has no meaning. The same bits for any number of threads. Cost: about 20 ns a pixel and core;
+ * 0.5 MB a thread. docs/methods/loss.md. */
+StippleStatus stipple_image_loss(StippleContext* context, uint32_t width, uint32_t height,
+                                 const float* rendered, const float* target, const float* weights,
+                                 const StippleImageLossOptions* options, StippleImageLoss* value,
+                                 float* gradient);
+
 /* ---- volumes ----------------------------------------------------------------------------------- */
 
 typedef struct StippleVoxelizeOptions {

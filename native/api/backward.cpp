@@ -1,0 +1,259 @@
+#include <algorithm>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "api/camera.h"
+#include "api/guard.h"
+#include "api/handles.h"
+#include "api/instances.h"
+#include "api/job.h"
+#include "api/render_settings.h"
+#include "base/parallel.h"
+#include "splat/render_backward.h"
+#include "train/image_loss.h"
+
+using namespace stipple;
+using namespace stipple::api;
+
+namespace {
+
+/// A buffer of the caller and what fills it.
+struct Output {
+  float* StippleSplatGradients::*buffer;
+  std::vector<float> SplatGradients::*values;
+};
+
+constexpr Output kOutputs[] = {
+    {&StippleSplatGradients::positions, &SplatGradients::positions},
+    {&StippleSplatGradients::rotations, &SplatGradients::rotations},
+    {&StippleSplatGradients::scales, &SplatGradients::scales},
+    {&StippleSplatGradients::opacities, &SplatGradients::opacities},
+    {&StippleSplatGradients::sh, &SplatGradients::sh},
+    {&StippleSplatGradients::contributions, &SplatGradients::contributions},
+    {&StippleSplatGradients::blending_weights, &SplatGradients::blending_weights},
+    {&StippleSplatGradients::edge_weights, &SplatGradients::edge_weights},
+    {&StippleSplatGradients::screen_gradients, &SplatGradients::screen_gradients},
+    {&StippleSplatGradients::absolute_screen_gradients, &SplatGradients::absolute_screen_gradients},
+    {&StippleSplatGradients::screen_gradient_norms, &SplatGradients::screen_gradient_norms},
+    {&StippleSplatGradients::errors, &SplatGradients::errors},
+    {&StippleSplatGradients::largest_errors, &SplatGradients::largest_errors}};
+
+using Buffers = std::vector<StippleSplatGradients>;
+
+/// The caller's buffers [count], each with room for its cloud.
+Buffers buffersFrom(const StippleSplatGradients* gradients, const Instances& placed) {
+  Buffers made;
+  if (placed.list.empty()) return made;
+  require(gradients, "gradients");
+  for (size_t i = 0; i < placed.list.size(); ++i) {
+    const std::string name = "gradients[" + std::to_string(i) + "]";
+    made.push_back(complete(gradients + i, name.c_str()));
+    const size_t count = placed.list[i].cloud->size();
+    if (made.back().capacity < count) {
+      fail(ErrorCode::kBufferTooSmall, name + ".capacity is " +
+                                           std::to_string(made.back().capacity) + " splats; " +
+                                           std::to_string(count) + " are needed");
+    }
+  }
+  return made;
+}
+
+bool isWanted(const Buffers& buffers, float* StippleSplatGradients::*buffer) {
+  return std::any_of(buffers.begin(), buffers.end(),
+                     [&](const StippleSplatGradients& one) { return one.*buffer != nullptr; });
+}
+
+/// The picture that a statistic needs; empty where the statistic is not wanted.
+std::span<const float> pictureFor(bool wanted, const float* values, size_t count,
+                                  const char* picture, const char* statistic) {
+  if (!wanted) return {};
+  if (!values) {
+    fail(ErrorCode::kInvalidArgument, std::string("input->") + picture +
+                                          " is NULL; it must be given where " + statistic +
+                                          " are wanted");
+  }
+  return {values, count};
+}
+
+/// Asks for those statistics only that have a buffer.
+BackwardInput inputFrom(const StippleBackwardInput* input, const Buffers& buffers,
+                        const Camera& view) {
+  const StippleBackwardInput given = complete(input, "input");
+  const size_t pixel_count = static_cast<size_t>(view.width) * view.height;
+  const auto wanted = [&](float* StippleSplatGradients::*buffer) {
+    return isWanted(buffers, buffer);
+  };
+  BackwardInput made;
+  made.colour_gradient = {&require(given.colour_gradient, "input->colour_gradient"),
+                          pixel_count * 4};
+  made.residual = pictureFor(wanted(&StippleSplatGradients::contributions), given.residual,
+                             pixel_count * 3, "residual", "contributions");
+  if (!made.residual.empty() && given.residual_weights) {
+    made.residual_weights = {given.residual_weights, pixel_count};
+  }
+  made.edge_weights = pictureFor(wanted(&StippleSplatGradients::edge_weights), given.edge_weights,
+                                 pixel_count, "edge_weights", "edge weights");
+  made.errors = pictureFor(
+      wanted(&StippleSplatGradients::errors) || wanted(&StippleSplatGradients::largest_errors),
+      given.errors, pixel_count, "errors", "errors");
+  made.with_blending_weights = wanted(&StippleSplatGradients::blending_weights);
+  made.with_screen_gradients = wanted(&StippleSplatGradients::screen_gradients) ||
+                               wanted(&StippleSplatGradients::absolute_screen_gradients) ||
+                               wanted(&StippleSplatGradients::screen_gradient_norms);
+  return made;
+}
+
+/// Refuses what is drawn but has no derivative here.
+void requireDerivative(const RenderSettings& settings) {
+  if (settings.method != STIPPLE_RENDER_TILED) {
+    fail(ErrorCode::kInvalidArgument, "options->method is " + std::to_string(settings.method) +
+                                          "; derivatives have 0 (tiled) only");
+  }
+  if (settings.linearise) {
+    fail(ErrorCode::kInvalidArgument,
+         "options->output_colour is 0 (scene linear), which converts the composited picture; "
+         "derivatives are those of 1 (composited)");
+  }
+}
+
+void deliverGradients(const BackwardResult& made, const Buffers& buffers,
+                      StippleBackwardResult* result) {
+  for (size_t i = 0; i < buffers.size(); ++i) {
+    for (const Output& output : kOutputs) {
+      float* out = buffers[i].*output.buffer;
+      const std::vector<float>& values = made.instances[i].*output.values;
+      if (out) std::copy(values.begin(), values.end(), out);
+    }
+  }
+  if (!result) return;
+  StippleBackwardResult out = {};
+  std::copy(made.camera.begin(), made.camera.end(), out.camera);
+  std::copy(made.background.begin(), made.background.end(), out.background);
+  out.visible_count = made.visible_count;
+  deliver(result, out, "result");
+}
+
+/// In the renderer's own memory, or in new where another job of the same renderer is using that.
+void runBackward(RendererMemory& memory, const Instances& placed, const Camera& view,
+                 const RenderOptions& options, const BackwardInput& input, const Buffers& buffers,
+                 StippleBackwardResult* result, Progress& progress) {
+  const std::unique_lock<std::mutex> lock(memory.mutex, std::try_to_lock);
+  if (lock.owns_lock()) {
+    renderBackward(placed.list, view, options, input, memory.backward_workspace,
+                   memory.backward_result, UINT64_MAX, &progress);
+    progress.throwIfCancelled();
+    deliverGradients(memory.backward_result, buffers, result);
+  } else {
+    const BackwardResult made =
+        renderBackward(placed.list, view, options, input, UINT64_MAX, &progress);
+    progress.throwIfCancelled();
+    deliverGradients(made, buffers, result);
+  }
+}
+
+PixelLayout layoutOf(uint32_t channels, const char* name) {
+  if (channels != 3 && channels != 4) {
+    fail(ErrorCode::kInvalidArgument,
+         std::string(name) + " is " + std::to_string(channels) + "; 3 or 4 is allowed");
+  }
+  return channels == 4 ? PixelLayout::kRgba : PixelLayout::kRgb;
+}
+
+}  // namespace
+
+extern "C" {
+
+StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer,
+                                              const StippleInstance* instances, uint64_t count,
+                                              const StippleCamera* camera,
+                                              const StippleRenderOptions* options,
+                                              const StippleBackwardInput* input,
+                                              const StippleSplatGradients* gradients,
+                                              StippleBackwardResult* result, StippleJob** job) {
+  return guarded([&] {
+    require(renderer, "renderer");
+    require(job, "job");
+    Instances placed = instancesFrom(instances, count);
+    const RenderSettings settings = renderSettings(options, placed);
+    requireDerivative(settings);
+    const Camera view = cameraFrom(camera);
+    validate(view);
+    Buffers buffers = buffersFrom(gradients, placed);
+    const BackwardInput given = inputFrom(input, buffers, view);
+    if (result) complete(result, "result");
+    renderer->context->requirePictureMemory(
+        backwardMemoryBound(placed.list, view, settings.options, given),
+        "the backward pass of a picture of " + sizeText(view),
+        renderMemory(placed.list, view, settings.options).pair_bytes);
+    *job = startJob(
+        renderer->context, [memory = renderer->memory, placed = std::move(placed), settings, view,
+                            given, buffers = std::move(buffers), result](Progress& progress) {
+          runBackward(*memory, placed, view, settings.options, given, buffers, result, progress);
+          return JobResult{};
+        });
+  });
+}
+
+StippleStatus stipple_renderer_backward_memory_bound(const StippleRenderer* renderer,
+                                                     const StippleInstance* instances,
+                                                     uint64_t count, const StippleCamera* camera,
+                                                     const StippleBackwardInput* input,
+                                                     const StippleSplatGradients* gradients,
+                                                     uint64_t* bytes) {
+  return guarded([&] {
+    require(renderer, "renderer");
+    require(bytes, "bytes");
+    const Instances placed = instancesFrom(instances, count);
+    const Camera view = cameraFrom(camera);
+    validate(view);
+    const Buffers buffers = buffersFrom(gradients, placed);
+    *bytes = backwardMemoryBound(placed.list, view, {}, inputFrom(input, buffers, view));
+  });
+}
+
+void stipple_image_loss_options_init(StippleImageLossOptions* options) {
+  if (!options) return;
+  *options = {};
+  options->struct_size = sizeof(StippleImageLossOptions);
+  options->rendered_channels = 4;
+  options->target_channels = 3;
+  options->ssim_share = ImageLossOptions{}.ssim_share;
+}
+
+StippleStatus stipple_image_loss(StippleContext* context, uint32_t width, uint32_t height,
+                                 const float* rendered, const float* target, const float* weights,
+                                 const StippleImageLossOptions* options, StippleImageLoss* value,
+                                 float* gradient) {
+  return guarded([&] {
+    require(context, "context");
+    require(rendered, "rendered");
+    require(target, "target");
+    complete(value, "value");
+    StippleImageLossOptions defaults;
+    stipple_image_loss_options_init(&defaults);
+    const StippleImageLossOptions given = completed(options, defaults, "options");
+    const PixelLayout layout = layoutOf(given.rendered_channels, "options->rendered_channels");
+    const PictureView target_view = {target,
+                                     layoutOf(given.target_channels, "options->target_channels")};
+    constexpr uint32_t kMaxSide = 65536;
+    if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) {
+      fail(ErrorCode::kInvalidArgument, "the picture is " + std::to_string(width) + " x " +
+                                            std::to_string(height) +
+                                            " pixels; each side must be 1 to 65536");
+    }
+    ImageLossValue made;
+    withThreads(context->state->thread_count, [&] {
+      made = ImageLoss().evaluate(width, height, {rendered, layout}, target_view, weights,
+                                  {gradient, layout}, {given.ssim_share});
+    });
+    StippleImageLoss out = {};
+    out.loss = made.loss;
+    out.l1 = made.l1;
+    out.ssim = made.ssim;
+    deliver(value, out, "value");
+  });
+}
+
+}  // extern "C"
