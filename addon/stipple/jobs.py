@@ -6,10 +6,74 @@ timer polls it: Blender stays usable, the status bar shows the progress, Escape 
 operator ends with one undo step.
 """
 
+import threading
+import time
+
 from .binding.errors import CancelledError, StippleError
 from .binding.structs import JobState
 
 POLL_SECONDS = 0.05
+
+
+class Task:
+    """Several native calls in a thread of their own, polled like a native job. Never touches Blender."""
+
+    def __init__(self, work):
+        """work(task) → result; it calls task.advance and task.run between its steps."""
+        self.result = None
+        self._error = None
+        self._progress = (0.0, '')
+        self._cancelled = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(work,), daemon=True)
+        self._thread.start()
+
+    def poll(self):
+        """(state, fraction 0..1, stage). Never waits."""
+        if self._thread.is_alive():
+            return (JobState.RUNNING, *self._progress)
+        if self._error is None:
+            return JobState.DONE, 1.0, self._progress[1]
+        cancelled = isinstance(self._error, CancelledError)
+        return (JobState.CANCELLED if cancelled else JobState.FAILED, *self._progress)
+
+    def cancel(self):
+        self._cancelled.set()
+
+    def wait(self):
+        self._thread.join()
+        if self._error is not None:
+            raise self._error
+
+    def close(self):
+        """Cancels what still runs and waits for its end."""
+        self.cancel()
+        self._thread.join()
+
+    def advance(self, fraction, stage):
+        """For the work: says how far it is. Raises CancelledError after a cancel."""
+        self._progress = (fraction, stage)
+        if self._cancelled.is_set():
+            raise CancelledError()
+
+    def run(self, job, start=0.0, end=1.0):
+        """For the work: a native job as the part of it between two fractions; returns the job when it is done."""
+        while True:
+            state, fraction, stage = job.poll()
+            if state != JobState.RUNNING:
+                job.wait()
+                return job
+            if self._cancelled.is_set():
+                job.cancel()
+            self._progress = (start + (end - start) * fraction, stage)
+            time.sleep(POLL_SECONDS / 10)
+
+    def _run(self, work):
+        try:
+            self.result = work(self)
+        except StippleError as error:
+            self._error = error
+        except Exception as error:  # the thread's end is wait(), which must hear of it
+            self._error = error
 
 
 class JobOperator:

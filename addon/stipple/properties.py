@@ -18,6 +18,8 @@ COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: texture
                  ('BAKED', "Baked Lighting", "Colors as lit by the scene, baked by Cycles"),
                  ('ATTRIBUTE', "Attribute", "The active color attribute"))
 
+SIDES = (('INSIDE', "Inside", "Keep what is inside"), ('OUTSIDE', "Outside", "Keep what is outside"))
+
 
 class STIPPLE_PG_source_object(bpy.types.PropertyGroup):
     object: PointerProperty(name="Object", type=bpy.types.Object)

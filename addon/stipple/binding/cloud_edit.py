@@ -105,6 +105,11 @@ def ground_plane(cloud, cloud_to_world, up=(0.0, 0.0, 1.0), max_tilt=None, toler
     return plane
 
 
+def matrix_of(plane):
+    """The 4x4 matrix of a StippleGroundPlane, which levels it."""
+    return np.array(plane.matrix).reshape(4, 4)
+
+
 def level_points(library, points, up=(0.0, 0.0, 1.0)):
     """The rigid 4x4 matrix that brings the plane through three points to z = 0."""
     return _matrix_of(library, library.stipple_level_points, _doubles(points, 9), _doubles(up, 3))

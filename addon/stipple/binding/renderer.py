@@ -48,12 +48,16 @@ class Renderer(Handle):
             options.background = (c_double * 3)(*background)
         return options
 
-    def start(self, instances, camera, options, with_depth=True):
-        """Starts the picture of instances [(cloud, matrix)]; clouds must outlive the start only."""
+    def start(self, instances, camera, options, with_depth=True, median_depth=False):
+        """Starts the picture of instances [(cloud, matrix)]; clouds must outlive the start only.
+
+        median_depth: where light is half gone, instead of the mean depth of what is seen.
+        """
         shape = (camera.height, camera.width)
         colour = np.empty(shape + (4,), np.float32)
         depth = np.empty(shape, np.float32) if with_depth else None
-        buffers = StippleRenderBuffers(colour=pointer_to(colour), depth=pointer_to(depth))
+        buffers = StippleRenderBuffers(colour=pointer_to(colour))
+        setattr(buffers, 'median_depth' if median_depth else 'depth', pointer_to(depth))
         array = instance_array(instances)
         job = Job(self.library, new_handle(self.library, 'stipple_renderer_render_start', self.pointer, array,
                                            len(instances), byref(camera), byref(options), byref(buffers)),

@@ -3,7 +3,6 @@
 
 import bpy
 
-from ..binding.cloud import Cloud
 from ..jobs import JobOperator
 from ..scene import sources, splat_data, sync
 
@@ -22,12 +21,7 @@ class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
 
     def start(self, context):
         data = context.object.data
-        path = sources.absolute_path(data.stipple.source, data)
-        if data.stipple.source_kind == 'MODEL':
-            cloud = sources.model(path).decode(sources.decode_settings(data.stipple))
-        else:
-            cloud = Cloud.load(sources.context(), path)
-        self._splats = cloud.read()
+        self._splats = sources.decode_data(data, sources.decode_settings(data.stipple)).read()
         return None
 
     def finish(self, context, _job):

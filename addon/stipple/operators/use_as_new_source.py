@@ -26,12 +26,8 @@ class STIPPLE_OT_use_as_new_source(JobOperator, bpy.types.Operator):
 
     def finish(self, context, _job):
         data = context.object.data
-        stipple = data.stipple
         with sync.paused():
-            stipple.source = sources.blend_path(self._path)
-            stipple.source_kind = 'CLOUD'
-            stipple.source_objects.clear()
-            stipple.source_changed = stipple.edited = False
+            sources.attach_cloud(data, self._path)
         sync.write(data, self._arrays, '')
         self.report({'INFO'}, f"{self._arrays.count:,} splats are their own source now, in '{self._path}'")
 

@@ -7,7 +7,7 @@ Shape Keys and all else that meshes have.
 
 import bpy
 
-from ..scene import splat_data, sync
+from ..scene import masks, splat_data, sync
 
 
 class _SplatPanel:
@@ -36,6 +36,23 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
         column.prop(stipple, 'detail_weight')
         column.prop(stipple, 'color_from')
         column.operator('stipple.update_from_source', icon='FILE_REFRESH')
+
+
+class STIPPLE_PT_clean_up(_SplatPanel, bpy.types.Panel):
+    bl_label = "Splat Clean Up"
+
+    def draw(self, context):
+        layout = self.layout
+        counts = masks.counts(context.object.data)
+        if counts is not None:
+            row = layout.row()
+            row.label(text=f"{counts[0] - counts[1]:,} of {counts[0]:,} splats hidden", icon='HIDE_ON')
+            row.operator('stipple.clear_mask', text="", icon='X')
+        column = layout.column(align=True)
+        column.operator_context = 'INVOKE_DEFAULT'
+        column.operator('stipple.delete_floaters')
+        column.operator('stipple.crop_by_box')
+        column.operator('stipple.crop_by_mesh')
 
 
 class STIPPLE_PT_advanced(_SplatPanel, bpy.types.Panel):
@@ -128,4 +145,4 @@ def unregister():
             host.remove(_draw_budget)
 
 
-classes = (STIPPLE_PT_source, STIPPLE_PT_advanced)
+classes = (STIPPLE_PT_source, STIPPLE_PT_clean_up, STIPPLE_PT_advanced)

@@ -3,6 +3,8 @@
 
 import bpy
 
+from ..scene import splat_data
+
 
 class STIPPLE_MT_add(bpy.types.Menu):
     bl_label = "Gaussian Splats"
@@ -11,6 +13,31 @@ class STIPPLE_MT_add(bpy.types.Menu):
         self.layout.operator_context = 'INVOKE_DEFAULT'
         self.layout.operator('stipple.splats_from_mesh', text="From Selected Meshes", icon='MESH_DATA')
         self.layout.operator('stipple.splats_import', text="From File", icon='FILE')
+
+
+class STIPPLE_MT_object(bpy.types.Menu):
+    bl_label = "Gaussian Splats"
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.operator_context = 'INVOKE_DEFAULT'
+        layout.operator('stipple.level_to_ground', icon='GRID')
+        layout.operator('stipple.level_to_ground', text="Level to Three Points", icon='BLANK1').use_points = True
+        layout.operator('stipple.set_scale', icon='DRIVER_DISTANCE')
+        layout.separator()
+        layout.operator('stipple.delete_floaters', icon='BRUSH_DATA')
+        layout.operator('stipple.crop_by_box', icon='CUBE')
+        layout.operator('stipple.crop_by_mesh', icon='MESH_ICOSPHERE')
+        layout.operator('stipple.clear_mask', icon='X')
+        layout.separator()
+        layout.operator('stipple.merge_splats', icon='AUTOMERGE_OFF')
+        layout.operator('stipple.apply_transform', icon='OBJECT_ORIGIN')
+
+
+def _draw_object(self, context):
+    if splat_data.is_splat_object(context.object):
+        self.layout.separator()
+        self.layout.menu('STIPPLE_MT_object', icon='OUTLINER_DATA_POINTCLOUD')
 
 
 def _draw_add(self, _context):
@@ -33,7 +60,7 @@ def _draw_export(self, _context):
 
 
 _MENUS = (('VIEW3D_MT_add', _draw_add), ('VIEW3D_MT_object_convert', _draw_convert),
-          ('TOPBAR_MT_file_import', _draw_import), ('TOPBAR_MT_file_export', _draw_export))
+          ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import), ('TOPBAR_MT_file_export', _draw_export))
 
 
 def register():
@@ -46,4 +73,4 @@ def unregister():
         getattr(bpy.types, name).remove(draw)
 
 
-classes = (STIPPLE_MT_add,)
+classes = (STIPPLE_MT_add, STIPPLE_MT_object)

@@ -13,13 +13,13 @@ from collections import OrderedDict
 import bpy
 
 from .. import preferences, version
-from ..binding import library
+from ..binding import cloud_edit, library
 from ..binding.cloud import Cloud
 from ..binding.context import Context
 from ..binding.errors import StippleError
 from ..binding.model import DecodeSettings, Model
 from ..binding.structs import AnchorOrder, Status
-from . import meshes, splat_data
+from . import masks, meshes, splat_data
 
 MODEL_SUFFIX = '.stipple.safetensors'
 _MAX_MODELS = 4
@@ -88,6 +88,33 @@ def decode(path, settings):
     return cloud
 
 
+def decode_data(data, settings):
+    """The cloud that a datablock's source gives at these settings, without what its mask leaves out."""
+    path = absolute_path(data.stipple.source, data)
+    if data.stipple.source_kind == 'MODEL':
+        return model(path).decode(settings)
+    return masked(whole_cloud(data), data)
+
+
+def whole_cloud(data):
+    """All splats of a datablock's source, masked ones too."""
+    return Cloud.load(context(), absolute_path(data.stipple.source, data))
+
+
+def shown_cloud(data):
+    """The splats of a datablock at full count: the whole source without what is masked, or what is stored where the
+    source has no count of its own."""
+    if data.stipple.source_kind == 'CLOUD' and not data.stipple.edited:
+        return masked(whole_cloud(data), data)
+    return Cloud.create(context(), splat_data.read(data))
+
+
+def masked(cloud, data):
+    """The splats of a source's whole cloud that stay. Errors: StippleError where the source has another count."""
+    mask = masks.read(data)
+    return cloud if mask is None else cloud_edit.keep(cloud, mask)
+
+
 def decode_settings(stipple, mode='VIEWPORT'):
     """The settings of a datablock as the binding takes them; mode 'RENDER' takes the render budget."""
     anchors = stipple.anchors
@@ -128,6 +155,16 @@ def save_cloud(cloud, name):
     """Writes splats as a source of their own, beside the other sources; returns the path."""
     path = model_path_for(name)[:-len(MODEL_SUFFIX)] + '.ply'
     return _save(cloud.save, path, '.ply', False)
+
+
+def attach_cloud(data, path):
+    """Notes a splat file as the source of a datablock, all of it shown."""
+    stipple = data.stipple
+    stipple.source = blend_path(path)
+    stipple.source_kind = 'CLOUD'
+    stipple.source_objects.clear()
+    stipple.source_changed = stipple.edited = False
+    masks.clear(data)
 
 
 def _save(write, path, suffix, overwrite):

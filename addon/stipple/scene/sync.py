@@ -11,7 +11,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..binding.errors import StippleError
-from . import meshes, sources, splat_data
+from . import masks, meshes, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -42,10 +42,10 @@ def sync(obj, depsgraph, mode):
     """
     data = obj.data
     stipple = data.stipple
-    if stipple.source_kind != 'MODEL' or not stipple.source or stipple.edited:
+    if stipple.source_kind == 'NONE' or not stipple.source or stipple.edited:
         return False
     settings = sources.decode_settings(_evaluated(data, depsgraph), mode)
-    key = written_key(stipple, settings)
+    key = written_key(data, settings)
     if data.get(WRITTEN_KEY) == key:
         return False
     settings.check()
@@ -53,8 +53,7 @@ def sync(obj, depsgraph, mode):
         stipple.edited = True
         raise StippleError(f"The splats of '{data.name}' were edited by hand; use them as a new source, or revert to "
                            'the source, to change their settings.')
-    cloud = sources.model(sources.absolute_path(stipple.source, data)).decode(settings)
-    write(data, cloud.read(), key)
+    write(data, sources.decode_data(data, settings).read(), key)
     return True
 
 
@@ -67,11 +66,14 @@ def write(data, arrays, key):
 
 def write_decoded(data, arrays):
     """Stores splats that were decoded with the present settings."""
-    write(data, arrays, written_key(data.stipple, sources.decode_settings(data.stipple)))
+    write(data, arrays, written_key(data, sources.decode_settings(data.stipple)))
 
 
-def written_key(stipple, settings):
+def written_key(data, settings):
     """A text that is equal for equal splats."""
+    stipple = data.stipple
+    if stipple.source_kind == 'CLOUD':
+        return masks.key(data)
     return f'{stipple.source}|{settings.anchors}|{settings.gaussians_per_anchor}|{int(settings.order)}|{settings.seed}'
 
 
@@ -82,6 +84,7 @@ def copy_settings(old, new):
             setattr(new.stipple, name, getattr(old.stipple, name))
     for entry in old.stipple.source_objects:
         new.stipple.source_objects.add().object = entry.object
+    masks.copy(old, new)
     if old.animation_data is not None and old.animation_data.action is not None:
         new.animation_data_create().action = old.animation_data.action
 

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The object's matrix goes into the splats."""
+
+import bpy
+from mathutils import Matrix
+
+from ..binding.errors import invalid
+from ..jobs import JobOperator, Task
+from ..scene import edits, sources, sync
+
+
+class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
+    """Move, turn and scale the splats themselves as their object does, harmonics included"""
+
+    bl_idname = 'stipple.apply_transform'
+    bl_label = "Apply Transform to Splats"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT' and bool(edits.selected_splats(context))
+
+    def invoke(self, context, _event):
+        return self.run_in_window(context)
+
+    def start(self, context):
+        objects = edits.selected_splats(context)
+        for obj in objects:
+            if obj.data.users > 1:
+                raise invalid(f"The splats of '{obj.name}' have {obj.data.users} users; make them single-user first.")
+        wanted = [(target, obj.matrix_world.copy()) for target, obj in zip(edits.targets(objects), objects)]
+
+        def work(task):
+            moved = []
+            for i, (target, matrix) in enumerate(wanted):
+                task.advance(i / len(wanted), 'Moving splats')
+                moved.append((target, target.cloud.transformed(matrix)))
+            return moved
+        return Task(work)
+
+    def finish(self, _context, job):
+        for target, cloud in job.result:
+            data = target.obj.data
+            path = sources.save_cloud(cloud, target.obj.name)
+            with sync.paused():
+                sources.attach_cloud(data, path)
+            # Row by row the same splats, so what was hidden stays hidden.
+            edits.write([(target.on(cloud), target.mask)])
+            target.obj.matrix_world = Matrix.Identity(4)
+        self.report({'INFO'}, f'{len(job.result)} objects applied')
+
+
+classes = (STIPPLE_OT_apply_transform,)

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Turns and moves what is selected so that the active splats' floor is the ground of the world."""
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty
+from mathutils import Matrix
+
+from ..binding import cloud_edit
+from ..jobs import JobOperator
+from ..scene import picking, placement, sources, splat_data
+
+
+class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.Operator):
+    """Make the floor of the active splats horizontal and put it at height 0; everything selected moves along"""
+
+    bl_idname = 'stipple.level_to_ground'
+    bl_label = "Level to Ground"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    point_count = 3
+    use_points: BoolProperty(name="Pick Points", description="Three points of the floor, instead of a search for it",
+                             default=False)
+    points: FloatVectorProperty(name="Points", size=9, options={'SKIP_SAVE', 'HIDDEN'})
+    max_tilt: FloatProperty(name="Maximum Tilt", description="How far from level the floor may be now", default=0.785398,
+                            min=0.0174533, max=1.570796, subtype='ANGLE')
+    seed: IntProperty(name="Seed", description="Another seed may find another plane", default=0, min=0)
+
+    @classmethod
+    def poll(cls, context):
+        return splat_data.is_splat_object(context.object) and context.mode == 'OBJECT'
+
+    def start(self, context):
+        if self.use_points:
+            self._matrix = cloud_edit.level_points(sources.context().library, self.points)
+            self._found = 'three points'
+        else:
+            cloud = sources.cloud_from_object(context.object)
+            plane = cloud_edit.ground_plane(cloud, context.object.matrix_world, max_tilt=self.max_tilt, seed=self.seed)
+            self._matrix = cloud_edit.matrix_of(plane)
+            self._found = f'{plane.inlier_count:,} of {plane.considered_count:,} splats'
+        return None
+
+    def finish(self, context, _job):
+        placement.move(placement.chosen(context), Matrix(self._matrix.tolist()))
+        self.report({'INFO'}, f'Leveled to the plane of {self._found}')
+
+
+classes = (STIPPLE_OT_level_to_ground,)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Selected splat objects become one."""
+
+import bpy
+import numpy as np
+
+from ..binding import cloud_edit
+from ..binding.errors import invalid
+from ..jobs import JobOperator, Task
+from ..scene import masks, sources, splat_data, sync
+
+
+class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
+    """Join the selected splats into the active object, with their harmonics turned along"""
+
+    bl_idname = 'stipple.merge_splats'
+    bl_label = "Merge Splats"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return (context.mode == 'OBJECT' and splat_data.is_splat_object(context.object)
+                and context.object.select_get())
+
+    def invoke(self, context, _event):
+        return self.run_in_window(context)
+
+    def start(self, context):
+        active = context.object
+        others = [obj for obj in context.view_layer.objects.selected
+                  if splat_data.is_splat_object(obj) and obj != active]
+        if not others:
+            raise invalid('One splat object is selected; select at least two.')
+        self._objects = [active] + others
+        inverse = np.linalg.inv(np.array(active.matrix_world))
+        instances = [(sources.shown_cloud(obj.data), inverse @ np.array(obj.matrix_world)) for obj in self._objects]
+        instances[0] = (instances[0][0], np.eye(4))  # to the bit
+
+        def work(task):
+            task.advance(0.0, 'Merging splats')
+            return cloud_edit.merge(instances)
+        return Task(work)
+
+    def finish(self, _context, job):
+        active = self._objects[0]
+        path = sources.save_cloud(job.result, active.name)
+        # A datablock of its own: the old one may have other users.
+        data = splat_data.new_data(active.data.name)
+        with sync.paused():
+            sources.attach_cloud(data, path)
+        splats = job.result.read()
+        sync.write(data, splats, masks.key(data))
+        active.data = data
+        for obj in self._objects[1:]:
+            bpy.data.objects.remove(obj)
+        self.report({'INFO'}, f"{splats.count:,} splats of {len(self._objects)} objects in '{active.name}'")
+
+
+classes = (STIPPLE_OT_merge_splats,)
