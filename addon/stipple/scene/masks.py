@@ -2,9 +2,10 @@
 """Which splats of its source a datablock leaves out: packed bits in an ID property.
 
 So undo, saving, linking and linked duplicates treat a mask like every other setting, and every budget
-keeps it.
+keeps it. The property is text: from Blender 4 on, bytes end at the first zero.
 """
 
+import base64
 import zlib
 
 import numpy as np
@@ -19,7 +20,7 @@ def read(data):
     if packed is None:
         return None
     total = data[COUNTS_KEY][0]
-    bits = np.frombuffer(zlib.decompress(packed), np.uint8)
+    bits = np.frombuffer(zlib.decompress(base64.b64decode(packed)), np.uint8)
     return np.unpackbits(bits, count=total)
 
 
@@ -29,7 +30,7 @@ def store(data, mask):
     if kept == len(mask):
         clear(data)
         return
-    data[MASK_KEY] = zlib.compress(np.packbits(mask != 0).tobytes(), 1)
+    data[MASK_KEY] = base64.b64encode(zlib.compress(np.packbits(mask != 0).tobytes(), 1)).decode()
     data[COUNTS_KEY] = [len(mask), kept]
 
 
@@ -54,4 +55,4 @@ def counts(data):
 def key(data):
     """A text that is equal for equal masks; empty for none."""
     packed = data.get(MASK_KEY)
-    return '' if packed is None else f'mask {zlib.crc32(packed):08x}'
+    return '' if packed is None else f'mask {zlib.crc32(packed.encode()):08x}'
