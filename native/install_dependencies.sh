@@ -8,9 +8,10 @@ packages=(
   g++ cmake ninja-build ccache pkgconf git
   # The library: parallel loops, linear algebra, vector instructions, neighbour search.
   libtbb-dev libeigen3-dev libhwy-dev libnanoflann-dev
-  # Files: JSON, volumes (OpenVDB's headers use Boost's), meshes, pictures. The quick
+  # Files: JSON, volumes (OpenVDB's headers use Boost's), meshes, pictures, packed splats. The quick
   # start and the tests use OpenImageIO's tools too.
   nlohmann-json3-dev libopenvdb-dev libboost-dev libtinygltf-dev libopenimageio-dev openimageio-tools
+  zlib1g-dev libzstd-dev
   # The command-line tool.
   libcli11-dev
   # Tests and benchmarks; readelf and nm look at what the libraries need and export.

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstddef>
 
 #include "api/bounds.h"
 #include "api/guard.h"
@@ -32,6 +33,7 @@ SplatCloud fromArrays(const StippleCloudArrays& arrays) {
   cloud.sh_degree = static_cast<int>(arrays.sh_degree);
   cloud.colour_space = enumValue<ColourSpace>(arrays.colour_space, 1, "arrays->colour_space");
   cloud.antialias = enumValue<Antialias>(arrays.antialias, 1, "arrays->antialias");
+  cloud.frame = enumValue<Frame>(arrays.frame, kLastFrame, "arrays->frame");
   const size_t count = arrays.count;
   if (count > 0) {
     cloud.positions.assign(&require(arrays.positions, "arrays->positions"),
@@ -61,7 +63,8 @@ StippleStatus stipple_cloud_create(StippleContext* context, const StippleCloudAr
   return guarded([&] {
     require(context, "context");
     require(cloud, "cloud");
-    const StippleCloudArrays given = complete(arrays, "arrays");
+    const StippleCloudArrays given =
+        completeUpTo(arrays, offsetof(StippleCloudArrays, frame), "arrays");
     *cloud =
         new StippleCloud{context->state, std::make_shared<const SplatCloud>(fromArrays(given))};
   });
@@ -80,6 +83,7 @@ StippleStatus stipple_cloud_info(const StippleCloud* cloud, StippleCloudInfo* in
     out.antialias = static_cast<uint32_t>(splats.antialias);
     out.count = splats.size();
     fillBounds(splats.positions, out.bounds_min, out.bounds_max);
+    out.frame = static_cast<uint32_t>(splats.frame);
     deliver(info, out, "info");
   });
 }
@@ -115,7 +119,10 @@ StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8,
 }
 
 void stipple_cloud_save_options_init(StippleCloudSaveOptions* options) {
-  if (options) *options = StippleCloudSaveOptions{sizeof(StippleCloudSaveOptions), 0};
+  if (!options) return;
+  *options = {};
+  options->struct_size = sizeof(StippleCloudSaveOptions);
+  options->sh_degree_limit = static_cast<uint32_t>(kMaxShDegree);
 }
 
 StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf8,
@@ -128,7 +135,35 @@ StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf
     const StippleCloudSaveOptions given = completed(options, defaults, "options");
     SplatWriteOptions write;
     write.ascii = enumValue<uint32_t>(given.ascii, 1, "options->ascii") == 1;
+    write.sh_degree_limit = enumValue<int>(
+        given.sh_degree_limit, static_cast<uint32_t>(kMaxShDegree), "options->sh_degree_limit");
+    write.version = enumValue<int>(given.format_version, 255, "options->format_version");
+    write.frame = enumValue<Frame>(given.frame, kLastFrame, "options->frame");
     withThreads(cloud->context->thread_count, [&] { writeSplatFile(*cloud->cloud, path, write); });
+  });
+}
+
+StippleStatus stipple_format_count(uint64_t* count) {
+  return guarded([&] { require(count, "count") = splatFormats().size(); });
+}
+
+StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
+  return guarded([&] {
+    if (index >= splatFormats().size()) {
+      fail(ErrorCode::kInvalidArgument, "index is " + std::to_string(index) + "; 0 to " +
+                                            std::to_string(splatFormats().size() - 1) +
+                                            " is allowed");
+    }
+    const SplatFormat& format = splatFormats()[static_cast<size_t>(index)];
+    StippleFormatInfo out = {};
+    out.can_read = format.read != nullptr ? 1 : 0;
+    out.can_write = format.write != nullptr ? 1 : 0;
+    out.max_sh_degree = static_cast<uint32_t>(format.max_sh_degree);
+    out.frame = static_cast<uint32_t>(format.frame);
+    out.name = format.name;
+    out.title = format.title;
+    out.endings = format.endings;
+    deliver(info, out, "info");
   });
 }
 
@@ -153,11 +188,16 @@ StippleStatus stipple_cloud_compare(const StippleCloud* a, const StippleCloud* b
     out.same_order = made.same_order ? 1 : 0;
     out.count_a = first.size();
     out.count_b = second.size();
-    out.max_position = made.max_position;
-    out.max_rotation = made.max_rotation;
-    out.max_scale_ratio = made.max_scale_ratio;
-    out.max_opacity = made.max_opacity;
-    out.max_sh = made.max_sh;
+    out.max_position = made.position.max;
+    out.max_rotation = made.rotation.max;
+    out.max_scale_ratio = made.scale_ratio.max;
+    out.max_opacity = made.opacity.max;
+    out.max_sh = made.sh.max;
+    out.mean_position = made.position.mean;
+    out.mean_rotation = made.rotation.mean;
+    out.mean_scale_ratio = made.scale_ratio.mean;
+    out.mean_opacity = made.opacity.mean;
+    out.mean_sh = made.sh.mean;
     deliver(result, out, "result");
   });
 }

@@ -67,6 +67,16 @@ T complete(const T* given, const char* name) {
   return *given;
 }
 
+/// A struct of the caller whose first `needed` bytes must be there; the rest is 0 where it ends early.
+template <typename T>
+T completeUpTo(const T* given, size_t needed, const char* name) {
+  const size_t size = require(given, name).struct_size;
+  if (size < needed) failStructSize(name, size, sizeof(T));
+  T result = {};
+  std::memcpy(&result, given, std::min(size, sizeof(T)));
+  return result;
+}
+
 /// Fills a struct of the caller, as far as its struct_size goes.
 template <typename T>
 void deliver(T* out, T value, const char* name) {

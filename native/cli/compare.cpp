@@ -34,6 +34,11 @@ Report compareClouds(const Context& context, const std::string& a, const std::st
   report.add("max_scale_ratio", result.max_scale_ratio);
   report.add("max_opacity", result.max_opacity);
   report.add("max_sh", result.max_sh);
+  report.add("mean_position", result.mean_position);
+  report.add("mean_rotation", result.mean_rotation);
+  report.add("mean_scale_ratio", result.mean_scale_ratio);
+  report.add("mean_opacity", result.mean_opacity);
+  report.add("mean_sh", result.mean_sh);
   return report;
 }
 

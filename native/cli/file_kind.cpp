@@ -2,6 +2,7 @@
 #include <cctype>
 
 #include "cli/commands.h"
+#include "cli/formats.h"
 
 namespace stipple::cli {
 
@@ -10,16 +11,17 @@ FileKind fileKind(const std::string& path) {
   std::string ending = dot == std::string::npos || path[dot] == '/' ? "" : path.substr(dot);
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (ending == ".ply") return FileKind::kSplats;
+  // A glTF file holds meshes, splats or both: commands that take either say which they want.
   if (ending == ".glb" || ending == ".gltf") return FileKind::kMesh;
+  if (hasSplatEnding(path)) return FileKind::kSplats;
   if (ending == ".safetensors") return FileKind::kModel;
   if (ending == ".json") return FileKind::kViews;
   if (ending == ".vdb") return FileKind::kVolume;
   for (const char* image : {".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}) {
     if (ending == image) return FileKind::kImage;
   }
-  throw Failure("'" + path + "' ends with '" + ending +
-                "'; .ply, .glb, .gltf, .stipple.safetensors, .json, .vdb, .png, .exr, .jpg, .tif "
+  throw Failure("'" + path + "' ends with '" + ending + "'; " + splatEndings(false) +
+                ", .glb, .gltf, .stipple.safetensors, .json, .vdb, .png, .exr, .jpg, .tif "
                 "or .hdr is expected");
 }
 

@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/formats.h"
 #include "cli/report.h"
 
 namespace stipple::cli {
@@ -18,6 +19,9 @@ Report describeSplats(const Context& context, const std::string& path) {
   report.add("colour_space", info.colour_space == STIPPLE_COLOUR_DISPLAY ? "srgb_rec709_display"
                                                                          : "lin_rec709_display");
   report.add("antialias", info.antialias == STIPPLE_ANTIALIAS_MIP ? "mip" : "classic");
+  report.add("frame", info.frame == STIPPLE_FRAME_UNKNOWN
+                          ? "unknown (counts as RDF where a format demands a frame)"
+                          : frameName(info.frame));
   report.add("bounds_min", info.bounds_min);
   report.add("bounds_max", info.bounds_max);
   return report;

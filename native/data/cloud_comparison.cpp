@@ -8,12 +8,24 @@ namespace stipple {
 
 namespace {
 
-double largestDifference(const std::vector<float>& a, const std::vector<float>& b) {
-  double largest = 0;
-  for (size_t i = 0; i < a.size(); ++i) {
-    largest = std::max(largest, std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
+/// Largest and mean of value(i), i < count.
+template <typename Value>
+Difference over(size_t count, const Value& value) {
+  Difference difference;
+  double sum = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const double one = value(i);
+    difference.max = std::max(difference.max, one);
+    sum += one;
   }
-  return largest;
+  if (count > 0) difference.mean = sum / static_cast<double>(count);
+  return difference;
+}
+
+Difference between(const std::vector<float>& a, const std::vector<float>& b) {
+  return over(a.size(), [&](size_t i) {
+    return std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i]));
+  });
 }
 
 /// Angle of the rotation between two quaternions of any length, radians. Uses atan2 of both parts
@@ -34,18 +46,16 @@ CloudComparison compare(const SplatCloud& a, const SplatCloud& b) {
   CloudComparison result;
   result.same_order = a.size() == b.size() && a.sh_degree == b.sh_degree;
   if (!result.same_order) return result;
-  result.max_position = largestDifference(a.positions, b.positions);
-  result.max_opacity = largestDifference(a.opacities, b.opacities);
-  result.max_sh = largestDifference(a.sh, b.sh);
-  for (size_t i = 0; i < a.scales.size(); ++i) {
-    if (a.scales[i] == b.scales[i]) continue;
-    const double ratio = static_cast<double>(a.scales[i]) / static_cast<double>(b.scales[i]);
-    result.max_scale_ratio = std::max(result.max_scale_ratio, std::abs(std::log(ratio)));
-  }
-  for (size_t i = 0; i < a.size(); ++i) {
-    result.max_rotation =
-        std::max(result.max_rotation, rotationBetween(&a.rotations[i * 4], &b.rotations[i * 4]));
-  }
+  result.position = between(a.positions, b.positions);
+  result.opacity = between(a.opacities, b.opacities);
+  result.sh = between(a.sh, b.sh);
+  result.scale_ratio = over(a.scales.size(), [&](size_t i) {
+    if (a.scales[i] == b.scales[i]) return 0.0;
+    return std::abs(std::log(static_cast<double>(a.scales[i]) / static_cast<double>(b.scales[i])));
+  });
+  result.rotation = over(a.size(), [&](size_t i) {
+    return rotationBetween(&a.rotations[i * 4], &b.rotations[i * 4]);
+  });
   return result;
 }
 

@@ -6,14 +6,20 @@
 
 namespace stipple {
 
-/// Largest differences between two clouds, splat by splat.
+/// Largest and mean difference of one attribute.
+struct Difference {
+  double max = 0;
+  double mean = 0;
+};
+
+/// Differences between two clouds, splat by splat.
 struct CloudComparison {
-  bool same_order = false;     ///< same count and degree; else the differences stay 0
-  double max_position = 0;     ///< metres
-  double max_rotation = 0;     ///< radians; q and -q are equal
-  double max_scale_ratio = 0;  ///< |ln(scale_a / scale_b)|; +inf where one of them is 0
-  double max_opacity = 0;
-  double max_sh = 0;
+  bool same_order = false;  ///< same count and degree; else the differences stay 0
+  Difference position;      ///< metres, per coordinate
+  Difference rotation;      ///< radians; q and -q are equal
+  Difference scale_ratio;   ///< |ln(scale_a / scale_b)|; +inf where one of them is 0
+  Difference opacity;
+  Difference sh;
 };
 
 CloudComparison compare(const SplatCloud& a, const SplatCloud& b);

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "data/splat_frame.h"
+
 namespace stipple {
 
 /// In which space splat colours were made and must be composited.
@@ -34,6 +36,7 @@ struct SplatCloud {
   int sh_degree = 0;             ///< 0..kMaxShDegree; 3DGS basis and signs
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kClassic;
+  Frame frame = Frame::kUnknown;  ///< which way the axes of the positions point
 
   size_t size() const { return opacities.size(); }
   size_t shStride() const { return shCoefficientCount(sh_degree) * 3; }

@@ -9,7 +9,7 @@
 
 namespace stipple {
 
-constexpr uint32_t kMediaTableVersion = 1;
+constexpr uint32_t kMediaTableVersion = 2;
 
 extern "C" {
 
@@ -96,6 +96,16 @@ struct StippleMediaTable {
                        StippleMediaStatus* status);
   void (*volume_read)(const char* path, double* voxel_size, double* origin,
                       const StippleMediaSink* sink, StippleMediaStatus* status);
+  /// Compressed streams. In: what, which messages name; bytes [count]. Unpacking writes at most
+  /// `capacity` bytes to `out` and says how many; packing hands one array to the sink.
+  void (*gzip_unpack)(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,
+                      uint64_t capacity, uint64_t* produced, StippleMediaStatus* status);
+  void (*gzip_pack)(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
+                    const StippleMediaSink* sink, StippleMediaStatus* status);
+  void (*zstd_unpack)(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,
+                      uint64_t capacity, uint64_t* produced, StippleMediaStatus* status);
+  void (*zstd_pack)(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
+                    const StippleMediaSink* sink, StippleMediaStatus* status);
 };
 
 /// The one function that libstipple_media exports: null for another version.

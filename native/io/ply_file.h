@@ -4,6 +4,7 @@
 
 #include "base/progress.h"
 #include "data/splat_cloud.h"
+#include "io/splat_format.h"
 
 namespace stipple {
 
@@ -13,11 +14,12 @@ SplatCloud readPlySplats(const std::string& path, Progress* progress);
 
 /// Writes x y z nx ny nz f_dc f_rest opacity scale rot, float32 (the order that the first 3DGS
 /// viewers take for granted), little-endian or as text.
-void writePlySplats(const SplatCloud& cloud, const std::string& path, bool ascii,
-                    Progress* progress);
+void writePlySplats(const SplatCloud& cloud, const std::string& path,
+                    const SplatWriteOptions& options, Progress* progress);
 
 /// Comment keys that carry what the numbers alone do not say.
 constexpr char kPlyColourSpaceKey[] = "stipple_colour_space";
+constexpr char kPlyFrameKey[] = "stipple_frame";
 constexpr char kPlyRenderModeKey[] = "SplatRenderMode:";
 constexpr char kColourSpaceDisplay[] = "srgb_rec709_display";
 constexpr char kColourSpaceLinear[] = "lin_rec709_display";

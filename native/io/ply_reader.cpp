@@ -105,6 +105,14 @@ class Reader {
         }
         cloud_.colour_space =
             value == kColourSpaceLinear ? ColourSpace::kLinear : ColourSpace::kDisplay;
+      } else if (key == kPlyFrameKey) {
+        const std::optional<Frame> frame = frameFromName(value);
+        if (!frame || *frame == Frame::kUnknown) {
+          failHere(ErrorCode::kUnsupported,
+                   "has the frame '" + value.substr(0, 60) +
+                       "'; three letters such as RDF, RUB or RFU are known");
+        }
+        cloud_.frame = *frame;
       }
     }
     // Mip-Splatting's trainer writes filter_3D and no comment.

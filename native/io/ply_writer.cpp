@@ -33,6 +33,9 @@ std::string header(const SplatCloud& cloud, bool ascii) {
       kPlyRenderModeKey + (cloud.antialias == Antialias::kMip ? " mip" : " default") +
       "\ncomment " + kPlyColourSpaceKey + " " +
       (cloud.colour_space == ColourSpace::kLinear ? kColourSpaceLinear : kColourSpaceDisplay) +
+      (cloud.frame == Frame::kUnknown
+           ? std::string()
+           : std::string("\ncomment ") + kPlyFrameKey + " " + frameName(cloud.frame)) +
       "\nelement vertex " + std::to_string(cloud.size()) + "\n";
   const auto property = [&text](const std::string& name) {
     text += "property float " + name + "\n";
@@ -97,9 +100,9 @@ void storeLittleEndian(const float* row, size_t length, char* bytes) {
 
 }  // namespace
 
-void writePlySplats(const SplatCloud& cloud, const std::string& path, bool ascii,
-                    Progress* progress) {
-  validate(cloud, "cloud");
+void writePlySplats(const SplatCloud& cloud, const std::string& path,
+                    const SplatWriteOptions& options, Progress* progress) {
+  const bool ascii = options.ascii;
   OutputFile file(path);
   const std::string head = header(cloud, ascii);
   file.write(head.data(), head.size());

@@ -1,8 +1,15 @@
 #include "io/splat_file.h"
 
 #include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <utility>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "io/input_file.h"
 #include "io/ply_file.h"
 
@@ -10,35 +17,151 @@ namespace stipple {
 
 namespace {
 
-constexpr char kPlyEnding[] = ".ply";
+constexpr size_t kGrain = 4096;
 
-std::string firstBytes(const std::string& path) {
+bool startsAsPly(const SplatFileStart& start) {
+  return start.bytes.rfind("ply", 0) == 0;
+}
+
+std::string lowerName(const std::string& path) {
+  std::string name = std::filesystem::path(path).filename().string();
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return name;
+}
+
+std::vector<std::string> endingsOf(const SplatFormat& format) {
+  std::istringstream words(format.endings);
+  std::vector<std::string> endings;
+  for (std::string word; words >> word;) endings.push_back(word);
+  return endings;
+}
+
+/// Length of the format's ending that the file name has; 0 for none.
+size_t endingLength(const SplatFormat& format, const std::string& name) {
+  size_t longest = 0;
+  for (const std::string& ending : endingsOf(format)) {
+    if (name.size() >= ending.size() &&
+        name.compare(name.size() - ending.size(), ending.size(), ending) == 0) {
+      longest = std::max(longest, ending.size());
+    }
+  }
+  return longest;
+}
+
+SplatFileStart startOf(const std::string& path) {
+  SplatFileStart start;
+  start.path = path;
+  start.name = lowerName(path);
+  std::error_code ignored;
+  start.is_folder = std::filesystem::is_directory(path, ignored);
+  if (start.is_folder) return start;
   const InputFile file(path);
-  std::string bytes(static_cast<size_t>(std::min<uint64_t>(file.size(), 4)), '\0');
-  file.readAt(0, bytes.data(), bytes.size());
-  return bytes;
+  start.bytes.resize(static_cast<size_t>(std::min<uint64_t>(file.size(), kSplatSniffBytes)));
+  file.readAt(0, start.bytes.data(), start.bytes.size());
+  return start;
+}
+
+/// "3DGS PLY (.ply), SPZ (.spz) and ..." of the formats that can be read (or written).
+std::string listOfFormats(bool written) {
+  std::vector<std::string> parts;
+  for (const SplatFormat& format : splatFormats()) {
+    if (written ? format.write == nullptr : format.read == nullptr) continue;
+    parts.push_back(std::string(format.title) + " (" + format.endings + ")");
+  }
+  std::string text;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (i > 0) text += i + 1 == parts.size() ? " and " : ", ";
+    text += parts[i];
+  }
+  return text;
+}
+
+/// Harmonics of a lower degree; the rest of the cloud as it is.
+void limitDegree(SplatCloud& cloud, int degree) {
+  if (cloud.sh_degree <= degree) return;
+  const size_t before = cloud.shStride();
+  cloud.sh_degree = degree;
+  const size_t after = cloud.shStride();
+  std::vector<float> kept(cloud.size() * after);
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      std::memcpy(&kept[i * after], &cloud.sh[i * before], after * sizeof(float));
+    }
+  });
+  cloud.sh = std::move(kept);
+}
+
+/// The cloud as a format takes it, where that differs from the cloud as it is.
+std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& format,
+                                   const SplatWriteOptions& options) {
+  const int degree = std::min(options.sh_degree_limit, format.max_sh_degree);
+  const Frame wanted = options.frame == Frame::kUnknown ? format.frame : options.frame;
+  // Without a frame, a cloud stays so where the format's own is what it counts as.
+  const bool turns = cloud.frame == Frame::kUnknown
+                         ? wanted != kConventionalFrame || options.frame != Frame::kUnknown
+                         : cloud.frame != wanted;
+  if (cloud.sh_degree <= degree && !turns) return std::nullopt;
+  SplatCloud copy = cloud;
+  limitDegree(copy, degree);
+  if (turns) convertFrame(copy, wanted);
+  return copy;
 }
 
 }  // namespace
 
+const std::vector<SplatFormat>& splatFormats() {
+  static const std::vector<SplatFormat> kFormats = {
+      {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, startsAsPly, readPlySplats, writePlySplats},
+  };
+  return kFormats;
+}
+
+const SplatFormat* splatFormatOfEnding(const std::string& path) {
+  const std::string name = lowerName(path);
+  const SplatFormat* best = nullptr;
+  size_t longest = 0;
+  for (const SplatFormat& format : splatFormats()) {
+    const size_t length = endingLength(format, name);
+    if (length > longest) best = &format;
+    longest = std::max(longest, length);
+  }
+  return best;
+}
+
 SplatCloud readSplatFile(const std::string& path, Progress* progress) {
-  const std::string start = firstBytes(path);
-  const std::string ending = lowerEnding(path);
-  // A file that is named PLY and is not one gets the PLY reader's words.
-  if (start.rfind("ply", 0) == 0 || ending == kPlyEnding) return readPlySplats(path, progress);
+  const SplatFileStart start = startOf(path);
+  for (const SplatFormat& format : splatFormats()) {
+    if (format.read != nullptr && format.sniff != nullptr && format.sniff(start)) {
+      return format.read(path, progress);
+    }
+  }
+  // A folder that no format knows gets the words of every reader.
+  if (start.is_folder) const InputFile file(path);
+  // A file that is named after a format and is not of it gets that reader's words.
+  const SplatFormat* named = splatFormatOfEnding(path);
+  if (named != nullptr && named->read != nullptr) return named->read(path, progress);
   fail(ErrorCode::kFormat, path + " is not a splat file that can be read: its ending is '" +
-                               ending +
-                               "' and it does not start with 'ply'; 3DGS PLY is supported");
+                               lowerEnding(path) +
+                               "' and its first bytes are those of no format; " +
+                               listOfFormats(false) + " can be read");
 }
 
 void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress) {
-  const std::string ending = lowerEnding(path);
-  if (ending != kPlyEnding) {
-    fail(ErrorCode::kUnsupported,
-         path + " cannot be written as splats: its ending is '" + ending + "'; .ply is supported");
+  const SplatFormat* format = splatFormatOfEnding(path);
+  if (format == nullptr || format->write == nullptr) {
+    fail(ErrorCode::kUnsupported, path + " cannot be written as splats: its ending is '" +
+                                      lowerEnding(path) + "'; " + listOfFormats(true) +
+                                      " can be written");
   }
-  writePlySplats(cloud, path, options.ascii, progress);
+  if (options.sh_degree_limit < 0 || options.sh_degree_limit > kMaxShDegree) {
+    fail(ErrorCode::kInvalidArgument, "the limit of the harmonic degree is " +
+                                          std::to_string(options.sh_degree_limit) +
+                                          "; 0 to 4 is allowed");
+  }
+  validate(cloud, "cloud");
+  const std::optional<SplatCloud> changed = prepared(cloud, *format, options);
+  format->write(changed ? *changed : cloud, path, options, progress);
 }
 
 }  // namespace stipple

@@ -4,6 +4,7 @@
 
 #include "base/progress.h"
 #include "data/splat_cloud.h"
+#include "io/splat_format.h"
 
 namespace stipple {
 
@@ -11,11 +12,9 @@ namespace stipple {
 /// Errors: kIo (cannot be opened), kFormat (what is wrong and where), kUnsupported.
 SplatCloud readSplatFile(const std::string& path, Progress* progress = nullptr);
 
-struct SplatWriteOptions {
-  bool ascii = false;  ///< PLY: text instead of little-endian binary
-};
-
-/// Writes by the ending of the path (.ply); under a temporary name, then renamed.
+/// Writes by the ending of the path; under a temporary name, then renamed. Harmonics that the
+/// format or the options leave no room for are cut off, positions turned to the frame of the format
+/// or the options.
 void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress = nullptr);
 

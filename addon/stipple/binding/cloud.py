@@ -8,8 +8,10 @@ import numpy as np
 
 from .errors import invalid
 from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
-from .structs import (Antialias, ColourSpace, StippleCloudArrays, StippleCloudBuffers, StippleCloudComparison,
-                      StippleCloudInfo, StippleCloudSaveOptions)
+from .structs import (Antialias, ColourSpace, Frame, StippleCloudArrays, StippleCloudBuffers,
+                      StippleCloudComparison, StippleCloudInfo, StippleCloudSaveOptions)
+
+SAVE_OPTIONS = ('ascii', 'sh_degree_limit', 'format_version', 'frame')
 
 
 @dataclass
@@ -23,6 +25,7 @@ class SplatArrays:
     sh: np.ndarray         # [N,(degree+1)^2,3]
     colour_space: int = ColourSpace.DISPLAY
     antialias: int = Antialias.CLASSIC
+    frame: int = Frame.UNKNOWN  # which way the axes of the positions point
 
     @property
     def count(self):
@@ -55,7 +58,7 @@ class Cloud(Handle):
             if array.shape != shape:
                 raise invalid(f'Splat array {name} has shape {array.shape}; allowed is {shape}.')
         given = StippleCloudArrays(sh_degree=arrays.sh_degree, colour_space=int(arrays.colour_space),
-                                   antialias=int(arrays.antialias), count=count,
+                                   antialias=int(arrays.antialias), frame=int(arrays.frame), count=count,
                                    **{name: pointer_to(array) for name, (array, _) in fields.items()})
         return cls(context.library, new_handle(context.library, 'stipple_cloud_create', context.pointer, byref(given)))
 
@@ -75,17 +78,21 @@ class Cloud(Handle):
         n, coefficients = info.count, (info.sh_degree + 1) ** 2
         arrays = SplatArrays(np.empty((n, 3), np.float32), np.empty((n, 4), np.float32), np.empty((n, 3), np.float32),
                              np.empty(n, np.float32), np.empty((n, coefficients, 3), np.float32),
-                             ColourSpace(info.colour_space), Antialias(info.antialias))
+                             ColourSpace(info.colour_space), Antialias(info.antialias), Frame(info.frame))
         buffers = StippleCloudBuffers(capacity=n, positions=pointer_to(arrays.positions),
                                       rotations=pointer_to(arrays.rotations), scales=pointer_to(arrays.scales),
                                       opacities=pointer_to(arrays.opacities), sh=pointer_to(arrays.sh))
         self._check(self.library.stipple_cloud_read(self.pointer, byref(buffers)))
         return arrays
 
-    def save(self, path, ascii=False):
+    def save(self, path, **options_given):
+        """Writes by the ending; options_given: fields of StippleCloudSaveOptions, such as ascii=1."""
         options = StippleCloudSaveOptions()
         self.library.stipple_cloud_save_options_init(byref(options))
-        options.ascii = 1 if ascii else 0
+        for name, value in options_given.items():
+            if name not in SAVE_OPTIONS:
+                raise invalid(f'Save option {name} is unknown; {", ".join(SAVE_OPTIONS)} are allowed.')
+            setattr(options, name, int(value))
         self._check(self.library.stipple_cloud_save(self.pointer, path_bytes(path), byref(options)))
 
     def transformed(self, matrix):

@@ -45,6 +45,8 @@ FUNCTIONS = {
     'stipple_cloud_load': (_status, [_handle, _path, _out_handle]),
     'stipple_cloud_save_options_init': (None, [_to(s.StippleCloudSaveOptions)]),
     'stipple_cloud_save': (_status, [_handle, _path, _to(s.StippleCloudSaveOptions)]),
+    'stipple_format_count': (_status, [POINTER(c_uint64)]),
+    'stipple_format_info': (_status, [c_uint64, _to(s.StippleFormatInfo)]),
     'stipple_cloud_transform': (_status, [_handle, _matrix, _out_handle]),
     'stipple_cloud_compare': (_status, [_handle, _handle, _to(s.StippleCloudComparison)]),
     # meshes

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Enumerations and structs of stipple.h, field by field; tests/addon compares them with the header."""
 
-from ctypes import POINTER, Structure, c_char, c_double, c_float, c_uint32, c_uint64, c_void_p, sizeof
+from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_uint32, c_uint64, c_void_p, sizeof
 from enum import IntEnum
 
 ABI_VERSION = 1
@@ -41,6 +41,26 @@ class ColourSpace(IntEnum):
 class Antialias(IntEnum):
     CLASSIC = 0
     MIP = 1
+
+
+class Frame(IntEnum):
+    UNKNOWN = 0
+    LDB = 1
+    RDB = 2
+    LUB = 3
+    RUB = 4
+    LDF = 5
+    RDF = 6
+    LUF = 7
+    RUF = 8
+    LFD = 9
+    RFD = 10
+    LFU = 11
+    RFU = 12
+    LBD = 13
+    RBD = 14
+    LBU = 15
+    RBU = 16
 
 
 class MaterialColour(IntEnum):
@@ -97,6 +117,7 @@ ENUMS = {
     'StippleJobState': (JobState, 'STIPPLE_JOB_'),
     'StippleColourSpace': (ColourSpace, 'STIPPLE_COLOUR_'),
     'StippleAntialias': (Antialias, 'STIPPLE_ANTIALIAS_'),
+    'StippleFrame': (Frame, 'STIPPLE_FRAME_'),
     'StippleMaterialColour': (MaterialColour, 'STIPPLE_MATERIAL_'),
     'StippleAnchorOrder': (AnchorOrder, 'STIPPLE_ORDER_'),
     'StippleCameraModel': (CameraModel, 'STIPPLE_CAMERA_'),
@@ -128,12 +149,13 @@ class StippleJobProgress(_Sized):
 class StippleCloudArrays(_Sized):
     _fields_ = [('struct_size', c_uint32), ('sh_degree', c_uint32), ('colour_space', c_uint32),
                 ('antialias', c_uint32), ('count', c_uint64), ('positions', _floats), ('rotations', _floats),
-                ('scales', _floats), ('opacities', _floats), ('sh', _floats)]
+                ('scales', _floats), ('opacities', _floats), ('sh', _floats), ('frame', c_uint32), ('reserved', c_uint32)]
 
 
 class StippleCloudInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('sh_degree', c_uint32), ('colour_space', c_uint32),
-                ('antialias', c_uint32), ('count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3)]
+                ('antialias', c_uint32), ('count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3),
+                ('frame', c_uint32), ('reserved', c_uint32)]
 
 
 class StippleCloudBuffers(_Sized):
@@ -142,13 +164,22 @@ class StippleCloudBuffers(_Sized):
 
 
 class StippleCloudSaveOptions(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('ascii', c_uint32)]
+    _fields_ = [('struct_size', c_uint32), ('ascii', c_uint32), ('sh_degree_limit', c_uint32),
+                ('format_version', c_uint32), ('frame', c_uint32), ('reserved', c_uint32)]
+
+
+class StippleFormatInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('can_read', c_uint32), ('can_write', c_uint32),
+                ('max_sh_degree', c_uint32), ('frame', c_uint32), ('reserved', c_uint32),
+                ('name', c_char_p), ('title', c_char_p), ('endings', c_char_p)]
 
 
 class StippleCloudComparison(_Sized):
     _fields_ = [('struct_size', c_uint32), ('same_order', c_uint32), ('count_a', c_uint64), ('count_b', c_uint64),
                 ('max_position', c_double), ('max_rotation', c_double), ('max_scale_ratio', c_double),
-                ('max_opacity', c_double), ('max_sh', c_double)]
+                ('max_opacity', c_double), ('max_sh', c_double), ('mean_position', c_double),
+                ('mean_rotation', c_double), ('mean_scale_ratio', c_double), ('mean_opacity', c_double),
+                ('mean_sh', c_double)]
 
 
 class StippleMaterial(_Sized):

@@ -37,7 +37,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         cloud = sources.cloud_from_object(evaluated)
         if self.apply_transform:
             cloud = cloud.transformed(evaluated.matrix_world)
-        cloud.save(path, self.ascii)
+        cloud.save(path, ascii=self.ascii)
         self._count = cloud.info().count
         return None
 

@@ -127,6 +127,28 @@ typedef enum StippleAntialias {
   STIPPLE_ANTIALIAS_MIP = 1
 } StippleAntialias;
 
+/* Which way x, y and z of a cloud's positions point: Left or Right, Up or Down, Front or Back. Files keep
+ * their frame; writers turn positions, rotations and harmonics where a format demands another. */
+typedef enum StippleFrame {
+  STIPPLE_FRAME_UNKNOWN = 0, /* counts as RDF where a format demands a frame */
+  STIPPLE_FRAME_LDB = 1,
+  STIPPLE_FRAME_RDB = 2,
+  STIPPLE_FRAME_LUB = 3,
+  STIPPLE_FRAME_RUB = 4,     /* SPZ, glTF */
+  STIPPLE_FRAME_LDF = 5,
+  STIPPLE_FRAME_RDF = 6,     /* COLMAP, trained 3DGS files */
+  STIPPLE_FRAME_LUF = 7,
+  STIPPLE_FRAME_RUF = 8,
+  STIPPLE_FRAME_LFD = 9,
+  STIPPLE_FRAME_RFD = 10,
+  STIPPLE_FRAME_LFU = 11,
+  STIPPLE_FRAME_RFU = 12,    /* Blender: Z up */
+  STIPPLE_FRAME_LBD = 13,
+  STIPPLE_FRAME_RBD = 14,
+  STIPPLE_FRAME_LBU = 15,
+  STIPPLE_FRAME_RBU = 16
+} StippleFrame;
+
 typedef struct StippleCloudArrays {
   uint32_t struct_size;
   uint32_t sh_degree;      /* 0..4 */
@@ -138,6 +160,8 @@ typedef struct StippleCloudArrays {
   const float* scales;     /* [N,3] linear standard deviations, metres, >= 0 */
   const float* opacities;  /* [N] 0..1 */
   const float* sh;         /* [N,(degree+1)^2,3] coefficient-major, colour fastest, DC first */
+  uint32_t frame;          /* StippleFrame */
+  uint32_t reserved;
 } StippleCloudArrays;
 
 typedef struct StippleCloudInfo {
@@ -148,6 +172,8 @@ typedef struct StippleCloudInfo {
   uint64_t count;
   float bounds_min[3];  /* of the positions; 0 where count is 0 */
   float bounds_max[3];
+  uint32_t frame;       /* StippleFrame */
+  uint32_t reserved;
 } StippleCloudInfo;
 
 /* Any pointer may be NULL (not wanted). capacity: splats that every given buffer has room for. */
@@ -170,17 +196,39 @@ void stipple_cloud_free(StippleCloud* cloud);
 StippleStatus stipple_cloud_info(const StippleCloud* cloud, StippleCloudInfo* info);
 /* Errors: BUFFER_TOO_SMALL when capacity < count. */
 StippleStatus stipple_cloud_read(const StippleCloud* cloud, const StippleCloudBuffers* buffers);
-/* Reads a splat file (3DGS PLY). The format is told by its content. */
+/* Reads a splat file of any format that stipple_format_info lists. The format is told by its content. */
 StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8, StippleCloud** cloud);
 
 typedef struct StippleCloudSaveOptions {
   uint32_t struct_size;
-  uint32_t ascii;  /* 1: PLY as text */
+  uint32_t ascii;           /* 1: PLY as text */
+  uint32_t sh_degree_limit; /* 0..4, default 4: harmonics above it are left out */
+  uint32_t format_version;  /* SPZ: 3 or 4; 0, the default: the newest */
+  uint32_t frame;           /* StippleFrame that positions are written in; 0: the format's own */
+  uint32_t reserved;
 } StippleCloudSaveOptions;
 void stipple_cloud_save_options_init(StippleCloudSaveOptions* options);
-/* Writes by the ending of the path (.ply), under a temporary name that is then renamed. */
+/* Writes by the ending of the path (stipple_format_info), under a temporary name that is then renamed.
+ * A format's limits apply: docs/formats.md has what each loses. */
 StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf8,
                                  const StippleCloudSaveOptions* options);
+
+/* One format of splat files. The texts live as long as the library. */
+typedef struct StippleFormatInfo {
+  uint32_t struct_size;
+  uint32_t can_read;       /* 1 or 0 */
+  uint32_t can_write;
+  uint32_t max_sh_degree;  /* that it holds */
+  uint32_t frame;          /* StippleFrame that positions are written in */
+  uint32_t reserved;
+  const char* name;        /* one word: "ply" */
+  const char* title;       /* for people: "3DGS PLY" */
+  const char* endings;     /* of file names, lower case, separated by blanks; the usual one first */
+} StippleFormatInfo;
+StippleStatus stipple_format_count(uint64_t* count);
+/* index 0..count-1. */
+StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info);
+
 /* The cloud moved by an affine matrix: covariances become M C M^T, harmonics turn (and mirror) with the
  * orthogonal part of M's polar decomposition. Pictures equal those of an instance with that matrix, except
  * that colours above degree 0 do not follow uneven scale and shear. Errors: INVALID_ARGUMENT for a matrix
@@ -198,6 +246,11 @@ typedef struct StippleCloudComparison {
   double max_scale_ratio;  /* largest |ln(scale_a / scale_b)| */
   double max_opacity;
   double max_sh;
+  double mean_position;    /* means over all values, in the same units */
+  double mean_rotation;
+  double mean_scale_ratio;
+  double mean_opacity;
+  double mean_sh;
 } StippleCloudComparison;
 StippleStatus stipple_cloud_compare(const StippleCloud* a, const StippleCloud* b,
                                     StippleCloudComparison* result);

@@ -76,10 +76,11 @@ void stipple_media_mesh_read(const char* path, const StippleMediaSink* sink,
 }
 
 extern "C" const StippleMediaTable* stipple_media_table(uint32_t version) {
-  static const StippleMediaTable kTable = {kMediaTableVersion,       stipple_media_image_read,
-                                           stipple_media_png_write,  stipple_media_exr_write,
-                                           stipple_media_mesh_read,  stipple_media_volume_write,
-                                           stipple_media_volume_read};
+  static const StippleMediaTable kTable = {
+      kMediaTableVersion,        stipple_media_image_read,  stipple_media_png_write,
+      stipple_media_exr_write,   stipple_media_mesh_read,   stipple_media_volume_write,
+      stipple_media_volume_read, stipple_media_gzip_unpack, stipple_media_gzip_pack,
+      stipple_media_zstd_unpack, stipple_media_zstd_pack};
   return version == kMediaTableVersion ? &kTable : nullptr;
 }
 

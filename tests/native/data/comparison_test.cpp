@@ -71,10 +71,10 @@ TEST(CloudComparison, MeasuresEachAttributeInItsUnit) {
   b.rotations = {-std::cos(0.05f), -std::sin(0.05f), 0, 0};  // 0.1 rad, opposite sign
   const CloudComparison result = compare(a, b);
   EXPECT_TRUE(result.same_order);
-  EXPECT_DOUBLE_EQ(result.max_position, 0.5);
-  EXPECT_NEAR(result.max_scale_ratio, 0.25, 1e-6);
-  EXPECT_DOUBLE_EQ(result.max_opacity, 0.25);
-  EXPECT_NEAR(result.max_rotation, 0.1, 1e-6);
+  EXPECT_DOUBLE_EQ(result.position.max, 0.5);
+  EXPECT_NEAR(result.scale_ratio.max, 0.25, 1e-6);
+  EXPECT_DOUBLE_EQ(result.opacity.max, 0.25);
+  EXPECT_NEAR(result.rotation.max, 0.1, 1e-6);
 }
 
 TEST(CloudComparison, DoesNotCompareCloudsOfDifferentCount) {

@@ -251,6 +251,10 @@ TEST_F(Ply, ReadsTheModeAndColourSpaceFromComments) {
   EXPECT_EQ(read("comment antialiased 0\n").antialias, Antialias::kClassic);
   EXPECT_EQ(read("comment stipple_colour_space lin_rec709_display\n").colour_space,
             ColourSpace::kLinear);
+  EXPECT_EQ(read("").frame, Frame::kUnknown);
+  EXPECT_EQ(read("comment stipple_frame RFU\n").frame, Frame::kRFU);
+  expectError(ErrorCode::kUnsupported, {"frame", "'up'", "RDF"},
+              [&] { read("comment stipple_frame up\n"); });
   expectError(ErrorCode::kUnsupported, {"acescg", "lin_rec709_display"},
               [&] { read("comment stipple_colour_space acescg\n"); });
 }
@@ -488,6 +492,35 @@ TEST_F(Ply, SurvivesAnyDamage) {
     }
   }
   EXPECT_GT(refused, 500u);
+}
+
+TEST_F(Ply, KeepsAnUnknownFrameAndTurnsAKnownOneToItsOwn) {
+  SplatCloud cloud = randomCloud(50, 2, 3);
+  EXPECT_EQ(roundTrip(cloud).frame, Frame::kUnknown);
+  EXPECT_EQ(roundTrip(cloud).positions, cloud.positions);
+  cloud.frame = Frame::kRUB;
+  const SplatCloud turned = roundTrip(cloud);
+  EXPECT_EQ(turned.frame, Frame::kRDF);
+  EXPECT_EQ(turned.positions[0], cloud.positions[0]);
+  EXPECT_EQ(turned.positions[1], -cloud.positions[1]);
+  EXPECT_EQ(turned.positions[2], -cloud.positions[2]);
+  writeSplatFile(cloud, path("kept.ply"), {.frame = Frame::kRUB});
+  const SplatCloud kept = readSplatFile(path("kept.ply"));
+  EXPECT_EQ(kept.frame, Frame::kRUB);
+  EXPECT_EQ(kept.positions, cloud.positions);
+}
+
+TEST_F(Ply, LeavesOutHarmonicsAboveTheLimit) {
+  const SplatCloud cloud = randomCloud(20, 3, 4);
+  writeSplatFile(cloud, path("low.ply"), {.sh_degree_limit = 1});
+  const SplatCloud low = readSplatFile(path("low.ply"));
+  ASSERT_EQ(low.sh_degree, 1);
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    for (size_t k = 0; k < 12; ++k) EXPECT_EQ(low.sh[i * 12 + k], cloud.sh[i * 48 + k]);
+  }
+  expectError(ErrorCode::kInvalidArgument, {"5", "0 to 4"}, [&] {
+    writeSplatFile(cloud, path("low.ply"), {.sh_degree_limit = 5});
+  });
 }
 
 }  // namespace

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/library.h"
+
+namespace stipple::cli {
+
+/// The splat formats that the library knows.
+std::vector<StippleFormatInfo> splatFormats();
+
+/// The format whose ending the path has (the longest that fits), or nothing.
+bool hasSplatEnding(const std::string& path);
+
+/// ".ply, .spz or .splat": the endings of all formats, or of those that can be written.
+std::string splatEndings(bool written);
+
+/// "RDF" and so on, "unknown" for 0; and back: Failure for another name.
+std::string frameName(uint32_t frame);
+uint32_t frameOfName(const std::string& name);
+
+}  // namespace stipple::cli
