@@ -4,43 +4,28 @@
 #include <cmath>
 #include <iterator>
 
+#include "splat/cpu/tile_splats.h"
+
 namespace stipple {
 
 namespace {
 
-constexpr size_t kPrefetchDistance = 24;
+#include "splat/cpu/tile_splat_steps-inl.h"
 
-[[gnu::always_inline]] inline void fillTileSplat(const VisibleSplat& splat, const Tile& tile,
-                                                 TileSplat& out) {
-  constexpr double kScale = 0.84932180028801904;  // sqrt(log2(e)/2)
-  constexpr double kSide = kTileSide;
-  const Footprint<double>& f = splat.footprint;
-  const double dx = tile.x0 + 0.5 - f.mean_x;
-  const double dy = tile.y0 + 0.5 - f.mean_y;
-  const double g0 = kScale * (f.l00 * dx);
-  const double g1 = kScale * (f.l10 * dx + f.l11 * dy);
-  const double l00 = kScale * f.l00;
-  const double l10 = kScale * f.l10;
-  const double l11 = kScale * f.l11;
-  out.g0 = static_cast<float>(g0);
-  out.g1 = static_cast<float>(g1);
-  out.l00 = static_cast<float>(l00);
-  out.l10 = static_cast<float>(l10);
-  out.l11 = static_cast<float>(l11);
-  out.log2_opacity = splat.log2_opacity;
-  // |g| <= 2.83 where alpha >= 1/255, and g is off by at most 4 roundings of its largest term.
-  const double largest =
-      std::abs(g0) + std::abs(g1) + (kSide - 1) * (std::abs(l00) + std::abs(l10) + std::abs(l11));
-  out.doubt_low = static_cast<float>(2e-6 * largest + 4e-6);
-  out.doubt_high = largest > static_cast<double>(kMaxFloatReach) ? kFinished : out.doubt_low;
-  out.finish_doubt = static_cast<float>(std::min(largest, static_cast<double>(kMaxFloatReach)));
-  std::copy(splat.colour, splat.colour + 3, out.colour);
-  out.depth = splat.depth;
-  // Whole parts by conversion, which is one instruction everywhere, unlike std::floor.
-  const double first = std::clamp(-dy - splat.half_y, 0.0, kSide);
-  out.row_begin = static_cast<uint32_t>(first);
-  out.row_begin += static_cast<double>(out.row_begin) < first ? 1 : 0;
-  out.row_end = static_cast<uint32_t>(std::clamp(-dy + splat.half_y + 1.0, 0.0, kSide));
+/// Everything but finish_doubt and what gatherTileSplats copies. Returns the size of g and l.
+float fillTileSplat(const double (&fields)[kTileSplatFields], const Tile& tile, TileSplat& out) {
+  TileSplatSteps<double> made;
+  tileSplatSteps(fields, tile.x0 + 0.5, tile.y0 + 0.5, made);
+  out.g0 = static_cast<float>(made.g0);
+  out.g1 = static_cast<float>(made.g1);
+  out.l00 = static_cast<float>(made.l00);
+  out.l10 = static_cast<float>(made.l10);
+  out.l11 = static_cast<float>(made.l11);
+  out.doubt_low = static_cast<float>(made.doubt_low);
+  out.doubt_high = made.largest > static_cast<double>(kMaxFloatReach) ? kFinished : out.doubt_low;
+  out.row_begin = kTileSide - static_cast<uint32_t>(made.below);
+  out.row_end = static_cast<uint32_t>(made.above);
+  return static_cast<float>(made.largest);
 }
 
 }  // namespace
@@ -57,19 +42,38 @@ Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats
 
 TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   TileSplat out;
-  fillTileSplat(splat, tile, out);
+  const Footprint<double>& f = splat.footprint;
+  const float largest =
+      fillTileSplat({f.mean_x, f.mean_y, f.l00, f.l10, f.l11, splat.half_y}, tile, out);
+  out.finish_doubt = std::min(largest, kMaxFloatReach);
+  out.log2_opacity = splat.log2_opacity;
+  out.depth = splat.depth;
+  std::copy(splat.colour, splat.colour + 3, out.colour);
   return out;
+}
+
+float makeTileSplatsScalar(const VisibleSplat* visible, const Tile& tile, size_t begin,
+                           size_t count, TileSplat* out) {
+  TileSplatColumns columns;
+  gatherTileSplats(visible, tile, begin, count, columns, out);
+  float largest = 0;
+  for (size_t i = 0; i < count; ++i) {
+    double fields[kTileSplatFields];
+    for (size_t k = 0; k < kTileSplatFields; ++k) fields[k] = columns[k][i];
+    largest = std::max(largest, fillTileSplat(fields, tile, out[i]));
+  }
+  return largest;
 }
 
 void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin, size_t count,
                     float& largest, TileSplat* out) {
-  for (size_t i = 0; i < count; ++i) {
-    // A tile's splats lie far apart, so each would wait for memory.
-    const size_t ahead = std::min(begin + i + kPrefetchDistance, tile.splats.size() - 1);
-    prefetchSplat(&visible[tile.splats[ahead]]);
-    fillTileSplat(visible[tile.splats[begin + i]], tile, out[i]);
-    largest = std::max(largest, out[i].finish_doubt);
-    out[i].finish_doubt = finishDoubt(largest, begin + i + 1);
+  const TileSplatMaker maker = chosenTileSplatMaker();
+  for (size_t first = 0; first < count; first += kTileSplatBatch) {
+    const size_t here = std::min(kTileSplatBatch, count - first);
+    const float seen = maker(visible, tile, begin + first, here, out + first);
+    largest = std::max(largest, std::min(seen, kMaxFloatReach));
+    const float doubt = finishDoubt(largest, begin + first + here);
+    for (size_t i = 0; i < here; ++i) out[first + i].finish_doubt = doubt;
   }
 }
 

@@ -22,7 +22,7 @@ Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats
 TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile);
 
 /// Splats begin .. begin + count of the tile's list as its kernel wants them. In and out: largest,
-/// 0 for the first call of a tile; carried from batch to batch for finishDoubt.
+/// 0 for the first call of a tile; carried from call to call for finishDoubt.
 void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin, size_t count,
                     float& largest, TileSplat* out);
 

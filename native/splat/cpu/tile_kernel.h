@@ -12,19 +12,19 @@ namespace stipple {
 /// A splat as one tile sees it, float32. With g(x, y) = (g0 + l00 x, g1 + l10 x + l11 y), x and y
 /// the pixel's column and row in the tile, alpha before the clamp is 2^(log2_opacity - |g|^2):
 /// the factor sqrt(log2(e)/2) is in g and l.
-struct TileSplat {
+struct alignas(16) TileSplat {
   float g0, g1;
   float l00, l10, l11;
-  float log2_opacity;
   /// A pixel is in doubt where the exponent lies within doubt_low below or doubt_high above the
   /// threshold log2(1/255): there rounding could decide. doubt_high is huge for splats so thin that
   /// float32 cannot give their alpha at all.
   float doubt_low, doubt_high;
   /// Relative distance to 1e-4 within which the end of a pixel is in doubt: finishDoubt of the
-  /// splats up to this one.
+  /// splats up to this one, or more.
   float finish_doubt;
-  float colour[3];
+  float log2_opacity;
   float depth;
+  float colour[3];
   uint32_t row_begin, row_end;  ///< rows of the tile that the splat can touch
 };
 

@@ -38,6 +38,9 @@ PixelBlend<double> blendInDouble(const VisibleSplat* visible, const Tile& tile, 
 }
 
 void replaceDoubtful(const VisibleSplat* visible, const Tile& tile, TilePixels& pixels) {
+  uint32_t any = 0;
+  for (const float doubt : pixels.doubt) any |= std::bit_cast<uint32_t>(doubt);
+  if (any == 0) return;
   for (uint32_t y = 0; y < tile.height; ++y) {
     for (uint32_t x = 0; x < tile.width; ++x) {
       const size_t i = static_cast<size_t>(y) * kTileSide + x;
@@ -55,40 +58,64 @@ void replaceDoubtful(const VisibleSplat* visible, const Tile& tile, TilePixels& 
   }
 }
 
+/// Chooses by bits: with comparisons of numbers, which may trap, the compiler makes no vectors.
 float expectedDepth(const TilePixels& pixels, size_t i) {
-  const float coverage = 1.0f - pixels.transmittance[i];
-  return coverage > 0 ? pixels.weighted_depth[i] / coverage : kEmptyDepth;
+  const uint32_t coverage = std::bit_cast<uint32_t>(1.0f - pixels.transmittance[i]);
+  const uint32_t nothing = coverage == 0 ? ~0u : 0u;
+  const float divisor = std::bit_cast<float>(coverage | (nothing & std::bit_cast<uint32_t>(1.0f)));
+  const uint32_t depth = std::bit_cast<uint32_t>(pixels.weighted_depth[i] / divisor);
+  return std::bit_cast<float>((depth & ~nothing) |
+                              (std::bit_cast<uint32_t>(kEmptyDepth) & nothing));
+}
+
+/// A row of a tile. Loops over plain arrays, one output each, so that the compiler makes vectors.
+void writeRow(const TilePixels& pixels, size_t first, size_t count, const RenderOptions& options,
+              RenderResult& result, size_t out) {
+  const float* transmittance = pixels.transmittance + first;
+  const float* red = pixels.red + first;
+  const float* green = pixels.green + first;
+  const float* blue = pixels.blue + first;
+  float* colour = &result.colour[out * 4];
+  if (options.with_background) {
+    const float background[3] = {static_cast<float>(options.background[0]),
+                                 static_cast<float>(options.background[1]),
+                                 static_cast<float>(options.background[2])};
+    for (size_t x = 0; x < count; ++x) {
+      colour[x * 4] = red[x] + transmittance[x] * background[0];
+      colour[x * 4 + 1] = green[x] + transmittance[x] * background[1];
+      colour[x * 4 + 2] = blue[x] + transmittance[x] * background[2];
+      colour[x * 4 + 3] = 1.0f;
+    }
+  } else {
+    for (size_t x = 0; x < count; ++x) {
+      colour[x * 4] = red[x];
+      colour[x * 4 + 1] = green[x];
+      colour[x * 4 + 2] = blue[x];
+      colour[x * 4 + 3] = 1.0f - transmittance[x];
+    }
+  }
+  if (options.with_depth) {
+    float* depth = &result.depth[out];
+    for (size_t x = 0; x < count; ++x) depth[x] = expectedDepth(pixels, first + x);
+  }
+  if (options.with_median_depth) {
+    for (size_t x = 0; x < count; ++x) {
+      const float median = pixels.median_depth[first + x];
+      result.median_depth[out + x] = median == kNoMedian ? kEmptyDepth : median;
+    }
+  }
+  if (options.with_counts) {
+    for (size_t x = 0; x < count; ++x) {
+      result.counts[out + x] = static_cast<uint32_t>(pixels.count[first + x]);
+    }
+  }
 }
 
 void writePixels(const Tile& tile, const TilePixels& pixels, const RenderOptions& options,
                  RenderResult& result) {
-  const float background[3] = {static_cast<float>(options.background[0]),
-                               static_cast<float>(options.background[1]),
-                               static_cast<float>(options.background[2])};
   for (uint32_t y = 0; y < tile.height; ++y) {
-    for (uint32_t x = 0; x < tile.width; ++x) {
-      const size_t i = static_cast<size_t>(y) * kTileSide + x;
-      const size_t out = static_cast<size_t>(tile.y0 + y) * result.width + tile.x0 + x;
-      const float transmittance = pixels.transmittance[i];
-      const float coverage = 1.0f - transmittance;
-      float* colour = &result.colour[out * 4];
-      colour[0] = pixels.red[i];
-      colour[1] = pixels.green[i];
-      colour[2] = pixels.blue[i];
-      colour[3] = coverage;
-      if (options.with_background) {
-        for (size_t c = 0; c < 3; ++c) colour[c] += transmittance * background[c];
-        colour[3] = 1.0f;
-      }
-      if (options.with_depth) {
-        result.depth[out] = expectedDepth(pixels, i);
-      }
-      if (options.with_median_depth) {
-        const float median = pixels.median_depth[i];
-        result.median_depth[out] = median == kNoMedian ? kEmptyDepth : median;
-      }
-      if (options.with_counts) result.counts[out] = static_cast<uint32_t>(pixels.count[i]);
-    }
+    const size_t out = static_cast<size_t>(tile.y0 + y) * result.width + tile.x0;
+    writeRow(pixels, static_cast<size_t>(y) * kTileSide, tile.width, options, result, out);
   }
 }
 

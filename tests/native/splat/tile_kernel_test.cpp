@@ -2,13 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <random>
 #include <string>
 
 #include "base/error.h"
+#include "splat/cpu/tile_splats.h"
 
 namespace stipple {
 namespace {
@@ -94,6 +98,53 @@ TEST(TileKernel, EveryTargetBlendsAsTheScalarOne) {
         // other.
         EXPECT_LE(doubts_differ, 2u);
         EXPECT_EQ(seen.transmittance[kTilePixelCount - 1], 1.0f);
+      }
+    }
+  }
+}
+
+TEST(TileSplats, HaveTheSameBitsOnEveryTarget) {
+  Rng uniform{std::mt19937(5)};
+  // Ordinary ones, needles thinner than float32 can hold, and some that lie outside the tile.
+  std::vector<VisibleSplat> splats(kTileSplatBatch);
+  std::vector<uint32_t> list;
+  for (VisibleSplat& s : splats) {
+    const float sharp = list.size() % 7 == 0 ? 1e4f : 1.0f;
+    s.footprint = {
+        static_cast<double>(uniform(1950, 2000)),          static_cast<double>(uniform(950, 1000)),
+        static_cast<double>(sharp * uniform(0.05f, 1.5f)), static_cast<double>(uniform(-1, 1)),
+        static_cast<double>(uniform(0.05f, 1.5f)),         static_cast<double>(uniform(0.01f, 1))};
+    s.half_x = static_cast<double>(uniform(0.5f, 30));
+    s.half_y = static_cast<double>(uniform(0.5f, 30));
+    s.log2_opacity = uniform(-7, 0);
+    s.depth = uniform(1, 9);
+    for (float& c : s.colour) c = uniform(0, 1);
+    list.push_back(static_cast<uint32_t>(list.size()));
+  }
+  std::reverse(list.begin(), list.end());
+  Tile tile{1968, 976, kTileSide, kTileSide, list};
+  // No count is a multiple of every number of lanes.
+  for (const size_t count : {size_t{1}, size_t{3}, size_t{61}, size_t{127}, kTileSplatBatch}) {
+    std::vector<TileSplat> expected(count);
+    const size_t begin = kTileSplatBatch - count;
+    const float largest = makeTileSplatsScalar(splats.data(), tile, begin, count, expected.data());
+    EXPECT_GT(largest, 0.0f);
+    for (const NamedTileSplatMaker& named : tileSplatMakers()) {
+      SCOPED_TRACE(::testing::Message() << named.target << " count " << count);
+      std::vector<TileSplat> seen(count);
+      EXPECT_EQ(named.make(splats.data(), tile, begin, count, seen.data()), largest);
+      for (size_t i = 0; i < count; ++i) {
+        expected[i].finish_doubt = seen[i].finish_doubt = 0;
+        EXPECT_EQ(std::memcmp(&seen[i], &expected[i], offsetof(TileSplat, row_end) + 4), 0) << i;
+        TileSplat alone = makeTileSplat(splats[list[begin + i]], tile);
+        alone.finish_doubt = 0;
+        EXPECT_EQ(std::memcmp(&seen[i], &alone, offsetof(TileSplat, row_end) + 4), 0) << i;
+        // The rows are those that hold a pixel centre within half_y of the splat's.
+        const VisibleSplat& splat = splats[list[begin + i]];
+        for (uint32_t y = 0; y < kTileSide; ++y) {
+          const double dy = std::abs(tile.y0 + y + 0.5 - splat.footprint.mean_y);
+          EXPECT_EQ(y >= seen[i].row_begin && y < seen[i].row_end, dy <= splat.half_y) << i;
+        }
       }
     }
   }
