@@ -11,7 +11,7 @@ packages=(
   # Files: JSON, volumes (OpenVDB's headers use Boost's), meshes, pictures, packed splats. The quick
   # start and the tests use OpenImageIO's tools too.
   nlohmann-json3-dev libopenvdb-dev libboost-dev libtinygltf-dev libopenimageio-dev openimageio-tools
-  zlib1g-dev libzstd-dev
+  zlib1g-dev libzstd-dev libwebp-dev
   # The command-line tool.
   libcli11-dev
   # Tests and benchmarks; readelf and nm look at what the libraries need and export.

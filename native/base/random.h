@@ -23,6 +23,7 @@ enum class RandomUse : uint32_t {
   kSurfaceSample = 4,
   kDecoder = 5,
   kGroundPlane = 6,
+  kPalette = 9,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and

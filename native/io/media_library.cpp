@@ -43,9 +43,10 @@ fs::path findLibrary() {
 }
 
 [[noreturn]] void failUnavailable(const std::string& why) {
-  fail(ErrorCode::kUnavailable,
-       std::string(kFileName) +
-           ", which reads and writes pictures, meshes, volumes and packed splats, cannot be loaded: " + why);
+  fail(ErrorCode::kUnavailable, std::string(kFileName) +
+                                    ", which reads and writes pictures, meshes, volumes and packed "
+                                    "splats, cannot be loaded: " +
+                                    why);
 }
 
 const StippleMediaTable* openLibrary() {

@@ -81,6 +81,10 @@ enum StippleMediaVolumeArray : uint32_t {
   kMediaColour = 2,
 };
 
+enum StippleMediaWebpArray : uint32_t {
+  kMediaWebpBytes = 0,  ///< uint8: the encoded file
+};
+
 struct StippleMediaTable {
   uint32_t version;
   void (*image_read)(const char* path, StippleMediaImage* image, const StippleMediaSink* sink,
@@ -106,6 +110,22 @@ struct StippleMediaTable {
                       uint64_t capacity, uint64_t* produced, StippleMediaStatus* status);
   void (*zstd_pack)(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
                     const StippleMediaSink* sink, StippleMediaStatus* status);
+
+  /// WebP, from and to memory; `name` is what messages call it. Every byte of every channel is
+  /// kept, under an alpha of 0 too. In: rgba [height, width, 4].
+  void (*webp_size)(const char* name, const uint8_t* bytes, uint64_t byte_count, uint32_t* width,
+                    uint32_t* height, StippleMediaStatus* status);
+  void (*webp_decode)(const char* name, const uint8_t* bytes, uint64_t byte_count, uint8_t* rgba,
+                      uint64_t rgba_bytes, StippleMediaStatus* status);
+  /// Lossless; the sink's one array is kMediaWebpBytes.
+  void (*webp_encode)(const char* name, const uint8_t* rgba, uint32_t width, uint32_t height,
+                      const StippleMediaSink* sink, StippleMediaStatus* status);
+
+  /// Raw deflate data of a zip entry, whose size the archive tells. Out: whole [whole_bytes].
+  void (*zip_inflate)(const char* name, const uint8_t* bytes, uint64_t byte_count, uint8_t* whole,
+                      uint64_t whole_bytes, StippleMediaStatus* status);
+  /// CRC-32 of zip entries.
+  uint32_t (*zip_checksum)(const uint8_t* bytes, uint64_t byte_count);
 };
 
 /// The one function that libstipple_media exports: null for another version.

@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "io/input_file.h"
 #include "io/ply_file.h"
+#include "io/sog_file.h"
 
 namespace stipple {
 
@@ -112,6 +113,9 @@ std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& f
 const std::vector<SplatFormat>& splatFormats() {
   static const std::vector<SplatFormat> kFormats = {
       {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, startsAsPly, readPlySplats, writePlySplats},
+      {"sog", "SOG", ".sog meta.json", 3, Frame::kRDF, startsAsSog, readSog,
+       [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
+          Progress* progress) { writeSog(cloud, path, {}, progress); }},
   };
   return kFormats;
 }

@@ -31,6 +31,16 @@ void stipple_media_zstd_unpack(const char* what, const uint8_t* bytes, uint64_t 
                                uint64_t capacity, uint64_t* produced, StippleMediaStatus* status);
 void stipple_media_zstd_pack(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
                              const StippleMediaSink* sink, StippleMediaStatus* status);
+void stipple_media_webp_size(const char* name, const uint8_t* bytes, uint64_t byte_count,
+                             uint32_t* width, uint32_t* height, StippleMediaStatus* status);
+void stipple_media_webp_decode(const char* name, const uint8_t* bytes, uint64_t byte_count,
+                               uint8_t* rgba, uint64_t rgba_bytes, StippleMediaStatus* status);
+void stipple_media_webp_encode(const char* name, const uint8_t* rgba, uint32_t width,
+                               uint32_t height, const StippleMediaSink* sink,
+                               StippleMediaStatus* status);
+void stipple_media_zip_inflate(const char* name, const uint8_t* bytes, uint64_t byte_count,
+                               uint8_t* whole, uint64_t whole_bytes, StippleMediaStatus* status);
+uint32_t stipple_media_zip_checksum(const uint8_t* bytes, uint64_t byte_count);
 }
 
 /// Turns what `work` throws into a status; an exception of another library is a fault of the file,

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace stipple {
+
+/// 256 ascending values that stand for many.
+struct Codebook {
+  std::array<float, 256> values{};
+  /// The nearest one; of two as near, the lower.
+  uint8_t nearest(float value) const;
+};
+
+/// A codebook of small squared error: 1-D k-means, from a start that is the best in the limit of
+/// many values, to a fixed point or 1000 rounds. 256 different values or fewer are kept exactly
+/// (the rest of the codebook repeats the last). In: finite values in any order; may be empty.
+/// Determinism: no random numbers. Cost: O(n log n).
+Codebook makeCodebook(std::vector<float> values);
+
+}  // namespace stipple
