@@ -50,6 +50,11 @@ void validate(std::span<const AdamGroup> groups, uint64_t step, const AdamOption
         (!group.parameters || !group.gradients || !group.first_moments || !group.second_moments)) {
       fail(ErrorCode::kInvalidArgument, name + ": an array is null; four are needed");
     }
+    if (group.row_stride != 0 && group.row_stride < group.row_length) {
+      fail(ErrorCode::kInvalidArgument, name + ": row_stride is " +
+                                            std::to_string(group.row_stride) + "; 0 or at least " +
+                                            std::to_string(group.row_length) + " is allowed");
+    }
     if (sparse && group.row_count != groups[0].row_count) {
       fail(ErrorCode::kInvalidArgument,
            name + " has " + std::to_string(group.row_count) +
@@ -71,6 +76,10 @@ AdamFactors factorsOf(const AdamGroup& group, uint64_t step, const AdamOptions& 
   return factors;
 }
 
+size_t strideOf(const AdamGroup& group) {
+  return group.row_stride == 0 ? group.row_length : group.row_stride;
+}
+
 /// Rows of a piece: whole ones, at least one.
 size_t rowsPerPiece(const AdamGroup& group) {
   return std::max<size_t>(1, kPiece / std::max<size_t>(1, group.row_length));
@@ -85,10 +94,19 @@ struct Step {
   std::atomic<bool> all_usable{true};
 
   void stepRows(const AdamGroup& group, const AdamFactors& factors, size_t begin, size_t end) {
-    const size_t first = begin * group.row_length;
-    if (!kernel.step(factors, (end - begin) * group.row_length, group.parameters + first,
-                     group.gradients + first, group.first_moments + first,
-                     group.second_moments + first)) {
+    if (strideOf(group) == group.row_length) {
+      stepElements(group, factors, begin * group.row_length, (end - begin) * group.row_length);
+      return;
+    }
+    for (size_t row = begin; row < end; ++row) {
+      stepElements(group, factors, row * group.row_stride, group.row_length);
+    }
+  }
+
+  void stepElements(const AdamGroup& group, const AdamFactors& factors, size_t first,
+                    size_t count) {
+    if (!kernel.step(factors, count, group.parameters + first, group.gradients + first,
+                     group.first_moments + first, group.second_moments + first)) {
       all_usable = false;
     }
   }
@@ -124,7 +142,8 @@ void failForGradient(std::span<const AdamGroup> groups, const uint8_t* visible) 
     const AdamGroup& group = groups[g];
     for (size_t i = 0; i < group.row_count * group.row_length; ++i) {
       if (visible && !visible[i / group.row_length]) continue;
-      const float value = group.gradients[i];
+      const float value =
+          group.gradients[i / group.row_length * strideOf(group) + i % group.row_length];
       if (std::isfinite(value) && std::abs(value) <= kLargestGradient) continue;
       fail(ErrorCode::kInvalidArgument,
            "gradient " + std::to_string(i % group.row_length) + " of row " +

@@ -14,7 +14,8 @@ struct AdamOptions {
 };
 
 /// Parameters that share a learning rate, [row_count, row_length], one row per Gaussian. Moments
-/// start as zeros and belong to this function from then on.
+/// start as zeros and belong to this function from then on. Rows of the four arrays may lie apart,
+/// as the first harmonic and the others of a Gaussian do, which have rates of their own.
 struct AdamGroup {
   float* parameters = nullptr;
   const float* gradients = nullptr;
@@ -23,6 +24,7 @@ struct AdamGroup {
   size_t row_count = 0;
   size_t row_length = 0;
   double learning_rate = 0;  ///< 0..1e6
+  size_t row_stride = 0;     ///< elements from a row to the next; 0: row_length, nothing between
 };
 
 /// Largest magnitude of a gradient: its square stays inside float32.
@@ -39,12 +41,12 @@ struct AdamKernel;
 /// moments too (sparse Adam; the bias correction stays that of `step`); all groups must then have
 /// as many rows.
 /// Errors: kInvalidArgument for step 0, options or a rate out of range, null arrays, rows that
-/// disagree; then nothing is changed. For a gradient that is not finite or beyond +-1e18 that
-/// element keeps its parameter and moments, all others take the step, and the message names the
-/// first one: nothing that is not finite enters a parameter.
-/// Threads and determinism: pieces in parallel, elements independent: same bits for any number of
-/// threads. Cost: O(elements), 28 bytes of memory traffic each; allocates nothing.
-/// Source: Kingma, Ba, Adam: A Method for Stochastic Optimization, ICLR 2015, algorithm 1.
+/// disagree or overlap; then nothing is changed. For a gradient that is not finite or beyond +-1e18
+/// that element keeps its parameter and moments, all others take the step, and the message names
+/// the first one: nothing that is not finite enters a parameter. Threads and determinism: pieces in
+/// parallel, elements independent: same bits for any number of threads. Cost: O(elements), 28 bytes
+/// of memory traffic each; allocates nothing. Source: Kingma, Ba, Adam: A Method for Stochastic
+/// Optimization, ICLR 2015, algorithm 1.
 void adamStep(std::span<const AdamGroup> groups, uint64_t step, const AdamOptions& options = {},
               const uint8_t* visible = nullptr);
 

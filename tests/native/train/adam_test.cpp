@@ -106,6 +106,62 @@ TEST(Adam, GroupsHaveTheirOwnRates) {
   EXPECT_NE(still.m[0], 0.0f);
 }
 
+TEST(Adam, RowsThatLieApartAreSteppedAsIfTheyDidNot) {
+  // The first harmonic and the 15 others of 700 Gaussians, each with its rate.
+  Parameters together(700, 48, 0);
+  fill(together.p, 1.0f, 40);
+  fill(together.g, 1.0f, 41);
+  fill(together.m, 0.1f, 42);
+  std::fill(together.v.begin(), together.v.end(), 0.2f);
+  Parameters first(700, 3, 1e-2), others(700, 45, 5e-4);
+  const auto copyRows = [&](const std::vector<float>& from, std::vector<float>& head,
+                            std::vector<float>& tail) {
+    for (size_t row = 0; row < 700; ++row) {
+      std::copy_n(&from[row * 48], 3, &head[row * 3]);
+      std::copy_n(&from[row * 48 + 3], 45, &tail[row * 45]);
+    }
+  };
+  for (std::vector<float> Parameters::*array :
+       {&Parameters::p, &Parameters::g, &Parameters::m, &Parameters::v}) {
+    copyRows(together.*array, first.*array, others.*array);
+  }
+  const AdamGroup apart[] = {first.group(), others.group()};
+  AdamGroup head = together.group();
+  head.row_length = 3;
+  head.row_stride = 48;
+  head.learning_rate = 1e-2;
+  AdamGroup tail = head;
+  tail.row_length = 45;
+  tail.learning_rate = 5e-4;
+  tail.gradients += 3;
+  for (float** array : {&tail.parameters, &tail.first_moments, &tail.second_moments}) *array += 3;
+  const AdamGroup strided[] = {head, tail};
+  std::vector<uint8_t> visible(700);
+  for (size_t i = 0; i < 700; ++i) visible[i] = i % 5 != 0;
+  for (const uint8_t* flags :
+       {static_cast<const uint8_t*>(nullptr), static_cast<const uint8_t*>(visible.data())}) {
+    adamStep(apart, 2, {}, flags);
+    adamStep(strided, 2, {}, flags);
+    for (std::vector<float> Parameters::*array : {&Parameters::p, &Parameters::m, &Parameters::v}) {
+      std::vector<float> seen_first(700 * 3), seen_others(700 * 45);
+      copyRows(together.*array, seen_first, seen_others);
+      EXPECT_EQ(seen_first, first.*array);
+      EXPECT_EQ(seen_others, others.*array);
+    }
+  }
+  together.g[48 * 9 + 3 + 7] = std::numeric_limits<float>::infinity();
+  try {
+    adamStep(strided, 3);
+    ADD_FAILURE() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("gradient 7 of row 9 in group 1 is inf"),
+              std::string::npos)
+        << error.what();
+  }
+  tail.row_stride = 44;
+  EXPECT_THROW(adamStep({&tail, 1}, 3), Error);
+}
+
 TEST(Adam, RowsThatAreNotVisibleStayAsTheyAre) {
   for (const size_t length : {1u, 3u, 48u}) {
     Parameters sparse(1000, length, 1e-2), dense(1000, length, 1e-2);
