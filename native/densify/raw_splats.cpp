@@ -1,0 +1,102 @@
+#include "densify/raw_splats.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stipple {
+
+void RawSplats::resize(size_t count) {
+  for (size_t i = 0; i < kRawArrayCount; ++i) {
+    const RawArray array = static_cast<RawArray>(i);
+    arrayOf(*this, array).resize(count * rowLength(*this, array));
+  }
+}
+
+const std::vector<float>& arrayOf(const RawSplats& splats, RawArray array) {
+  switch (array) {
+    case RawArray::kPositions:
+      return splats.positions;
+    case RawArray::kRotations:
+      return splats.rotations;
+    case RawArray::kLogScales:
+      return splats.log_scales;
+    case RawArray::kLogits:
+      return splats.logits;
+    case RawArray::kSh:
+      break;
+  }
+  return splats.sh;
+}
+
+std::vector<float>& arrayOf(RawSplats& splats, RawArray array) {
+  return const_cast<std::vector<float>&>(arrayOf(static_cast<const RawSplats&>(splats), array));
+}
+
+size_t rowLength(const RawSplats& splats, RawArray array) {
+  constexpr size_t kLengths[] = {3, 4, 3, 1};
+  return array == RawArray::kSh ? splats.shStride() : kLengths[static_cast<size_t>(array)];
+}
+
+RawSplats zerosLike(const RawSplats& splats) {
+  RawSplats zeros;
+  zeros.sh_degree = splats.sh_degree;
+  zeros.colour_space = splats.colour_space;
+  zeros.antialias = splats.antialias;
+  zeros.resize(splats.size());
+  return zeros;
+}
+
+float activatedScale(float log_scale) {
+  return std::exp(log_scale);
+}
+
+float activatedOpacity(float logit) {
+  // The exponential of a number that is not positive: it cannot overflow.
+  const float small = std::exp(-std::abs(logit));
+  return logit >= 0 ? 1.0f / (1.0f + small) : small / (1.0f + small);
+}
+
+float rawScale(float scale) {
+  return std::log(std::max(scale, kLeastRawScale));
+}
+
+float rawOpacity(float opacity) {
+  const double held =
+      std::clamp(static_cast<double>(opacity), static_cast<double>(kLeastRawOpacity),
+                 1.0 - static_cast<double>(kLeastRawOpacity));
+  return static_cast<float>(std::log(held) - std::log1p(-held));
+}
+
+RawSplats rawSplats(const SplatCloud& cloud) {
+  RawSplats raw;
+  raw.sh_degree = cloud.sh_degree;
+  raw.colour_space = cloud.colour_space;
+  raw.antialias = cloud.antialias;
+  raw.positions = cloud.positions;
+  raw.rotations = cloud.rotations;
+  raw.sh = cloud.sh;
+  raw.log_scales.resize(cloud.scales.size());
+  std::transform(cloud.scales.begin(), cloud.scales.end(), raw.log_scales.begin(), rawScale);
+  raw.logits.resize(cloud.opacities.size());
+  std::transform(cloud.opacities.begin(), cloud.opacities.end(), raw.logits.begin(), rawOpacity);
+  return raw;
+}
+
+SplatCloud activated(const RawSplats& splats) {
+  SplatCloud cloud;
+  cloud.sh_degree = splats.sh_degree;
+  cloud.colour_space = splats.colour_space;
+  cloud.antialias = splats.antialias;
+  cloud.positions = splats.positions;
+  cloud.rotations = splats.rotations;
+  cloud.sh = splats.sh;
+  cloud.scales.resize(splats.log_scales.size());
+  std::transform(splats.log_scales.begin(), splats.log_scales.end(), cloud.scales.begin(),
+                 activatedScale);
+  cloud.opacities.resize(splats.logits.size());
+  std::transform(splats.logits.begin(), splats.logits.end(), cloud.opacities.begin(),
+                 activatedOpacity);
+  return cloud;
+}
+
+}  // namespace stipple

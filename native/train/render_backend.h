@@ -1,0 +1,131 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "data/splat_cloud.h"
+#include "densify/splat_edit.h"
+#include "math/camera.h"
+#include "splat/render.h"
+#include "train/adam.h"
+#include "train/image_loss.h"
+
+namespace stipple {
+
+/// Numbers of a Gaussian that share a learning rate.
+enum class ParameterGroup : uint32_t {
+  kPositions = 0,
+  kRotations = 1,
+  kLogScales = 2,
+  kLogits = 3,
+  kShFirst = 4,   ///< the constant harmonic
+  kShOthers = 5,  ///< the ones above it
+};
+constexpr size_t kParameterGroupCount = 6;
+
+struct StepOptions {
+  /// By ParameterGroup. A group of rate 0 takes no step: its moments stay as they are.
+  std::array<double, kParameterGroupCount> learning_rates{};
+  AdamOptions adam;
+};
+
+/// Which statistics a backward pass gathers; each costs time only where it is asked for. Pictures
+/// have the size of the drawn one and are empty where not used.
+struct BackwardRequest {
+  bool with_contributions = false;  ///< of the drawn picture against its target
+  bool with_blending_weights = false;
+  bool with_screen_gradients = false;
+  std::span<const float> contribution_weights;  ///< [H,W] >= 0; empty: 1
+  std::span<const float> edge_weights;          ///< [H,W] not empty: edge weights are gathered
+  std::span<const float> errors;                ///< [H,W] not empty: errors are gathered
+};
+
+/// Of one backward pass; what they are is said at SplatGradients and BackwardResult.
+struct BackwardSummary {
+  std::array<double, 6> camera{};
+  std::array<double, 3> background{};
+  uint64_t visible_count = 0;
+};
+
+enum class Statistic : uint32_t {
+  kContributions = 0,
+  kBlendingWeights = 1,
+  kEdgeWeights = 2,
+  kScreenGradients = 3,          ///< [N,2]
+  kAbsoluteScreenGradients = 4,  ///< [N,2]
+  kScreenGradientNorms = 5,
+  kErrors = 6,
+  kLargestErrors = 7,
+};
+
+/// Everything of a fit that a checkpoint has to keep.
+struct TrainingState {
+  RawSplats splats;
+  RawSplats first_moments;
+  RawSplats second_moments;
+  uint64_t step = 0;  ///< taken so far
+};
+
+/// Holds the splats of a fit and does its passes, each by one call: forward, loss, backward, step,
+/// and now and then an edit. Parameters, moments, pictures, derivatives and statistics stay inside,
+/// so that they may lie in the memory of another processor; what the caller wants to see is copied
+/// out on demand. One call at a time.
+///
+/// Errors of every call: kInvalidArgument for arguments outside their range and for a pass out of
+/// its order; what the backend holds is then as it was.
+/// Determinism: the same calls give the same bits, for any number of threads.
+class RenderBackend {
+ public:
+  virtual ~RenderBackend() = default;
+
+  /// "cpu" and so on.
+  virtual const char* name() const = 0;
+
+  /// Takes the splats of a fit, forgets what was held. Moments and step become 0, or those of a
+  /// checkpoint; pictures stay.
+  virtual void upload(const SplatCloud& cloud) = 0;
+  virtual void restore(const TrainingState& state) = 0;
+
+  virtual size_t splatCount() const = 0;
+  virtual SplatCloud download() const = 0;
+  virtual TrainingState state() const = 0;
+
+  /// Keeps a target picture [H,W,3], in the space in which splats are composited. Returns its
+  /// number: 0, 1, 2...
+  virtual uint32_t addTarget(uint32_t width, uint32_t height, std::span<const float> pixels) = 0;
+
+  /// Draws the splats.
+  virtual void forward(const Camera& camera, const RenderOptions& options,
+                       Progress* progress = nullptr) = 0;
+
+  /// Loss of the drawn picture against a target, and its derivative by the picture. In: weights
+  /// [H,W] >= 0, or empty: 1.
+  virtual ImageLossValue loss(uint32_t target, const ImageLossOptions& options,
+                              std::span<const float> weights = {}) = 0;
+
+  /// Derivatives of that loss by the raw parameters, and statistics.
+  virtual BackwardSummary backward(const BackwardRequest& request,
+                                   Progress* progress = nullptr) = 0;
+
+  /// One step of Adam along them. May follow a backward pass once.
+  virtual void step(const StepOptions& options) = 0;
+
+  /// Changes which splats there are. Drawn picture, derivatives and statistics are gone after it.
+  virtual void edit(const SplatEdit& edit) = 0;
+
+  /// [H,W,4] drawn last.
+  virtual std::vector<float> picture() const = 0;
+  /// By the raw parameters, of the last backward pass.
+  virtual RawSplats gradients() const = 0;
+  /// [N] or as stated, of the last backward pass; refused where it was not asked for.
+  virtual std::vector<float> statistic(Statistic statistic) const = 0;
+};
+
+/// On this processor, with native/splat, train/image_loss and train/adam.
+std::unique_ptr<RenderBackend> makeCpuBackend();
+
+}  // namespace stipple
