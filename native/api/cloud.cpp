@@ -6,8 +6,8 @@
 #include "api/handles.h"
 #include "base/parallel.h"
 #include "data/cloud_comparison.h"
+#include "data/cloud_transform.h"
 #include "io/splat_file.h"
-#include "splat/cloud_transform.h"
 
 using namespace stipple;
 using namespace stipple::api;

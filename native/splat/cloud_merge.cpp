@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "splat/cloud_transform.h"
+#include "data/cloud_transform.h"
 
 namespace stipple {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "splat/cloud_transform.h"
+#include "data/cloud_transform.h"
 #include "splat/random_scene.h"
 
 namespace stipple {

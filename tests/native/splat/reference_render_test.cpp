@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "data/cloud_transform.h"
 #include "math/colour.h"
-#include "splat/cloud_transform.h"
 #include "splat/projection.h"
 #include "splat/random_scene.h"
 

@@ -1,4 +1,4 @@
-#include "splat/cloud_transform.h"
+#include "data/cloud_transform.h"
 
 #include <cmath>
 #include <string>
