@@ -18,6 +18,7 @@
 #include "io/ply_file.h"
 #include "io/ply_header.h"
 #include "io/ply_rows.h"
+#include "io/quantize.h"
 
 namespace stipple {
 
@@ -257,23 +258,9 @@ class Reader {
         return;
       }
       if (flat_) scale[2] = kFlatness * std::min(scale[0], scale[1]);
-      normalise(&cloud_.rotations[i * 4]);
+      normaliseRotation(&cloud_.rotations[i * 4]);
       if (!filters_.empty()) smooth(i);
     }
-  }
-
-  static void normalise(float* q) {
-    const double squared = double(q[0]) * double(q[0]) + double(q[1]) * double(q[1]) +
-                           double(q[2]) * double(q[2]) + double(q[3]) * double(q[3]);
-    // A quaternion that is a unit one up to rounding stays as it is, bit for bit.
-    if (std::abs(squared - 1.0) < 1e-6) return;
-    if (squared == 0.0) {
-      // 3DGS turns the zero quaternion into the identity matrix.
-      q[0] = 1.0f;
-      return;
-    }
-    const double inverse = 1.0 / std::sqrt(squared);
-    for (int k = 0; k < 4; ++k) q[k] = static_cast<float>(double(q[k]) * inverse);
   }
 
   /// Variances grow by filter_3D squared, the peak falls so that the integral stays.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "math/half_float.h"
 
 namespace stipple {
 
@@ -35,19 +36,6 @@ T load(const char* bytes, bool swap) {
   T value;
   std::memcpy(&value, bytes, sizeof(T));
   return swap ? swapBytes(value) : value;
-}
-
-/// IEEE 754 binary16.
-float halfToFloat(uint16_t half) {
-  const int exponent = (half >> 10) & 31;
-  const int mantissa = half & 1023;
-  const float sign = (half & 0x8000) != 0 ? -1.0f : 1.0f;
-  if (exponent == 31) {
-    return mantissa == 0 ? sign * std::numeric_limits<float>::infinity()
-                         : std::numeric_limits<float>::quiet_NaN();
-  }
-  if (exponent == 0) return sign * std::ldexp(static_cast<float>(mantissa), -24);
-  return sign * std::ldexp(static_cast<float>(1024 + mantissa), exponent - 25);
 }
 
 struct Half {

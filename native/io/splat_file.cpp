@@ -10,9 +10,11 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "data/splat_colour.h"
 #include "io/input_file.h"
 #include "io/ply_file.h"
 #include "io/sog_file.h"
+#include "io/spz_file.h"
 
 namespace stipple {
 
@@ -101,9 +103,11 @@ std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& f
   const bool turns = cloud.frame == Frame::kUnknown
                          ? wanted != kConventionalFrame || options.frame != Frame::kUnknown
                          : cloud.frame != wanted;
-  if (cloud.sh_degree <= degree && !turns) return std::nullopt;
+  const bool recolours = cloud.colour_space == ColourSpace::kLinear && !format.holds_linear;
+  if (cloud.sh_degree <= degree && !turns && !recolours) return std::nullopt;
   SplatCloud copy = cloud;
   limitDegree(copy, degree);
+  if (recolours) convertColours(copy, ColourSpace::kDisplay);
   if (turns) convertFrame(copy, wanted);
   return copy;
 }
@@ -112,8 +116,9 @@ std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& f
 
 const std::vector<SplatFormat>& splatFormats() {
   static const std::vector<SplatFormat> kFormats = {
-      {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, startsAsPly, readPlySplats, writePlySplats},
-      {"sog", "SOG", ".sog meta.json", 3, Frame::kRDF, startsAsSog, readSog,
+      {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, true, startsAsPly, readPlySplats, writePlySplats},
+      {"spz", "SPZ", ".spz", 4, Frame::kRUB, false, startsAsSpz, readSpzSplats, writeSpzSplats},
+      {"sog", "SOG", ".sog meta.json", 3, Frame::kRDF, true, startsAsSog, readSog,
        [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
           Progress* progress) { writeSog(cloud, path, {}, progress); }},
   };

@@ -37,11 +37,12 @@ struct SplatFormat {
   /// The frame that positions are written in: a cloud of another known frame is converted first.
   /// One of an unknown frame counts as kConventionalFrame.
   Frame frame;
+  bool holds_linear;  ///< else colours of linear clouds are converted to display space first
   /// True where the first bytes (or a folder's name) say that a file is of this format; null where
   /// nothing but the ending tells.
   bool (*sniff)(const SplatFileStart& start);
   SplatCloud (*read)(const std::string& path, Progress* progress);  ///< null: not read
-  /// In: a cloud that is valid, in `frame` and within max_sh_degree. Null: not written.
+  /// In: a cloud that is valid, in its frame, colour space and degree. Null: not written.
   void (*write)(const SplatCloud& cloud, const std::string& path, const SplatWriteOptions& options,
                 Progress* progress);
 };
