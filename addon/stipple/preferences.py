@@ -2,9 +2,20 @@
 """What belongs to the machine rather than to a file."""
 
 import bpy
-from bpy.props import IntProperty, StringProperty
+from bpy.props import CollectionProperty, EnumProperty, IntProperty, StringProperty
 
 from . import version
+
+
+UP_AXES = (('AUTO', "From File", "As the file says, or as files of its format usually are"),
+           ('Z', "Z Up", "As in Blender"), ('-Y', "-Y Up", "As most captured scenes: the frame of their first camera"),
+           ('Y', "Y Up", "As in glTF and most game engines"))
+
+
+class STIPPLE_PG_format(bpy.types.PropertyGroup):
+    """What was chosen last for files of a format; its name is the format's."""
+
+    up_axis: EnumProperty(name="Up Axis", items=UP_AXES)
 
 
 class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
@@ -18,6 +29,7 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
                                  "kept, empty for Blender's user folder", subtype='DIR_PATH', options=version.RELATIVE_PATH)
     library_path: StringProperty(name="Library", description="Path of libstipple.so, empty for the one inside the "
                                  "add-on", subtype='FILE_PATH', options=version.RELATIVE_PATH)
+    formats: CollectionProperty(type=STIPPLE_PG_format)
 
     def draw(self, _context):
         layout = self.layout
@@ -28,6 +40,8 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
         column.prop(self, 'memory_limit', text="Memory Limit (MiB)")
         column.prop(self, 'cache_folder')
         column.prop(self, 'library_path')
+        for entry in self.formats:
+            column.prop(entry, 'up_axis', text=f"Up Axis of .{entry.name}")
 
 
 def get():
@@ -36,4 +50,20 @@ def get():
     return addon.preferences if addon else None
 
 
-classes = (STIPPLE_AP_preferences,)
+def up_axis(format_name):
+    """The up axis that was chosen last for a format: a key of UP_AXES."""
+    chosen = get()
+    entry = chosen.formats.get(format_name) if chosen is not None else None
+    return entry.up_axis if entry is not None else 'AUTO'
+
+
+def remember_up_axis(format_name, axis):
+    chosen = get()
+    if chosen is None or up_axis(format_name) == axis:
+        return
+    entry = chosen.formats.get(format_name) or chosen.formats.add()
+    entry.name, entry.up_axis = format_name, axis
+    bpy.context.preferences.is_dirty = True
+
+
+classes = (STIPPLE_PG_format, STIPPLE_AP_preferences)

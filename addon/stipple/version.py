@@ -22,6 +22,8 @@ FLAT_COLOR_SHADER = 'FLAT_COLOR' if VERSION >= (4, 0, 0) else '3D_FLAT_COLOR'
 # Voxels by which Cycles and EEVEE draw an OpenVDB grid too far along each axis: older ones put a voxel's corner
 # where its centre belongs (measured with one splat: 3.4.1 and 4.3.2 half a voxel, 5.2.2 nothing).
 VOXEL_SHIFT = 0.5 if VERSION < (5, 0, 0) else 0.0
+# Files dropped into a window and Collection Exporters find their operators by a FileHandler.
+HAS_FILE_HANDLERS = VERSION >= (4, 1, 0)
 EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BLENDER_EEVEE'
 
 

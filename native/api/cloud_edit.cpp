@@ -171,17 +171,18 @@ StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask,
   });
 }
 
-StippleStatus stipple_cloud_merge(const StippleInstance* instances, uint64_t count,
+StippleStatus stipple_cloud_merge(const StippleInstance* instances, uint64_t count, uint32_t frame,
                                   StippleCloud** merged_cloud) {
   return guarded([&] {
     if (count < 1) fail(ErrorCode::kInvalidArgument, "count is 0; at least 1 cloud is needed");
+    const Frame label = enumValue<Frame>(frame, kLastFrame, "frame");
     const Instances placed = instancesFrom(instances, count);
     require(merged_cloud, "merged");
     const Context& context = instances[0].cloud->context;
     context->requireMemory(mergeMemoryBound(placed.list), "the merged cloud");
     withThreads(context->thread_count, [&] {
       *merged_cloud =
-          new StippleCloud{context, std::make_shared<const SplatCloud>(merged(placed.list))};
+          new StippleCloud{context, std::make_shared<const SplatCloud>(merged(placed.list, label))};
     });
   });
 }

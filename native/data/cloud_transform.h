@@ -13,6 +13,7 @@ namespace stipple {
 /// colours equal those of the same cloud drawn through the matrix, unless the matrix scales
 /// unevenly or shears and the degree is above 0: drawing then bends the viewing directions, which
 /// no harmonics of the same degree can store.
+/// The label of the frame stays: what the matrix leads to is the caller's knowledge.
 /// Errors: kInvalidArgument for a cloud that validate() refuses, for a matrix that validateAffine
 /// refuses (singular, not affine), and where a position or scale leaves the range of float32.
 /// Cost: O(splats x coefficients), all threads; same result for any number of threads.

@@ -73,8 +73,9 @@ uint64_t bytesOf(const SplatCloud& cloud, int degree) {
 
 }  // namespace
 
-SplatCloud merged(std::span<const SplatInstance> instances) {
+SplatCloud merged(std::span<const SplatInstance> instances, Frame frame) {
   SplatCloud result;
+  result.frame = frame;
   if (instances.empty()) return result;
   requireAgreement(instances);
   result.sh_degree = highestDegree(instances);

@@ -61,6 +61,7 @@ SplatCloud kept(const SplatCloud& cloud, std::span<const uint8_t> mask) {
   result.sh_degree = cloud.sh_degree;
   result.colour_space = cloud.colour_space;
   result.antialias = cloud.antialias;
+  result.frame = cloud.frame;
   gather(cloud.positions, 3, chosen, result.positions);
   gather(cloud.rotations, 4, chosen, result.rotations);
   gather(cloud.scales, 3, chosen, result.scales);

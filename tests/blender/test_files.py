@@ -45,7 +45,7 @@ def test_transform_is_applied_on_request(stipple, tmp_path):
     matrix = Matrix.Translation((1, 2, 3)) @ Euler((0.3, 0.4, 0.5)).to_matrix().to_4x4() @ Matrix.Scale(2.0, 4)
     obj.matrix_world = matrix
     bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'own.ply'), apply_transform=False)
-    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'world.ply'), apply_transform=True)
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'world.ply'), apply_transform=True, up_axis='Z')
     load = stipple.binding.cloud.Cloud.load
     native = stipple.scene.sources.context()
     assert_close(load(native, str(tmp_path / 'own.ply')).read(), arrays)
@@ -64,10 +64,10 @@ def test_transform_is_applied_on_request(stipple, tmp_path):
 def test_uneven_and_mirrored_objects_are_applied(stipple, tmp_path, scale):
     arrays = make_arrays(stipple, degree=1)
     write_ply(stipple, tmp_path / 'in.ply', arrays)
-    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
+    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'), up_axis='Z')
     bpy.context.object.scale = scale
     bpy.context.view_layer.update()
-    assert bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply')) == {'FINISHED'}
+    assert bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), up_axis='Z') == {'FINISHED'}
     out = stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(), str(tmp_path / 'out.ply')).read()
     m = np.diag(scale).astype(float)
     for i in range(len(arrays.positions)):
@@ -103,3 +103,136 @@ def test_up_axis_turns_the_object_only(stipple, tmp_path, axis, up):
     obj = bpy.context.object
     np.testing.assert_allclose(np.array(obj.matrix_world)[:3, :3] @ up, (0, 0, 1), atol=1e-6)
     np.testing.assert_array_equal(stipple.scene.splat_data.read(obj.data).positions, arrays.positions)
+
+
+def load(stipple, path):
+    return stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(), str(path)).read()
+
+
+@pytest.mark.parametrize('frame, up', [('UNKNOWN', (0, -1, 0)), ('RDF', (0, -1, 0)), ('RUB', (0, 1, 0)),
+                                       ('RFU', (0, 0, 1)), ('LUF', (0, 1, 0))])
+def test_the_files_frame_decides_by_default(stipple, tmp_path, frame, up):
+    arrays = make_arrays(stipple, degree=1)
+    arrays.frame = stipple.binding.structs.Frame[frame]
+    stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), arrays).save(str(tmp_path / 'in.ply'),
+                                                                                    frame=arrays.frame)
+    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
+    obj = bpy.context.object
+    np.testing.assert_allclose(np.array(obj.matrix_world)[:3, :3] @ up, (0, 0, 1), atol=1e-6)
+    assert_close(stipple.scene.splat_data.read(obj.data), arrays)
+    assert stipple.scene.splat_data.read(obj.data).frame == arrays.frame
+
+
+def test_an_export_in_the_formats_frame_comes_back_to_its_place(stipple, tmp_path):
+    write_ply(stipple, tmp_path / 'in.ply', make_arrays(stipple, degree=2))
+    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
+    obj = bpy.context.object
+    obj.matrix_world = Matrix.Translation((1, 2, 3)) @ Euler((0.3, 0.4, 0.5)).to_matrix().to_4x4()
+    for axis, up in (('AUTO', (0, -1, 0)), ('Y', (0, 1, 0)), ('Z', (0, 0, 1)), ('-Y', (0, -1, 0))):
+        scenes.select(obj)
+        bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), up_axis=axis)
+        bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'out.ply'))
+        back = bpy.context.object
+        np.testing.assert_allclose(np.array(back.matrix_world)[:3, :3] @ up, (0, 0, 1), atol=1e-6)
+
+        def world(o):
+            m = np.array(o.matrix_world)
+            return stipple.scene.splat_data.read(o.data).positions @ m[:3, :3].T + m[:3, 3]
+        np.testing.assert_allclose(world(back), world(obj), atol=1e-5)
+
+
+def test_several_files_at_once_and_a_broken_one_among_them(stipple, tmp_path):
+    for i, name in enumerate(('a', 'b')):
+        write_ply(stipple, tmp_path / f'{name}.ply', make_arrays(stipple, count=10 + i))
+    (tmp_path / 'c.ply').write_bytes(b'ply\nnonsense')
+    files = [{'name': f'{name}.ply'} for name in 'abc']
+    assert bpy.ops.stipple.splats_import(directory=str(tmp_path), files=files) == {'FINISHED'}
+    assert sorted(o.name for o in bpy.data.objects) == ['a', 'b']
+    assert {o.name for o in bpy.context.view_layer.objects.selected} == {'a', 'b'}
+    scenes.refuses(lambda: bpy.ops.stipple.splats_import(directory=str(tmp_path), files=files[2:]), 'c.ply')
+    assert len(bpy.data.objects) == 2
+
+
+def test_the_up_axis_of_a_format_is_remembered(stipple, tmp_path):
+    preferences = stipple.preferences
+    write_ply(stipple, tmp_path / 'in.ply', make_arrays(stipple, degree=0))
+    preferences.remember_up_axis('ply', 'Y')
+    try:
+        bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
+        np.testing.assert_allclose(np.array(bpy.context.object.matrix_world)[:3, :3] @ (0, 1, 0), (0, 0, 1), atol=1e-6)
+        bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'), up_axis='Z')
+        assert bpy.context.object.matrix_world == Matrix.Identity(4)
+    finally:
+        preferences.get().formats.clear()
+    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
+    np.testing.assert_allclose(np.array(bpy.context.object.matrix_world)[:3, :3] @ (0, -1, 0), (0, 0, 1), atol=1e-6)
+
+
+def test_export_of_a_selection_a_collection_and_all_that_is_visible(stipple, tmp_path):
+    objects = []
+    for i, name in enumerate('abc'):
+        write_ply(stipple, tmp_path / f'{name}.ply', make_arrays(stipple, count=10 * (i + 1), degree=i))
+        bpy.ops.stipple.splats_import(filepath=str(tmp_path / f'{name}.ply'))
+        objects.append(bpy.context.object)
+    a, b, c = objects
+    out = tmp_path / 'out.ply'
+
+    def exported(**options):
+        assert bpy.ops.stipple.splats_export(filepath=str(out), **options) == {'FINISHED'}
+        return load(stipple, out)
+    scenes.select(a, c)
+    assert exported().positions.shape == (40, 3)
+    assert exported().sh.shape == (40, 9, 3)
+    assert exported(max_degree=1).sh.shape == (40, 4, 3)
+    assert exported(use_selection=False).count == 60
+    b.hide_set(True)
+    assert exported(use_selection=False).count == 40
+    collection = bpy.data.collections.new('only b')
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(b)
+    assert exported(collection='only b').count == 20
+    for obj in objects:
+        obj.select_set(False)
+    scenes.refuses(lambda: bpy.ops.stipple.splats_export(filepath=str(out)), 'no splats in the selection')
+    # In the active object's own space, the others relative to it.
+    c.matrix_world = Matrix.Translation((1, 0, 0)) @ c.matrix_world
+    a.matrix_world = c.matrix_world @ Matrix.Translation((0, 0, 5))
+    scenes.select(c, a)
+    both = exported(apply_transform=False)
+    np.testing.assert_array_equal(both.positions[:30], stipple.scene.splat_data.read(c.data).positions)
+    np.testing.assert_allclose(both.positions[30:], stipple.scene.splat_data.read(a.data).positions + (0, 0, 5), atol=1e-5)
+
+
+def test_budgets_of_an_export(stipple, tmp_path):
+    obj = scenes.make_splats(scenes.quad(), anchors=100, source_path=str(tmp_path / 'a.stipple.safetensors'))
+    obj.data.stipple.anchors_render = 250
+    for budget, count in (('VIEWPORT', 100), ('RENDER', 250), ('FULL', 250)):
+        bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), budget=budget)
+        assert load(stipple, tmp_path / 'out.ply').count == count
+
+
+def test_the_size_is_estimated_well(stipple, tmp_path):
+    write_ply(stipple, tmp_path / 'in.ply', make_arrays(stipple, count=20000, degree=3))
+    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
+    exporting, formats = stipple.scene.exporting, stipple.scene.formats
+    form = formats.of_path('x.ply')
+    for degree in (0, 1, 3):
+        bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), max_degree=degree)
+        size = (tmp_path / 'out.ply').stat().st_size
+        assert abs(formats.estimated_bytes(form, 20000, degree) - size) < 0.01 * size + 2000
+
+    class Settings:
+        collection, use_selection, budget, max_degree, filepath = '', True, 'VIEWPORT', 3, 'x.ply'
+    assert exporting.size_label(bpy.context, Settings) == '20,000 splats, about 5.0 MB'
+
+
+def test_dialogs_and_file_handlers_know_the_formats_of_the_library(stipple):
+    formats = stipple.scene.formats
+    known = formats.all_formats()
+    assert sorted(formats.READ_ENDINGS) == sorted(e for f in known if f.can_read for e in f.endings)
+    assert sorted(formats.WRITE_ENDINGS) == sorted(e for f in known if f.can_write for e in f.endings)
+    assert formats.of_path('/a/B.PLY').name == 'ply' and formats.of_path('a.txt') is None
+    handler = getattr(bpy.types, 'STIPPLE_FH_splats', None)
+    assert (handler is not None) == (bpy.app.version >= (4, 1, 0))
+    if handler is not None:
+        assert set(handler.bl_file_extensions.split(';')) == {e for e in formats.READ_ENDINGS if e[0] == '.'}

@@ -20,7 +20,7 @@ def make_arrays(stipple, count=50, degree=2):
 def assert_equal(a, b):
     for name in ('positions', 'rotations', 'scales', 'opacities', 'sh'):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), name)
-    assert (a.colour_space, a.antialias) == (b.colour_space, b.antialias)
+    assert (a.colour_space, a.antialias, a.frame) == (b.colour_space, b.antialias, b.frame)
 
 
 @pytest.mark.parametrize('degree', [0, 1, 2, 3, 4])

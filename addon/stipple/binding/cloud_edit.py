@@ -14,7 +14,7 @@ from .errors import check, invalid
 from .handle import contiguous, matrix16, new_handle, pointer_to
 from .job import Job
 from .renderer import instance_array
-from .structs import (Side, StippleFloaterOptions, StippleFloaterReport, StippleGroundPlane,
+from .structs import (Frame, Side, StippleFloaterOptions, StippleFloaterReport, StippleGroundPlane,
                       StippleGroundPlaneOptions)
 
 
@@ -83,12 +83,13 @@ def keep(cloud, mask):
                                            len(mask)))
 
 
-def merge(instances):
-    """One cloud of [(cloud, 4x4 matrix)]."""
+def merge(instances, frame=Frame.UNKNOWN):
+    """One cloud of [(cloud, 4x4 matrix)]; frame: what the matrices lead to."""
     if not instances:
         raise invalid('There is nothing to merge; at least one cloud is needed.')
     library = instances[0][0].library
-    return Cloud(library, new_handle(library, 'stipple_cloud_merge', instance_array(instances), len(instances)))
+    return Cloud(library, new_handle(library, 'stipple_cloud_merge', instance_array(instances), len(instances),
+                                     int(frame)))
 
 
 def ground_plane(cloud, cloud_to_world, up=(0.0, 0.0, 1.0), max_tilt=None, tolerance=0.0, seed=0):

@@ -4,9 +4,10 @@
 import bpy
 from mathutils import Matrix
 
+from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene import edits, sources, sync
+from ..scene import edits, frames, sources, sync
 
 
 class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
@@ -34,7 +35,7 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
             moved = []
             for i, (target, matrix) in enumerate(wanted):
                 task.advance(i / len(wanted), 'Moving splats')
-                moved.append((target, target.cloud.transformed(matrix)))
+                moved.append((target, cloud_edit.merge([(target.cloud, matrix)], frames.WORLD)))
             return moved
         return Task(work)
 

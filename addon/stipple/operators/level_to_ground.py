@@ -32,17 +32,18 @@ class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.O
     def start(self, context):
         if self.use_points:
             self._matrix = cloud_edit.level_points(sources.context().library, self.points)
-            self._found = 'three points'
+            self._found, self._doubtful = 'three points', False
         else:
             cloud = sources.cloud_from_object(context.object)
             plane = cloud_edit.ground_plane(cloud, context.object.matrix_world, max_tilt=self.max_tilt, seed=self.seed)
             self._matrix = cloud_edit.matrix_of(plane)
             self._found = f'{plane.inlier_count:,} of {plane.considered_count:,} splats'
+            self._doubtful = plane.inlier_count < 0.03 * plane.considered_count
         return None
 
     def finish(self, context, _job):
         placement.move(placement.chosen(context), Matrix(self._matrix.tolist()))
-        self.report({'INFO'}, f'Leveled to the plane of {self._found}')
+        self.report({'WARNING' if self._doubtful else 'INFO'}, f'Leveled to the plane of {self._found}')
 
 
 classes = (STIPPLE_OT_level_to_ground,)

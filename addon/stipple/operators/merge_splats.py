@@ -33,12 +33,13 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
             raise invalid('One splat object is selected; select at least two.')
         self._objects = [active] + others
         inverse = np.linalg.inv(np.array(active.matrix_world))
-        instances = [(sources.shown_cloud(obj.data), inverse @ np.array(obj.matrix_world)) for obj in self._objects]
-        instances[0] = (instances[0][0], np.eye(4))  # to the bit
+        clouds = [sources.full_cloud(obj.data) for obj in self._objects]
+        matrices = [np.eye(4)] + [inverse @ np.array(obj.matrix_world) for obj in others]
+        frame = clouds[0].info().frame
 
         def work(task):
             task.advance(0.0, 'Merging splats')
-            return cloud_edit.merge(instances)
+            return cloud_edit.merge(list(zip(clouds, matrices)), frame)
         return Task(work)
 
     def finish(self, _context, job):

@@ -1,48 +1,97 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The active splat object becomes a file."""
+"""Splat objects become a file."""
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..binding.errors import invalid
-from ..jobs import JobOperator
-from ..scene import sources, splat_data
+from ..jobs import JobOperator, Task
+from ..preferences import UP_AXES
+from ..scene import exporting, formats, frames
 
-ENDINGS = ('.ply',)
+BUDGETS = (('VIEWPORT', "Viewport", "The splats that are shown now"),
+           ('RENDER', "Render", "The splats that renders show"),
+           ('FULL', "Full", "All splats of the source that are not hidden"))
 
 
 class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
-    """Export the active object's splats to a file"""
+    """Export splats to a file"""
 
     bl_idname = 'stipple.splats_export'
     bl_label = "Export Splats"
     bl_options = {'REGISTER', 'PRESET'}
 
-    filename_ext = '.ply'
-    filter_glob: StringProperty(default='*.ply', options={'HIDDEN'})
-    apply_transform: BoolProperty(name="Apply Transform", description="Write the splats where the object puts them, with "
-                                  "their harmonics turned; otherwise in the object's own space", default=True)
-    ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger", default=False)
+    filename_ext = formats.WRITE_ENDINGS[0]
+    check_extension = None  # several endings are right
+    filter_glob: StringProperty(default=formats.glob(formats.WRITE_ENDINGS), options={'HIDDEN'})
+    collection: StringProperty(name="Collection", description="Export the splats of this collection", default="",
+                               options={'HIDDEN'})
+    use_selection: BoolProperty(name="Selected Only", description="Export selected splats only, instead of all that are "
+                                "visible", default=True)
+    budget: EnumProperty(name="Budget", items=BUDGETS)
+    apply_transform: BoolProperty(name="Apply Transform", description="Write the splats where their objects put them, with "
+                                  "their harmonics turned; otherwise in the active object's own space", default=True)
+    up_axis: EnumProperty(name="Up Axis", description="Which way is up in the file, where the transform is applied",
+                          items=(('AUTO', "By Format", "As files of this format usually are"),) + UP_AXES[1:])
+    max_degree: IntProperty(name="Harmonics", description="Highest degree of the colors' harmonics that is written, 0 for "
+                            "colors that do not change with the view", default=4, min=0, max=4)
+    ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger (.ply)", default=False)
 
     @classmethod
     def poll(cls, context):
-        return splat_data.is_splat_object(context.object)
+        return exporting.any_splats(context)
+
+    def invoke(self, context, event):
+        if not self.filepath:
+            self.filepath = exporting.default_name(context) + self.filename_ext
+        return ExportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        return JobOperator.execute(self, context) if bpy.app.background else self.run_in_window(context)
+
+    def check(self, _context):
+        return False
 
     def start(self, context):
         path = bpy.path.abspath(self.filepath)
-        if not path.lower().endswith(ENDINGS):
-            raise invalid(f"'{path}' has an ending that is no splat format; allowed is {', '.join(ENDINGS)}.")
-        evaluated = context.object.evaluated_get(context.evaluated_depsgraph_get())
-        cloud = sources.cloud_from_object(evaluated)
-        if self.apply_transform:
-            cloud = cloud.transformed(evaluated.matrix_world)
-        cloud.save(path, ascii=self.ascii)
-        self._count = cloud.info().count
-        return None
+        form = formats.of_path(path)
+        if form is None or not form.can_write:
+            raise invalid(f"'{path}' has an ending that is no splat format to write; allowed are "
+                          f"{', '.join(formats.WRITE_ENDINGS)}.")
+        objects = exporting.chosen(context, self.collection, self.use_selection)
+        clouds = exporting.placed_clouds(context, objects, self.budget, self.apply_transform)
+        options = {'ascii': self.ascii, 'sh_degree_limit': self.max_degree}
+        if self.apply_transform and self.up_axis != 'AUTO':
+            options['frame'] = frames.UP_AXES[self.up_axis]
 
-    def finish(self, _context, _job):
-        self.report({'INFO'}, f"{self._count:,} splats written to '{self.filepath}'")
+        def work(task):
+            task.advance(0.0, 'Joining splats')
+            cloud = exporting.joined(clouds)
+            task.advance(0.3, 'Writing splats')
+            cloud.save(path, **options)
+            return cloud.info().count
+        return Task(work)
+
+    def finish(self, _context, job):
+        self.report({'INFO'}, f"{job.result:,} splats written to '{self.filepath}'")
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        if not self.collection:
+            layout.prop(self, 'use_selection')
+        layout.prop(self, 'budget')
+        layout.prop(self, 'apply_transform')
+        row = layout.row()
+        row.enabled = self.apply_transform
+        row.prop(self, 'up_axis')
+        layout.prop(self, 'max_degree')
+        if self.filepath.lower().endswith('.ply'):
+            layout.prop(self, 'ascii')
+        layout.label(text=exporting.size_label(context, self))
 
 
 classes = (STIPPLE_OT_splats_export,)

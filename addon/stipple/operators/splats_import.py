@@ -1,51 +1,116 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A splat file becomes a splat object, bit for bit."""
+"""Splat files become splat objects, bit for bit."""
 
 import os
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 from mathutils import Matrix
 
+from .. import preferences, version
 from ..binding.cloud import Cloud
-from ..jobs import JobOperator
-from ..scene import sources, splat_data, sync
+from ..binding.errors import StippleError
+from ..jobs import JobOperator, Task
+from ..scene import formats, frames, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
-    """Import Gaussian splats from a file"""
+    """Import Gaussian splats from files"""
 
     bl_idname = 'stipple.splats_import'
     bl_label = "Import Splats"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
-    filename_ext = '.ply'
-    filter_glob: StringProperty(default='*.ply', options={'HIDDEN'})
-    up_axis: bpy.props.EnumProperty(
-        name="Up Axis", description="Which way is up in the file; the object is turned, its data stay as they are",
-        items=(('Z', "Z Up", "As in Blender"), ('-Y', "-Y Up", "As most captured scenes, the frame of their first camera"),
-               ('Y', "Y Up", "As in glTF and most game engines")), default='Z')
+    filename_ext = formats.READ_ENDINGS[0]
+    filter_glob: StringProperty(default=formats.glob(formats.READ_ENDINGS), options={'HIDDEN'})
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
+    directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
+    up_axis: EnumProperty(name="Up Axis", description="Which way is up in the files; objects are turned, their data stay "
+                          "as they are", items=preferences.UP_AXES)
+
+    _asked = False
+
+    def invoke(self, context, event):
+        if self.directory and self.files:  # dropped into a window
+            return self.run_in_window(context)
+        self._asked = True
+        return ImportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        if self._asked and not bpy.app.background:
+            self._remember()
+            return self.run_in_window(context)
+        return JobOperator.execute(self, context)
 
     def start(self, _context):
-        self._splats = Cloud.load(sources.context(), bpy.path.abspath(self.filepath)).read()
-        return None
+        native, paths = sources.context(), self._paths()
 
-    def finish(self, context, _job):
-        name = os.path.splitext(os.path.basename(self.filepath))[0]
-        data = splat_data.new_data(name)
-        data.stipple.source = sources.blend_path(bpy.path.abspath(self.filepath))
-        data.stipple.source_kind = 'CLOUD'
-        sync.write(data, self._splats, '')
-        obj = splat_data.new_object(name, data)
-        turn = {'Z': 0.0, '-Y': -1.5707963267948966, 'Y': 1.5707963267948966}[self.up_axis]
-        obj.matrix_world = Matrix.Rotation(turn, 4, 'X')
-        context.collection.objects.link(obj)
+        def work(task):
+            loaded, failed = [], []
+            for i, path in enumerate(paths):
+                task.advance(i / len(paths), f'Reading {os.path.basename(path)}')
+                try:
+                    loaded.append((path, Cloud.load(native, path).read()))
+                except StippleError as error:
+                    failed.append(error)
+            if not loaded:
+                raise failed[0]
+            return loaded, failed
+        return Task(work)
+
+    def finish(self, context, job):
+        loaded, failed = job.result
         for other in list(context.view_layer.objects.selected):
             other.select_set(False)
-        obj.select_set(True)
-        context.view_layer.objects.active = obj
-        self.report({'INFO'}, f"{self._splats.count:,} splats in '{obj.name}'")
+        for path, splats in loaded:
+            obj = self._object(path, splats)
+            context.collection.objects.link(obj)
+            obj.select_set(True)
+            context.view_layer.objects.active = obj
+        for error in failed:
+            self.report({'WARNING'}, str(error))
+        total = sum(splats.count for _, splats in loaded)
+        where = f"'{obj.name}'" if len(loaded) == 1 else f'{len(loaded)} objects'
+        self.report({'INFO'}, f'{total:,} splats in {where}')
+
+    def _object(self, path, splats):
+        name = os.path.basename(path)
+        form = formats.of_path(path)
+        ending = next((e for e in form.endings if name.lower().endswith(e)), '') if form else os.path.splitext(name)[1]
+        data = splat_data.new_data(name[:len(name) - len(ending)])
+        with sync.paused():
+            sources.attach_cloud(data, path)
+        sync.write(data, splats, '')
+        obj = splat_data.new_object(data.name, data)
+        axis = self.up_axis if self.up_axis != 'AUTO' or form is None else preferences.up_axis(form.name)
+        frame = splats.frame if axis == 'AUTO' else frames.UP_AXES[axis]
+        obj.matrix_world = Matrix(frames.to_world(frame).tolist())
+        return obj
+
+    def _paths(self):
+        if self.directory and self.files:
+            return [os.path.join(bpy.path.abspath(self.directory), entry.name) for entry in self.files]
+        return [bpy.path.abspath(self.filepath)]
+
+    def _remember(self):
+        """What the dialog was left with is the next default of its files' formats."""
+        for form in {formats.of_path(path) for path in self._paths()} - {None}:
+            if self.up_axis != 'AUTO':
+                preferences.remember_up_axis(form.name, self.up_axis)
 
 
 classes = (STIPPLE_OT_splats_import,)
+if version.HAS_FILE_HANDLERS:
+    class STIPPLE_FH_splats(bpy.types.FileHandler):
+        bl_idname = 'STIPPLE_FH_splats'
+        bl_label = "Gaussian Splats"
+        bl_import_operator = 'stipple.splats_import'
+        bl_export_operator = 'stipple.splats_export'
+        bl_file_extensions = ';'.join(ending for ending in formats.READ_ENDINGS if ending.startswith('.'))
+
+        @classmethod
+        def poll_drop(cls, context):
+            return context.area is not None and context.area.type in {'VIEW_3D', 'OUTLINER'}
+
+    classes += (STIPPLE_FH_splats,)

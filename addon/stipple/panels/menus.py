@@ -52,11 +52,11 @@ def _draw_convert(self, _context):
 
 
 def _draw_import(self, _context):
-    self.layout.operator('stipple.splats_import', text="Gaussian Splats (.ply)")
+    self.layout.operator('stipple.splats_import', text="Gaussian Splats")
 
 
 def _draw_export(self, _context):
-    self.layout.operator('stipple.splats_export', text="Gaussian Splats (.ply)")
+    self.layout.operator('stipple.splats_export', text="Gaussian Splats")
 
 
 _MENUS = (('VIEW3D_MT_add', _draw_add), ('VIEW3D_MT_object_convert', _draw_convert),

@@ -101,12 +101,22 @@ def whole_cloud(data):
     return Cloud.load(context(), absolute_path(data.stipple.source, data))
 
 
-def shown_cloud(data):
-    """The splats of a datablock at full count: the whole source without what is masked, or what is stored where the
-    source has no count of its own."""
-    if data.stipple.source_kind == 'CLOUD' and not data.stipple.edited:
-        return masked(whole_cloud(data), data)
-    return Cloud.create(context(), splat_data.read(data))
+def full_cloud(data):
+    """A datablock at full count: the whole source without what is hidden, splats of meshes at the render budget, and
+    what is stored where there is no source."""
+    stipple = data.stipple
+    if stipple.source_kind == 'NONE' or stipple.edited:
+        return Cloud.create(context(), splat_data.read(data))
+    return decode_data(data, decode_settings(stipple, 'RENDER'))
+
+
+def count_of(data, budget):
+    """Splats of a datablock at the budget 'RENDER' or 'FULL', without decoding."""
+    stipple = data.stipple
+    if stipple.source_kind == 'MODEL' and not stipple.edited:
+        settings = decode_settings(stipple, 'RENDER')
+        return settings.anchors * settings.gaussians_per_anchor
+    return splat_data.count(data)
 
 
 def masked(cloud, data):
@@ -154,7 +164,8 @@ def save_model(built, path, overwrite=False):
 def save_cloud(cloud, name):
     """Writes splats as a source of their own, beside the other sources; returns the path."""
     path = model_path_for(name)[:-len(MODEL_SUFFIX)] + '.ply'
-    return _save(cloud.save, path, '.ply', False)
+    # In its own frame: the source is what the object shows, number by number.
+    return _save(lambda to: cloud.save(to, frame=cloud.info().frame), path, '.ply', False)
 
 
 def attach_cloud(data, path):

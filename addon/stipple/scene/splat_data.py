@@ -15,12 +15,13 @@ import numpy as np
 from .. import version
 from ..binding.cloud import SplatArrays, sh_degree_of
 from ..binding.errors import StippleError
-from ..binding.structs import Antialias, ColourSpace, Status
+from ..binding.structs import Antialias, ColourSpace, Frame, Status
 
 LAYOUT_KEY = 'stipple_layout'
 LAYOUT = 1
 COLOUR_SPACE_KEY = 'stipple_colour_space'
 ANTIALIAS_KEY = 'stipple_antialias'
+FRAME_KEY = 'stipple_frame'
 _COLOUR_SPACES = {ColourSpace.DISPLAY: 'srgb_rec709_display', ColourSpace.LINEAR: 'lin_rec709_display'}
 _ANTIALIAS = {Antialias.CLASSIC: 'classic', Antialias.MIP: 'mip'}
 # Smallest scale that is stored, metres: viewers take logarithms, of which zero has none.
@@ -66,6 +67,11 @@ def count(data):
     return len(data.vertices) if isinstance(data, bpy.types.Mesh) else len(data.points)
 
 
+def degree(data):
+    """The degree of the harmonics that a datablock stores."""
+    return sh_degree_of(1 + sum(a.name.startswith('radiance:sh_') for a in data.attributes))
+
+
 def write(data, arrays):
     """Replaces the splats of a datablock."""
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
@@ -91,6 +97,7 @@ def write(data, arrays):
     data[LAYOUT_KEY] = LAYOUT
     data[COLOUR_SPACE_KEY] = _COLOUR_SPACES[ColourSpace(arrays.colour_space)]
     data[ANTIALIAS_KEY] = _ANTIALIAS[Antialias(arrays.antialias)]
+    data[FRAME_KEY] = Frame(arrays.frame).name
     if isinstance(data, bpy.types.Mesh):
         data.update()
     data.update_tag()
@@ -120,7 +127,8 @@ def read(data, original=None):
         sh[:, i + 1] = _get(data, f'radiance:sh_{i}', n, 3).reshape(n, 3)
     return SplatArrays(positions.reshape(n, 3), rotations.reshape(n, 4), scales.reshape(n, 3), base[:, 3].copy(), sh,
                        _key_of(_COLOUR_SPACES, marked.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
-                       _key_of(_ANTIALIAS, marked.get(ANTIALIAS_KEY), Antialias.CLASSIC))
+                       _key_of(_ANTIALIAS, marked.get(ANTIALIAS_KEY), Antialias.CLASSIC),
+                       Frame.__members__.get(marked.get(FRAME_KEY), Frame.UNKNOWN))
 
 
 def fingerprint(data):

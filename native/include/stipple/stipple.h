@@ -230,7 +230,7 @@ StippleStatus stipple_format_count(uint64_t* count);
 StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info);
 
 /* The cloud moved by an affine matrix: covariances become M C M^T, harmonics turn (and mirror) with the
- * orthogonal part of M's polar decomposition. Pictures equal those of an instance with that matrix, except
+ * orthogonal part of M's polar decomposition; the frame's label stays. Pictures equal those of an instance with that matrix, except
  * that colours above degree 0 do not follow uneven scale and shear. Errors: INVALID_ARGUMENT for a matrix
  * that is singular or not affine. */
 StippleStatus stipple_cloud_transform(const StippleCloud* cloud, const double matrix[16],
@@ -560,9 +560,10 @@ StippleStatus stipple_cloud_select_floaters_start(const StippleCloud* cloud,
 StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask, uint64_t mask_count,
                                  StippleCloud** kept);
 /* One cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity keeps
- * every bit), harmonics padded to the highest degree. Errors: UNSUPPORTED where colour spaces or antialias
- * flags differ. */
-StippleStatus stipple_cloud_merge(const StippleInstance* instances, uint64_t count, StippleCloud** merged);
+ * every bit), harmonics padded to the highest degree. frame: StippleFrame that the matrices lead to, the label
+ * of the result. Errors: UNSUPPORTED where colour spaces or antialias flags differ. */
+StippleStatus stipple_cloud_merge(const StippleInstance* instances, uint64_t count, uint32_t frame,
+                                  StippleCloud** merged);
 
 typedef struct StippleGroundPlaneOptions {
   uint32_t struct_size;

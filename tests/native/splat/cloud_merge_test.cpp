@@ -29,9 +29,10 @@ TEST(CloudMerge, MakesThePictureOfItsPartsTogether) {
   instances[1].cloud = &b;
   instances[1].object_to_world(0, 3) = 0.4;
   instances[1].object_to_world(2, 2) = -1;  // mirrored
-  const SplatCloud both = merged(instances);
+  const SplatCloud both = merged(instances, Frame::kRFU);
   ASSERT_EQ(both.size(), 80u);
   EXPECT_EQ(both.sh_degree, 3);
+  EXPECT_EQ(both.frame, Frame::kRFU);
   SplatInstance whole;
   whole.cloud = &both;
   const Camera camera = testing::frontCamera(48, 48, 40, 6);
@@ -49,7 +50,7 @@ TEST(CloudMerge, KeepsBitsAndPadsHarmonicsWithZeros) {
   std::vector<SplatInstance> instances(2);
   instances[0].cloud = &a;
   instances[1].cloud = &b;
-  const SplatCloud both = merged(instances);
+  const SplatCloud both = merged(instances, Frame::kRFU);
   const size_t stride = both.shStride();
   for (size_t i = 0; i < a.size(); ++i) {
     for (size_t c = 0; c < stride; ++c) {
@@ -74,7 +75,7 @@ TEST(CloudMerge, RefusesCloudsThatDisagreeAndSaysHow) {
     instances[0].cloud = &a;
     instances[1].cloud = other;
     try {
-      merged(instances);
+      merged(instances, Frame::kRFU);
       FAIL() << text;
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::kUnsupported);
@@ -84,12 +85,12 @@ TEST(CloudMerge, RefusesCloudsThatDisagreeAndSaysHow) {
 }
 
 TEST(CloudMerge, OfNothingIsEmpty) {
-  EXPECT_EQ(merged({}).size(), 0u);
+  EXPECT_EQ(merged({}, Frame::kUnknown).size(), 0u);
   const SplatCloud empty;
   std::vector<SplatInstance> instances(2);
   instances[0].cloud = &empty;
   instances[1].cloud = &empty;
-  EXPECT_EQ(merged(instances).size(), 0u);
+  EXPECT_EQ(merged(instances, Frame::kRFU).size(), 0u);
 }
 
 }  // namespace

@@ -54,12 +54,14 @@ TEST(CloudSelection, KeepsRowsBitForBitInTheirOrder) {
   recipe.degree = 2;
   recipe.antialias = Antialias::kMip;
   recipe.colour_space = ColourSpace::kLinear;
-  const SplatCloud cloud = randomCloud(recipe, 1);
+  SplatCloud cloud = randomCloud(recipe, 1);
+  cloud.frame = Frame::kRUB;
   const std::vector<uint8_t> mask = {0, 1, 0, 0, 1, 255, 0, 0, 1};
   const SplatCloud left = kept(cloud, mask);
   ASSERT_EQ(left.size(), 4u);
   EXPECT_EQ(left.antialias, cloud.antialias);
   EXPECT_EQ(left.colour_space, cloud.colour_space);
+  EXPECT_EQ(left.frame, Frame::kRUB);
   const size_t rows[] = {1, 4, 5, 8};
   const size_t stride = cloud.shStride();
   ASSERT_EQ(left.sh.size(), 4 * stride);
