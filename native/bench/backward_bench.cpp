@@ -33,49 +33,74 @@ struct Loss {
     for (float& value : gradient) value = uniform(random);
     for (float& value : residual) value = 0.1f * uniform(random);
   }
-  BackwardInput input(BackwardMode mode) const {
+  BackwardInput input(BackwardWants wants) const {
     BackwardInput input;
     input.colour_gradient = gradient;
-    if (mode != BackwardMode::kGradients) input.residual = residual;
-    if (mode == BackwardMode::kStatistics) {
+    if (wants.depth) input.depth_gradient = std::span(residual).first(residual.size() / 3);
+    if (wants.mode != BackwardMode::kGradients) input.residual = residual;
+    if (wants.mode == BackwardMode::kStatistics) {
       input.with_blending_weights = input.with_screen_gradients = true;
     }
     return input;
   }
 };
 
-void takeOffAll(const SplatCase& c, const BackwardKernel& kernel, const BackwardInput& input,
-                unsigned threads) {
+RenderWorkspace& workspaceOf() {
+  static RenderWorkspace workspace;
+  workspace.keepForBackward(true);
+  return workspace;
+}
+
+RenderResult& pictureOf() {
+  static RenderResult picture;
+  return picture;
+}
+
+/// As in training: the memory of the last step serves the next.
+struct Step {
+  BackwardWorkspace workspace;
+  BackwardResult result;
+};
+Step& stepMemory() {
+  static Step step;
+  return step;
+}
+
+/// The call from nothing.
+void fromNothing(const SplatCase& c, const BackwardInput& input) {
   const SplatInstance instance{&cloudOf(c)};
-  withThreads(threads, [&] {
-    // As in training: the memory of the last step serves the next.
-    static BackwardWorkspace workspace;
-    static BackwardResult result;
-    renderBackwardWith(kernel, {&instance, 1}, cameraOf(c), {}, input, workspace, result);
-    benchmark::DoNotOptimize(result.camera.data());
+  withThreads(2, [&] {
+    renderBackward({&instance, 1}, cameraOf(c), {}, input, stepMemory().workspace,
+                   stepMemory().result);
   });
 }
 
-void draw(const SplatCase& c) {
+void draw(const SplatCase& c, unsigned threads) {
   const SplatInstance instance{&cloudOf(c)};
-  withThreads(2, [&] {
-    static RenderWorkspace workspace;
-    static RenderResult picture;
-    renderTiled({&instance, 1}, cameraOf(c), {}, workspace, picture);
-    benchmark::DoNotOptimize(picture.colour.data());
+  withThreads(threads, [&] {
+    renderTiled({&instance, 1}, cameraOf(c), {}, workspaceOf(), pictureOf());
+  });
+}
+
+/// The call of a step of training, after `draw`.
+void goBack(const BackwardInput& input, unsigned threads) {
+  withThreads(threads, [&] {
+    renderBackward(workspaceOf(), pictureOf(), input, stepMemory().workspace, stepMemory().result);
   });
 }
 
 /// The two loops alone, one thread, splats made ready outside the clock.
 struct LoopTimes {
-  double mark = 1e300;  ///< seconds
+  double blend = 1e300;  ///< seconds, front to back
   double take_off = 1e300;
   double listed = 0;  ///< pixel-splat pairs of the lists
   double blended = 0;
 };
 
+void neverAsked(const void*, size_t, uint32_t, BackwardPixels&, float*) {}
+
 LoopTimes measureLoops(const SplatCase& c, const BackwardKernel& kernel, const Loss& loss,
-                       BackwardMode mode) {
+                       BackwardWants wants) {
   const SplatInstance instance{&cloudOf(c)};
   RenderOptions options;
   options.with_counts = true;
@@ -86,27 +111,30 @@ LoopTimes measureLoops(const SplatCase& c, const BackwardKernel& kernel, const L
   const PlacedScene scene = placeScene({&instance, 1}, cameraOf(c), {});
   const VisibleSplats visible = findVisibleSplats(scene, nullptr);
   const TileGrid grid(c.width, c.height);
+  const auto blended = std::make_unique<TilePixels>();
   const auto pixels = std::make_unique<BackwardPixels>();
-  std::vector<BackwardSplat> splats;
+  std::vector<TileSplat> splats;
   std::vector<float> sums;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    double mark = 0;
+    double blend = 0;
     double take_off = 0;
     times.listed = 0;
     forEachTileGroup(visible, grid, nullptr, [&](const TileListGroup& group) {
       for (size_t index = group.first_tile; index < group.end_tile; ++index) {
         const Tile tile = tileOf(grid, index, group.tile(index));
-        splats.clear();
-        for (const uint32_t i : tile.splats) {
-          splats.push_back({makeTileSplat(visible.splats[i], tile), 0});
-        }
-        sums.resize(splats.size() * backwardFieldCount(mode));
+        splats.resize(tile.splats.size());
+        float largest = 0;
+        makeTileSplats(visible.splats.get(), tile, 0, splats.size(), largest, splats.data());
+        sums.resize(splats.size() * backwardFieldCount(wants));
+        clearPixels(tile, *blended);
+        blend += secondsOf([&] {
+          kernel.blend(splats.data(), splats.size(), {true, false}, *blended);
+        });
         *pixels = {};
         for (uint32_t i = 0; i < kTilePixelCount; ++i) {
-          const bool inside = i % kTileSide < tile.width && i / kTileSide < tile.height;
-          pixels->transmittance[i] = 1.0f;
-          pixels->cut[i] = inside ? kLog2MinAlpha : kFinished;
-          pixels->last[i] = -1;
+          pixels->transmittance[i] = blended->transmittance[i];
+          pixels->end[i] = blended->end[i];
+          pixels->row_end[i / kTileSide] = std::max(pixels->row_end[i / kTileSide], pixels->end[i]);
           for (size_t channel = 0; channel < 4; ++channel) {
             pixels->gradient[channel][i] = loss.gradient[i * 4 + channel];
           }
@@ -116,80 +144,87 @@ LoopTimes measureLoops(const SplatCase& c, const BackwardKernel& kernel, const L
             pixels->room[channel][i] = 2.0f * std::abs(residual);
           }
         }
-        pixels->unfinished = tile.width * tile.height;
-        mark += secondsOf([&] { kernel.mark(splats.data(), splats.size(), 0, *pixels); });
-        take_off += secondsOf(
-            [&] { kernel.take_off(splats.data(), splats.size(), 0, mode, *pixels, sums.data()); });
+        const int32_t most = *std::max_element(pixels->row_end, pixels->row_end + kTileSide);
+        const size_t used = std::min(splats.size(), static_cast<size_t>(most));
+        take_off += secondsOf([&] {
+          kernel.take_off(splats.data(), used, {wants, 0, neverAsked, nullptr}, *pixels,
+                          sums.data());
+        });
         times.listed += static_cast<double>(splats.size()) * kTilePixelCount;
       }
     });
-    times.mark = std::min(times.mark, mark);
+    times.blend = std::min(times.blend, blend);
     times.take_off = std::min(times.take_off, take_off);
   }
   return times;
 }
 
-/// The whole call over its two loops on the same lists, and over a forward call in the same run.
-void againstFloor(benchmark::State& state, const SplatCase& c, BackwardMode mode) {
+/// Both calls over their loops on the same lists. The call of a step of training goes back from the
+/// picture that was drawn: its loop is the one that takes splats off. The call from nothing blends
+/// first, so both loops are its floor, as they are of a drawing and a call after it.
+void againstFloor(benchmark::State& state, const SplatCase& c, BackwardWants wants) {
   const Loss loss(c);
-  const BackwardInput input = loss.input(mode);
-  const BackwardKernel& kernel = chosenBackwardKernel();
-  takeOffAll(c, kernel, input, 2);
-  draw(c);
-  double best = 1e300;
+  const BackwardInput input = loss.input(wants);
+  fromNothing(c, input);
+  draw(c, 2);
+  goBack(input, 2);
+  double alone = 1e300;
   double forward = 1e300;
+  double backward = 1e300;
   for (auto step : state) {
     (void)step;
-    forward = std::min(forward, secondsOf([&] { draw(c); }));
-    const double seconds = secondsOf([&] { takeOffAll(c, kernel, input, 2); });
-    best = std::min(best, seconds);
+    alone = std::min(alone, secondsOf([&] { fromNothing(c, input); }));
+    forward = std::min(forward, secondsOf([&] { draw(c, 2); }));
+    const double seconds = secondsOf([&] { goBack(input, 2); });
+    backward = std::min(backward, seconds);
     state.SetIterationTime(seconds);
   }
-  const LoopTimes loops = measureLoops(c, kernel, loss, mode);
-  const double floor = (loops.mark + loops.take_off) / 2;
-  state.counters["best_ms"] = 1e3 * best;
-  state.counters["forward_ms"] = 1e3 * forward;
-  state.counters["mark_1_thread_ms"] = 1e3 * loops.mark;
+  const LoopTimes loops = measureLoops(c, chosenBackwardKernel(), loss, wants);
+  state.counters["after_drawing_ms"] = 1e3 * backward;
+  state.counters["from_nothing_ms"] = 1e3 * alone;
+  state.counters["drawing_ms"] = 1e3 * forward;
+  state.counters["blend_1_thread_ms"] = 1e3 * loops.blend;
   state.counters["take_off_1_thread_ms"] = 1e3 * loops.take_off;
   state.counters["ns_per_listed_pair"] = 1e9 * loops.take_off / loops.listed;
   state.counters["ns_per_blended_pair"] = 1e9 * loops.take_off / loops.blended;
-  state.counters["ratio_floor"] = best / floor;
-  state.counters["limit_floor"] = 2.0;
-  state.counters["ratio_forward"] = best / forward;
-  if (mode == BackwardMode::kContributions) {
-    const LoopTimes plain = measureLoops(c, kernel, loss, BackwardMode::kGradients);
-    state.counters["ratio_ns_more_per_listed_pair"] =
-        1e9 * (loops.take_off - plain.take_off) / loops.listed;
+  state.counters["ratio_after_drawing"] = backward / (loops.take_off / 2);
+  state.counters["limit_after_drawing"] = 2.0;
+  state.counters["ratio_from_nothing"] = alone / ((loops.blend + loops.take_off) / 2);
+  state.counters["ratio_drawing_and_after"] =
+      (forward + backward) / ((loops.blend + loops.take_off) / 2);
+  if (wants.mode == BackwardMode::kContributions) {
+    const LoopTimes plain =
+        measureLoops(c, chosenBackwardKernel(), loss, {BackwardMode::kGradients, false});
+    const double more = 1e9 * (loops.take_off - plain.take_off);
+    state.counters["ratio_ns_more_per_listed_pair"] = more / loops.listed;
     state.counters["limit_ns_more_per_listed_pair"] = 0.40;
-    state.counters["ns_more_per_blended_pair"] =
-        1e9 * (loops.take_off - plain.take_off) / loops.blended;
+    state.counters["ratio_ns_more_per_blended_pair"] = more / loops.blended;
   }
 }
 
 void againstOneThread(benchmark::State& state, const SplatCase& c) {
   const Loss loss(c);
-  const BackwardInput input = loss.input(BackwardMode::kGradients);
-  cloudOf(c);
+  const BackwardInput input = loss.input({BackwardMode::kGradients, false});
+  draw(c, 2);
   compare(
-      state, "one_thread", 1.8, [&] { takeOffAll(c, chosenBackwardKernel(), input, 2); },
-      [&] { takeOffAll(c, chosenBackwardKernel(), input, 1); });
+      state, "one_thread", 1.8, [&] { goBack(input, 2); }, [&] { goBack(input, 1); });
 }
 
-/// AVX2 over the best instruction set, the loops alone.
+/// AVX2 over the best instruction set, the loop alone.
 void againstNarrow(benchmark::State& state, const SplatCase& c) {
   const Loss loss(c);
   const BackwardKernel wide = chosenBackwardKernel();
   for (const BackwardKernel& narrow : backwardKernels()) {
-    if (std::string(narrow.target) != "AVX2" || narrow.mark == wide.mark) continue;
+    if (std::string(narrow.target) != "AVX2" || narrow.take_off == wide.take_off) continue;
     double wide_seconds = 1e300;
     double narrow_seconds = 1e300;
     for (auto step : state) {
       (void)step;
-      const LoopTimes a = measureLoops(c, wide, loss, BackwardMode::kGradients);
-      const LoopTimes b = measureLoops(c, narrow, loss, BackwardMode::kGradients);
-      wide_seconds = std::min(wide_seconds, a.mark + a.take_off);
-      narrow_seconds = std::min(narrow_seconds, b.mark + b.take_off);
-      state.SetIterationTime(b.mark + b.take_off);
+      const LoopTimes a = measureLoops(c, wide, loss, {BackwardMode::kGradients, false});
+      const LoopTimes b = measureLoops(c, narrow, loss, {BackwardMode::kGradients, false});
+      wide_seconds = std::min(wide_seconds, a.take_off);
+      narrow_seconds = std::min(narrow_seconds, b.take_off);
+      state.SetIterationTime(b.take_off);
     }
     state.counters["best_ms"] = 1e3 * wide_seconds;
     state.counters["avx2_ms"] = 1e3 * narrow_seconds;
@@ -211,10 +246,14 @@ void add(const std::string& name, int iterations, Arguments... arguments) {
 const bool registered = [] {
   for (const SplatCase& c : kCases) {
     const std::string name = c.name;
-    add("splat.backward." + name, kRepeats, againstFloor, c, BackwardMode::kGradients);
+    add("splat.backward." + name, kRepeats, againstFloor, c,
+        BackwardWants{BackwardMode::kGradients, false});
+    add("splat.backward_depth." + name, kRepeats, againstFloor, c,
+        BackwardWants{BackwardMode::kGradients, true});
     add("splat.backward_contributions." + name, kRepeats, againstFloor, c,
-        BackwardMode::kContributions);
-    add("splat.backward_statistics." + name, kRepeats, againstFloor, c, BackwardMode::kStatistics);
+        BackwardWants{BackwardMode::kContributions, false});
+    add("splat.backward_statistics." + name, kRepeats, againstFloor, c,
+        BackwardWants{BackwardMode::kStatistics, false});
     add("splat.backward_2_threads." + name, kRepeats, againstOneThread, c);
     add("splat.backward_avx2." + name, 1, againstNarrow, c);
   }

@@ -26,6 +26,13 @@ enum class BackwardMode : uint32_t {
   kStatistics = 2,     ///< and every other statistic
 };
 
+struct BackwardWants {
+  BackwardMode mode;
+  bool depth;  ///< the loss depends on the expected depth too
+
+  bool operator==(const BackwardWants&) const = default;
+};
+
 /// Sums over pixels that one splat has, in this order. With g the offset from the centre such that
 /// alpha = o 2^(-|g|^2), and s = alpha dL/dalpha where alpha is not held at 0.99.
 enum BackwardField : size_t {
@@ -49,12 +56,18 @@ enum BackwardField : size_t {
   kFieldError,
   kFieldLargestError,  ///< a maximum, not a sum
   kStatisticsFieldCount,
+  kMostFields,  ///< with depth
 };
 
-constexpr size_t backwardFieldCount(BackwardMode mode) {
+/// Of the sums before dL/d(depth of the splat), which comes last where it is wanted.
+constexpr size_t fieldCountOf(BackwardMode mode) {
   return mode == BackwardMode::kGradients       ? kGradientFieldCount
          : mode == BackwardMode::kContributions ? kContributionFieldCount
                                                 : kStatisticsFieldCount;
+}
+
+constexpr size_t backwardFieldCount(BackwardWants wants) {
+  return fieldCountOf(wants.mode) + (wants.depth ? 1 : 0);
 }
 
 /// 2 ln 2: q = d^T C^-1 d is this times |g|^2.
@@ -68,13 +81,16 @@ struct SplatAtPixel {
   T g0, g1;
   T l00, l10, l11;  ///< g = l d, d in pixels
   T colour[3];
+  T depth;
 };
 
 /// The loss at one pixel. With R the residual and w its weight: signed_weight = w sign(R), room =
 /// 2 w |R|.
 template <typename T>
 struct PixelLoss {
-  T gradient[4];  ///< dL/d(red, green, blue, alpha)
+  T gradient[4];     ///< dL/d(red, green, blue, alpha)
+  T depth;           ///< the pixel's expected depth
+  T depth_gradient;  ///< dL/d(that) over the pixel's coverage
   T signed_weight[3];
   T room[3];
   T edge;
@@ -86,15 +102,8 @@ template <typename T>
 struct PixelBackward {
   T transmittance;     ///< before the splat that was taken off last
   T behind;            ///< (colour behind).dL/dC
-  T colour_behind[3];  ///< kept for contributions only
+  T signed_behind[3];  ///< colour behind times signed_weight; kept for contributions only
 };
-
-/// w (|R| - |R - dC|) of one channel without cancellation: -w |dC| <= result <= w |R|.
-template <typename T>
-T contributionOf(T signed_weight, T room, T colour_change) {
-  const T change = signed_weight * colour_change;
-  return std::min(change, room - change);
-}
 
 /// sqrt(a^2 + b^2) for a, b >= 0 without squares that could leave the range of T.
 template <typename T>
@@ -104,14 +113,21 @@ T lengthOf(T a, T b) {
   return larger * std::sqrt(T(1) + ratio * ratio);
 }
 
-/// Takes one splat off the pixel and adds to its sums [backwardFieldCount(mode)].
+/// Takes one splat off the pixel and adds to its sums [backwardFieldCount(wants)].
+///
+/// With D = sum(w z)/A, A = 1 - T the coverage, dD = (sum(z dw) - D sum(dw))/A: depth is a fourth
+/// colour z - D over nothing, whose derivative is dL/dD / A.
 template <typename T>
-void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardMode mode,
+void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardWants wants,
              PixelBackward<T>& pixel, T* sums) {
   pixel.transmittance /= T(1) - splat.alpha;
   const T weight = pixel.transmittance * splat.alpha;
   T own = loss.gradient[3];
   for (int c = 0; c < 3; ++c) own += splat.colour[c] * loss.gradient[c];
+  if (wants.depth) {
+    own += (splat.depth - loss.depth) * loss.depth_gradient;
+    sums[backwardFieldCount(wants) - 1] += weight * loss.depth_gradient;
+  }
   const T difference = own - pixel.behind;
   pixel.behind += splat.alpha * difference;
   const T s = splat.held ? T(0) : weight * difference;
@@ -122,14 +138,17 @@ void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardMod
   sums[kFieldG01] += s * splat.g0 * splat.g1;
   sums[kFieldG11] += s * splat.g1 * splat.g1;
   for (size_t c = 0; c < 3; ++c) sums[kFieldRed + c] += weight * loss.gradient[c];
-  if (mode == BackwardMode::kGradients) return;
+  if (wants.mode == BackwardMode::kGradients) return;
 
+  // w (|R| - |R - dC|) per channel without cancellation: with x = w sign(R) dC it is
+  // min(x, 2 w |R| - x), so -w |dC| <= result <= w |R|.
   for (int c = 0; c < 3; ++c) {
-    const T over = splat.colour[c] - pixel.colour_behind[c];
-    sums[kFieldContribution] += contributionOf(loss.signed_weight[c], loss.room[c], weight * over);
-    pixel.colour_behind[c] += splat.alpha * over;
+    const T over = loss.signed_weight[c] * splat.colour[c] - pixel.signed_behind[c];
+    const T change = weight * over;
+    sums[kFieldContribution] += std::min(change, loss.room[c] - change);
+    pixel.signed_behind[c] += splat.alpha * over;
   }
-  if (mode == BackwardMode::kContributions) return;
+  if (wants.mode == BackwardMode::kContributions) return;
 
   const T by_x = T(kSquaredGScale) * s * (splat.g0 * splat.l00 + splat.g1 * splat.l10);
   const T by_y = T(kSquaredGScale) * s * (splat.g1 * splat.l11);

@@ -29,6 +29,11 @@ struct BackwardInput {
   std::span<const float> errors;
   bool with_blending_weights = false;
   bool with_screen_gradients = false;
+  /// [H,W] dL/d(expected depth), per metre, of RenderResult::depth. Empty: the loss does not depend
+  /// on it. Where nothing covers a pixel it counts for nothing. The median depth is that of one
+  /// splat, chosen by a threshold: a step function of everything else, so it has no derivative
+  /// here.
+  std::span<const float> depth_gradient;
 };
 
 /// Derivatives by one cloud's stored values, in the frame of the object. Splats that do not show
@@ -64,18 +69,6 @@ struct BackwardResult {
   uint64_t visible_count = 0;
 };
 
-/// Derivatives of a loss by everything that renderTiled draws. It takes every decision (which
-/// splat shows at which pixel, where a pixel ends) as the renderers do; the clamp of alpha at 0.99
-/// and that of colours at 0 pass no derivative; the ends of a splat at alpha = 1/255 and the order
-/// of blending are taken as fixed.
-/// Same bits for any number of threads. Errors: those of renderTiled; kInvalidArgument where an
-/// array has another size than the picture or holds a value outside its range; kMemoryLimit where
-/// backwardMemoryBound is above memory_limit_bytes. Cost: O(pairs of tiles and splats).
-BackwardResult renderBackward(std::span<const SplatInstance> instances, const Camera& camera,
-                              const RenderOptions& options, const BackwardInput& input,
-                              uint64_t memory_limit_bytes = UINT64_MAX,
-                              Progress* progress = nullptr);
-
 /// Memory of renderBackward that the next call uses again: a second call of the same size
 /// allocates nothing. One call at a time.
 class BackwardWorkspace {
@@ -92,14 +85,39 @@ class BackwardWorkspace {
   std::unique_ptr<Arrays> arrays_;
 };
 
-/// renderBackward into a result and a workspace that may have served before.
+/// Derivatives of a loss by everything that renderTiled draws. It takes every decision (which
+/// splat shows at which pixel, where a pixel ends) as the renderers do; the clamp of alpha at 0.99
+/// and that of colours at 0 pass no derivative; the ends of a splat at alpha = 1/255 and the order
+/// of blending are taken as fixed.
+///
+/// The second half of a step of training. In: drawn: a workspace that keeps for backward; picture:
+/// what renderTiled drew into it last; the clouds of that call, as they were then. Everything that
+/// the picture found out (projection, order, lists, ends of pixels) is used again. May be called
+/// several times for one picture.
+/// Same bits for any number of threads. Errors: kInvalidArgument where `drawn` does not hold that
+/// picture or its clouds have changed since, an array has another size than the picture or holds a
+/// value outside its range; kMemoryLimit where backwardMemoryBound(drawn, input) is above
+/// memory_limit_bytes; `result` is then as it was. Cost: O(pairs of tiles and splats).
+void renderBackward(RenderWorkspace& drawn, const RenderResult& picture, const BackwardInput& input,
+                    BackwardWorkspace& workspace, BackwardResult& result,
+                    uint64_t memory_limit_bytes = UINT64_MAX, Progress* progress = nullptr);
+
+/// Upper bound of the bytes that this allocates, the result included, whatever the workspace has.
+uint64_t backwardMemoryBound(RenderWorkspace& drawn, const BackwardInput& input);
+
+/// The same from nothing: the picture is blended first, and handed to nobody. Errors: those of
+/// renderTiled too.
 void renderBackward(std::span<const SplatInstance> instances, const Camera& camera,
                     const RenderOptions& options, const BackwardInput& input,
                     BackwardWorkspace& workspace, BackwardResult& result,
                     uint64_t memory_limit_bytes = UINT64_MAX, Progress* progress = nullptr);
+BackwardResult renderBackward(std::span<const SplatInstance> instances, const Camera& camera,
+                              const RenderOptions& options, const BackwardInput& input,
+                              uint64_t memory_limit_bytes = UINT64_MAX,
+                              Progress* progress = nullptr);
 
-/// Upper bound of the bytes that renderBackward allocates, its result included. Errors:
-/// kInvalidArgument for a camera that validate() refuses.
+/// Upper bound of the bytes that renderBackward from nothing allocates, its result included.
+/// Errors: kInvalidArgument for a camera that validate() refuses.
 uint64_t backwardMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
                              const RenderOptions& options, const BackwardInput& input);
 

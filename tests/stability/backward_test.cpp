@@ -213,34 +213,32 @@ TEST(BackwardStability, ExtremeQuaternionsAndColours) {
 
 TEST(BackwardStability, EveryKernelKeepsDeadLanesQuiet) {
   // One pixel of the tile is hit; the exponents of the others reach -1e13.
-  BackwardSplat splat{};
+  TileSplat splat{};
   splat.l00 = splat.l11 = splat.l10 = 1e5f;
   splat.g0 = -3e5f;
   splat.g1 = -6e5f;
   splat.doubt_low = splat.doubt_high = 1e-3f;
   splat.colour[0] = 1;
+  splat.depth = 1e38f;
   splat.row_end = kTileSide;
   for (const BackwardKernel& kernel : backwardKernels()) {
     SCOPED_TRACE(kernel.target);
     BackwardPixels pixels{};
     for (uint32_t i = 0; i < kTilePixelCount; ++i) {
-      pixels.transmittance[i] = 1;
-      pixels.cut[i] = kLog2MinAlpha;
-      pixels.last[i] = -1;
+      pixels.transmittance[i] = 0.01f;
+      pixels.end[i] = kNeverEnded;
       pixels.gradient[0][i] = 1;
+      pixels.depth[i] = kEmptyDepth;
     }
-    pixels.unfinished = kTilePixelCount;
-    kernel.mark(&splat, 1, 0, pixels);
+    std::fill(pixels.row_end, pixels.row_end + kTileSide, kNeverEnded);
     constexpr size_t kHit = 3 * kTileSide + 3;
-    EXPECT_NEAR(pixels.transmittance[kHit], 0.01f, 1e-6);
-    EXPECT_EQ(pixels.last[kHit], 0);
-    EXPECT_EQ(splat.rows, 1u << 3);
-    float sums[kStatisticsFieldCount];
-    kernel.take_off(&splat, 1, 0, BackwardMode::kStatistics, pixels, sums);
+    float sums[kMostFields];
+    kernel.take_off(&splat, 1, {{BackwardMode::kStatistics, true}, 0, nullptr, nullptr}, pixels,
+                    sums);
     EXPECT_NEAR(sums[kFieldRed], 0.99f, 1e-6);
     EXPECT_EQ(sums[kFieldS], 0.0f);  // alpha is held
     EXPECT_NEAR(pixels.transmittance[kHit], 1.0f, 1e-6);
-    EXPECT_EQ(pixels.transmittance[0], 1.0f);
+    EXPECT_EQ(pixels.transmittance[0], 0.01f);
     EXPECT_EQ(pixels.behind[0], 0.0f);
   }
 }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "splat/blend_backward.h"
 #include "splat/cpu/reused_array.h"
@@ -8,31 +10,45 @@
 
 namespace stipple {
 
-/// Sums of every visible splat over the tiles, double. Tiles hand in float sums per entry of their
-/// list; each splat then adds its own in the order of the tiles, so no atomics are needed and the
-/// result does not depend on the threads.
+/// What tiles hand in: float32 sums per entry of their lists.
+struct TileSums {
+  size_t first_tile, end_tile;
+  const float* values;   ///< [entries of those tiles][fields]
+  const uint32_t* used;  ///< [tiles of the picture] entries from there on have none
+};
+
+/// Sums of every splat over the tiles, double, by its place among all splats of the picture. Each
+/// splat walks its own entries in the order of the tiles, as they were listed, so no atomics are
+/// needed and the result does not depend on the threads.
 class BackwardSums {
  public:
-  /// Zeros for this many splats, in memory that may hold an earlier picture's.
-  void reset(size_t visible_count, BackwardMode mode);
+  /// For this many splats of the picture, in memory that may hold an earlier picture's.
+  void reset(size_t splat_count, BackwardWants wants);
 
-  /// Adds tiles [first_tile, end_tile) of the group. In: tile_sums [entries of those
-  /// tiles][fields].
-  void add(const TileListGroup& group, size_t first_tile, size_t end_tile, const float* tile_sums);
+  /// Adds some tiles of the group that `lists` holds.
+  void add(const VisibleSplats& visible, const TileGrid& grid, const TileListMemory& lists,
+           const TileSums& tiles);
 
-  const double* of(size_t visible) const { return sums_.get() + visible * field_count_; }
+  /// Sums of a splat; they have a meaning where it is touched.
+  const double* of(size_t splat) const { return sums_.get() + splat * field_count_; }
+  double* of(size_t splat) { return sums_.get() + splat * field_count_; }
 
-  /// Whether some sum is not 0: many splats in view are hidden by others.
-  bool isTouched(size_t visible) const;
+  /// Whether a tile handed in a sum that is not 0: many splats in view are hidden by others.
+  bool isTouched(size_t splat) const { return touched_[splat] != 0; }
 
-  uint64_t bytes() const { return sums_.bytes(); }
+  size_t fieldCount() const { return field_count_; }
 
-  static uint64_t memoryBound(uint64_t visible_count, BackwardMode mode);
+  static uint64_t memoryBound(uint64_t splat_count, const TileGrid& grid, BackwardWants wants);
 
  private:
-  size_t visible_count_ = 0;
+  template <size_t kFieldCount>
+  void addFields(const VisibleSplats& visible, const TileGrid& grid, const TileListMemory& lists,
+                 const TileSums& tiles);
+
   size_t field_count_ = 0;
-  ReusedArray<double> sums_;  ///< [visible][fields]
+  ReusedArray<double> sums_;       ///< [splats][fields]
+  ReusedArray<uint8_t> touched_;   ///< [splats]
+  std::vector<uint64_t> cursors_;  ///< [chunk][tile of the group]
 };
 
 }  // namespace stipple

@@ -1,37 +1,50 @@
 #include "splat/cpu/tile_backward.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <iterator>
 
-#include "splat/scene_backward.h"
-
-// As in cpu/tiled_render.cpp, pixels in which float32 rounding could decide a threshold are found
-// by the kernel and done in double, so every decision is the renderer's.
+// As in cpu/tiled_render.cpp, what float32 rounding could decide is decided in double: whether a
+// splat shows, on the spot; pixels whose end was in doubt, as a whole. So every decision is the
+// renderer's.
 
 namespace stipple {
 
 namespace {
 
 constexpr size_t kBatchSize = 128;
-/// Batches whose splats stay ready between the two passes; those before them are made again.
-constexpr size_t kBatchesKept = 32;
+constexpr size_t kPrefetchDistance = 24;
 /// At least ln(1e-4)/ln(1 - 1/255): more splats cannot blend before a pixel ends.
 constexpr size_t kMostBlended = 2352;
 constexpr double kGScale = 0.84932180028801904;  // sqrt(log2(e)/2): g = this times L d
+constexpr double kLargestSum = 3.4e38;
+constexpr uint32_t kSignBit = 0x80000000u;
 
 double valueAt(std::span<const float> values, size_t index, double otherwise) {
   return values.empty() ? otherwise : static_cast<double>(values[index]);
 }
 
+/// The sign bit is set where |value| is above kLargestInput, infinite or not a number. By bits:
+/// comparing NaN would raise a trap.
+uint32_t tooLarge(float value) {
+  return std::bit_cast<uint32_t>(kLargestInput) - (std::bit_cast<uint32_t>(value) & ~kSignBit);
+}
+
+/// The same where the value is below 0 (or -0, which a slower check lets pass).
+uint32_t tooLargeOrNegative(float value) {
+  return tooLarge(value) | (std::bit_cast<uint32_t>(value) & kSignBit);
+}
+
+/// Without depth.
 PixelLoss<double> lossAt(const PictureLoss& picture, size_t pixel) {
   const BackwardInput& input = *picture.input;
   PixelLoss<double> loss{};
   for (size_t c = 0; c < 4; ++c) {
     loss.gradient[c] = static_cast<double>(input.colour_gradient[pixel * 4 + c]);
   }
-  if (picture.with_background) loss.gradient[3] = 0.0;
-  if (picture.mode == BackwardMode::kGradients) return loss;
+  if (picture.picture->with_background) loss.gradient[3] = 0.0;
+  if (picture.wants.mode == BackwardMode::kGradients) return loss;
   const double weight = valueAt(input.residual_weights, pixel, 1.0);
   for (size_t c = 0; c < 3; ++c) {
     const double residual = valueAt(input.residual, pixel * 3 + c, 0.0);
@@ -43,23 +56,44 @@ PixelLoss<double> lossAt(const PictureLoss& picture, size_t pixel) {
   return loss;
 }
 
-/// State of a pixel before its last splat is taken off.
-PixelBackward<double> startBehind(const PictureLoss& picture, const PixelLoss<double>& loss,
-                                  double transmittance) {
-  PixelBackward<double> pixel;
-  pixel.transmittance = transmittance;
-  pixel.behind = 0.0;
-  for (int c = 0; c < 3; ++c) {
-    pixel.colour_behind[c] = picture.with_background ? picture.background[c] : 0.0;
-    pixel.behind += pixel.colour_behind[c] * loss.gradient[c];
+size_t pixelOf(const PictureLoss& loss, const Tile& tile, uint32_t x, uint32_t y) {
+  return static_cast<size_t>(tile.y0 + y) * loss.picture->width + tile.x0 + x;
+}
+
+/// Returns alpha, 0 where the splat is skipped.
+double splatAt(const VisibleSplat& splat, const Tile& tile, uint32_t x, uint32_t y,
+               SplatAtPixel<double>& here) {
+  here.alpha = alphaInDouble(splat, tile, x, y);
+  if (!(here.alpha > 0)) return 0;
+  const Footprint<double>& f = splat.footprint;
+  const double dx = tile.x0 + x + 0.5 - f.mean_x;
+  const double dy = tile.y0 + y + 0.5 - f.mean_y;
+  here.held = !(f.opacity * std::exp(-halfSquaredDistance(f, dx, dy)) < kMaxAlpha);
+  here.l00 = kGScale * f.l00;
+  here.l10 = kGScale * f.l10;
+  here.l11 = kGScale * f.l11;
+  here.g0 = here.l00 * dx;
+  here.g1 = here.l10 * dx + here.l11 * dy;
+  std::copy(splat.colour, splat.colour + 3, here.colour);
+  here.depth = static_cast<double>(splat.depth);
+  return here.alpha;
+}
+
+/// Takes the splat off and adds to the entry's float sums.
+void takeOffOne(const SplatAtPixel<double>& here, const PixelLoss<double>& loss,
+                BackwardWants wants, PixelBackward<double>& pixel, float* sums) {
+  double one[kMostFields] = {};
+  takeOff(here, loss, wants, pixel, one);
+  for (size_t field = 0; field < backwardFieldCount(wants); ++field) {
+    const float value = static_cast<float>(std::clamp(one[field], -kLargestSum, kLargestSum));
+    const bool is_largest = wants.mode == BackwardMode::kStatistics && field == kFieldLargestError;
+    sums[field] = is_largest ? std::max(sums[field], value) : sums[field] + value;
   }
-  return pixel;
 }
 
 }  // namespace
 
-TileBackward::TileBackward()
-    : pixels_(std::make_unique<BackwardPixels>()), splats_(kBatchSize * kBatchesKept) {
+TileBackward::TileBackward() : pixels_(std::make_unique<BackwardPixels>()), splats_(kBatchSize) {
   blended_.reserve(kMostBlended);
 }
 
@@ -68,149 +102,217 @@ void TileBackward::begin(const BackwardKernel& kernel, const VisibleSplat* visib
   kernel_ = &kernel;
   visible_ = visible;
   loss_ = &loss;
+  input_is_good_ = true;
 }
 
 uint64_t TileBackward::memoryBound() {
-  return sizeof(BackwardPixels) + kBatchSize * kBatchesKept * sizeof(BackwardSplat) +
-         kMostBlended * sizeof(Blended);
+  return sizeof(BackwardPixels) + kBatchSize * sizeof(TileSplat) + kMostBlended * sizeof(Blended);
 }
 
-void TileBackward::clearPixels(const Tile& tile) {
+/// What the picture left behind. Returns how many splats of the list some pixel may show.
+uint32_t TileBackward::takeState(const Tile& tile, size_t index) {
   BackwardPixels& pixels = *pixels_;
-  std::fill(std::begin(pixels.transmittance), std::end(pixels.transmittance), 1.0f);
-  std::fill(std::begin(pixels.doubt), std::end(pixels.doubt), 0.0f);
-  std::fill(std::begin(pixels.last), std::end(pixels.last), -1);
-  std::fill(std::begin(pixels.cut), std::end(pixels.cut), kFinished);
-  for (uint32_t y = 0; y < tile.height; ++y) {
-    std::fill_n(pixels.cut + static_cast<size_t>(y) * kTileSide, tile.width, kLog2MinAlpha);
-  }
-  pixels.unfinished = tile.width * tile.height;
-}
-
-void TileBackward::makeBatch(const Tile& tile, size_t batch) {
-  BackwardSplat* out = &splats_[batch % kBatchesKept * kBatchSize];
-  const size_t begin = batch * kBatchSize;
-  const size_t end = std::min(begin + kBatchSize, tile.splats.size());
-  for (size_t i = begin; i < end; ++i) {
-    *out++ = {makeTileSplat(visible_[tile.splats[i]], tile), 0};
-  }
-}
-
-/// Returns how many splats from the front were looked at before every pixel had ended.
-size_t TileBackward::mark(const Tile& tile) {
-  size_t begin = 0;
-  for (; begin < tile.splats.size() && pixels_->unfinished > 0; begin += kBatchSize) {
-    const size_t batch = begin / kBatchSize;
-    makeBatch(tile, batch);
-    kernel_->mark(&splats_[batch % kBatchesKept * kBatchSize],
-                  std::min(kBatchSize, tile.splats.size() - begin), static_cast<int32_t>(begin),
-                  *pixels_);
-  }
-  return std::min(begin, tile.splats.size());
-}
-
-void TileBackward::prepareTakeOff(const Tile& tile, double* background) {
-  BackwardPixels& pixels = *pixels_;
-  for (uint32_t y = 0; y < tile.height; ++y) {
-    for (uint32_t x = 0; x < tile.width; ++x) {
-      const size_t i = static_cast<size_t>(y) * kTileSide + x;
-      if (pixels.doubt[i] != 0.0f) {
-        pixels.last[i] = -1;
-        continue;
-      }
-      const PixelLoss<double> loss =
-          lossAt(*loss_, static_cast<size_t>(tile.y0 + y) * loss_->width + tile.x0 + x);
-      const double transmittance = static_cast<double>(pixels.transmittance[i]);
-      const PixelBackward<double> pixel = startBehind(*loss_, loss, transmittance);
-      for (size_t c = 0; c < 4; ++c) pixels.gradient[c][i] = static_cast<float>(loss.gradient[c]);
-      pixels.behind[i] = static_cast<float>(pixel.behind);
-      for (size_t c = 0; c < 3; ++c) background[c] += transmittance * loss.gradient[c];
-      if (loss_->mode == BackwardMode::kGradients) continue;
-      for (size_t c = 0; c < 3; ++c) {
-        pixels.colour_behind[c][i] = static_cast<float>(pixel.colour_behind[c]);
-        pixels.signed_weight[c][i] = static_cast<float>(loss.signed_weight[c]);
-        pixels.room[c][i] = static_cast<float>(loss.room[c]);
-      }
-      pixels.edge[i] = static_cast<float>(loss.edge);
-      pixels.error[i] = static_cast<float>(loss.error);
+  const KeptPicture& kept = *loss_->picture;
+  const size_t first = index * kTilePixelCount;
+  std::copy_n(kept.transmittance.get() + first, kTilePixelCount, pixels.transmittance);
+  std::copy_n(kept.ends.get() + first, kTilePixelCount, pixels.end);
+  int32_t most = 0;
+  int32_t least = 0;
+  for (uint32_t y = 0; y < kTileSide; ++y) {
+    int32_t row_end = 0;
+    for (uint32_t x = 0; x < kTileSide; ++x) {
+      row_end = std::max(row_end, pixels.end[y * kTileSide + x]);
+      least = std::min(least, pixels.end[y * kTileSide + x]);
     }
+    pixels.row_end[y] = row_end;
+    most = std::max(most, row_end);
+  }
+  has_doubt_ = least < 0;
+  return static_cast<uint32_t>(std::min<size_t>(static_cast<size_t>(most), tile.splats.size()));
+}
+
+/// Values are looked at before they are used: infinity times 0 would raise a trap.
+bool TileBackward::lossIsGood(const Tile& tile) const {
+  const BackwardInput& input = *loss_->input;
+  uint32_t bad = 0;
+  const auto look = [&](std::span<const float> values, size_t channels, auto judge_value) {
+    if (values.empty()) return;
+    for (uint32_t y = 0; y < tile.height; ++y) {
+      const float* row = &values[pixelOf(*loss_, tile, 0, y) * channels];
+      uint32_t bad_row = 0;
+      for (size_t i = 0; i < tile.width * channels; ++i) bad_row |= judge_value(row[i]);
+      bad |= bad_row;
+    }
+  };
+  look(input.colour_gradient, 4, tooLarge);
+  look(input.depth_gradient, 1, tooLarge);
+  look(input.residual, 3, tooLarge);
+  look(input.residual_weights, 1, tooLargeOrNegative);
+  look(input.edge_weights, 1, tooLarge);
+  look(input.errors, 1, tooLargeOrNegative);
+  return !(bad & kSignBit);
+}
+
+void TileBackward::takeLoss(const Tile& tile, size_t index, double* background) {
+  BackwardPixels& pixels = *pixels_;
+  const KeptPicture& kept = *loss_->picture;
+  const BackwardInput& input = *loss_->input;
+  for (uint32_t y = 0; y < tile.height; ++y) {
+    const size_t row = static_cast<size_t>(y) * kTileSide;
+    const float* gradient = &input.colour_gradient[pixelOf(*loss_, tile, 0, y) * 4];
+    for (uint32_t x = 0; x < tile.width; ++x) {
+      pixels.gradient[0][row + x] = gradient[x * 4];
+      pixels.gradient[1][row + x] = gradient[x * 4 + 1];
+      pixels.gradient[2][row + x] = gradient[x * 4 + 2];
+      pixels.gradient[3][row + x] = gradient[x * 4 + 3];
+    }
+  }
+  std::fill(std::begin(pixels.behind), std::end(pixels.behind), 0.0f);
+  if (kept.with_background) {
+    std::fill(std::begin(pixels.gradient[3]), std::end(pixels.gradient[3]), 0.0f);
+    for (size_t c = 0; c < 3; ++c) {
+      const float colour = static_cast<float>(kept.background[c]);
+      float seen[kTileSide] = {};  // by column
+      for (uint32_t y = 0; y < tile.height; ++y) {
+        const size_t row = static_cast<size_t>(y) * kTileSide;
+        for (uint32_t x = 0; x < tile.width; ++x) {
+          pixels.behind[row + x] += colour * pixels.gradient[c][row + x];
+          seen[x] += pixels.transmittance[row + x] * pixels.gradient[c][row + x];
+        }
+      }
+      for (const float value : seen) background[c] += static_cast<double>(value);
+    }
+  }
+  if (loss_->wants.depth) {
+    std::copy_n(kept.depth.get() + index * kTilePixelCount, kTilePixelCount, pixels.depth);
+    for (uint32_t y = 0; y < tile.height; ++y) {
+      const float* gradient = &input.depth_gradient[pixelOf(*loss_, tile, 0, y)];
+      for (uint32_t x = 0; x < tile.width; ++x) {
+        const size_t i = static_cast<size_t>(y) * kTileSide + x;
+        const float coverage = 1.0f - pixels.transmittance[i];
+        pixels.depth_gradient[i] = coverage > 0 ? gradient[x] / coverage : 0.0f;
+      }
+    }
+  }
+}
+
+void TileBackward::takeStatistics(const Tile& tile) {
+  BackwardPixels& pixels = *pixels_;
+  const KeptPicture& kept = *loss_->picture;
+  const BackwardInput& input = *loss_->input;
+  for (uint32_t y = 0; y < tile.height; ++y) {
+    const size_t row = static_cast<size_t>(y) * kTileSide;
+    const size_t pixel = pixelOf(*loss_, tile, 0, y);
+    for (uint32_t x = 0; x < tile.width; ++x) {
+      const float weight =
+          input.residual_weights.empty() ? 1.0f : input.residual_weights[pixel + x];
+      for (size_t c = 0; c < 3; ++c) {
+        const float residual = input.residual.empty() ? 0.0f : input.residual[(pixel + x) * 3 + c];
+        const float signed_weight = residual < 0 ? -weight : weight;
+        const float behind = kept.with_background ? static_cast<float>(kept.background[c]) : 0.0f;
+        pixels.signed_weight[c][row + x] = signed_weight;
+        pixels.room[c][row + x] = 2.0f * weight * std::abs(residual);
+        pixels.signed_behind[c][row + x] = signed_weight * behind;
+      }
+      pixels.edge[row + x] = input.edge_weights.empty() ? 0.0f : input.edge_weights[pixel + x];
+      pixels.error[row + x] = input.errors.empty() ? 0.0f : input.errors[pixel + x];
+    }
+  }
+}
+
+/// One splat at one pixel whose other splats are taken off in float32.
+void TileBackward::judge(const void* context, size_t splat, uint32_t pixel, BackwardPixels& pixels,
+                         float* sums) {
+  const Judged& judged = *static_cast<const Judged*>(context);
+  const TileBackward& self = *judged.self;
+  const uint32_t x = pixel % kTileSide;
+  const uint32_t y = pixel / kTileSide;
+  SplatAtPixel<double> here;
+  const uint32_t index = judged.tile->splats[judged.begin + splat];
+  if (!(splatAt(self.visible_[index], *judged.tile, x, y, here) > 0)) return;
+  PixelLoss<double> loss = lossAt(*self.loss_, pixelOf(*self.loss_, *judged.tile, x, y));
+  loss.depth = static_cast<double>(pixels.depth[pixel]);
+  loss.depth_gradient = static_cast<double>(pixels.depth_gradient[pixel]);
+  PixelBackward<double> state;
+  state.transmittance = static_cast<double>(pixels.transmittance[pixel]);
+  state.behind = static_cast<double>(pixels.behind[pixel]);
+  for (size_t c = 0; c < 3; ++c) {
+    state.signed_behind[c] = static_cast<double>(pixels.signed_behind[c][pixel]);
+  }
+  takeOffOne(here, loss, self.loss_->wants, state, sums);
+  pixels.transmittance[pixel] = static_cast<float>(state.transmittance);
+  pixels.behind[pixel] = static_cast<float>(state.behind);
+  for (size_t c = 0; c < 3; ++c) {
+    pixels.signed_behind[c][pixel] = static_cast<float>(state.signed_behind[c]);
   }
 }
 
 void TileBackward::takeOff(const Tile& tile, size_t used, float* sums) {
-  const size_t field_count = backwardFieldCount(loss_->mode);
-  const size_t batches = (used + kBatchSize - 1) / kBatchSize;
-  for (size_t batch = batches; batch-- > 0;) {
-    BackwardSplat* splats = &splats_[batch % kBatchesKept * kBatchSize];
+  const size_t field_count = backwardFieldCount(loss_->wants);
+  Judged judged{this, &tile, 0};
+  TakeOffOptions options{loss_->wants, 0, judge, &judged};
+  for (size_t batch = (used + kBatchSize - 1) / kBatchSize; batch-- > 0;) {
     const size_t begin = batch * kBatchSize;
     const size_t count = std::min(kBatchSize, used - begin);
-    if (batch + kBatchesKept < batches) {
-      makeBatch(tile, batch);
-      for (size_t i = 0; i < count; ++i) {
-        splats[i].rows = (1u << splats[i].row_end) - (1u << splats[i].row_begin);
-        if (splats[i].row_end <= splats[i].row_begin) splats[i].rows = 0;
-      }
+    for (size_t i = count; i-- > 0;) {
+      // A tile's splats lie far apart, so each would wait for memory.
+      const size_t ahead = begin + i < kPrefetchDistance ? 0 : begin + i - kPrefetchDistance;
+      prefetchSplat(&visible_[tile.splats[ahead]]);
+      splats_[i] = makeTileSplat(visible_[tile.splats[begin + i]], tile);
     }
-    kernel_->take_off(splats, count, static_cast<int32_t>(begin), loss_->mode, *pixels_,
-                      sums + begin * field_count);
+    judged.begin = begin;
+    options.first = static_cast<int32_t>(begin);
+    kernel_->take_off(splats_.data(), count, options, *pixels_, sums + begin * field_count);
   }
 }
 
-void TileBackward::takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, float* sums,
-                                   double* background) {
+void TileBackward::takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, float* sums) {
   blended_.clear();
   PixelBlend<double> blend;
   for (size_t place = 0; place < tile.splats.size() && !blend.finished; ++place) {
     const VisibleSplat& splat = visible_[tile.splats[place]];
-    const Footprint<double>& f = splat.footprint;
-    const double dx = tile.x0 + x + 0.5 - f.mean_x;
-    const double dy = tile.y0 + y + 0.5 - f.mean_y;
-    const double half_squared_distance = halfSquaredDistance(f, dx, dy);
-    const double alpha = splatAlpha(f.opacity, half_squared_distance);
-    if (!(alpha > 0)) continue;
-    blend.add(alpha, splat.colour, static_cast<double>(splat.depth));
-    if (blend.finished) break;
-    const bool held = !(f.opacity * std::exp(-half_squared_distance) < kMaxAlpha);
-    blended_.push_back({static_cast<uint32_t>(place), held, alpha, kGScale * (f.l00 * dx),
-                        kGScale * (f.l10 * dx + f.l11 * dy)});
+    Blended one;
+    if (!(splatAt(splat, tile, x, y, one.here) > 0)) continue;
+    one.place = static_cast<uint32_t>(place);
+    blend.add(one.here.alpha, splat.colour, one.here.depth);
+    if (!blend.finished) blended_.push_back(one);
   }
 
-  const PixelLoss<double> loss =
-      lossAt(*loss_, static_cast<size_t>(tile.y0 + y) * loss_->width + tile.x0 + x);
-  for (size_t c = 0; c < 3; ++c) background[c] += blend.transmittance * loss.gradient[c];
-  PixelBackward<double> pixel = startBehind(*loss_, loss, blend.transmittance);
-  const size_t field_count = backwardFieldCount(loss_->mode);
+  const size_t pixel = pixelOf(*loss_, tile, x, y);
+  PixelLoss<double> loss = lossAt(*loss_, pixel);
+  if (loss_->wants.depth && blend.count > 0) {
+    const double coverage = 1.0 - blend.transmittance;
+    loss.depth = blend.weighted_depth / coverage;
+    loss.depth_gradient = static_cast<double>(loss_->input->depth_gradient[pixel]) / coverage;
+  }
+  PixelBackward<double> state{blend.transmittance, 0.0, {}};
+  const KeptPicture& kept = *loss_->picture;
+  for (size_t c = 0; kept.with_background && c < 3; ++c) {
+    state.behind += kept.background[c] * loss.gradient[c];
+    state.signed_behind[c] = kept.background[c] * loss.signed_weight[c];
+  }
+  const size_t field_count = backwardFieldCount(loss_->wants);
   for (size_t k = blended_.size(); k-- > 0;) {
-    const Blended& blended = blended_[k];
-    const VisibleSplat& splat = visible_[tile.splats[blended.place]];
-    const Footprint<double>& f = splat.footprint;
-    SplatAtPixel<double> here = {blended.alpha,   blended.held,    blended.g0,      blended.g1,
-                                 kGScale * f.l00, kGScale * f.l10, kGScale * f.l11, {}};
-    std::copy(splat.colour, splat.colour + 3, here.colour);
-    double one[kStatisticsFieldCount] = {};
-    stipple::takeOff(here, loss, loss_->mode, pixel, one);
-    float* all = sums + blended.place * field_count;
-    for (size_t field = 0; field < field_count; ++field) {
-      const float value = storedGradient(one[field]);
-      all[field] = field == kFieldLargestError ? std::max(all[field], value) : all[field] + value;
-    }
+    takeOffOne(blended_[k].here, loss, loss_->wants, state, sums + blended_[k].place * field_count);
   }
 }
 
-void TileBackward::run(const Tile& tile, float* sums, double* background) {
-  const size_t field_count = backwardFieldCount(loss_->mode);
-  clearPixels(tile);
-  const size_t used = mark(tile);
-  prepareTakeOff(tile, background);
-  std::fill(sums + used * field_count, sums + tile.splats.size() * field_count, 0.0f);
+uint32_t TileBackward::run(const Tile& tile, size_t index, float* sums, double* background) {
+  const uint32_t used = takeState(tile, index);
+  if (!lossIsGood(tile)) input_is_good_ = false;
+  if (!input_is_good_) return 0;
+  takeLoss(tile, index, background);
+  if (loss_->wants.mode != BackwardMode::kGradients) takeStatistics(tile);
   takeOff(tile, used, sums);
+  if (!has_doubt_) return used;
+  const size_t field_count = backwardFieldCount(loss_->wants);
+  std::fill(sums + used * field_count, sums + tile.splats.size() * field_count, 0.0f);
   for (uint32_t y = 0; y < tile.height; ++y) {
     for (uint32_t x = 0; x < tile.width; ++x) {
-      if (pixels_->doubt[static_cast<size_t>(y) * kTileSide + x] != 0.0f) {
-        takeOffInDouble(tile, x, y, sums, background);
-      }
+      if (pixels_->end[y * kTileSide + x] == kInDoubt) takeOffInDouble(tile, x, y, sums);
     }
   }
+  return static_cast<uint32_t>(tile.splats.size());
 }
 
 }  // namespace stipple

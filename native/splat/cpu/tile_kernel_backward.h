@@ -7,45 +7,47 @@
 #include "splat/blend_backward.h"
 #include "splat/cpu/tile_kernel.h"
 
-// A tile backwards takes two passes. `mark` goes front to back and finds what the renderer decided:
-// which splat is the last at each pixel, the transmittance behind it, and the pixels in doubt.
-// `takeOff` then goes back to front over the splats that some pixel shows.
-
 namespace stipple {
-
-/// A splat as one tile sees it.
-struct BackwardSplat : TileSplat {
-  uint32_t rows;  ///< bit y: some pixel of row y shows the splat; filled by `mark`
-};
 
 /// What the kernels keep per pixel of a tile, row by row.
 struct BackwardPixels {
-  // Of `mark`.
-  alignas(64) float transmittance[kTilePixelCount];  ///< behind the last splat so far
-  alignas(64) float cut[kTilePixelCount];            ///< as in TilePixels
-  alignas(64) float doubt[kTilePixelCount];
-  alignas(64) int32_t last[kTilePixelCount];  ///< place in the tile's list, -1: none
-  uint32_t unfinished;
-  // Of `takeOff`: PixelLoss and PixelBackward.
+  /// Splats from this place of the tile's list on are not in the pixel, nor are any where it is 0
+  /// or less.
+  alignas(64) int32_t end[kTilePixelCount];
+  int32_t row_end[kTileSide];  ///< the largest of each row
+  // PixelLoss and PixelBackward.
+  alignas(64) float transmittance[kTilePixelCount];
   alignas(64) float gradient[4][kTilePixelCount];
+  alignas(64) float depth[kTilePixelCount];
+  alignas(64) float depth_gradient[kTilePixelCount];
   alignas(64) float behind[kTilePixelCount];
-  alignas(64) float colour_behind[3][kTilePixelCount];
+  alignas(64) float signed_behind[3][kTilePixelCount];
   alignas(64) float signed_weight[3][kTilePixelCount];
   alignas(64) float room[3][kTilePixelCount];
   alignas(64) float edge[kTilePixelCount];
   alignas(64) float error[kTilePixelCount];
 };
 
-/// Splats [count] follow each other in the tile's list from place `first` on.
-using MarkKernel = void (*)(BackwardSplat* splats, size_t count, int32_t first,
-                            BackwardPixels& pixels);
-/// The same splats, last first. Out: sums [count][backwardFieldCount(mode)], written whole.
-using TakeOffKernel = void (*)(const BackwardSplat* splats, size_t count, int32_t first,
-                               BackwardMode mode, BackwardPixels& pixels, float* sums);
+/// Takes a splat off one pixel in double where float32 cannot decide whether it shows. In: context
+/// of TakeOffOptions; splat, its place in this call's list. Adds to sums.
+using TakeOffJudge = void (*)(const void* context, size_t splat, uint32_t pixel,
+                              BackwardPixels& pixels, float* sums);
+
+struct TakeOffOptions {
+  BackwardWants wants;
+  int32_t first;  ///< place of this call's first splat in the tile's list
+  TakeOffJudge judge;
+  const void* judge_context;
+};
+
+/// Takes splats [count], which follow each other in the tile's list, off its pixels, last first.
+/// Out: sums [count][backwardFieldCount(wants)], written whole.
+using TakeOffKernel = void (*)(const TileSplat* splats, size_t count, const TakeOffOptions& options,
+                               BackwardPixels& pixels, float* sums);
 
 struct BackwardKernel {
   const char* target;  ///< as in NamedTileKernel
-  MarkKernel mark;
+  TileKernel blend;    ///< of the same target: both must see the same alpha
   TakeOffKernel take_off;
 };
 
@@ -55,9 +57,8 @@ const BackwardKernel& chosenBackwardKernel();
 /// Every kernel that is compiled and runs on this processor, "scalar" first.
 std::vector<BackwardKernel> backwardKernels();
 
-/// The plain kernels, straight from splat/blend_backward.h.
-void markTileScalar(BackwardSplat* splats, size_t count, int32_t first, BackwardPixels& pixels);
-void takeOffTileScalar(const BackwardSplat* splats, size_t count, int32_t first, BackwardMode mode,
+/// The plain kernel, straight from splat/blend_backward.h.
+void takeOffTileScalar(const TileSplat* splats, size_t count, const TakeOffOptions& options,
                        BackwardPixels& pixels, float* sums);
 
 }  // namespace stipple

@@ -12,7 +12,7 @@ struct Offset {
   float exponent;
 };
 
-Offset offsetAt(const BackwardSplat& splat, uint32_t x, uint32_t y) {
+Offset offsetAt(const TileSplat& splat, uint32_t x, uint32_t y) {
   const float column = static_cast<float>(x);
   Offset at;
   at.g0 = splat.g0 + splat.l00 * column;
@@ -21,31 +21,11 @@ Offset offsetAt(const BackwardSplat& splat, uint32_t x, uint32_t y) {
   return at;
 }
 
-void markPixel(BackwardSplat& splat, float exponent, int32_t place, uint32_t y,
-               BackwardPixels& pixels, size_t i) {
-  bool doubtful = exponent < kLog2MinAlpha + splat.doubt_high;
-  bool ends = doubtful;
-  if (!doubtful) {
-    const float alpha = std::min(static_cast<float>(kMaxAlpha), std::exp2(exponent));
-    const float next = pixels.transmittance[i] * (1.0f - alpha);
-    constexpr float kLeast = static_cast<float>(kMinTransmittance);
-    doubtful = std::abs(next - kLeast) < kLeast * kFinishDoubt;
-    ends = doubtful || next < kLeast;
-    if (!ends) {
-      pixels.transmittance[i] = next;
-      pixels.last[i] = place;
-      splat.rows |= 1u << y;
-    }
-  }
-  if (!ends) return;
-  if (doubtful) pixels.doubt[i] = 1.0f;
-  pixels.cut[i] = kFinished;
-  --pixels.unfinished;
-}
-
 PixelLoss<float> lossAt(const BackwardPixels& pixels, size_t i) {
   PixelLoss<float> loss;
   for (size_t c = 0; c < 4; ++c) loss.gradient[c] = pixels.gradient[c][i];
+  loss.depth = pixels.depth[i];
+  loss.depth_gradient = pixels.depth_gradient[i];
   for (size_t c = 0; c < 3; ++c) {
     loss.signed_weight[c] = pixels.signed_weight[c][i];
     loss.room[c] = pixels.room[c][i];
@@ -55,7 +35,7 @@ PixelLoss<float> lossAt(const BackwardPixels& pixels, size_t i) {
   return loss;
 }
 
-void takeOffPixel(const BackwardSplat& splat, const Offset& at, BackwardMode mode,
+void takeOffPixel(const TileSplat& splat, const Offset& at, BackwardWants wants,
                   BackwardPixels& pixels, size_t i, float* sums) {
   constexpr float kMost = static_cast<float>(kMaxAlpha);
   const float alpha = std::exp2(at.exponent);
@@ -68,50 +48,39 @@ void takeOffPixel(const BackwardSplat& splat, const Offset& at, BackwardMode mod
   here.l10 = splat.l10;
   here.l11 = splat.l11;
   std::copy(splat.colour, splat.colour + 3, here.colour);
+  here.depth = splat.depth;
   PixelBackward<float> pixel;
   pixel.transmittance = pixels.transmittance[i];
   pixel.behind = pixels.behind[i];
-  for (size_t c = 0; c < 3; ++c) pixel.colour_behind[c] = pixels.colour_behind[c][i];
-  takeOff(here, lossAt(pixels, i), mode, pixel, sums);
+  for (size_t c = 0; c < 3; ++c) pixel.signed_behind[c] = pixels.signed_behind[c][i];
+  takeOff(here, lossAt(pixels, i), wants, pixel, sums);
   pixels.transmittance[i] = pixel.transmittance;
   pixels.behind[i] = pixel.behind;
-  for (size_t c = 0; c < 3; ++c) pixels.colour_behind[c][i] = pixel.colour_behind[c];
+  for (size_t c = 0; c < 3; ++c) pixels.signed_behind[c][i] = pixel.signed_behind[c];
 }
 
 }  // namespace
 
-void markTileScalar(BackwardSplat* splats, size_t count, int32_t first, BackwardPixels& pixels) {
-  for (size_t s = 0; s < count; ++s) {
-    BackwardSplat& splat = splats[s];
-    splat.rows = 0;
-    if (pixels.unfinished == 0) continue;
-    for (uint32_t y = splat.row_begin; y < splat.row_end; ++y) {
-      for (uint32_t x = 0; x < kTileSide; ++x) {
-        const size_t i = static_cast<size_t>(y) * kTileSide + x;
-        if (pixels.cut[i] == kFinished) continue;
-        const Offset at = offsetAt(splat, x, y);
-        if (at.exponent <= kLog2MinAlpha - splat.doubt_low) continue;
-        markPixel(splat, at.exponent, first + static_cast<int32_t>(s), y, pixels, i);
-      }
-    }
-  }
-}
-
-void takeOffTileScalar(const BackwardSplat* splats, size_t count, int32_t first, BackwardMode mode,
+void takeOffTileScalar(const TileSplat* splats, size_t count, const TakeOffOptions& options,
                        BackwardPixels& pixels, float* sums) {
-  const size_t field_count = backwardFieldCount(mode);
+  const size_t field_count = backwardFieldCount(options.wants);
   std::fill(sums, sums + count * field_count, 0.0f);
   for (size_t s = count; s-- > 0;) {
-    const BackwardSplat& splat = splats[s];
-    const int32_t place = first + static_cast<int32_t>(s);
-    for (uint32_t y = 0; y < kTileSide; ++y) {
-      if (!(splat.rows >> y & 1u)) continue;
+    const TileSplat& splat = splats[s];
+    const int32_t place = options.first + static_cast<int32_t>(s);
+    for (uint32_t y = splat.row_begin; y < splat.row_end; ++y) {
+      if (place >= pixels.row_end[y]) continue;
       for (uint32_t x = 0; x < kTileSide; ++x) {
         const size_t i = static_cast<size_t>(y) * kTileSide + x;
-        if (place > pixels.last[i]) continue;
+        if (place >= pixels.end[i]) continue;
         const Offset at = offsetAt(splat, x, y);
         if (at.exponent <= kLog2MinAlpha - splat.doubt_low) continue;
-        takeOffPixel(splat, at, mode, pixels, i, sums + s * field_count);
+        float* own = sums + s * field_count;
+        if (at.exponent >= kLog2MinAlpha + splat.doubt_high) {
+          takeOffPixel(splat, at, options.wants, pixels, i, own);
+        } else {
+          options.judge(options.judge_context, s, static_cast<uint32_t>(i), pixels, own);
+        }
       }
     }
   }

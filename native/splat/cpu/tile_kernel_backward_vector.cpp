@@ -10,7 +10,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <bit>
 #include <limits>
 
 #include "splat/cpu/exp2-inl.h"
@@ -25,9 +24,45 @@ using Tag = hn::CappedTag<float, kTileSide>;
 using Vec = hn::Vec<Tag>;
 using IntTag = hn::RebindToSigned<Tag>;
 
+alignas(64) constexpr float kRows[kTileSide] = {0, 1, 2,  3,  4,  5,  6,  7,
+                                                8, 9, 10, 11, 12, 13, 14, 15};
+
 HWY_INLINE float sumOfLanes(Tag d, Vec v) {
   return hn::GetLane(hn::SumOfLanes(d, v));
 }
+
+#if HWY_HAVE_SCALABLE || HWY_TARGET == HWY_SCALAR
+/// Sums of four vectors over their lanes.
+HWY_INLINE void sumFour(Tag d, Vec a, Vec b, Vec c, Vec e, float* out) {
+  out[0] = sumOfLanes(d, a);
+  out[1] = sumOfLanes(d, b);
+  out[2] = sumOfLanes(d, c);
+  out[3] = sumOfLanes(d, e);
+}
+#else
+template <class D>
+HWY_INLINE void storeSumOfBlocks(D d, hn::Vec<D> v, float* out) {
+  if constexpr (hn::MaxLanes(D()) > 4) {
+    const hn::Half<D> half;
+    storeSumOfBlocks(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)), out);
+  } else {
+    hn::StoreU(v, d, out);
+  }
+}
+
+/// Sums of four vectors over their lanes: a quarter of the shuffles of four sums.
+HWY_INLINE void sumFour(Tag d, Vec a, Vec b, Vec c, Vec e, float* out) {
+  const hn::Repartition<double, Tag> pairs;
+  const auto ab =
+      hn::BitCast(pairs, hn::Add(hn::InterleaveLower(d, a, b), hn::InterleaveUpper(d, a, b)));
+  const auto ce =
+      hn::BitCast(pairs, hn::Add(hn::InterleaveLower(d, c, e), hn::InterleaveUpper(d, c, e)));
+  storeSumOfBlocks(d,
+                   hn::Add(hn::BitCast(d, hn::InterleaveLower(pairs, ab, ce)),
+                           hn::BitCast(d, hn::InterleaveUpper(pairs, ab, ce))),
+                   out);
+}
+#endif
 
 /// sqrt(a^2 + b^2) for a, b >= 0, as lengthOf in splat/blend_backward.h.
 HWY_INLINE Vec lengthOfLanes(Tag d, Vec a, Vec b) {
@@ -37,87 +72,41 @@ HWY_INLINE Vec lengthOfLanes(Tag d, Vec a, Vec b) {
   return hn::Mul(larger, hn::Sqrt(hn::MulAdd(ratio, ratio, hn::Set(d, 1.0f))));
 }
 
-void markTile(BackwardSplat* splats, size_t count, int32_t first, BackwardPixels& pixels) {
-  const Tag d;
-  const IntTag di;
-  const size_t lanes = hn::Lanes(d);
-  const Vec max_alpha = hn::Set(d, static_cast<float>(kMaxAlpha));
-  const Vec min_transmittance = hn::Set(d, static_cast<float>(kMinTransmittance));
-  const Vec finish_doubt = hn::Set(d, static_cast<float>(kMinTransmittance) * kFinishDoubt);
-  const Vec finished = hn::Set(d, kFinished);
-  const Vec lowest = hn::Set(d, -9.0f);  // dead lanes may hold -1e12
-
-  for (size_t s = 0; s < count; ++s) {
-    BackwardSplat& splat = splats[s];
-    splat.rows = 0;
-    if (pixels.unfinished == 0) continue;
-    const auto place = hn::Set(di, first + static_cast<int32_t>(s));
-    const Vec low = hn::Set(d, kLog2MinAlpha - splat.doubt_low);
-    const Vec high = hn::Set(d, kLog2MinAlpha + splat.doubt_high);
-    const Vec l11 = hn::Set(d, splat.l11);
-    for (size_t column = 0; column < kTileSide; column += lanes) {
-      const Vec x = hn::Iota(d, static_cast<float>(column));
-      const Vec g0 = hn::MulAdd(hn::Set(d, splat.l00), x, hn::Set(d, splat.g0));
-      const Vec most = hn::NegMulAdd(g0, g0, hn::Set(d, splat.log2_opacity));
-      if (hn::AllFalse(d, hn::Gt(most, low))) continue;
-      const Vec g1_first = hn::MulAdd(hn::Set(d, splat.l10), x, hn::Set(d, splat.g1));
-      for (uint32_t y = splat.row_begin; y < splat.row_end; ++y) {
-        const size_t i = static_cast<size_t>(y) * kTileSide + column;
-        const Vec g1 = hn::MulAdd(l11, hn::Set(d, static_cast<float>(y)), g1_first);
-        const Vec exponent = hn::NegMulAdd(g1, g1, most);
-        const Vec cut = hn::Load(d, pixels.cut + i);
-        const auto touched = hn::And(hn::Gt(exponent, low), hn::Lt(cut, finished));
-        if (hn::AllFalse(d, touched)) continue;
-
-        const auto unclear = hn::And(touched, hn::Lt(exponent, high));
-        const auto shows = hn::AndNot(unclear, touched);
-        const Vec alpha = hn::Min(max_alpha, exp2Small(d, hn::Max(exponent, lowest)));
-        const Vec before = hn::Load(d, pixels.transmittance + i);
-        const Vec next = hn::NegMulAdd(before, alpha, before);
-        const auto near = hn::Lt(hn::Abs(hn::Sub(next, min_transmittance)), finish_doubt);
-        const auto doubtful = hn::Or(unclear, hn::And(shows, near));
-        const auto ends = hn::Or(doubtful, hn::And(shows, hn::Lt(next, min_transmittance)));
-        const auto blends = hn::AndNot(ends, shows);
-
-        hn::Store(hn::IfThenElse(blends, next, before), d, pixels.transmittance + i);
-        const auto last = hn::Load(di, pixels.last + i);
-        hn::Store(hn::IfThenElse(hn::RebindMask(di, blends), place, last), di, pixels.last + i);
-        if (!hn::AllFalse(d, blends)) splat.rows |= 1u << y;
-        if (!hn::AllFalse(d, ends)) {
-          hn::Store(hn::IfThenElse(ends, finished, cut), d, pixels.cut + i);
-          const Vec doubt = hn::Load(d, pixels.doubt + i);
-          hn::Store(hn::IfThenElse(doubtful, hn::Set(d, 1.0f), doubt), d, pixels.doubt + i);
-          pixels.unfinished -= static_cast<uint32_t>(hn::CountTrue(d, ends));
-        }
-      }
-    }
+/// Hands the lanes of `unclear` to the judge. In: first, the pixel of lane 0.
+HWY_NOINLINE void judgeLanes(Tag d, hn::Mask<Tag> unclear, size_t splat, size_t first,
+                             const TakeOffOptions& options, BackwardPixels& pixels, float* sums) {
+  HWY_ALIGN float asked[kTileSide];
+  hn::Store(hn::IfThenElseZero(unclear, hn::Set(d, 1.0f)), d, asked);
+  for (size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+    if (asked[lane] == 0.0f) continue;
+    options.judge(options.judge_context, splat, static_cast<uint32_t>(first + lane), pixels, sums);
   }
 }
 
-template <BackwardMode kMode>
-void takeOffSplats(const BackwardSplat* splats, size_t count, int32_t first, BackwardPixels& pixels,
-                   float* sums) {
+template <BackwardMode kMode, bool kDepth>
+void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& options,
+                   BackwardPixels& pixels, float* sums) {
   constexpr bool kContributions = kMode != BackwardMode::kGradients;
   constexpr bool kStatistics = kMode == BackwardMode::kStatistics;
-  constexpr size_t kFieldCount = backwardFieldCount(kMode);
+  constexpr size_t kFieldCount = backwardFieldCount({kMode, kDepth});
   const Tag d;
   const IntTag di;
   const size_t lanes = hn::Lanes(d);
   const Vec zero = hn::Zero(d);
   const Vec one = hn::Set(d, 1.0f);
   const Vec max_alpha = hn::Set(d, static_cast<float>(kMaxAlpha));
-  const Vec lowest = hn::Set(d, -9.0f);
+  const Vec lowest = hn::Set(d, -9.0f);  // dead lanes may hold -1e12
   const Vec squared_g_scale = hn::Set(d, static_cast<float>(kSquaredGScale));
+  float judged[kFieldCount];
 
   for (size_t k = count; k-- > 0;) {
-    const BackwardSplat& splat = splats[k];
+    const TileSplat& splat = splats[k];
     float* out = sums + k * kFieldCount;
-    if (splat.rows == 0) {
-      std::fill(out, out + kFieldCount, 0.0f);
-      continue;
-    }
-    const auto before = hn::Set(di, first + static_cast<int32_t>(k) - 1);
+    const int32_t place = options.first + static_cast<int32_t>(k);
+    bool is_judged = false;
+    const auto this_place = hn::Set(di, place);
     const Vec low = hn::Set(d, kLog2MinAlpha - splat.doubt_low);
+    const Vec high = hn::Set(d, kLog2MinAlpha + splat.doubt_high);
     const Vec l11 = hn::Set(d, splat.l11);
     const Vec red = hn::Set(d, splat.colour[0]);
     const Vec green = hn::Set(d, splat.colour[1]);
@@ -127,6 +116,7 @@ void takeOffSplats(const BackwardSplat* splats, size_t count, int32_t first, Bac
     Vec sum_red = zero, sum_green = zero, sum_blue = zero;
     Vec sum_contribution = zero, sum_weight = zero, sum_edge = zero, sum_error = zero;
     Vec sum_x = zero, sum_y = zero, sum_norm = zero, largest_error = zero;
+    Vec sum_depth = zero;
     for (size_t column = 0; column < kTileSide; column += lanes) {
       const Vec x = hn::Iota(d, static_cast<float>(column));
       const Vec g0 = hn::MulAdd(hn::Set(d, splat.l00), x, hn::Set(d, splat.g0));
@@ -135,14 +125,21 @@ void takeOffSplats(const BackwardSplat* splats, size_t count, int32_t first, Bac
       const Vec g1_first = hn::MulAdd(hn::Set(d, splat.l10), x, hn::Set(d, splat.g1));
       // g0 is that of the column: it is multiplied in once the rows are summed.
       Vec column_s = zero, column_g1 = zero;
-      for (uint32_t rows = splat.rows; rows != 0; rows &= rows - 1) {
-        const uint32_t y = static_cast<uint32_t>(std::countr_zero(rows));
+      for (uint32_t y = splat.row_begin; y < splat.row_end; ++y) {
+        if (place >= pixels.row_end[y]) continue;
         const size_t i = static_cast<size_t>(y) * kTileSide + column;
-        const Vec g1 = hn::MulAdd(l11, hn::Set(d, static_cast<float>(y)), g1_first);
+        const Vec g1 = hn::MulAdd(l11, hn::Set(d, kRows[y]), g1_first);
         const Vec exponent = hn::NegMulAdd(g1, g1, most);
-        const auto reached = hn::Gt(hn::Load(di, pixels.last + i), before);
-        const auto shows = hn::And(hn::Gt(exponent, low), hn::RebindMask(d, reached));
+        const auto reached = hn::Gt(hn::Load(di, pixels.end + i), this_place);
+        auto shows = hn::And(hn::Gt(exponent, low), hn::RebindMask(d, reached));
         if (hn::AllFalse(d, shows)) continue;
+        const auto unclear = hn::And(shows, hn::Lt(exponent, high));
+        if (HWY_UNLIKELY(!hn::AllFalse(d, unclear))) {
+          if (!is_judged) std::fill(judged, judged + kFieldCount, 0.0f);
+          is_judged = true;
+          judgeLanes(d, unclear, k, i, options, pixels, judged);
+          shows = hn::AndNot(unclear, shows);
+        }
 
         const Vec free_alpha = exp2Small(d, hn::Max(exponent, lowest));
         const Vec alpha = hn::IfThenElseZero(shows, hn::Min(max_alpha, free_alpha));
@@ -156,6 +153,12 @@ void takeOffSplats(const BackwardSplat* splats, size_t count, int32_t first, Bac
         Vec own = hn::MulAdd(red, by_red, hn::Load(d, pixels.gradient[3] + i));
         own = hn::MulAdd(green, by_green, own);
         own = hn::MulAdd(blue, by_blue, own);
+        if constexpr (kDepth) {
+          const Vec by_depth = hn::Load(d, pixels.depth_gradient + i);
+          const Vec over = hn::Sub(hn::Set(d, splat.depth), hn::Load(d, pixels.depth + i));
+          own = hn::MulAdd(over, by_depth, own);
+          sum_depth = hn::MulAdd(weight, by_depth, sum_depth);
+        }
         const Vec behind = hn::Load(d, pixels.behind + i);
         const Vec difference = hn::Sub(own, behind);
         hn::Store(hn::MulAdd(alpha, difference, behind), d, pixels.behind + i);
@@ -171,13 +174,11 @@ void takeOffSplats(const BackwardSplat* splats, size_t count, int32_t first, Bac
 
         if constexpr (kContributions) {
           const auto channel = [&](size_t c, Vec colour) {
-            const Vec colour_behind = hn::Load(d, pixels.colour_behind[c] + i);
-            const Vec over = hn::Sub(colour, colour_behind);
-            const Vec change =
-                hn::Mul(hn::Mul(weight, over), hn::Load(d, pixels.signed_weight[c] + i));
-            const Vec other = hn::Sub(hn::Load(d, pixels.room[c] + i), change);
-            hn::Store(hn::MulAdd(alpha, over, colour_behind), d, pixels.colour_behind[c] + i);
-            return hn::Min(change, other);
+            const Vec behind_c = hn::Load(d, pixels.signed_behind[c] + i);
+            const Vec over = hn::MulSub(hn::Load(d, pixels.signed_weight[c] + i), colour, behind_c);
+            hn::Store(hn::MulAdd(alpha, over, behind_c), d, pixels.signed_behind[c] + i);
+            const Vec other = hn::NegMulAdd(weight, over, hn::Load(d, pixels.room[c] + i));
+            return hn::Min(hn::Mul(weight, over), other);
           };
           Vec contribution = channel(0, red);
           contribution = hn::Add(contribution, channel(1, green));
@@ -207,42 +208,54 @@ void takeOffSplats(const BackwardSplat* splats, size_t count, int32_t first, Bac
       sum_g00 = hn::MulAdd(s_g0, g0, sum_g00);
       sum_g01 = hn::MulAdd(column_g1, g0, sum_g01);
     }
-    out[kFieldS] = sumOfLanes(d, sum_s);
-    out[kFieldG0] = sumOfLanes(d, sum_g0);
-    out[kFieldG1] = sumOfLanes(d, sum_g1);
-    out[kFieldG00] = sumOfLanes(d, sum_g00);
-    out[kFieldG01] = sumOfLanes(d, sum_g01);
-    out[kFieldG11] = sumOfLanes(d, sum_g11);
-    out[kFieldRed] = sumOfLanes(d, sum_red);
-    out[kFieldGreen] = sumOfLanes(d, sum_green);
-    out[kFieldBlue] = sumOfLanes(d, sum_blue);
-    if constexpr (kContributions) out[kFieldContribution] = sumOfLanes(d, sum_contribution);
+    sumFour(d, sum_s, sum_g0, sum_g1, sum_g00, out);
+    sumFour(d, sum_g01, sum_g11, sum_red, sum_green, out + kFieldG01);
+    float four[4];
+    sumFour(d, sum_blue, sum_contribution, sum_weight, sum_edge, four);
+    out[kFieldBlue] = four[0];
+    if constexpr (kContributions) out[kFieldContribution] = four[1];
+    if constexpr (kStatistics) std::copy(four + 2, four + 4, out + kFieldWeight);
     if constexpr (kStatistics) {
-      out[kFieldWeight] = sumOfLanes(d, sum_weight);
-      out[kFieldEdge] = sumOfLanes(d, sum_edge);
-      out[kFieldAbsoluteX] = sumOfLanes(d, sum_x);
-      out[kFieldAbsoluteY] = sumOfLanes(d, sum_y);
-      out[kFieldNorm] = sumOfLanes(d, sum_norm);
-      out[kFieldError] = sumOfLanes(d, sum_error);
+      sumFour(d, sum_x, sum_y, sum_norm, sum_error, out + kFieldAbsoluteX);
       out[kFieldLargestError] = hn::GetLane(hn::MaxOfLanes(d, largest_error));
+    }
+    if constexpr (kDepth) out[kFieldCount - 1] = sumOfLanes(d, sum_depth);
+    if (HWY_UNLIKELY(is_judged)) {
+      for (size_t field = 0; field < kFieldCount; ++field) {
+        out[field] = kStatistics && field == kFieldLargestError
+                         ? std::max(out[field], judged[field])
+                         : out[field] + judged[field];
+      }
     }
   }
 }
 
-void takeOffTile(const BackwardSplat* splats, size_t count, int32_t first, BackwardMode mode,
-                 BackwardPixels& pixels, float* sums) {
-  switch (mode) {
+template <bool kDepth>
+void takeOffInMode(const TileSplat* splats, size_t count, const TakeOffOptions& options,
+                   BackwardPixels& pixels, float* sums) {
+  switch (options.wants.mode) {
     case BackwardMode::kGradients:
-      return takeOffSplats<BackwardMode::kGradients>(splats, count, first, pixels, sums);
+      return takeOffSplats<BackwardMode::kGradients, kDepth>(splats, count, options, pixels, sums);
     case BackwardMode::kContributions:
-      return takeOffSplats<BackwardMode::kContributions>(splats, count, first, pixels, sums);
+      return takeOffSplats<BackwardMode::kContributions, kDepth>(splats, count, options, pixels,
+                                                                 sums);
     case BackwardMode::kStatistics:
-      return takeOffSplats<BackwardMode::kStatistics>(splats, count, first, pixels, sums);
+      return takeOffSplats<BackwardMode::kStatistics, kDepth>(splats, count, options, pixels, sums);
   }
 }
 
+void takeOffTile(const TileSplat* splats, size_t count, const TakeOffOptions& options,
+                 BackwardPixels& pixels, float* sums) {
+  if (options.wants.depth) {
+    takeOffInMode<true>(splats, count, options, pixels, sums);
+  } else {
+    takeOffInMode<false>(splats, count, options, pixels, sums);
+  }
+}
+
+/// Without its `blend`.
 BackwardKernel backwardKernel() {
-  return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET), markTile,
+  return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET), nullptr,
           takeOffTile};
 }
 
@@ -259,7 +272,7 @@ namespace stipple {
 HWY_EXPORT(backwardKernel);
 
 std::vector<BackwardKernel> backwardKernels() {
-  std::vector<BackwardKernel> kernels = {{"scalar", markTileScalar, takeOffTileScalar}};
+  std::vector<BackwardKernel> kernels = {{"scalar", nullptr, takeOffTileScalar}};
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
@@ -267,6 +280,13 @@ std::vector<BackwardKernel> backwardKernels() {
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  const std::vector<NamedTileKernel> forward = tileKernels();
+  for (BackwardKernel& kernel : kernels) {
+    const auto same = std::find_if(forward.begin(), forward.end(), [&](const NamedTileKernel& f) {
+      return std::string(f.target) == kernel.target;
+    });
+    kernel.blend = same->kernel;  // both are compiled for the same targets
+  }
   return kernels;
 }
 
@@ -274,13 +294,9 @@ namespace {
 
 BackwardKernel chooseBackwardKernel() {
   const TileKernel forward = chosenTileKernel();
-  for (const NamedTileKernel& named : tileKernels()) {
-    if (named.kernel != forward) continue;
-    for (const BackwardKernel& kernel : backwardKernels()) {
-      if (std::string(kernel.target) == named.target) return kernel;
-    }
-  }
-  return HWY_DYNAMIC_DISPATCH(backwardKernel)();
+  const std::vector<BackwardKernel> kernels = backwardKernels();
+  return *std::find_if(kernels.begin(), kernels.end(),
+                       [&](const BackwardKernel& kernel) { return kernel.blend == forward; });
 }
 
 }  // namespace

@@ -23,10 +23,13 @@ struct TileListGroup {
   }
 };
 
-/// What forEachTileGroup works with; kept for the next picture.
+/// What forEachTileGroup works with; kept for the next picture. Afterwards it holds the last group,
+/// which is the only one unless the lists are huge.
 struct TileListMemory {
-  std::vector<uint32_t> counts;   ///< [chunk][tile]
-  std::vector<uint64_t> cursors;  ///< [chunk][tile of the group]
+  std::vector<uint32_t> counts;  ///< [chunk][tile]
+  /// [chunk][tile of the group] Behind the chunk's last entry of the tile.
+  std::vector<uint64_t> cursors;
+  size_t chunk_size = 0;  ///< splats
   TileListGroup group;
 };
 

@@ -1,10 +1,10 @@
 #include "splat/cpu/tiled_backward.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -12,14 +12,13 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "math/affine.h"
+#include "splat/cpu/back_projector.h"
 #include "splat/cpu/backward_sums.h"
 #include "splat/cpu/tile_backward.h"
-#include "splat/projection_backward.h"
-#include "splat/scene_backward.h"
 
 // Tiles run side by side and write one set of sums per entry of their list; then each splat adds
-// its own in the order of the tiles; then the projection of each splat is taken back.
+// its own in the order of the tiles; then projection and colour of each splat are taken back, in
+// the order of the clouds, and every row of the result is written, once.
 
 namespace stipple {
 
@@ -29,58 +28,59 @@ namespace {
 constexpr uint64_t kHeldEntries = 1u << 20;
 constexpr size_t kTileGrain = 4;
 constexpr size_t kSplatGrain = 2048;
-constexpr size_t kPrefetchDistance = 8;
-constexpr uint32_t kNotVisible = std::numeric_limits<uint32_t>::max();
-/// Largest derivative or weight that is accepted: with colours up to 6e28 (the largest that the
-/// renderer makes) every float32 product and sum of a tile stays below 3e38.
-constexpr double kLargestInput = 1e4;
+/// Rows that a back projector is given at once.
+constexpr size_t kRowsAtOnce = 256;
 
-void requirePicture(std::span<const float> values, size_t pixel_count, size_t channels, float least,
-                    bool may_be_empty, const char* what) {
+void requireSize(std::span<const float> values, size_t pixel_count, size_t channels,
+                 bool may_be_empty, const char* what) {
   if (values.empty() && may_be_empty) return;
-  if (values.size() != pixel_count * channels) {
-    fail(ErrorCode::kInvalidArgument,
-         std::string(what) + " holds " + std::to_string(values.size()) +
-             " values; the picture has " + std::to_string(pixel_count) + " pixels of " +
-             std::to_string(channels));
-  }
-  const auto good = [least](float value) {
+  if (values.size() == pixel_count * channels) return;
+  fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(values.size()) +
+                                        " values; the picture has " + std::to_string(pixel_count) +
+                                        " pixels of " + std::to_string(channels));
+}
+
+void requireRange(std::span<const float> values, float least, const char* what) {
+  for (const float value : values) {
     // By bits: infinity and NaN are above the largest, and comparing NaN would raise a trap.
-    const bool in_range = (std::bit_cast<uint32_t>(value) & 0x7fffffffu) <=
-                          std::bit_cast<uint32_t>(static_cast<float>(kLargestInput));
-    return in_range && value >= least;
-  };
-  // The top bit of the difference is set where a value is above the largest.
-  constexpr uint32_t kLargestBits = std::bit_cast<uint32_t>(static_cast<float>(kLargestInput));
-  uint32_t above = 0;
-  for (const float value : values) {
-    above |= kLargestBits - (std::bit_cast<uint32_t>(value) & 0x7fffffffu);
-  }
-  if (!(above & 0x80000000u) && least < 0.0f) return;
-  for (const float value : values) {
-    if (good(value)) continue;
+    const bool in_range =
+        (std::bit_cast<uint32_t>(value) & 0x7fffffffu) <= std::bit_cast<uint32_t>(kLargestInput);
+    if (in_range && value >= least) continue;
     fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(value) + "; " +
                                           std::to_string(static_cast<double>(least)) + " to " +
-                                          std::to_string(kLargestInput) + " is allowed");
+                                          std::to_string(static_cast<double>(kLargestInput)) +
+                                          " is allowed");
   }
 }
 
-void validateInput(const Camera& camera, const BackwardInput& input) {
-  const size_t pixel_count = static_cast<size_t>(camera.width) * camera.height;
-  constexpr float kAny = -static_cast<float>(kLargestInput);
-  requirePicture(input.colour_gradient, pixel_count, 4, kAny, false, "colour_gradient");
-  requirePicture(input.residual, pixel_count, 3, kAny, true, "residual");
-  requirePicture(input.residual_weights, pixel_count, 1, 0.0f, true, "residual_weights");
-  requirePicture(input.edge_weights, pixel_count, 1, kAny, true, "edge_weights");
-  requirePicture(input.errors, pixel_count, 1, 0.0f, true, "errors");
+void requireSizes(const KeptPicture& picture, const BackwardInput& input) {
+  const size_t pixel_count = static_cast<size_t>(picture.width) * picture.height;
+  requireSize(input.colour_gradient, pixel_count, 4, false, "colour_gradient");
+  requireSize(input.depth_gradient, pixel_count, 1, true, "depth_gradient");
+  requireSize(input.residual, pixel_count, 3, true, "residual");
+  requireSize(input.residual_weights, pixel_count, 1, true, "residual_weights");
+  requireSize(input.edge_weights, pixel_count, 1, true, "edge_weights");
+  requireSize(input.errors, pixel_count, 1, true, "errors");
 }
 
-BackwardMode modeOf(const BackwardInput& input) {
+/// Names the value that the tiles found.
+void requireRanges(const BackwardInput& input) {
+  requireRange(input.colour_gradient, -kLargestInput, "colour_gradient");
+  requireRange(input.depth_gradient, -kLargestInput, "depth_gradient");
+  requireRange(input.residual, -kLargestInput, "residual");
+  requireRange(input.residual_weights, 0.0f, "residual_weights");
+  requireRange(input.edge_weights, -kLargestInput, "edge_weights");
+  requireRange(input.errors, 0.0f, "errors");
+}
+
+BackwardWants wantsOf(const BackwardInput& input) {
+  const bool with_depth = !input.depth_gradient.empty();
   if (input.with_blending_weights || input.with_screen_gradients || !input.edge_weights.empty() ||
       !input.errors.empty()) {
-    return BackwardMode::kStatistics;
+    return {BackwardMode::kStatistics, with_depth};
   }
-  return input.residual.empty() ? BackwardMode::kGradients : BackwardMode::kContributions;
+  return {input.residual.empty() ? BackwardMode::kGradients : BackwardMode::kContributions,
+          with_depth};
 }
 
 /// Calls use(array, values per splat) for every array of the result that is wanted.
@@ -120,13 +120,16 @@ void clearUnwanted(const BackwardInput& input, SplatGradients& gradients) {
   }
 }
 
-/// Takes the splats off every tile; returns dL/dbackground.
-std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, const TileGrid& grid,
+/// Takes the splats off every tile and adds their sums; returns dL/dbackground.
+std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, RenderWorkspace::Arrays& drawn,
                                    const PictureLoss& loss, BackwardWorkspace::Arrays& arrays,
                                    Progress* progress) {
-  const VisibleSplats& visible = arrays.forward.visible;
-  const size_t field_count = backwardFieldCount(loss.mode);
+  const TileGrid grid(loss.picture->width, loss.picture->height);
+  const VisibleSplats& visible = drawn.visible;
+  const size_t field_count = backwardFieldCount(loss.wants);
   arrays.backgrounds.assign(grid.tileCount() * 3, 0.0);
+  arrays.used.resize(grid.tileCount());
+  std::atomic<bool> input_is_good{true};
   // By reference where they are handed over: a std::function of a large capture allocates.
   const auto take_off_group = [&](const TileListGroup& group) {
     const auto entriesBefore = [&](size_t tile) { return group.offsets[tile - group.first_tile]; };
@@ -144,108 +147,178 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, const TileGrid&
         scratch->begin(kernel, visible.splats.get(), loss);
         for (size_t tile = first + from; tile < first + to; ++tile) {
           const uint64_t entry = entriesBefore(tile) - entriesBefore(first);
-          scratch->run(tileOf(grid, tile, group.tile(tile)), tile_sums + entry * field_count,
-                       &arrays.backgrounds[tile * 3]);
+          arrays.used[tile] =
+              scratch->run(tileOf(grid, tile, group.tile(tile)), tile,
+                           tile_sums + entry * field_count, &arrays.backgrounds[tile * 3]);
         }
+        if (!scratch->inputIsGood()) input_is_good.store(false, std::memory_order_relaxed);
         arrays.scratch.giveBack(std::move(scratch));
       };
       parallelFor(end - first, kTileGrain, std::ref(take_off_tiles));
-      arrays.sums.add(group, first, end, tile_sums);
+      arrays.sums.add(visible, grid, drawn.lists, {first, end, tile_sums, arrays.used.data()});
       first = end;
       advance(progress, static_cast<double>(first) / static_cast<double>(grid.tileCount()),
               "Taking splats off");
     }
   };
-  forEachTileGroup(visible, grid, progress, arrays.forward.lists, std::ref(take_off_group));
+  const TileListGroup& group = drawn.lists.group;
+  if (group.first_tile == 0 && group.end_tile == grid.tileCount()) {
+    take_off_group(group);
+  } else {
+    forEachTileGroup(visible, grid, progress, drawn.lists, std::ref(take_off_group));
+  }
+  if (!input_is_good) requireRanges(*loss.input);
   std::array<double, 3> total{};
+  if (!loss.picture->with_background) return total;
   for (size_t i = 0; i < arrays.backgrounds.size(); ++i) total[i % 3] += arrays.backgrounds[i];
   return total;
 }
 
-/// The picture's splats with what taking their projection back needs.
-struct Taken {
-  const PlacedScene& scene;
-  const BackwardInput& input;
-  const std::vector<size_t>& instance_of;
-  const std::vector<Mat3d>& normal_to_view;
-};
-
-void storeStatistics(const BackwardInput& input, const double* sums, const Vec2d& mean,
+void storeStatistics(const BackwardInput& input, const double* sums, const double* mean,
                      size_t index, SplatGradients& out) {
-  if (!input.residual.empty()) {
-    out.contributions[index] = storedGradient(sums[kFieldContribution]);
-  }
-  if (input.with_blending_weights) out.blending_weights[index] = storedGradient(sums[kFieldWeight]);
-  if (!input.edge_weights.empty()) out.edge_weights[index] = storedGradient(sums[kFieldEdge]);
+  const auto stored = [](double value) {
+    return static_cast<float>(std::clamp(value, -kLargestStored, kLargestStored));
+  };
+  if (!input.residual.empty()) out.contributions[index] = stored(sums[kFieldContribution]);
+  if (input.with_blending_weights) out.blending_weights[index] = stored(sums[kFieldWeight]);
+  if (!input.edge_weights.empty()) out.edge_weights[index] = stored(sums[kFieldEdge]);
   if (input.with_screen_gradients) {
     for (size_t axis = 0; axis < 2; ++axis) {
-      out.screen_gradients[index * 2 + axis] = storedGradient(mean[static_cast<int>(axis)]);
-      out.absolute_screen_gradients[index * 2 + axis] =
-          storedGradient(sums[kFieldAbsoluteX + axis]);
+      out.screen_gradients[index * 2 + axis] = static_cast<float>(mean[axis]);
+      out.absolute_screen_gradients[index * 2 + axis] = stored(sums[kFieldAbsoluteX + axis]);
     }
-    out.screen_gradient_norms[index] = storedGradient(sums[kFieldNorm]);
+    out.screen_gradient_norms[index] = stored(sums[kFieldNorm]);
   }
   if (!input.errors.empty()) {
-    out.errors[index] = storedGradient(sums[kFieldError]);
-    out.largest_errors[index] = storedGradient(sums[kFieldLargestError]);
+    out.errors[index] = stored(sums[kFieldError]);
+    out.largest_errors[index] = stored(sums[kFieldLargestError]);
   }
 }
 
-/// Takes back projection and colour of one splat; adds to the camera's derivative [6].
-void takeBack(const Taken& taken, uint32_t splat, const double* sums,
-              std::vector<SplatGradients>& results, double* camera) {
-  const size_t cloud_index = cloudOfSplat(taken.scene, splat);
-  const PlacedCloud& placed = taken.scene.clouds[cloud_index];
-  const SplatCloud& cloud = *placed.cloud;
-  const size_t index = splat - placed.first_index;
-  SplatGradients& out = results[taken.instance_of[cloud_index]];
-
-  // e = L d is sqrt(2 ln 2) g.
-  const double scale = std::sqrt(kSquaredGScale);
-  FootprintGradient by_footprint;
-  by_footprint.s = sums[kFieldS];
-  by_footprint.first = scale * Vec2d(sums[kFieldG0], sums[kFieldG1]);
-  by_footprint.second << sums[kFieldG00], sums[kFieldG01], sums[kFieldG01], sums[kFieldG11];
-  by_footprint.second *= kSquaredGScale;
-  const ProjectionGradient gradient = projectBackward(
-      taken.scene.view, placed.linear, placed.translation, &cloud.positions[index * 3],
-      &cloud.rotations[index * 4], &cloud.scales[index * 3], cloud.opacities[index],
-      placed.low_pass, by_footprint);
-  const Vec3d by_direction = splatColourBackward(taken.scene, placed, index, sums + kFieldRed,
-                                                 &out.sh[index * cloud.shStride()]);
-  const bool perspective = taken.scene.view.perspective;
-  const Vec3d seen = taken.normal_to_view[cloud_index] * by_direction;
-  // A camera that moves by upsilon sees a splat at p from where p - upsilon was; a parallel view
-  // that turns by omega looks along its z axis turned by -omega.
-  const Vec3d turn =
-      perspective ? gradient.turn : Vec3d(gradient.turn - Vec3d(-seen[1], seen[0], 0.0));
-  const Vec3d shift = perspective ? Vec3d(gradient.centre + seen) : gradient.centre;
-  for (int axis = 0; axis < 3; ++axis) {
-    camera[axis] += turn[axis];
-    camera[3 + axis] += shift[axis];
+/// Writes rows [begin, end) of one cloud's result; adds to the camera's derivative [6].
+void takeBackRows(BackProjector project, const PlacedScene& scene, const PlacedCloud& placed,
+                  const BackwardInput& input, const BackwardSums& sums, size_t begin, size_t end,
+                  SplatGradients& out, double* camera) {
+  const CloudSums cloud_sums{sums.of(placed.first_index), sums.fieldCount(),
+                             !input.depth_gradient.empty()};
+  uint32_t rows[kRowsAtOnce];
+  double means[kRowsAtOnce * 2];
+  size_t count = 0;
+  const auto flush = [&] {
+    project(scene, placed, rows, count, cloud_sums, out, means, camera);
+    for (size_t i = 0; i < count; ++i) {
+      storeStatistics(input, sums.of(placed.first_index + rows[i]), means + i * 2, rows[i], out);
+    }
+    count = 0;
+  };
+  for (size_t row = begin; row < end;) {
+    if (sums.isTouched(placed.first_index + row)) {
+      rows[count++] = static_cast<uint32_t>(row++);
+      if (count == kRowsAtOnce) flush();
+      continue;
+    }
+    const size_t first = row;
+    while (row < end && !sums.isTouched(placed.first_index + row)) ++row;
+    forEachArray(*placed.cloud, input,
+                 [&](std::vector<float> SplatGradients::*array, size_t per_splat) {
+                   float* values = (out.*array).data();
+                   std::fill(values + first * per_splat, values + row * per_splat, 0.0f);
+                 });
   }
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const int a = static_cast<int>(axis);
-    out.positions[index * 3 + axis] =
-        storedGradient(gradient.position[a] + (perspective ? by_direction[a] : 0.0));
-    out.scales[index * 3 + axis] = storedGradient(gradient.scales[a]);
-  }
-  for (size_t k = 0; k < 4; ++k) {
-    out.rotations[index * 4 + k] = storedGradient(gradient.rotation[static_cast<int>(k)]);
-  }
-  out.opacities[index] = storedGradient(gradient.opacity);
-  storeStatistics(taken.input, sums, gradient.mean, index, out);
+  if (count > 0) flush();
 }
 
-uint64_t resultBytes(std::span<const SplatInstance> instances, const BackwardInput& input) {
-  uint64_t bytes = instances.size() * sizeof(SplatGradients);
-  for (const SplatInstance& instance : instances) {
-    if (!instance.cloud) continue;
-    forEachArray(*instance.cloud, input, [&](auto, uint64_t per_splat) {
-      bytes += instance.cloud->size() * per_splat * sizeof(float);
+/// Writes the result of every splat.
+void takeBackSplats(BackProjector project, const PlacedScene& scene, const BackwardInput& input,
+                    BackwardWorkspace::Arrays& arrays, BackwardResult& result, Progress* progress) {
+  arrays.cameras.assign(rangeCount(scene.splat_count, kSplatGrain), {});
+  const auto take_back = [&](size_t begin, size_t end) {
+    if (progress) progress->throwIfCancelled();
+    double* camera = arrays.cameras[begin / kSplatGrain].data();
+    for (size_t cloud = cloudOfSplat(scene, begin); begin < end; ++cloud) {
+      const PlacedCloud& placed = scene.clouds[cloud];
+      const size_t first = begin - placed.first_index;
+      const size_t last = std::min(end - placed.first_index, placed.cloud->size());
+      takeBackRows(project, scene, placed, input, arrays.sums, first, last,
+                   result.instances[placed.instance], camera);
+      begin = placed.first_index + last;
+    }
+  };
+  parallelFor(scene.splat_count, kSplatGrain, std::ref(take_back));
+  result.camera = {};
+  for (const std::array<double, 6>& part : arrays.cameras) {
+    for (size_t k = 0; k < 6; ++k) result.camera[k] += part[k];
+  }
+}
+
+void prepareResult(const KeptPicture& picture, const BackwardInput& input, BackwardResult& result) {
+  result.instances.resize(picture.clouds.size());
+  for (size_t i = 0; i < picture.clouds.size(); ++i) {
+    const SplatCloud& cloud = *picture.clouds[i];
+    clearUnwanted(input, result.instances[i]);
+    forEachArray(cloud, input, [&](std::vector<float> SplatGradients::*array, size_t per_splat) {
+      (result.instances[i].*array).resize(cloud.size() * per_splat);
     });
   }
+}
+
+/// The clouds must be what was drawn: everything else was found out from them.
+void requireSame(const RenderWorkspace::Arrays& drawn) {
+  const PlacedScene& scene = drawn.scene;
+  bool is_same = true;
+  for (size_t i = 0; i < scene.clouds.size() && is_same; ++i) {
+    const PlacedCloud& placed = scene.clouds[i];
+    const uint64_t end =
+        i + 1 < scene.clouds.size() ? scene.clouds[i + 1].first_index : scene.splat_count;
+    is_same = placed.cloud->size() == end - placed.first_index;
+    if (is_same) validateSizes(*placed.cloud, "a cloud that was drawn");
+  }
+  if (is_same && fingerprintOf(scene, drawn.visible) == drawn.kept.fingerprint) return;
+  fail(ErrorCode::kInvalidArgument,
+       "the splats changed after their picture was drawn; draw them again, then go backward");
+}
+
+uint64_t resultBytes(const SplatCloud* cloud, const BackwardInput& input) {
+  uint64_t bytes = sizeof(SplatGradients);
+  if (!cloud) return bytes;
+  forEachArray(*cloud, input, [&](auto, uint64_t per_splat) {
+    bytes += cloud->size() * per_splat * sizeof(float);
+  });
   return bytes;
+}
+
+/// Of a picture that is there, beside the result.
+uint64_t backwardBound(uint64_t splat_count, const TileGrid& grid, const BackwardInput& input) {
+  const BackwardWants wants = wantsOf(input);
+  const uint64_t entries =
+      std::min<uint64_t>(splat_count * grid.tileCount(), std::max(splat_count, kHeldEntries));
+  const uint64_t threads = std::max(1u, std::thread::hardware_concurrency());
+  return BackwardSums::memoryBound(splat_count, grid, wants) +
+         entries * backwardFieldCount(wants) * sizeof(float) +
+         grid.tileCount() * (3 * sizeof(double) + sizeof(uint32_t)) +
+         threads * (TileBackward::memoryBound() + sizeof(TileBackward)) +
+         rangeCount(splat_count, kSplatGrain) * sizeof(std::array<double, 6>);
+}
+
+void requireMemory(uint64_t needed, uint64_t limit, size_t splat_count) {
+  if (needed <= limit) return;
+  fail(ErrorCode::kMemoryLimit, "the backward pass of " + std::to_string(splat_count) +
+                                    " splats needs up to " + std::to_string(needed) + " bytes; " +
+                                    std::to_string(limit) + " are allowed");
+}
+
+/// From the picture that `drawn` keeps, whichever that is.
+void goBackward(const BackwardKernel& kernel, BackProjector project, RenderWorkspace::Arrays& drawn,
+                const BackwardInput& input, BackwardWorkspace::Arrays& arrays,
+                BackwardResult& result, Progress* progress) {
+  const PictureLoss loss{&input, &drawn.kept, wantsOf(input)};
+  arrays.sums.reset(drawn.scene.splat_count, loss.wants);
+  const std::array<double, 3> background = takeOffTiles(kernel, drawn, loss, arrays, progress);
+  prepareResult(drawn.kept, input, result);
+  result.background = background;
+  result.visible_count = drawn.visible.count;
+  takeBackSplats(project, drawn.scene, input, arrays, result, progress);
+  advance(progress, 1.0, "Taking splats off");
 }
 
 }  // namespace
@@ -268,85 +341,79 @@ BackwardWorkspace::~BackwardWorkspace() = default;
 BackwardWorkspace::BackwardWorkspace(BackwardWorkspace&&) noexcept = default;
 BackwardWorkspace& BackwardWorkspace::operator=(BackwardWorkspace&&) noexcept = default;
 
-void renderBackwardWith(const BackwardKernel& kernel, std::span<const SplatInstance> instances,
-                        const Camera& camera, const RenderOptions& options,
-                        const BackwardInput& input, BackwardWorkspace& workspace,
-                        BackwardResult& result, uint64_t memory_limit_bytes, Progress* progress) {
-  BackwardWorkspace::Arrays& arrays = workspace.arrays();
-  PlacedScene& scene = arrays.forward.scene;
-  VisibleSplats& visible = arrays.forward.visible;
-  placeSceneUnread(instances, camera, options, scene);
-  validateInput(camera, input);
-  const uint64_t needed = backwardMemoryBound(instances, camera, options, input);
-  if (needed > memory_limit_bytes) {
-    fail(ErrorCode::kMemoryLimit, "the backward pass of " + std::to_string(scene.splat_count) +
-                                      " splats needs up to " + std::to_string(needed) + " bytes; " +
-                                      std::to_string(memory_limit_bytes) + " are allowed");
+void renderBackwardWith(const BackwardKernel& kernel, BackProjector project, RenderWorkspace& drawn,
+                        const RenderResult& picture, const BackwardInput& input,
+                        BackwardWorkspace& workspace, BackwardResult& result,
+                        uint64_t memory_limit_bytes, Progress* progress) {
+  RenderWorkspace::Arrays& arrays = drawn.arrays();
+  const KeptPicture& kept = arrays.kept;
+  if (kept.number == 0) {
+    fail(ErrorCode::kInvalidArgument,
+         "the workspace keeps no picture; call keepForBackward(true) before one is drawn into it");
   }
-  advance(progress, 0.0, "Projecting splats");
-  findVisibleSplats(chosenProjector(), scene, progress, visible);
-
-  result.visible_count = visible.count;
-  result.instances.resize(instances.size());
-  for (size_t i = 0; i < instances.size(); ++i) {
-    const SplatCloud& cloud = *instances[i].cloud;
-    clearUnwanted(input, result.instances[i]);
-    forEachArray(cloud, input, [&](std::vector<float> SplatGradients::*array, size_t per_splat) {
-      (result.instances[i].*array).assign(cloud.size() * per_splat, 0.0f);
-    });
+  if (picture.number != kept.number) {
+    fail(ErrorCode::kInvalidArgument,
+         "picture " + std::to_string(picture.number) +
+             " is not what the workspace drew last, which is picture " +
+             std::to_string(kept.number));
   }
-
-  PictureLoss loss{&input, camera.width, options.with_background, {}, modeOf(input)};
-  std::copy(options.background, options.background + 3, loss.background);
-  arrays.sums.reset(visible.count, loss.mode);
-  result.background =
-      takeOffTiles(kernel, TileGrid(camera.width, camera.height), loss, arrays, progress);
-  if (!options.with_background) result.background = {};
-
-  arrays.instance_of.clear();
-  arrays.normal_to_view.clear();
-  for (size_t i = 0; i < instances.size(); ++i) {
-    if (instances[i].cloud->size() > 0) arrays.instance_of.push_back(i);
+  requireSizes(kept, input);
+  if (!input.depth_gradient.empty() && !kept.with_depth) {
+    fail(ErrorCode::kInvalidArgument,
+         "depth_gradient is given for a picture that was drawn without depth");
   }
-  for (const PlacedCloud& placed : scene.clouds) {
-    arrays.normal_to_view.push_back(inverse(placed.linear).transpose());
-  }
-  const Taken taken{scene, input, arrays.instance_of, arrays.normal_to_view};
-  // In the order of the clouds: attributes and derivatives are then read and written in a row.
-  uint32_t* place_of = arrays.place_of.resize(scene.splat_count);
-  std::fill(place_of, place_of + scene.splat_count, kNotVisible);
-  parallelFor(visible.count, kSplatGrain, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      place_of[visible.splats[i].index] = static_cast<uint32_t>(i);
-    }
-  });
-  arrays.cameras.assign(rangeCount(scene.splat_count, kSplatGrain), {});
-  const auto take_back = [&](size_t begin, size_t end) {
-    if (progress) progress->throwIfCancelled();
-    for (size_t i = begin; i < end; ++i) {
-      // The sums lie in the order of depth, so each would wait for memory.
-      const uint32_t ahead = place_of[std::min(i + kPrefetchDistance, end - 1)];
-      if (ahead != kNotVisible) __builtin_prefetch(arrays.sums.of(ahead));
-      if (place_of[i] == kNotVisible || !arrays.sums.isTouched(place_of[i])) continue;
-      takeBack(taken, static_cast<uint32_t>(i), arrays.sums.of(place_of[i]), result.instances,
-               arrays.cameras[begin / kSplatGrain].data());
-    }
-  };
-  parallelFor(scene.splat_count, kSplatGrain, std::ref(take_back));
-  result.camera = {};
-  for (const std::array<double, 6>& part : arrays.cameras) {
-    for (size_t k = 0; k < 6; ++k) result.camera[k] += part[k];
-  }
-  advance(progress, 1.0, "Taking splats off");
+  requireSame(arrays);
+  requireMemory(backwardMemoryBound(drawn, input), memory_limit_bytes, arrays.scene.splat_count);
+  goBackward(kernel, project, arrays, input, workspace.arrays(), result, progress);
 }
 
-BackwardResult renderBackwardWith(const BackwardKernel& kernel,
+void renderBackward(RenderWorkspace& drawn, const RenderResult& picture, const BackwardInput& input,
+                    BackwardWorkspace& workspace, BackwardResult& result,
+                    uint64_t memory_limit_bytes, Progress* progress) {
+  renderBackwardWith(chosenBackwardKernel(), chosenBackProjector(), drawn, picture, input,
+                     workspace, result, memory_limit_bytes, progress);
+}
+
+uint64_t backwardMemoryBound(RenderWorkspace& drawn, const BackwardInput& input) {
+  const KeptPicture& kept = drawn.arrays().kept;
+  uint64_t splat_count = 0;
+  uint64_t result_bytes = 0;
+  for (const SplatCloud* cloud : kept.clouds) {
+    splat_count += cloud->size();
+    result_bytes += resultBytes(cloud, input);
+  }
+  return result_bytes + backwardBound(splat_count, TileGrid(kept.width, kept.height), input);
+}
+
+void renderBackwardWith(const BackwardKernel& kernel, BackProjector project,
+                        std::span<const SplatInstance> instances, const Camera& camera,
+                        const RenderOptions& options, const BackwardInput& input,
+                        BackwardWorkspace& workspace, BackwardResult& result,
+                        uint64_t memory_limit_bytes, Progress* progress) {
+  BackwardWorkspace::Arrays& arrays = workspace.arrays();
+  RenderWorkspace::Arrays& drawn = arrays.own_picture.arrays();
+  placeSceneUnread(instances, camera, options, drawn.scene);
+  KeptPicture size;
+  size.width = camera.width;
+  size.height = camera.height;
+  requireSizes(size, input);
+  requireMemory(backwardMemoryBound(instances, camera, options, input), memory_limit_bytes,
+                drawn.scene.splat_count);
+  RenderOptions needed = options;
+  needed.with_depth = !input.depth_gradient.empty();
+  needed.with_median_depth = needed.with_counts = false;
+  blendTiledWith(kernel.blend, chosenProjector(), instances, camera, needed, arrays.own_picture,
+                 progress);
+  goBackward(kernel, project, drawn, input, arrays, result, progress);
+}
+
+BackwardResult renderBackwardWith(const BackwardKernel& kernel, BackProjector project,
                                   std::span<const SplatInstance> instances, const Camera& camera,
                                   const RenderOptions& options, const BackwardInput& input,
                                   uint64_t memory_limit_bytes, Progress* progress) {
   BackwardWorkspace workspace;
   BackwardResult result;
-  renderBackwardWith(kernel, instances, camera, options, input, workspace, result,
+  renderBackwardWith(kernel, project, instances, camera, options, input, workspace, result,
                      memory_limit_bytes, progress);
   return result;
 }
@@ -355,37 +422,31 @@ void renderBackward(std::span<const SplatInstance> instances, const Camera& came
                     const RenderOptions& options, const BackwardInput& input,
                     BackwardWorkspace& workspace, BackwardResult& result,
                     uint64_t memory_limit_bytes, Progress* progress) {
-  renderBackwardWith(chosenBackwardKernel(), instances, camera, options, input, workspace, result,
-                     memory_limit_bytes, progress);
+  renderBackwardWith(chosenBackwardKernel(), chosenBackProjector(), instances, camera, options,
+                     input, workspace, result, memory_limit_bytes, progress);
 }
 
 BackwardResult renderBackward(std::span<const SplatInstance> instances, const Camera& camera,
                               const RenderOptions& options, const BackwardInput& input,
                               uint64_t memory_limit_bytes, Progress* progress) {
-  return renderBackwardWith(chosenBackwardKernel(), instances, camera, options, input,
-                            memory_limit_bytes, progress);
+  return renderBackwardWith(chosenBackwardKernel(), chosenBackProjector(), instances, camera,
+                            options, input, memory_limit_bytes, progress);
 }
 
 uint64_t backwardMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,
-                             const RenderOptions&, const BackwardInput& input) {
+                             const RenderOptions& options, const BackwardInput& input) {
   validate(camera);
-  uint64_t splat_count = 0;
-  for (const SplatInstance& instance : instances) {
-    if (instance.cloud) splat_count += instance.cloud->size();
-  }
   const TileGrid grid(camera.width, camera.height);
-  const BackwardMode mode = modeOf(input);
-  const uint64_t entries =
-      std::min<uint64_t>(splat_count * grid.tileCount(), std::max(splat_count, kHeldEntries));
-  const uint64_t threads = std::max(1u, std::thread::hardware_concurrency());
-  return visibleSplatsMemoryBound(splat_count) + tileListsMemoryBound(splat_count, grid) +
-         resultBytes(instances, input) + BackwardSums::memoryBound(splat_count, mode) +
-         entries * backwardFieldCount(mode) * sizeof(float) +
-         grid.tileCount() * 3 * sizeof(double) +
-         threads * (TileBackward::memoryBound() + sizeof(TileBackward)) +
-         rangeCount(splat_count, kSplatGrain) * sizeof(std::array<double, 6>) +
-         splat_count * sizeof(uint32_t) +
-         instances.size() * (2 * sizeof(PlacedCloud) + 2 * sizeof(Mat3d) + 2 * sizeof(size_t));
+  uint64_t splat_count = 0;
+  uint64_t result_bytes = 0;
+  for (const SplatInstance& instance : instances) {
+    splat_count += instance.cloud ? instance.cloud->size() : 0;
+    result_bytes += resultBytes(instance.cloud, input);
+  }
+  const RenderMemory forward = renderMemory(instances, camera, options);
+  return forward.splat_bytes + forward.pixel_bytes + forward.pair_bytes + forward.other_bytes +
+         keptPictureBound(grid, !input.depth_gradient.empty(), instances.size()) + result_bytes +
+         backwardBound(splat_count, grid, input);
 }
 
 }  // namespace stipple

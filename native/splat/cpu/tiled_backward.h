@@ -5,6 +5,7 @@
 #include <mutex>
 #include <vector>
 
+#include "splat/cpu/back_projector.h"
 #include "splat/cpu/backward_sums.h"
 #include "splat/cpu/reused_array.h"
 #include "splat/cpu/tile_backward.h"
@@ -27,24 +28,27 @@ class TileScratch {
 };
 
 struct BackwardWorkspace::Arrays {
-  RenderWorkspace::Arrays forward;
+  RenderWorkspace own_picture;  ///< of a call from nothing
   BackwardSums sums;
   ReusedArray<float> tile_sums;     ///< [held entries][fields]
-  ReusedArray<uint32_t> place_of;   ///< [splats] place among the visible ones
+  std::vector<uint32_t> used;       ///< [tiles] as TileSums::used
   std::vector<double> backgrounds;  ///< [tiles][3]
   std::vector<std::array<double, 6>> cameras;
-  std::vector<size_t> instance_of;    ///< [clouds of the scene]
-  std::vector<Mat3d> normal_to_view;  ///< [clouds of the scene] transposed inverse of linear
   TileScratch scratch;
 };
 
-/// renderBackward with a kernel of backwardKernels(): for tests and benchmarks that compare them.
-void renderBackwardWith(const BackwardKernel& kernel, std::span<const SplatInstance> instances,
-                        const Camera& camera, const RenderOptions& options,
-                        const BackwardInput& input, BackwardWorkspace& workspace,
-                        BackwardResult& result, uint64_t memory_limit_bytes = UINT64_MAX,
-                        Progress* progress = nullptr);
-BackwardResult renderBackwardWith(const BackwardKernel& kernel,
+/// renderBackward with a kernel of backwardKernels() and one of backProjectors(): for tests and
+/// benchmarks that compare them.
+void renderBackwardWith(const BackwardKernel& kernel, BackProjector project, RenderWorkspace& drawn,
+                        const RenderResult& picture, const BackwardInput& input,
+                        BackwardWorkspace& workspace, BackwardResult& result,
+                        uint64_t memory_limit_bytes = UINT64_MAX, Progress* progress = nullptr);
+void renderBackwardWith(const BackwardKernel& kernel, BackProjector project,
+                        std::span<const SplatInstance> instances, const Camera& camera,
+                        const RenderOptions& options, const BackwardInput& input,
+                        BackwardWorkspace& workspace, BackwardResult& result,
+                        uint64_t memory_limit_bytes = UINT64_MAX, Progress* progress = nullptr);
+BackwardResult renderBackwardWith(const BackwardKernel& kernel, BackProjector project,
                                   std::span<const SplatInstance> instances, const Camera& camera,
                                   const RenderOptions& options, const BackwardInput& input,
                                   uint64_t memory_limit_bytes = UINT64_MAX,

@@ -108,8 +108,8 @@ TEST(BackwardOutputs, AreThoseOfTheScalarKernelOnEveryTarget) {
   ASSERT_GE(kernels.size(), 2u);
   for (const Wanted wanted : kEveryMode) {
     const auto run = [&](const BackwardKernel& kernel) {
-      return renderBackwardWith(kernel, scene.instances(), scene.camera, scene.options,
-                                scene.input(wanted));
+      return renderBackwardWith(kernel, chosenBackProjector(), scene.instances(), scene.camera,
+                                scene.options, scene.input(wanted));
     };
     const BackwardResult expected = run(kernels[0]);
     for (const BackwardKernel& kernel : kernels) {

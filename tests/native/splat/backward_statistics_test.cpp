@@ -307,8 +307,7 @@ TEST(Backward, ChangesNoGradientWhenStatisticsAreAskedFor) {
 }
 
 TEST(Backward, EveryTargetAgreesWithTheScalarOne) {
-  // Long lists, so that batches are made again behind the first 4,096 splats; faint, so that
-  // pixels do not end before.
+  // Long lists of many batches; faint, so that pixels do not end before.
   SplatCloud cloud = smallCloud(9000, 0, 280);
   for (float& opacity : cloud.opacities) opacity = 0.008f;
   const Camera camera = frontCamera(40, 33, 30, 3);
@@ -323,11 +322,13 @@ TEST(Backward, EveryTargetAgreesWithTheScalarOne) {
   const std::vector<BackwardKernel> kernels = backwardKernels();
   ASSERT_GE(kernels.size(), 2u);
   const SplatGradients expected =
-      renderBackwardWith(kernels[0], {&instance, 1}, camera, {}, input).instances[0];
+      renderBackwardWith(kernels[0], takeBackScalar, {&instance, 1}, camera, {}, input)
+          .instances[0];
   for (const BackwardKernel& kernel : kernels) {
     SCOPED_TRACE(kernel.target);
     const SplatGradients seen =
-        renderBackwardWith(kernel, {&instance, 1}, camera, {}, input).instances[0];
+        renderBackwardWith(kernel, chosenBackProjector(), {&instance, 1}, camera, {}, input)
+            .instances[0];
     for (std::vector<float> SplatGradients::*array :
          {&SplatGradients::positions, &SplatGradients::rotations, &SplatGradients::scales,
           &SplatGradients::opacities, &SplatGradients::sh, &SplatGradients::contributions,

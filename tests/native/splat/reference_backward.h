@@ -4,9 +4,8 @@
 #include <vector>
 
 #include "splat/blend_backward.h"
-#include "splat/projection_backward.h"
+#include "splat/projection_backward_matrices.h"
 #include "splat/render_backward.h"
-#include "splat/scene_backward.h"
 
 // One cloud backwards in double: no tiles, no lists, no SIMD. It judges how the tiled pass decides
 // and adds; the formulas that both share are judged by differences.
@@ -18,7 +17,7 @@ struct ReferenceSplat {
   double colour[3];
   size_t index;
   uint32_t key;
-  double sums[kStatisticsFieldCount] = {};
+  double sums[kMostFields] = {};
 };
 
 inline std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene) {
@@ -41,9 +40,10 @@ inline std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene) {
   return splats;
 }
 
-/// Adds one pixel's share to the sums of its splats. The loss has gradient [4] and residual [3].
+/// Adds one pixel's share to the sums of its splats. The loss has gradient [4] and residual [3],
+/// and by_depth by the expected depth.
 inline void takeOffPixel(std::vector<ReferenceSplat>& splats, double px, double py,
-                         const PixelLoss<double>& loss) {
+                         PixelLoss<double> loss, double by_depth = 0) {
   constexpr double kGScale = 0.84932180028801904;  // sqrt(log2(e)/2)
   struct Blended {
     ReferenceSplat* splat;
@@ -68,19 +68,26 @@ inline void takeOffPixel(std::vector<ReferenceSplat>& splats, double px, double 
     here.g0 = here.l00 * dx;
     here.g1 = here.l10 * dx + here.l11 * dy;
     std::copy(splat.colour, splat.colour + 3, here.colour);
+    here.depth = splat.projected.depth;
     blended.push_back({&splat, here});
+  }
+  if (blend.count > 0) {
+    loss.depth = blend.weighted_depth / (1.0 - blend.transmittance);
+    loss.depth_gradient = by_depth / (1.0 - blend.transmittance);
   }
   PixelBackward<double> pixel{blend.transmittance, 0.0, {0.0, 0.0, 0.0}};
   for (size_t k = blended.size(); k-- > 0;) {
-    takeOff(blended[k].here, loss, BackwardMode::kStatistics, pixel, blended[k].splat->sums);
+    takeOff(blended[k].here, loss, {BackwardMode::kStatistics, true}, pixel,
+            blended[k].splat->sums);
   }
 }
 
-/// The tiled pass over nothing, with every statistic; residual [H,W,3].
+/// The tiled pass over nothing, with every statistic; residual [H,W,3], depth_gradient [H,W].
 inline SplatGradients backwardReference(const SplatCloud& cloud, const Camera& camera,
                                         const RenderOptions& options,
                                         const std::vector<float>& gradient,
-                                        const std::vector<float>& residual) {
+                                        const std::vector<float>& residual,
+                                        const std::vector<float>& depth_gradient = {}) {
   const SplatInstance instance{&cloud};
   const PlacedScene scene = placeScene({&instance, 1}, camera, options);
   std::vector<ReferenceSplat> splats = visibleInOrder(scene);
@@ -94,7 +101,8 @@ inline SplatGradients backwardReference(const SplatCloud& cloud, const Camera& c
         loss.signed_weight[c] = r < 0 ? -1.0 : 1.0;
         loss.room[c] = 2.0 * std::abs(r);
       }
-      takeOffPixel(splats, x + 0.5, y + 0.5, loss);
+      takeOffPixel(splats, x + 0.5, y + 0.5, loss,
+                   depth_gradient.empty() ? 0.0 : static_cast<double>(depth_gradient[i]));
     }
   }
   SplatGradients out;
@@ -110,14 +118,15 @@ inline SplatGradients backwardReference(const SplatCloud& cloud, const Camera& c
   for (const ReferenceSplat& splat : splats) {
     const size_t i = splat.index;
     const double scale = std::sqrt(kSquaredGScale);
-    FootprintGradient by_footprint;
+    FootprintMatrices by_footprint;
     by_footprint.s = splat.sums[kFieldS];
     by_footprint.first = scale * Vec2d(splat.sums[kFieldG0], splat.sums[kFieldG1]);
     by_footprint.second << splat.sums[kFieldG00], splat.sums[kFieldG01], splat.sums[kFieldG01],
         splat.sums[kFieldG11];
     by_footprint.second *= kSquaredGScale;
+    by_footprint.depth = splat.sums[kMostFields - 1];
     const PlacedCloud& placed = scene.clouds[0];
-    const ProjectionGradient by =
+    const ProjectionVectors by =
         projectBackward(scene.view, placed.linear, placed.translation, &cloud.positions[i * 3],
                         &cloud.rotations[i * 4], &cloud.scales[i * 3], cloud.opacities[i],
                         placed.low_pass, by_footprint);

@@ -1,0 +1,193 @@
+// Included inside a namespace, once by cpu/back_projector_scalar.cpp and once per instruction set
+// by cpu/back_projector_vector.cpp, hence no include guard. Needs there: loadLanes<T>(const
+// double*), storeLanes(T, double*), laneCount<T>(), takeFootprintBack (projectBackwardSteps of the
+// same namespace) and takeHarmonicsBack. One order of operations in double and nothing fused, so
+// every instruction set gives the same bits.
+
+constexpr size_t kMaxLanes = 8;
+
+/// What goes into a block of splats, columns apart.
+enum InColumn : size_t {
+  kInPosition = 0,
+  kInRotation = 3,
+  kInScales = 7,
+  kInOpacity = 10,
+  kInS = 11,
+  kInFirst = 12,
+  kInSecond = 14,
+  kInDepth = 17,
+  kInCount = 18,
+};
+
+/// What comes out of it.
+enum OutColumn : size_t {
+  kOutPosition = 0,
+  kOutRotation = 3,
+  kOutScales = 7,
+  kOutOpacity = 10,
+  kOutMean = 11,
+  kOutTurn = 13,
+  kOutShift = 16,
+  kOutCount = 19,
+};
+
+/// Harmonics of the lanes' directions, and what their derivatives need.
+template <typename T>
+struct DirectionLanes {
+  T unit[3];
+  T inverse_length;
+};
+
+template <typename T>
+void fillColumns(const PlacedCloud& placed, const uint32_t* rows, size_t count,
+                 const CloudSums& sums, double (*in)[kMaxLanes]) {
+  const SplatCloud& cloud = *placed.cloud;
+  for (size_t lane = 0; lane < laneCount<T>(); ++lane) {
+    // Lanes behind the last splat repeat it.
+    const size_t row = rows[lane < count ? lane : count - 1];
+    for (size_t k = 0; k < 3; ++k) {
+      in[kInPosition + k][lane] = static_cast<double>(cloud.positions[row * 3 + k]);
+      in[kInScales + k][lane] = static_cast<double>(cloud.scales[row * 3 + k]);
+    }
+    for (size_t k = 0; k < 4; ++k) {
+      in[kInRotation + k][lane] = static_cast<double>(cloud.rotations[row * 4 + k]);
+    }
+    in[kInOpacity][lane] = static_cast<double>(cloud.opacities[row]);
+    const double* sum = sums.values + row * sums.field_count;
+    in[kInS][lane] = sum[kFieldS];
+    for (size_t k = 0; k < 2; ++k) in[kInFirst + k][lane] = sum[kFieldG0 + k];
+    for (size_t k = 0; k < 3; ++k) in[kInSecond + k][lane] = sum[kFieldG00 + k];
+    in[kInDepth][lane] = sums.with_depth ? sum[sums.field_count - 1] : 0.0;
+  }
+}
+
+/// Out: basis [coefficient][lane], slopes [coefficient][axis][lane].
+template <typename T>
+void directionSteps(const PlacedScene& scene, const PlacedCloud& placed, const T* position,
+                    DirectionLanes<T>& direction, double (*basis)[kMaxLanes],
+                    double (*slopes)[3][kMaxLanes]) {
+  using std::sqrt;
+  T* d = direction.unit;
+  for (int axis = 0; axis < 3; ++axis) {
+    d[axis] = scene.view.perspective ? position[axis] - T(placed.eye[axis]) : T(placed.eye[axis]);
+  }
+  direction.inverse_length = T(1) / sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+  for (int axis = 0; axis < 3; ++axis) d[axis] = d[axis] * direction.inverse_length;
+  T values[25];
+  T gradients[25][3];
+  harmonicBasis(placed.sh_degree, d[0], d[1], d[2], values);
+  harmonicBasisGradient(placed.sh_degree, d[0], d[1], d[2], gradients);
+  const size_t coefficients = shCoefficientCount(placed.sh_degree);
+  for (size_t k = 1; k < coefficients; ++k) {
+    storeLanes(values[k], basis[k]);
+    for (size_t axis = 0; axis < 3; ++axis) storeLanes(gradients[k][axis], slopes[k][axis]);
+  }
+}
+
+/// A block of at most laneCount<T>() splats.
+template <typename T>
+void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Mat3d& normal_to_view,
+                   const uint32_t* rows, size_t count, const CloudSums& sums, SplatGradients& out,
+                   double* means, double* camera) {
+  using std::max;
+  using std::min;
+  alignas(64) double in[kInCount][kMaxLanes];
+  fillColumns<T>(placed, rows, count, sums, in);
+  SplatGeometry<T> splat;
+  for (size_t k = 0; k < 3; ++k) {
+    splat.position[k] = loadLanes<T>(in[kInPosition + k]);
+    splat.scales[k] = loadLanes<T>(in[kInScales + k]);
+  }
+  for (size_t k = 0; k < 4; ++k) splat.rotation[k] = loadLanes<T>(in[kInRotation + k]);
+  splat.opacity = loadLanes<T>(in[kInOpacity]);
+  FootprintGradient<T> by;
+  // e = L d is sqrt(2 ln 2) g.
+  by.s = loadLanes<T>(in[kInS]);
+  const double scale = std::sqrt(kSquaredGScale);
+  for (size_t k = 0; k < 2; ++k) by.first[k] = T(scale) * loadLanes<T>(in[kInFirst + k]);
+  for (size_t k = 0; k < 3; ++k) by.second[k] = T(kSquaredGScale) * loadLanes<T>(in[kInSecond + k]);
+  by.depth = loadLanes<T>(in[kInDepth]);
+  T centre[3];
+  placePoint(placed.linear, placed.translation, splat.position, centre);
+  ProjectionGradient<T> gradient;
+  takeFootprintBack(scene.view, placed.linear, centre, splat, placed.low_pass, by, gradient);
+
+  const bool turns = placed.sh_degree > 0;
+  alignas(64) double basis[25][kMaxLanes];
+  alignas(64) double slopes[25][3][kMaxLanes];
+  alignas(64) double along[3][kMaxLanes] = {};
+  DirectionLanes<T> direction;
+  if (turns) directionSteps(scene, placed, splat.position, direction, basis, slopes);
+  const size_t stride = placed.cloud->shStride();
+  for (size_t lane = 0; lane < count; ++lane) {
+    const size_t row = rows[lane];
+    const double* by_colour = sums.values + row * sums.field_count + kFieldRed;
+    takeHarmonicsBack(placed, &basis[0][lane], &slopes[0][0][lane], &placed.cloud->sh[row * stride],
+                      by_colour, &out.sh[row * stride], &along[0][lane]);
+  }
+  const bool perspective = scene.view.perspective;
+  if (turns) {
+    T by_direction[3];
+    for (size_t axis = 0; axis < 3; ++axis) by_direction[axis] = loadLanes<T>(along[axis]);
+    const T* d = direction.unit;
+    const T inward = d[0] * by_direction[0] + d[1] * by_direction[1] + d[2] * by_direction[2];
+    for (int axis = 0; axis < 3; ++axis) {
+      by_direction[axis] = (by_direction[axis] - d[axis] * inward) * direction.inverse_length;
+    }
+    T seen[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      seen[axis] = T(normal_to_view(axis, 0)) * by_direction[0] +
+                   T(normal_to_view(axis, 1)) * by_direction[1] +
+                   T(normal_to_view(axis, 2)) * by_direction[2];
+    }
+    // A camera that moves by upsilon sees a splat at p from where p - upsilon was; a parallel view
+    // that turns by omega looks along its z axis turned by -omega.
+    if (perspective) {
+      for (int axis = 0; axis < 3; ++axis) {
+        gradient.position[axis] = gradient.position[axis] + by_direction[axis];
+        gradient.centre[axis] = gradient.centre[axis] + seen[axis];
+      }
+    } else {
+      gradient.turn[0] = gradient.turn[0] + seen[1];
+      gradient.turn[1] = gradient.turn[1] - seen[0];
+    }
+  }
+
+  alignas(64) double columns[kOutCount][kMaxLanes];
+  const auto store = [&](const T& value, size_t column) {
+    storeLanes(max(min(value, T(kLargestStored)), T(-kLargestStored)), columns[column]);
+  };
+  for (size_t k = 0; k < 3; ++k) {
+    store(gradient.position[k], kOutPosition + k);
+    store(gradient.scales[k], kOutScales + k);
+    storeLanes(gradient.turn[k], columns[kOutTurn + k]);
+    storeLanes(gradient.centre[k], columns[kOutShift + k]);
+  }
+  for (size_t k = 0; k < 4; ++k) store(gradient.rotation[k], kOutRotation + k);
+  store(gradient.opacity, kOutOpacity);
+  for (size_t k = 0; k < 2; ++k) store(gradient.mean[k], kOutMean + k);
+  for (size_t lane = 0; lane < count; ++lane) {
+    const size_t row = rows[lane];
+    const auto value = [&](size_t column) { return static_cast<float>(columns[column][lane]); };
+    for (size_t k = 0; k < 3; ++k) {
+      out.positions[row * 3 + k] = value(kOutPosition + k);
+      out.scales[row * 3 + k] = value(kOutScales + k);
+    }
+    for (size_t k = 0; k < 4; ++k) out.rotations[row * 4 + k] = value(kOutRotation + k);
+    out.opacities[row] = value(kOutOpacity);
+    for (size_t k = 0; k < 2; ++k) means[lane * 2 + k] = columns[kOutMean + k][lane];
+    for (size_t k = 0; k < 6; ++k) camera[k] += columns[kOutTurn + k][lane];
+  }
+}
+
+template <typename T>
+void takeBackRows(const PlacedScene& scene, const PlacedCloud& placed, const uint32_t* rows,
+                  size_t count, const CloudSums& sums, SplatGradients& out, double* means,
+                  double* camera) {
+  const Mat3d normal_to_view = inverse(placed.linear).transpose();
+  const size_t lanes = laneCount<T>();
+  for (size_t i = 0; i < count; i += lanes) {
+    takeBackBlock<T>(scene, placed, normal_to_view, rows + i, std::min(lanes, count - i), sums, out,
+                     means + i * 2, camera);
+  }
+}
