@@ -43,7 +43,8 @@ void expectNear(const std::vector<float>& seen, const std::vector<float>& expect
   EXPECT_EQ(wrong, 0u) << name << " of " << seen.size();
 }
 
-void expectSound(const SplatCloud& cloud, const Camera& camera, LowPass low_pass) {
+void expectSound(const SplatCloud& cloud, const Camera& camera, LowPass low_pass,
+                 bool with_depth = false) {
   RenderOptions options;
   options.low_pass = low_pass;
   const std::vector<float> gradient = randomWeights(pixelCount(camera) * 4, 1);
@@ -53,10 +54,14 @@ void expectSound(const SplatCloud& cloud, const Camera& camera, LowPass low_pass
   input.residual = residual;
   input.with_blending_weights = true;
   input.with_screen_gradients = true;
+  const std::vector<float> depth_gradient =
+      with_depth ? randomWeights(pixelCount(camera), 3) : std::vector<float>();
+  input.depth_gradient = depth_gradient;
   const SplatInstance instance{&cloud};
   const BackwardResult result = renderBackward({&instance, 1}, camera, options, input);
   const SplatGradients& seen = result.instances[0];
-  const SplatGradients expected = backwardReference(cloud, camera, options, gradient, residual);
+  const SplatGradients expected =
+      backwardReference(cloud, camera, options, gradient, residual, depth_gradient);
   expectNear(seen.positions, expected.positions, "positions");
   // Turning a round splat changes nothing: what is left are differences of what its axes change.
   double turning = 0;
@@ -171,6 +176,29 @@ TEST(BackwardStability, TenThousandLayers) {
   }
 }
 
+TEST(BackwardStability, DepthOfPixelsThatAreHardlyCovered) {
+  // Coverage down to 1/255 and depths from the near plane to a million units behind each other.
+  CloudRecipe recipe;
+  recipe.count = 300;
+  recipe.degree = 1;
+  for (const float opacity : {1.01f / 255.0f, 0.005f, 0.1f, 1.0f}) {
+    SCOPED_TRACE(opacity);
+    SplatCloud cloud = randomCloud(recipe, 13);
+    for (float& o : cloud.opacities) o = opacity;
+    for (const LowPass low_pass : {LowPass::kClassic, LowPass::kMip, LowPass::kNone}) {
+      expectSound(cloud, frontCamera(40, 40, 30, 3), low_pass, true);
+    }
+  }
+}
+
+TEST(BackwardStability, DepthOfNeedlesAndManyLayers) {
+  expectSound(withScales(100, 1000.0f, 1e-3f, 1e-3f, 1), frontCamera(43, 31, 30, 3),
+              LowPass::kClassic, true);
+  SplatCloud cloud = withScales(10000, 2, 2, 2, 11);
+  for (float& o : cloud.opacities) o = 0.004f;
+  expectSound(cloud, frontCamera(12, 12, 10, 3), LowPass::kClassic, true);
+}
+
 TEST(BackwardStability, EqualDepthsAndTinyPictures) {
   CloudRecipe recipe;
   recipe.count = 300;
@@ -250,8 +278,8 @@ TEST(BackwardStability, RefusesWhatIsNotFinite) {
   const std::vector<float> ones(n * 4, 1.0f);
   const auto inputOf = [&](const std::vector<float>& values) {
     const std::span<const float> all = values;
-    return BackwardInput{all, all.first(n * 3), all.first(n), all.first(n), all.first(n), true,
-                         true};
+    return BackwardInput{all,  all.first(n * 3), all.first(n), all.first(n), all.first(n), true,
+                         true, all.first(n)};
   };
   const auto refused = [&](const SplatCloud& cloud, const BackwardInput& input) {
     const SplatInstance instance{&cloud};
@@ -272,7 +300,8 @@ TEST(BackwardStability, RefusesWhatIsNotFinite) {
     const BackwardInput bad_input = inputOf(broken);
     for (std::span<const float> BackwardInput::*picture :
          {&BackwardInput::colour_gradient, &BackwardInput::residual,
-          &BackwardInput::residual_weights, &BackwardInput::edge_weights, &BackwardInput::errors}) {
+          &BackwardInput::residual_weights, &BackwardInput::edge_weights, &BackwardInput::errors,
+          &BackwardInput::depth_gradient}) {
       BackwardInput input = inputOf(ones);
       input.*picture = bad_input.*picture;
       refused(good, input);

@@ -78,7 +78,7 @@ void directionSteps(const PlacedScene& scene, const PlacedCloud& placed, const T
   harmonicBasis(placed.sh_degree, d[0], d[1], d[2], values);
   harmonicBasisGradient(placed.sh_degree, d[0], d[1], d[2], gradients);
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
-  for (size_t k = 1; k < coefficients; ++k) {
+  for (size_t k = 0; k < coefficients; ++k) {
     storeLanes(values[k], basis[k]);
     for (size_t axis = 0; axis < 3; ++axis) storeLanes(gradients[k][axis], slopes[k][axis]);
   }
@@ -117,7 +117,11 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
   alignas(64) double slopes[25][3][kMaxLanes];
   alignas(64) double along[3][kMaxLanes] = {};
   DirectionLanes<T> direction;
-  if (turns) directionSteps(scene, placed, splat.position, direction, basis, slopes);
+  if (turns) {
+    directionSteps(scene, placed, splat.position, direction, basis, slopes);
+  } else {
+    storeLanes(T(static_cast<double>(kShC0)), basis[0]);
+  }
   const size_t stride = placed.cloud->shStride();
   for (size_t lane = 0; lane < count; ++lane) {
     const size_t row = rows[lane];

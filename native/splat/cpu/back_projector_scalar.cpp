@@ -43,11 +43,10 @@ void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const dou
 void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
                        const float* sh, const double* by_colour, float* by_sh, double* along) {
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
-  const double first = static_cast<double>(kShC0);
   double by_sum[3];
   double by_axis[3] = {};
   for (size_t c = 0; c < 3; ++c) {
-    double sum = 0.5 + first * static_cast<double>(sh[c]);
+    double sum = 0.5 + basis[0] * static_cast<double>(sh[c]);
     double sums[3] = {};
     for (size_t k = 1; k < coefficients; ++k) {
       const double value = static_cast<double>(sh[k * 3 + c]);
@@ -61,7 +60,7 @@ void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const dou
   }
   for (size_t axis = 0; axis < 3; ++axis) along[axis * kMaxLanes] = by_axis[axis];
   for (size_t k = 0; k < coefficients; ++k) {
-    const double value = k == 0 ? first : basis[k * kMaxLanes];
+    const double value = basis[k * kMaxLanes];
     for (size_t c = 0; c < 3; ++c) {
       by_sh[k * 3 + c] =
           static_cast<float>(std::clamp(value * by_sum[c], -kLargestStored, kLargestStored));

@@ -64,7 +64,7 @@ HWY_INLINE void harmonicsOfColour(const PlacedCloud& placed, const double* basis
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
   for (size_t c = 0; c < 3; ++c) {
     double* own = sums + c;
-    own[0] = 0.5 + static_cast<double>(kShC0) * static_cast<double>(sh[c]);
+    own[0] = 0.5 + basis[0] * static_cast<double>(sh[c]);
     for (size_t axis = 1; axis < 4; ++axis) own[axis * 4] = 0;
     for (size_t k = 1; k < coefficients; ++k) {
       const double value = static_cast<double>(sh[k * 3 + c]);
@@ -79,7 +79,6 @@ HWY_INLINE void harmonicsOfColour(const PlacedCloud& placed, const double* basis
 void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
                        const float* sh, const double* by_colour, float* by_sh, double* along) {
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
-  const double first = static_cast<double>(kShC0);
   // Rows: colour, then its derivatives by the axes of the direction.
   HWY_ALIGN double sums[16];
   constexpr bool kHasQuads = hn::MaxLanes(Quad()) == 4;
@@ -90,7 +89,7 @@ void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const dou
     auto colour = hn::Zero(d), by_x = colour, by_y = colour, by_z = colour;
     if (coefficients > 1) {
       const auto value = hn::PromoteTo(d, hn::LoadU(floats, sh));
-      colour = hn::Add(hn::Set(d, 0.5), hn::Mul(hn::Set(d, first), value));
+      colour = hn::Add(hn::Set(d, 0.5), hn::Mul(hn::Set(d, basis[0]), value));
     }
     for (size_t k = 1; k + 1 < coefficients; ++k) {
       const auto value = hn::PromoteTo(d, hn::LoadU(floats, sh + k * 3));
@@ -108,7 +107,7 @@ void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const dou
     for (size_t c = 0; c < 3; ++c) {
       const double value = static_cast<double>(sh[k * 3 + c]);
       if (k == 0) {
-        sums[c] = 0.5 + first * value;
+        sums[c] = 0.5 + basis[0] * value;
         continue;
       }
       sums[c] += basis[k * kMaxLanes] * value;
@@ -133,12 +132,12 @@ void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const dou
     const auto most = hn::Set(d, kLargestStored);
     const auto least = hn::Set(d, -kLargestStored);
     for (; k + 1 < coefficients; ++k) {
-      const auto value = hn::Mul(hn::Set(d, k == 0 ? first : basis[k * kMaxLanes]), by);
+      const auto value = hn::Mul(hn::Set(d, basis[k * kMaxLanes]), by);
       hn::StoreU(hn::DemoteTo(floats, hn::Max(hn::Min(value, most), least)), floats, by_sh + k * 3);
     }
   }
   for (; k < coefficients; ++k) {
-    const double value = k == 0 ? first : basis[k * kMaxLanes];
+    const double value = basis[k * kMaxLanes];
     for (size_t c = 0; c < 3; ++c) {
       by_sh[k * 3 + c] =
           static_cast<float>(std::clamp(value * by_sum[c], -kLargestStored, kLargestStored));

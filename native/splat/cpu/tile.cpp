@@ -88,8 +88,8 @@ double alphaInDouble(const VisibleSplat& splat, const Tile& tile, uint32_t x, ui
 
 void clearPixels(const Tile& tile, TilePixels& pixels) {
   std::fill(std::begin(pixels.transmittance), std::end(pixels.transmittance), 1.0f);
-  for (float* plane :
-       {pixels.red, pixels.green, pixels.blue, pixels.weighted_depth, pixels.count, pixels.doubt}) {
+  for (float* plane : {pixels.red, pixels.green, pixels.blue, pixels.weighted_depth,
+                       pixels.coverage, pixels.count, pixels.doubt}) {
     std::fill(plane, plane + kTilePixelCount, 0.0f);
   }
   std::fill(std::begin(pixels.median_depth), std::end(pixels.median_depth), kNoMedian);

@@ -254,11 +254,11 @@ void TileBackward::takeOff(const Tile& tile, size_t used, float* sums) {
   for (size_t batch = (used + kBatchSize - 1) / kBatchSize; batch-- > 0;) {
     const size_t begin = batch * kBatchSize;
     const size_t count = std::min(kBatchSize, used - begin);
-    for (size_t i = count; i-- > 0;) {
-      // A tile's splats lie far apart, so each would wait for memory.
-      const size_t ahead = begin + i < kPrefetchDistance ? 0 : begin + i - kPrefetchDistance;
-      prefetchSplat(&visible_[tile.splats[ahead]]);
-      splats_[i] = makeTileSplat(visible_[tile.splats[begin + i]], tile);
+    float largest = 0;
+    makeTileSplats(visible_, tile, begin, count, largest, splats_.data());
+    // A tile's splats lie far apart, so the first of the next batch would wait for memory.
+    for (size_t i = 0; begin > 0 && i < kPrefetchDistance; ++i) {
+      prefetchSplat(&visible_[tile.splats[begin - kBatchSize + i]]);
     }
     judged.begin = begin;
     options.first = static_cast<int32_t>(begin);

@@ -35,6 +35,8 @@ struct TilePixels {
   alignas(64) float green[kTilePixelCount];
   alignas(64) float blue[kTilePixelCount];
   alignas(64) float weighted_depth[kTilePixelCount];
+  /// Sum of w: 1 - transmittance, but with all its digits where little covers the pixel.
+  alignas(64) float coverage[kTilePixelCount];
   alignas(64) float median_depth[kTilePixelCount];  ///< kNoMedian until it is known
   alignas(64) float count[kTilePixelCount];         ///< at most 2,350 splats blend: exact
   /// Smallest exponent that still blends: kLog2MinAlpha, or kFinished once nothing more may.
@@ -79,7 +81,8 @@ struct TileKernelOptions {
   /// Asked where rounding could decide whether a splat shows; nullptr: the pixel is in doubt then.
   AlphaJudge judge = nullptr;
   const void* judge_context = nullptr;
-  int32_t first = 0;  ///< place of this call's first splat in the tile's list
+  bool with_coverage = false;  ///< beside depth
+  int32_t first = 0;           ///< place of this call's first splat in the tile's list
 };
 
 /// Blends the splats in order into the tile; stops early once every pixel is finished.

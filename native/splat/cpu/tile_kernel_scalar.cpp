@@ -35,6 +35,7 @@ void blendPixel(const TileSplat& splat, float alpha, const TileKernelOptions& op
     return;
   }
   const bool had_median = pixel.has_median;
+  const float weight = pixel.transmittance * alpha;
   pixel.add(alpha, splat.colour, splat.depth);
   if (pixel.finished) {
     finish(pixels, i, place);
@@ -45,6 +46,7 @@ void blendPixel(const TileSplat& splat, float alpha, const TileKernelOptions& op
   pixels.green[i] += pixel.colour[1];
   pixels.blue[i] += pixel.colour[2];
   if (options.with_depth) pixels.weighted_depth[i] += pixel.weighted_depth;
+  if (options.with_depth && options.with_coverage) pixels.coverage[i] += weight;
   if (options.with_extras) {
     if (pixel.has_median && !had_median) pixels.median_depth[i] = splat.depth;
     pixels.count[i] += 1.0f;

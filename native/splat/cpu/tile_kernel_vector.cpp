@@ -35,7 +35,7 @@ HWY_NOINLINE Vec judgedAlpha(Tag d, hn::Mask<Tag> unclear, Vec alpha, size_t spl
   return hn::Load(d, values);
 }
 
-template <bool kDepth, bool kExtras>
+template <bool kDepth, bool kCoverage, bool kExtras>
 void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions& options,
                  TilePixels& pixels) {
   const Tag d;
@@ -95,6 +95,9 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
         accumulate(pixels.green, splat.colour[1]);
         accumulate(pixels.blue, splat.colour[2]);
         if constexpr (kDepth) accumulate(pixels.weighted_depth, splat.depth);
+        if constexpr (kCoverage) {
+          hn::Store(hn::Add(weight, hn::Load(d, pixels.coverage + i)), d, pixels.coverage + i);
+        }
         if constexpr (kExtras) {
           const Vec median = hn::Load(d, pixels.median_depth + i);
           const auto passes =
@@ -118,18 +121,24 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
   }
 }
 
+template <bool kExtras>
+void blendWithExtras(const TileSplat* splats, size_t count, const TileKernelOptions& options,
+                     TilePixels& pixels) {
+  if (!options.with_depth) {
+    blendSplats<false, false, kExtras>(splats, count, options, pixels);
+  } else if (!options.with_coverage) {
+    blendSplats<true, false, kExtras>(splats, count, options, pixels);
+  } else {
+    blendSplats<true, true, kExtras>(splats, count, options, pixels);
+  }
+}
+
 void blendTile(const TileSplat* splats, size_t count, TileKernelOptions options,
                TilePixels& pixels) {
   if (options.with_extras) {
-    if (options.with_depth) {
-      blendSplats<true, true>(splats, count, options, pixels);
-    } else {
-      blendSplats<false, true>(splats, count, options, pixels);
-    }
-  } else if (options.with_depth) {
-    blendSplats<true, false>(splats, count, options, pixels);
+    blendWithExtras<true>(splats, count, options, pixels);
   } else {
-    blendSplats<false, false>(splats, count, options, pixels);
+    blendWithExtras<false>(splats, count, options, pixels);
   }
 }
 

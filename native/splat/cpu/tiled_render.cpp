@@ -51,6 +51,7 @@ void replaceDoubtful(const VisibleSplat* visible, const Tile& tile, TilePixels& 
       pixels.green[i] = static_cast<float>(pixel.colour[1]);
       pixels.blue[i] = static_cast<float>(pixel.colour[2]);
       pixels.weighted_depth[i] = static_cast<float>(pixel.weighted_depth);
+      pixels.coverage[i] = static_cast<float>(1.0 - pixel.transmittance);
       pixels.median_depth[i] =
           pixel.has_median ? static_cast<float>(pixel.median_depth) : kNoMedian;
       pixels.count[i] = static_cast<float>(pixel.count);
@@ -142,7 +143,10 @@ void keepTile(size_t index, const TilePixels& pixels, KeptPicture& kept) {
   }
   if (!kept.with_depth) return;
   float* depth = kept.depth.get() + first;
-  for (size_t i = 0; i < kTilePixelCount; ++i) depth[i] = expectedDepth(pixels, i);
+  for (size_t i = 0; i < kTilePixelCount; ++i) {
+    const float coverage = pixels.coverage[i];
+    depth[i] = coverage > 0 ? pixels.weighted_depth[i] / coverage : kEmptyDepth;
+  }
 }
 
 /// Out: result and kept, where not null.
@@ -155,6 +159,7 @@ void renderTile(const VisibleSplat* visible, const Tile& tile, size_t index, Til
   Judged judged{visible, &tile, 0};
   TileKernelOptions kernel_options = {options.with_depth,
                                       options.with_median_depth || options.with_counts};
+  kernel_options.with_coverage = kept != nullptr;
   kernel_options.judge = judgeAlpha;
   kernel_options.judge_context = &judged;
   float largest = 0;

@@ -22,7 +22,8 @@ struct KeptPicture {
   ReusedArray<float> transmittance;       ///< behind the last splat
   /// As TilePixels::end; kInDoubt where the pixel was blended again in double.
   ReusedArray<int32_t> ends;
-  ReusedArray<float> depth;  ///< as RenderResult::depth, if with_depth
+  ReusedArray<float>
+      depth;  ///< as RenderResult::depth but over TilePixels::coverage, if with_depth
 
   uint64_t bytes() const;
 };

@@ -32,6 +32,16 @@ inline double linearLoss(const ReferenceResult& picture, const std::vector<float
   return sum;
 }
 
+/// The same, and weights [H,W] times the expected depth where a pixel has one.
+inline double linearLoss(const ReferenceResult& picture, const std::vector<float>& weights,
+                         const std::vector<float>& depth_weights) {
+  double sum = linearLoss(picture, weights);
+  for (size_t i = 0; i < depth_weights.size(); ++i) {
+    if (picture.counts[i] > 0) sum += static_cast<double>(depth_weights[i]) * picture.depth[i];
+  }
+  return sum;
+}
+
 /// Few splats of many sizes, in view of `smallCamera`.
 inline SplatCloud smallCloud(size_t count, int degree, uint32_t seed) {
   CloudRecipe recipe;

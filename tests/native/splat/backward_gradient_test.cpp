@@ -29,6 +29,7 @@ struct Scene {
   std::vector<Mat4d> matrices;
   Camera camera;
   RenderOptions options;
+  std::vector<float> depth_weights = {};  ///< [H,W] by the expected depth, or empty
 
   std::vector<SplatInstance> instances() const {
     std::vector<SplatInstance> all;
@@ -58,7 +59,9 @@ double centralDifference(const Scene& scene, const std::vector<float>& weights, 
     const double down = move(moved, -step);
     const ReferenceResult below = moved.reference();
     if (above.counts != here.counts || below.counts != here.counts) continue;
-    return (linearLoss(above, weights) - linearLoss(below, weights)) / (up - down);
+    return (linearLoss(above, weights, scene.depth_weights) -
+            linearLoss(below, weights, scene.depth_weights)) /
+           (up - down);
   }
   return std::nan("");
 }
@@ -105,15 +108,17 @@ constexpr NamedArray kArrays[] = {
 BackwardResult backward(const Scene& scene, const std::vector<float>& weights) {
   BackwardInput input;
   input.colour_gradient = weights;
+  input.depth_gradient = scene.depth_weights;
   return renderBackward(scene.instances(), scene.camera, scene.options, input);
 }
 
-/// Judges every `stride`-th value of every array of every cloud.
-void judgeClouds(const Scene& scene, const std::vector<float>& weights, size_t stride) {
+/// Judges every `stride`-th value of some arrays of every cloud.
+void judgeClouds(const Scene& scene, const std::vector<float>& weights, size_t stride,
+                 std::span<const NamedArray> arrays = kArrays) {
   const BackwardResult result = backward(scene, weights);
   Judgement judgement;
   for (size_t cloud = 0; cloud < scene.clouds.size(); ++cloud) {
-    for (const NamedArray& array : kArrays) {
+    for (const NamedArray& array : arrays) {
       const std::vector<float>& gradient = result.instances[cloud].*array.gradient;
       ASSERT_EQ(gradient.size(), (scene.clouds[cloud].*array.stored).size());
       const double largest = largestOf(gradient);
@@ -177,6 +182,11 @@ void judgeCameraAndBackground(const Scene& scene, const std::vector<float>& weig
   }
 }
 
+/// A loss that no colour enters.
+void judgeGeometry(const Scene& scene, const std::vector<float>& weights) {
+  judgeClouds(scene, weights, 1, std::span(kArrays).first(4));
+}
+
 void judge(const Scene& scene, size_t stride, uint32_t seed) {
   const std::vector<float> weights = randomWeights(pixelCount(scene.camera) * 4, seed);
   judgeClouds(scene, weights, stride);
@@ -226,6 +236,32 @@ TEST(Backward, MatchesDifferencesOfTheHighestHarmonicsUnderAnOrthographicCamera)
     std::fill(scene.options.background, scene.options.background + 3, 0.75);
     judge(scene, 3, 11);
   }
+}
+
+TEST(Backward, MatchesDifferencesThroughTheExpectedDepth) {
+  for (const bool with_background : {false, true}) {
+    for (const CameraModel model : {CameraModel::kPerspective, CameraModel::kOrthographic}) {
+      SCOPED_TRACE(::testing::Message() << with_background << static_cast<int>(model));
+      Scene scene = oneCloud(smallCloud(14, 1, 57));
+      scene.camera.model = model;
+      if (model == CameraModel::kOrthographic) scene.camera.fx = scene.camera.fy = 8;
+      scene.options.with_background = with_background;
+      scene.options.background[0] = 0.5;
+      scene.depth_weights = randomWeights(pixelCount(scene.camera), 12);
+      judge(scene, 1, 13);
+      // Depth alone, so that nothing else hides it.
+      const std::vector<float> none(pixelCount(scene.camera) * 4, 0.0f);
+      judgeGeometry(scene, none);
+    }
+  }
+}
+
+TEST(Backward, MatchesDifferencesThroughTheExpectedDepthWherePixelsEnd) {
+  SplatCloud cloud = smallCloud(30, 0, 58);
+  for (float& opacity : cloud.opacities) opacity = 0.9999f;
+  Scene scene = oneCloud(cloud);
+  scene.depth_weights = randomWeights(pixelCount(scene.camera), 14);
+  judge(scene, 3, 15);
 }
 
 TEST(Backward, MatchesDifferencesThroughTheLinearisationOfColours) {

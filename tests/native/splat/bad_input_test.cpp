@@ -37,10 +37,12 @@ struct Call {
   std::vector<float> residual_weights = std::vector<float>(30, 1.0f);
   std::vector<float> edge_weights = std::vector<float>(30, 1.0f);
   std::vector<float> errors = std::vector<float>(30, 1.0f);
+  std::vector<float> depth_gradient = std::vector<float>(30, 1.0f);
 
   SplatInstance instance() const { return {&cloud, matrix}; }
   BackwardInput input() const {
-    return {colour_gradient, residual, residual_weights, edge_weights, errors, true, true};
+    return {colour_gradient, residual, residual_weights, edge_weights, errors, true, true,
+            depth_gradient};
   }
 };
 
@@ -117,7 +119,8 @@ TEST(BadInput, PicturesOfAnotherSizeAreRefusedByName) {
                                     {"residual", &Call::residual},
                                     {"residual_weights", &Call::residual_weights},
                                     {"edge_weights", &Call::edge_weights},
-                                    {"errors", &Call::errors}}) {
+                                    {"errors", &Call::errors},
+                                    {"depth_gradient", &Call::depth_gradient}}) {
     for (const int change : {-1, 1}) {
       Call call;
       (call.*array).resize((call.*array).size() + static_cast<size_t>(change), 1.0f);
@@ -195,7 +198,8 @@ TEST(BadInput, CamerasThatMakeNoPictureAreRefused) {
     c.spoil(call.camera);
     // So that sizes of arrays are not what is wrong.
     for (std::vector<float> Call::*array :
-         {&Call::residual, &Call::residual_weights, &Call::edge_weights, &Call::errors}) {
+         {&Call::residual, &Call::residual_weights, &Call::edge_weights, &Call::errors,
+          &Call::depth_gradient}) {
       (call.*array).clear();
     }
     expectRefused(call, c.message);
@@ -253,7 +257,8 @@ TEST(BadInput, PicturesWithValuesOutsideTheirRangeAreRefusedByName) {
                                               {"residual", &Call::residual, true},
                                               {"residual_weights", &Call::residual_weights, false},
                                               {"edge_weights", &Call::edge_weights, true},
-                                              {"errors", &Call::errors, false}}) {
+                                              {"errors", &Call::errors, false},
+                                              {"depth_gradient", &Call::depth_gradient, true}}) {
     for (const double bad : {kNan, kInfinity, -kInfinity, 2e4, -2e4, -1.0}) {
       if (bad == -1.0 && negative) continue;
       Call call;
@@ -283,7 +288,7 @@ void expectNothingDrawn(const SplatCloud& cloud, const Camera& camera) {
   const std::span<const float> all = pictures;
   const size_t n = pixelCount(camera);
   const BackwardInput input = {
-      all, all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true};
+      all, all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true, all.first(n)};
   const BackwardResult result = renderBackward({&instance, 1}, camera, options, input);
   double by_red = 0;
   for (size_t i = 0; i < n; ++i) by_red += static_cast<double>(pictures[i * 4]);
