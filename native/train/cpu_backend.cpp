@@ -49,6 +49,8 @@ void requireLike(const RawSplats& splats, const RawSplats& others, const char* w
 
 class CpuBackend final : public RenderBackend {
  public:
+  CpuBackend() { workspace_.keepForBackward(true); }
+
   const char* name() const override { return "cpu"; }
 
   void upload(const SplatCloud& cloud) override {
@@ -92,8 +94,6 @@ class CpuBackend final : public RenderBackend {
     const Lent lent(*this);
     const SplatInstance instance{&cloud_};
     renderTiled({&instance, 1}, camera, options, workspace_, picture_, progress);
-    camera_ = camera;
-    options_ = options;
     stage_ = Stage::kDrawn;
   }
 
@@ -139,9 +139,8 @@ class CpuBackend final : public RenderBackend {
     input.with_screen_gradients = request.with_screen_gradients;
     stage_ = Stage::kLoss;
     const Lent lent(*this);
-    const SplatInstance instance{&cloud_};
-    renderBackward({&instance, 1}, camera_, options_, input, backward_workspace_, gradients_,
-                   UINT64_MAX, progress);
+    renderBackward(workspace_, picture_, input, backward_workspace_, gradients_, UINT64_MAX,
+                   progress);
     throughActivations();
     stage_ = Stage::kGradients;
     return {gradients_.camera, gradients_.background, gradients_.visible_count};
@@ -299,8 +298,6 @@ class CpuBackend final : public RenderBackend {
   std::vector<Target> targets_;
 
   Stage stage_ = Stage::kSplats;
-  Camera camera_;
-  RenderOptions options_;
   RenderWorkspace workspace_;
   RenderResult picture_;
   ImageLoss image_loss_;
