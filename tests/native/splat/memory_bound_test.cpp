@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <cstdlib>
 #include <new>
+#include <string>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
 #include "splat/random_scene.h"
@@ -210,6 +212,36 @@ TEST(BackwardMemoryBound, IsNeverExceeded) {
       }
     }
   }
+}
+
+TEST(BackwardMemoryBound, RefusesTooLittleMemoryBeforeAnythingIsAllocated) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the address sanitizer replaces the allocator that is counted here";
+#endif
+  CloudRecipe recipe;
+  recipe.count = 100000;
+  const SplatCloud cloud = randomCloud(recipe, 4);
+  const SplatInstance instance{&cloud};
+  const Camera camera = frontCamera(500, 400, 300, 3);
+  const std::vector<float> gradient(testing::pixelCount(camera) * 4, 1.0f);
+  BackwardInput input;
+  input.colour_gradient = gradient;
+  const uint64_t bound = backwardMemoryBound({&instance, 1}, camera, {}, input);
+  const uint64_t before = held.load();
+  peak.store(before);
+  std::string message;
+  try {
+    renderBackward({&instance, 1}, camera, {}, input, bound / 2);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kMemoryLimit);
+    message = error.what();
+  }
+  EXPECT_NE(message.find("100000 splats needs up to " + std::to_string(bound) + " bytes; " +
+                         std::to_string(bound / 2) + " are allowed"),
+            std::string::npos)
+      << message;
+  // The workspace itself, the placed scene and the message.
+  EXPECT_LT(peak.load() - before, 65536u);
 }
 
 TEST(BackwardWorkspace, AllocatesNothingForASecondCallOfTheSameSizeAndGivesTheSame) {
