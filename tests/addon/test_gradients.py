@@ -76,6 +76,22 @@ def test_statistics_come_on_request(context, camera):
         assert instance['contributions'].any() and instance['screen_gradients'].shape == (COUNT, 2)
 
 
+def test_a_loss_of_depth_moves_splats_along_the_view(context, camera):
+    renderer = Renderer(context)
+    options = renderer.options(output_colour=OutputColour.COMPOSITED)
+    cloud = Cloud.create(context, splats(4))
+    picture = drawn(renderer, cloud, camera, options)
+    nothing = np.zeros_like(picture)
+    task = start_backward(renderer, [(cloud, np.eye(4))], camera, options, nothing,
+                          depth_gradient=(picture[..., 3] > 0).astype(np.float32))
+    task.job.wait()
+    # The camera looks along -z of the world. Moving everything away by a metre makes every expected depth a metre
+    # larger; what is left are pixels whose splats move in the picture.
+    away = -task.instances[0]['positions'][:, 2].sum()
+    covered = (picture[..., 3] > 0).sum()
+    assert 0.8 * covered < away < 1.2 * covered
+
+
 def test_bad_input_is_one_sentence(context, camera):
     renderer = Renderer(context)
     cloud = Cloud.create(context, splats(3))

@@ -75,13 +75,13 @@ class Backward:
 
 
 def start_backward(renderer, instances, camera, options, colour_gradient, statistics=(), residual=None,
-                   residual_weights=None, edge_weights=None, errors=None):
+                   residual_weights=None, edge_weights=None, errors=None, depth_gradient=None):
     """Starts the derivative of a loss by instances [(cloud, matrix)], from its derivative by the picture that
     `renderer` draws of the same arguments, [H,W,4]. statistics: names of STATISTICS; pictures: see stipple.h.
     options must ask for composited colours. Clouds and pictures need not outlive the start."""
     call = Backward(instances, camera, colour_gradient, statistics,
                     {'residual': residual, 'residual_weights': residual_weights, 'edge_weights': edge_weights,
-                     'errors': errors})
+                     'errors': errors, 'depth_gradient': depth_gradient})
     job = Job(renderer.library,
               new_handle(renderer.library, 'stipple_renderer_backward_start', renderer.pointer, call.placed,
                          len(instances), byref(camera), byref(options), byref(call.input), call.gradients,

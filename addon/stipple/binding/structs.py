@@ -274,7 +274,7 @@ class StippleGroundPlane(_Sized):
 
 class StippleBackwardInput(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour_gradient', _floats), ('residual', _floats),
-                ('residual_weights', _floats), ('edge_weights', _floats), ('errors', _floats)]
+                ('residual_weights', _floats), ('edge_weights', _floats), ('errors', _floats), ('depth_gradient', _floats)]
 
 
 class StippleSplatGradients(_Sized):

@@ -608,6 +608,8 @@ typedef struct StippleBackwardInput {
   const float* residual_weights; /* [H,W] >= 0, weight of each pixel in contributions; NULL: 1 */
   const float* edge_weights;     /* [H,W] for edge_weights */
   const float* errors;           /* [H,W] >= 0, for errors and largest_errors */
+  const float* depth_gradient;   /* [H,W] dL/d(expected depth), per metre; NULL: none. Where nothing covers a
+                                    pixel it counts for nothing; the median depth has no derivative */
 } StippleBackwardInput;
 
 /* What the loss changes by the stored values of one instance's cloud, in the object's own space. Any

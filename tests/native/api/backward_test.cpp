@@ -131,7 +131,7 @@ class Backward : public ApiTest {
 
   void giveEveryPicture() {
     input_.residual = input_.residual_weights = pictures_.data();
-    input_.edge_weights = input_.errors = pictures_.data();
+    input_.edge_weights = input_.errors = input_.depth_gradient = pictures_.data();
   }
 
   /// Starts and waits; the status of whichever failed.
@@ -292,7 +292,8 @@ TEST_F(Backward, WritesNothingWhereAValueIsRefused) {
         Case{"residual", &StippleBackwardInput::residual},
         Case{"residual_weights", &StippleBackwardInput::residual_weights},
         Case{"edge_weights", &StippleBackwardInput::edge_weights},
-        Case{"errors", &StippleBackwardInput::errors}}) {
+        Case{"errors", &StippleBackwardInput::errors},
+        Case{"depth_gradient", &StippleBackwardInput::depth_gradient}}) {
     for (const float bad : bad_values) {
       std::vector<float> values = pictures_;
       values[17] = bad;
