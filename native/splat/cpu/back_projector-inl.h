@@ -53,11 +53,12 @@ void fillColumns(const PlacedCloud& placed, const uint32_t* rows, size_t count,
       in[kInRotation + k][lane] = static_cast<double>(cloud.rotations[row * 4 + k]);
     }
     in[kInOpacity][lane] = static_cast<double>(cloud.opacities[row]);
-    const double* sum = sums.values + row * sums.field_count;
-    in[kInS][lane] = sum[kFieldS];
-    for (size_t k = 0; k < 2; ++k) in[kInFirst + k][lane] = sum[kFieldG0 + k];
-    for (size_t k = 0; k < 3; ++k) in[kInSecond + k][lane] = sum[kFieldG00 + k];
-    in[kInDepth][lane] = sums.with_depth ? sum[sums.field_count - 1] : 0.0;
+    const float* sum = sums.values + row * sums.stride;
+    in[kInS][lane] = static_cast<double>(sum[kFieldS]);
+    for (size_t k = 0; k < 2; ++k) in[kInFirst + k][lane] = static_cast<double>(sum[kFieldG0 + k]);
+    for (size_t k = 0; k < 3; ++k)
+      in[kInSecond + k][lane] = static_cast<double>(sum[kFieldG00 + k]);
+    in[kInDepth][lane] = sums.depth_field ? static_cast<double>(sum[*sums.depth_field]) : 0.0;
   }
 }
 
@@ -125,7 +126,7 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
   const size_t stride = placed.cloud->shStride();
   for (size_t lane = 0; lane < count; ++lane) {
     const size_t row = rows[lane];
-    const double* by_colour = sums.values + row * sums.field_count + kFieldRed;
+    const float* by_colour = sums.values + row * sums.stride + kFieldRed;
     takeHarmonicsBack(placed, &basis[0][lane], &slopes[0][0][lane], &placed.cloud->sh[row * stride],
                       by_colour, &out.sh[row * stride], &along[0][lane]);
   }
@@ -190,7 +191,14 @@ void takeBackRows(const PlacedScene& scene, const PlacedCloud& placed, const uin
                   double* camera) {
   const Mat3d normal_to_view = inverse(placed.linear).transpose();
   const size_t lanes = laneCount<T>();
+  const size_t stride = placed.cloud->shStride();
   for (size_t i = 0; i < count; i += lanes) {
+    for (size_t next = i + lanes; next < std::min(i + 2 * lanes, count); ++next) {
+      for (size_t k = 0; k < stride; k += 16) {
+        __builtin_prefetch(&placed.cloud->sh[rows[next] * stride + k]);
+        __builtin_prefetch(&out.sh[rows[next] * stride + k], 1);
+      }
+    }
     takeBackBlock<T>(scene, placed, normal_to_view, rows + i, std::min(lanes, count - i), sums, out,
                      means + i * 2, camera);
   }

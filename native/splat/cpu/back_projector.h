@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "splat/render_backward.h"
@@ -11,9 +12,9 @@ namespace stipple {
 
 /// Sums over tiles (splat/blend_backward.h) of a cloud's splats, row by row.
 struct CloudSums {
-  const double* values;  ///< [rows][field_count]
-  size_t field_count;
-  bool with_depth;  ///< the last field is dL/d(depth of the splat)
+  const float* values;  ///< [rows][stride]
+  size_t stride;
+  std::optional<size_t> depth_field;  ///< dL/d(depth of the splat)
 };
 
 /// A float32 of any double is held to the largest that is finite.

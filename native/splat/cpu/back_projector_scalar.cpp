@@ -34,14 +34,14 @@ void takeFootprintBack(const View<double>& view, const Mat3d& linear, const T* c
 }
 
 void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
-                       const float* sh, const double* by_colour, float* by_sh, double* along);
+                       const float* sh, const float* by_colour, float* by_sh, double* along);
 
 #include "splat/cpu/back_projector-inl.h"
 
 /// In: basis [coefficient], slopes [coefficient][axis], all kMaxLanes apart; sh of the row. Out:
 /// by_sh of the row; along [axis] by the viewing direction, kMaxLanes apart.
 void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
-                       const float* sh, const double* by_colour, float* by_sh, double* along) {
+                       const float* sh, const float* by_colour, float* by_sh, double* along) {
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
   double by_sum[3];
   double by_axis[3] = {};
@@ -55,7 +55,7 @@ void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const dou
         sums[axis] += slopes[(k * 3 + axis) * kMaxLanes] * value;
       }
     }
-    by_sum[c] = colourSumBackward(placed, sum, by_colour[c]);
+    by_sum[c] = colourSumBackward(placed, sum, static_cast<double>(by_colour[c]));
     for (size_t axis = 0; axis < 3; ++axis) by_axis[axis] += by_sum[c] * sums[axis];
   }
   for (size_t axis = 0; axis < 3; ++axis) along[axis * kMaxLanes] = by_axis[axis];

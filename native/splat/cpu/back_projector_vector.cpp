@@ -54,7 +54,7 @@ HWY_INLINE void takeFootprintBack(const View<double>& view, const Mat3d& linear,
 }
 
 void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
-                       const float* sh, const double* by_colour, float* by_sh, double* along);
+                       const float* sh, const float* by_colour, float* by_sh, double* along);
 
 #include "splat/cpu/back_projector-inl.h"
 
@@ -77,7 +77,7 @@ HWY_INLINE void harmonicsOfColour(const PlacedCloud& placed, const double* basis
 }
 
 void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
-                       const float* sh, const double* by_colour, float* by_sh, double* along) {
+                       const float* sh, const float* by_colour, float* by_sh, double* along) {
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
   // Rows: colour, then its derivatives by the axes of the direction.
   HWY_ALIGN double sums[16];
@@ -120,7 +120,8 @@ void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const dou
   }
 
   HWY_ALIGN double by_sum[4] = {};
-  for (size_t c = 0; c < 3; ++c) by_sum[c] = colourSumBackward(placed, sums[c], by_colour[c]);
+  for (size_t c = 0; c < 3; ++c)
+    by_sum[c] = colourSumBackward(placed, sums[c], static_cast<double>(by_colour[c]));
   for (size_t axis = 0; axis < 3; ++axis) {
     const double* own = sums + (axis + 1) * 4;
     along[axis * kMaxLanes] = by_sum[0] * own[0] + by_sum[1] * own[1] + by_sum[2] * own[2];

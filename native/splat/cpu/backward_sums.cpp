@@ -8,19 +8,57 @@
 
 namespace stipple {
 
+namespace {
+
+/// Whole cache lines.
+size_t strideOf(BackwardWants wants) {
+  constexpr size_t kLine = 16;
+  return (backwardFieldCount(wants) + kLine - 1) / kLine * kLine;
+}
+
+}  // namespace
+
 void BackwardSums::reset(size_t splat_count, BackwardWants wants) {
   field_count_ = backwardFieldCount(wants);
-  sums_.resize(splat_count * field_count_);
+  stride_ = strideOf(wants);
+  sums_.resize(splat_count * stride_);
   uint8_t* touched = touched_.resize(splat_count);
   std::fill(touched, touched + splat_count, uint8_t{0});
 }
 
+namespace {
+
+/// Entries that are asked for before the first of them is added: each lies in another tile's part
+/// of memory and would be waited for.
+constexpr size_t kEntriesAhead = 64;
+
+struct AskedEntry {
+  uint32_t visible;
+  const float* values;
+};
+
+template <size_t kFieldCount>
+void addEntry(const float* from, double* to) {
+  for (size_t field = 0; field < std::min<size_t>(kFieldCount, kFieldLargestError); ++field) {
+    to[field] += static_cast<double>(from[field]);
+  }
+  if constexpr (kFieldCount > kFieldLargestError) {
+    const double largest = static_cast<double>(from[kFieldLargestError]);
+    to[kFieldLargestError] = std::max(to[kFieldLargestError], largest);
+    for (size_t field = kFieldLargestError + 1; field < kFieldCount; ++field) {
+      to[field] += static_cast<double>(from[field]);
+    }
+  }
+}
+
+}  // namespace
+
 template <size_t kFieldCount>
 void BackwardSums::addFields(const VisibleSplats& visible, const TileGrid& grid,
                              const TileListMemory& lists, const TileSums& tiles) {
-  constexpr size_t kSummed = std::min<size_t>(kFieldCount, kFieldLargestError);
   const TileListGroup& group = lists.group;
   const size_t group_tiles = group.end_tile - group.first_tile;
+  const bool is_first = tiles.first_tile == 0;
   const uint64_t first_entry = group.offsets[tiles.first_tile - group.first_tile];
   cursors_.resize(rangeCount(visible.count, lists.chunk_size) * group_tiles);
   // By reference where it is handed over: a std::function of a large capture allocates.
@@ -31,41 +69,50 @@ void BackwardSums::addFields(const VisibleSplats& visible, const TileGrid& grid,
     const uint64_t* starts =
         chunk == 0 ? group.offsets.data() : &lists.cursors[(chunk - 1) * group_tiles];
     std::copy_n(starts, group_tiles, cursors);
+
+    AskedEntry asked[kEntriesAhead];
+    size_t asked_count = 0;
+    size_t current = begin;  // whose sums these are
+    double sums[kFieldCount] = {};
+    const auto store_sums = [&] {
+      if (std::none_of(sums, sums + kFieldCount, [](double sum) { return sum != 0.0; })) return;
+      const uint32_t splat = visible.splats[current].index;
+      float* to = sums_.get() + splat * stride_;
+      if (!is_first && touched_[splat] != 0) addEntry<kFieldCount>(to, sums);
+      touched_[splat] = 1;
+      for (size_t field = 0; field < kFieldCount; ++field) {
+        constexpr double kLargest = 3.4e38;
+        to[field] = static_cast<float>(std::clamp(sums[field], -kLargest, kLargest));
+        sums[field] = 0;
+      }
+    };
+    const auto add_asked = [&] {
+      for (size_t i = 0; i < asked_count; ++i) {
+        if (asked[i].visible != current) {
+          store_sums();
+          current = asked[i].visible;
+        }
+        addEntry<kFieldCount>(asked[i].values, sums);
+      }
+      asked_count = 0;
+    };
     for (size_t i = begin; i < end; ++i) {
-      double sums[kFieldCount] = {};
-      bool is_touched = false;
       forEachTileOf(visible, i, grid, [&](size_t tile) {
         if (tile < tiles.first_tile || tile >= tiles.end_tile) return;
         const size_t own = tile - group.first_tile;
         const uint64_t entry = cursors[own]++;
         if (entry - group.offsets[own] >= tiles.used[tile]) return;
-        const float* from = tiles.values + (entry - first_entry) * kFieldCount;
-        for (size_t field = 0; field < kSummed; ++field) {
-          sums[field] += static_cast<double>(from[field]);
-        }
-        for (size_t field = kSummed; field < kFieldCount; ++field) {
-          const double value = static_cast<double>(from[field]);
-          sums[field] =
-              field == kFieldLargestError ? std::max(sums[field], value) : sums[field] + value;
-        }
-        is_touched = true;
+        const float* values = tiles.values + (entry - first_entry) * kFieldCount;
+        __builtin_prefetch(values);
+        __builtin_prefetch(values + kFieldCount - 1);
+        asked[asked_count++] = {static_cast<uint32_t>(i), values};
+        if (asked_count == kEntriesAhead) add_asked();
       });
-      if (!is_touched) continue;
-      is_touched = std::any_of(sums, sums + kFieldCount, [](double sum) { return sum != 0.0; });
-      if (!is_touched) continue;
-      const uint32_t splat = visible.splats[i].index;
-      double* to = of(splat);
-      if (touched_[splat] == 0) {
-        std::copy_n(sums, kFieldCount, to);
-        touched_[splat] = 1;
-        continue;
-      }
-      for (size_t field = 0; field < kFieldCount; ++field) {
-        to[field] = kFieldCount > kFieldLargestError && field == kFieldLargestError
-                        ? std::max(to[field], sums[field])
-                        : to[field] + sums[field];
-      }
+      __builtin_prefetch(of(visible.splats[i].index), 1);
+      __builtin_prefetch(&visible.splats[std::min(i + kEntriesAhead, end - 1)].index);
     }
+    add_asked();
+    if (begin < end) store_sums();
   };
   parallelFor(visible.count, lists.chunk_size, std::ref(add_chunk));
 }
@@ -89,7 +136,7 @@ void BackwardSums::add(const VisibleSplats& visible, const TileGrid& grid,
 uint64_t BackwardSums::memoryBound(uint64_t splat_count, const TileGrid& grid,
                                    BackwardWants wants) {
   // As many cursors as the lists have themselves; the last term: huge pages round up.
-  return splat_count * (backwardFieldCount(wants) * sizeof(double) + 1) +
+  return splat_count * (strideOf(wants) * sizeof(float) + 1) +
          tileListsBound(splat_count, grid).other_bytes + 2 * (uint64_t{2} << 20);
 }
 

@@ -17,9 +17,10 @@ struct TileSums {
   const uint32_t* used;  ///< [tiles of the picture] entries from there on have none
 };
 
-/// Sums of every splat over the tiles, double, by its place among all splats of the picture. Each
-/// splat walks its own entries in the order of the tiles, as they were listed, so no atomics are
-/// needed and the result does not depend on the threads.
+/// Sums of every splat over the tiles, by its place among all splats of the picture. Each splat
+/// walks its own entries in the order of the tiles, as they were listed, so no atomics are needed
+/// and the result does not depend on the threads. They are summed in double and stored in float32,
+/// a cache line each: a splat's place is random, so lines are what they cost.
 class BackwardSums {
  public:
   /// For this many splats of the picture, in memory that may hold an earlier picture's.
@@ -30,13 +31,13 @@ class BackwardSums {
            const TileSums& tiles);
 
   /// Sums of a splat; they have a meaning where it is touched.
-  const double* of(size_t splat) const { return sums_.get() + splat * field_count_; }
-  double* of(size_t splat) { return sums_.get() + splat * field_count_; }
+  const float* of(size_t splat) const { return sums_.get() + splat * stride_; }
 
   /// Whether a tile handed in a sum that is not 0: many splats in view are hidden by others.
   bool isTouched(size_t splat) const { return touched_[splat] != 0; }
 
   size_t fieldCount() const { return field_count_; }
+  size_t stride() const { return stride_; }
 
   static uint64_t memoryBound(uint64_t splat_count, const TileGrid& grid, BackwardWants wants);
 
@@ -46,7 +47,8 @@ class BackwardSums {
                  const TileSums& tiles);
 
   size_t field_count_ = 0;
-  ReusedArray<double> sums_;       ///< [splats][fields]
+  size_t stride_ = 0;
+  ReusedArray<float> sums_;        ///< [splats][stride]
   ReusedArray<uint8_t> touched_;   ///< [splats]
   std::vector<uint64_t> cursors_;  ///< [chunk][tile of the group]
 };

@@ -27,14 +27,14 @@ double valueAt(std::span<const float> values, size_t index, double otherwise) {
 
 /// The sign bit is set where |value| is above kLargestInput, infinite or not a number. By bits:
 /// comparing NaN would raise a trap.
-uint32_t tooLarge(float value) {
+constexpr auto kTooLarge = [](float value) {
   return std::bit_cast<uint32_t>(kLargestInput) - (std::bit_cast<uint32_t>(value) & ~kSignBit);
-}
+};
 
 /// The same where the value is below 0 (or -0, which a slower check lets pass).
-uint32_t tooLargeOrNegative(float value) {
-  return tooLarge(value) | (std::bit_cast<uint32_t>(value) & kSignBit);
-}
+constexpr auto kTooLargeOrNegative = [](float value) {
+  return kTooLarge(value) | (std::bit_cast<uint32_t>(value) & kSignBit);
+};
 
 /// Without depth.
 PixelLoss<double> lossAt(const PictureLoss& picture, size_t pixel) {
@@ -144,12 +144,12 @@ bool TileBackward::lossIsGood(const Tile& tile) const {
       bad |= bad_row;
     }
   };
-  look(input.colour_gradient, 4, tooLarge);
-  look(input.depth_gradient, 1, tooLarge);
-  look(input.residual, 3, tooLarge);
-  look(input.residual_weights, 1, tooLargeOrNegative);
-  look(input.edge_weights, 1, tooLarge);
-  look(input.errors, 1, tooLargeOrNegative);
+  look(input.colour_gradient, 4, kTooLarge);
+  look(input.depth_gradient, 1, kTooLarge);
+  look(input.residual, 3, kTooLarge);
+  look(input.residual_weights, 1, kTooLargeOrNegative);
+  look(input.edge_weights, 1, kTooLarge);
+  look(input.errors, 1, kTooLargeOrNegative);
   return !(bad & kSignBit);
 }
 

@@ -174,24 +174,21 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, RenderWorkspace
   return total;
 }
 
-void storeStatistics(const BackwardInput& input, const double* sums, const double* mean,
+void storeStatistics(const BackwardInput& input, const float* sums, const double* mean,
                      size_t index, SplatGradients& out) {
-  const auto stored = [](double value) {
-    return static_cast<float>(std::clamp(value, -kLargestStored, kLargestStored));
-  };
-  if (!input.residual.empty()) out.contributions[index] = stored(sums[kFieldContribution]);
-  if (input.with_blending_weights) out.blending_weights[index] = stored(sums[kFieldWeight]);
-  if (!input.edge_weights.empty()) out.edge_weights[index] = stored(sums[kFieldEdge]);
+  if (!input.residual.empty()) out.contributions[index] = sums[kFieldContribution];
+  if (input.with_blending_weights) out.blending_weights[index] = sums[kFieldWeight];
+  if (!input.edge_weights.empty()) out.edge_weights[index] = sums[kFieldEdge];
   if (input.with_screen_gradients) {
     for (size_t axis = 0; axis < 2; ++axis) {
       out.screen_gradients[index * 2 + axis] = static_cast<float>(mean[axis]);
-      out.absolute_screen_gradients[index * 2 + axis] = stored(sums[kFieldAbsoluteX + axis]);
+      out.absolute_screen_gradients[index * 2 + axis] = sums[kFieldAbsoluteX + axis];
     }
-    out.screen_gradient_norms[index] = stored(sums[kFieldNorm]);
+    out.screen_gradient_norms[index] = sums[kFieldNorm];
   }
   if (!input.errors.empty()) {
-    out.errors[index] = stored(sums[kFieldError]);
-    out.largest_errors[index] = stored(sums[kFieldLargestError]);
+    out.errors[index] = sums[kFieldError];
+    out.largest_errors[index] = sums[kFieldLargestError];
   }
 }
 
@@ -199,8 +196,8 @@ void storeStatistics(const BackwardInput& input, const double* sums, const doubl
 void takeBackRows(BackProjector project, const PlacedScene& scene, const PlacedCloud& placed,
                   const BackwardInput& input, const BackwardSums& sums, size_t begin, size_t end,
                   SplatGradients& out, double* camera) {
-  const CloudSums cloud_sums{sums.of(placed.first_index), sums.fieldCount(),
-                             !input.depth_gradient.empty()};
+  CloudSums cloud_sums{sums.of(placed.first_index), sums.stride(), {}};
+  if (!input.depth_gradient.empty()) cloud_sums.depth_field = sums.fieldCount() - 1;
   uint32_t rows[kRowsAtOnce];
   double means[kRowsAtOnce * 2];
   size_t count = 0;

@@ -26,9 +26,8 @@ struct Taken {
 };
 
 /// Sums of some size and sign for every row.
-std::vector<double> someSums(size_t rows, size_t fields) {
-  const std::vector<float> values = randomWeights(rows * fields, 31);
-  return {values.begin(), values.end()};
+std::vector<float> someSums(size_t rows, size_t fields) {
+  return randomWeights(rows * fields, 31);
 }
 
 std::vector<uint32_t> visibleRows(const PlacedScene& scene, const PlacedCloud& placed) {
@@ -41,7 +40,7 @@ std::vector<uint32_t> visibleRows(const PlacedScene& scene, const PlacedCloud& p
 }
 
 Taken takeBack(BackProjector project, const PlacedScene& scene, const std::vector<uint32_t>& rows,
-               const std::vector<double>& sums, bool with_depth) {
+               const std::vector<float>& sums, bool with_depth) {
   const SplatCloud& cloud = *scene.clouds[0].cloud;
   Taken taken;
   taken.gradients.positions.resize(cloud.positions.size());
@@ -50,7 +49,8 @@ Taken takeBack(BackProjector project, const PlacedScene& scene, const std::vecto
   taken.gradients.opacities.resize(cloud.size());
   taken.gradients.sh.resize(cloud.sh.size(), -1.0f);
   taken.means.resize(rows.size() * 2);
-  const CloudSums all{sums.data(), sums.size() / cloud.size(), with_depth};
+  CloudSums all{sums.data(), sums.size() / cloud.size(), {}};
+  if (with_depth) all.depth_field = all.stride - 1;
   project(scene, scene.clouds[0], rows.data(), rows.size(), all, taken.gradients,
           taken.means.data(), taken.camera.data());
   return taken;
@@ -98,7 +98,7 @@ TEST(BackProjector, GivesTheSameBitsOnEveryTarget) {
     const PlacedScene scene = sceneFor(c, cloud);
     const std::vector<uint32_t> rows = visibleRows(scene, scene.clouds[0]);
     ASSERT_GT(rows.size(), 100u);
-    const std::vector<double> sums = someSums(cloud.size(), kGradientFieldCount + 1);
+    const std::vector<float> sums = someSums(cloud.size(), kGradientFieldCount + 1);
     const Taken expected = takeBack(takeBackScalar, scene, rows, sums, true);
     ASSERT_GE(backProjectors().size(), 2u);
     for (const NamedBackProjector& named : backProjectors()) {
@@ -123,12 +123,13 @@ TEST(BackProjector, GivesTheNumbersOfMatricesInLongDouble) {
     const PlacedCloud& placed = scene.clouds[0];
     const std::vector<uint32_t> rows = visibleRows(scene, placed);
     const size_t fields = kGradientFieldCount + 1;
-    const std::vector<double> sums = someSums(cloud.size(), fields);
+    const std::vector<float> sums = someSums(cloud.size(), fields);
     const Taken seen = takeBack(takeBackScalar, scene, rows, sums, true);
     const double scale = std::sqrt(kSquaredGScale);
+    const std::vector<double> wide(sums.begin(), sums.end());
     for (size_t n = 0; n < rows.size(); ++n) {
       const size_t i = rows[n];
-      const double* sum = &sums[i * fields];
+      const double* sum = &wide[i * fields];
       testing::FootprintMatrices by;
       by.s = sum[kFieldS];
       by.first = scale * Vec2d(sum[kFieldG0], sum[kFieldG1]);
@@ -182,19 +183,19 @@ TEST(BackProjector, KeepsTheDigitsOfNeedles) {
   const PlacedCloud& placed = scene.clouds[0];
   const std::vector<uint32_t> rows = visibleRows(scene, placed);
   ASSERT_GT(rows.size(), 100u);
-  std::vector<double> sums(cloud.size() * kGradientFieldCount, 0.0);
+  std::vector<float> sums(cloud.size() * kGradientFieldCount, 0.0f);
   // What a needle's pixels give: offsets along it are a millionth of those across.
   for (size_t i = 0; i < cloud.size(); ++i) {
-    double* sum = &sums[i * kGradientFieldCount];
-    sum[kFieldS] = sum[kFieldG1] = sum[kFieldG11] = 1.0;
-    sum[kFieldG0] = sum[kFieldG01] = 1e-6;
-    sum[kFieldG00] = 1e-12;
+    float* sum = &sums[i * kGradientFieldCount];
+    sum[kFieldS] = sum[kFieldG1] = sum[kFieldG11] = 1.0f;
+    sum[kFieldG0] = sum[kFieldG01] = 0x1p-20f;
+    sum[kFieldG00] = 0x1p-40f;
   }
   const Taken seen = takeBack(takeBackScalar, scene, rows, sums, false);
   for (const uint32_t i : rows) {
-    testing::FootprintMatrices by{1.0, std::sqrt(kSquaredGScale) * Vec2d(1e-6, 1.0),
+    testing::FootprintMatrices by{1.0, std::sqrt(kSquaredGScale) * Vec2d(0x1p-20, 1.0),
                                   Eigen::Matrix2d::Zero(), 0.0};
-    by.second << 1e-12, 1e-6, 1e-6, 1.0;
+    by.second << 0x1p-40, 0x1p-20, 0x1p-20, 1.0;
     by.second *= kSquaredGScale;
     const Vec4d expected =
         testing::projectBackward(scene.view, placed.linear, placed.translation,
