@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
+#include "splat/cpu/tiled_render.h"
 
 // Going backward from the picture that was drawn, as a step of training does.
 
@@ -155,6 +156,69 @@ TEST(BackwardFromDrawing, RefusesADepthGradientWithoutDepthAndTooLittleMemory) {
     EXPECT_EQ(error.code(), ErrorCode::kMemoryLimit);
     EXPECT_NE(std::string(error.what()).find(std::to_string(bound)), std::string::npos);
   }
+}
+
+/// A picture and its strips: derivatives of all pixels are the sums of those of the strips. An
+/// orthographic camera, whose projection does not depend on the size of the picture.
+void expectSumOfStrips(const SplatCloud& cloud, uint32_t side, uint32_t strips) {
+  Camera camera = frontCamera(side, side, side / 3.0, 3);
+  camera.model = CameraModel::kOrthographic;
+  camera.fx = camera.fy = side / 3.0;
+  const SplatInstance instance{&cloud};
+  const std::vector<float> gradient = randomWeights(pixelCount(camera) * 4, 10);
+  BackwardInput input;
+  input.colour_gradient = gradient;
+  input.with_blending_weights = true;
+  const SplatGradients all = renderBackward({&instance, 1}, camera, {}, input).instances[0];
+  std::vector<double> weights(cloud.size(), 0.0);
+  std::vector<double> opacities(cloud.size(), 0.0);
+  const uint32_t rows = side / strips;
+  ASSERT_EQ(rows % 16, 0u);  // whole tiles, so that float32 sums are the same
+  for (uint32_t strip = 0; strip < strips; ++strip) {
+    Camera part = camera;
+    part.height = rows;
+    part.cy = camera.cy - strip * rows;
+    const size_t values = pixelCount(part) * 4;
+    input.colour_gradient = std::span(gradient).subspan(strip * values, values);
+    const SplatGradients of = renderBackward({&instance, 1}, part, {}, input).instances[0];
+    for (size_t i = 0; i < cloud.size(); ++i) {
+      weights[i] += static_cast<double>(of.blending_weights[i]);
+      opacities[i] += static_cast<double>(of.opacities[i]);
+    }
+  }
+  double most = 0;
+  for (size_t i = 0; i < cloud.size(); ++i) most = std::max(most, std::abs(opacities[i]));
+  EXPECT_GT(most, 0);
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    // Sums are stored in float32 after each part of the tiles: 6e-8 of the largest, a few times.
+    EXPECT_NEAR(static_cast<double>(all.blending_weights[i]), weights[i], 1e-6 * weights[i]);
+    EXPECT_NEAR(static_cast<double>(all.opacities[i]), opacities[i], 1e-6 * most);
+  }
+}
+
+SplatCloud coveringCloud(size_t count, float opacity) {
+  SplatCloud cloud = smallCloud(count, 0, 11);
+  for (float& scale : cloud.scales) scale = 5.0f;
+  for (float& o : cloud.opacities) o = opacity;
+  return cloud;
+}
+
+TEST(BackwardFromDrawing, AddsUpTilesThatAreHeldInSeveralParts) {
+  // 900 tiles list 1,200 splats each: more than the million entries that are held at once.
+  expectSumOfStrips(coveringCloud(1200, 0.02f), 480, 2);
+}
+
+TEST(BackwardFromDrawing, ListsSplatsAgainWhereTheDrawingCouldNotKeepTheLists) {
+  const SplatCloud cloud = smallCloud(300, 1, 12);
+  const SplatInstance instance{&cloud};
+  Drawn drawn;
+  drawn.draw({&instance, 1});
+  drawn.goBack(drawn.input());
+  const BackwardResult before = drawn.result;
+  // As after a drawing whose lists came in several groups, of which only the last is there.
+  drawn.workspace.arrays().lists.group.first_tile = 3;
+  drawn.goBack(drawn.input());
+  expectSame(drawn.result, before);
 }
 
 TEST(BackwardFromDrawing, IgnoresDepthWhereNothingCoversThePixel) {
