@@ -12,8 +12,10 @@
 #include "base/parallel.h"
 #include "data/splat_colour.h"
 #include "io/input_file.h"
+#include "io/ksplat_file.h"
 #include "io/ply_file.h"
 #include "io/sog_file.h"
+#include "io/splat32_file.h"
 #include "io/spz_file.h"
 
 namespace stipple {
@@ -118,6 +120,9 @@ const std::vector<SplatFormat>& splatFormats() {
   static const std::vector<SplatFormat> kFormats = {
       {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, true, startsAsPly, readPlySplats, writePlySplats},
       {"spz", "SPZ", ".spz", 4, Frame::kRUB, false, startsAsSpz, readSpzSplats, writeSpzSplats},
+      {"splat", "splat records", ".splat", 0, Frame::kRDF, false, nullptr, readSplat32,
+       writeSplat32},
+      {"ksplat", "ksplat", ".ksplat", 3, Frame::kRDF, false, nullptr, readKsplat, nullptr},
       {"sog", "SOG", ".sog meta.json", 3, Frame::kRDF, true, startsAsSog, readSog,
        [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
           Progress* progress) { writeSog(cloud, path, {}, progress); }},

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "data/splat_cloud.h"
+
+namespace stipple {
+
+/// Refuses a cloud with values that no splat can have, as a fault of the file that it was read
+/// from. Errors: kFormat with the file, the splat, the value seen and what is allowed.
+void requireValidSplats(const SplatCloud& cloud, const std::string& path);
+
+}  // namespace stipple
