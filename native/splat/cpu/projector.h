@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "splat/cpu/tile_grid.h"
 #include "splat/scene.h"
 
 namespace stipple {
@@ -35,10 +36,17 @@ inline DepthItem depthItem(double depth, size_t slot) {
   return static_cast<uint64_t>(depthKey(depth)) << 32 | static_cast<uint32_t>(slot);
 }
 
-/// Projects rows [begin, end) of one cloud. The visible ones go to splats[slot] and items[slot],
-/// slot + 1, ...; returns the slot after the last.
+/// Where a projector puts what shows; the arrays have the same indices, called slots.
+struct ProjectedSlots {
+  VisibleSplat* splats;
+  DepthItem* items;
+  TileSpan* spans;
+};
+
+/// Projects rows [begin, end) of one cloud. The visible ones go to `slot`, slot + 1, ...; returns
+/// the slot after the last.
 using Projector = size_t (*)(const PlacedScene& scene, const PlacedCloud& placed, size_t begin,
-                             size_t end, VisibleSplat* splats, DepthItem* items, size_t slot);
+                             size_t end, const ProjectedSlots& to, size_t slot);
 
 struct NamedProjector {
   const char* target;  ///< as NamedTileKernel::target
@@ -48,7 +56,13 @@ struct NamedProjector {
 /// One splat after another; the vector targets give the same footprints, depths and colours, bit
 /// for bit, and bounds that differ by rounding.
 size_t projectScalar(const PlacedScene& scene, const PlacedCloud& placed, size_t begin, size_t end,
-                     VisibleSplat* splats, DepthItem* items, size_t slot);
+                     const ProjectedSlots& to, size_t slot);
+
+/// The grid of the scene's picture.
+inline TileGrid gridOf(const PlacedScene& scene) {
+  return TileGrid(static_cast<uint32_t>(scene.view.width),
+                  static_cast<uint32_t>(scene.view.height));
+}
 
 /// As chosenTileKernel() and tileKernels().
 Projector chosenProjector();

@@ -6,11 +6,12 @@
 namespace stipple {
 
 size_t projectScalar(const PlacedScene& scene, const PlacedCloud& placed, size_t begin, size_t end,
-                     VisibleSplat* splats, DepthItem* items, size_t slot) {
+                     const ProjectedSlots& to, size_t slot) {
+  const TileGrid grid = gridOf(scene);
   for (size_t row = begin; row < end; ++row) {
     Projected<double> projected;
     if (!projectSplat(scene, placed, row, projected)) continue;
-    VisibleSplat& splat = splats[slot];
+    VisibleSplat& splat = to.splats[slot];
     splat.footprint = projected.footprint;
     splat.half_x = projected.half_x;
     splat.half_y = projected.half_y;
@@ -18,7 +19,8 @@ size_t projectScalar(const PlacedScene& scene, const PlacedCloud& placed, size_t
     splat.depth = static_cast<float>(std::min(projected.depth, 1e38));
     splatColour(scene, placed, row, splat.colour);
     splat.index = static_cast<uint32_t>(placed.first_index + row);
-    items[slot] = depthItem(projected.depth, slot);
+    to.items[slot] = depthItem(projected.depth, slot);
+    to.spans[slot] = tileSpanOf(splat, grid);
     ++slot;
   }
   return slot;

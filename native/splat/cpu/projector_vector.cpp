@@ -30,6 +30,58 @@ constexpr size_t kMaxLanes = 8;
 #include "math/harmonic_basis-inl.h"
 #include "splat/projection_steps-inl.h"
 
+HWY_INLINE Double wholePart(Double value) {
+  return Double(hn::Trunc(value.v));
+}
+
+#include "splat/cpu/tile_span_steps-inl.h"
+
+using Word = hn::Rebind<uint64_t, Doubles>;
+
+/// A whole number of 0..2^51.
+HWY_INLINE hn::Vec<Word> wordOf(Double value) {
+  const Doubles d;
+  const Word dw;
+  const auto shift = hn::Set(d, 0x1p52);  // brings the number into the low bits
+  return hn::Xor(hn::BitCast(dw, hn::Add(value.v, shift)), hn::BitCast(dw, shift));
+}
+
+/// As tileSpanOf.
+HWY_INLINE hn::Vec<Word> tileSpans(const Projected<Double>& splat, const TileGrid& grid) {
+  const Doubles d;
+  const Word dw;
+  const Double rows(grid.rows), columns(grid.columns), zero(0.0), one(1.0);
+  SpanBox<Double> box;
+  spanBox(splat.footprint, splat.half_x, splat.half_y, columns, rows, box);
+  const Double row_count = box.last_row - box.first_row + one;
+  const Double column_count = box.last_column - box.first_column + one;
+  const auto fits = hn::And(Double(kSpanRows) >= row_count, Double(kSpanColumns) >= column_count);
+  // One row or column of tiles: the box is exact.
+  const auto is_box = hn::Or(one >= row_count, one >= column_count);
+  const bool has_edges = !hn::AllTrue(d, hn::Or(is_box, hn::Not(fits)));
+  auto mask = hn::Zero(dw);
+  for (uint32_t k = 0; k < kSpanRows; ++k) {
+    const auto present = hn::And(fits, row_count > Double(k));
+    if (hn::AllFalse(d, present)) break;
+    Double first = box.first_column, last = box.last_column;
+    if (has_edges) {
+      rowColumns(box, box.first_row + Double(k), columns, first, last);
+      first = pick(is_box, box.first_column, first);
+      last = pick(is_box, box.last_column, last);
+    }
+    const auto ones = hn::Set(dw, 1);
+    const auto met = hn::Sub(hn::Shl(ones, wordOf(max(last - first + one, zero))), ones);
+    const Double at =
+        min(first - box.first_column, Double(kSpanColumns)) + Double(k * kSpanColumns);
+    mask = hn::Or(mask, hn::IfThenElseZero(hn::RebindMask(dw, present), hn::Shl(met, wordOf(at))));
+  }
+  const auto place = hn::Or(hn::ShiftLeft<48>(wordOf(max(box.first_row, zero))),
+                            hn::ShiftLeft<32>(wordOf(max(box.first_column, zero))));
+  const auto meets = hn::Ne(mask, hn::Zero(dw));
+  return hn::IfThenElse(hn::RebindMask(dw, fits), hn::IfThenElseZero(meets, hn::Or(mask, place)),
+                        hn::Set(dw, kWideSpan));
+}
+
 HWY_INLINE Double promoted(hn::Vec<Floats> v) {
   return Double(hn::PromoteTo(Doubles(), v));
 }
@@ -106,13 +158,15 @@ HWY_INLINE void sumHarmonics(const PlacedCloud& placed, const float* sh, const f
 }
 
 size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t begin, size_t end,
-                   VisibleSplat* splats, DepthItem* items, size_t slot) {
+                   const ProjectedSlots& to, size_t slot) {
+  const TileGrid grid = gridOf(scene);
   const Doubles d;
   const size_t lanes = hn::Lanes(d);
   const View<double>& view = scene.view;
   const SplatCloud& cloud = *placed.cloud;
   const size_t sh_stride = cloud.shStride();
   HWY_ALIGN double columns[9][kMaxLanes];
+  HWY_ALIGN TileSpan spans[kMaxLanes];
   HWY_ALIGN float log2_opacity[kMaxLanes];
   HWY_ALIGN float depth[kMaxLanes];
   HWY_ALIGN float basis[25 * kMaxLanes];
@@ -143,6 +197,7 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
     const Double fields[9] = {f.mean_x,  f.mean_y,   f.l00,      f.l10,    f.l11,
                               f.opacity, out.half_x, out.half_y, out.depth};
     for (size_t k = 0; k < 9; ++k) hn::Store(fields[k].v, d, columns[k]);
+    hn::Store(tileSpans(out, grid), Word(), spans);
     const Double log2e(1.4426950408889634);
     const Double log2o = log(pick(shows, f.opacity, one)) * log2e;
     hn::Store(hn::DemoteTo(Floats(), log2o.v), Floats(), log2_opacity);
@@ -154,7 +209,7 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
     hn::StoreMaskBits(d, shows, bits);
     for (uint32_t left = bits[0]; left != 0; left &= left - 1) {
       const size_t lane = static_cast<size_t>(__builtin_ctz(left));
-      VisibleSplat& visible = splats[slot];
+      VisibleSplat& visible = to.splats[slot];
       visible.footprint = {columns[0][lane], columns[1][lane], columns[2][lane],
                            columns[3][lane], columns[4][lane], columns[5][lane]};
       visible.half_x = columns[6][lane];
@@ -163,11 +218,12 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
       visible.depth = depth[lane];
       sumHarmonics(placed, &cloud.sh[(row + lane) * sh_stride], basis + lane, visible.colour);
       visible.index = static_cast<uint32_t>(placed.first_index + row + lane);
-      items[slot] = depthItem(columns[8][lane], slot);
+      to.spans[slot] = spans[lane];
+      to.items[slot] = depthItem(columns[8][lane], slot);
       ++slot;
     }
   }
-  return projectScalar(scene, placed, row, end, splats, items, slot);
+  return projectScalar(scene, placed, row, end, to, slot);
 }
 
 NamedProjector namedProjector() {

@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "splat/cpu/projector.h"
-
 namespace stipple {
+
+struct VisibleSplat;
 
 constexpr uint32_t kTileSide = 16;
 constexpr uint32_t kTilePixelCount = kTileSide * kTileSide;

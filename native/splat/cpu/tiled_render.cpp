@@ -203,7 +203,8 @@ uint64_t RenderWorkspace::bytes() const {
   const VisibleSplats& visible = arrays_->visible;
   const TileListMemory& lists = arrays_->lists;
   return arrays_->scene.clouds.capacity() * sizeof(PlacedCloud) + visible.splats.bytes() +
-         visible.slots.bytes() + visible.items[0].bytes() + visible.items[1].bytes() +
+         visible.slots.bytes() + visible.slot_spans.bytes() + visible.items[0].bytes() +
+         visible.items[1].bytes() +
          (visible.filled.capacity() + visible.digits.capacity() + lists.counts.capacity()) *
              sizeof(uint32_t) +
          (lists.cursors.capacity() + lists.group.offsets.capacity()) * sizeof(uint64_t) +

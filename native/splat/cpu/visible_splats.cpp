@@ -22,14 +22,14 @@ constexpr size_t kMaxDigits = size_t{1} << kMaxDigitBits;
 /// Checks and projects splats [begin, end) into slots from `begin` on. Returns how many are
 /// visible.
 size_t projectRange(Projector project, const PlacedScene& scene, size_t begin, size_t end,
-                    VisibleSplat* slots, DepthItem* items) {
+                    const ProjectedSlots& slots) {
   size_t slot = begin;
   for (size_t cloud = cloudOfSplat(scene, begin); begin < end; ++cloud) {
     const PlacedCloud& placed = scene.clouds[cloud];
     const size_t first = begin - placed.first_index;
     const size_t last = std::min(end - placed.first_index, placed.cloud->size());
     if (!rowsAreValid(*placed.cloud, first, last)) refuseCloud(placed);
-    slot = project(scene, placed, first, last, slots, items, slot);
+    slot = project(scene, placed, first, last, slots, slot);
     begin = placed.first_index + last;
   }
   return slot;
@@ -145,31 +145,30 @@ void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* pr
   visible.spans = nullptr;
   visible.splats.resize(0);
   if (count == 0) return;
-  VisibleSplat* slots = visible.slots.resize(count);
-  DepthItem* items = visible.items[0].resize(count);
+  const ProjectedSlots slots = {visible.slots.resize(count), visible.items[0].resize(count),
+                                visible.slot_spans.resize(count)};
   visible.items[1].resize(count);
   visible.filled.resize(rangeCount(count, kRangeSplats));
   visible.digits.resize(kMaxSortChunks * kMaxDigits);
   const auto project_range = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
-    const size_t after = projectRange(project, scene, begin, end, slots, items);
+    const size_t after = projectRange(project, scene, begin, end, slots);
     visible.filled[begin / kRangeSplats] = static_cast<uint32_t>(after - begin);
   };
   parallelFor(count, kRangeSplats, std::cref(project_range));
 
   for (const uint32_t part : visible.filled) visible.count += part;
   const DepthItem* sorted = DepthSort(visible).run();
-  TileSpan* spans = visible.items[sorted == items ? 1 : 0].get();
+  TileSpan* spans = visible.items[sorted == slots.items ? 1 : 0].get();
   VisibleSplat* splats = visible.splats.resize(visible.count);
-  const TileGrid grid(static_cast<uint32_t>(scene.view.width),
-                      static_cast<uint32_t>(scene.view.height));
   const auto gather = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
     constexpr size_t kAhead = 32;
     for (size_t i = begin; i < end; ++i) {
-      prefetchSplat(&slots[static_cast<uint32_t>(sorted[std::min(i + kAhead, end - 1)])]);
-      splats[i] = slots[static_cast<uint32_t>(sorted[i])];
-      spans[i] = tileSpanOf(splats[i], grid);
+      prefetchSplat(&slots.splats[static_cast<uint32_t>(sorted[std::min(i + kAhead, end - 1)])]);
+      const uint32_t slot = static_cast<uint32_t>(sorted[i]);
+      splats[i] = slots.splats[slot];
+      spans[i] = slots.spans[slot];
     }
   };
   parallelFor(visible.count, kRangeSplats, std::cref(gather));
@@ -184,7 +183,7 @@ VisibleSplats findVisibleSplats(const PlacedScene& scene, Progress* progress) {
 
 uint64_t visibleSplatsMemoryBound(uint64_t splat_count) {
   // The last term: arrays on huge pages are rounded up.
-  return splat_count * (2 * sizeof(VisibleSplat) + 2 * sizeof(DepthItem)) +
+  return splat_count * (2 * sizeof(VisibleSplat) + 2 * sizeof(DepthItem) + sizeof(TileSpan)) +
          rangeCount(splat_count, kRangeSplats) * sizeof(uint32_t) +
          kMaxSortChunks * kMaxDigits * sizeof(uint32_t) + 4 * (uint64_t{2} << 20);
 }

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "splat/cpu/projector.h"
 #include "splat/cpu/reused_array.h"
-#include "splat/cpu/tile_grid.h"
 #include "splat/scene.h"
 
 namespace stipple {
@@ -20,6 +20,7 @@ struct VisibleSplats {
 
   // What finding them needs; kept for the next picture.
   ReusedArray<VisibleSplat> slots;  ///< as projected, by range of splats
+  ReusedArray<TileSpan> slot_spans;
   ReusedArray<DepthItem> items[2];
   std::vector<uint32_t> filled;  ///< visible splats of each range
   std::vector<uint32_t> digits;  ///< [chunk][digit] of the sort

@@ -78,15 +78,18 @@ TEST(TileLists, HoldEveryPairOfTheExactSetAndAtMostOneInAHundredMore) {
 }
 
 std::vector<VisibleSplat> projectWith(Projector projector, const PlacedScene& scene,
-                                      std::vector<DepthItem>& items) {
+                                      std::vector<DepthItem>& items, std::vector<TileSpan>& spans) {
   std::vector<VisibleSplat> splats(scene.splat_count);
   items.resize(scene.splat_count);
+  spans.resize(scene.splat_count);
+  const ProjectedSlots slots = {splats.data(), items.data(), spans.data()};
   size_t slot = 0;
   for (const PlacedCloud& placed : scene.clouds) {
-    slot = projector(scene, placed, 0, placed.cloud->size(), splats.data(), items.data(), slot);
+    slot = projector(scene, placed, 0, placed.cloud->size(), slots, slot);
   }
   splats.resize(slot);
   items.resize(slot);
+  spans.resize(slot);
   return splats;
 }
 
@@ -106,11 +109,13 @@ TEST(Projector, GivesTheSameBitsOnEveryTarget) {
       options.blend_space = degree == 1 ? BlendSpace::kSceneLinear : BlendSpace::kAsTrained;
       const PlacedScene scene = placeScene({&instance, 1}, camera, options);
       std::vector<DepthItem> expected_items, items;
-      const std::vector<VisibleSplat> expected = projectWith(projectScalar, scene, expected_items);
+      std::vector<TileSpan> expected_spans, spans;
+      const std::vector<VisibleSplat> expected =
+          projectWith(projectScalar, scene, expected_items, expected_spans);
       EXPECT_GT(expected.size(), 100u);
       for (const NamedProjector& named : projectors()) {
         SCOPED_TRACE(::testing::Message() << named.target << " degree " << degree);
-        const std::vector<VisibleSplat> seen = projectWith(named.project, scene, items);
+        const std::vector<VisibleSplat> seen = projectWith(named.project, scene, items, spans);
         ASSERT_EQ(seen.size(), expected.size());
         EXPECT_EQ(items, expected_items);
         for (size_t i = 0; i < seen.size(); ++i) {
