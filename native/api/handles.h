@@ -2,6 +2,7 @@
 
 #include <stipple/stipple.h>
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -53,6 +54,8 @@ struct StippleContext {
 struct StippleCloud {
   stipple::api::Context context;
   std::shared_ptr<const stipple::SplatCloud> cloud;
+  /// rowsAreValid() has accepted the cloud, which never changes: drawing need not ask again.
+  mutable std::atomic<bool> is_checked{false};
 };
 
 /// A mesh grows by its add functions until a job takes a share; later additions copy first.

@@ -16,6 +16,9 @@ namespace stipple {
 struct SplatInstance {
   const SplatCloud* cloud = nullptr;
   Mat4d object_to_world = Mat4d::Identity();  ///< invertible, affine (scale and shear allowed)
+  /// True: rowsAreValid() has accepted all of the cloud and nothing has written to it since; the
+  /// renderer then does not read its values a second time to check them.
+  bool values_are_checked = false;
 };
 
 enum class LowPass : uint32_t {

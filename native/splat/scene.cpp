@@ -51,6 +51,7 @@ PlacedCloud place(const SplatInstance& instance, const Camera& camera,
                    ? Vec3d(to_object * (cameraCentre(camera) - origin))
                    : Vec3d(to_object * to_view.row(2).transpose());
   placed.instance = 0;
+  placed.is_checked = instance.values_are_checked;
   placed.first_index = 0;
   placed.low_pass = lowPassOf(cloud, options.low_pass);
   placed.sh_degree = std::min(cloud.sh_degree, options.sh_degree_limit);

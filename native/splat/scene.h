@@ -19,6 +19,7 @@ struct PlacedCloud {
   /// Perspective: the camera's centre in object space. Orthographic: the viewing direction there.
   Vec3d eye;
   size_t instance;       ///< of the caller's list
+  bool is_checked;       ///< SplatInstance::values_are_checked
   uint64_t first_index;  ///< of its splat 0 among all splats of the picture
   LowPass low_pass;      ///< never kFromCloud
   int sh_degree;

@@ -26,6 +26,7 @@ using Double = Lanes<Doubles>;
 using Float = Lanes<Floats>;
 
 constexpr size_t kMaxLanes = 8;
+constexpr size_t kPrefetchGroups = 6;  // of lanes: 2 to 6 KB ahead
 
 #include "math/harmonic_basis-inl.h"
 #include "splat/projection_steps-inl.h"
@@ -108,6 +109,15 @@ HWY_INLINE SplatGeometry<Double> loadGeometry(const SplatCloud& cloud, size_t ro
   return splat;
 }
 
+/// Asks for the harmonics of rows [row, row + count), which may lie behind the end: they are much
+/// longer than what the processor fetches ahead by itself.
+HWY_INLINE void prefetchRows(const SplatCloud& cloud, size_t row, size_t count) {
+  const size_t stride = cloud.shStride();
+  const size_t end = std::min((row + count) * stride, cloud.sh.size());
+  constexpr size_t kLineFloats = 16;
+  for (size_t i = row * stride; i < end; i += kLineFloats) __builtin_prefetch(&cloud.sh[i]);
+}
+
 /// Harmonics in the direction of each lane. Out: basis [coefficient][lane]; lanes outside `shows`
 /// are finite.
 HWY_INLINE void directionBasis(const PlacedScene& scene, const PlacedCloud& placed,
@@ -174,6 +184,7 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
 
   size_t row = begin;
   for (; row + lanes <= end; row += lanes) {
+    prefetchRows(cloud, row + kPrefetchGroups * lanes, lanes);
     SplatGeometry<Double> splat = loadGeometry(cloud, row);
     Double centre[3];
     placePoint(placed.linear, placed.translation, splat.position, centre);

@@ -28,7 +28,7 @@ size_t projectRange(Projector project, const PlacedScene& scene, size_t begin, s
     const PlacedCloud& placed = scene.clouds[cloud];
     const size_t first = begin - placed.first_index;
     const size_t last = std::min(end - placed.first_index, placed.cloud->size());
-    if (!rowsAreValid(*placed.cloud, first, last)) refuseCloud(placed);
+    if (!placed.is_checked && !rowsAreValid(*placed.cloud, first, last)) refuseCloud(placed);
     slot = project(scene, placed, first, last, slots, slot);
     begin = placed.first_index + last;
   }
