@@ -41,8 +41,10 @@ uint64_t blendAllTiles(const VisibleSplats& visible, const TileGrid& grid, TileK
 
 void countPairs(const VisibleSplats& visible, const TileGrid& grid, BlendFloor& floor) {
   std::vector<std::vector<uint32_t>> exact(grid.tileCount());
+  std::vector<uint32_t> place_of(visible.splats.size());
   for (size_t i = 0; i < visible.count; ++i) {
-    const VisibleSplat& splat = visible.splats[i];
+    const VisibleSplat& splat = visible.at(i);
+    place_of[visible.slotAt(i)] = static_cast<uint32_t>(i);
     forEachExactTile(splat.footprint, splat.half_x, splat.half_y, grid,
                      [&](size_t tile) { exact[tile].push_back(static_cast<uint32_t>(i)); });
   }
@@ -54,8 +56,8 @@ void countPairs(const VisibleSplats& visible, const TileGrid& grid, BlendFloor& 
       // Both are in rising order.
       size_t at = 0;
       for (const uint32_t splat : exact[tile]) {
-        while (at < listed.size() && listed[at] < splat) ++at;
-        floor.missing_pairs += at == listed.size() || listed[at] != splat;
+        while (at < listed.size() && place_of[listed[at]] < splat) ++at;
+        floor.missing_pairs += at == listed.size() || place_of[listed[at]] != splat;
       }
     }
   });

@@ -11,7 +11,7 @@ namespace stipple {
 struct Tile {
   uint32_t x0, y0;                   ///< first pixel
   uint32_t width, height;            ///< pixels inside the picture
-  std::span<const uint32_t> splats;  ///< indices of visible splats, front to back
+  std::span<const uint32_t> splats;  ///< slots of visible splats, front to back
 };
 
 /// Tile `index` of the grid with its list.

@@ -94,11 +94,11 @@ void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progre
       if (progress) progress->throwIfCancelled();
       uint64_t* cursor = &cursors[begin / chunk_size * group_tiles];
       for (size_t i = begin; i < end; ++i) {
-        const uint32_t splat = static_cast<uint32_t>(i);
+        const uint32_t slot = visible.slotAt(i);
         forEachTileOf(visible, i, grid, [&](size_t tile) {
           // One comparison: a tile before the group wraps around.
           const size_t own = tile - group.first_tile;
-          if (own < group_tiles) entries[cursor[own]++] = splat;
+          if (own < group_tiles) entries[cursor[own]++] = slot;
         });
       }
     };

@@ -10,7 +10,7 @@
 
 namespace stipple {
 
-/// Indices of the visible splats of tiles [first_tile, end_tile), each tile front to back.
+/// Slots of the visible splats of tiles [first_tile, end_tile), each tile front to back.
 struct TileListGroup {
   size_t first_tile = 0;
   size_t end_tile = 0;

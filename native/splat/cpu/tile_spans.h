@@ -74,7 +74,7 @@ template <typename Visit>
 void forEachTileOf(const VisibleSplats& visible, size_t i, const TileGrid& grid, Visit visit) {
   const TileSpan span = visible.spans[i];
   if (span >= kWideSpan) {
-    forEachTileSpan(visible.splats[i], grid, [&](int64_t row, int64_t first, int64_t last) {
+    forEachTileSpan(visible.at(i), grid, [&](int64_t row, int64_t first, int64_t last) {
       const size_t start = static_cast<size_t>(row) * grid.columns;
       for (int64_t column = first; column <= last; ++column) {
         visit(start + static_cast<size_t>(column));

@@ -203,8 +203,7 @@ uint64_t RenderWorkspace::bytes() const {
   const VisibleSplats& visible = arrays_->visible;
   const TileListMemory& lists = arrays_->lists;
   return arrays_->scene.clouds.capacity() * sizeof(PlacedCloud) + visible.splats.bytes() +
-         visible.slots.bytes() + visible.slot_spans.bytes() + visible.items[0].bytes() +
-         visible.items[1].bytes() +
+         visible.slot_spans.bytes() + visible.items[0].bytes() + visible.items[1].bytes() +
          (visible.filled.capacity() + visible.digits.capacity() + lists.counts.capacity()) *
              sizeof(uint32_t) +
          (lists.cursors.capacity() + lists.group.offsets.capacity()) * sizeof(uint64_t) +
@@ -237,7 +236,7 @@ uint64_t fingerprintOf(const PlacedScene& scene, const VisibleSplats& visible) {
     }
   };
   for (size_t i = 0; i < std::min(kSamples, visible.count); ++i) {
-    const uint32_t splat = visible.splats[i * visible.count / kSamples % visible.count].index;
+    const uint32_t splat = visible.at(i * visible.count / kSamples % visible.count).index;
     const PlacedCloud& placed = scene.clouds[cloudOfSplat(scene, splat)];
     const size_t row = splat - placed.first_index;
     const SplatCloud& cloud = *placed.cloud;

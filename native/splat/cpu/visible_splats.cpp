@@ -13,6 +13,7 @@ namespace {
 /// Splats of one task; their inputs (up to 340 bytes each) stay in the second-level cache between
 /// the check of their values and the projection.
 constexpr size_t kRangeSplats = 2048;
+constexpr size_t kGatherSplats = 8192;
 /// Chunks of the sort: each has a counter per digit, which are summed on one thread.
 constexpr size_t kMaxSortChunks = 16;
 constexpr size_t kMinChunkItems = 32768;
@@ -142,10 +143,10 @@ void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* pr
                        VisibleSplats& visible) {
   const size_t count = scene.splat_count;
   visible.count = 0;
+  visible.order = nullptr;
   visible.spans = nullptr;
-  visible.splats.resize(0);
   if (count == 0) return;
-  const ProjectedSlots slots = {visible.slots.resize(count), visible.items[0].resize(count),
+  const ProjectedSlots slots = {visible.splats.resize(count), visible.items[0].resize(count),
                                 visible.slot_spans.resize(count)};
   visible.items[1].resize(count);
   visible.filled.resize(rangeCount(count, kRangeSplats));
@@ -158,20 +159,13 @@ void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* pr
   parallelFor(count, kRangeSplats, std::cref(project_range));
 
   for (const uint32_t part : visible.filled) visible.count += part;
-  const DepthItem* sorted = DepthSort(visible).run();
-  TileSpan* spans = visible.items[sorted == slots.items ? 1 : 0].get();
-  VisibleSplat* splats = visible.splats.resize(visible.count);
+  visible.order = DepthSort(visible).run();
+  TileSpan* spans = visible.items[visible.order == slots.items ? 1 : 0].get();
   const auto gather = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
-    constexpr size_t kAhead = 32;
-    for (size_t i = begin; i < end; ++i) {
-      prefetchSplat(&slots.splats[static_cast<uint32_t>(sorted[std::min(i + kAhead, end - 1)])]);
-      const uint32_t slot = static_cast<uint32_t>(sorted[i]);
-      splats[i] = slots.splats[slot];
-      spans[i] = slots.spans[slot];
-    }
+    for (size_t i = begin; i < end; ++i) spans[i] = slots.spans[visible.slotAt(i)];
   };
-  parallelFor(visible.count, kRangeSplats, std::cref(gather));
+  parallelFor(visible.count, kGatherSplats, std::cref(gather));
   visible.spans = spans;
 }
 
@@ -183,7 +177,7 @@ VisibleSplats findVisibleSplats(const PlacedScene& scene, Progress* progress) {
 
 uint64_t visibleSplatsMemoryBound(uint64_t splat_count) {
   // The last term: arrays on huge pages are rounded up.
-  return splat_count * (2 * sizeof(VisibleSplat) + 2 * sizeof(DepthItem) + sizeof(TileSpan)) +
+  return splat_count * (sizeof(VisibleSplat) + 2 * sizeof(DepthItem) + sizeof(TileSpan)) +
          rangeCount(splat_count, kRangeSplats) * sizeof(uint32_t) +
          kMaxSortChunks * kMaxDigits * sizeof(uint32_t) + 4 * (uint64_t{2} << 20);
 }

@@ -11,15 +11,21 @@
 
 namespace stipple {
 
-/// The splats that can show, in the order of blending: front to back by depthKey, ties by splat
-/// index. They lie in memory in that order too, since every later step walks them in it.
+/// The splats that can show, and the order of blending: front to back by depthKey, ties by splat
+/// index. They stay in memory where they were projected, in slots by ranges of the clouds' rows,
+/// which lists of tiles name: to bring them into the order of depth would read and write each once
+/// more, and a tile takes splats from everywhere in either order.
 struct VisibleSplats {
-  ReusedArray<VisibleSplat> splats;
-  const TileSpan* spans = nullptr;  ///< [count]; lies in one of `items`
+  ReusedArray<VisibleSplat> splats;  ///< by slot; each range of splats begins at its own number
+  const DepthItem* order = nullptr;  ///< [count] front to back; lies in one of `items`
+  const TileSpan* spans = nullptr;   ///< [count] front to back; lies in the other
   size_t count = 0;
 
+  /// The slot of the splat that is `place` from the front.
+  uint32_t slotAt(size_t place) const { return static_cast<uint32_t>(order[place]); }
+  const VisibleSplat& at(size_t place) const { return splats[slotAt(place)]; }
+
   // What finding them needs; kept for the next picture.
-  ReusedArray<VisibleSplat> slots;  ///< as projected, by range of splats
   ReusedArray<TileSpan> slot_spans;
   ReusedArray<DepthItem> items[2];
   std::vector<uint32_t> filled;  ///< visible splats of each range

@@ -25,8 +25,10 @@ struct Pairs {
 
 Pairs countPairs(const VisibleSplats& visible, const TileGrid& grid) {
   std::vector<std::vector<uint32_t>> exact(grid.tileCount());
+  std::vector<uint32_t> place_of(visible.splats.size());
   for (size_t i = 0; i < visible.count; ++i) {
-    const VisibleSplat& splat = visible.splats[i];
+    const VisibleSplat& splat = visible.at(i);
+    place_of[visible.slotAt(i)] = static_cast<uint32_t>(i);
     bench::forEachExactTile(splat.footprint, splat.half_x, splat.half_y, grid,
                             [&](size_t tile) { exact[tile].push_back(static_cast<uint32_t>(i)); });
   }
@@ -36,7 +38,8 @@ Pairs countPairs(const VisibleSplats& visible, const TileGrid& grid) {
     EXPECT_EQ(group.first_tile, next_tile);
     next_tile = group.end_tile;
     for (size_t tile = group.first_tile; tile < group.end_tile; ++tile) {
-      const std::span<const uint32_t> listed = group.tile(tile);
+      std::vector<uint32_t> listed;
+      for (const uint32_t slot : group.tile(tile)) listed.push_back(place_of[slot]);
       pairs.listed += listed.size();
       pairs.exact += exact[tile].size();
       for (size_t k = 1; k < listed.size(); ++k) pairs.out_of_order += listed[k] <= listed[k - 1];
@@ -158,8 +161,8 @@ TEST(VisibleSplats, ComeInTheOrderOfAStableSortByDepth) {
     ASSERT_GT(visible.count, 20000u);
     size_t wrong = 0;
     for (size_t i = 1; i < visible.count; ++i) {
-      const VisibleSplat& a = visible.splats[i - 1];
-      const VisibleSplat& b = visible.splats[i];
+      const VisibleSplat& a = visible.at(i - 1);
+      const VisibleSplat& b = visible.at(i);
       wrong += !(a.depth < b.depth || (a.depth == b.depth && a.index < b.index));
     }
     EXPECT_EQ(wrong, 0u) << "stretch " << stretch;
