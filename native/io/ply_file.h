@@ -8,6 +8,10 @@
 
 namespace stipple {
 
+/// True for a PLY whose splats are packed in chunks, and for any other PLY.
+bool startsAsCompressedPly(const SplatFileStart& start);
+bool startsAsPly(const SplatFileStart& start);
+
 /// Reads a 3DGS PLY: any property order, number types, text or binary of either byte order, degrees
 /// 0 to 4; properties and elements that a splat does not need are passed over.
 SplatCloud readPlySplats(const std::string& path, Progress* progress);
@@ -17,10 +21,14 @@ SplatCloud readPlySplats(const std::string& path, Progress* progress);
 void writePlySplats(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress);
 
-/// Comment keys that carry what the numbers alone do not say.
-constexpr char kPlyColourSpaceKey[] = "stipple_colour_space";
-constexpr char kPlyFrameKey[] = "stipple_frame";
-constexpr char kPlyRenderModeKey[] = "SplatRenderMode:";
+/// Reads a compressed PLY as PlayCanvas has it: chunks of 256 splats, harmonics to degree 3.
+SplatCloud readCompressedPly(const std::string& path, Progress* progress);
+
+/// Writes a compressed PLY; the splats are put in Morton order.
+void writeCompressedPly(const SplatCloud& cloud, const std::string& path,
+                        const SplatWriteOptions& options, Progress* progress);
+
+/// Names of the colour spaces in files that carry one.
 constexpr char kColourSpaceDisplay[] = "srgb_rec709_display";
 constexpr char kColourSpaceLinear[] = "lin_rec709_display";
 

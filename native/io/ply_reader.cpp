@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "io/input_file.h"
+#include "io/ply_comments.h"
 #include "io/ply_file.h"
 #include "io/ply_header.h"
 #include "io/ply_rows.h"
@@ -72,7 +73,7 @@ class Reader {
       if (element.name == "chunk") {
         failHere(
             ErrorCode::kUnsupported,
-            "is a compressed PLY (element 'chunk'); only uncompressed 3DGS PLY files are read");
+            "has an element 'chunk' after 4096 bytes of header; a compressed PLY names it before");
       }
     }
     for (const PlyElement& element : header_.elements) {
@@ -86,36 +87,7 @@ class Reader {
   }
 
   void readComments() {
-    bool has_mode = false;
-    for (const std::string& comment : header_.comments) {
-      std::istringstream words(comment);
-      std::string key;
-      std::string value;
-      words >> key >> value;
-      if (key == kPlyRenderModeKey) {
-        cloud_.antialias = value == "mip" ? Antialias::kMip : Antialias::kClassic;
-        has_mode = true;
-      } else if (key == "antialiased" && !has_mode) {
-        cloud_.antialias = value == "1" ? Antialias::kMip : Antialias::kClassic;
-        has_mode = true;
-      } else if (key == kPlyColourSpaceKey) {
-        if (value != kColourSpaceLinear && value != kColourSpaceDisplay) {
-          failHere(ErrorCode::kUnsupported, "has the colour space '" + value.substr(0, 60) + "'; " +
-                                                kColourSpaceDisplay + " and " + kColourSpaceLinear +
-                                                " are known");
-        }
-        cloud_.colour_space =
-            value == kColourSpaceLinear ? ColourSpace::kLinear : ColourSpace::kDisplay;
-      } else if (key == kPlyFrameKey) {
-        const std::optional<Frame> frame = frameFromName(value);
-        if (!frame || *frame == Frame::kUnknown) {
-          failHere(ErrorCode::kUnsupported,
-                   "has the frame '" + value.substr(0, 60) +
-                       "'; three letters such as RDF, RUB or RFU are known");
-        }
-        cloud_.frame = *frame;
-      }
-    }
+    const bool has_mode = readPlyComments(header_.comments, file_.path(), cloud_);
     // Mip-Splatting's trainer writes filter_3D and no comment.
     if (!has_mode && find("filter_3D")) cloud_.antialias = Antialias::kMip;
   }

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "io/output_file.h"
+#include "io/ply_comments.h"
 #include "io/ply_file.h"
 
 namespace stipple {
@@ -28,15 +29,9 @@ size_t rowLength(const SplatCloud& cloud) {
 }
 
 std::string header(const SplatCloud& cloud, bool ascii) {
-  std::string text =
-      std::string("ply\nformat ") + (ascii ? "ascii" : "binary_little_endian") + " 1.0\ncomment " +
-      kPlyRenderModeKey + (cloud.antialias == Antialias::kMip ? " mip" : " default") +
-      "\ncomment " + kPlyColourSpaceKey + " " +
-      (cloud.colour_space == ColourSpace::kLinear ? kColourSpaceLinear : kColourSpaceDisplay) +
-      (cloud.frame == Frame::kUnknown
-           ? std::string()
-           : std::string("\ncomment ") + kPlyFrameKey + " " + frameName(cloud.frame)) +
-      "\nelement vertex " + std::to_string(cloud.size()) + "\n";
+  std::string text = std::string("ply\nformat ") + (ascii ? "ascii" : "binary_little_endian") +
+                     " 1.0\n" + plyComments(cloud) + "element vertex " +
+                     std::to_string(cloud.size()) + "\n";
   const auto property = [&text](const std::string& name) {
     text += "property float " + name + "\n";
   };

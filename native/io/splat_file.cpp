@@ -24,10 +24,6 @@ namespace {
 
 constexpr size_t kGrain = 4096;
 
-bool startsAsPly(const SplatFileStart& start) {
-  return start.bytes.rfind("ply", 0) == 0;
-}
-
 std::string lowerName(const std::string& path) {
   std::string name = std::filesystem::path(path).filename().string();
   for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -119,6 +115,8 @@ std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& f
 const std::vector<SplatFormat>& splatFormats() {
   static const std::vector<SplatFormat> kFormats = {
       {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, true, startsAsPly, readPlySplats, writePlySplats},
+      {"compressed_ply", "compressed PLY", ".compressed.ply", 3, Frame::kRDF, true,
+       startsAsCompressedPly, readCompressedPly, writeCompressedPly},
       {"spz", "SPZ", ".spz", 4, Frame::kRUB, false, startsAsSpz, readSpzSplats, writeSpzSplats},
       {"splat", "splat records", ".splat", 0, Frame::kRDF, false, nullptr, readSplat32,
        writeSplat32},

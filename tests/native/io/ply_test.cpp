@@ -403,7 +403,7 @@ TEST_F(Ply, SaysWhatIsWrongWithAHeader) {
 TEST_F(Ply, NamesOtherKindsOfPly) {
   RawPly ply = twoSplats();
   ply.elements_before = "element chunk 0\nproperty float min_x\n";
-  expectError(ErrorCode::kUnsupported, {"compressed"},
+  expectError(ErrorCode::kFormat, {"compressed", "2 splats"},
               [&] { readSplatFile(store("a.ply", ply.bytes())); });
   RawPly scaffold = twoSplats();
   scaffold.at("f_dc_0").name = "f_anchor_feat_0";
