@@ -29,7 +29,7 @@ SplatCloud ball(const SplatCase& c) {
     }
     for (size_t k = 0; k < 4; ++k) cloud.rotations[i * 4 + k] = normal(random);
     const float o = uniform(random);
-    cloud.opacities[i] = 0.02f + 0.97f * o * o;
+    cloud.opacities[i] = c.faint * (0.02f + 0.97f * o * o);
   }
   for (float& value : cloud.sh) value = 0.3f * normal(random);
   return cloud;

@@ -13,7 +13,8 @@ struct SplatCase {
   size_t splats;
   uint32_t width, height;
   int degree;
-  double size;  ///< median standard deviation, times 1/sqrt(splats) of the ball's radius
+  double size;      ///< median standard deviation, times 1/sqrt(splats) of the ball's radius
+  float faint = 1;  ///< opacities times this
 };
 
 /// Splats in a ball, as fitted scenes have them: flat-ish, many faint, log-normal sizes. Made once.

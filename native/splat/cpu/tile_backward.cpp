@@ -196,26 +196,45 @@ void TileBackward::takeLoss(const Tile& tile, size_t index, double* background) 
   }
 }
 
+/// Loops over plain arrays, one output each, so that the compiler makes vectors.
 void TileBackward::takeStatistics(const Tile& tile) {
   BackwardPixels& pixels = *pixels_;
   const KeptPicture& kept = *loss_->picture;
   const BackwardInput& input = *loss_->input;
+  float ones[kTileSide];
+  std::fill_n(ones, kTileSide, 1.0f);
+  const auto copyRow = [&](std::span<const float> from, size_t pixel, float* to) {
+    if (from.empty()) {
+      std::fill_n(to, tile.width, 0.0f);
+    } else {
+      std::copy_n(&from[pixel], tile.width, to);
+    }
+  };
   for (uint32_t y = 0; y < tile.height; ++y) {
     const size_t row = static_cast<size_t>(y) * kTileSide;
     const size_t pixel = pixelOf(*loss_, tile, 0, y);
-    for (uint32_t x = 0; x < tile.width; ++x) {
-      const float weight =
-          input.residual_weights.empty() ? 1.0f : input.residual_weights[pixel + x];
-      for (size_t c = 0; c < 3; ++c) {
-        const float residual = input.residual.empty() ? 0.0f : input.residual[(pixel + x) * 3 + c];
-        const float signed_weight = residual < 0 ? -weight : weight;
-        const float behind = kept.with_background ? static_cast<float>(kept.background[c]) : 0.0f;
-        pixels.signed_weight[c][row + x] = signed_weight;
-        pixels.room[c][row + x] = 2.0f * weight * std::abs(residual);
-        pixels.signed_behind[c][row + x] = signed_weight * behind;
+    copyRow(input.edge_weights, pixel, pixels.edge + row);
+    copyRow(input.errors, pixel, pixels.error + row);
+    const float* weights = input.residual_weights.empty() ? ones : &input.residual_weights[pixel];
+    for (size_t c = 0; c < 3; ++c) {
+      float* signed_weight = pixels.signed_weight[c] + row;
+      float* room = pixels.room[c] + row;
+      float* behind = pixels.signed_behind[c] + row;
+      if (input.residual.empty()) {
+        for (float* plane : {signed_weight, room, behind}) std::fill_n(plane, tile.width, 0.0f);
+        continue;
       }
-      pixels.edge[row + x] = input.edge_weights.empty() ? 0.0f : input.edge_weights[pixel + x];
-      pixels.error[row + x] = input.errors.empty() ? 0.0f : input.errors[pixel + x];
+      const float* residual = &input.residual[pixel * 3 + c];
+      const float colour = kept.with_background ? static_cast<float>(kept.background[c]) : 0.0f;
+      for (uint32_t x = 0; x < tile.width; ++x) {
+        // The sign of a residual of 0 does not matter: min(x, 0 - x) is the same for x and -x.
+        const uint32_t sign = std::bit_cast<uint32_t>(residual[x * 3]) & kSignBit;
+        signed_weight[x] = std::bit_cast<float>(std::bit_cast<uint32_t>(weights[x]) ^ sign);
+      }
+      for (uint32_t x = 0; x < tile.width; ++x) {
+        room[x] = 2.0f * weights[x] * std::abs(residual[x * 3]);
+      }
+      for (uint32_t x = 0; x < tile.width; ++x) behind[x] = signed_weight[x] * colour;
     }
   }
 }
