@@ -1,8 +1,8 @@
 // Included inside a namespace, once by cpu/back_projector_scalar.cpp and once per instruction set
 // by cpu/back_projector_vector.cpp, hence no include guard. Needs there: loadLanes<T>(const
-// double*), storeLanes(T, double*), laneCount<T>(), takeFootprintBack (projectBackwardSteps of the
-// same namespace) and takeHarmonicsBack. One order of operations in double and nothing fused, so
-// every instruction set gives the same bits.
+// double*), storeLanes(T, double* or float*), laneCount<T>(), takeFootprintBack
+// (projectBackwardSteps of the same namespace) and takeHarmonicsBack. One order of operations in
+// double and nothing fused, so every instruction set gives the same bits.
 
 constexpr size_t kMaxLanes = 8;
 
@@ -62,11 +62,23 @@ void fillColumns(const PlacedCloud& placed, const uint32_t* rows, size_t count,
   }
 }
 
-/// Out: basis [coefficient][lane], slopes [coefficient][axis][lane].
+/// Harmonics of a block's directions. A derivative by a coefficient is the product of two float32
+/// numbers, which cannot leave its range: dL/dcolour is at most 1e4 times 2^32 pixels, and the
+/// slope of the linearisation 2e17.
+struct HarmonicColumns {
+  alignas(64) double basis[25][kMaxLanes];
+  alignas(64) float stored_basis[25][kMaxLanes];  ///< what derivatives are multiplied by
+  alignas(64) double slopes[25][3][kMaxLanes];    ///< [coefficient][axis]
+};
+
+/// Colour of one lane. In: sh and by_colour of its row. Out: by_sh of the row; along [axis] by the
+/// viewing direction, kMaxLanes apart.
+void takeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                       const float* sh, const float* by_colour, float* by_sh, double* along);
+
 template <typename T>
 void directionSteps(const PlacedScene& scene, const PlacedCloud& placed, const T* position,
-                    DirectionLanes<T>& direction, double (*basis)[kMaxLanes],
-                    double (*slopes)[3][kMaxLanes]) {
+                    DirectionLanes<T>& direction, HarmonicColumns& columns) {
   using std::sqrt;
   T* d = direction.unit;
   for (int axis = 0; axis < 3; ++axis) {
@@ -80,8 +92,11 @@ void directionSteps(const PlacedScene& scene, const PlacedCloud& placed, const T
   harmonicBasisGradient(placed.sh_degree, d[0], d[1], d[2], gradients);
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
   for (size_t k = 0; k < coefficients; ++k) {
-    storeLanes(values[k], basis[k]);
-    for (size_t axis = 0; axis < 3; ++axis) storeLanes(gradients[k][axis], slopes[k][axis]);
+    storeLanes(values[k], columns.basis[k]);
+    storeLanes(values[k], columns.stored_basis[k]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      storeLanes(gradients[k][axis], columns.slopes[k][axis]);
+    }
   }
 }
 
@@ -114,21 +129,21 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
   takeFootprintBack(scene.view, placed.linear, centre, splat, placed.low_pass, by, gradient);
 
   const bool turns = placed.sh_degree > 0;
-  alignas(64) double basis[25][kMaxLanes];
-  alignas(64) double slopes[25][3][kMaxLanes];
+  HarmonicColumns harmonics;
   alignas(64) double along[3][kMaxLanes] = {};
   DirectionLanes<T> direction;
   if (turns) {
-    directionSteps(scene, placed, splat.position, direction, basis, slopes);
+    directionSteps(scene, placed, splat.position, direction, harmonics);
   } else {
-    storeLanes(T(static_cast<double>(kShC0)), basis[0]);
+    storeLanes(T(static_cast<double>(kShC0)), harmonics.basis[0]);
+    storeLanes(T(static_cast<double>(kShC0)), harmonics.stored_basis[0]);
   }
   const size_t stride = placed.cloud->shStride();
   for (size_t lane = 0; lane < count; ++lane) {
     const size_t row = rows[lane];
     const float* by_colour = sums.values + row * sums.stride + kFieldRed;
-    takeHarmonicsBack(placed, &basis[0][lane], &slopes[0][0][lane], &placed.cloud->sh[row * stride],
-                      by_colour, &out.sh[row * stride], &along[0][lane]);
+    takeHarmonicsBack(placed, harmonics, lane, &placed.cloud->sh[row * stride], by_colour,
+                      &out.sh[row * stride], &along[0][lane]);
   }
   const bool perspective = scene.view.perspective;
   if (turns) {
@@ -191,14 +206,7 @@ void takeBackRows(const PlacedScene& scene, const PlacedCloud& placed, const uin
                   double* camera) {
   const Mat3d normal_to_view = inverse(placed.linear).transpose();
   const size_t lanes = laneCount<T>();
-  const size_t stride = placed.cloud->shStride();
   for (size_t i = 0; i < count; i += lanes) {
-    for (size_t next = i + lanes; next < std::min(i + 2 * lanes, count); ++next) {
-      for (size_t k = 0; k < stride; k += 16) {
-        __builtin_prefetch(&placed.cloud->sh[rows[next] * stride + k]);
-        __builtin_prefetch(&out.sh[rows[next] * stride + k], 1);
-      }
-    }
     takeBackBlock<T>(scene, placed, normal_to_view, rows + i, std::min(lanes, count - i), sums, out,
                      means + i * 2, camera);
   }

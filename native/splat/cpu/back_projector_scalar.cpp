@@ -21,6 +21,10 @@ void storeLanes(double value, double* out) {
   *out = value;
 }
 
+void storeLanes(double value, float* out) {
+  *out = static_cast<float>(value);
+}
+
 template <typename T>
 constexpr size_t laneCount() {
   return 1;
@@ -33,39 +37,28 @@ void takeFootprintBack(const View<double>& view, const Mat3d& linear, const T* c
   projectBackwardSteps(view, linear, centre, splat, low_pass, by, out);
 }
 
-void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
-                       const float* sh, const float* by_colour, float* by_sh, double* along);
-
 #include "splat/cpu/back_projector-inl.h"
 
-/// In: basis [coefficient], slopes [coefficient][axis], all kMaxLanes apart; sh of the row. Out:
-/// by_sh of the row; along [axis] by the viewing direction, kMaxLanes apart.
-void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
+void takeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
                        const float* sh, const float* by_colour, float* by_sh, double* along) {
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
-  double by_sum[3];
   double by_axis[3] = {};
   for (size_t c = 0; c < 3; ++c) {
-    double sum = 0.5 + basis[0] * static_cast<double>(sh[c]);
+    double sum = 0.5 + harmonics.basis[0][lane] * static_cast<double>(sh[c]);
     double sums[3] = {};
     for (size_t k = 1; k < coefficients; ++k) {
       const double value = static_cast<double>(sh[k * 3 + c]);
-      sum += basis[k * kMaxLanes] * value;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        sums[axis] += slopes[(k * 3 + axis) * kMaxLanes] * value;
-      }
+      sum += harmonics.basis[k][lane] * value;
+      for (size_t axis = 0; axis < 3; ++axis) sums[axis] += harmonics.slopes[k][axis][lane] * value;
     }
-    by_sum[c] = colourSumBackward(placed, sum, static_cast<double>(by_colour[c]));
-    for (size_t axis = 0; axis < 3; ++axis) by_axis[axis] += by_sum[c] * sums[axis];
+    const double by_sum = colourSumBackward(placed, sum, static_cast<double>(by_colour[c]));
+    for (size_t axis = 0; axis < 3; ++axis) by_axis[axis] += by_sum * sums[axis];
+    const float stored = static_cast<float>(by_sum);
+    for (size_t k = 0; k < coefficients; ++k) {
+      by_sh[k * 3 + c] = harmonics.stored_basis[k][lane] * stored;
+    }
   }
   for (size_t axis = 0; axis < 3; ++axis) along[axis * kMaxLanes] = by_axis[axis];
-  for (size_t k = 0; k < coefficients; ++k) {
-    const double value = basis[k * kMaxLanes];
-    for (size_t c = 0; c < 3; ++c) {
-      by_sh[k * 3 + c] =
-          static_cast<float>(std::clamp(value * by_sum[c], -kLargestStored, kLargestStored));
-    }
-  }
   std::fill(by_sh + coefficients * 3, by_sh + placed.cloud->shStride(), 0.0f);
 }
 

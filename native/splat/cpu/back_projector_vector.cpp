@@ -35,6 +35,11 @@ HWY_INLINE void storeLanes(Double value, double* out) {
   hn::Store(value.v, Doubles(), out);
 }
 
+HWY_INLINE void storeLanes(Double value, float* out) {
+  const hn::Rebind<float, Doubles> d;
+  hn::Store(hn::DemoteTo(d, value.v), d, out);
+}
+
 template <typename T>
 HWY_INLINE size_t laneCount() {
   return hn::Lanes(Doubles());
@@ -53,98 +58,87 @@ HWY_INLINE void takeFootprintBack(const View<double>& view, const Mat3d& linear,
   HWY_NAMESPACE::projectBackwardSteps(view, linear, centre, splat, low_pass, by, out);
 }
 
-void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
-                       const float* sh, const float* by_colour, float* by_sh, double* along);
-
 #include "splat/cpu/back_projector-inl.h"
 
-/// As in cpu/back_projector_scalar.cpp.
-HWY_INLINE void harmonicsOfColour(const PlacedCloud& placed, const double* basis,
-                                  const double* slopes, const float* sh, double* sums) {
-  const size_t coefficients = shCoefficientCount(placed.sh_degree);
+/// Adds coefficient k of one lane to `sums`: a row of colours, then its derivatives by the axes of
+/// the direction.
+HWY_INLINE void addCoefficient(const HarmonicColumns& harmonics, size_t lane, size_t k,
+                               const float* sh, double (&sums)[4][4]) {
   for (size_t c = 0; c < 3; ++c) {
-    double* own = sums + c;
-    own[0] = 0.5 + basis[0] * static_cast<double>(sh[c]);
-    for (size_t axis = 1; axis < 4; ++axis) own[axis * 4] = 0;
-    for (size_t k = 1; k < coefficients; ++k) {
-      const double value = static_cast<double>(sh[k * 3 + c]);
-      own[0] += basis[k * kMaxLanes] * value;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        own[(axis + 1) * 4] += slopes[(k * 3 + axis) * kMaxLanes] * value;
-      }
+    const double value = static_cast<double>(sh[k * 3 + c]);
+    sums[0][c] += harmonics.basis[k][lane] * value;
+    if (k == 0) continue;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      sums[axis + 1][c] += harmonics.slopes[k][axis][lane] * value;
     }
   }
 }
 
-void takeHarmonicsBack(const PlacedCloud& placed, const double* basis, const double* slopes,
-                       const float* sh, const float* by_colour, float* by_sh, double* along) {
-  const size_t coefficients = shCoefficientCount(placed.sh_degree);
-  // Rows: colour, then its derivatives by the axes of the direction.
-  HWY_ALIGN double sums[16];
+/// As in cpu/back_projector_scalar.cpp, in the same order for each colour.
+template <size_t kCoefficients>
+void takeCoefficientsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                          const float* sh, const float* by_colour, float* by_sh, double* along) {
+  HWY_ALIGN double sums[4][4] = {{0.5, 0.5, 0.5}};
   constexpr bool kHasQuads = hn::MaxLanes(Quad()) == 4;
-  const hn::Rebind<float, Quad> floats;
+  // Each coefficient is loaded and stored with the number behind it, so the last goes by itself.
+  constexpr size_t kInQuads = kHasQuads ? kCoefficients - 1 : 0;
   const Quad d;
-  if constexpr (kHasQuads) {
-    // Each coefficient is loaded with the number behind it, so the last one goes by itself.
-    auto colour = hn::Zero(d), by_x = colour, by_y = colour, by_z = colour;
-    if (coefficients > 1) {
-      const auto value = hn::PromoteTo(d, hn::LoadU(floats, sh));
-      colour = hn::Add(hn::Set(d, 0.5), hn::Mul(hn::Set(d, basis[0]), value));
-    }
-    for (size_t k = 1; k + 1 < coefficients; ++k) {
+  const hn::Rebind<float, Quad> floats;
+  if constexpr (kInQuads > 0) {
+    auto colour = hn::Load(d, sums[0]), by_x = hn::Zero(d), by_y = by_x, by_z = by_x;
+    for (size_t k = 0; k < kInQuads; ++k) {
       const auto value = hn::PromoteTo(d, hn::LoadU(floats, sh + k * 3));
-      const double* slope = slopes + k * 3 * kMaxLanes;
-      colour = hn::Add(colour, hn::Mul(hn::Set(d, basis[k * kMaxLanes]), value));
-      by_x = hn::Add(by_x, hn::Mul(hn::Set(d, slope[0]), value));
-      by_y = hn::Add(by_y, hn::Mul(hn::Set(d, slope[kMaxLanes]), value));
-      by_z = hn::Add(by_z, hn::Mul(hn::Set(d, slope[2 * kMaxLanes]), value));
+      const auto times = [&](double factor) HWY_ATTR { return hn::Mul(hn::Set(d, factor), value); };
+      colour = hn::Add(colour, times(harmonics.basis[k][lane]));
+      if (k == 0) continue;
+      by_x = hn::Add(by_x, times(harmonics.slopes[k][0][lane]));
+      by_y = hn::Add(by_y, times(harmonics.slopes[k][1][lane]));
+      by_z = hn::Add(by_z, times(harmonics.slopes[k][2][lane]));
     }
-    hn::Store(colour, d, sums);
-    hn::Store(by_x, d, sums + 4);
-    hn::Store(by_y, d, sums + 8);
-    hn::Store(by_z, d, sums + 12);
-    const size_t k = coefficients - 1;
-    for (size_t c = 0; c < 3; ++c) {
-      const double value = static_cast<double>(sh[k * 3 + c]);
-      if (k == 0) {
-        sums[c] = 0.5 + basis[0] * value;
-        continue;
-      }
-      sums[c] += basis[k * kMaxLanes] * value;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        sums[(axis + 1) * 4 + c] += slopes[(k * 3 + axis) * kMaxLanes] * value;
-      }
-    }
-  } else {
-    harmonicsOfColour(placed, basis, slopes, sh, sums);
+    hn::Store(colour, d, sums[0]);
+    hn::Store(by_x, d, sums[1]);
+    hn::Store(by_y, d, sums[2]);
+    hn::Store(by_z, d, sums[3]);
   }
+  for (size_t k = kInQuads; k < kCoefficients; ++k) addCoefficient(harmonics, lane, k, sh, sums);
 
-  HWY_ALIGN double by_sum[4] = {};
-  for (size_t c = 0; c < 3; ++c)
-    by_sum[c] = colourSumBackward(placed, sums[c], static_cast<double>(by_colour[c]));
+  double by_sum[3];
+  HWY_ALIGN float stored[4] = {};
+  for (size_t c = 0; c < 3; ++c) {
+    by_sum[c] = colourSumBackward(placed, sums[0][c], static_cast<double>(by_colour[c]));
+    stored[c] = static_cast<float>(by_sum[c]);
+  }
   for (size_t axis = 0; axis < 3; ++axis) {
-    const double* own = sums + (axis + 1) * 4;
+    const double* own = sums[axis + 1];
     along[axis * kMaxLanes] = by_sum[0] * own[0] + by_sum[1] * own[1] + by_sum[2] * own[2];
   }
-  size_t k = 0;
-  if constexpr (kHasQuads) {
-    // The number behind each coefficient is overwritten by the next; the last goes by itself.
-    const auto by = hn::Load(d, by_sum);
-    const auto most = hn::Set(d, kLargestStored);
-    const auto least = hn::Set(d, -kLargestStored);
-    for (; k + 1 < coefficients; ++k) {
-      const auto value = hn::Mul(hn::Set(d, basis[k * kMaxLanes]), by);
-      hn::StoreU(hn::DemoteTo(floats, hn::Max(hn::Min(value, most), least)), floats, by_sh + k * 3);
+  if constexpr (kInQuads > 0) {
+    const auto by = hn::Load(floats, stored);
+    for (size_t k = 0; k < kInQuads; ++k) {
+      hn::StoreU(hn::Mul(hn::Set(floats, harmonics.stored_basis[k][lane]), by), floats,
+                 by_sh + k * 3);
     }
   }
-  for (; k < coefficients; ++k) {
-    const double value = basis[k * kMaxLanes];
-    for (size_t c = 0; c < 3; ++c) {
-      by_sh[k * 3 + c] =
-          static_cast<float>(std::clamp(value * by_sum[c], -kLargestStored, kLargestStored));
-    }
+  for (size_t k = kInQuads; k < kCoefficients; ++k) {
+    for (size_t c = 0; c < 3; ++c) by_sh[k * 3 + c] = harmonics.stored_basis[k][lane] * stored[c];
   }
-  std::fill(by_sh + coefficients * 3, by_sh + placed.cloud->shStride(), 0.0f);
+  std::fill(by_sh + kCoefficients * 3, by_sh + placed.cloud->shStride(), 0.0f);
+}
+
+void takeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                       const float* sh, const float* by_colour, float* by_sh, double* along) {
+  switch (placed.sh_degree) {
+    case 0:
+      return takeCoefficientsBack<1>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+    case 1:
+      return takeCoefficientsBack<4>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+    case 2:
+      return takeCoefficientsBack<9>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+    case 3:
+      return takeCoefficientsBack<16>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+    default:
+      return takeCoefficientsBack<25>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+  }
 }
 
 NamedBackProjector namedBackProjector() {
