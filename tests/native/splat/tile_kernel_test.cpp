@@ -103,6 +103,20 @@ TEST(TileKernel, EveryTargetBlendsAsTheScalarOne) {
   }
 }
 
+TEST(TileKernel, GivesTheSameBitsWithoutCullingBelowTheTile) {
+  const std::vector<TileSplat> splats = randomSplats(300, 0.005f, 12);
+  for (const NamedTileKernel& named : tileKernels()) {
+    SCOPED_TRACE(named.target);
+    TileKernelOptions options{true, false};
+    TilePixels culled = emptyPixels(), whole = emptyPixels();
+    named.kernel(splats.data(), splats.size(), options, culled);
+    options.culls_pixels = false;
+    named.kernel(splats.data(), splats.size(), options, whole);
+    EXPECT_LT(culled.unfinished, kTilePixelCount - 1);
+    EXPECT_EQ(std::memcmp(&culled, &whole, sizeof(TilePixels)), 0);
+  }
+}
+
 TEST(TileSplats, HaveTheSameBitsOnEveryTarget) {
   Rng uniform{std::mt19937(5)};
   // Ordinary ones, needles thinner than float32 can hold, and some that lie outside the tile.
