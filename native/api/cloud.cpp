@@ -147,6 +147,15 @@ StippleStatus stipple_format_count(uint64_t* count) {
   return guarded([&] { require(count, "count") = splatFormats().size(); });
 }
 
+StippleStatus stipple_format_of_file(const char* path_utf8, uint64_t* index) {
+  return guarded([&] {
+    const SplatFormat* format = splatFormatOfContent(&require(path_utf8, "path_utf8"));
+    const SplatFormat* first = splatFormats().data();
+    require(index, "index") =
+        format != nullptr ? static_cast<uint64_t>(format - first) : splatFormats().size();
+  });
+}
+
 StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
   return guarded([&] {
     if (index >= splatFormats().size()) {

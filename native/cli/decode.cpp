@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <chrono>
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/formats.h"
 #include "cli/report.h"
 
 namespace stipple::cli {
@@ -22,7 +24,10 @@ Model modelFrom(const Context& context, const Arguments& arguments) {
   if (kind == FileKind::kModel) {
     return make<Model>(stipple_model_load, context.get(), arguments.in.c_str());
   }
-  if (kind != FileKind::kMesh) {
+  // A glTF file of splats may hold meshes too; one without gets the mesh reader's words.
+  const std::string ending =
+      arguments.in.substr(std::min(arguments.in.rfind('.'), arguments.in.size()));
+  if (kind != FileKind::kMesh && ending != ".glb" && ending != ".gltf") {
     throw Failure("'" + arguments.in +
                   "' is not a source of splats; .glb, .gltf or .stipple.safetensors is expected");
   }
@@ -58,11 +63,12 @@ void decode(const Context& context, const Arguments& arguments) {
   options.order =
       arguments.order == "progressive" ? STIPPLE_ORDER_PROGRESSIVE : STIPPLE_ORDER_SYSTEMATIC;
   options.seed = arguments.seed;
-  const FileKind out_kind = fileKind(arguments.out);
+  // A glTF file that is there may hold a mesh; what is written over it holds splats.
+  const FileKind out_kind =
+      hasSplatEnding(arguments.out) ? FileKind::kSplats : fileKind(arguments.out);
   if (out_kind != FileKind::kSplats && out_kind != FileKind::kModel) {
-    throw Failure("'" + arguments.out +
-                  "' is not a splat file; .ply or .stipple.safetensors is "
-                  "expected");
+    throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
+                  " or .stipple.safetensors is expected");
   }
   const Model model = modelFrom(context, arguments);
   if (out_kind == FileKind::kModel) {

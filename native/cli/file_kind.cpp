@@ -11,8 +11,14 @@ FileKind fileKind(const std::string& path) {
   std::string ending = dot == std::string::npos || path[dot] == '/' ? "" : path.substr(dot);
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  // A glTF file holds meshes, splats or both: commands that take either say which they want.
-  if (ending == ".glb" || ending == ".gltf") return FileKind::kMesh;
+  // A glTF file holds meshes, splats or both; splats go first, because fewer programs show them.
+  if (ending == ".glb" || ending == ".gltf") {
+    uint64_t index = 0;
+    uint64_t count = 0;
+    check(stipple_format_count(&count));
+    const bool splats = stipple_format_of_file(path.c_str(), &index) == STIPPLE_OK && index < count;
+    return splats ? FileKind::kSplats : FileKind::kMesh;
+  }
   if (hasSplatEnding(path)) return FileKind::kSplats;
   if (ending == ".safetensors") return FileKind::kModel;
   if (ending == ".json") return FileKind::kViews;

@@ -100,7 +100,8 @@ void addRender(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("render", "A picture of splats");
   command->add_option("in", arguments->in, "Splat files, rendered together")->required();
-  command->add_option("--camera", arguments->camera, "transforms.json, or a COLMAP folder")->required();
+  command->add_option("--camera", arguments->camera, "transforms.json, or a COLMAP folder")
+      ->required();
   command->add_option("--view", arguments->view, "Which camera of the file")->capture_default_str();
   command->add_option("--width", arguments->width, "Pixels; default: as the camera says");
   command->add_option("--height", arguments->height, "Pixels");

@@ -18,10 +18,10 @@ enum class Frame : uint32_t {
   kLDB = 1,
   kRDB = 2,
   kLUB = 3,
-  kRUB = 4,  ///< SPZ; glTF, as cameras look at it
+  kRUB = 4,  ///< SPZ
   kLDF = 5,
   kRDF = 6,  ///< COLMAP, trained 3DGS files
-  kLUF = 7,  ///< glTF, as its models look
+  kLUF = 7,  ///< glTF: models face along z
   kRUF = 8,  ///< left-handed, Unity
   kLFD = 9,
   kRFD = 10,

@@ -85,6 +85,28 @@ enum StippleMediaWebpArray : uint32_t {
   kMediaWebpBytes = 0,  ///< uint8: the encoded file
 };
 
+/// The splats of one use of a glTF primitive.
+struct StippleMediaSplatPart {
+  uint64_t count;
+  uint32_t sh_degree;
+  uint32_t colour_space;  ///< ColourSpace
+  uint32_t antialias;     ///< Antialias
+  uint32_t frame;         ///< Frame
+  uint32_t mesh;          ///< which of the file's, for messages
+  uint32_t primitive;
+  double matrix[16];  ///< from the primitive to the scene, row by row
+};
+
+/// Of splats that are read: the parts first, then five arrays of each.
+enum StippleMediaSplatArray : uint32_t {
+  kMediaSplatParts = 0,      ///< StippleMediaSplatPart
+  kMediaSplatPositions = 1,  ///< + 5 part: float [N,3]
+  kMediaSplatRotations = 2,  ///< float [N,4] x, y, z, w
+  kMediaSplatScales = 3,     ///< float [N,3]
+  kMediaSplatOpacities = 4,  ///< float [N]
+  kMediaSplatSh = 5,         ///< float [N,(degree+1)^2,3]
+};
+
 struct StippleMediaTable {
   uint32_t version;
   void (*image_read)(const char* path, StippleMediaImage* image, const StippleMediaSink* sink,
@@ -126,6 +148,10 @@ struct StippleMediaTable {
                       uint64_t whole_bytes, StippleMediaStatus* status);
   /// CRC-32 of zip entries.
   uint32_t (*zip_checksum)(const uint8_t* bytes, uint64_t byte_count);
+
+  /// The splats of a glTF or GLB file's scene (KHR_gaussian_splatting).
+  void (*gltf_splats_read)(const char* path, const StippleMediaSink* sink,
+                           StippleMediaStatus* status);
 };
 
 /// The one function that libstipple_media exports: null for another version.

@@ -11,6 +11,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "data/splat_colour.h"
+#include "io/gltf_splat_names.h"
+#include "io/gltf_splats.h"
 #include "io/input_file.h"
 #include "io/ksplat_file.h"
 #include "io/ply_file.h"
@@ -121,6 +123,8 @@ const std::vector<SplatFormat>& splatFormats() {
       {"splat", "splat records", ".splat", 0, Frame::kRDF, false, nullptr, readSplat32,
        writeSplat32},
       {"ksplat", "ksplat", ".ksplat", 3, Frame::kRDF, false, nullptr, readKsplat, nullptr},
+      {"gltf", "glTF with KHR_gaussian_splatting", ".glb .gltf", 3, kGltfFrame, true,
+       startsAsGltfSplats, readGltfSplats, writeGltfSplats},
       {"sog", "SOG", ".sog meta.json", 3, Frame::kRDF, true, startsAsSog, readSog,
        [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
           Progress* progress) { writeSog(cloud, path, {}, progress); }},
@@ -140,15 +144,21 @@ const SplatFormat* splatFormatOfEnding(const std::string& path) {
   return best;
 }
 
-SplatCloud readSplatFile(const std::string& path, Progress* progress) {
+const SplatFormat* splatFormatOfContent(const std::string& path) {
   const SplatFileStart start = startOf(path);
   for (const SplatFormat& format : splatFormats()) {
-    if (format.read != nullptr && format.sniff != nullptr && format.sniff(start)) {
-      return format.read(path, progress);
-    }
+    if (format.read != nullptr && format.sniff != nullptr && format.sniff(start)) return &format;
   }
+  // Some formats have no first bytes of their own.
+  const SplatFormat* named = start.is_folder ? nullptr : splatFormatOfEnding(path);
+  return named != nullptr && named->read != nullptr && named->sniff == nullptr ? named : nullptr;
+}
+
+SplatCloud readSplatFile(const std::string& path, Progress* progress) {
+  if (const SplatFormat* format = splatFormatOfContent(path)) return format->read(path, progress);
+  std::error_code ignored;
   // A folder that no format knows gets the words of every reader.
-  if (start.is_folder) const InputFile file(path);
+  if (std::filesystem::is_directory(path, ignored)) const InputFile file(path);
   // A file that is named after a format and is not of it gets that reader's words.
   const SplatFormat* named = splatFormatOfEnding(path);
   if (named != nullptr && named->read != nullptr) return named->read(path, progress);

@@ -50,6 +50,10 @@ struct SplatFormat {
 /// All formats, in the order in which files are tried.
 const std::vector<SplatFormat>& splatFormats();
 
+/// The format that a file's content has, or its ending where the format has no first bytes of its
+/// own; null for files of no format that can be read. Errors: kIo.
+const SplatFormat* splatFormatOfContent(const std::string& path);
+
 /// The format whose ending the path has (the longest that fits), or null.
 const SplatFormat* splatFormatOfEnding(const std::string& path);
 

@@ -47,6 +47,7 @@ FUNCTIONS = {
     'stipple_cloud_save': (_status, [_handle, _path, _to(s.StippleCloudSaveOptions)]),
     'stipple_format_count': (_status, [POINTER(c_uint64)]),
     'stipple_format_info': (_status, [c_uint64, _to(s.StippleFormatInfo)]),
+    'stipple_format_of_file': (_status, [_path, POINTER(c_uint64)]),
     'stipple_cloud_transform': (_status, [_handle, _matrix, _out_handle]),
     'stipple_cloud_compare': (_status, [_handle, _handle, _to(s.StippleCloudComparison)]),
     # meshes

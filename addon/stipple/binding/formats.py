@@ -30,3 +30,11 @@ def splat_formats(library):
         formats.append(SplatFormat(info.name.decode(), info.title.decode(), tuple(info.endings.decode().split()),
                                    bool(info.can_read), bool(info.can_write), info.max_sh_degree, Frame(info.frame)))
     return formats
+
+
+def splat_format_of_file(library, path):
+    """The format of an existing file by its content, or None: a glTF file may hold meshes only."""
+    index = c_uint64()
+    check(library, library.stipple_format_of_file(str(path).encode(), byref(index)))
+    formats = splat_formats(library)
+    return formats[index.value] if index.value < len(formats) else None

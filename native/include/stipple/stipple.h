@@ -228,6 +228,10 @@ typedef struct StippleFormatInfo {
 StippleStatus stipple_format_count(uint64_t* count);
 /* index 0..count-1. */
 StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info);
+/* The format of an existing file by its content; by its ending where the format has no first bytes of its
+ * own. A glTF file is one of splats only where it names KHR_gaussian_splatting.
+ * Out: index, or *count* of stipple_format_count where the file is of no splat format. */
+StippleStatus stipple_format_of_file(const char* path_utf8, uint64_t* index);
 
 /* The cloud moved by an affine matrix: covariances become M C M^T, harmonics turn (and mirror) with the
  * orthogonal part of M's polar decomposition; the frame's label stays. Pictures equal those of an instance with that matrix, except

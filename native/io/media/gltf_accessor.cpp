@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
+#include <type_traits>
 
 #include "base/error.h"
 
@@ -81,32 +83,51 @@ size_t componentBytes(int type, const std::string& what) {
   return static_cast<size_t>(bytes);
 }
 
-float component(const unsigned char* bytes, int type, bool normalized) {
-  switch (type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE: {
-      const float value = load<int8_t>(bytes);
-      return normalized ? std::max(value / 127.0f, -1.0f) : value;
+template <typename T>
+float asFloat(T value, bool normalized) {
+  if constexpr (std::is_integral_v<T>) {
+    if (normalized) {
+      // Both ends of a signed range stand for -1.
+      return std::max(static_cast<float>(value) / static_cast<float>(std::numeric_limits<T>::max()),
+                      -1.0f);
     }
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: {
-      const float value = load<uint8_t>(bytes);
-      return normalized ? value / 255.0f : value;
+  }
+  return static_cast<float>(value);
+}
+
+/// Elements of `width` values of type T, `stride` bytes apart, to floats, `out_stride` apart.
+template <typename T>
+void convert(const unsigned char* bytes, size_t stride, size_t count, size_t width, bool normalized,
+             float* out, size_t out_stride) {
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t c = 0; c < width; ++c) {
+      out[i * out_stride + c] = asFloat(load<T>(bytes + i * stride + c * sizeof(T)), normalized);
     }
-    case TINYGLTF_COMPONENT_TYPE_SHORT: {
-      const float value = load<int16_t>(bytes);
-      return normalized ? std::max(value / 32767.0f, -1.0f) : value;
-    }
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: {
-      const float value = load<uint16_t>(bytes);
-      return normalized ? value / 65535.0f : value;
-    }
+  }
+}
+
+void convert(const tinygltf::Accessor& accessor, const unsigned char* bytes, size_t stride,
+             size_t count, size_t width, float* out, size_t out_stride) {
+  const auto run = [&](auto zero) {
+    convert<decltype(zero)>(bytes, stride, count, width, accessor.normalized, out, out_stride);
+  };
+  switch (accessor.componentType) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+      return run(int8_t{});
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return run(uint8_t{});
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+      return run(int16_t{});
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return run(uint16_t{});
     case TINYGLTF_COMPONENT_TYPE_INT:
-      return static_cast<float>(load<int32_t>(bytes));
+      return run(int32_t{});
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-      return static_cast<float>(load<uint32_t>(bytes));
+      return run(uint32_t{});
     case TINYGLTF_COMPONENT_TYPE_DOUBLE:
-      return static_cast<float>(load<double>(bytes));
+      return run(double{});
     default:
-      return load<float>(bytes);
+      return run(float{});
   }
 }
 
@@ -125,7 +146,7 @@ uint32_t wholeNumber(const unsigned char* bytes, int type, const std::string& wh
 }
 
 void applySparse(const tinygltf::Model& model, const tinygltf::Accessor& accessor, size_t width,
-                 const std::string& what, std::vector<float>& values) {
+                 const std::string& what, float* out, size_t out_stride) {
   const auto& sparse = accessor.sparse;
   // Signed in one version of tinygltf, unsigned in the next.
   const auto negative = [](auto number) { return static_cast<int64_t>(number) < 0; };
@@ -149,10 +170,8 @@ void applySparse(const tinygltf::Model& model, const tinygltf::Accessor& accesso
       failHere(what + " replaces element " + std::to_string(target) + " of " +
                std::to_string(accessor.count));
     }
-    for (size_t c = 0; c < width; ++c) {
-      values[target * width + c] = component(replaced.first + i * replaced.stride + c * value_bytes,
-                                             accessor.componentType, accessor.normalized);
-    }
+    convert(accessor, replaced.first + i * replaced.stride, 0, 1, width, out + target * out_stride,
+            out_stride);
   }
 }
 
@@ -164,8 +183,12 @@ size_t accessorWidth(const tinygltf::Model& model, int accessor, const std::stri
   return width > 0 ? static_cast<size_t>(width) : 0;
 }
 
-std::vector<float> readFloats(const tinygltf::Model& model, int index, size_t width,
-                              const std::string& what) {
+size_t accessorCount(const tinygltf::Model& model, int index, const std::string& what) {
+  return accessorAt(model, index, what).count;
+}
+
+void requireAccessor(const tinygltf::Model& model, int index, size_t width,
+                     const std::string& what) {
   const tinygltf::Accessor& accessor = accessorAt(model, index, what);
   const size_t seen = accessorWidth(model, index, what);
   if (seen != width) {
@@ -173,26 +196,35 @@ std::vector<float> readFloats(const tinygltf::Model& model, int index, size_t wi
              " are needed");
   }
   const size_t bytes = componentBytes(accessor.componentType, what);
-  std::vector<float> values;
   if (accessor.bufferView >= 0) {
+    rangeOf(model, accessor.bufferView, accessor.byteOffset, accessor.count, bytes * width, what);
+  } else if (accessor.count > kMaxZeroElements) {
+    failHere(what + " claims " + std::to_string(accessor.count) +
+             " elements without data; at most " + std::to_string(kMaxZeroElements) +
+             " are allowed");
+  }
+}
+
+void readFloatsTo(const tinygltf::Model& model, int index, size_t width, const std::string& what,
+                  float* out, size_t out_stride) {
+  requireAccessor(model, index, width, what);
+  const tinygltf::Accessor& accessor = accessorAt(model, index, what);
+  if (accessor.bufferView >= 0) {
+    const size_t bytes = componentBytes(accessor.componentType, what);
     const Range range = rangeOf(model, accessor.bufferView, accessor.byteOffset, accessor.count,
                                 bytes * width, what);
-    values.resize(accessor.count * width);
-    for (size_t i = 0; i < accessor.count; ++i) {
-      for (size_t c = 0; c < width; ++c) {
-        values[i * width + c] = component(range.first + i * range.stride + c * bytes,
-                                          accessor.componentType, accessor.normalized);
-      }
-    }
+    convert(accessor, range.first, range.stride, accessor.count, width, out, out_stride);
   } else {
-    if (accessor.count > kMaxZeroElements) {
-      failHere(what + " claims " + std::to_string(accessor.count) +
-               " elements without data; at most " + std::to_string(kMaxZeroElements) +
-               " are allowed");
-    }
-    values.assign(accessor.count * width, 0.0f);
+    for (size_t i = 0; i < accessor.count; ++i) std::fill_n(out + i * out_stride, width, 0.0f);
   }
-  if (accessor.sparse.isSparse) applySparse(model, accessor, width, what, values);
+  if (accessor.sparse.isSparse) applySparse(model, accessor, width, what, out, out_stride);
+}
+
+std::vector<float> readFloats(const tinygltf::Model& model, int index, size_t width,
+                              const std::string& what) {
+  requireAccessor(model, index, width, what);
+  std::vector<float> values(accessorAt(model, index, what).count * width);
+  readFloatsTo(model, index, width, what, values.data(), width);
   return values;
 }
 

@@ -18,6 +18,18 @@ namespace stipple::media {
 std::vector<float> readFloats(const tinygltf::Model& model, int accessor, size_t width,
                               const std::string& what);
 
+/// The same to floats of the caller's, `out_stride` apart. In: out, room for accessorCount elements
+/// of an accessor that requireAccessor lets pass.
+void readFloatsTo(const tinygltf::Model& model, int accessor, size_t width, const std::string& what,
+                  float* out, size_t out_stride);
+
+/// Elements of an accessor. Errors: kFormat if there is no such accessor.
+size_t accessorCount(const tinygltf::Model& model, int accessor, const std::string& what);
+
+/// Refuses accessors that readFloats refuses, before anything is allocated.
+void requireAccessor(const tinygltf::Model& model, int accessor, size_t width,
+                     const std::string& what);
+
 /// Components per element of an accessor. Errors: kFormat if there is no such accessor.
 size_t accessorWidth(const tinygltf::Model& model, int accessor, const std::string& what);
 

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <set>
 #include <string>
 #include <vector>
@@ -17,6 +16,7 @@
 #include "base/error.h"
 #include "io/media/gltf_accessor.h"
 #include "io/media/gltf_material.h"
+#include "io/media/gltf_scene.h"
 #include "io/media/media_calls.h"
 #include "math/vec.h"
 
@@ -24,40 +24,13 @@ namespace stipple::media {
 
 namespace {
 
-constexpr int kMaxDepth = 1000;
+const std::set<std::string> kKnownExtensions = {"KHR_texture_transform", "KHR_mesh_quantization",
+                                                "KHR_materials_unlit", "EXT_texture_webp"};
 
 /// glTF is Y up and looks along +Z; here Z is up: (x, y, z) → (x, −z, y).
 Mat4d zUp() {
   Mat4d matrix;
   matrix << 1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1;
-  return matrix;
-}
-
-Mat4d localMatrix(const tinygltf::Node& node) {
-  Mat4d matrix = Mat4d::Identity();
-  if (node.matrix.size() == 16) {
-    // Column by column in the file.
-    for (int row = 0; row < 4; ++row) {
-      for (int column = 0; column < 4; ++column) {
-        matrix(row, column) = node.matrix[static_cast<size_t>(column * 4 + row)];
-      }
-    }
-    return matrix;
-  }
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  if (node.rotation.size() == 4) {
-    // x, y, z, w in the file.
-    rotation =
-        Eigen::Quaterniond(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]);
-    if (rotation.norm() > 0) rotation.normalize();
-  }
-  Vec3d scale(1, 1, 1);
-  if (node.scale.size() == 3) scale = Vec3d(node.scale[0], node.scale[1], node.scale[2]);
-  matrix.topLeftCorner<3, 3>() = rotation.toRotationMatrix() * scale.asDiagonal();
-  if (node.translation.size() == 3) {
-    matrix.topRightCorner<3, 1>() =
-        Vec3d(node.translation[0], node.translation[1], node.translation[2]);
-  }
   return matrix;
 }
 
@@ -84,13 +57,13 @@ std::vector<uint32_t> triangleCorners(const std::vector<uint32_t>& indices, int 
 class GltfReader {
  public:
   explicit GltfReader(const std::string& path)
-      : path_(path), materials_(model_, path_, images_, mesh_) {}
+      : path_(path),
+        scene_(path, kKnownExtensions, "mesh"),
+        model_(scene_.model()),
+        materials_(model_, path_, scene_.images(), mesh_) {}
 
   TriMesh read() {
-    load();
-    requireExtensions();
-    const Mat4d root = zUp();
-    for (const int node : rootNodes()) visit(node, root, 0);
+    scene_.visitMeshes(zUp(), [this](size_t mesh, const Mat4d& matrix) { addMesh(mesh, matrix); });
     if (mesh_.triangles.empty()) {
       fail(ErrorCode::kFormat, path_ + " holds no triangles in its scene; at least one is needed");
     }
@@ -101,93 +74,12 @@ class GltfReader {
   }
 
  private:
-  void load() {
-    tinygltf::TinyGLTF loader;
-    // Images are only kept here; those that a base colour needs are decoded later. The ranges of
-    // images inside the file's own buffers are not checked by tinygltf, so they are not touched
-    // yet.
-    loader.SetImageLoader(
-        [](tinygltf::Image* image, const int index, std::string*, std::string*, int, int,
-           const unsigned char* bytes, int size, void* user) {
-          auto& images = *static_cast<std::vector<std::vector<unsigned char>>*>(user);
-          if (image->bufferView >= 0) return true;
-          if (index < 0 || size < 0) return false;
-          images.resize(std::max(images.size(), static_cast<size_t>(index) + 1));
-          images[static_cast<size_t>(index)].assign(bytes, bytes + size);
-          return true;
-        },
-        &images_);
-    std::string error;
-    std::string warning;
-    std::string ending = std::filesystem::path(path_).extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    const bool loaded = ending == ".glb"
-                            ? loader.LoadBinaryFromFile(&model_, &error, &warning, path_)
-                            : loader.LoadASCIIFromFile(&model_, &error, &warning, path_);
-    if (!loaded) {
-      fail(ErrorCode::kFormat,
-           path_ + " is not a valid glTF file: " + (error.empty() ? "no reason is given" : error));
+  void addMesh(size_t index, const Mat4d& matrix) {
+    const tinygltf::Mesh& mesh = model_.meshes[index];
+    for (size_t p = 0; p < mesh.primitives.size(); ++p) {
+      addPrimitive(mesh.primitives[p], matrix,
+                   path_ + ": mesh " + std::to_string(index) + ", primitive " + std::to_string(p));
     }
-    images_.resize(model_.images.size());
-    for (size_t i = 0; i < images_.size(); ++i) {
-      if (model_.images[i].bufferView < 0) continue;
-      images_[i] =
-          readView(model_, model_.images[i].bufferView, path_ + ": image " + std::to_string(i));
-    }
-  }
-
-  void requireExtensions() const {
-    static const std::set<std::string> kKnown = {"KHR_texture_transform", "KHR_mesh_quantization",
-                                                 "KHR_materials_unlit", "EXT_texture_webp"};
-    for (const std::string& name : model_.extensionsRequired) {
-      if (kKnown.count(name) == 0) {
-        fail(ErrorCode::kUnsupported, path_ + " requires the glTF extension '" +
-                                          name.substr(0, 80) +
-                                          "', which is not supported; export the mesh without it");
-      }
-    }
-  }
-
-  std::vector<int> rootNodes() const {
-    const size_t scene = model_.defaultScene < 0 ? 0 : static_cast<size_t>(model_.defaultScene);
-    if (scene < model_.scenes.size()) return model_.scenes[scene].nodes;
-    std::set<int> children;
-    for (const tinygltf::Node& node : model_.nodes) {
-      children.insert(node.children.begin(), node.children.end());
-    }
-    std::vector<int> roots;
-    for (size_t i = 0; i < model_.nodes.size(); ++i) {
-      if (children.count(static_cast<int>(i)) == 0) roots.push_back(static_cast<int>(i));
-    }
-    return roots;
-  }
-
-  void visit(int index, const Mat4d& parent, int depth) {
-    if (index < 0 || static_cast<size_t>(index) >= model_.nodes.size()) {
-      fail(ErrorCode::kFormat, path_ + " names node " + std::to_string(index) + "; the file has " +
-                                   std::to_string(model_.nodes.size()));
-    }
-    // In a valid file every node has one parent; this also ends circles.
-    if (depth > kMaxDepth || ++visits_ > model_.nodes.size()) {
-      fail(ErrorCode::kFormat, path_ + ": node " + std::to_string(index) +
-                                   " has several parents or is its own ancestor");
-    }
-    const tinygltf::Node& node = model_.nodes[static_cast<size_t>(index)];
-    const Mat4d matrix = parent * localMatrix(node);
-    if (node.mesh >= 0) {
-      if (static_cast<size_t>(node.mesh) >= model_.meshes.size()) {
-        fail(ErrorCode::kFormat, path_ + " names mesh " + std::to_string(node.mesh) +
-                                     "; the file has " + std::to_string(model_.meshes.size()));
-      }
-      const tinygltf::Mesh& mesh = model_.meshes[static_cast<size_t>(node.mesh)];
-      for (size_t p = 0; p < mesh.primitives.size(); ++p) {
-        addPrimitive(
-            mesh.primitives[p], matrix,
-            path_ + ": mesh " + std::to_string(node.mesh) + ", primitive " + std::to_string(p));
-      }
-    }
-    for (const int child : node.children) visit(child, matrix, depth + 1);
   }
 
   static int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
@@ -363,11 +255,10 @@ class GltfReader {
   }
 
   std::string path_;
-  tinygltf::Model model_;
-  std::vector<std::vector<unsigned char>> images_;
+  GltfScene scene_;
+  const tinygltf::Model& model_;
   TriMesh mesh_;
   MaterialReader materials_;
-  size_t visits_ = 0;
   bool any_normals_ = false;
   bool any_uvs_ = false;
   bool any_colours_ = false;

@@ -41,6 +41,8 @@ void stipple_media_webp_encode(const char* name, const uint8_t* rgba, uint32_t w
 void stipple_media_zip_inflate(const char* name, const uint8_t* bytes, uint64_t byte_count,
                                uint8_t* whole, uint64_t whole_bytes, StippleMediaStatus* status);
 uint32_t stipple_media_zip_checksum(const uint8_t* bytes, uint64_t byte_count);
+void stipple_media_gltf_splats_read(const char* path, const StippleMediaSink* sink,
+                                    StippleMediaStatus* status);
 }
 
 /// Turns what `work` throws into a status; an exception of another library is a fault of the file,

@@ -11,12 +11,15 @@ namespace stipple {
 /// is the test's own text.
 class GlbBuilder {
  public:
-  /// Adds data as a buffer view; returns its index.
-  int addView(const std::string& bytes) {
+  /// Adds data as a buffer view; returns its index. In: stride, bytes between elements; 0: none
+  /// said.
+  int addView(const std::string& bytes, int stride = 0) {
     while (data_.size() % 4 != 0) data_.push_back('\0');
     if (!views_.empty()) views_ += ",";
     views_ += "{\"buffer\":0,\"byteOffset\":" + std::to_string(data_.size());
-    views_ += ",\"byteLength\":" + std::to_string(bytes.size()) + "}";
+    views_ += ",\"byteLength\":" + std::to_string(bytes.size());
+    if (stride > 0) views_ += ",\"byteStride\":" + std::to_string(stride);
+    views_ += "}";
     data_ += bytes;
     return view_count_++;
   }

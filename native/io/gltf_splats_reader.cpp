@@ -1,0 +1,152 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "data/cloud_transform.h"
+#include "io/gltf_splat_names.h"
+#include "io/gltf_splats.h"
+#include "io/input_file.h"
+#include "io/media_library.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr size_t kGrain = 4096;
+// The JSON of a real splat file is a few kilobytes; a mesh file's may be longer.
+constexpr uint64_t kMaxJsonBytes = uint64_t{1} << 26;
+constexpr size_t kGlbHead = 20;
+constexpr char kGlbMagic[] = "glTF";
+
+/// What the media library delivers, part by part.
+struct Delivery {
+  std::vector<StippleMediaSplatPart> infos;
+  std::vector<SplatCloud> clouds;
+
+  void* take(uint32_t array, uint64_t bytes) {
+    if (array == kMediaSplatParts) {
+      infos.resize(static_cast<size_t>(bytes / sizeof(StippleMediaSplatPart)));
+      clouds.resize(infos.size());
+      return infos.data();
+    }
+    SplatCloud& cloud = clouds.at((array - kMediaSplatPositions) / 5);
+    std::vector<float>* const arrays[] = {&cloud.positions, &cloud.rotations, &cloud.scales,
+                                          &cloud.opacities, &cloud.sh};
+    std::vector<float>& values = *arrays[(array - kMediaSplatPositions) % 5];
+    values.resize(static_cast<size_t>(bytes / sizeof(float)));
+    return values.data();
+  }
+};
+
+/// x, y, z, w to w, x, y, z of length 1; zeros stay for validate() to find.
+void finishRotations(SplatCloud& cloud) {
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      float* q = &cloud.rotations[i * 4];
+      std::rotate(q, q + 3, q + 4);
+      double squares = 0;
+      for (int k = 0; k < 4; ++k) squares += double(q[k]) * double(q[k]);
+      // A unit quaternion up to rounding stays as it is, bit for bit.
+      if (std::abs(squares - 1.0) < 1e-6 || !(squares > 0)) continue;
+      const double length = std::sqrt(squares);
+      for (int k = 0; k < 4; ++k) q[k] = static_cast<float>(double(q[k]) / length);
+    }
+  });
+}
+
+/// The part in the file's scene. In: what, the part in messages.
+SplatCloud placed(SplatCloud cloud, const StippleMediaSplatPart& info, const std::string& what) {
+  cloud.sh_degree = static_cast<int>(info.sh_degree);
+  cloud.colour_space = static_cast<ColourSpace>(info.colour_space);
+  cloud.antialias = static_cast<Antialias>(info.antialias);
+  cloud.frame = static_cast<Frame>(info.frame);
+  finishRotations(cloud);
+  const Mat4d matrix = Eigen::Map<const Mat4d>(info.matrix);
+  try {
+    validate(cloud, "part");
+    return matrix == Mat4d::Identity() ? std::move(cloud) : transformed(cloud, matrix);
+  } catch (const Error& error) {
+    fail(ErrorCode::kFormat, what + ": " + error.what());
+  }
+}
+
+/// Adds a part to the others, which have the same degree, or gets zeros above its own.
+void append(SplatCloud& all, const SplatCloud& part) {
+  const auto add = [](std::vector<float>& to, const std::vector<float>& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  add(all.positions, part.positions);
+  add(all.rotations, part.rotations);
+  add(all.scales, part.scales);
+  add(all.opacities, part.opacities);
+  const size_t from = part.shStride();
+  const size_t to = all.shStride();
+  const size_t first = all.sh.size();
+  all.sh.resize(first + part.size() * to, 0.0f);
+  for (size_t i = 0; i < part.size(); ++i) {
+    std::copy_n(&part.sh[i * from], from, &all.sh[first + i * to]);
+  }
+}
+
+}  // namespace
+
+bool startsAsGltfSplats(const SplatFileStart& start) {
+  const bool binary = start.bytes.rfind(kGlbMagic, 0) == 0;
+  if (start.is_folder || (!binary && lowerEnding(start.path) != ".gltf")) return false;
+  const InputFile file(start.path);
+  uint64_t json = file.size();
+  if (binary && start.bytes.size() >= kGlbHead) {
+    uint32_t length = 0;
+    std::memcpy(&length, start.bytes.data() + 12, sizeof(length));
+    json = std::min<uint64_t>(json, kGlbHead + uint64_t{length});
+  }
+  std::string text(static_cast<size_t>(std::min(json, kMaxJsonBytes)), '\0');
+  file.readAt(0, text.data(), text.size());
+  return text.find(std::string(1, '"') + kGltfSplats + '"') != text.npos;
+}
+
+SplatCloud readGltfSplats(const std::string& path, Progress* progress) {
+  // Names a missing or unreadable file in the words of every reader.
+  if (InputFile(path).size() == 0) fail(ErrorCode::kFormat, path + " is empty");
+  Delivery delivery;
+  const MediaSink sink(
+      [&delivery](uint32_t array, uint64_t bytes) { return delivery.take(array, bytes); });
+  const StippleMediaTable& media = mediaTable();
+  callMedia([&](StippleMediaStatus* status) {
+    media.gltf_splats_read(path.c_str(), sink.get(), status);
+  });
+  advance(progress, 0.5, "Reading splats");
+  SplatCloud all;
+  std::vector<SplatCloud> parts;
+  int degree = 0;
+  for (size_t p = 0; p < delivery.clouds.size(); ++p) {
+    const StippleMediaSplatPart& info = delivery.infos[p];
+    parts.push_back(placed(std::move(delivery.clouds[p]), info,
+                           path + ": mesh " + std::to_string(info.mesh) + ", primitive " +
+                               std::to_string(info.primitive)));
+    const SplatCloud& first = parts.front();
+    const SplatCloud& part = parts.back();
+    degree = std::max(degree, part.sh_degree);
+    if (part.colour_space != first.colour_space || part.antialias != first.antialias ||
+        part.frame != first.frame) {
+      fail(ErrorCode::kUnsupported, path +
+                                        " holds splats of several colour spaces, low-pass "
+                                        "filters or frames; one of each is needed");
+    }
+  }
+  advance(progress, 0.9, "Reading splats");
+  if (parts.size() == 1) return std::move(parts.front());
+  all.sh_degree = degree;
+  all.colour_space = parts.front().colour_space;
+  all.antialias = parts.front().antialias;
+  all.frame = parts.front().frame;
+  for (const SplatCloud& part : parts) append(all, part);
+  return all;
+}
+
+}  // namespace stipple

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "math/vec.h"
+
+namespace tinygltf {
+class Model;
+}
+
+namespace stipple::media {
+
+/// A glTF or GLB file in memory, and walks through its default scene.
+/// Errors: kFormat with what tinygltf says, kUnsupported (a required extension that is not known).
+class GltfScene {
+ public:
+  /// In: known, extensions that a file may require; kind, what messages call what is read.
+  GltfScene(const std::string& path, const std::set<std::string>& known, const std::string& kind);
+  ~GltfScene();
+  GltfScene(const GltfScene&) = delete;
+  GltfScene& operator=(const GltfScene&) = delete;
+
+  const tinygltf::Model& model() const { return *model_; }
+  /// The files of the pictures, still encoded.
+  const std::vector<std::vector<unsigned char>>& images() const { return images_; }
+
+  /// Each use of a mesh: its index, and the matrix that leads to the frame of `root`.
+  using Visit = std::function<void(size_t mesh, const Mat4d& matrix)>;
+  void visitMeshes(const Mat4d& root, const Visit& visit) const;
+
+ private:
+  struct Walk;
+
+  void load();
+  std::vector<int> rootNodes() const;
+  void visitNode(int index, const Mat4d& parent, int depth, Walk& walk) const;
+
+  std::string path_;
+  std::unique_ptr<tinygltf::Model> model_;
+  std::vector<std::vector<unsigned char>> images_;
+};
+
+}  // namespace stipple::media
