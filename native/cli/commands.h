@@ -9,6 +9,7 @@ namespace stipple::cli {
 /// Each adds one subcommand to the tool; its callback does the work and throws Failure.
 void addInfo(CLI::App& app, const Context& context);
 void addConvert(CLI::App& app, const Context& context);
+void addFormats(CLI::App& app);
 void addDecode(CLI::App& app, const Context& context);
 void addRender(CLI::App& app, const Context& context);
 void addVoxelize(CLI::App& app, const Context& context);

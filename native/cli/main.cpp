@@ -28,6 +28,7 @@ int run(int argc, char** argv) {
   app.parse_complete_callback(create);
   addInfo(app, context);
   addConvert(app, context);
+  addFormats(app);
   addDecode(app, context);
   addRender(app, context);
   addVoxelize(app, context);

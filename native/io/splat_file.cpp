@@ -117,7 +117,7 @@ std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& f
 const std::vector<SplatFormat>& splatFormats() {
   static const std::vector<SplatFormat> kFormats = {
       {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, true, startsAsPly, readPlySplats, writePlySplats},
-      {"compressed_ply", "compressed PLY", ".compressed.ply", 3, Frame::kRDF, true,
+      {"compressed-ply", "compressed PLY", ".compressed.ply", 3, Frame::kRDF, true,
        startsAsCompressedPly, readCompressedPly, writeCompressedPly},
       {"spz", "SPZ", ".spz", 4, Frame::kRUB, false, startsAsSpz, readSpzSplats, writeSpzSplats},
       {"splat", "splat records", ".splat", 0, Frame::kRDF, false, nullptr, readSplat32,
