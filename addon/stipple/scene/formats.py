@@ -9,8 +9,8 @@ from . import sources
 # entropy coding leave it to the data.
 _BYTES = {'ply': (68, 12), 'compressed-ply': (16, 3), 'spz': (16, 2), 'splat': (32, 0), 'sog': (12, 0.5), 'gltf': (56, 12)}
 # Registering loads no library, so file handlers and dialogs have these; a test compares them with the library's.
-READ_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.sog', 'meta.json')
-WRITE_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.sog', 'meta.json')
+READ_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog', 'meta.json')
+WRITE_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.glb', '.gltf', '.sog', 'meta.json')
 _known = {}
 
 
