@@ -44,9 +44,10 @@ void countPairs(const VisibleSplats& visible, const TileGrid& grid, BlendFloor& 
   std::vector<std::vector<uint32_t>> exact(grid.tileCount());
   std::vector<uint32_t> place_of(visible.splats.size());
   for (size_t i = 0; i < visible.count; ++i) {
-    const VisibleSplat& splat = visible.at(i);
-    place_of[visible.slotAt(i)] = static_cast<uint32_t>(i);
-    forEachExactTile(splat.footprint, splat.half_x, splat.half_y, grid,
+    const uint32_t slot = visible.slotAt(i);
+    place_of[slot] = static_cast<uint32_t>(i);
+    forEachExactTile(visible.slots().footprint(slot), visible.extras[slot].half_x,
+                     static_cast<double>(visible.splats[slot].half_y), grid,
                      [&](size_t tile) { exact[tile].push_back(static_cast<uint32_t>(i)); });
   }
   forEachTileGroup(visible, grid, nullptr, [&](const TileListGroup& group) {

@@ -76,7 +76,7 @@ void BackwardSums::addFields(const VisibleSplats& visible, const TileGrid& grid,
     double sums[kFieldCount] = {};
     const auto store_sums = [&] {
       if (std::none_of(sums, sums + kFieldCount, [](double sum) { return sum != 0.0; })) return;
-      const uint32_t splat = visible.at(current).index;
+      const uint32_t splat = visible.extraAt(current).index;
       float* to = sums_.get() + splat * stride_;
       if (!is_first && touched_[splat] != 0) addEntry<kFieldCount>(to, sums);
       touched_[splat] = 1;
@@ -108,8 +108,8 @@ void BackwardSums::addFields(const VisibleSplats& visible, const TileGrid& grid,
         asked[asked_count++] = {static_cast<uint32_t>(i), values};
         if (asked_count == kEntriesAhead) add_asked();
       });
-      __builtin_prefetch(of(visible.at(i).index), 1);
-      __builtin_prefetch(&visible.at(std::min(i + kEntriesAhead, end - 1)).index);
+      __builtin_prefetch(of(visible.extraAt(i).index), 1);
+      __builtin_prefetch(&visible.extraAt(std::min(i + kEntriesAhead, end - 1)).index);
     }
     add_asked();
     if (begin < end) store_sums();

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "splat/cpu/tile_grid.h"
@@ -9,24 +10,40 @@
 
 namespace stipple {
 
-/// What the tiles need of one splat. The geometry stays double: a tile takes the difference to its
-/// corner in double and goes on in float, so a wide picture or a long needle loses no digits.
+/// What every tile needs of a splat: one cache line, since a tile's splats lie far apart. The
+/// geometry stays double: a tile takes the difference to its corner in double and goes on in float,
+/// so a wide picture or a long needle loses no digits.
 struct VisibleSplat {
-  Footprint<double> footprint;
-  double half_x;  ///< pixels, as in Projected
-  double half_y;
+  double mean_x, mean_y;  ///< as in Footprint
+  double l00, l10, l11;
+  float half_y;  ///< pixels, as in Projected; infinite where that is above float32
   float log2_opacity;
   float depth;      ///< view z, metres
   float colour[3];  ///< blending space
-  uint32_t index;   ///< among all splats of the picture: PlacedCloud::first_index + its row
+};
+static_assert(sizeof(VisibleSplat) == 64);
+
+/// What is seldom needed of it.
+struct VisibleExtra {
+  double opacity;  ///< as in Footprint
+  double half_x;   ///< pixels, as in Projected
+  uint32_t index;  ///< among all splats of the picture: PlacedCloud::first_index + its row
 };
 
-/// Asks for the up to three cache lines of a splat.
-inline void prefetchSplat(const VisibleSplat* splat) {
-  const char* first = reinterpret_cast<const char*>(splat);
-  __builtin_prefetch(first);
-  __builtin_prefetch(first + 64);
-  __builtin_prefetch(first + sizeof(VisibleSplat) - 1);
+/// Both, by slot: the place where a splat was put when it was projected.
+struct SplatSlots {
+  const VisibleSplat* splats = nullptr;
+  const VisibleExtra* extras = nullptr;
+
+  Footprint<double> footprint(uint32_t slot) const {
+    const VisibleSplat& s = splats[slot];
+    return {s.mean_x, s.mean_y, s.l00, s.l10, s.l11, extras[slot].opacity};
+  }
+};
+
+/// Halves of boxes have a margin that is larger than this rounding.
+inline float heldHalf(double half) {
+  return half < 3e38 ? static_cast<float>(half) : std::numeric_limits<float>::infinity();
 }
 
 /// Sorts as unsigned numbers: depthKey above, the splat's place in memory below.
@@ -36,9 +53,10 @@ inline DepthItem depthItem(double depth, size_t slot) {
   return static_cast<uint64_t>(depthKey(depth)) << 32 | static_cast<uint32_t>(slot);
 }
 
-/// Where a projector puts what shows; the arrays have the same indices, called slots.
+/// Where a projector puts what shows, by slot.
 struct ProjectedSlots {
   VisibleSplat* splats;
+  VisibleExtra* extras;
   DepthItem* items;
   TileSpan* spans;
 };

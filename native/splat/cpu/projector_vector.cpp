@@ -221,14 +221,17 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
     for (uint32_t left = bits[0]; left != 0; left &= left - 1) {
       const size_t lane = static_cast<size_t>(__builtin_ctz(left));
       VisibleSplat& visible = to.splats[slot];
-      visible.footprint = {columns[0][lane], columns[1][lane], columns[2][lane],
-                           columns[3][lane], columns[4][lane], columns[5][lane]};
-      visible.half_x = columns[6][lane];
-      visible.half_y = columns[7][lane];
+      visible.mean_x = columns[0][lane];
+      visible.mean_y = columns[1][lane];
+      visible.l00 = columns[2][lane];
+      visible.l10 = columns[3][lane];
+      visible.l11 = columns[4][lane];
+      visible.half_y = heldHalf(columns[7][lane]);
       visible.log2_opacity = log2_opacity[lane];
       visible.depth = depth[lane];
       sumHarmonics(placed, &cloud.sh[(row + lane) * sh_stride], basis + lane, visible.colour);
-      visible.index = static_cast<uint32_t>(placed.first_index + row + lane);
+      to.extras[slot] = {columns[5][lane], columns[6][lane],
+                         static_cast<uint32_t>(placed.first_index + row + lane)};
       to.spans[slot] = spans[lane];
       to.items[slot] = depthItem(columns[8][lane], slot);
       ++slot;

@@ -42,9 +42,9 @@ Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats
 
 TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile) {
   TileSplat out;
-  const Footprint<double>& f = splat.footprint;
-  const float largest =
-      fillTileSplat({f.mean_x, f.mean_y, f.l00, f.l10, f.l11, splat.half_y}, tile, out);
+  const float largest = fillTileSplat({splat.mean_x, splat.mean_y, splat.l00, splat.l10, splat.l11,
+                                       static_cast<double>(splat.half_y)},
+                                      tile, out);
   out.finish_doubt = std::min(largest, kMaxFloatReach);
   out.log2_opacity = splat.log2_opacity;
   out.depth = splat.depth;
@@ -77,13 +77,11 @@ void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin,
   }
 }
 
-double alphaInDouble(const VisibleSplat& splat, const Tile& tile, uint32_t x, uint32_t y) {
-  const Footprint<double>& f = splat.footprint;
-  const double dx = tile.x0 + x + 0.5 - f.mean_x;
-  const double dy = tile.y0 + y + 0.5 - f.mean_y;
-  // As the reference: the bounds are exact, and cheaper than an exponential.
-  if (std::abs(dx) > splat.half_x || std::abs(dy) > splat.half_y) return 0.0;
-  return splatAlpha(f.opacity, halfSquaredDistance(f, dx, dy));
+double alphaInDouble(const SplatSlots& slots, uint32_t slot, const Tile& tile, uint32_t x,
+                     uint32_t y) {
+  double distance;
+  if (!mayShow(slots.splats[slot], tile, x, y, distance)) return 0.0;
+  return splatAlpha(slots.extras[slot].opacity, distance);
 }
 
 void clearPixels(const Tile& tile, TilePixels& pixels) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 
@@ -26,8 +27,24 @@ TileSplat makeTileSplat(const VisibleSplat& splat, const Tile& tile);
 void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin, size_t count,
                     float& largest, TileSplat* out);
 
+/// False where a splat of the list surely does not show at pixel (x, y) of the tile. Out: distance,
+/// as halfSquaredDistance, where true.
+inline bool mayShow(const VisibleSplat& splat, const Tile& tile, uint32_t x, uint32_t y,
+                    double& distance) {
+  const double dx = tile.x0 + x + 0.5 - splat.mean_x;
+  const double dy = tile.y0 + y + 0.5 - splat.mean_y;
+  if (std::abs(dy) > static_cast<double>(splat.half_y)) return false;
+  const Footprint<double> shape = {splat.mean_x, splat.mean_y, splat.l00,
+                                   splat.l10,    splat.l11,    1.0};
+  distance = halfSquaredDistance(shape, dx, dy);
+  constexpr double kLog2e = 1.4426950408889634, kRounding = 1e-4;
+  const double log2_reach = static_cast<double>(splat.log2_opacity - kLog2MinAlpha);
+  return distance * kLog2e <= log2_reach + kRounding;
+}
+
 /// Alpha of a splat of the list at pixel (x, y) of the tile, in double, as the reference has it.
-double alphaInDouble(const VisibleSplat& splat, const Tile& tile, uint32_t x, uint32_t y);
+double alphaInDouble(const SplatSlots& slots, uint32_t slot, const Tile& tile, uint32_t x,
+                     uint32_t y);
 
 /// Nothing blended yet; pixels outside the picture are finished.
 void clearPixels(const Tile& tile, TilePixels& pixels);

@@ -61,11 +61,12 @@ size_t pixelOf(const PictureLoss& loss, const Tile& tile, uint32_t x, uint32_t y
 }
 
 /// Returns alpha, 0 where the splat is skipped.
-double splatAt(const VisibleSplat& splat, const Tile& tile, uint32_t x, uint32_t y,
+double splatAt(const SplatSlots& slots, uint32_t slot, const Tile& tile, uint32_t x, uint32_t y,
                SplatAtPixel<double>& here) {
-  here.alpha = alphaInDouble(splat, tile, x, y);
+  here.alpha = alphaInDouble(slots, slot, tile, x, y);
   if (!(here.alpha > 0)) return 0;
-  const Footprint<double>& f = splat.footprint;
+  const VisibleSplat& splat = slots.splats[slot];
+  const Footprint<double> f = slots.footprint(slot);
   const double dx = tile.x0 + x + 0.5 - f.mean_x;
   const double dy = tile.y0 + y + 0.5 - f.mean_y;
   here.held = !(f.opacity * std::exp(-halfSquaredDistance(f, dx, dy)) < kMaxAlpha);
@@ -97,10 +98,10 @@ TileBackward::TileBackward() : pixels_(std::make_unique<BackwardPixels>()), spla
   blended_.reserve(kMostBlended);
 }
 
-void TileBackward::begin(const BackwardKernel& kernel, const VisibleSplat* visible,
+void TileBackward::begin(const BackwardKernel& kernel, const SplatSlots& slots,
                          const PictureLoss& loss) {
   kernel_ = &kernel;
-  visible_ = visible;
+  slots_ = slots;
   loss_ = &loss;
   input_is_good_ = true;
 }
@@ -248,7 +249,7 @@ void TileBackward::judge(const void* context, size_t splat, uint32_t pixel, Back
   const uint32_t y = pixel / kTileSide;
   SplatAtPixel<double> here;
   const uint32_t index = judged.tile->splats[judged.begin + splat];
-  if (!(splatAt(self.visible_[index], *judged.tile, x, y, here) > 0)) return;
+  if (!(splatAt(self.slots_, index, *judged.tile, x, y, here) > 0)) return;
   PixelLoss<double> loss = lossAt(*self.loss_, pixelOf(*self.loss_, *judged.tile, x, y));
   loss.depth = static_cast<double>(pixels.depth[pixel]);
   loss.depth_gradient = static_cast<double>(pixels.depth_gradient[pixel]);
@@ -274,10 +275,10 @@ void TileBackward::takeOff(const Tile& tile, size_t used, float* sums) {
     const size_t begin = batch * kBatchSize;
     const size_t count = std::min(kBatchSize, used - begin);
     float largest = 0;
-    makeTileSplats(visible_, tile, begin, count, largest, splats_.data());
+    makeTileSplats(slots_.splats, tile, begin, count, largest, splats_.data());
     // A tile's splats lie far apart, so the first of the next batch would wait for memory.
     for (size_t i = 0; begin > 0 && i < kPrefetchDistance; ++i) {
-      prefetchSplat(&visible_[tile.splats[begin - kBatchSize + i]]);
+      __builtin_prefetch(&slots_.splats[tile.splats[begin - kBatchSize + i]]);
     }
     judged.begin = begin;
     options.first = static_cast<int32_t>(begin);
@@ -289,11 +290,10 @@ void TileBackward::takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, flo
   blended_.clear();
   PixelBlend<double> blend;
   for (size_t place = 0; place < tile.splats.size() && !blend.finished; ++place) {
-    const VisibleSplat& splat = visible_[tile.splats[place]];
     Blended one;
-    if (!(splatAt(splat, tile, x, y, one.here) > 0)) continue;
+    if (!(splatAt(slots_, tile.splats[place], tile, x, y, one.here) > 0)) continue;
     one.place = static_cast<uint32_t>(place);
-    blend.add(one.here.alpha, splat.colour, one.here.depth);
+    blend.add(one.here.alpha, one.here.colour, one.here.depth);
     if (!blend.finished) blended_.push_back(one);
   }
 

@@ -28,7 +28,7 @@ class TileBackward {
   TileBackward();
 
   /// Of which picture the next tiles are; all three must outlive them.
-  void begin(const BackwardKernel& kernel, const VisibleSplat* visible, const PictureLoss& loss);
+  void begin(const BackwardKernel& kernel, const SplatSlots& slots, const PictureLoss& loss);
 
   /// Tile `index` of the picture. Out: sums [tile.splats.size()][backwardFieldCount(wants)], one
   /// entry per splat of the tile. Adds dL/dbackground of the tile to `background` [3]. Returns how
@@ -60,7 +60,7 @@ class TileBackward {
   void takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, float* sums);
 
   const BackwardKernel* kernel_ = nullptr;
-  const VisibleSplat* visible_ = nullptr;
+  SplatSlots slots_;
   const PictureLoss* loss_ = nullptr;
   std::unique_ptr<BackwardPixels> pixels_;
   std::vector<TileSplat> splats_;  ///< one batch

@@ -5,7 +5,8 @@
 
 namespace stipple {
 
-struct VisibleSplat;
+template <typename T>
+struct Projected;
 
 constexpr uint32_t kTileSide = 16;
 constexpr uint32_t kTilePixelCount = kTileSide * kTileSide;
@@ -33,6 +34,6 @@ constexpr uint32_t kSpanColumns = 8;
 constexpr uint32_t kSpanRows = 4;
 constexpr TileSpan kWideSpan = uint64_t{0xffff} << 48;  // grids have at most 4096 columns and rows
 
-TileSpan tileSpanOf(const VisibleSplat& splat, const TileGrid& grid);
+TileSpan tileSpanOf(const Projected<double>& splat, const TileGrid& grid);
 
 }  // namespace stipple

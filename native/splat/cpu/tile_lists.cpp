@@ -23,27 +23,25 @@ size_t chunkCount(size_t splats, size_t tiles) {
 
 }  // namespace
 
-TileSpan tileSpanOf(const VisibleSplat& splat, const TileGrid& grid) {
-  int64_t first_row = -1, first_column = 0;
-  bool fits = true;
-  uint32_t mask = 0;
-  // The first row need not begin leftmost: columns count from the box.
-  const double left = splat.footprint.mean_x - splat.half_x;
-  first_column = tilesBetween(left, left, grid.columns).last;
-  first_column = std::max<int64_t>(first_column, 0);
-  forEachTileSpan(splat, grid, [&](int64_t row, int64_t first, int64_t last) {
-    if (first_row < 0) first_row = row;
-    if (row - first_row >= kSpanRows || first < first_column ||
-        last - first_column >= kSpanColumns) {
-      fits = false;
-      return;
-    }
-    const uint32_t columns = ((2u << (last - first)) - 1u) << (first - first_column);
-    mask |= columns << static_cast<uint32_t>(row - first_row) * kSpanColumns;
-  });
-  if (!fits) return kWideSpan;
-  if (mask == 0) return 0;
-  return static_cast<uint64_t>(first_row) << 48 | static_cast<uint64_t>(first_column) << 32 | mask;
+TileSpan tileSpanOf(const Projected<double>& splat, const TileGrid& grid) {
+  SpanBox<double> box;
+  spanBox(splat.footprint, splat.half_x, splat.half_y, static_cast<double>(grid.columns),
+          static_cast<double>(grid.rows), box);
+  if (box.last_row - box.first_row >= kSpanRows ||
+      box.last_column - box.first_column >= kSpanColumns) {
+    return kWideSpan;
+  }
+  const uint64_t first_row = static_cast<uint64_t>(box.first_row);
+  const uint64_t first_column = static_cast<uint64_t>(box.first_column);
+  uint64_t mask = 0;
+  forEachTileSpan(splat.footprint, splat.half_x, splat.half_y, grid,
+                  [&](int64_t row, int64_t first, int64_t last) {
+                    const uint64_t columns = (uint64_t{2} << (last - first)) - 1;
+                    const uint64_t at = static_cast<uint64_t>(first) - first_column +
+                                        (static_cast<uint64_t>(row) - first_row) * kSpanColumns;
+                    mask |= columns << at;
+                  });
+  return mask == 0 ? 0 : first_row << 48 | first_column << 32 | mask;
 }
 
 void forEachTileGroup(const VisibleSplats& visible, const TileGrid& grid, Progress* progress,

@@ -1,4 +1,4 @@
-// Included inside a namespace, by cpu/tile_span.cpp with T = double and once per instruction set by
+// Included inside a namespace, by cpu/tile_spans.h with T = double and once per instruction set by
 // cpu/projector_vector.cpp with a vector of them, hence no include guard. One order of operations
 // and no fused products: every lane gets the bits of the scalar code.
 //

@@ -40,14 +40,14 @@ inline void gatherTileSplats(const VisibleSplat* visible, const Tile& tile, size
   constexpr size_t kPrefetchDistance = 24;
   for (size_t i = 0; i < count; ++i) {
     const size_t ahead = std::min(begin + i + kPrefetchDistance, tile.splats.size() - 1);
-    prefetchSplat(&visible[tile.splats[ahead]]);
+    __builtin_prefetch(&visible[tile.splats[ahead]]);
     const VisibleSplat& splat = visible[tile.splats[begin + i]];
-    columns[0][i] = splat.footprint.mean_x;
-    columns[1][i] = splat.footprint.mean_y;
-    columns[2][i] = splat.footprint.l00;
-    columns[3][i] = splat.footprint.l10;
-    columns[4][i] = splat.footprint.l11;
-    columns[5][i] = splat.half_y;
+    columns[0][i] = splat.mean_x;
+    columns[1][i] = splat.mean_y;
+    columns[2][i] = splat.l00;
+    columns[3][i] = splat.l10;
+    columns[4][i] = splat.l11;
+    columns[5][i] = static_cast<double>(splat.half_y);
     out[i].log2_opacity = splat.log2_opacity;
     out[i].depth = splat.depth;
     for (size_t c = 0; c < 3; ++c) out[i].colour[c] = splat.colour[c];

@@ -144,7 +144,7 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, RenderWorkspace
       const auto take_off_tiles = [&](size_t from, size_t to) {
         if (progress) progress->throwIfCancelled();
         std::unique_ptr<TileBackward> scratch = arrays.scratch.take();
-        scratch->begin(kernel, visible.splats.get(), loss);
+        scratch->begin(kernel, visible.slots(), loss);
         for (size_t tile = first + from; tile < first + to; ++tile) {
           const uint64_t entry = entriesBefore(tile) - entriesBefore(first);
           arrays.used[tile] =

@@ -25,19 +25,35 @@ namespace {
 constexpr size_t kBatchSize = 128;
 
 /// A pixel as the reference blends it.
-PixelBlend<double> blendInDouble(const VisibleSplat* visible, const Tile& tile, uint32_t x,
+PixelBlend<double> blendInDouble(const SplatSlots& slots, const Tile& tile, uint32_t x,
                                  uint32_t y) {
+  // A few splats at a time: what else is needed of those that may show is asked for before it is
+  // used.
+  struct Near {
+    uint32_t slot;
+    double distance;
+  };
+  constexpr size_t kAtOnce = 64;
+  Near near[kAtOnce];
   PixelBlend<double> pixel;
-  for (const uint32_t index : tile.splats) {
-    const VisibleSplat& splat = visible[index];
-    const double alpha = alphaInDouble(splat, tile, x, y);
-    if (alpha > 0) pixel.add(alpha, splat.colour, static_cast<double>(splat.depth));
-    if (pixel.finished) break;
+  for (size_t begin = 0; begin < tile.splats.size() && !pixel.finished; begin += kAtOnce) {
+    size_t count = 0;
+    for (const uint32_t slot :
+         tile.splats.subspan(begin, std::min(kAtOnce, tile.splats.size() - begin))) {
+      if (!mayShow(slots.splats[slot], tile, x, y, near[count].distance)) continue;
+      __builtin_prefetch(&slots.extras[slot]);
+      near[count++].slot = slot;
+    }
+    for (size_t i = 0; i < count && !pixel.finished; ++i) {
+      const VisibleSplat& splat = slots.splats[near[i].slot];
+      const double alpha = splatAlpha(slots.extras[near[i].slot].opacity, near[i].distance);
+      if (alpha > 0) pixel.add(alpha, splat.colour, static_cast<double>(splat.depth));
+    }
   }
   return pixel;
 }
 
-void replaceDoubtful(const VisibleSplat* visible, const Tile& tile, TilePixels& pixels) {
+void replaceDoubtful(const SplatSlots& slots, const Tile& tile, TilePixels& pixels) {
   uint32_t any = 0;
   for (const float doubt : pixels.doubt) any |= std::bit_cast<uint32_t>(doubt);
   if (any == 0) return;
@@ -45,7 +61,7 @@ void replaceDoubtful(const VisibleSplat* visible, const Tile& tile, TilePixels& 
     for (uint32_t x = 0; x < tile.width; ++x) {
       const size_t i = static_cast<size_t>(y) * kTileSide + x;
       if (pixels.doubt[i] == 0.0f) continue;
-      const PixelBlend<double> pixel = blendInDouble(visible, tile, x, y);
+      const PixelBlend<double> pixel = blendInDouble(slots, tile, x, y);
       pixels.transmittance[i] = static_cast<float>(pixel.transmittance);
       pixels.red[i] = static_cast<float>(pixel.colour[0]);
       pixels.green[i] = static_cast<float>(pixel.colour[1]);
@@ -122,15 +138,15 @@ void writePixels(const Tile& tile, const TilePixels& pixels, const RenderOptions
 
 /// The batch that the kernel works on, for judgeAlpha.
 struct Judged {
-  const VisibleSplat* visible;
+  const SplatSlots* slots;
   const Tile* tile;
   size_t begin;
 };
 
 double judgeAlpha(const void* context, size_t splat, uint32_t pixel) {
   const Judged& judged = *static_cast<const Judged*>(context);
-  const uint32_t index = judged.tile->splats[judged.begin + splat];
-  return alphaInDouble(judged.visible[index], *judged.tile, pixel % kTileSide, pixel / kTileSide);
+  const uint32_t slot = judged.tile->splats[judged.begin + splat];
+  return alphaInDouble(*judged.slots, slot, *judged.tile, pixel % kTileSide, pixel / kTileSide);
 }
 
 /// What `kept` holds of tile `index`.
@@ -150,13 +166,13 @@ void keepTile(size_t index, const TilePixels& pixels, KeptPicture& kept) {
 }
 
 /// Out: result and kept, where not null.
-void renderTile(const VisibleSplat* visible, const Tile& tile, size_t index, TileKernel kernel,
+void renderTile(const SplatSlots& slots, const Tile& tile, size_t index, TileKernel kernel,
                 const RenderOptions& options, RenderResult* result, KeptPicture* kept) {
   // Scratch of this thread: 9 KiB of pixels and 7 KiB of splats, in the first-level cache.
   TilePixels pixels;
   TileSplat batch[kBatchSize];
   clearPixels(tile, pixels);
-  Judged judged{visible, &tile, 0};
+  Judged judged{&slots, &tile, 0};
   TileKernelOptions kernel_options = {options.with_depth,
                                       options.with_median_depth || options.with_counts};
   kernel_options.with_coverage = kept != nullptr;
@@ -165,12 +181,12 @@ void renderTile(const VisibleSplat* visible, const Tile& tile, size_t index, Til
   float largest = 0;
   for (size_t begin = 0; begin < tile.splats.size() && pixels.unfinished > 0; begin += kBatchSize) {
     const size_t count = std::min(kBatchSize, tile.splats.size() - begin);
-    makeTileSplats(visible, tile, begin, count, largest, batch);
+    makeTileSplats(slots.splats, tile, begin, count, largest, batch);
     judged.begin = begin;
     kernel_options.first = static_cast<int32_t>(begin);
     kernel(batch, count, kernel_options, pixels);
   }
-  replaceDoubtful(visible, tile, pixels);
+  replaceDoubtful(slots, tile, pixels);
   if (result) writePixels(tile, pixels, options, *result);
   if (kept) keepTile(index, pixels, *kept);
 }
@@ -203,7 +219,8 @@ uint64_t RenderWorkspace::bytes() const {
   const VisibleSplats& visible = arrays_->visible;
   const TileListMemory& lists = arrays_->lists;
   return arrays_->scene.clouds.capacity() * sizeof(PlacedCloud) + visible.splats.bytes() +
-         visible.slot_spans.bytes() + visible.items[0].bytes() + visible.items[1].bytes() +
+         visible.extras.bytes() + visible.slot_spans.bytes() + visible.items[0].bytes() +
+         visible.items[1].bytes() +
          (visible.filled.capacity() + visible.digits.capacity() + lists.counts.capacity()) *
              sizeof(uint32_t) +
          (lists.cursors.capacity() + lists.group.offsets.capacity()) * sizeof(uint64_t) +
@@ -236,7 +253,7 @@ uint64_t fingerprintOf(const PlacedScene& scene, const VisibleSplats& visible) {
     }
   };
   for (size_t i = 0; i < std::min(kSamples, visible.count); ++i) {
-    const uint32_t splat = visible.at(i * visible.count / kSamples % visible.count).index;
+    const uint32_t splat = visible.extraAt(i * visible.count / kSamples % visible.count).index;
     const PlacedCloud& placed = scene.clouds[cloudOfSplat(scene, splat)];
     const size_t row = splat - placed.first_index;
     const SplatCloud& cloud = *placed.cloud;
@@ -292,7 +309,7 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
       for (size_t index = group.first_tile + begin; index < group.first_tile + end; ++index) {
         if (progress) progress->throwIfCancelled();
         const Tile tile = tileOf(grid, index, group.tile(index));
-        renderTile(visible.splats.get(), tile, index, kernel, options, result, kept);
+        renderTile(visible.slots(), tile, index, kernel, options, result, kept);
         const size_t finished = finished_tiles.fetch_add(1, std::memory_order_relaxed) + 1;
         if (finished % grid.columns == 0) {
           advance(progress, static_cast<double>(finished) / static_cast<double>(grid.tileCount()),

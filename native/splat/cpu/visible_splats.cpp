@@ -146,8 +146,8 @@ void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* pr
   visible.order = nullptr;
   visible.spans = nullptr;
   if (count == 0) return;
-  const ProjectedSlots slots = {visible.splats.resize(count), visible.items[0].resize(count),
-                                visible.slot_spans.resize(count)};
+  const ProjectedSlots slots = {visible.splats.resize(count), visible.extras.resize(count),
+                                visible.items[0].resize(count), visible.slot_spans.resize(count)};
   visible.items[1].resize(count);
   visible.filled.resize(rangeCount(count, kRangeSplats));
   visible.digits.resize(kMaxSortChunks * kMaxDigits);
@@ -176,10 +176,12 @@ VisibleSplats findVisibleSplats(const PlacedScene& scene, Progress* progress) {
 }
 
 uint64_t visibleSplatsMemoryBound(uint64_t splat_count) {
-  // The last term: arrays on huge pages are rounded up.
-  return splat_count * (sizeof(VisibleSplat) + 2 * sizeof(DepthItem) + sizeof(TileSpan)) +
+  const uint64_t arrays = splat_count * (sizeof(VisibleSplat) + sizeof(VisibleExtra) +
+                                         2 * sizeof(DepthItem) + sizeof(TileSpan));
+  // Arrays on huge pages, 8 MiB at least, are rounded up to 2 MiB.
+  return arrays + std::min(arrays / 4, 5 * (uint64_t{2} << 20)) +
          rangeCount(splat_count, kRangeSplats) * sizeof(uint32_t) +
-         kMaxSortChunks * kMaxDigits * sizeof(uint32_t) + 4 * (uint64_t{2} << 20);
+         kMaxSortChunks * kMaxDigits * sizeof(uint32_t);
 }
 
 }  // namespace stipple

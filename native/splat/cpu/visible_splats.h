@@ -17,6 +17,7 @@ namespace stipple {
 /// more, and a tile takes splats from everywhere in either order.
 struct VisibleSplats {
   ReusedArray<VisibleSplat> splats;  ///< by slot; each range of splats begins at its own number
+  ReusedArray<VisibleExtra> extras;  ///< by slot
   const DepthItem* order = nullptr;  ///< [count] front to back; lies in one of `items`
   const TileSpan* spans = nullptr;   ///< [count] front to back; lies in the other
   size_t count = 0;
@@ -24,6 +25,8 @@ struct VisibleSplats {
   /// The slot of the splat that is `place` from the front.
   uint32_t slotAt(size_t place) const { return static_cast<uint32_t>(order[place]); }
   const VisibleSplat& at(size_t place) const { return splats[slotAt(place)]; }
+  const VisibleExtra& extraAt(size_t place) const { return extras[slotAt(place)]; }
+  SplatSlots slots() const { return {splats.get(), extras.get()}; }
 
   // What finding them needs; kept for the next picture.
   ReusedArray<TileSpan> slot_spans;

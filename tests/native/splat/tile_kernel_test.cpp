@@ -124,12 +124,12 @@ TEST(TileSplats, HaveTheSameBitsOnEveryTarget) {
   std::vector<uint32_t> list;
   for (VisibleSplat& s : splats) {
     const float sharp = list.size() % 7 == 0 ? 1e4f : 1.0f;
-    s.footprint = {
-        static_cast<double>(uniform(1950, 2000)),          static_cast<double>(uniform(950, 1000)),
-        static_cast<double>(sharp * uniform(0.05f, 1.5f)), static_cast<double>(uniform(-1, 1)),
-        static_cast<double>(uniform(0.05f, 1.5f)),         static_cast<double>(uniform(0.01f, 1))};
-    s.half_x = static_cast<double>(uniform(0.5f, 30));
-    s.half_y = static_cast<double>(uniform(0.5f, 30));
+    s.mean_x = static_cast<double>(uniform(1950, 2000));
+    s.mean_y = static_cast<double>(uniform(950, 1000));
+    s.l00 = static_cast<double>(sharp * uniform(0.05f, 1.5f));
+    s.l10 = static_cast<double>(uniform(-1, 1));
+    s.l11 = static_cast<double>(uniform(0.05f, 1.5f));
+    s.half_y = uniform(0.5f, 30);
     s.log2_opacity = uniform(-7, 0);
     s.depth = uniform(1, 9);
     for (float& c : s.colour) c = uniform(0, 1);
@@ -156,8 +156,10 @@ TEST(TileSplats, HaveTheSameBitsOnEveryTarget) {
         // The rows are those that hold a pixel centre within half_y of the splat's.
         const VisibleSplat& splat = splats[list[begin + i]];
         for (uint32_t y = 0; y < kTileSide; ++y) {
-          const double dy = std::abs(tile.y0 + y + 0.5 - splat.footprint.mean_y);
-          EXPECT_EQ(y >= seen[i].row_begin && y < seen[i].row_end, dy <= splat.half_y) << i;
+          const double dy = std::abs(tile.y0 + y + 0.5 - splat.mean_y);
+          EXPECT_EQ(y >= seen[i].row_begin && y < seen[i].row_end,
+                    dy <= static_cast<double>(splat.half_y))
+              << i;
         }
       }
     }
