@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "data/cloud_comparison.h"
 #include "data/cloud_transform.h"
+#include "io/sog_levels.h"
 #include "io/splat_file.h"
 
 using namespace stipple;
@@ -140,6 +141,26 @@ StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf
     write.version = enumValue<int>(given.format_version, 255, "options->format_version");
     write.frame = enumValue<Frame>(given.frame, kLastFrame, "options->frame");
     withThreads(cloud->context->thread_count, [&] { writeSplatFile(*cloud->cloud, path, write); });
+  });
+}
+
+StippleStatus stipple_cloud_save_levels(const StippleCloud* const* levels, uint64_t level_count,
+                                        const StippleCloud* environment, const char* path_utf8) {
+  return guarded([&] {
+    const std::string path = &require(path_utf8, "path_utf8");
+    if (level_count == 0) {
+      fail(ErrorCode::kInvalidArgument, "level_count is 0; at least 1 is needed");
+    }
+    require(levels, "levels");
+    std::vector<const SplatCloud*> clouds;
+    for (uint64_t i = 0; i < level_count; ++i) {
+      clouds.push_back(
+          require(levels[i], ("levels[" + std::to_string(i) + "]").c_str()).cloud.get());
+    }
+    withThreads(levels[0]->context->thread_count, [&] {
+      writeSogLevels(clouds, environment != nullptr ? environment->cloud.get() : nullptr, path, {},
+                     nullptr);
+    });
   });
 }
 

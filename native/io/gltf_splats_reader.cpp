@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "data/cloud_transform.h"
+#include "io/cloud_parts.h"
 #include "io/gltf_splat_names.h"
 #include "io/gltf_splats.h"
 #include "io/input_file.h"
@@ -75,24 +76,6 @@ SplatCloud placed(SplatCloud cloud, const StippleMediaSplatPart& info, const std
   }
 }
 
-/// Adds a part to the others, which have the same degree, or gets zeros above its own.
-void append(SplatCloud& all, const SplatCloud& part) {
-  const auto add = [](std::vector<float>& to, const std::vector<float>& from) {
-    to.insert(to.end(), from.begin(), from.end());
-  };
-  add(all.positions, part.positions);
-  add(all.rotations, part.rotations);
-  add(all.scales, part.scales);
-  add(all.opacities, part.opacities);
-  const size_t from = part.shStride();
-  const size_t to = all.shStride();
-  const size_t first = all.sh.size();
-  all.sh.resize(first + part.size() * to, 0.0f);
-  for (size_t i = 0; i < part.size(); ++i) {
-    std::copy_n(&part.sh[i * from], from, &all.sh[first + i * to]);
-  }
-}
-
 }  // namespace
 
 bool startsAsGltfSplats(const SplatFileStart& start) {
@@ -121,9 +104,7 @@ SplatCloud readGltfSplats(const std::string& path, Progress* progress) {
     media.gltf_splats_read(path.c_str(), sink.get(), status);
   });
   advance(progress, 0.5, "Reading splats");
-  SplatCloud all;
   std::vector<SplatCloud> parts;
-  int degree = 0;
   for (size_t p = 0; p < delivery.clouds.size(); ++p) {
     const StippleMediaSplatPart& info = delivery.infos[p];
     parts.push_back(placed(std::move(delivery.clouds[p]), info,
@@ -131,7 +112,6 @@ SplatCloud readGltfSplats(const std::string& path, Progress* progress) {
                                std::to_string(info.primitive)));
     const SplatCloud& first = parts.front();
     const SplatCloud& part = parts.back();
-    degree = std::max(degree, part.sh_degree);
     if (part.colour_space != first.colour_space || part.antialias != first.antialias ||
         part.frame != first.frame) {
       fail(ErrorCode::kUnsupported, path +
@@ -141,12 +121,7 @@ SplatCloud readGltfSplats(const std::string& path, Progress* progress) {
   }
   advance(progress, 0.9, "Reading splats");
   if (parts.size() == 1) return std::move(parts.front());
-  all.sh_degree = degree;
-  all.colour_space = parts.front().colour_space;
-  all.antialias = parts.front().antialias;
-  all.frame = parts.front().frame;
-  for (const SplatCloud& part : parts) append(all, part);
-  return all;
+  return joined(parts);
 }
 
 }  // namespace stipple

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "io/input_file.h"
 #include "io/sog_file.h"
+#include "io/sog_level_names.h"
 #include "io/sog_meta.h"
 #include "io/webp_image.h"
 #include "io/zip_file.h"
@@ -21,7 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kMetaName[] = "meta.json";
 constexpr uint64_t kMaxMetaBytes = uint64_t{1} << 24;
 constexpr size_t kGrain = 4096;
 constexpr uint64_t kPaletteRow = 64;
@@ -83,7 +83,7 @@ class Files {
   std::unique_ptr<InputFile> file_;
   std::unique_ptr<ZipReader> zip_;
   fs::path folder_;
-  std::string meta_ = kMetaName;
+  std::string meta_ = kSogMetaName;
 };
 
 class Reader {
@@ -287,9 +287,9 @@ class Reader {
 bool startsAsSog(const SplatFileStart& start) {
   if (start.is_folder) {
     std::error_code ignored;
-    return fs::exists(fs::path(start.path) / kMetaName, ignored);
+    return fs::exists(fs::path(start.path) / kSogMetaName, ignored);
   }
-  return start.name == kMetaName || start.bytes.rfind("PK\3\4", 0) == 0;
+  return start.name == kSogMetaName || start.bytes.rfind("PK\3\4", 0) == 0;
 }
 
 SplatCloud readSog(const std::string& path, Progress* progress) {

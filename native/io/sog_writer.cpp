@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "io/cloud_parts.h"
 #include "io/input_file.h"
 #include "io/output_file.h"
 #include "io/ply_file.h"
@@ -22,7 +23,6 @@
 #include "io/vector_palette.h"
 #include "io/webp_image.h"
 #include "io/zip_file.h"
-#include "math/morton.h"
 
 namespace stipple {
 
@@ -131,34 +131,7 @@ class Encoder {
 
   void fillOrder() {
     for (size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<uint32_t>(i);
-    if (!options_.sort || order_.empty()) return;
-    std::array<double, 3> low;
-    std::array<double, 3> side;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      double high = -std::numeric_limits<double>::infinity();
-      low[axis] = -high;
-      for (size_t i = 0; i < order_.size(); ++i) {
-        const double value = static_cast<double>(cloud_.positions[i * 3 + axis]);
-        low[axis] = std::min(low[axis], value);
-        high = std::max(high, value);
-      }
-      side[axis] = high - low[axis];
-    }
-    constexpr double kCells = (1 << 21) - 1;
-    std::vector<std::pair<uint64_t, uint32_t>> keys(order_.size());
-    parallelFor(keys.size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        uint32_t cell[3];
-        for (size_t axis = 0; axis < 3; ++axis) {
-          const double value = static_cast<double>(cloud_.positions[i * 3 + axis]);
-          const double share = side[axis] > 0 ? (value - low[axis]) / side[axis] : 0.0;
-          cell[axis] = static_cast<uint32_t>(share * kCells);
-        }
-        keys[i] = {mortonEncode(cell[0], cell[1], cell[2]), static_cast<uint32_t>(i)};
-      }
-    });
-    std::sort(keys.begin(), keys.end());
-    for (size_t k = 0; k < keys.size(); ++k) order_[k] = keys[k].second;
+    if (options_.sort) sortAlongMortonCurve(cloud_.positions, order_.data(), order_.size());
   }
 
   void encodeMeans() {

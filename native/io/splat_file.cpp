@@ -17,6 +17,7 @@
 #include "io/ksplat_file.h"
 #include "io/ply_file.h"
 #include "io/sog_file.h"
+#include "io/sog_levels.h"
 #include "io/splat32_file.h"
 #include "io/spz_file.h"
 
@@ -125,6 +126,10 @@ const std::vector<SplatFormat>& splatFormats() {
       {"ksplat", "ksplat", ".ksplat", 3, Frame::kRDF, false, nullptr, readKsplat, nullptr},
       {"gltf", "glTF with KHR_gaussian_splatting", ".glb .gltf", 3, kGltfFrame, true,
        startsAsGltfSplats, readGltfSplats, writeGltfSplats},
+      {"sog_levels", "streamed SOG", "lod-meta.json", 3, Frame::kRDF, true, startsAsSogLevels,
+       readSogLevels,
+       [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
+          Progress* progress) { writeSogLevels({&cloud}, nullptr, path, {}, progress); }},
       {"sog", "SOG", ".sog meta.json", 3, Frame::kRDF, true, startsAsSog, readSog,
        [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
           Progress* progress) { writeSog(cloud, path, {}, progress); }},

@@ -45,6 +45,7 @@ FUNCTIONS = {
     'stipple_cloud_load': (_status, [_handle, _path, _out_handle]),
     'stipple_cloud_save_options_init': (None, [_to(s.StippleCloudSaveOptions)]),
     'stipple_cloud_save': (_status, [_handle, _path, _to(s.StippleCloudSaveOptions)]),
+    'stipple_cloud_save_levels': (_status, [POINTER(_handle), c_uint64, _handle, _path]),
     'stipple_format_count': (_status, [POINTER(c_uint64)]),
     'stipple_format_info': (_status, [c_uint64, _to(s.StippleFormatInfo)]),
     'stipple_format_of_file': (_status, [_path, POINTER(c_uint64)]),

@@ -1,0 +1,87 @@
+#include <stdlib.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "api/fixtures.h"
+
+namespace stipple::test {
+namespace {
+
+class Formats : public ApiTest {
+ protected:
+  void SetUp() override {
+    ApiTest::SetUp();
+    std::string pattern = (std::filesystem::temp_directory_path() / "stipple_api_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override {
+    std::filesystem::remove_all(folder_);
+    ApiTest::TearDown();
+  }
+  std::string path(const char* name) const { return (folder_ / name).string(); }
+  std::string formatOf(const std::string& file) const {
+    uint64_t index = 0;
+    uint64_t count = 0;
+    STIPPLE_EXPECT_OK(stipple_format_count(&count));
+    STIPPLE_EXPECT_OK(stipple_format_of_file(file.c_str(), &index));
+    if (index == count) return "";
+    auto info = sized<StippleFormatInfo>();
+    STIPPLE_EXPECT_OK(stipple_format_info(index, &info));
+    return info.name;
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(Formats, AreToldByContent) {
+  StippleCloud* cloud = oneSplat(1, 0, 0);
+  const char* const kFiles[][2] = {{"a.glb", "gltf"},    {"a.gltf", "gltf"}, {"a.sog", "sog"},
+                                   {"meta.json", "sog"}, {"a.ply", "ply"},   {"a.splat", "splat"}};
+  for (const auto& [name, format] : kFiles) {
+    STIPPLE_ASSERT_OK(stipple_cloud_save(cloud, path(name).c_str(), nullptr));
+    EXPECT_EQ(formatOf(path(name)), format) << name;
+  }
+  std::filesystem::rename(path("a.glb"), path("renamed"));
+  EXPECT_EQ(formatOf(path("renamed")), "gltf");
+  // A glTF file that does not name the extension holds meshes.
+  std::ofstream(path("mesh.gltf")) << R"({"asset": {"version": "2.0"}, "meshes": []})";
+  EXPECT_EQ(formatOf(path("mesh.gltf")), "");
+  uint64_t index = 0;
+  EXPECT_EQ(stipple_format_of_file(path("missing.ply").c_str(), &index), STIPPLE_ERROR_IO);
+  EXPECT_EQ(stipple_format_of_file(nullptr, &index), STIPPLE_ERROR_INVALID_ARGUMENT);
+  stipple_cloud_free(cloud);
+}
+
+TEST_F(Formats, LevelsAreSavedAndTheFinestIsRead) {
+  StippleCloud* fine = oneSplat(1, 0, 0);
+  StippleCloud* coarse = oneSplat(0, 1, 0);
+  const StippleCloud* levels[] = {fine, coarse};
+  const std::string file = path("lod-meta.json");
+  STIPPLE_ASSERT_OK(stipple_cloud_save_levels(levels, 2, coarse, file.c_str()));
+  StippleCloud* back = nullptr;
+  STIPPLE_ASSERT_OK(stipple_cloud_load(context_, file.c_str(), &back));
+  auto info = sized<StippleCloudInfo>();
+  STIPPLE_ASSERT_OK(stipple_cloud_info(back, &info));
+  EXPECT_EQ(info.count, 2u);  // the finest level's, and the environment's
+  float sh[6] = {};
+  auto buffers = sized<StippleCloudBuffers>();
+  buffers.capacity = 2;
+  buffers.sh = sh;
+  STIPPLE_ASSERT_OK(stipple_cloud_read(back, &buffers));
+  EXPECT_GT(sh[0], sh[1]);
+  EXPECT_LT(sh[3], sh[4]);
+  EXPECT_EQ(stipple_cloud_save_levels(levels, 0, nullptr, file.c_str()),
+            STIPPLE_ERROR_INVALID_ARGUMENT);
+  const StippleCloud* missing[] = {fine, nullptr};
+  EXPECT_EQ(stipple_cloud_save_levels(missing, 2, nullptr, file.c_str()),
+            STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(stipple_last_error_message()).find("levels[1]"), std::string::npos);
+  for (StippleCloud* cloud : {fine, coarse, back}) stipple_cloud_free(cloud);
+}
+
+}  // namespace
+}  // namespace stipple::test
