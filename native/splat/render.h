@@ -95,7 +95,7 @@ void renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
 
 /// Upper bounds of the bytes that renderTiled allocates, by what they grow with.
 struct RenderMemory {
-  uint64_t splat_bytes = 0;   ///< at most 200 per splat, and 9 MiB
+  uint64_t splat_bytes = 0;   ///< at most 112 per splat, and 11 MiB
   uint64_t pixel_bytes = 0;   ///< at most 64 per pixel: counters of the tiles
   uint64_t pair_bytes = 0;    ///< 4 per pair of splat and tile, at most 136 MB or 4 per splat
   uint64_t result_bytes = 0;  ///< the picture itself

@@ -168,7 +168,7 @@ void keepTile(size_t index, const TilePixels& pixels, KeptPicture& kept) {
 /// Out: result and kept, where not null.
 void renderTile(const SplatSlots& slots, const Tile& tile, size_t index, TileKernel kernel,
                 const RenderOptions& options, RenderResult* result, KeptPicture* kept) {
-  // Scratch of this thread: 9 KiB of pixels and 7 KiB of splats, in the first-level cache.
+  // Scratch of this thread: 10 KiB of pixels and 8 KiB of splats, in the first-level cache.
   TilePixels pixels;
   TileSplat batch[kBatchSize];
   clearPixels(tile, pixels);
