@@ -1,4 +1,5 @@
-// Splat files against what the disk cache gives: the same bytes through fread and fwrite alone.
+// Splat files against what the disk cache gives: the same bytes through fread and fwrite alone, and
+// through the packing library where the format packs.
 // Files lie in memory (/dev/shm), so that a slow disk does not hide the work of the reader.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
@@ -8,8 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "base/parallel.h"
 #include "base/random.h"
 #include "bench/comparison.h"
+#include "io/compression.h"
+#include "io/little_endian.h"
 #include "io/splat_file.h"
 
 namespace stipple::bench {
@@ -18,8 +22,8 @@ namespace {
 constexpr size_t kSplats = 1000000;
 constexpr int kDegree = 3;
 
-std::string scratchPath() {
-  return "/dev/shm/stipple_bench_" + std::to_string(::getpid()) + ".ply";
+std::string scratchPath(const std::string& ending) {
+  return "/dev/shm/stipple_bench_" + std::to_string(::getpid()) + ending;
 }
 
 const SplatCloud& cloud() {
@@ -39,18 +43,6 @@ const SplatCloud& cloud() {
     return made;
   }();
   return kCloud;
-}
-
-/// The file that every benchmark here reads or makes again; removed at the end of the program.
-struct ScratchFile {
-  std::string path = scratchPath();
-  ScratchFile() { writeSplatFile(cloud(), path, {}); }
-  ~ScratchFile() { ::unlink(path.c_str()); }
-};
-
-const std::string& scratchFile() {
-  static const ScratchFile kFile;
-  return kFile.path;
 }
 
 struct Closer {
@@ -77,36 +69,124 @@ void finish(benchmark::State& state, size_t bytes) {
   state.SetItemsProcessed(static_cast<int64_t>(kSplats) * state.iterations());
 }
 
-void plyRead(benchmark::State& state) {
-  const std::string& path = scratchFile();
+/// A packed stream of a file and what it unpacks to.
+struct Stream {
+  Compression compression;
+  size_t offset, size, plain;
+};
+
+/// The streams of an SPZ file of version 3 (one of gzip) or 4 (zstd, listed in a table).
+std::vector<Stream> streamsOf(const std::vector<char>& file) {
+  if (file[0] != 'N') {
+    const auto* end = file.data() + file.size() - 4;
+    return {{Compression::kGzip, 0, file.size(), loadLittleEndian<uint32_t>(end)}};
+  }
+  std::vector<Stream> streams;
+  const size_t count = static_cast<uint8_t>(file[15]);
+  const size_t table = loadLittleEndian<uint32_t>(&file[16]);
+  size_t offset = table + count * 16;
+  for (size_t s = 0; s < count; ++s) {
+    const auto packed = static_cast<size_t>(loadLittleEndian<uint64_t>(&file[table + s * 16]));
+    const auto plain = static_cast<size_t>(loadLittleEndian<uint64_t>(&file[table + s * 16 + 8]));
+    streams.push_back({Compression::kZstd, offset, packed, plain});
+    offset += packed;
+  }
+  return streams;
+}
+
+/// All streams unpacked, several at a time where there are several.
+std::vector<ByteVector> unpackAll(const std::vector<char>& file,
+                                  const std::vector<Stream>& streams) {
+  std::vector<ByteVector> plain(streams.size());
+  parallelFor(streams.size(), 1, [&](size_t begin, size_t end) {
+    for (size_t s = begin; s < end; ++s) {
+      plain[s].resize(streams[s].plain);
+      unpackBytes(streams[s].compression,
+                  reinterpret_cast<const uint8_t*>(&file[streams[s].offset]), streams[s].size,
+                  plain[s].data(), plain[s].size(), "floor");
+    }
+  });
+  return plain;
+}
+
+void packAll(const std::vector<ByteVector>& plain, const std::vector<Stream>& streams) {
+  parallelFor(streams.size(), 1, [&](size_t begin, size_t end) {
+    for (size_t s = begin; s < end; ++s) {
+      const bool gzip = streams[s].compression == Compression::kGzip;
+      benchmark::DoNotOptimize(packBytes(streams[s].compression, plain[s].data(), plain[s].size(),
+                                         gzip ? 6 : 12, "floor"));
+    }
+  });
+}
+
+struct Case {
+  const char* name;
+  const char* ending;
+  SplatWriteOptions options;
+  bool packed;  ///< the floor unpacks (or packs) the file's streams too
+};
+
+/// Reading against fread, and unpacking where the format packs.
+void readCase(benchmark::State& state, const Case& which) {
+  const std::string path = scratchPath(which.ending);
+  writeSplatFile(cloud(), path, which.options);
   size_t bytes = 0;
   compare(
-      state, "fread", 0.0, [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
-      [&] { bytes = readWhole(path).size(); });
+      state, which.packed ? "fread+unpack" : "fread", 0.6,
+      [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
+      [&] {
+        const std::vector<char> file = readWhole(path);
+        bytes = file.size();
+        if (which.packed) benchmark::DoNotOptimize(unpackAll(file, streamsOf(file)));
+      });
+  ::unlink(path.c_str());
   finish(state, bytes);
 }
 
-void plyWrite(benchmark::State& state) {
-  const std::string& path = scratchFile();
+/// Writing against fwrite, and packing the same bytes where the format packs.
+void writeCase(benchmark::State& state, const Case& which) {
+  const std::string path = scratchPath(which.ending);
+  writeSplatFile(cloud(), path, which.options);
   const std::vector<char> bytes = readWhole(path);
+  std::vector<Stream> streams;
+  if (which.packed) streams = streamsOf(bytes);
+  const std::vector<ByteVector> plain = unpackAll(bytes, streams);
   const std::string floor_path = path + ".floor";
   compare(
-      state, "fwrite", 0.0, [&] { writeSplatFile(cloud(), path, {}); },
-      [&] { writeWhole(floor_path, bytes); });
+      state, which.packed ? "pack+fwrite" : "fwrite", 0.6,
+      [&] { writeSplatFile(cloud(), path, which.options); },
+      [&] {
+        packAll(plain, streams);
+        writeWhole(floor_path, bytes);
+      });
   ::unlink(floor_path.c_str());
+  ::unlink(path.c_str());
   finish(state, bytes.size());
 }
 
-BENCHMARK(plyRead)
-    ->Name("io.ply_read.1M")
-    ->UseManualTime()
-    ->Iterations(8)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK(plyWrite)
-    ->Name("io.ply_write.1M")
-    ->UseManualTime()
-    ->Iterations(8)
-    ->Unit(benchmark::kMillisecond);
+const Case kCases[] = {{"ply", ".ply", {}, false},
+                       {"compressed_ply", ".compressed.ply", {}, false},
+                       {"splat", ".splat", {}, false},
+                       {"spz3", ".spz", {.version = 3}, true},
+                       {"spz4", ".spz", {.version = 4}, true}};
+
+const bool kRegistered = [] {
+  for (const Case& which : kCases) {
+    // Packing a million splats takes seconds: fewer rounds there.
+    const int rounds = which.packed ? 2 : 8;
+    benchmark::RegisterBenchmark((std::string("io.") + which.name + "_read.1M").c_str(), readCase,
+                                 which)
+        ->UseManualTime()
+        ->Iterations(8)
+        ->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark((std::string("io.") + which.name + "_write.1M").c_str(), writeCase,
+                                 which)
+        ->UseManualTime()
+        ->Iterations(rounds)
+        ->Unit(benchmark::kMillisecond);
+  }
+  return true;
+}();
 
 }  // namespace
 }  // namespace stipple::bench

@@ -142,8 +142,8 @@ class Reader {
         if (std::isfinite(ranges_[i][k]) && !(is_scale && ranges_[i][k] > kPlyLargestLogScale)) {
           continue;
         }
-        failHere(std::string(kChunkProperties[k]) + " of chunk " + std::to_string(i) +
-                 " is " + std::to_string(ranges_[i][k]) +
+        failHere(std::string(kChunkProperties[k]) + " of chunk " + std::to_string(i) + " is " +
+                 std::to_string(ranges_[i][k]) +
                  "; a finite number, and a logarithm up "
                  "to 88.7 for scales, is expected");
       }
@@ -200,6 +200,10 @@ class Reader {
 
   void readHarmonics() {
     const size_t rest = shCoefficientCount(cloud_.sh_degree) - 1;
+    std::array<float, 256> value_of;
+    for (size_t byte = 0; byte < 256; ++byte) {
+      value_of[byte] = static_cast<float>(plyHarmonicOf(static_cast<uint8_t>(byte)));
+    }
     std::vector<size_t> columns;
     for (size_t k = 0; k < rest * 3; ++k) {
       columns.push_back(column(harmonics_, "f_rest_" + std::to_string(k), PlyType::kUint8));
@@ -212,8 +216,9 @@ class Reader {
         const uint8_t* row = &block[(i - begin) * harmonics_.stride];
         float* sh = &cloud_.sh[i * cloud_.shStride()];
         // The file holds all of red, then all of green, then all of blue.
-        for (size_t k = 0; k < rest * 3; ++k) {
-          sh[(1 + k % rest) * 3 + k / rest] = static_cast<float>(plyHarmonicOf(row[columns[k]]));
+        const size_t* at = columns.data();
+        for (size_t channel = 0; channel < 3; ++channel) {
+          for (size_t k = 1; k <= rest; ++k) sh[k * 3 + channel] = value_of[row[*at++]];
         }
       }
     });

@@ -78,8 +78,7 @@ std::array<double, 9> valuesOf(const SplatCloud& cloud, size_t i) {
 uint32_t stepOf(double value, float low, float high, uint32_t steps) {
   const double extent = static_cast<double>(high) - static_cast<double>(low);
   if (!(extent > 0)) return 0;
-  const double share = std::clamp((value - static_cast<double>(low)) / extent, 0.0, 1.0);
-  return static_cast<uint32_t>(std::nearbyint(share * steps));
+  return nearestStep((value - static_cast<double>(low)) / extent * steps, steps);
 }
 
 uint32_t packRotation(const float* q) {
@@ -93,8 +92,7 @@ uint32_t packRotation(const float* q) {
   uint32_t packed = static_cast<uint32_t>(largest);
   for (size_t k = 0; k < 4; ++k) {
     if (k == largest) continue;
-    const double share = std::clamp(static_cast<double>(q[k]) * factor + 0.5, 0.0, 1.0);
-    packed = packed << 10 | static_cast<uint32_t>(std::nearbyint(share * 1023.0));
+    packed = packed << 10 | nearestStep((static_cast<double>(q[k]) * factor + 0.5) * 1023.0, 1023);
   }
   return packed;
 }
@@ -182,8 +180,9 @@ class Writer {
                       row + 12);
     const float* sh = &cloud_.sh[from * cloud_.shStride()];
     const size_t rest = harmonic_bytes_ / 3;
-    for (size_t k = 0; k < harmonic_bytes_; ++k) {
-      harmonics_[i * harmonic_bytes_ + k] = harmonicByte(sh[(1 + k % rest) * 3 + k / rest]);
+    uint8_t* bytes = harmonics_.data() + i * harmonic_bytes_;
+    for (size_t channel = 0; channel < 3; ++channel) {
+      for (size_t k = 1; k <= rest; ++k) *bytes++ = harmonicByte(sh[k * 3 + channel]);
     }
   }
 

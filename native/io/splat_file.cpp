@@ -19,6 +19,7 @@
 #include "io/sog_file.h"
 #include "io/sog_levels.h"
 #include "io/splat32_file.h"
+#include "io/splat_check.h"
 #include "io/spz_file.h"
 
 namespace stipple {
@@ -80,19 +81,27 @@ std::string listOfFormats(bool written) {
   return text;
 }
 
-/// Harmonics of a lower degree; the rest of the cloud as it is.
-void limitDegree(SplatCloud& cloud, int degree) {
-  if (cloud.sh_degree <= degree) return;
+/// A copy with harmonics up to a degree.
+SplatCloud copyOf(const SplatCloud& cloud, int degree) {
+  if (cloud.sh_degree <= degree) return cloud;
+  SplatCloud copy;
+  copy.sh_degree = degree;
+  copy.colour_space = cloud.colour_space;
+  copy.antialias = cloud.antialias;
+  copy.frame = cloud.frame;
+  copy.positions = cloud.positions;
+  copy.rotations = cloud.rotations;
+  copy.scales = cloud.scales;
+  copy.opacities = cloud.opacities;
   const size_t before = cloud.shStride();
-  cloud.sh_degree = degree;
-  const size_t after = cloud.shStride();
-  std::vector<float> kept(cloud.size() * after);
+  const size_t after = copy.shStride();
+  copy.sh.resize(cloud.size() * after);
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      std::memcpy(&kept[i * after], &cloud.sh[i * before], after * sizeof(float));
+      std::memcpy(&copy.sh[i * after], &cloud.sh[i * before], after * sizeof(float));
     }
   });
-  cloud.sh = std::move(kept);
+  return copy;
 }
 
 /// The cloud as a format takes it, where that differs from the cloud as it is.
@@ -106,8 +115,7 @@ std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& f
                          : cloud.frame != wanted;
   const bool recolours = cloud.colour_space == ColourSpace::kLinear && !format.holds_linear;
   if (cloud.sh_degree <= degree && !turns && !recolours) return std::nullopt;
-  SplatCloud copy = cloud;
-  limitDegree(copy, degree);
+  SplatCloud copy = copyOf(cloud, degree);
   if (recolours) convertColours(copy, ColourSpace::kDisplay);
   if (turns) convertFrame(copy, wanted);
   return copy;
@@ -186,7 +194,7 @@ void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                                           std::to_string(options.sh_degree_limit) +
                                           "; 0 to 4 is allowed");
   }
-  validate(cloud, "cloud");
+  validateInParallel(cloud, "cloud");
   const std::optional<SplatCloud> changed = prepared(cloud, *format, options);
   format->write(changed ? *changed : cloud, path, options, progress);
 }

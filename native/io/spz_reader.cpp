@@ -21,7 +21,7 @@ namespace {
 constexpr size_t kGrain = 8192;
 // deflate packs at most 1032 bytes into one.
 constexpr uint64_t kGzipRatio = 1032;
-// Far above what zstd makes of quantised splats; the bound that other readers put on a lying count.
+// Far above what zstd makes of positions; the bound that other readers put on a lying count.
 constexpr uint64_t kZstdRatio = 1024;
 // Extension records at the end of an old file: known ones take 12 and 20 bytes.
 constexpr size_t kExtensionRoom = size_t{1} << 16;
@@ -99,13 +99,13 @@ class Reader {
     return total;
   }
 
-  /// A lying count is refused before anything is allocated for it.
-  void requireRoom(uint64_t ratio) const {
+  /// A lying count is refused before anything is allocated for it. In: bytes that the splats unpack
+  /// to, and how many of them a byte of the file can hold.
+  void requireRoom(uint64_t unpacked, uint64_t ratio) const {
     const uint64_t possible = file_.size() * ratio;
-    if (allArrayBytes() > possible) {
-      failHere("claims " + std::to_string(header_.count) + " splats, " +
-               std::to_string(allArrayBytes()) + " bytes unpacked; its " +
-               std::to_string(file_.size()) + " bytes can hold at most " +
+    if (unpacked > possible) {
+      failHere("claims " + std::to_string(header_.count) + " splats, " + std::to_string(unpacked) +
+               " bytes unpacked; its " + std::to_string(file_.size()) + " bytes can hold at most " +
                std::to_string(possible));
     }
   }
@@ -119,7 +119,7 @@ class Reader {
                std::to_string(start.size()));
     }
     readHeader(start.data());
-    requireRoom(kGzipRatio);
+    requireRoom(allArrayBytes(), kGzipRatio);
     const uint64_t wanted = kSpzOldHeaderBytes + allArrayBytes() + kExtensionRoom;
     ByteVector plain(static_cast<size_t>(wanted));
     plain.resize(unpackBytes(Compression::kGzip, bytes_.data(), bytes_.size(), plain.data(),
@@ -156,7 +156,7 @@ class Reader {
                " bytes, it holds " + std::to_string(bytes_.size()));
     }
     readHeader(bytes_.data());
-    requireRoom(kZstdRatio);
+    requireRoom(arrayBytes(0), kZstdRatio);
     const size_t stream_count = bytes_[15];
     const uint64_t table = loadLittleEndian<uint32_t>(&bytes_[16]);
     const uint64_t table_end = table + stream_count * kSpzStreamEntryBytes;

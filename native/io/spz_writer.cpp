@@ -47,10 +47,9 @@ int fractionalBits(const SplatCloud& cloud) {
 
 uint8_t harmonicByte(float value, size_t coefficient) {
   const int step = coefficient < 4 ? kFirstDegreeStep : kHigherDegreeStep;
-  // Limits first: the conversion of a large number to int is undefined.
-  const double wide = std::clamp(static_cast<double>(value) * 128.0 + 128.0, -16.0, 300.0);
-  return static_cast<uint8_t>(
-      std::clamp(static_cast<int>(std::nearbyint(wide / step)) * step, 0, 255));
+  const double steps = (static_cast<double>(value) * 128.0 + 128.0) / step;
+  return static_cast<uint8_t>(std::min(
+      nearestStep(steps, 256 / static_cast<uint32_t>(step)) * static_cast<uint32_t>(step), 255u));
 }
 
 uint32_t smallestThree(const float* q) {
@@ -67,8 +66,7 @@ uint32_t smallestThree(const float* q) {
   uint32_t packed = static_cast<uint32_t>(largest);
   for (size_t k = 0; k < 4; ++k) {
     if (k == largest) continue;
-    const double steps = std::nearbyint(std::abs(static_cast<double>(xyzw[k])) * to_steps);
-    const uint32_t magnitude = static_cast<uint32_t>(std::min(steps, 511.0));
+    const uint32_t magnitude = nearestStep(std::abs(static_cast<double>(xyzw[k])) * to_steps, 511);
     packed = packed << 10 | ((xyzw[k] < 0) != turned ? 512u : 0u) | magnitude;
   }
   return packed;
@@ -80,11 +78,12 @@ std::array<ByteVector, kSpzArrayCount> encode(const SplatCloud& cloud, int bits)
     arrays[a].resize(cloud.size() * spzBytesPerSplat(a, 3, cloud.sh_degree));
   }
   const size_t stride = cloud.shStride();
+  const double to_fixed = std::ldexp(1.0, bits);
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin * 3; i < end * 3; ++i) {
-      const double fixed =
-          std::nearbyint(std::ldexp(static_cast<double>(cloud.positions[i]), bits));
-      const auto number = static_cast<uint32_t>(static_cast<int32_t>(fixed));
+      const double fixed = static_cast<double>(cloud.positions[i]) * to_fixed;
+      const auto number =
+          static_cast<uint32_t>(static_cast<int32_t>(fixed + (fixed < 0 ? -0.5 : 0.5)));
       for (size_t b = 0; b < 3; ++b) arrays[0][i * 3 + b] = static_cast<uint8_t>(number >> (8 * b));
       const double scale = static_cast<double>(cloud.scales[i]);
       arrays[3][i] = scale > 0 ? nearestByte((std::log(scale) + 10.0) * 16.0) : uint8_t{0};

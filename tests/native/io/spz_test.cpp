@@ -224,6 +224,25 @@ TEST_F(Spz, GivesBackWhatTheStepsOfTheFormatAllow) {
   }
 }
 
+TEST_F(Spz, HoldsScenesThatPackVeryWell) {
+  // 60 splats again and again: a thousandth of their bytes, yet no bomb.
+  const SplatCloud few = randomCloud(60, 3, 16);
+  SplatCloud many = few;
+  many.resize(60000);
+  for (size_t i = 60; i < many.size(); ++i) {
+    for (size_t k = 0; k < 3; ++k) many.positions[i * 3 + k] = few.positions[i % 60 * 3 + k];
+    for (size_t k = 0; k < 3; ++k) many.scales[i * 3 + k] = few.scales[i % 60 * 3 + k];
+    for (size_t k = 0; k < 4; ++k) many.rotations[i * 4 + k] = few.rotations[i % 60 * 4 + k];
+    for (size_t k = 0; k < 48; ++k) many.sh[i * 48 + k] = few.sh[i % 60 * 48 + k];
+    many.opacities[i] = few.opacities[i % 60];
+  }
+  for (const int version : {3, 4}) {
+    writeSplatFile(many, path("a.spz"), {.version = version});
+    EXPECT_LT(load(path("a.spz")).size(), 60000u);
+    EXPECT_EQ(readSplatFile(path("a.spz")).size(), 60000u);
+  }
+}
+
 TEST_F(Spz, WritesOnceMoreWhatItHasRead) {
   SplatCloud cloud = randomCloud(500, 3, 12);
   writeSplatFile(cloud, path("a.spz"), {});
