@@ -24,44 +24,50 @@ namespace {
 
 constexpr size_t kBatchSize = 128;
 
-/// A pixel as the reference blends it.
-PixelBlend<double> blendInDouble(const SplatSlots& slots, const Tile& tile, uint32_t x,
-                                 uint32_t y) {
-  // A few splats at a time: what else is needed of those that may show is asked for before it is
-  // used.
-  struct Near {
-    uint32_t slot;
-    double distance;
-  };
-  constexpr size_t kAtOnce = 64;
-  Near near[kAtOnce];
-  PixelBlend<double> pixel;
-  for (size_t begin = 0; begin < tile.splats.size() && !pixel.finished; begin += kAtOnce) {
-    size_t count = 0;
-    for (const uint32_t slot :
-         tile.splats.subspan(begin, std::min(kAtOnce, tile.splats.size() - begin))) {
-      if (!mayShow(slots.splats[slot], tile, x, y, near[count].distance)) continue;
-      __builtin_prefetch(&slots.extras[slot]);
-      near[count++].slot = slot;
-    }
-    for (size_t i = 0; i < count && !pixel.finished; ++i) {
-      const VisibleSplat& splat = slots.splats[near[i].slot];
-      const double alpha = splatAlpha(slots.extras[near[i].slot].opacity, near[i].distance);
-      if (alpha > 0) pixel.add(alpha, splat.colour, static_cast<double>(splat.depth));
+/// A pixel of a tile that is blended as the reference blends it.
+struct DoubtfulPixel {
+  uint32_t x, y;
+  PixelBlend<double> blend;
+};
+
+/// Goes over the tile's splats once for all of them.
+void blendInDouble(const SplatSlots& slots, const Tile& tile, DoubtfulPixel* pixels, size_t count) {
+  constexpr size_t kAhead = 8;
+  for (size_t i = 0; i < tile.splats.size() && count > 0; ++i) {
+    const size_t ahead = std::min(i + kAhead, tile.splats.size() - 1);
+    __builtin_prefetch(&slots.splats[tile.splats[ahead]]);
+    __builtin_prefetch(&slots.extras[tile.splats[ahead]]);
+    const uint32_t slot = tile.splats[i];
+    const VisibleSplat& splat = slots.splats[slot];
+    for (size_t k = 0; k < count; ++k) {
+      double distance;
+      if (!mayShow(splat, tile, pixels[k].x, pixels[k].y, distance)) continue;
+      const double alpha = splatAlpha(slots.extras[slot].opacity, distance);
+      if (alpha == 0) continue;
+      pixels[k].blend.add(alpha, splat.colour, static_cast<double>(splat.depth));
+      // A pixel that has ended changes places with the last that has not.
+      if (pixels[k].blend.finished) std::swap(pixels[k--], pixels[--count]);
     }
   }
-  return pixel;
 }
 
 void replaceDoubtful(const SplatSlots& slots, const Tile& tile, TilePixels& pixels) {
   uint32_t any = 0;
   for (const float doubt : pixels.doubt) any |= std::bit_cast<uint32_t>(doubt);
   if (any == 0) return;
-  for (uint32_t y = 0; y < tile.height; ++y) {
-    for (uint32_t x = 0; x < tile.width; ++x) {
-      const size_t i = static_cast<size_t>(y) * kTileSide + x;
-      if (pixels.doubt[i] == 0.0f) continue;
-      const PixelBlend<double> pixel = blendInDouble(slots, tile, x, y);
+  constexpr size_t kAtOnce = 32;
+  DoubtfulPixel doubtful[kAtOnce];
+  for (uint32_t next = 0; next < kTilePixelCount;) {
+    size_t count = 0;
+    for (; next < kTilePixelCount && count < kAtOnce; ++next) {
+      // Pixels outside the picture are never in doubt.
+      if (pixels.doubt[next] == 0.0f) continue;
+      doubtful[count++] = {next % kTileSide, next / kTileSide, {}};
+    }
+    blendInDouble(slots, tile, doubtful, count);
+    for (size_t k = 0; k < count; ++k) {
+      const size_t i = static_cast<size_t>(doubtful[k].y) * kTileSide + doubtful[k].x;
+      const PixelBlend<double>& pixel = doubtful[k].blend;
       pixels.transmittance[i] = static_cast<float>(pixel.transmittance);
       pixels.red[i] = static_cast<float>(pixel.colour[0]);
       pixels.green[i] = static_cast<float>(pixel.colour[1]);
