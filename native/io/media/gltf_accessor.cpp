@@ -205,26 +205,36 @@ void requireAccessor(const tinygltf::Model& model, int index, size_t width,
   }
 }
 
-void readFloatsTo(const tinygltf::Model& model, int index, size_t width, const std::string& what,
-                  float* out, size_t out_stride) {
+FloatSource::FloatSource(const tinygltf::Model& model, int index, size_t width,
+                         const std::string& what)
+    : model_(model), accessor_(accessorAt(model, index, what)), width_(width), what_(what) {
   requireAccessor(model, index, width, what);
-  const tinygltf::Accessor& accessor = accessorAt(model, index, what);
-  if (accessor.bufferView >= 0) {
-    const size_t bytes = componentBytes(accessor.componentType, what);
-    const Range range = rangeOf(model, accessor.bufferView, accessor.byteOffset, accessor.count,
-                                bytes * width, what);
-    convert(accessor, range.first, range.stride, accessor.count, width, out, out_stride);
-  } else {
-    for (size_t i = 0; i < accessor.count; ++i) std::fill_n(out + i * out_stride, width, 0.0f);
+  if (accessor_.bufferView < 0) return;
+  const Range range = rangeOf(model, accessor_.bufferView, accessor_.byteOffset, accessor_.count,
+                              componentBytes(accessor_.componentType, what) * width, what);
+  first_ = range.first;
+  stride_ = range.stride;
+}
+
+void FloatSource::readDense(size_t begin, size_t end, float* out, size_t out_stride) const {
+  if (first_ != nullptr) {
+    convert(accessor_, first_ + begin * stride_, stride_, end - begin, width_, out, out_stride);
+    return;
   }
-  if (accessor.sparse.isSparse) applySparse(model, accessor, width, what, out, out_stride);
+  for (size_t i = 0; i < end - begin; ++i) std::fill_n(out + i * out_stride, width_, 0.0f);
+}
+
+void FloatSource::readSparse(float* out, size_t out_stride) const {
+  if (accessor_.sparse.isSparse) applySparse(model_, accessor_, width_, what_, out, out_stride);
 }
 
 std::vector<float> readFloats(const tinygltf::Model& model, int index, size_t width,
                               const std::string& what) {
   requireAccessor(model, index, width, what);
   std::vector<float> values(accessorAt(model, index, what).count * width);
-  readFloatsTo(model, index, width, what, values.data(), width);
+  const FloatSource source(model, index, width, what);
+  source.readDense(0, values.size() / width, values.data(), width);
+  source.readSparse(values.data(), width);
   return values;
 }
 

@@ -7,7 +7,8 @@
 
 namespace tinygltf {
 class Model;
-}
+struct Accessor;
+}  // namespace tinygltf
 
 namespace stipple::media {
 
@@ -18,10 +19,24 @@ namespace stipple::media {
 std::vector<float> readFloats(const tinygltf::Model& model, int accessor, size_t width,
                               const std::string& what);
 
-/// The same to floats of the caller's, `out_stride` apart. In: out, room for accessorCount elements
-/// of an accessor that requireAccessor lets pass.
-void readFloatsTo(const tinygltf::Model& model, int accessor, size_t width, const std::string& what,
-                  float* out, size_t out_stride);
+/// An accessor that is read in pieces, from any thread: first the pieces of its dense part, then
+/// its sparse part once. Refuses what readFloats refuses when it is made.
+class FloatSource {
+ public:
+  FloatSource(const tinygltf::Model& model, int accessor, size_t width, const std::string& what);
+  /// Elements [begin, end) to `out`, `out_stride` floats apart.
+  void readDense(size_t begin, size_t end, float* out, size_t out_stride) const;
+  /// In: out, where element 0 is.
+  void readSparse(float* out, size_t out_stride) const;
+
+ private:
+  const tinygltf::Model& model_;
+  const tinygltf::Accessor& accessor_;
+  size_t width_;
+  std::string what_;
+  const unsigned char* first_ = nullptr;  ///< null: all zeros
+  size_t stride_ = 0;
+};
 
 /// Elements of an accessor. Errors: kFormat if there is no such accessor.
 size_t accessorCount(const tinygltf::Model& model, int accessor, const std::string& what);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "data/splat_cloud.h"
 #include "io/gltf_splat_names.h"
 #include "io/media/gltf_accessor.h"
@@ -22,6 +23,7 @@ namespace {
 // A file may show one splat mesh at several nodes; more than this many are made to exhaust memory.
 constexpr uint64_t kMaxUses = 64;
 constexpr int kMaxDegree = 3;
+constexpr size_t kBlock = 1024;
 
 const std::set<std::string> kKnownExtensions = {kGltfSplats, "KHR_mesh_quantization",
                                                 "KHR_materials_unlit", "KHR_texture_transform"};
@@ -179,8 +181,15 @@ class SplatReader {
       return static_cast<float*>(
           allocate(sink, which + static_cast<uint32_t>(index) * 5, floats * sizeof(float)));
     };
+    struct Column {
+      FloatSource source;
+      float* out;
+      size_t stride;
+    };
+    std::vector<Column> columns;
     const auto take = [&](const std::string& name, size_t width, float* out, size_t stride) {
-      readFloatsTo(model_, find(part, name), width, part.what + ", " + name, out, stride);
+      columns.push_back(
+          {FloatSource(model_, find(part, name), width, part.what + ", " + name), out, stride});
     };
     take("POSITION", 3, array(kMediaSplatPositions, 3), 3);
     take(kGltfRotation, 4, array(kMediaSplatRotations, 4), 4);
@@ -194,6 +203,13 @@ class SplatReader {
         take(gltfHarmonic(d, m), 3, sh + (d * d + m) * 3, stride);
       }
     }
+    // Block by block, so that the harmonics of a splat meet in the cache.
+    parallelFor(static_cast<size_t>(part.info.count), kBlock, [&](size_t begin, size_t end) {
+      for (const Column& column : columns) {
+        column.source.readDense(begin, end, column.out + begin * column.stride, column.stride);
+      }
+    });
+    for (const Column& column : columns) column.source.readSparse(column.out, column.stride);
   }
 
   std::string path_;

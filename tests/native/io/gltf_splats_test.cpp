@@ -272,8 +272,8 @@ TEST_F(GltfSplats, FallBackColoursAreLinear) {
           expected = 0.5 + 0.28209479177387814 * double(cloud.sh[i * 3 + c]);
           if (space == ColourSpace::kDisplay) expected = srgbToLinear(expected);
         }
-        // Half a step of 16 bits.
-        EXPECT_NEAR(code / 65535.0, std::clamp(expected, 0.0, 1.0), 0.5 / 65535.0 + 1e-9);
+        // Half a step of 16 bits, and what the transfer function's table is off.
+        EXPECT_NEAR(code / 65535.0, std::clamp(expected, 0.0, 1.0), 0.5 / 65535.0 + 1e-7);
       }
     }
   }
