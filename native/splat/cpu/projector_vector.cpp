@@ -250,9 +250,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include <strings.h>
-
-#include <cstdlib>
+#include "splat/cpu/target_choice.h"
 
 namespace stipple {
 
@@ -260,33 +258,19 @@ HWY_EXPORT(namedProjector);
 
 namespace {
 
-Projector chooseProjector() {
-  // A name that no target has is refused by chosenTileKernel.
-  if (const char* forced = std::getenv("STIPPLE_FORCE_TARGET")) {
-    for (const NamedProjector& named : projectors()) {
-      if (strcasecmp(named.target, forced) == 0) return named.project;
-    }
-  }
-  return HWY_DYNAMIC_DISPATCH(namedProjector)().project;
+NamedProjector dispatched() {
+  return HWY_DYNAMIC_DISPATCH(namedProjector)();
 }
 
 }  // namespace
 
 std::vector<NamedProjector> projectors() {
-  std::vector<NamedProjector> list = {{"scalar", projectScalar}};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    list.push_back(HWY_DYNAMIC_DISPATCH(namedProjector)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return list;
+  return onEveryTarget<NamedProjector>({"scalar", projectScalar}, dispatched);
 }
 
 Projector chosenProjector() {
-  static const Projector projector = chooseProjector();
-  return projector;
+  static const Projector chosen = chosenTarget<NamedProjector>(projectors, dispatched).project;
+  return chosen;
 }
 
 }  // namespace stipple

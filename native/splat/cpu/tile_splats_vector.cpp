@@ -86,9 +86,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include <strings.h>
-
-#include <cstdlib>
+#include "splat/cpu/target_choice.h"
 
 namespace stipple {
 
@@ -96,33 +94,20 @@ HWY_EXPORT(namedMaker);
 
 namespace {
 
-TileSplatMaker chooseMaker() {
-  // A name that no target has is refused by chosenTileKernel.
-  if (const char* forced = std::getenv("STIPPLE_FORCE_TARGET")) {
-    for (const NamedTileSplatMaker& named : tileSplatMakers()) {
-      if (strcasecmp(named.target, forced) == 0) return named.make;
-    }
-  }
-  return HWY_DYNAMIC_DISPATCH(namedMaker)().make;
+NamedTileSplatMaker dispatched() {
+  return HWY_DYNAMIC_DISPATCH(namedMaker)();
 }
 
 }  // namespace
 
 std::vector<NamedTileSplatMaker> tileSplatMakers() {
-  std::vector<NamedTileSplatMaker> list = {{"scalar", makeTileSplatsScalar}};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    list.push_back(HWY_DYNAMIC_DISPATCH(namedMaker)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return list;
+  return onEveryTarget<NamedTileSplatMaker>({"scalar", makeTileSplatsScalar}, dispatched);
 }
 
 TileSplatMaker chosenTileSplatMaker() {
-  static const TileSplatMaker maker = chooseMaker();
-  return maker;
+  static const TileSplatMaker chosen =
+      chosenTarget<NamedTileSplatMaker>(tileSplatMakers, dispatched).make;
+  return chosen;
 }
 
 }  // namespace stipple
