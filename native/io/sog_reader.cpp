@@ -207,11 +207,13 @@ class Reader {
     palette_count_ =
         std::min<uint64_t>(uint64_t{picture.height} * kPaletteRow, meta_.palette_count);
     palette_.resize(static_cast<size_t>(palette_count_) * row * 3);
-    for (size_t pixel = 0; pixel < palette_count_ * row; ++pixel) {
-      for (size_t c = 0; c < 3; ++c) {
-        palette_[pixel * 3 + c] = meta_.harmonics[picture.bytes[pixel * 4 + c]];
+    parallelFor(static_cast<size_t>(palette_count_) * row, kGrain, [&](size_t begin, size_t end) {
+      for (size_t pixel = begin; pixel < end; ++pixel) {
+        for (size_t c = 0; c < 3; ++c) {
+          palette_[pixel * 3 + c] = meta_.harmonics[picture.bytes[pixel * 4 + c]];
+        }
       }
-    }
+    });
   }
 
   void fillSplat(size_t i, std::string* bad) {

@@ -97,6 +97,7 @@ class Encoder {
     }
     encodeMeans();
     advance(progress_, 0.05, kStage);
+    makeCodebooks();
     encodeScales();
     encodeRotations();
     encodeColours();
@@ -177,18 +178,30 @@ class Encoder {
     return {least, most};
   }
 
-  void encodeScales() {
-    std::vector<float> logarithms(cloud_.scales.size());
-    parallelFor(logarithms.size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) logarithms[i] = logScale(cloud_.scales[i]);
+  /// Both codebooks, side by side: most of their time is one thread's sorting.
+  void makeCodebooks() {
+    logarithms_.resize(cloud_.scales.size());
+    colours_.resize(cloud_.size() * 3);
+    parallelFor(cloud_.size(), kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin * 3; i < end * 3; ++i) logarithms_[i] = logScale(cloud_.scales[i]);
+      for (size_t i = begin; i < end; ++i) {
+        std::copy_n(&cloud_.sh[i * cloud_.shStride()], 3, &colours_[i * 3]);
+      }
     });
-    const Codebook codebook = makeCodebook(logarithms);
+    parallelFor(2, 1, [&](size_t which, size_t) {
+      (which == 0 ? scale_codebook_ : colour_codebook_) =
+          makeCodebook(which == 0 ? logarithms_ : colours_);
+    });
+  }
+
+  void encodeScales() {
     fillPixels(addPicture("scales.webp"), [&](uint8_t* pixel, size_t i) {
-      for (size_t axis = 0; axis < 3; ++axis)
-        pixel[axis] = codebook.nearest(logarithms[i * 3 + axis]);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        pixel[axis] = scale_codebook_.nearest(logarithms_[i * 3 + axis]);
+      }
       pixel[3] = 255;
     });
-    meta_["scales"] = {{"codebook", toJson(codebook)}, {"files", {"scales.webp"}}};
+    meta_["scales"] = {{"codebook", toJson(scale_codebook_)}, {"files", {"scales.webp"}}};
   }
 
   void encodeRotations() {
@@ -215,18 +228,14 @@ class Encoder {
   }
 
   void encodeColours() {
-    const size_t stride = cloud_.shStride();
-    std::vector<float> colours(cloud_.size() * 3);
-    for (size_t i = 0; i < cloud_.size(); ++i) {
-      std::copy_n(&cloud_.sh[i * stride], 3, &colours[i * 3]);
-    }
-    const Codebook codebook = makeCodebook(colours);
     fillPixels(addPicture("sh0.webp"), [&](uint8_t* pixel, size_t i) {
-      for (size_t c = 0; c < 3; ++c) pixel[c] = codebook.nearest(colours[i * 3 + c]);
+      for (size_t c = 0; c < 3; ++c) {
+        pixel[c] = colour_codebook_.nearest(colours_[i * 3 + c]);
+      }
       pixel[3] =
           static_cast<uint8_t>(std::lround(static_cast<double>(cloud_.opacities[i]) * 255.0));
     });
-    meta_["sh0"] = {{"codebook", toJson(codebook)}, {"files", {"sh0.webp"}}};
+    meta_["sh0"] = {{"codebook", toJson(colour_codebook_)}, {"files", {"sh0.webp"}}};
   }
 
   void encodeHarmonics() {
@@ -292,6 +301,10 @@ class Encoder {
   std::vector<uint32_t> order_;
   uint64_t width_ = 0;
   uint64_t height_ = 0;
+  std::vector<float> logarithms_;  ///< [N,3] of scales
+  std::vector<float> colours_;     ///< [N,3]
+  Codebook scale_codebook_;
+  Codebook colour_codebook_;
   Json meta_;
   std::vector<Picture> pictures_;
 };
