@@ -24,6 +24,7 @@ enum class RandomUse : uint32_t {
   kDecoder = 5,
   kGroundPlane = 6,
   kPalette = 9,
+  kViewRig = 10,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and

@@ -12,6 +12,7 @@ namespace stipple {
 /// What a decoder turns into splats: the whole anchor set, in one call.
 struct DecodeRequest {
   const AnchorSet* anchors = nullptr;
+  uint64_t budget = 0;  ///< P; only decoders without anchors (an existing cloud) read it
   uint32_t gaussians_per_anchor = 1;  ///< K
   double time = 0.0;                  ///< seconds; only decoders of moving splats read it
   const Camera* camera = nullptr;     ///< only view-adaptive decoders read it

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "data/splat_cloud.h"
+#include "math/camera.h"
+
+namespace stipple {
+
+enum class ViewRig : uint32_t {
+  kAutomatic = 0,  ///< inside where the cloud surrounds its own middle, around it otherwise
+  kAround = 1,     ///< from a sphere around the cloud, looking at its middle
+  kInside = 2,     ///< from places near the middle, looking out: rooms, landscapes
+};
+
+struct ViewRigOptions {
+  ViewRig rig = ViewRig::kAutomatic;
+  uint32_t count = 16;  ///< views, 1..4096
+  uint32_t size = 256;  ///< pixels per side, 1..65536
+  uint64_t seed = 0;    ///< other seeds give other views, spread as evenly
+};
+
+/// Cameras that see a cloud from everywhere: directions of a turned Fibonacci sphere.
+/// Errors: kInvalidArgument for an empty cloud, a count or size out of range.
+std::vector<Camera> viewsOfCloud(const SplatCloud& cloud, const ViewRigOptions& options);
+
+/// What kAutomatic chooses: kInside where at least half of the directions from the middle of the
+/// cloud end on a surface farther than 0.3 of its radius.
+ViewRig chooseRig(const SplatCloud& cloud);
+
+}  // namespace stipple

@@ -1,0 +1,76 @@
+#include "train/visibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/parallel.h"
+#include "math/covariance.h"
+#include "splat/projection.h"
+#include "splat/render_backward.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr size_t kGrain = 2048;
+
+/// Sum of alpha over the pixels of a view with nothing in front, by the area of the projected
+/// Gaussian in the middle of its pixels, clamps left out; the picture's borders cut nothing off.
+double unhiddenWeight(const Projected<double>& splat) {
+  const Footprint<double>& f = splat.footprint;
+  return 2 * std::numbers::pi * f.opacity / (f.l00 * f.l11);
+}
+
+}  // namespace
+
+std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Camera> views,
+                                   Progress* progress) {
+  const size_t count = cloud.size();
+  std::vector<double> seen(count, 0.0);
+  std::vector<double> whole(count, 0.0);
+  RenderOptions options;
+  options.with_depth = false;
+  const SplatInstance instance{&cloud};
+  BackwardWorkspace workspace;
+  BackwardResult result;
+  std::vector<float> no_gradient;
+  for (size_t v = 0; v < views.size(); ++v) {
+    advance(progress, static_cast<double>(v) / static_cast<double>(views.size()),
+            "Looking at the splats");
+    const Camera& camera = views[v];
+    no_gradient.assign(size_t{4} * camera.width * camera.height, 0.0f);
+    BackwardInput input;
+    input.colour_gradient = no_gradient;
+    input.with_blending_weights = true;
+    renderBackward({&instance, 1}, camera, options, input, workspace, result, UINT64_MAX, nullptr);
+    const std::vector<float>& weights = result.instances[0].blending_weights;
+    const View<double> view = makeView<double>(camera);
+    const Mat3d linear = camera.world_to_camera.topLeftCorner<3, 3>();
+    const Vec3d translation = camera.world_to_camera.topRightCorner<3, 1>();
+    const LowPass low_pass = cloud.antialias == Antialias::kMip ? LowPass::kMip : LowPass::kClassic;
+    parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        Projected<double> projected;
+        if (!project(view, linear, translation, &cloud.positions[i * 3], &cloud.rotations[i * 4],
+                     &cloud.scales[i * 3], cloud.opacities[i], low_pass, projected)) {
+          continue;
+        }
+        // Near views show a splat large without making it more important: areas, not pixels.
+        const double pixel = view.perspective ? projected.depth / view.fx : 1 / view.fx;
+        seen[i] += static_cast<double>(weights[i]) * pixel * pixel;
+        whole[i] += unhiddenWeight(projected) * pixel * pixel;
+      }
+    });
+  }
+  std::vector<float> visibility(count);
+  for (size_t i = 0; i < count; ++i) {
+    const bool faint = static_cast<double>(cloud.opacities[i]) < kMinAlpha;
+    const double unknown = faint ? 0.0 : 1.0;
+    const double share = whole[i] > 0 ? seen[i] / whole[i] : unknown;
+    visibility[i] = static_cast<float>(std::clamp(share, 0.0, 1.0));
+  }
+  return visibility;
+}
+
+}  // namespace stipple
