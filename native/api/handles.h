@@ -7,12 +7,14 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "data/image.h"
 #include "data/sparse_volume.h"
 #include "data/splat_cloud.h"
 #include "data/tri_mesh.h"
+#include "decode/hierarchy_decoder.h"
 #include "decode/surface_model.h"
 #include "density/octree_density.h"
 #include "io/camera_file.h"
@@ -33,6 +35,9 @@ struct ContextState {
   void requirePictureMemory(uint64_t bytes, const std::string& what, uint64_t pair_bytes) const;
 };
 using Context = std::shared_ptr<const ContextState>;
+
+/// A source of splats: of a mesh, or of an existing cloud.
+using ModelParts = std::variant<SurfaceModel, std::shared_ptr<const HierarchyDecoder>>;
 
 /// What a renderer keeps from one picture to the next; its jobs hold a share.
 struct RendererMemory {
@@ -71,7 +76,7 @@ struct StippleDensity {
 
 struct StippleModel {
   stipple::api::Context context;
-  stipple::SurfaceModel model;
+  stipple::api::ModelParts parts;
 };
 
 struct StippleViews {

@@ -101,7 +101,7 @@ void stipple_job_free(StippleJob* job) {
 
 StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model) {
   return guarded([&] {
-    const auto& made = resultOf<stipple::SurfaceModel>(require(job, "job"), "model");
+    const auto& made = resultOf<ModelParts>(require(job, "job"), "model");
     require(model, "model") = new StippleModel{job->context, made};
   });
 }

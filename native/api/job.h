@@ -16,7 +16,7 @@
 namespace stipple::api {
 
 /// What a job leaves: nothing (it filled the caller's buffers), a model, a cloud or a volume.
-using JobResult = std::variant<std::monostate, SurfaceModel, std::shared_ptr<const SplatCloud>,
+using JobResult = std::variant<std::monostate, ModelParts, std::shared_ptr<const SplatCloud>,
                                std::shared_ptr<const SparseVolume>>;
 
 /// Work of a job: runs on the job's own thread within the context's thread limit. It owns shares of

@@ -4,8 +4,10 @@
 #include "api/bounds.h"
 #include "api/guard.h"
 #include "api/handles.h"
+#include "api/hierarchy.h"
 #include "api/job.h"
 #include "base/parallel.h"
+#include "io/asset_header.h"
 #include "io/surface_asset.h"
 
 using namespace stipple;
@@ -69,8 +71,15 @@ DecodeSettings decodeSettings(const StippleDecodeOptions* options) {
   return settings;
 }
 
-std::shared_ptr<const SplatCloud> decode(const SurfaceModel& model, const DecodeSettings& settings,
+std::shared_ptr<const SplatCloud> decode(const ModelParts& parts, const DecodeSettings& settings,
                                          Progress* progress) {
+  if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
+    DecodeRequest request;
+    request.budget = settings.sampling.count;
+    request.gaussians_per_anchor = settings.gaussians_per_anchor;
+    return std::make_shared<const SplatCloud>((*hierarchy)->decode(request));
+  }
+  const auto& model = std::get<SurfaceModel>(parts);
   const AnchorSet anchors = sampleAnchors(*model.density, settings.sampling, progress);
   DecodeRequest request;
   request.anchors = &anchors;
@@ -80,7 +89,11 @@ std::shared_ptr<const SplatCloud> decode(const SurfaceModel& model, const Decode
   return std::make_shared<const SplatCloud>(model.decoder->decode(request));
 }
 
-uint64_t decodeMemoryBound(const SurfaceModel& model, const DecodeSettings& settings) {
+uint64_t decodeMemoryBound(const ModelParts& parts, const DecodeSettings& settings) {
+  if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
+    return (*hierarchy)->memoryBound(settings.sampling.count, settings.gaussians_per_anchor);
+  }
+  const auto& model = std::get<SurfaceModel>(parts);
   return sampleMemoryBound(settings.sampling.count, settings.sampling.with_ranks) +
          model.decoder->memoryBound(settings.sampling.count, settings.gaussians_per_anchor);
 }
@@ -143,7 +156,7 @@ StippleStatus stipple_model_from_mesh_start(StippleContext* context, const Stipp
     const SurfaceModelOptions settings = modelOptions(completed(options, defaults, "options"));
     std::shared_ptr<const TriMesh> triangles = mesh->mesh;
     *job = startJob(context->state, [triangles, settings](Progress& progress) -> JobResult {
-      return buildSurfaceModel(*triangles, settings, &progress);
+      return ModelParts(buildSurfaceModel(*triangles, settings, &progress));
     });
   });
 }
@@ -155,14 +168,22 @@ StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8,
     require(model, "model");
     const std::string path = &require(path_utf8, "path_utf8");
     withThreads(context->state->thread_count, [&] {
-      *model = new StippleModel{context->state, fromAsset(readSurfaceAsset(path))};
+      *model = new StippleModel{context->state, readAssetKind(path) == kAssetHierarchy
+                                                    ? ModelParts(loadHierarchy(path))
+                                                    : fromAsset(readSurfaceAsset(path))};
     });
   });
 }
 
 StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf8) {
   return guarded([&] {
-    writeSurfaceAsset(toAsset(require(model, "model").model), &require(path_utf8, "path_utf8"));
+    const ModelParts& parts = require(model, "model").parts;
+    const std::string path = &require(path_utf8, "path_utf8");
+    if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
+      saveHierarchy(**hierarchy, path);
+    } else {
+      writeSurfaceAsset(toAsset(std::get<SurfaceModel>(parts)), path);
+    }
   });
 }
 
@@ -172,12 +193,22 @@ void stipple_model_free(StippleModel* model) {
 
 StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* info) {
   return guarded([&] {
-    const SurfaceModel& parts = require(model, "model").model;
+    const ModelParts& parts = require(model, "model").parts;
     StippleModelInfo out = {};
-    out.leaf_level = static_cast<uint32_t>(parts.density->leafLevel());
-    out.leaf_count = parts.density->leafCount();
-    out.sample_count = parts.surface->size();
-    fillBounds(parts.surface->positions, out.bounds_min, out.bounds_max);
+    if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
+      const SplatCloud& leaves = *(*hierarchy)->leaves();
+      out.kind = STIPPLE_MODEL_HIERARCHY;
+      out.leaf_count = leaves.size();
+      out.sh_degree = static_cast<uint32_t>(leaves.sh_degree);
+      fillBounds(leaves.positions, out.bounds_min, out.bounds_max);
+    } else {
+      const auto& surface = std::get<SurfaceModel>(parts);
+      out.kind = STIPPLE_MODEL_SURFACE;
+      out.leaf_level = static_cast<uint32_t>(surface.density->leafLevel());
+      out.leaf_count = surface.density->leafCount();
+      out.sample_count = surface.surface->size();
+      fillBounds(surface.surface->positions, out.bounds_min, out.bounds_max);
+    }
     deliver(info, out, "info");
   });
 }
@@ -185,7 +216,13 @@ StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* in
 StippleStatus stipple_model_density(const StippleModel* model, StippleDensity** density) {
   return guarded([&] {
     require(model, "model");
-    require(density, "density") = new StippleDensity{model->context, model->model.density};
+    require(density, "density");
+    const auto* surface = std::get_if<SurfaceModel>(&model->parts);
+    if (!surface) {
+      fail(ErrorCode::kUnsupported,
+           "this model is the hierarchy of a cloud and has no density; that of a mesh has one");
+    }
+    *density = new StippleDensity{model->context, surface->density};
   });
 }
 
@@ -195,9 +232,9 @@ StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecod
     require(model, "model");
     require(cloud, "cloud");
     const DecodeSettings settings = decodeSettings(options);
-    model->context->requireMemory(decodeMemoryBound(model->model, settings), "this budget");
+    model->context->requireMemory(decodeMemoryBound(model->parts, settings), "this budget");
     withThreads(model->context->thread_count, [&] {
-      *cloud = new StippleCloud{model->context, decode(model->model, settings, nullptr)};
+      *cloud = new StippleCloud{model->context, decode(model->parts, settings, nullptr)};
     });
   });
 }
@@ -208,8 +245,8 @@ StippleStatus stipple_model_decode_start(const StippleModel* model,
     require(model, "model");
     require(job, "job");
     const DecodeSettings settings = decodeSettings(options);
-    model->context->requireMemory(decodeMemoryBound(model->model, settings), "this budget");
-    const SurfaceModel parts = model->model;
+    model->context->requireMemory(decodeMemoryBound(model->parts, settings), "this budget");
+    const ModelParts parts = model->parts;
     *job = startJob(model->context, [parts, settings](Progress& progress) -> JobResult {
       return decode(parts, settings, &progress);
     });
@@ -221,7 +258,7 @@ StippleStatus stipple_model_decode_memory_bound(const StippleModel* model,
                                                 uint64_t* bytes) {
   return guarded([&] {
     require(model, "model");
-    require(bytes, "bytes") = decodeMemoryBound(model->model, decodeSettings(options));
+    require(bytes, "bytes") = decodeMemoryBound(model->parts, decodeSettings(options));
   });
 }
 

@@ -25,6 +25,7 @@ enum class RandomUse : uint32_t {
   kGroundPlane = 6,
   kPalette = 9,
   kViewRig = 10,
+  kViewOrder = 11,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <memory>
 
 #include "cli/commands.h"
@@ -13,6 +14,8 @@ namespace {
 struct Arguments {
   std::string in, out, order = "systematic";
   int64_t anchors = 20000;
+  double ratio = 0;
+  int64_t refine = 0;
   int64_t gaussians_per_anchor = 1;
   uint64_t seed = 0;
   uint64_t samples = 0;
@@ -24,12 +27,21 @@ Model modelFrom(const Context& context, const Arguments& arguments) {
   if (kind == FileKind::kModel) {
     return make<Model>(stipple_model_load, context.get(), arguments.in.c_str());
   }
-  // A glTF file of splats may hold meshes too; one without gets the mesh reader's words.
-  const std::string ending =
-      arguments.in.substr(std::min(arguments.in.rfind('.'), arguments.in.size()));
-  if (kind != FileKind::kMesh && ending != ".glb" && ending != ".gltf") {
+  if (kind == FileKind::kSplats) {
+    const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
+    StippleModelFromCloudOptions options;
+    stipple_model_from_cloud_options_init(&options);
+    options.seed = arguments.seed;
+    const auto job = make<Job>(stipple_model_from_cloud_start, context.get(),
+                               const_cast<const StippleCloud*>(cloud.get()),
+                               const_cast<const StippleModelFromCloudOptions*>(&options));
+    finish(job);
+    return make<Model>(stipple_job_model, job.get());
+  }
+  if (kind != FileKind::kMesh) {
     throw Failure("'" + arguments.in +
-                  "' is not a source of splats; .glb, .gltf or .stipple.safetensors is expected");
+                  "' is not a source of splats; a mesh, a splat file or .stipple.safetensors is "
+                  "expected");
   }
   const auto mesh = make<Mesh>(stipple_mesh_load, context.get(), arguments.in.c_str());
   StippleModelFromMeshOptions options;
@@ -53,11 +65,51 @@ uint64_t counted(int64_t value, const char* name, int64_t last) {
   return static_cast<uint64_t>(value);
 }
 
+/// The budget as it was asked for: a count, or a share of an existing cloud.
+uint64_t budgetOf(const Model& model, const Arguments& arguments) {
+  if (arguments.ratio == 0) return counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
+  auto info = sized<StippleModelInfo>();
+  check(stipple_model_info(model.get(), &info));
+  if (info.kind != STIPPLE_MODEL_HIERARCHY) {
+    throw Failure("--ratio is a share of existing splats; a mesh takes --anchors");
+  }
+  if (!(arguments.ratio > 0 && arguments.ratio <= 1)) {
+    throw Failure("--ratio is " + std::to_string(arguments.ratio) +
+                  "; above 0 and up to 1 is allowed");
+  }
+  const double count = std::round(arguments.ratio * static_cast<double>(info.leaf_count));
+  return static_cast<uint64_t>(std::max(count, 1.0));
+}
+
+/// The splats of a budget fitted to pictures of all of them.
+Cloud refined(const Cloud& cloud, const Model& model, const Arguments& arguments) {
+  auto info = sized<StippleModelInfo>();
+  check(stipple_model_info(model.get(), &info));
+  if (info.kind != STIPPLE_MODEL_HIERARCHY) {
+    throw Failure("--refine fits to existing splats; a mesh has none");
+  }
+  StippleDecodeOptions all;
+  stipple_decode_options_init(&all);
+  all.anchor_count = info.leaf_count;
+  const auto full =
+      make<Cloud>(stipple_model_decode, model.get(), const_cast<const StippleDecodeOptions*>(&all));
+  StippleRefineOptions options;
+  stipple_refine_options_init(&options);
+  options.iterations = static_cast<uint32_t>(counted(arguments.refine, "--refine", 1000000));
+  options.seed = arguments.seed;
+  const auto job =
+      make<Job>(stipple_cloud_refine_start, const_cast<const StippleCloud*>(cloud.get()),
+                const_cast<const StippleCloud*>(full.get()),
+                const_cast<const StippleRefineOptions*>(&options));
+  finish(job);
+  return make<Cloud>(stipple_job_cloud, job.get());
+}
+
 void decode(const Context& context, const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   StippleDecodeOptions options;
   stipple_decode_options_init(&options);
-  options.anchor_count = counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
+  counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
   options.gaussians_per_anchor =
       static_cast<uint32_t>(counted(arguments.gaussians_per_anchor, "--gaussians-per-anchor", 32));
   options.order =
@@ -75,9 +127,11 @@ void decode(const Context& context, const Arguments& arguments) {
     check(stipple_model_save(model.get(), arguments.out.c_str()));
     return;
   }
+  options.anchor_count = budgetOf(model, arguments);
   const auto job = make<Job>(stipple_model_decode_start, model.get(), &options);
   finish(job);
-  const auto cloud = make<Cloud>(stipple_job_cloud, job.get());
+  auto cloud = make<Cloud>(stipple_job_cloud, job.get());
+  if (arguments.refine != 0) cloud = refined(cloud, model, arguments);
   check(stipple_cloud_save(cloud.get(), arguments.out.c_str(), nullptr));
   auto info = sized<StippleCloudInfo>();
   check(stipple_cloud_info(cloud.get(), &info));
@@ -93,15 +147,23 @@ void decode(const Context& context, const Arguments& arguments) {
 
 void addDecode(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("decode", "A mesh or a model to splats of any number");
-  command->add_option("in", arguments->in, "Mesh (.glb, .gltf) or model (.stipple.safetensors)")
+  CLI::App* command =
+      app.add_subcommand("decode", "A mesh, splats or a model to splats of any number");
+  command
+      ->add_option("in", arguments->in,
+                   "Mesh (.glb, .gltf), splat file or model (.stipple.safetensors)")
       ->required();
   command
       ->add_option("out", arguments->out,
                    "Splats (.ply), or the model itself "
                    "(.stipple.safetensors)")
       ->required();
-  command->add_option("--anchors", arguments->anchors, "Anchor budget")->capture_default_str();
+  auto* anchors =
+      command->add_option("--anchors", arguments->anchors, "Anchor budget")->capture_default_str();
+  command->add_option("--ratio", arguments->ratio, "Budget as a share of existing splats, 0..1")
+      ->excludes(anchors);
+  command->add_option("--refine", arguments->refine,
+                      "Existing splats: steps that fit the result to pictures of all of them");
   command
       ->add_option("--gaussians-per-anchor", arguments->gaussians_per_anchor,
                    "Splats made of each anchor")

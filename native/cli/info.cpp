@@ -46,6 +46,14 @@ Report describeModel(const Context& context, const std::string& path) {
   auto info = sized<StippleModelInfo>();
   check(stipple_model_info(model.get(), &info));
   Report report;
+  if (info.kind == STIPPLE_MODEL_HIERARCHY) {
+    report.add("kind", "hierarchy of splats");
+    report.add("count", info.leaf_count);
+    report.add("harmonic_degree", uint64_t{info.sh_degree});
+    report.add("bounds_min", info.bounds_min);
+    report.add("bounds_max", info.bounds_max);
+    return report;
+  }
   report.add("kind", "surface model");
   report.add("leaf_level", uint64_t{info.leaf_level});
   report.add("leaves", info.leaf_count);

@@ -1,6 +1,5 @@
 #include "decode/merge_node.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <numbers>
 
 #include "math/covariance.h"
+#include "math/principal_axes.h"
 #include "math/quaternion.h"
 
 // Based on: Crouse, Willett, Pattipati, Svensson, A Look at Gaussian Mixture Reduction Algorithms,
@@ -235,16 +235,14 @@ void writeNode(const MergeNode& node, const MergeScale& scale, SplatCloud& cloud
   const auto& c = node.covariance;
   Mat3d covariance;
   covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
-  // The solver scales by the largest entry; a covariance of zeros has any axes.
-  const Eigen::SelfAdjointEigenSolver<Mat3d> solver(covariance);
-  Mat3d axes = solver.eigenvectors();
-  if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
-  const Vec4d quaternion = quaternionFromRotation(axes);
+  // Of a symmetric matrix without negative eigenvalues, lengths are the eigenvalues.
+  const PrincipalAxes principal = principalAxes(covariance);
+  const Vec4d quaternion = quaternionFromRotation(principal.axes);
   for (size_t axis = 0; axis < 3; ++axis) {
-    const double variance = std::max(solver.eigenvalues()[static_cast<int>(axis)], 0.0);
     cloud.positions[index * 3 + axis] =
         static_cast<float>(node.mean[axis] * scale.unit + scale.centre[axis]);
-    cloud.scales[index * 3 + axis] = static_cast<float>(std::sqrt(variance) * scale.unit);
+    cloud.scales[index * 3 + axis] =
+        static_cast<float>(std::sqrt(principal.lengths[static_cast<int>(axis)]) * scale.unit);
   }
   for (size_t k = 0; k < 4; ++k) {
     cloud.rotations[index * 4 + k] = static_cast<float>(quaternion[static_cast<int>(k)]);

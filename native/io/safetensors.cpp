@@ -147,19 +147,25 @@ const SafeTensor& SafeTensorsReader::require(const std::string& name, const char
   return tensor;
 }
 
-std::vector<float> SafeTensorsReader::readFloats(const std::string& name, uint64_t width) const {
-  const SafeTensor& tensor = require(name, "F32", width);
-  std::vector<float> values(static_cast<size_t>(tensor.bytes / sizeof(float)));
-  file_.readAt(tensor.offset, values.data(), values.size() * sizeof(float));
+template <typename T>
+std::vector<T> SafeTensorsReader::readValues(const SafeTensor& tensor) const {
+  std::vector<T> values(static_cast<size_t>(tensor.bytes / sizeof(T)));
+  file_.readAt(tensor.offset, values.data(), values.size() * sizeof(T));
   return values;
+}
+
+std::vector<float> SafeTensorsReader::readFloats(const std::string& name, uint64_t width) const {
+  return readValues<float>(require(name, "F32", width));
+}
+
+std::vector<uint32_t> SafeTensorsReader::readUint32s(const std::string& name,
+                                                     uint64_t width) const {
+  return readValues<uint32_t>(require(name, "U32", width));
 }
 
 std::vector<uint64_t> SafeTensorsReader::readUint64s(const std::string& name,
                                                      uint64_t width) const {
-  const SafeTensor& tensor = require(name, "U64", width);
-  std::vector<uint64_t> values(static_cast<size_t>(tensor.bytes / sizeof(uint64_t)));
-  file_.readAt(tensor.offset, values.data(), values.size() * sizeof(uint64_t));
-  return values;
+  return readValues<uint64_t>(require(name, "U64", width));
 }
 
 void SafeTensorsWriter::addEntry(const std::string& name, const char* dtype, uint64_t width,
@@ -177,6 +183,11 @@ void SafeTensorsWriter::addEntry(const std::string& name, const char* dtype, uin
 void SafeTensorsWriter::add(const std::string& name, const std::vector<float>& values,
                             uint64_t width) {
   addEntry(name, "F32", width, values.data(), sizeof(float), values.size());
+}
+
+void SafeTensorsWriter::add(const std::string& name, const std::vector<uint32_t>& values,
+                            uint64_t width) {
+  addEntry(name, "U32", width, values.data(), sizeof(uint32_t), values.size());
 }
 
 void SafeTensorsWriter::add(const std::string& name, const std::vector<uint64_t>& values,

@@ -31,9 +31,12 @@ class SafeTensorsReader {
   /// Values of a tensor. In: width, the last sizes of its shape multiplied; the first is free.
   /// Errors: kFormat where the tensor is missing or of another type or shape.
   std::vector<float> readFloats(const std::string& name, uint64_t width) const;
+  std::vector<uint32_t> readUint32s(const std::string& name, uint64_t width) const;
   std::vector<uint64_t> readUint64s(const std::string& name, uint64_t width) const;
 
  private:
+  template <typename T>
+  std::vector<T> readValues(const SafeTensor& tensor) const;
   const SafeTensor& require(const std::string& name, const char* dtype, uint64_t width) const;
 
   InputFile file_;
@@ -47,6 +50,7 @@ class SafeTensorsWriter {
  public:
   void setMetadata(const std::string& key, const std::string& value) { metadata_[key] = value; }
   void add(const std::string& name, const std::vector<float>& values, uint64_t width);
+  void add(const std::string& name, const std::vector<uint32_t>& values, uint64_t width);
   void add(const std::string& name, const std::vector<uint64_t>& values, uint64_t width);
   /// Errors: kIo; the old file stays.
   void write(const std::string& path) const;

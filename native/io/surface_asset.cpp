@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "io/asset_header.h"
 #include "io/safetensors.h"
 
 namespace stipple {
@@ -12,35 +13,10 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kMajorVersion = 1;
-constexpr char kVersion[] = "1.0";
-constexpr char kKind[] = "surface";
 constexpr size_t kMaxLevels = 64;
 
 std::string levelName(const char* stem, size_t level) {
   return std::string(stem) + "." + std::to_string(level);
-}
-
-const std::string& requireText(const SafeTensorsReader& file, const char* key) {
-  const auto found = file.metadata().find(key);
-  if (found == file.metadata().end()) {
-    fail(ErrorCode::kFormat,
-         file.path() + " is not a Stipple asset: its metadata has no '" + key + "'");
-  }
-  return found->second;
-}
-
-int majorVersion(const SafeTensorsReader& file) {
-  const std::string& text = requireText(file, "stipple_version");
-  const size_t dot = text.find('.');
-  const std::string major = text.substr(0, dot);
-  const bool digits = !major.empty() && major.size() < 6 &&
-                      major.find_first_not_of("0123456789") == std::string::npos;
-  if (!digits) {
-    fail(ErrorCode::kFormat, file.path() + " has the stipple_version '" + text.substr(0, 20) +
-                                 "'; a number such as 1.0 is needed");
-  }
-  return std::stoi(major);
 }
 
 /// JSON text of the metadata. Errors: kFormat.
@@ -116,8 +92,7 @@ void validateAsset(const SurfaceAsset& asset, const std::string& name, ErrorCode
 void writeSurfaceAsset(const SurfaceAsset& asset, const std::string& path) {
   validateAsset(asset, "asset", ErrorCode::kInvalidArgument);
   SafeTensorsWriter file;
-  file.setMetadata("stipple_version", kVersion);
-  file.setMetadata("kind", kKind);
+  setAssetKind(file, kAssetSurface);
   file.setMetadata("colour_space", "lin_rec709_display");
   file.setMetadata("frame", "right-handed, z up, metres");
   file.setMetadata("root_cube", Json({asset.root_origin[0], asset.root_origin[1],
@@ -140,17 +115,7 @@ void writeSurfaceAsset(const SurfaceAsset& asset, const std::string& path) {
 
 SurfaceAsset readSurfaceAsset(const std::string& path) {
   const SafeTensorsReader file(path);
-  const int version = majorVersion(file);
-  if (version != kMajorVersion) {
-    fail(ErrorCode::kUnsupported, path + " is a Stipple asset of version " +
-                                      std::to_string(version) +
-                                      "; version 1 is supported by this release");
-  }
-  const std::string& kind = requireText(file, "kind");
-  if (kind != kKind) {
-    fail(ErrorCode::kUnsupported,
-         path + " is a Stipple asset of kind '" + kind.substr(0, 40) + "'; 'surface' is needed");
-  }
+  requireAssetKind(file, kAssetSurface);
   SurfaceAsset asset;
   readRoot(file, asset);
   const Json levels = parseText(file, "levels");

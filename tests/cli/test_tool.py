@@ -94,6 +94,21 @@ def test_a_saved_model_decodes_to_the_same_splats(scene):
     assert result['same_order'] == 1 and result['max_position'] == 0
 
 
+def test_splats_come_down_to_any_share_of_themselves(scene):
+    run('decode', scene / 'cube.ply', scene / 'tree.stipple.safetensors')
+    assert figures('info', scene / 'tree.stipple.safetensors')['kind'] == 'hierarchy of splats'
+    run('decode', scene / 'tree.stipple.safetensors', scene / 'fifth.ply', '--ratio', 0.2)
+    assert figures('info', scene / 'fifth.ply')['count'] == 1000
+    run('decode', scene / 'tree.stipple.safetensors', scene / 'all.ply', '--anchors', 5000)
+    result = figures('compare', scene / 'cube.ply', scene / 'all.ply')
+    assert result['same_order'] == 1 and result['max_position'] == 0 and result['max_sh'] == 0
+    run('decode', scene / 'tree.stipple.safetensors', scene / 'refined.ply', '--anchors', 100, '--refine', 2)
+    assert figures('info', scene / 'refined.ply')['count'] == 100
+    assert '0 and up to 1' in error('decode', scene / 'cube.ply', scene / 'never.ply', '--ratio', 1.5)
+    assert '5000' in error('decode', scene / 'cube.ply', scene / 'never.ply', '--anchors', 5001)
+    assert not (scene / 'never.ply').exists()
+
+
 def test_convert_to_text_and_back_loses_only_rounding(scene):
     run('convert', scene / 'cube.ply', scene / 'text.ply', '--ascii')
     result = figures('compare', scene / 'cube.ply', scene / 'text.ply')

@@ -9,7 +9,8 @@ from .density import Density, check_anchor_count
 from .errors import invalid
 from .handle import Handle, new_handle, path_bytes
 from .job import Job
-from .structs import AnchorOrder, StippleDecodeOptions, StippleModelFromMeshOptions, StippleModelInfo
+from .structs import (AnchorOrder, StippleDecodeOptions, StippleModelFromCloudOptions, StippleModelFromMeshOptions,
+                      StippleModelInfo, StippleRefineOptions, ViewRig)
 
 MAX_GAUSSIANS_PER_ANCHOR = 32
 
@@ -33,6 +34,26 @@ class DecodeSettings:
             raise invalid(f'Seed is {self.seed}; allowed are 0 and above.')
 
 
+def _unsigned(value, name, least):
+    """Refuses what does not fit the library's unsigned fields."""
+    if not least <= value <= 0xffffffff:
+        raise invalid(f'{name} is {value}; allowed are {least} and above.')
+    return value
+
+
+def refine_start(cloud, full, iterations=100, view_count=32, view_size=512, view_rig=ViewRig.AUTOMATIC, seed=0):
+    """A job whose cloud() is the reduced cloud, fitted to pictures of the full one."""
+    options = StippleRefineOptions()
+    cloud.library.stipple_refine_options_init(byref(options))
+    options.iterations = _unsigned(iterations, 'Iterations', 0)
+    options.view_count = _unsigned(view_count, 'Views', 1)
+    options.view_size = _unsigned(view_size, 'View size', 1)
+    options.view_rig = int(view_rig)
+    options.seed = seed
+    return Job(cloud.library, new_handle(cloud.library, 'stipple_cloud_refine_start', cloud.pointer, full.pointer,
+                                         byref(options)))
+
+
 class Model(Handle):
     free_function = 'stipple_model_free'
 
@@ -49,6 +70,20 @@ class Model(Handle):
         options.sample_count = sample_count
         return Job(context.library, new_handle(context.library, 'stipple_model_from_mesh_start', context.pointer,
                                                mesh.pointer, byref(options)))
+
+    @staticmethod
+    def from_cloud_start(context, cloud, view_count=16, view_size=256, view_rig=ViewRig.AUTOMATIC, seed=0,
+                         footprint=0.0):
+        """A job whose model() is the merge tree of an existing cloud."""
+        options = StippleModelFromCloudOptions()
+        context.library.stipple_model_from_cloud_options_init(byref(options))
+        options.view_rig = int(view_rig)
+        options.view_count = _unsigned(view_count, 'Views', 0)
+        options.view_size = _unsigned(view_size, 'View size', 1)
+        options.seed = seed
+        options.footprint = footprint
+        return Job(context.library, new_handle(context.library, 'stipple_model_from_cloud_start', context.pointer,
+                                               cloud.pointer, byref(options)))
 
     @classmethod
     def load(cls, context, path):

@@ -74,6 +74,17 @@ class AnchorOrder(IntEnum):
     PROGRESSIVE = 1
 
 
+class ViewRig(IntEnum):
+    AUTOMATIC = 0
+    AROUND = 1
+    INSIDE = 2
+
+
+class ModelKind(IntEnum):
+    SURFACE = 0
+    HIERARCHY = 1
+
+
 class CameraModel(IntEnum):
     PERSPECTIVE = 0
     ORTHOGRAPHIC = 1
@@ -120,6 +131,8 @@ ENUMS = {
     'StippleFrame': (Frame, 'STIPPLE_FRAME_'),
     'StippleMaterialColour': (MaterialColour, 'STIPPLE_MATERIAL_'),
     'StippleAnchorOrder': (AnchorOrder, 'STIPPLE_ORDER_'),
+    'StippleViewRig': (ViewRig, 'STIPPLE_RIG_'),
+    'StippleModelKind': (ModelKind, 'STIPPLE_MODEL_'),
     'StippleCameraModel': (CameraModel, 'STIPPLE_CAMERA_'),
     'StippleLowPass': (LowPass, 'STIPPLE_LOW_PASS_'),
     'StippleBlendSpace': (BlendSpace, 'STIPPLE_BLEND_'),
@@ -218,9 +231,20 @@ class StippleModelFromMeshOptions(_Sized):
                 ('detail_weight', c_double)]
 
 
+class StippleModelFromCloudOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('view_rig', c_uint32), ('view_count', c_uint32), ('view_size', c_uint32),
+                ('seed', c_uint64), ('footprint', c_double)]
+
+
+class StippleRefineOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('iterations', c_uint32), ('view_count', c_uint32),
+                ('view_size', c_uint32), ('view_rig', c_uint32), ('reserved', c_uint32), ('seed', c_uint64)]
+
+
 class StippleModelInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('leaf_count', c_uint64),
-                ('sample_count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3)]
+                ('sample_count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3),
+                ('kind', c_uint32), ('sh_degree', c_uint32)]
 
 
 class StippleDecodeOptions(_Sized):

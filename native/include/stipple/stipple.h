@@ -379,21 +379,46 @@ typedef struct StippleModelFromMeshOptions {
 } StippleModelFromMeshOptions;
 void stipple_model_from_mesh_options_init(StippleModelFromMeshOptions* options);
 
+/* From where an existing cloud is looked at. */
+typedef enum StippleViewRig {
+  STIPPLE_RIG_AUTOMATIC = 0, /* inside where the cloud surrounds its own middle, around it otherwise */
+  STIPPLE_RIG_AROUND = 1,    /* from a sphere around the cloud */
+  STIPPLE_RIG_INSIDE = 2     /* from places near the middle, looking out */
+} StippleViewRig;
+
+typedef struct StippleModelFromCloudOptions {
+  uint32_t struct_size;
+  uint32_t view_rig;    /* StippleViewRig, default automatic */
+  uint32_t view_count;  /* pictures that tell which splats are seen, 0..4096, default 16; 0: all count as seen */
+  uint32_t view_size;   /* pixels per side, 1..65536, default 256 */
+  uint64_t seed;        /* of the views */
+  double footprint;     /* metres: standard deviation of the low-pass through which errors are judged; 0, the
+                           default: half a pixel where the cloud fills a picture of 800 */
+} StippleModelFromCloudOptions;
+void stipple_model_from_cloud_options_init(StippleModelFromCloudOptions* options);
+
+typedef enum StippleModelKind {
+  STIPPLE_MODEL_SURFACE = 0,  /* of a mesh: density and surface */
+  STIPPLE_MODEL_HIERARCHY = 1 /* of a cloud: its merge tree; any budget up to its count */
+} StippleModelKind;
+
 typedef struct StippleModelInfo {
   uint32_t struct_size;
-  uint32_t leaf_level;
-  uint64_t leaf_count;
-  uint64_t sample_count;
+  uint32_t leaf_level;    /* surface; 0 for a hierarchy */
+  uint64_t leaf_count;    /* surface: of the octree; hierarchy: splats of the cloud, the largest budget */
+  uint64_t sample_count;  /* surface; 0 for a hierarchy */
   float bounds_min[3];
   float bounds_max[3];
+  uint32_t kind;          /* StippleModelKind */
+  uint32_t sh_degree;     /* of the splats that it makes */
 } StippleModelInfo;
 
 typedef struct StippleDecodeOptions {
   uint32_t struct_size;
   uint32_t order;                 /* StippleAnchorOrder, default systematic */
-  uint64_t anchor_count;          /* P, 1..STIPPLE_MAX_ANCHORS, default 20,000 */
+  uint64_t anchor_count;          /* P, 1..STIPPLE_MAX_ANCHORS, default 20,000; of a hierarchy: up to its count */
   uint64_t seed;
-  uint32_t gaussians_per_anchor;  /* K, 1..32, default 1 */
+  uint32_t gaussians_per_anchor;  /* K, 1..32, default 1; of a hierarchy: 1 */
   uint32_t reserved;
 } StippleDecodeOptions;
 void stipple_decode_options_init(StippleDecodeOptions* options);
@@ -402,10 +427,19 @@ void stipple_decode_options_init(StippleDecodeOptions* options);
 StippleStatus stipple_model_from_mesh_start(StippleContext* context, const StippleMesh* mesh,
                                             const StippleModelFromMeshOptions* options,
                                             StippleJob** job);
+/* The merge tree of an existing cloud, as a job (stipple_job_model). Decoded at P it gives exactly P splats,
+ * those of the whole cloud bit for bit where P is its count; P + 1 replaces one splat by the two that it was
+ * merged from. order and seed of the decode options do not matter. Same result for any number of threads.
+ * Errors: INVALID_ARGUMENT for an empty cloud; MEMORY_LIMIT. Cost: a few microseconds per splat, and the
+ * pictures (docs/methods/reduction.md). */
+StippleStatus stipple_model_from_cloud_start(StippleContext* context, const StippleCloud* cloud,
+                                             const StippleModelFromCloudOptions* options,
+                                             StippleJob** job);
 StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8, StippleModel** model);
 StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf8);
 void stipple_model_free(StippleModel* model);
 StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* info);
+/* Errors: UNSUPPORTED for a hierarchy, which has none. */
 StippleStatus stipple_model_density(const StippleModel* model, StippleDensity** density);
 /* P anchors, P*K splats. Fast enough to follow a slider (docs/methods/surface_splats.md has figures). */
 StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecodeOptions* options,
@@ -415,6 +449,24 @@ StippleStatus stipple_model_decode_start(const StippleModel* model, const Stippl
                                          StippleJob** job);
 StippleStatus stipple_model_decode_memory_bound(const StippleModel* model,
                                                 const StippleDecodeOptions* options, uint64_t* bytes);
+
+typedef struct StippleRefineOptions {
+  uint32_t struct_size;
+  uint32_t iterations;  /* steps, 0..1,000,000, default 100; 0 gives the cloud as it is */
+  uint32_t view_count;  /* pictures of the full cloud, 1..4096, default 32 */
+  uint32_t view_size;   /* pixels per side, 1..65536, default 512 */
+  uint32_t view_rig;    /* StippleViewRig, default automatic */
+  uint32_t reserved;
+  uint64_t seed;        /* of the views */
+} StippleRefineOptions;
+void stipple_refine_options_init(StippleRefineOptions* options);
+
+/* Fits a reduced cloud (a decoded model) to pictures of the full one, as a job (stipple_job_cloud): position,
+ * rotation, scale, opacity and harmonics move, the count and the order stay. Same result for any number of
+ * threads. Errors: INVALID_ARGUMENT for an empty cloud or clouds of different colour space. Cost: one drawing
+ * of `full` per view, one drawing and one backward pass of `cloud` per iteration. */
+StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const StippleCloud* full,
+                                         const StippleRefineOptions* options, StippleJob** job);
 
 /* ---- cameras ----------------------------------------------------------------------------------- */
 

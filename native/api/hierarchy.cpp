@@ -1,0 +1,165 @@
+#include "api/hierarchy.h"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "api/guard.h"
+#include "api/job.h"
+#include "io/hierarchy_asset.h"
+#include "train/refine.h"
+#include "train/view_rig.h"
+#include "train/visibility.h"
+
+using namespace stipple;
+using namespace stipple::api;
+
+namespace {
+
+void requireRange(uint32_t value, uint32_t first, uint32_t last, const char* name) {
+  if (value < first || value > last) {
+    fail(ErrorCode::kInvalidArgument, std::string(name) + " is " + std::to_string(value) + "; " +
+                                          std::to_string(first) + " to " + std::to_string(last) +
+                                          " is allowed");
+  }
+}
+
+struct HierarchySettings {
+  ViewRigOptions rig;
+  uint32_t view_count = 0;
+  MergeTreeOptions tree;
+};
+
+HierarchySettings hierarchySettings(const StippleModelFromCloudOptions& given) {
+  HierarchySettings settings;
+  settings.rig.rig = enumValue<ViewRig>(given.view_rig, 2, "options->view_rig");
+  requireRange(given.view_count, 0, 4096, "options->view_count");
+  requireRange(given.view_size, 1, 65536, "options->view_size");
+  settings.view_count = given.view_count;
+  settings.rig.count = given.view_count;
+  settings.rig.size = given.view_size;
+  settings.rig.seed = given.seed;
+  if (!std::isfinite(given.footprint) || given.footprint < 0) {
+    fail(ErrorCode::kInvalidArgument, "options->footprint is " + std::to_string(given.footprint) +
+                                          " m; 0 (automatic) or more is allowed");
+  }
+  settings.tree.footprint = given.footprint;
+  return settings;
+}
+
+RefineOptions refineSettings(const StippleRefineOptions& given) {
+  RefineOptions settings;
+  requireRange(given.iterations, 0, 1000000, "options->iterations");
+  requireRange(given.view_count, 1, 4096, "options->view_count");
+  requireRange(given.view_size, 1, 65536, "options->view_size");
+  settings.iterations = given.iterations;
+  settings.view_count = given.view_count;
+  settings.view_size = given.view_size;
+  settings.rig = enumValue<ViewRig>(given.view_rig, 2, "options->view_rig");
+  settings.seed = given.seed;
+  return settings;
+}
+
+Hierarchy build(const std::shared_ptr<const SplatCloud>& cloud, const HierarchySettings& settings,
+                Progress& progress) {
+  std::vector<float> visibility;
+  if (settings.view_count > 0) {
+    const std::vector<Camera> views = viewsOfCloud(*cloud, settings.rig);
+    visibility = splatVisibility(*cloud, views, &progress);
+  }
+  auto tree = std::make_shared<const MergeTree>(
+      buildMergeTree(*cloud, visibility, settings.tree, &progress));
+  return std::make_shared<const HierarchyDecoder>(cloud, std::move(tree));
+}
+
+}  // namespace
+
+namespace stipple::api {
+
+Hierarchy loadHierarchy(const std::string& path) {
+  HierarchyAsset asset = readHierarchyAsset(path);
+  auto leaves = std::make_shared<const SplatCloud>(std::move(asset.leaves));
+  auto tree = std::make_shared<MergeTree>();
+  tree->nodes = std::move(asset.nodes);
+  tree->parents = std::move(asset.parents);
+  tree->errors = std::move(asset.errors);
+  try {
+    return std::make_shared<const HierarchyDecoder>(std::move(leaves), std::move(tree));
+  } catch (const Error& error) {
+    fail(ErrorCode::kFormat, path + ": " + error.what());
+  }
+}
+
+void saveHierarchy(const HierarchyDecoder& hierarchy, const std::string& path) {
+  HierarchyAsset asset;
+  asset.leaves = *hierarchy.leaves();
+  asset.nodes = hierarchy.tree()->nodes;
+  asset.parents = hierarchy.tree()->parents;
+  asset.errors = hierarchy.tree()->errors;
+  writeHierarchyAsset(asset, path);
+}
+
+}  // namespace stipple::api
+
+extern "C" {
+
+void stipple_model_from_cloud_options_init(StippleModelFromCloudOptions* options) {
+  if (!options) return;
+  *options = {};
+  options->struct_size = sizeof(StippleModelFromCloudOptions);
+  options->view_rig = STIPPLE_RIG_AUTOMATIC;
+  options->view_count = 16;
+  options->view_size = 256;
+}
+
+StippleStatus stipple_model_from_cloud_start(StippleContext* context, const StippleCloud* cloud,
+                                             const StippleModelFromCloudOptions* options,
+                                             StippleJob** job) {
+  return guarded([&] {
+    require(context, "context");
+    require(cloud, "cloud");
+    require(job, "job");
+    StippleModelFromCloudOptions defaults;
+    stipple_model_from_cloud_options_init(&defaults);
+    const HierarchySettings settings = hierarchySettings(completed(options, defaults, "options"));
+    const std::shared_ptr<const SplatCloud> leaves = cloud->cloud;
+    if (leaves->size() == 0) {
+      fail(ErrorCode::kInvalidArgument, "the cloud has 0 splats; a hierarchy needs at least 1");
+    }
+    context->state->requireMemory(mergeTreeMemoryBound(leaves->size(), leaves->sh_degree),
+                                  "the hierarchy of this cloud");
+    *job = startJob(context->state, [leaves, settings](Progress& progress) -> JobResult {
+      return ModelParts(build(leaves, settings, progress));
+    });
+  });
+}
+
+void stipple_refine_options_init(StippleRefineOptions* options) {
+  if (!options) return;
+  const RefineOptions defaults;
+  *options = {};
+  options->struct_size = sizeof(StippleRefineOptions);
+  options->iterations = defaults.iterations;
+  options->view_count = defaults.view_count;
+  options->view_size = defaults.view_size;
+  options->view_rig = STIPPLE_RIG_AUTOMATIC;
+}
+
+StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const StippleCloud* full,
+                                         const StippleRefineOptions* options, StippleJob** job) {
+  return guarded([&] {
+    require(cloud, "cloud");
+    require(full, "full");
+    require(job, "job");
+    StippleRefineOptions defaults;
+    stipple_refine_options_init(&defaults);
+    const RefineOptions settings = refineSettings(completed(options, defaults, "options"));
+    const std::shared_ptr<const SplatCloud> start = cloud->cloud;
+    const std::shared_ptr<const SplatCloud> whole = full->cloud;
+    *job = startJob(cloud->context, [start, whole, settings](Progress& progress) -> JobResult {
+      return std::make_shared<const SplatCloud>(refineCloud(*start, *whole, settings, &progress));
+    });
+  });
+}
+
+}  // extern "C"

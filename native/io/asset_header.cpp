@@ -1,0 +1,63 @@
+#include "io/asset_header.h"
+
+#include "base/error.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr int kMajorVersion = 1;
+constexpr char kVersion[] = "1.0";
+
+int majorVersion(const SafeTensorsReader& file) {
+  const std::string& text = requireText(file, "stipple_version");
+  const size_t dot = text.find('.');
+  const std::string major = text.substr(0, dot);
+  const bool digits = !major.empty() && major.size() < 6 &&
+                      major.find_first_not_of("0123456789") == std::string::npos;
+  if (!digits) {
+    fail(ErrorCode::kFormat, file.path() + " has the stipple_version '" + text.substr(0, 20) +
+                                 "'; a number such as 1.0 is needed");
+  }
+  return std::stoi(major);
+}
+
+}  // namespace
+
+const std::string& requireText(const SafeTensorsReader& file, const char* key) {
+  const auto found = file.metadata().find(key);
+  if (found == file.metadata().end()) {
+    fail(ErrorCode::kFormat,
+         file.path() + " is not a Stipple asset: its metadata has no '" + key + "'");
+  }
+  return found->second;
+}
+
+const std::string& assetKind(const SafeTensorsReader& file) {
+  const int version = majorVersion(file);
+  if (version != kMajorVersion) {
+    fail(ErrorCode::kUnsupported, file.path() + " is a Stipple asset of version " +
+                                      std::to_string(version) +
+                                      "; version 1 is supported by this release");
+  }
+  return requireText(file, "kind");
+}
+
+std::string readAssetKind(const std::string& path) {
+  return assetKind(SafeTensorsReader(path));
+}
+
+void requireAssetKind(const SafeTensorsReader& file, const char* kind) {
+  const std::string& seen = assetKind(file);
+  if (seen != kind) {
+    fail(ErrorCode::kUnsupported, file.path() + " is a Stipple asset of kind '" +
+                                      seen.substr(0, 40) + "'; '" + kind + "' is needed");
+  }
+}
+
+void setAssetKind(SafeTensorsWriter& file, const char* kind) {
+  file.setMetadata("stipple_version", kVersion);
+  file.setMetadata("kind", kind);
+}
+
+}  // namespace stipple

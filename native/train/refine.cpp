@@ -1,0 +1,162 @@
+#include "train/refine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/random.h"
+#include "data/cloud_extent.h"
+#include "train/render_backend.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr uint32_t kMaxIterations = 1000000;
+
+/// Rates at the start; they fall to kLastRate of it along a half cosine, so that the last steps
+/// settle. Positions: in units of a typical splat of the start.
+constexpr double kPositionRate = 0.05;
+constexpr double kRotationRate = 5e-3;
+constexpr double kLogScaleRate = 1e-2;
+constexpr double kLogitRate = 3e-2;
+constexpr double kColourRate = 1e-2;
+constexpr double kHigherColourRate = 5e-4;
+constexpr double kLastRate = 0.1;
+/// Few steps: the second moment must follow within tens of them.
+constexpr double kBeta2 = 0.99;
+
+void validateInput(const SplatCloud& start, const SplatCloud& full, const RefineOptions& options) {
+  validate(start, "cloud");
+  validate(full, "full cloud");
+  if (start.size() == 0 || full.size() == 0) {
+    fail(ErrorCode::kInvalidArgument, "refining needs splats; the clouds have " +
+                                          std::to_string(start.size()) + " and " +
+                                          std::to_string(full.size()));
+  }
+  if (start.colour_space != full.colour_space) {
+    fail(ErrorCode::kInvalidArgument, "the cloud and the full cloud have different colour spaces");
+  }
+  if (options.iterations > kMaxIterations) {
+    fail(ErrorCode::kInvalidArgument, "iterations is " + std::to_string(options.iterations) +
+                                          "; at most " + std::to_string(kMaxIterations) +
+                                          " is allowed");
+  }
+}
+
+/// Median of the middle axis: the size of a splat as it is mostly seen, metres.
+double typicalSize(const SplatCloud& cloud) {
+  std::vector<float> sizes(cloud.size());
+  for (size_t i = 0; i < sizes.size(); ++i) {
+    const float* s = &cloud.scales[i * 3];
+    sizes[i] = std::max(std::min(s[0], s[1]), std::min(std::max(s[0], s[1]), s[2]));
+  }
+  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return static_cast<double>(*middle);
+}
+
+StepOptions stepOptions(double size, double progress) {
+  const double fall =
+      kLastRate + (1 - kLastRate) * 0.5 * (1 + std::cos(progress * 3.141592653589793));
+  StepOptions step;
+  step.adam.beta2 = kBeta2;
+  const auto set = [&](ParameterGroup group, double rate) {
+    step.learning_rates[static_cast<size_t>(group)] = rate * fall;
+  };
+  set(ParameterGroup::kPositions, kPositionRate * size);
+  set(ParameterGroup::kRotations, kRotationRate);
+  set(ParameterGroup::kLogScales, kLogScaleRate);
+  set(ParameterGroup::kLogits, kLogitRate);
+  set(ParameterGroup::kShFirst, kColourRate);
+  set(ParameterGroup::kShOthers, kHigherColourRate);
+  return step;
+}
+
+/// Every second view stands before white: then coverage shows where colours are dark, too.
+RenderOptions renderOptions(size_t view) {
+  RenderOptions options;
+  options.with_depth = false;
+  options.with_background = true;
+  std::fill_n(options.background, 3, view % 2 == 0 ? 0.0 : 1.0);
+  return options;
+}
+
+void addTargets(const SplatCloud& full, const std::vector<Camera>& views, RenderBackend& backend,
+                Progress* progress) {
+  const SplatInstance instance{&full};
+  RenderWorkspace workspace;
+  RenderResult picture;
+  std::vector<float> pixels;
+  for (size_t v = 0; v < views.size(); ++v) {
+    advance(progress, 0.2 * static_cast<double>(v) / static_cast<double>(views.size()),
+            "Drawing all splats");
+    renderTiled({&instance, 1}, views[v], renderOptions(v), workspace, picture);
+    const size_t count = picture.colour.size() / 4;
+    pixels.resize(count * 3);
+    for (size_t i = 0; i < count; ++i) {
+      std::copy_n(&picture.colour[i * 4], 3, &pixels[i * 3]);
+    }
+    backend.addTarget(views[v].width, views[v].height, pixels);
+  }
+}
+
+/// All views once per round, each round in an order of its own.
+class ViewOrder {
+ public:
+  ViewOrder(size_t count, uint64_t seed) : order_(count), seed_(seed) {
+    for (size_t i = 0; i < count; ++i) order_[i] = static_cast<uint32_t>(i);
+  }
+
+  uint32_t at(uint64_t iteration) {
+    const size_t place = iteration % order_.size();
+    if (place == 0) {
+      for (size_t i = order_.size(); i > 1; --i) {
+        const uint64_t bits = keyedBits(seed_, RandomUse::kViewOrder, iteration + i);
+        std::swap(order_[i - 1], order_[bits % i]);
+      }
+    }
+    return order_[place];
+  }
+
+ private:
+  std::vector<uint32_t> order_;
+  uint64_t seed_;
+};
+
+}  // namespace
+
+SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
+                       const RefineOptions& options, Progress* progress) {
+  validateInput(start, full, options);
+  if (options.iterations == 0) return start;
+  ViewRigOptions rig;
+  rig.rig = options.rig;
+  rig.count = options.view_count;
+  rig.size = options.view_size;
+  rig.seed = options.seed;
+  const std::vector<Camera> views = viewsOfCloud(full, rig);
+  const std::unique_ptr<RenderBackend> backend = makeCpuBackend();
+  backend->upload(start);
+  addTargets(full, views, *backend, progress);
+  ImageLossOptions loss;
+  loss.ssim_share = options.ssim_share;
+  const double size = typicalSize(start);
+  ViewOrder order(views.size(), options.seed);
+  for (uint32_t i = 0; i < options.iterations; ++i) {
+    const double done = static_cast<double>(i) / options.iterations;
+    advance(progress, 0.2 + 0.8 * done, "Refining splats");
+    const uint32_t view = order.at(i);
+    backend->forward(views[view], renderOptions(view));
+    backend->loss(view, loss);
+    backend->backward({});
+    backend->step(stepOptions(size, done));
+  }
+  SplatCloud refined = backend->download();
+  refined.frame = start.frame;
+  return refined;
+}
+
+}  // namespace stipple

@@ -1,0 +1,313 @@
+#include "decode/merge_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "decode/hierarchy_decoder.h"
+#include "decode/merge_node.h"
+#include "decode/test_clouds.h"
+#include "math/covariance.h"
+
+namespace stipple {
+namespace {
+
+using test::randomCloud;
+
+HierarchyDecoder decoderOf(const SplatCloud& cloud, std::span<const float> visibility = {},
+                           const MergeTreeOptions& options = {}) {
+  auto leaves = std::make_shared<const SplatCloud>(cloud);
+  auto tree = std::make_shared<const MergeTree>(buildMergeTree(cloud, visibility, options));
+  return {leaves, tree};
+}
+
+SplatCloud cutOf(const HierarchyDecoder& decoder, uint64_t budget) {
+  DecodeRequest request;
+  request.budget = budget;
+  return decoder.decode(request);
+}
+
+void expectSame(const SplatCloud& a, const SplatCloud& b) {
+  EXPECT_EQ(a.positions, b.positions);
+  EXPECT_EQ(a.rotations, b.rotations);
+  EXPECT_EQ(a.scales, b.scales);
+  EXPECT_EQ(a.opacities, b.opacities);
+  EXPECT_EQ(a.sh, b.sh);
+}
+
+/// Integral of -ln(1 - o exp(-r^2/2)) r dr by Simpson's rule over t = r^2 / 2, 0 to 40.
+double depthByQuadrature(double opacity) {
+  constexpr int kSteps = 200000;
+  const double step = 40.0 / kSteps;
+  double sum = 0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double factor = i == 0 || i == kSteps ? 1 : i % 2 == 1 ? 4 : 2;
+    sum -= factor * std::log1p(-opacity * std::exp(-step * i));
+  }
+  return sum * step / 3;
+}
+
+/// Over 2 pi: the root of the mean of the squared areas over three orthogonal directions.
+double areaOf(const Mat3d& c) {
+  const double xy = c(0, 0) * c(1, 1) - c(0, 1) * c(0, 1);
+  const double xz = c(0, 0) * c(2, 2) - c(0, 2) * c(0, 2);
+  const double yz = c(1, 1) * c(2, 2) - c(1, 2) * c(1, 2);
+  return std::sqrt((xy + xz + yz) / 3);
+}
+
+TEST(MergeNode, OpticalDepthIsItsIntegralAndComesBack) {
+  for (const double opacity : {0.001, 0.2, 0.499, 0.501, 0.9, 0.99}) {
+    // Simpson with a step of 2e-4 on a smooth function: far below 1e-9.
+    EXPECT_NEAR(opticalDepth(opacity), depthByQuadrature(opacity), 1e-9);
+    // 512 cubic pieces.
+    EXPECT_NEAR(opacityOfDepth(opticalDepth(opacity)), opacity, 1e-7);
+  }
+  EXPECT_EQ(opticalDepth(0), 0);
+  EXPECT_NEAR(opticalDepth(1), std::numbers::pi * std::numbers::pi / 6, 1e-15);
+  EXPECT_EQ(opacityOfDepth(10), kMergeMaxOpacity);
+}
+
+TEST(MergeNode, ErrorIsTheSquaredChangeOfThreeProjections) {
+  SplatCloud cloud = randomCloud(2, 5, 0);
+  for (float& x : cloud.positions) x *= 0.05f;
+  MergeScale scale;
+  scale.footprint = 1e-4;
+  const MergeNode a = leafNode(cloud, 0, 0.5, scale);
+  const MergeNode b = leafNode(cloud, 1, 1.0, scale);
+  const MergeNode m = mergedNode(a, b, scale);
+  // Colour less a third of the merged one, and coverage, on a grid of each coordinate plane.
+  double sum = 0;
+  const int axes[3][2] = {{0, 1}, {0, 2}, {1, 2}};
+  const size_t entries[3][3] = {{0, 1, 3}, {0, 2, 5}, {3, 4, 5}};
+  constexpr int kHalf = 250;
+  constexpr double kStep = 0.25 / kHalf;
+  for (int plane = 0; plane < 3; ++plane) {
+    const auto profile = [&](const MergeNode& node, double x, double y) {
+      const double xx = node.covariance[entries[plane][0]] + scale.footprint;
+      const double xy = node.covariance[entries[plane][1]];
+      const double yy = node.covariance[entries[plane][2]] + scale.footprint;
+      const double det = xx * yy - xy * xy;
+      const double dx = x - node.mean[static_cast<size_t>(axes[plane][0])];
+      const double dy = y - node.mean[static_cast<size_t>(axes[plane][1])];
+      return node.contrast * node.opacity *
+             std::exp(-0.5 * (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / det);
+    };
+    for (int i = -kHalf; i <= kHalf; ++i) {
+      for (int j = -kHalf; j <= kHalf; ++j) {
+        const double x = m.mean[static_cast<size_t>(axes[plane][0])] + i * kStep;
+        const double y = m.mean[static_cast<size_t>(axes[plane][1])] + j * kStep;
+        const double pa = profile(a, x, y);
+        const double pb = profile(b, x, y);
+        const double pm = profile(m, x, y);
+        double squared = 0.3 * (pa + pb - pm) * (pa + pb - pm);
+        for (size_t c = 0; c < 3; ++c) {
+          const double behind = 0.3 * m.colour[c];
+          const double change = pa * (a.colour[c] - behind) + pb * (b.colour[c] - behind) -
+                                pm * (m.colour[c] - behind);
+          squared += change * change;
+        }
+        sum += squared * kStep * kStep;
+      }
+    }
+  }
+  // The grid ends at eight standard deviations and its sums of Gaussians are exact to 1e-8.
+  EXPECT_NEAR(mergeError(a, b, m, scale) / sum, 1.0, 1e-6);
+}
+
+TEST(MergeTree, RootHasTheMomentsOfAllLeaves) {
+  const SplatCloud cloud = randomCloud(60, 3, 2);
+  std::vector<float> visibility(60);
+  for (size_t i = 0; i < 60; ++i) visibility[i] = 0.1f + 0.015f * static_cast<float>(i);
+  MergeTreeOptions options;
+  options.footprint = 1e-6;  // adds 1e-12 to variances of at least 4e-6
+  const MergeTree tree = buildMergeTree(cloud, visibility, options);
+  double mass = 0;
+  Vec3d mean = Vec3d::Zero();
+  Mat3d second = Mat3d::Zero();
+  std::vector<double> sh(cloud.shStride(), 0.0);
+  for (size_t i = 0; i < 60; ++i) {
+    const Mat3d c = covariance<double>(&cloud.rotations[i * 4], &cloud.scales[i * 3]);
+    const double m =
+        static_cast<double>(visibility[i]) * static_cast<double>(cloud.opacities[i]) * areaOf(c);
+    const Vec3d p(static_cast<double>(cloud.positions[i * 3]),
+                  static_cast<double>(cloud.positions[i * 3 + 1]),
+                  static_cast<double>(cloud.positions[i * 3 + 2]));
+    mass += m;
+    mean += m * p;
+    second += m * (c + p * p.transpose());
+    for (size_t k = 0; k < sh.size(); ++k) {
+      sh[k] += m * static_cast<double>(cloud.sh[i * sh.size() + k]);
+    }
+  }
+  mean /= mass;
+  const Mat3d expected = second / mass - mean * mean.transpose();
+  const Mat3d seen = covariance<double>(tree.nodes.rotations.data(), tree.nodes.scales.data());
+  // Stored as float32 numbers of about 1: a few units of 6e-8. Harmonics are rounded once per
+  // level.
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(static_cast<double>(tree.nodes.positions[static_cast<size_t>(axis)]), mean[axis],
+                1e-6);
+  }
+  EXPECT_LT((seen - expected).norm(), 1e-6 * expected.norm());
+  for (size_t k = 0; k < sh.size(); ++k) {
+    EXPECT_NEAR(static_cast<double>(tree.nodes.sh[k]), sh[k] / mass, 1e-5);
+  }
+}
+
+TEST(MergeTree, PairKeepsItsOpticalDepth) {
+  SplatCloud cloud = randomCloud(2, 9, 0);
+  cloud.opacities = {0.3f, 0.6f};
+  MergeTreeOptions options;
+  options.footprint = 1e-6;
+  const MergeTree tree = buildMergeTree(cloud, {}, options);
+  double depth = 0;
+  for (size_t i = 0; i < 2; ++i) {
+    depth += opticalDepth(static_cast<double>(cloud.opacities[i])) *
+             areaOf(covariance<double>(&cloud.rotations[i * 4], &cloud.scales[i * 3]));
+  }
+  const double area =
+      areaOf(covariance<double>(tree.nodes.rotations.data(), tree.nodes.scales.data()));
+  EXPECT_NEAR(opticalDepth(static_cast<double>(tree.nodes.opacities[0])) * area, depth,
+              1e-6 * depth);
+}
+
+TEST(MergeTree, EveryBudgetIsExactAndRefinesOneSplat) {
+  const SplatCloud cloud = randomCloud(300, 1);
+  const HierarchyDecoder decoder = decoderOf(cloud);
+  std::vector<uint32_t> before;
+  for (uint64_t budget = 1; budget <= 300; ++budget) {
+    const std::vector<uint32_t> ids = decoder.cut(budget);
+    ASSERT_EQ(ids.size(), budget);
+    ASSERT_TRUE(std::is_sorted(ids.begin(), ids.end()));
+    ASSERT_EQ(cutOf(decoder, budget).size(), budget);
+    if (budget > 1) {
+      std::vector<uint32_t> gone, come;
+      std::set_difference(before.begin(), before.end(), ids.begin(), ids.end(),
+                          std::back_inserter(gone));
+      std::set_difference(ids.begin(), ids.end(), before.begin(), before.end(),
+                          std::back_inserter(come));
+      ASSERT_EQ(gone.size(), 1u);
+      ASSERT_EQ(come.size(), 2u);
+      for (const uint32_t child : come) ASSERT_EQ(decoder.tree()->parents[child], gone[0]);
+    }
+    before = ids;
+  }
+  expectSame(cutOf(decoder, 300), cloud);
+}
+
+TEST(MergeTree, ErrorsNeverRise) {
+  const MergeTree tree = buildMergeTree(randomCloud(2000, 4), {}, {});
+  EXPECT_TRUE(std::is_sorted(tree.errors.rbegin(), tree.errors.rend()));
+  EXPECT_GE(tree.errors.back(), 0.0f);
+}
+
+TEST(MergeTree, IsTheSameForAnyNumberOfThreads) {
+  const SplatCloud cloud = randomCloud(20000, 7);
+  MergeTree one, four;
+  withThreads(1, [&] { one = buildMergeTree(cloud, {}, {}); });
+  withThreads(4, [&] { four = buildMergeTree(cloud, {}, {}); });
+  EXPECT_EQ(one.parents, four.parents);
+  EXPECT_EQ(one.errors, four.errors);
+  expectSame(one.nodes, four.nodes);
+}
+
+TEST(MergeTree, HiddenSplatsMergeFirstAndChangeNothing) {
+  SplatCloud cloud = randomCloud(400, 11, 0);
+  std::vector<float> visibility(400, 1.0f);
+  for (size_t i = 0; i < 200; ++i) visibility[i] = 0.0f;
+  const HierarchyDecoder decoder = decoderOf(cloud, visibility);
+  // Half of the splats are gone and yet nearly all that are seen are still there as they were.
+  const std::vector<uint32_t> ids = decoder.cut(210);
+  const size_t kept = static_cast<size_t>(
+      std::count_if(ids.begin(), ids.end(), [&](uint32_t id) { return id >= 399 + 200; }));
+  std::set<float> places;
+  const SplatCloud cut = cutOf(decoder, 210);
+  for (size_t i = 0; i < cut.size(); ++i) places.insert(cut.positions[i * 3]);
+  size_t near = 0;
+  for (size_t i = 200; i < 400; ++i) {
+    const auto next = places.lower_bound(cloud.positions[i * 3] - 2e-3f);
+    near += next != places.end() && *next < cloud.positions[i * 3] + 2e-3f ? 1 : 0;
+  }
+  EXPECT_GT(near, 170u) << kept << " unchanged";
+}
+
+TEST(MergeTree, LongChainsOfEverCheaperPartnersEnd) {
+  // On a line, each next gap a little smaller: only the last two splats are each other's nearest.
+  constexpr size_t kCount = 20000;
+  SplatCloud cloud = randomCloud(kCount, 2, 0);
+  double x = 0;
+  for (size_t i = 0; i < kCount; ++i) {
+    x += 1.0 - 0.5 * static_cast<double>(i) / kCount;
+    cloud.positions[i * 3] = static_cast<float>(x);
+    cloud.positions[i * 3 + 1] = cloud.positions[i * 3 + 2] = 0.0f;
+    for (size_t k = 0; k < 3; ++k) {
+      cloud.scales[i * 3 + k] = 0.5f;
+      cloud.sh[i * 3 + k] = 0.5f;
+    }
+    cloud.opacities[i] = 0.5f;
+  }
+  const HierarchyDecoder decoder = decoderOf(cloud);
+  EXPECT_EQ(cutOf(decoder, 777).size(), 777u);
+}
+
+TEST(MergeTree, TakesDegenerateClouds) {
+  SplatCloud one = randomCloud(1, 1);
+  expectSame(cutOf(decoderOf(one), 1), one);
+
+  SplatCloud same = randomCloud(500, 1);
+  for (size_t i = 0; i < same.positions.size(); ++i) same.positions[i] = same.positions[i % 3];
+  SplatCloud points = randomCloud(500, 2);
+  std::fill(points.scales.begin(), points.scales.end(), 0.0f);
+  SplatCloud clear = randomCloud(500, 3);
+  std::fill(clear.opacities.begin(), clear.opacities.end(), 0.0f);
+  SplatCloud huge = randomCloud(500, 4);
+  for (size_t i = 0; i < 100; ++i) huge.scales[i] = 1e18f;
+  for (size_t i = 0; i < 30; ++i) huge.positions[i] = i % 2 == 0 ? 1e15f : -1e15f;
+  SplatCloud nothing = same;
+  std::fill(nothing.scales.begin(), nothing.scales.end(), 0.0f);
+  std::fill(nothing.opacities.begin(), nothing.opacities.end(), 1.0f);
+  for (const SplatCloud& cloud : {same, points, clear, huge, nothing}) {
+    const HierarchyDecoder decoder = decoderOf(cloud);
+    for (const uint64_t budget : {1u, 2u, 250u, 499u, 500u}) {
+      const SplatCloud cut = cutOf(decoder, budget);
+      EXPECT_EQ(cut.size(), budget);
+      EXPECT_NO_THROW(validate(cut, "cut"));
+    }
+  }
+}
+
+TEST(MergeTree, RefusesBadInputInOneSentence) {
+  const SplatCloud cloud = randomCloud(10, 1);
+  EXPECT_THROW(buildMergeTree({}, {}, {}), Error);
+  const std::vector<float> few(9, 1.0f);
+  EXPECT_THROW(buildMergeTree(cloud, few, {}), Error);
+  std::vector<float> wrong(10, 1.0f);
+  wrong[4] = 1.5f;
+  EXPECT_THROW(buildMergeTree(cloud, wrong, {}), Error);
+  MergeTreeOptions options;
+  options.footprint = -1;
+  EXPECT_THROW(buildMergeTree(cloud, {}, options), Error);
+
+  const HierarchyDecoder decoder = decoderOf(cloud);
+  EXPECT_THROW(cutOf(decoder, 0), Error);
+  EXPECT_THROW(cutOf(decoder, 11), Error);
+  MergeTree loop = *decoder.tree();
+  loop.parents[3] = 5;
+  EXPECT_THROW(validateTree(loop, cloud, "tree"), Error);
+  MergeTree rising = *decoder.tree();
+  rising.errors[4] = rising.errors[0] * 2 + 1;
+  EXPECT_THROW(validateTree(rising, cloud, "tree"), Error);
+  MergeTree three = *decoder.tree();
+  three.parents.back() = three.parents[three.parents.size() - 2];
+  three.parents[three.parents.size() - 3] = three.parents.back();
+  EXPECT_THROW(validateTree(three, cloud, "tree"), Error);
+  EXPECT_THROW(validateTree(*decoder.tree(), randomCloud(11, 1), "tree"), Error);
+}
+
+}  // namespace
+}  // namespace stipple

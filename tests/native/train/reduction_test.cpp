@@ -1,0 +1,182 @@
+// What the reduction of clouds takes from pictures: views, visibility, refinement.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "data/cloud_extent.h"
+#include "splat/render.h"
+#include "train/refine.h"
+#include "train/view_rig.h"
+#include "train/visibility.h"
+
+namespace stipple {
+namespace {
+
+/// Flat splats that close a sphere of a radius about the origin.
+SplatCloud sphere(size_t count, double radius, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+  SplatCloud cloud;
+  cloud.resize(count);
+  const double golden = 3.141592653589793 * (3 - std::sqrt(5.0));
+  for (size_t i = 0; i < count; ++i) {
+    const double z = 1 - (2.0 * static_cast<double>(i) + 1) / static_cast<double>(count);
+    const double ring = std::sqrt(1 - z * z);
+    const double angle = golden * static_cast<double>(i);
+    const double p[3] = {ring * std::cos(angle), ring * std::sin(angle), z};
+    for (size_t k = 0; k < 3; ++k) {
+      cloud.positions[i * 3 + k] = static_cast<float>(radius * p[k]);
+      cloud.scales[i * 3 + k] = static_cast<float>(2 * radius / std::sqrt(double(count)));
+      cloud.sh[i * 3 + k] = 2 * unit(random) - 1;
+    }
+    cloud.rotations[i * 4] = 1;
+    cloud.opacities[i] = 0.9f;
+  }
+  return cloud;
+}
+
+void append(SplatCloud& cloud, const SplatCloud& other) {
+  const auto add = [](std::vector<float>& a, const std::vector<float>& b) {
+    a.insert(a.end(), b.begin(), b.end());
+  };
+  add(cloud.positions, other.positions);
+  add(cloud.rotations, other.rotations);
+  add(cloud.scales, other.scales);
+  add(cloud.opacities, other.opacities);
+  add(cloud.sh, other.sh);
+}
+
+/// Mean squared difference of pictures of both clouds from one rig.
+double pictureError(const SplatCloud& a, const SplatCloud& b, const std::vector<Camera>& views) {
+  double sum = 0;
+  size_t count = 0;
+  for (const Camera& camera : views) {
+    const SplatInstance one{&a};
+    const SplatInstance two{&b};
+    const RenderResult first = renderTiled({&one, 1}, camera, {});
+    const RenderResult second = renderTiled({&two, 1}, camera, {});
+    for (size_t i = 0; i < first.colour.size(); ++i) {
+      const double d = static_cast<double>(first.colour[i] - second.colour[i]);
+      sum += d * d;
+    }
+    count += first.colour.size();
+  }
+  return sum / static_cast<double>(count);
+}
+
+TEST(CloudExtent, LeavesOutFarSplats) {
+  SplatCloud cloud = sphere(2000, 1.0, 1);
+  cloud.positions[0] = 1e6f;
+  const CloudExtent extent = cloudExtent(cloud);
+  // The half diagonal of the box of a unit sphere, less what lies beyond one splat in 200.
+  EXPECT_NEAR(extent.radius, std::sqrt(3.0), 0.03);
+  for (const double x : extent.centre) EXPECT_NEAR(x, 0, 0.02);
+  EXPECT_EQ(cloudExtent({}).radius, 1.0);
+}
+
+TEST(ViewRig, LooksAtThingsFromAroundAndAtRoomsFromInside) {
+  // A ball with a core is a thing: from its middle everything is near.
+  SplatCloud thing = sphere(3000, 1.0, 1);
+  append(thing, sphere(1000, 0.2, 2));
+  EXPECT_EQ(chooseRig(thing), ViewRig::kAround);
+  EXPECT_EQ(chooseRig(sphere(3000, 1.0, 1)), ViewRig::kInside);
+  ViewRigOptions options;
+  options.count = 20;
+  options.rig = ViewRig::kAround;
+  const double radius = cloudExtent(thing).radius;
+  for (const Camera& camera : viewsOfCloud(thing, options)) {
+    EXPECT_NO_THROW(validate(camera));
+    // The sphere around the cloud touches the borders of a picture of 40 degrees.
+    EXPECT_NEAR(cameraCentre(camera).norm(), radius / std::sin(20 * 3.141592653589793 / 180), 0.1);
+  }
+  options.rig = ViewRig::kInside;
+  for (const Camera& camera : viewsOfCloud(thing, options)) {
+    EXPECT_NO_THROW(validate(camera));
+    EXPECT_LT(cameraCentre(camera).norm(), 0.5 * radius);
+  }
+  options.count = 0;
+  EXPECT_THROW(viewsOfCloud(thing, options), Error);
+  EXPECT_THROW(viewsOfCloud({}, {}), Error);
+}
+
+TEST(Visibility, IsNearOneInFrontAndNearZeroBehind) {
+  SplatCloud cloud = sphere(4000, 1.0, 1);
+  const size_t front_count = cloud.size();
+  append(cloud, sphere(500, 0.5, 2));
+  ViewRigOptions options;
+  options.rig = ViewRig::kAround;
+  options.size = 128;
+  const auto views = viewsOfCloud(cloud, options);
+  const std::vector<float> visibility = splatVisibility(cloud, views);
+  double front = 0;
+  double behind = 0;
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    ASSERT_TRUE(visibility[i] >= 0 && visibility[i] <= 1);
+    (i < front_count ? front : behind) += static_cast<double>(visibility[i]);
+  }
+  // Closed by overlapping splats of opacity 0.9, so each is half hidden by its neighbours and seen
+  // from one side only.
+  EXPECT_GT(front / static_cast<double>(front_count), 0.02);
+  // Four overlapping splats of opacity 0.9 let through little, the rims of two a few hundredths.
+  EXPECT_LT(behind / 500, 0.01);
+}
+
+TEST(Visibility, OfSplatsApartIsNearlyOne) {
+  SplatCloud cloud = sphere(2, 1.0, 1);
+  for (float& x : cloud.scales) x = 0.02f;
+  ViewRigOptions options;
+  options.rig = ViewRig::kAround;
+  options.size = 256;
+  // Alpha ends at 1/255 (1/230 of the splat's mass), and no view is along the line of both.
+  for (const float x : splatVisibility(cloud, viewsOfCloud(cloud, options))) {
+    EXPECT_GT(x, 0.97f);
+  }
+  cloud.opacities[1] = 0.001f;
+  EXPECT_EQ(splatVisibility(cloud, viewsOfCloud(cloud, options))[1], 0.0f);
+}
+
+TEST(Refine, BringsAWrongCloudNearerToTheFullOne) {
+  const SplatCloud full = sphere(400, 1.0, 1);
+  SplatCloud start = full;
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  for (float& x : start.sh) x += 0.2f * normal(random);
+  for (float& x : start.opacities) x *= 0.8f;
+  for (float& x : start.positions) x += 0.01f * normal(random);
+  RefineOptions options;
+  options.iterations = 80;
+  options.view_count = 12;
+  options.view_size = 96;
+  const SplatCloud refined = refineCloud(start, full, options);
+  ASSERT_EQ(refined.size(), start.size());
+  ViewRigOptions unseen;
+  unseen.seed = 99;
+  unseen.size = 96;
+  const auto views = viewsOfCloud(full, unseen);
+  EXPECT_LT(pictureError(refined, full, views), 0.4 * pictureError(start, full, views));
+}
+
+TEST(Refine, IsTheSameForAnyNumberOfThreads) {
+  const SplatCloud full = sphere(300, 1.0, 1);
+  SplatCloud start = sphere(100, 1.0, 2);
+  RefineOptions options;
+  options.iterations = 5;
+  options.view_count = 3;
+  options.view_size = 64;
+  SplatCloud one, four;
+  withThreads(1, [&] { one = refineCloud(start, full, options); });
+  withThreads(4, [&] { four = refineCloud(start, full, options); });
+  EXPECT_EQ(one.positions, four.positions);
+  EXPECT_EQ(one.sh, four.sh);
+  options.iterations = 0;
+  EXPECT_EQ(refineCloud(start, full, options).positions, start.positions);
+  EXPECT_THROW(refineCloud({}, full, options), Error);
+  start.colour_space = ColourSpace::kLinear;
+  EXPECT_THROW(refineCloud(start, full, options), Error);
+}
+
+}  // namespace
+}  // namespace stipple
