@@ -7,10 +7,13 @@ from . import sources
 
 # Bytes that one splat of degree 0 and each further coefficient (three numbers) take, about, where packing and
 # entropy coding leave it to the data.
-_BYTES = {'ply': (68, 12), 'compressed-ply': (16, 3), 'spz': (16, 2), 'splat': (32, 0), 'sog': (12, 0.5), 'gltf': (56, 12)}
+_BYTES = {'ply': (68, 12), 'compressed_ply': (16, 3), 'spz': (16, 2), 'splat': (32, 0), 'sog': (12, 0.5),
+          'sog_levels': (12, 0.5), 'gltf': (56, 12)}
 # Registering loads no library, so file handlers and dialogs have these; a test compares them with the library's.
-READ_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog', 'meta.json')
-WRITE_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.glb', '.gltf', '.sog', 'meta.json')
+READ_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog', 'meta.json',
+                 'lod-meta.json')
+WRITE_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.glb', '.gltf', '.sog', 'meta.json',
+                  'lod-meta.json')
 _known = {}
 
 
