@@ -8,7 +8,7 @@
 #include "mesh/floaters.h"
 #include "mesh/winding_number.h"
 #include "splat/cloud_merge.h"
-#include "splat/cloud_selection.h"
+#include "data/cloud_selection.h"
 #include "splat/ground_plane.h"
 
 using namespace stipple;

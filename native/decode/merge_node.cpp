@@ -20,6 +20,8 @@ namespace stipple {
 
 namespace {
 
+/// Extent of the cloud over the default footprint: half a pixel where it fills a picture of 800.
+constexpr double kFootprintsPerRadius = 760;
 constexpr double kTwoPi = 2 * std::numbers::pi;
 constexpr double kLargestDepth = std::numbers::pi * std::numbers::pi / 6;
 
@@ -127,6 +129,15 @@ double dotColours(const MergeNode& a, const MergeNode& b, const std::array<doubl
 }
 
 }  // namespace
+
+MergeScale mergeScale(const CloudExtent& extent, double footprint) {
+  MergeScale scale;
+  scale.centre = extent.centre;
+  scale.unit = extent.radius;
+  const double share = footprint > 0 ? footprint / extent.radius : 1 / kFootprintsPerRadius;
+  scale.footprint = share * share;
+  return scale;
+}
 
 double opticalDepth(double opacity) {
   // Li2(1 - e^-u) is the Debye-like integral of t / (e^t - 1) from 0 to u; beyond o = 1/2 Euler's

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 
+#include "data/cloud_extent.h"
 #include "data/splat_cloud.h"
 
 namespace stipple {
@@ -32,6 +33,10 @@ struct MergeScale {
   double unit = 1;                    ///< metres
   double footprint = 0;               ///< variance of the low-pass that errors are seen through
 };
+
+/// The scale of a tree over a cloud of this extent. In: footprint: standard deviation of the
+/// low-pass, metres; 0: automatic (MergeTreeOptions).
+MergeScale mergeScale(const CloudExtent& extent, double footprint);
 
 /// The integral of the optical depth -ln(1 - o exp(-r^2 / 2)) r dr: the dilogarithm of o.
 double opticalDepth(double opacity);

@@ -19,8 +19,6 @@ namespace {
 
 constexpr size_t kGrain = 2048;
 constexpr int kMortonLevel = 16;
-/// Extent of the cloud over the default footprint: half a pixel where it fills a picture of 800.
-constexpr double kFootprintsPerRadius = 760;
 /// Splats that no view sees may show in others: they count a little.
 constexpr float kLeastVisibility = 0.003f;
 
@@ -158,12 +156,7 @@ MergeTree buildMergeTree(const SplatCloud& leaves, std::span<const float> visibi
   const size_t leaf_count = leaves.size();
   const CloudExtent extent = cloudExtent(leaves);
   const std::vector<uint32_t> order = spatialOrder(leaves, extent);
-  MergeScale scale;
-  scale.centre = extent.centre;
-  scale.unit = extent.radius;
-  const double footprint =
-      options.footprint > 0 ? options.footprint / extent.radius : 1 / kFootprintsPerRadius;
-  scale.footprint = footprint * footprint;
+  const MergeScale scale = mergeScale(extent, options.footprint);
 
   std::vector<MergeNode> nodes(leaf_count);
   parallelFor(leaf_count, kGrain, [&](size_t begin, size_t end) {

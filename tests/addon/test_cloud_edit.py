@@ -8,6 +8,7 @@ from stipple.binding import cloud_edit
 from stipple.binding.cloud import Cloud, SplatArrays
 from stipple.binding.errors import CancelledError, StippleError
 from stipple.binding.mesh import Mesh
+from stipple.binding.model import DecodeSettings, Model
 from stipple.binding.structs import Antialias, Side
 
 
@@ -120,6 +121,24 @@ def test_merge_pads_harmonics_and_moves(context):
     mip.antialias = Antialias.MIP
     with pytest.raises(StippleError, match='antialias'):
         cloud_edit.merge([(Cloud.create(context, a), np.eye(4)), (Cloud.create(context, mip), np.eye(4))])
+
+
+def test_a_tree_without_some_splats_never_shows_them(context):
+    given = arrays(300, degree=1)
+    job = Model.from_cloud_start(context, Cloud.create(context, given))
+    job.wait()
+    model = job.model()
+    mask = (given.positions[:, 0] < 0).astype(np.uint8)
+    kept = int(mask.sum())
+    masked = model.masked(mask)
+    assert masked.info().leaf_count == kept
+    np.testing.assert_array_equal(masked.decode(DecodeSettings(kept)).read().positions, given.positions[mask == 1])
+    for budget in (1, 10, kept // 2):
+        positions = masked.decode(DecodeSettings(budget)).read().positions
+        assert positions.shape == (budget, 3) and positions[:, 0].max() < 0
+    for wrong, text in ((mask[:-1], 'mask holds 299'), (mask * 0, 'leaves out all 300')):
+        with pytest.raises(StippleError, match=text):
+            model.masked(wrong)
 
 
 def test_ground_plane_is_levelled(context):

@@ -105,6 +105,7 @@ FUNCTIONS = {
     'stipple_cloud_select_floaters_start': (_status, [_handle, _to(s.StippleFloaterOptions), _mask, c_uint64,
                                                       _to(s.StippleFloaterReport), _out_handle]),
     'stipple_cloud_keep': (_status, [_handle, _mask, c_uint64, _out_handle]),
+    'stipple_model_keep': (_status, [_handle, _mask, c_uint64, _out_handle]),
     'stipple_cloud_merge': (_status, [_to(s.StippleInstance), c_uint64, c_uint32, _out_handle]),
     'stipple_ground_plane_options_init': (None, [_to(s.StippleGroundPlaneOptions)]),
     'stipple_cloud_ground_plane': (_status, [_handle, _matrix, _to(s.StippleGroundPlaneOptions),

@@ -4,10 +4,12 @@
 from ctypes import byref, c_uint64
 from dataclasses import dataclass
 
+import numpy as np
+
 from .cloud import Cloud
 from .density import Density, check_anchor_count
 from .errors import invalid
-from .handle import Handle, new_handle, path_bytes
+from .handle import Handle, contiguous, new_handle, path_bytes, pointer_to
 from .job import Job
 from .structs import (AnchorOrder, StippleDecodeOptions, StippleModelFromCloudOptions, StippleModelFromMeshOptions,
                       StippleModelInfo, StippleRefineOptions, ViewRig)
@@ -84,6 +86,12 @@ class Model(Handle):
         options.footprint = footprint
         return Job(context.library, new_handle(context.library, 'stipple_model_from_cloud_start', context.pointer,
                                                cloud.pointer, byref(options)))
+
+    def masked(self, mask):
+        """The model of a cloud without the splats whose mask [N] is 0, at every budget."""
+        mask = contiguous(mask, np.uint8)
+        return Model(self.library, new_handle(self.library, 'stipple_model_keep', self.pointer, pointer_to(mask),
+                                              len(mask)))
 
     @classmethod
     def load(cls, context, path):

@@ -622,6 +622,11 @@ StippleStatus stipple_cloud_select_floaters_start(const StippleCloud* cloud,
 /* The splats whose mask is not 0, in their order, bit for bit. */
 StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask, uint64_t mask_count,
                                  StippleCloud** kept);
+/* The hierarchy of a cloud without the splats whose mask is 0: no budget shows any of them, and its largest
+ * budget is what is left, bit for bit. mask [mask_count], mask_count = leaf_count of the model. Errors:
+ * UNSUPPORTED for the model of a mesh; INVALID_ARGUMENT for a mask that keeps nothing. Cost: O(N). */
+StippleStatus stipple_model_keep(const StippleModel* model, const uint8_t* mask, uint64_t mask_count,
+                                 StippleModel** kept);
 /* One cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity keeps
  * every bit), harmonics padded to the highest degree. frame: StippleFrame that the matrices lead to, the label
  * of the result. Errors: UNSUPPORTED where colour spaces or antialias flags differ. */

@@ -1,4 +1,4 @@
-#include "splat/cloud_selection.h"
+#include "data/cloud_selection.h"
 
 #include <gtest/gtest.h>
 
