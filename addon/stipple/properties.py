@@ -18,6 +18,7 @@ COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: texture
                  ('BAKED', "Baked Lighting", "Colors as lit by the scene, baked by Cycles"),
                  ('ATTRIBUTE', "Attribute", "The active color attribute"))
 
+BUDGET_KINDS = (('RATIO', "Ratio", "As a share of the source's splats"), ('COUNT', "Count", "As a number of splats"))
 SIDES = (('INSIDE', "Inside", "Keep what is inside"), ('OUTSIDE', "Outside", "Keep what is outside"))
 
 
@@ -32,7 +33,18 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                            options=version.RELATIVE_PATH, override=_OVERRIDABLE)
     source_kind: EnumProperty(name="Source Kind", items=(('NONE', "None", "The splats have no source"),
                                                          ('MODEL', "Model", "Splats at any budget"),
-                                                         ('CLOUD', "Splats", "Splats as they are")), default='NONE')
+                                                         ('CLOUD', "Splats", "Splats as they are"),
+                                                         ('TREE', "Splat Tree", "Splats of a file at any budget")),
+                              default='NONE')
+    source_count: IntProperty(options={'HIDDEN'})  # of a splat tree
+    budget_by: EnumProperty(name="Budget By", description="How the number of splats is given", items=BUDGET_KINDS,
+                            options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
+    ratio: FloatProperty(name="Ratio", description="Share of the source's splats that the viewport shows", default=1.0,
+                         min=0.0, max=1.0, subtype='FACTOR', precision=3, options=_CHANGEABLE, override=_OVERRIDABLE,
+                         update=sync.on_property_change)
+    ratio_render: FloatProperty(name="Render Ratio", description="Share of the source's splats that renders show",
+                                default=1.0, min=0.0, max=1.0, subtype='FACTOR', precision=3, options=_CHANGEABLE,
+                                override=_OVERRIDABLE)
     # Limits are checked where the value is used, so that one beyond them is reported and not bent.
     anchors: IntProperty(name="Anchor Budget", description="Number of places on the surface that get splats",
                          default=20000, soft_min=1, soft_max=1000000, options=_CHANGEABLE, override=_OVERRIDABLE,

@@ -6,6 +6,7 @@ from mathutils import Matrix
 
 from ..binding import cloud_edit
 from ..binding.errors import invalid
+from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene import edits, frames, sources, sync
 
@@ -29,22 +30,30 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
         for obj in objects:
             if obj.data.users > 1:
                 raise invalid(f"The splats of '{obj.name}' have {obj.data.users} users; make them single-user first.")
-        wanted = [(target, obj.matrix_world.copy()) for target, obj in zip(edits.targets(objects), objects)]
+        wanted = [(target, obj.matrix_world.copy(), obj.data.stipple.source_kind == 'TREE',
+                   sources.model_path_for(obj.name)) for target, obj in zip(edits.targets(objects), objects)]
+        native = sources.context()
 
         def work(task):
             moved = []
-            for i, (target, matrix) in enumerate(wanted):
+            for i, (target, matrix, has_budget, path) in enumerate(wanted):
                 task.advance(i / len(wanted), 'Moving splats')
-                moved.append((target, cloud_edit.merge([(target.cloud, matrix)], frames.WORLD)))
+                cloud, tree = cloud_edit.merge([(target.cloud, matrix)], frames.WORLD), None
+                if has_budget:
+                    job = task.run(Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted), (i + 1) / len(wanted))
+                    tree = sources.save_model(job.model(), path)
+                moved.append((target, cloud, tree))
             return moved
         return Task(work)
 
     def finish(self, _context, job):
-        for target, cloud in job.result:
+        for target, cloud, tree in job.result:
             data = target.obj.data
-            path = sources.save_cloud(cloud, target.obj.name)
             with sync.paused():
-                sources.attach_cloud(data, path)
+                if tree is not None:
+                    sources.attach_tree(data, tree, data.stipple.source_count)
+                else:
+                    sources.attach_cloud(data, sources.save_cloud(cloud, target.obj.name))
             # Row by row the same splats, so what was hidden stays hidden.
             edits.write([(target.on(cloud), target.mask)])
             target.obj.matrix_world = Matrix.Identity(4)

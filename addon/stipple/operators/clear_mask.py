@@ -20,7 +20,12 @@ class STIPPLE_OT_clear_mask(JobOperator, bpy.types.Operator):
                 and masks.counts(context.object.data) is not None)
 
     def start(self, context):
-        self._cloud = sources.whole_cloud(context.object.data)
+        data = context.object.data
+        self._cloud = None
+        if data.stipple.source_kind == 'CLOUD':
+            self._cloud = sources.whole_cloud(data)
+        else:
+            sources.model(sources.absolute_path(data.stipple.source, data))  # before anything changes
         return None
 
     def finish(self, context, _job):

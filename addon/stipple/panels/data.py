@@ -7,7 +7,11 @@ Shape Keys and all else that meshes have.
 
 import bpy
 
-from ..scene import masks, splat_data, sync
+from ..scene import exporting, geometry, masks, sources, splat_data, sync
+
+
+SEPARATOR = ' \u00b7 '
+NARROW_PX = 300  # a Properties editor in which the budget's line needs two
 
 
 class _SplatPanel:
@@ -41,13 +45,8 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
 class STIPPLE_PT_clean_up(_SplatPanel, bpy.types.Panel):
     bl_label = "Splat Clean Up"
 
-    def draw(self, context):
+    def draw(self, _context):
         layout = self.layout
-        counts = masks.counts(context.object.data)
-        if counts is not None:
-            row = layout.row()
-            row.label(text=f"{counts[0] - counts[1]:,} of {counts[0]:,} splats hidden", icon='HIDE_ON')
-            row.operator('stipple.clear_mask', text="", icon='X')
         column = layout.column(align=True)
         column.operator_context = 'INVOKE_DEFAULT'
         column.operator('stipple.delete_floaters')
@@ -79,9 +78,17 @@ def _draw_budget(self, context):
     stipple = data.stipple
     box = self.layout.box()
     box.use_property_split = True
-    box.label(text=f"{splat_data.count(data):,} Gaussian Splats", icon='OUTLINER_DATA_POINTCLOUD')
+    label = _shown_label(data)
+    narrow = context.region.width < NARROW_PX * context.preferences.system.ui_scale
+    for i, line in enumerate(label.split(SEPARATOR) if narrow else [label]):
+        box.label(text=line, icon='OUTLINER_DATA_POINTCLOUD' if i == 0 else 'BLANK1')
+    _draw_hidden(box, data)
     _draw_warnings(box, data)
+    if stipple.source_kind == 'TREE':
+        _draw_tree_budget(box, stipple)
+        return
     if stipple.source_kind != 'MODEL':
+        box.operator('stipple.add_budget', icon='MOD_DECIM')
         return
     column = box.column()
     column.enabled = not stipple.edited
@@ -89,6 +96,46 @@ def _draw_budget(self, context):
     column.prop(stipple, 'anchors', text="Splats" if single else "Anchor Budget")
     column.prop(stipple, 'anchors_render', text="Render")
     column.prop(stipple, 'seed')
+
+
+def _shown_label(data):
+    count = splat_data.count(data)
+    if data.stipple.source_kind != 'TREE':
+        return f"{count:,} Gaussian Splats"
+    size = exporting.megabytes(count * splat_data.bytes_each(data))
+    return f"Showing {count:,} of {sources.visible_count(data.stipple):,}{SEPARATOR}{size}"
+
+
+def _draw_hidden(layout, data):
+    counts = masks.counts(data)
+    if counts is not None:
+        row = layout.row()
+        row.label(text=f"{counts[0] - counts[1]:,} hidden", icon='HIDE_ON')
+        row.operator('stipple.clear_mask', text="", icon='X')
+
+
+def _draw_tree_budget(layout, stipple):
+    layout = layout.column()
+    layout.enabled = not stipple.edited
+    layout.use_property_split = False
+    layout.row().prop(stipple, 'budget_by', expand=True)
+    name = 'ratio' if stipple.budget_by == 'RATIO' else 'anchors'
+    row = layout.row()
+    for text, suffix, render in (("Viewport", '', False), ("Render", '_render', True)):
+        column = row.column(align=True)
+        column.label(text=text)
+        column.prop(stipple, name + suffix, text="", slider=name == 'ratio')
+        buttons = column.row(align=True)
+        for label, factor in (("\u00f7 2", 0.5), ("\u00d7 2", 2.0)):
+            button = buttons.operator('stipple.scale_budget', text=label)
+            button.factor, button.render = factor, render
+
+
+def _draw_foreign(self, context):
+    """Splats that something else made: they can have a budget too."""
+    obj = context.object
+    if not splat_data.is_splat_object(obj) and geometry.carries_splats(obj.data):
+        self.layout.operator('stipple.add_budget', icon='MOD_DECIM')
 
 
 def _draw_warnings(layout, data):
@@ -136,6 +183,7 @@ def register():
         host = getattr(bpy.types, name, None)
         if host is not None:
             host.append(_draw_budget)
+            host.append(_draw_foreign)
 
 
 def unregister():
@@ -143,6 +191,7 @@ def unregister():
         host = getattr(bpy.types, name, None)
         if host is not None:
             host.remove(_draw_budget)
+            host.remove(_draw_foreign)
 
 
 classes = (STIPPLE_PT_source, STIPPLE_PT_clean_up, STIPPLE_PT_advanced)

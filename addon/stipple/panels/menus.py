@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..scene import splat_data
+from ..scene import geometry, splat_data
 
 
 class STIPPLE_MT_add(bpy.types.Menu):
@@ -30,12 +30,13 @@ class STIPPLE_MT_object(bpy.types.Menu):
         layout.operator('stipple.crop_by_mesh', icon='MESH_ICOSPHERE')
         layout.operator('stipple.clear_mask', icon='X')
         layout.separator()
+        layout.operator('stipple.add_budget', icon='MOD_DECIM')
         layout.operator('stipple.merge_splats', icon='AUTOMERGE_OFF')
         layout.operator('stipple.apply_transform', icon='OBJECT_ORIGIN')
 
 
 def _draw_object(self, context):
-    if splat_data.is_splat_object(context.object):
+    if splat_data.is_splat_object(context.object) or geometry.may_carry_splats(context.object):
         self.layout.separator()
         self.layout.menu('STIPPLE_MT_object', icon='OUTLINER_DATA_POINTCLOUD')
 

@@ -34,11 +34,11 @@ def _cloud_of(obj, mode):
     """Native splats of an evaluated object, or None for none."""
     data, original = obj.data, obj.original.data
     stipple = data.stipple
-    from_source = stipple.source_kind == 'MODEL' and not stipple.edited and not _has_modifiers(obj)
+    from_source = stipple.source_kind in sources.MODEL_KINDS and not stipple.edited and not _has_modifiers(obj)
     if from_source and not sync.is_edited(original):
         settings = sources.decode_settings(stipple, mode)
         try:
-            return sources.decode(sources.absolute_path(stipple.source, original), settings)
+            return sources.decode(original, settings)
         except StippleError as error:
             raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
     if splat_data.count(data) == 0:

@@ -21,6 +21,8 @@ from ..binding.model import DecodeSettings, Model
 from ..binding.structs import AnchorOrder, Status
 from . import masks, meshes, splat_data
 
+# Kinds of sources that give splats at any budget.
+MODEL_KINDS = ('MODEL', 'TREE')
 MODEL_SUFFIX = '.stipple.safetensors'
 _MAX_MODELS = 4
 # Splats kept decoded over all cached clouds; 60 bytes each, so 1.2 GB at most.
@@ -68,17 +70,33 @@ def model(path):
 
 
 def remember_model(path, loaded):
-    _models[_file_key(path)] = loaded
+    _keep_model(_file_key(path), loaded)
+
+
+def _keep_model(key, loaded):
+    _models[key] = loaded
     while len(_models) > _MAX_MODELS:
         _models.popitem(last=False)
 
 
-def decode(path, settings):
-    """The cloud of a model at these settings; kept for the next picture."""
-    key = (_file_key(path), settings)
+def model_of(data):
+    """The model of a datablock's source, without what its mask hides; masked ones are kept like others."""
+    path, hidden = absolute_path(data.stipple.source, data), masks.key(data)
+    if not hidden:
+        return model(path)
+    key = (*_file_key(path), hidden)
+    if key not in _models:
+        _keep_model(key, model(path).masked(masks.read(data)))
+    _models.move_to_end(key)
+    return _models[key]
+
+
+def decode(data, settings):
+    """The cloud of a datablock's model at these settings; kept for the next picture."""
+    key = (_file_key(absolute_path(data.stipple.source, data)) + (masks.key(data),), settings)
     cloud = _clouds.get(key)
     if cloud is None:
-        cloud = model(path).decode(settings)
+        cloud = model_of(data).decode(settings)
         _clouds[key] = cloud
         total = sum(k[1].anchors * k[1].gaussians_per_anchor for k in _clouds)
         while total > _MAX_CACHED_SPLATS and len(_clouds) > 1:
@@ -90,15 +108,17 @@ def decode(path, settings):
 
 def decode_data(data, settings):
     """The cloud that a datablock's source gives at these settings, without what its mask leaves out."""
-    path = absolute_path(data.stipple.source, data)
-    if data.stipple.source_kind == 'MODEL':
-        return model(path).decode(settings)
-    return masked(whole_cloud(data), data)
+    if data.stipple.source_kind == 'CLOUD':
+        return masked(whole_cloud(data), data)
+    return model_of(data).decode(settings)
 
 
 def whole_cloud(data):
     """All splats of a datablock's source, masked ones too."""
-    return Cloud.load(context(), absolute_path(data.stipple.source, data))
+    path = absolute_path(data.stipple.source, data)
+    if data.stipple.source_kind == 'TREE':
+        return model(path).decode(DecodeSettings(data.stipple.source_count))
+    return Cloud.load(context(), path)
 
 
 def full_cloud(data):
@@ -107,14 +127,14 @@ def full_cloud(data):
     stipple = data.stipple
     if stipple.source_kind == 'NONE' or stipple.edited:
         return Cloud.create(context(), splat_data.read(data))
-    return decode_data(data, decode_settings(stipple, 'RENDER'))
+    return decode_data(data, decode_settings(stipple, 'FULL' if stipple.source_kind == 'TREE' else 'RENDER'))
 
 
 def count_of(data, budget):
     """Splats of a datablock at the budget 'RENDER' or 'FULL', without decoding."""
     stipple = data.stipple
-    if stipple.source_kind == 'MODEL' and not stipple.edited:
-        settings = decode_settings(stipple, 'RENDER')
+    if stipple.source_kind in MODEL_KINDS and not stipple.edited:
+        settings = decode_settings(stipple, budget)
         return settings.anchors * settings.gaussians_per_anchor
     return splat_data.count(data)
 
@@ -127,10 +147,29 @@ def masked(cloud, data):
 
 def decode_settings(stipple, mode='VIEWPORT'):
     """The settings of a datablock as the binding takes them; mode 'RENDER' takes the render budget."""
+    if stipple.source_kind == 'TREE':
+        return DecodeSettings(_tree_budget(stipple, mode))
     anchors = stipple.anchors
     if mode == 'RENDER' and stipple.anchors_render != 0:
         anchors = stipple.anchors_render
     return DecodeSettings(anchors, stipple.gaussians_per_anchor, AnchorOrder[stipple.order], stipple.seed)
+
+
+def _tree_budget(stipple, mode):
+    """Splats of a tree in a mode: 'VIEWPORT', 'RENDER' or 'FULL'; never more than there are."""
+    total = visible_count(stipple)
+    if mode == 'FULL':
+        return total
+    if stipple.budget_by == 'RATIO':
+        return max(1, round(total * (stipple.ratio_render if mode == 'RENDER' else stipple.ratio)))
+    count = stipple.anchors_render if mode == 'RENDER' and stipple.anchors_render != 0 else stipple.anchors
+    return min(count, total)
+
+
+def visible_count(stipple):
+    """Splats of a tree that are not hidden."""
+    counts = masks.counts(stipple.id_data)
+    return stipple.source_count if counts is None else counts[1]
 
 
 def cloud_from_object(obj):
@@ -166,6 +205,16 @@ def save_cloud(cloud, name):
     path = model_path_for(name)[:-len(MODEL_SUFFIX)] + '.ply'
     # In its own frame: the source is what the object shows, number by number.
     return _save(lambda to: cloud.save(to, frame=cloud.info().frame), path, '.ply', False)
+
+
+def attach_tree(data, path, count):
+    """Notes a splat tree of this many splats as the source of a datablock; its mask stays."""
+    stipple = data.stipple
+    stipple.source = blend_path(path)
+    stipple.source_kind = 'TREE'
+    stipple.source_count = count
+    stipple.source_objects.clear()
+    stipple.source_changed = stipple.edited = False
 
 
 def attach_cloud(data, path):

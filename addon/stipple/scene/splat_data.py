@@ -67,6 +67,11 @@ def count(data):
     return len(data.vertices) if isinstance(data, bpy.types.Mesh) else len(data.points)
 
 
+def bytes_each(data):
+    """Bytes that each splat of a datablock takes."""
+    return 4 * (3 + 3 + 4 + 4 + 3 * ((degree(data) + 1) ** 2 - 1))
+
+
 def degree(data):
     """The degree of the harmonics that a datablock stores."""
     return sh_degree_of(1 + sum(a.name.startswith('radiance:sh_') for a in data.attributes))

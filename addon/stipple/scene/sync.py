@@ -6,6 +6,8 @@ property's update function is not called when the property is animated, undone o
 """
 
 import logging
+import time
+from dataclasses import replace
 
 import bpy
 from bpy.app.handlers import persistent
@@ -17,11 +19,15 @@ WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
 
 ENGINE = 'STIPPLE'
+MOVE_SECONDS = 0.05  # that one move of a slider may take
+REST_SECONDS = 0.25  # after which a slider rests
+FEW = 1000           # fewer splats say nothing about the time that each takes
 
 log = logging.getLogger('stipple')
 # What is wrong with a datablock, by name, for the panel; empty while all is well.
 problems = {}
-_state = {'paused': 0, 'rendering': False}
+# seconds_per_splat: how long decoding and writing took last; the first value is a slow machine's.
+_state = {'paused': 0, 'rendering': False, 'seconds_per_splat': 1e-6}
 
 
 class paused:
@@ -34,17 +40,20 @@ class paused:
         _state['paused'] -= 1
 
 
-def sync(obj, depsgraph, mode):
+def sync(obj, depsgraph, mode, most=None):
     """Writes the attributes that an object's data should have now. Returns True where it wrote.
 
     depsgraph: evaluated settings (animation, drivers) are read through it; None: the settings as they are.
-    mode: 'VIEWPORT' or 'RENDER'. Errors: StippleError, with the splats as they were.
+    mode: 'VIEWPORT' or 'RENDER'. most: splats that are written at most for now, None for all. Errors: StippleError,
+    with the splats as they were.
     """
     data = obj.data
     stipple = data.stipple
     if stipple.source_kind == 'NONE' or not stipple.source or stipple.edited:
         return False
     settings = sources.decode_settings(_evaluated(data, depsgraph), mode)
+    if most is not None:
+        settings = replace(settings, anchors=min(settings.anchors, max(1, most // settings.gaussians_per_anchor)))
     key = written_key(data, settings)
     if data.get(WRITTEN_KEY) == key:
         return False
@@ -53,7 +62,11 @@ def sync(obj, depsgraph, mode):
         stipple.edited = True
         raise StippleError(f"The splats of '{data.name}' were edited by hand; use them as a new source, or revert to "
                            'the source, to change their settings.')
-    write(data, sources.decode_data(data, settings).read(), key)
+    begin = time.perf_counter()
+    splats = sources.decode_data(data, settings).read()
+    write(data, splats, key)
+    if splats.count >= FEW:
+        _state['seconds_per_splat'] = (time.perf_counter() - begin) / splats.count
     return True
 
 
@@ -74,6 +87,8 @@ def written_key(data, settings):
     stipple = data.stipple
     if stipple.source_kind == 'CLOUD':
         return masks.key(data)
+    if stipple.source_kind == 'TREE':
+        return f'{stipple.source}|{settings.anchors}|{masks.key(data)}'
     return f'{stipple.source}|{settings.anchors}|{settings.gaussians_per_anchor}|{int(settings.order)}|{settings.seed}'
 
 
@@ -101,15 +116,32 @@ def on_property_change(stipple, _context):
         return
     data = stipple.id_data
     users = [obj for obj in bpy.data.objects if obj.data == data]
-    if users:
+    if users and bpy.app.background:
         try_sync(users[0], None, 'VIEWPORT')
+    elif users:
+        follow(users[0])
 
 
-def try_sync(obj, depsgraph, mode):
+def follow(obj):
+    """Follows a slider: what cannot be written within MOVE_SECONDS is left out until the slider rests."""
+    most = int(MOVE_SECONDS / _state['seconds_per_splat'])
+    try_sync(obj, None, 'VIEWPORT', most)
+    if bpy.app.timers.is_registered(complete):
+        bpy.app.timers.unregister(complete)
+    bpy.app.timers.register(complete, first_interval=REST_SECONDS)
+
+
+def complete():
+    """The slider rests: all splats of the budget. A timer's function: it returns None to end."""
+    if not _state['rendering']:
+        sync_all()
+
+
+def try_sync(obj, depsgraph, mode, most=None):
     """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once."""
     name = obj.data.name
     try:
-        sync(obj, depsgraph, mode)
+        sync(obj, depsgraph, mode, most)
         problems.pop(name, None)
     except StippleError as error:
         if problems.get(name) != str(error):
@@ -222,5 +254,7 @@ def unregister():
         handlers = getattr(bpy.app.handlers, name)
         if function in handlers:
             handlers.remove(function)
+    if bpy.app.timers.is_registered(complete):
+        bpy.app.timers.unregister(complete)
     problems.clear()
     sources.forget()

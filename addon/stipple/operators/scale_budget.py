@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Half or twice the budget."""
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty
+
+from ..scene import sources, splat_data
+
+
+class STIPPLE_OT_scale_budget(bpy.types.Operator):
+    """Halve or double the number of splats"""
+
+    bl_idname = 'stipple.scale_budget'
+    bl_label = "Scale Budget"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    factor: FloatProperty(name="Factor", default=0.5, min=0.0)
+    render: BoolProperty(name="Render", description="The budget of renders instead of the viewport's", default=False)
+
+    @classmethod
+    def poll(cls, context):
+        return splat_data.is_splat_object(context.object) and (
+            context.object.data.stipple.source_kind in sources.MODEL_KINDS)
+
+    def execute(self, context):
+        stipple = context.object.data.stipple
+        mode = 'RENDER' if self.render else 'VIEWPORT'
+        name = 'ratio' if stipple.source_kind == 'TREE' and stipple.budget_by == 'RATIO' else 'anchors'
+        before = getattr(stipple, name + '_render') if self.render else getattr(stipple, name)
+        if name == 'ratio':
+            after = min(1.0, before * self.factor)
+        else:
+            after = max(1, round(sources.decode_settings(stipple, mode).anchors * self.factor))
+        setattr(stipple, name + '_render' if self.render else name, after)
+        return {'FINISHED'}
+
+
+classes = (STIPPLE_OT_scale_budget,)
