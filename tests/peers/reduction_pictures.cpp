@@ -1,0 +1,157 @@
+// Reduces a cloud by its merge tree, with and without refinement, and compares pictures of 16 views
+// with the full cloud, beside files that another program made at the same counts.
+//   reduction_pictures --count FILE
+//   reduction_pictures FILE (BUDGET RULE SECONDS RESULT)...
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/parallel.h"
+#include "decode/hierarchy_decoder.h"
+#include "io/splat_file.h"
+#include "splat/render.h"
+#include "train/refine.h"
+#include "train/view_rig.h"
+#include "train/visibility.h"
+
+namespace stipple {
+namespace {
+
+double secondsOf(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+struct Psnr {
+  double frame = 0;
+  double foreground = 0;  ///< over the pixels that the full cloud covers by 1/255 or more
+};
+
+/// Views of other seeds than those that visibility and refinement look from.
+class Judge {
+ public:
+  explicit Judge(const SplatCloud& full) {
+    ViewRigOptions rig;
+    rig.count = 16;
+    rig.size = 800;
+    rig.seed = 1234567;
+    views_ = viewsOfCloud(full, rig);
+    for (const Camera& view : views_) wanted_.push_back(draw(full, view));
+  }
+
+  Psnr psnr(const SplatCloud& cloud) const {
+    double all = 0, covered = 0;
+    size_t all_count = 0, covered_count = 0;
+    for (size_t v = 0; v < views_.size(); ++v) {
+      const std::vector<float> seen = draw(cloud, views_[v]);
+      for (size_t i = 0; i < seen.size(); i += 4) {
+        double squared = 0;
+        for (size_t c = 0; c < 3; ++c) {
+          const double d = static_cast<double>(std::clamp(seen[i + c], 0.0f, 1.0f)) -
+                           static_cast<double>(std::clamp(wanted_[v][i + c], 0.0f, 1.0f));
+          squared += d * d;
+        }
+        all += squared;
+        all_count += 3;
+        if (wanted_[v][i + 3] < 1.0f / 255) continue;
+        covered += squared;
+        covered_count += 3;
+      }
+    }
+    return {-10 * std::log10(all / static_cast<double>(all_count)),
+            -10 * std::log10(covered / static_cast<double>(covered_count))};
+  }
+
+ private:
+  static std::vector<float> draw(const SplatCloud& cloud, const Camera& camera) {
+    RenderOptions options;
+    options.with_depth = false;
+    const SplatInstance instance{&cloud};
+    return renderTiled({&instance, 1}, camera, options).colour;
+  }
+
+  std::vector<Camera> views_;
+  std::vector<std::vector<float>> wanted_;
+};
+
+void print(const char* what, uint64_t budget, const Psnr& psnr, double seconds) {
+  std::printf("%-26s %9llu %7.2f %7.2f %9.3f\n", what, static_cast<unsigned long long>(budget),
+              psnr.frame, psnr.foreground, seconds);
+  std::fflush(stdout);
+}
+
+/// As many steps as fit into a time, by the time that a few take.
+uint32_t stepsWithin(double seconds, const SplatCloud& cut, const SplatCloud& full) {
+  RefineOptions options;
+  options.iterations = 4;
+  options.view_count = 4;
+  const double few = secondsOf([&] { refineCloud(cut, full, options); }) / 4;
+  return static_cast<uint32_t>(std::clamp(0.85 * seconds / few - 32.0, 1.0, 2000.0));
+}
+
+void compare(int argc, char** argv) {
+  const auto full = std::make_shared<const SplatCloud>(readSplatFile(argv[1]));
+  const Judge judge(*full);
+  std::printf("%-26s %9s %7s %7s %9s\n", "", "splats", "frame", "foregr.", "seconds");
+  std::map<uint64_t, double> peer_seconds;
+  for (int i = 2; i + 3 < argc; i += 4) {
+    const uint64_t budget = std::strtoull(argv[i], nullptr, 10);
+    const double seconds = std::strtod(argv[i + 2], nullptr);
+    print(argv[i + 1], budget, judge.psnr(readSplatFile(argv[i + 3])), seconds);
+    double& least = peer_seconds.try_emplace(budget, seconds).first->second;
+    least = std::min(least, seconds);
+  }
+  MergeTree tree;
+  const double plain = secondsOf([&] { buildMergeTree(*full, {}, {}); });
+  std::vector<float> visibility;
+  const double looking = secondsOf(
+      [&] { visibility = splatVisibility(*full, viewsOfCloud(*full, ViewRigOptions())); });
+  const double building = secondsOf([&] { tree = buildMergeTree(*full, visibility, {}); });
+  std::printf("tree without pictures %.3f s; pictures %.3f s, tree %.3f s\n", plain, looking,
+              building);
+  const HierarchyDecoder decoder(full, std::make_shared<const MergeTree>(std::move(tree)));
+  for (const auto& [budget, seconds] : peer_seconds) {
+    DecodeRequest request;
+    request.budget = budget;
+    SplatCloud cut;
+    double cutting = 0;
+    withThreads(1, [&] { cutting = secondsOf([&] { cut = decoder.decode(request); }); });
+    print("merge tree, cut", budget, judge.psnr(cut), cutting);
+    RefineOptions options;
+    options.iterations = stepsWithin(seconds, cut, *full);
+    SplatCloud refined;
+    const double refining = secondsOf([&] { refined = refineCloud(cut, *full, options); });
+    const std::string what = "refined, " + std::to_string(options.iterations) + " steps";
+    print(what.c_str(), budget, judge.psnr(refined), refining);
+  }
+}
+
+}  // namespace
+}  // namespace stipple
+
+int main(int argc, char** argv) {
+  try {
+    if (argc == 3 && std::string(argv[1]) == "--count") {
+      std::printf("%zu\n", stipple::readSplatFile(argv[2]).size());
+      return 0;
+    }
+    if (argc < 6 || argc % 4 != 2) {
+      std::fprintf(stderr, "usage: reduction_pictures FILE (BUDGET RULE SECONDS RESULT)...\n");
+      return 2;
+    }
+    stipple::compare(argc, argv);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "reduction_pictures: %s\n", error.what());
+    return 1;
+  }
+}
