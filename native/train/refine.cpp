@@ -25,6 +25,10 @@ constexpr double kLogitRate = 3e-2;
 constexpr double kColourRate = 1e-2;
 constexpr double kHigherColourRate = 5e-4;
 constexpr double kLastRate = 0.1;
+/// A step of Adam has the size of the rate, whatever the gradient: near the goal it must be small.
+/// Rates are whole where the start is off by this mean L1, and fall in proportion below it.
+constexpr double kErrorOfFullRates = 4e-3;
+constexpr double kLeastShare = 0.02;
 /// Few steps: the second moment must follow within tens of them.
 constexpr double kBeta2 = 0.99;
 
@@ -58,13 +62,13 @@ double typicalSize(const SplatCloud& cloud) {
   return static_cast<double>(*middle);
 }
 
-StepOptions stepOptions(double size, double progress) {
+StepOptions stepOptions(double size, double share, double progress) {
   const double fall =
       kLastRate + (1 - kLastRate) * 0.5 * (1 + std::cos(progress * 3.141592653589793));
   StepOptions step;
   step.adam.beta2 = kBeta2;
   const auto set = [&](ParameterGroup group, double rate) {
-    step.learning_rates[static_cast<size_t>(group)] = rate * fall;
+    step.learning_rates[static_cast<size_t>(group)] = rate * share * fall;
   };
   set(ParameterGroup::kPositions, kPositionRate * size);
   set(ParameterGroup::kRotations, kRotationRate);
@@ -101,6 +105,18 @@ void addTargets(const SplatCloud& full, const std::vector<Camera>& views, Render
     }
     backend.addTarget(views[v].width, views[v].height, pixels);
   }
+}
+
+/// What the start lacks: mean L1 loss of a few views.
+double startingError(const std::vector<Camera>& views, const ImageLossOptions& loss,
+                     RenderBackend& backend) {
+  const size_t count = std::min<size_t>(views.size(), 4);
+  double sum = 0;
+  for (size_t v = 0; v < count; ++v) {
+    backend.forward(views[v], renderOptions(v));
+    sum += backend.loss(static_cast<uint32_t>(v), loss).l1;
+  }
+  return sum / static_cast<double>(count);
 }
 
 /// All views once per round, each round in an order of its own.
@@ -144,6 +160,8 @@ SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
   ImageLossOptions loss;
   loss.ssim_share = options.ssim_share;
   const double size = typicalSize(start);
+  const double share =
+      std::clamp(startingError(views, loss, *backend) / kErrorOfFullRates, kLeastShare, 1.0);
   ViewOrder order(views.size(), options.seed);
   for (uint32_t i = 0; i < options.iterations; ++i) {
     const double done = static_cast<double>(i) / options.iterations;
@@ -152,7 +170,7 @@ SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
     backend->forward(views[view], renderOptions(view));
     backend->loss(view, loss);
     backend->backward({});
-    backend->step(stepOptions(size, done));
+    backend->step(stepOptions(size, share, done));
   }
   SplatCloud refined = backend->download();
   refined.frame = start.frame;
