@@ -87,7 +87,9 @@ def written_formats():
 
 def loss(folder, title, ending, degree, options):
     """The figures of one format as a dict."""
-    source, packed, back = folder / 'source.ply', folder / f'packed{ending}', folder / 'back.ply'
+    source, back = folder / 'source.ply', folder / 'back.ply'
+    # A folder of its own: some formats are several files.
+    packed = Path(tempfile.mkdtemp(dir=folder)) / (f'cloud{ending}' if ending.startswith('.') else ending)
     write_ply(source, make_cloud(), DEGREE)
     tool('convert', source, packed, *options)
     tool('convert', packed, back)
@@ -95,7 +97,8 @@ def loss(folder, title, ending, degree, options):
     write_ply(folder / 'ordered.ply', in_first_order(read_ply(back, degree)), degree)
     figures = json.loads(tool('compare', folder / 'expected.ply', folder / 'ordered.ply', '--json'))
     assert figures['same_order'] == 1
-    return {'title': title, 'degree': degree, 'bytes': packed.stat().st_size / SIDE ** 3, **figures}
+    size = sum(file.stat().st_size for file in packed.parent.rglob('*') if file.is_file())
+    return {'title': title, 'degree': degree, 'bytes': size / SIDE ** 3, **figures}
 
 
 def number(value):
