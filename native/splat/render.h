@@ -96,7 +96,7 @@ void renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
 /// Upper bounds of the bytes that renderTiled allocates, by what they grow with.
 struct RenderMemory {
   uint64_t splat_bytes = 0;   ///< at most 112 per splat, and 11 MiB
-  uint64_t pixel_bytes = 0;   ///< at most 64 per pixel: counters of the tiles
+  uint64_t pixel_bytes = 0;   ///< at most 64 per pixel: counters of the tiles, what is kept
   uint64_t pair_bytes = 0;    ///< 4 per pair of splat and tile, at most 136 MB or 4 per splat
   uint64_t result_bytes = 0;  ///< the picture itself
   uint64_t other_bytes = 0;   ///< instances
@@ -105,9 +105,10 @@ struct RenderMemory {
     return splat_bytes + pixel_bytes + pair_bytes + result_bytes + other_bytes;
   }
 };
+/// In: keeps_for_backward, whether the workspace keeps pictures (RenderWorkspace::keepForBackward).
 /// Errors: kInvalidArgument for a camera that validate() refuses.
 RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera& camera,
-                          const RenderOptions& options);
+                          const RenderOptions& options, bool keeps_for_backward = false);
 
 /// Their sum: upper bound of the bytes that renderTiled allocates, its result included.
 uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camera& camera,

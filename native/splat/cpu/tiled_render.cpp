@@ -372,17 +372,21 @@ RenderResult renderTiled(std::span<const SplatInstance> instances, const Camera&
 }
 
 RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera& camera,
-                          const RenderOptions& options) {
+                          const RenderOptions& options, bool keeps_for_backward) {
   uint64_t splat_count = 0;
   for (const SplatInstance& instance : instances) {
     if (instance.cloud) splat_count += instance.cloud->size();
   }
   validate(camera);
-  const TileListsBound lists = tileListsBound(splat_count, TileGrid(camera.width, camera.height));
+  const TileGrid grid(camera.width, camera.height);
+  const TileListsBound lists = tileListsBound(splat_count, grid);
   RenderMemory memory;
   memory.splat_bytes = visibleSplatsMemoryBound(splat_count);
   memory.pair_bytes = lists.pair_bytes;
   memory.pixel_bytes = lists.other_bytes;
+  if (keeps_for_backward) {
+    memory.pixel_bytes += keptPictureBound(grid, options.with_depth, instances.size());
+  }
   memory.result_bytes = resultBytes(camera, options);
   memory.other_bytes = 2 * instances.size() * sizeof(PlacedCloud);
   return memory;

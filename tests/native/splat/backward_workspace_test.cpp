@@ -221,6 +221,20 @@ TEST(BackwardFromDrawing, ListsSplatsAgainWhereTheDrawingCouldNotKeepTheLists) {
   expectSame(drawn.result, before);
 }
 
+TEST(BackwardFromDrawing, IsCountedInTheMemoryOfTheDrawing) {
+  const SplatCloud cloud = smallCloud(300, 1, 12);
+  const SplatInstance instance{&cloud};
+  Drawn drawn;
+  drawn.camera = frontCamera(1500, 1100, 1100, 3);
+  drawn.draw({&instance, 1});
+  const RenderMemory plain = renderMemory({&instance, 1}, drawn.camera, {});
+  const RenderMemory kept = renderMemory({&instance, 1}, drawn.camera, {}, true);
+  EXPECT_LE(drawn.workspace.bytes(), kept.sum() - kept.result_bytes);
+  // Transmittance and end of each pixel, and its coverage for the depth, over whole tiles.
+  EXPECT_GE(kept.pixel_bytes - plain.pixel_bytes, 12u * 1504u * 1104u);
+  EXPECT_LE(kept.pixel_bytes, 64u * pixelCount(drawn.camera));
+}
+
 TEST(BackwardFromDrawing, IgnoresDepthWhereNothingCoversThePixel) {
   const SplatCloud cloud = smallCloud(1, 0, 9);
   SplatCloud away = cloud;
