@@ -90,18 +90,28 @@ double expNegative(double x) {
   return sum * std::bit_cast<double>(static_cast<uint64_t>(static_cast<int64_t>(n) + 1023) << 52);
 }
 
+/// Determinant of the symmetric matrix (xx xy; xy yy) after the low-pass of variance `blur`. Of a
+/// needle, rounding would leave anything of xx yy - xy^2: below 0 it is 0, what the blur adds
+/// stays.
+double blurredDeterminant(double xx, double xy, double yy, double blur) {
+  return std::max(std::max(xx * yy - xy * xy, 0.0) + blur * (xx + yy + blur), kSmallestDeterminant);
+}
+
 /// Integral of the product of two unit-mass Gaussians over a coordinate plane, through the
 /// low-pass.
 double planeProduct(const MergeNode& a, const MergeNode& b, size_t plane, double footprint) {
   const size_t* entries = kPlaneEntries[plane];
-  const double xx = a.covariance[entries[0]] + b.covariance[entries[0]] + 2 * footprint;
+  const double xx = a.covariance[entries[0]] + b.covariance[entries[0]];
   const double xy = a.covariance[entries[1]] + b.covariance[entries[1]];
-  const double yy = a.covariance[entries[2]] + b.covariance[entries[2]] + 2 * footprint;
-  const double determinant = std::max(xx * yy - xy * xy, kSmallestDeterminant);
+  const double yy = a.covariance[entries[2]] + b.covariance[entries[2]];
+  const double blur = 2 * footprint;
+  const double determinant = blurredDeterminant(xx, xy, yy, blur);
   const double dx = a.mean[kPlaneAxes[plane][0]] - b.mean[kPlaneAxes[plane][0]];
   const double dy = a.mean[kPlaneAxes[plane][1]] - b.mean[kPlaneAxes[plane][1]];
-  const double squared = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant;
-  return expNegative(-0.5 * squared) / (kTwoPi * std::sqrt(determinant));
+  const double squared =
+      ((yy + blur) * dx * dx - 2 * xy * dx * dy + (xx + blur) * dy * dy) / determinant;
+  // Along a needle rounding may leave less than 0.
+  return expNegative(-0.5 * std::max(squared, 0.0)) / (kTwoPi * std::sqrt(determinant));
 }
 
 /// Fills what follows from the covariance.
@@ -109,10 +119,9 @@ void measure(MergeNode& node, double footprint) {
   double squares = 0;
   for (size_t plane = 0; plane < 3; ++plane) {
     const size_t* entries = kPlaneEntries[plane];
-    const double xx = node.covariance[entries[0]] + footprint;
-    const double xy = node.covariance[entries[1]];
-    const double yy = node.covariance[entries[2]] + footprint;
-    const double determinant = std::max(xx * yy - xy * xy, kSmallestDeterminant);
+    const double determinant =
+        blurredDeterminant(node.covariance[entries[0]], node.covariance[entries[1]],
+                           node.covariance[entries[2]], footprint);
     squares += determinant;
     node.plane_size[plane] = std::sqrt(determinant);
     // The square of a Gaussian is one of half the variance.

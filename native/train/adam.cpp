@@ -41,7 +41,7 @@ void validate(std::span<const AdamGroup> groups, uint64_t step, const AdamOption
   for (size_t i = 0; i < groups.size(); ++i) {
     const AdamGroup& group = groups[i];
     const std::string name = "group " + std::to_string(i);
-    if (!(group.learning_rate >= 0 && group.learning_rate <= 1e6)) {
+    if (!(group.learning_rate >= 0 && group.learning_rate <= kMaxLearningRate)) {
       fail(ErrorCode::kInvalidArgument, name + ": learning_rate is " +
                                             std::to_string(group.learning_rate) +
                                             "; it must be within 0 and 1e6");

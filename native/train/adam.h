@@ -23,10 +23,11 @@ struct AdamGroup {
   float* second_moments = nullptr;
   size_t row_count = 0;
   size_t row_length = 0;
-  double learning_rate = 0;  ///< 0..1e6
+  double learning_rate = 0;  ///< 0..kMaxLearningRate
   size_t row_stride = 0;     ///< elements from a row to the next; 0: row_length, nothing between
 };
 
+constexpr double kMaxLearningRate = 1e6;
 /// Largest magnitude of a gradient: its square stays inside float32.
 constexpr float kLargestGradient = 1e18f;
 /// Moments below this become 0: they move nothing, and processors are slow on denormal numbers.

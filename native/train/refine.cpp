@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "data/cloud_extent.h"
+#include "train/adam.h"
 #include "train/render_backend.h"
 
 namespace stipple {
@@ -68,7 +69,9 @@ StepOptions stepOptions(double size, double share, double progress) {
   StepOptions step;
   step.adam.beta2 = kBeta2;
   const auto set = [&](ParameterGroup group, double rate) {
-    step.learning_rates[static_cast<size_t>(group)] = rate * share * fall;
+    // Splats of many kilometres take smaller steps than their size asks for.
+    step.learning_rates[static_cast<size_t>(group)] =
+        std::min(rate * share * fall, kMaxLearningRate);
   };
   set(ParameterGroup::kPositions, kPositionRate * size);
   set(ParameterGroup::kRotations, kRotationRate);

@@ -23,6 +23,8 @@ constexpr double kAngleAround = 40.0 * std::numbers::pi / 180;
 constexpr double kAngleInside = 75.0 * std::numbers::pi / 180;
 /// Places of cameras inside lie within this share of the radius.
 constexpr double kInsideShare = 0.25;
+/// Nothing within this many radii is cut off behind.
+constexpr double kFarRadii = 1e3;
 constexpr uint32_t kProbeSize = 48;
 constexpr double kProbeDepthShare = 0.3;
 
@@ -33,6 +35,7 @@ Camera lookingAlong(const Vec3d& eye, const Vec3d& forward, double angle, uint32
   camera.fx = camera.fy = 0.5 * size / std::tan(0.5 * angle);
   camera.cx = camera.cy = 0.5 * size;
   camera.near_plane = std::max(1e-3 * radius, 1e-9);
+  camera.far_plane = std::max(camera.far_plane, kFarRadii * radius);
   const Vec3d aside = std::abs(forward[1]) < 0.9 ? Vec3d(0, 1, 0) : Vec3d(1, 0, 0);
   const Vec3d right = forward.cross(aside).normalized();
   Mat3d rotation;
