@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "data/splat_frame.h"
+
 namespace stipple {
 
 namespace {
@@ -46,6 +48,11 @@ CloudComparison compare(const SplatCloud& a, const SplatCloud& b) {
   CloudComparison result;
   result.same_order = a.size() == b.size() && a.sh_degree == b.sh_degree;
   if (!result.same_order) return result;
+  if (!FrameConversion(b.frame, a.frame).isIdentity()) {
+    SplatCloud turned = b;
+    convertFrame(turned, a.frame);
+    return compare(a, turned);
+  }
   result.position = between(a.positions, b.positions);
   result.opacity = between(a.opacities, b.opacities);
   result.sh = between(a.sh, b.sh);

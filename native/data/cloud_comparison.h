@@ -22,6 +22,8 @@ struct CloudComparison {
   Difference sh;
 };
 
+/// Splat i of a against splat i of b, in the frame of a: a cloud that a format turned into its own
+/// frame equals the one that it came from. An unknown frame is taken for the conventional one.
 CloudComparison compare(const SplatCloud& a, const SplatCloud& b);
 
 }  // namespace stipple

@@ -263,6 +263,8 @@ typedef struct StippleCloudComparison {
   double mean_opacity;
   double mean_sh;
 } StippleCloudComparison;
+/* Splat i of a against splat i of b, in the frame of a. Formats that reorder splats (SOG, compressed
+ * PLY) give pairs of different splats: compare pictures of such clouds instead. */
 StippleStatus stipple_cloud_compare(const StippleCloud* a, const StippleCloud* b,
                                     StippleCloudComparison* result);
 

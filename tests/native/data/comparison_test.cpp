@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "data/cloud_comparison.h"
 #include "data/image_comparison.h"
+#include "data/splat_frame.h"
 
 namespace stipple {
 namespace {
@@ -75,6 +76,24 @@ TEST(CloudComparison, MeasuresEachAttributeInItsUnit) {
   EXPECT_NEAR(result.scale_ratio.max, 0.25, 1e-6);
   EXPECT_DOUBLE_EQ(result.opacity.max, 0.25);
   EXPECT_NEAR(result.rotation.max, 0.1, 1e-6);
+}
+
+TEST(CloudComparison, ComparesInOneFrame) {
+  SplatCloud a = oneSplat();
+  a.positions = {1, 2, 3};
+  a.rotations = {0.5f, 0.5f, 0.1f, 0.7f};
+  a.frame = Frame::kRDF;
+  SplatCloud b = a;
+  convertFrame(b, Frame::kRUB);
+  EXPECT_EQ(b.positions[1], -2);
+  EXPECT_EQ(compare(a, b).position.max, 0);
+  // Sign flips are exact; acos is not used, so equal rotations give 0.
+  EXPECT_EQ(compare(b, a).rotation.max, 0);
+  b.positions[1] = -2.5f;
+  EXPECT_EQ(compare(a, b).position.max, 0.5);
+  // Files that say nothing are in the frame of trained files.
+  a.frame = Frame::kUnknown;
+  EXPECT_EQ(compare(a, b).position.max, 0.5);
 }
 
 TEST(CloudComparison, DoesNotCompareCloudsOfDifferentCount) {
