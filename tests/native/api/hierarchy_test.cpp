@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "api/fixtures.h"
@@ -49,16 +50,57 @@ class HierarchyApi : public ApiTest {
     return model;
   }
 
-  uint64_t countAt(const StippleModel* model, uint64_t budget) {
+  StippleCloud* cutOf(const StippleModel* model, uint64_t budget) {
     StippleDecodeOptions options;
     stipple_decode_options_init(&options);
     options.anchor_count = budget;
     StippleCloud* cut = nullptr;
     EXPECT_EQ(stipple_model_decode(model, &options, &cut), STIPPLE_OK);
+    return cut;
+  }
+
+  uint64_t countAt(const StippleModel* model, uint64_t budget) {
+    StippleCloud* cut = cutOf(model, budget);
     auto info = sized<StippleCloudInfo>();
     EXPECT_EQ(stipple_cloud_info(cut, &info), STIPPLE_OK);
     stipple_cloud_free(cut);
     return info.count;
+  }
+
+  /// Every number of a cloud of degree 0.
+  std::vector<float> valuesOf(const StippleCloud* cloud) {
+    auto info = sized<StippleCloudInfo>();
+    EXPECT_EQ(stipple_cloud_info(cloud, &info), STIPPLE_OK);
+    std::vector<float> values(info.count * 14);
+    auto buffers = sized<StippleCloudBuffers>();
+    buffers.capacity = info.count;
+    buffers.positions = values.data();
+    buffers.rotations = buffers.positions + info.count * 3;
+    buffers.scales = buffers.rotations + info.count * 4;
+    buffers.opacities = buffers.scales + info.count * 3;
+    buffers.sh = buffers.opacities + info.count;
+    EXPECT_EQ(stipple_cloud_read(cloud, &buffers), STIPPLE_OK);
+    return values;
+  }
+
+  /// Cancels a job that has begun, and takes it to its end.
+  void expectCancelled(StippleJob* job) {
+    auto progress = sized<StippleJobProgress>();
+    EXPECT_EQ(stipple_job_poll(job, &progress), STIPPLE_OK);
+    EXPECT_EQ(progress.state, static_cast<uint32_t>(STIPPLE_JOB_RUNNING));
+    EXPECT_EQ(stipple_job_cancel(job), STIPPLE_OK);
+    EXPECT_EQ(stipple_job_wait(job), STIPPLE_ERROR_CANCELLED);
+    EXPECT_EQ(stipple_job_poll(job, &progress), STIPPLE_OK);
+    EXPECT_EQ(progress.state, static_cast<uint32_t>(STIPPLE_JOB_CANCELLED));
+  }
+
+  /// Waits until a job that runs has done a share of its work.
+  void waitFor(StippleJob* job, double fraction) {
+    auto progress = sized<StippleJobProgress>();
+    do {
+      ASSERT_EQ(stipple_job_poll(job, &progress), STIPPLE_OK);
+      std::this_thread::yield();
+    } while (progress.fraction < fraction && progress.state == STIPPLE_JOB_RUNNING);
   }
 };
 
@@ -145,6 +187,66 @@ TEST_F(HierarchyApi, RefusesBadInput) {
   EXPECT_EQ(stipple_model_from_cloud_start(context_, nullptr, nullptr, &job),
             STIPPLE_ERROR_INVALID_ARGUMENT);
   stipple_cloud_free(empty);
+  stipple_cloud_free(cloud);
+}
+
+TEST_F(HierarchyApi, ACancelledBuildLosesNothing) {
+  // Pictures that would take minutes, so the job is still at work when it is asked to stop.
+  StippleCloud* cloud = cloudOf(2000);
+  const std::vector<float> before = valuesOf(cloud);
+  StippleModelFromCloudOptions options;
+  stipple_model_from_cloud_options_init(&options);
+  options.view_count = 4096;
+  options.view_size = 1024;
+  StippleJob* job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_model_from_cloud_start(context_, cloud, &options, &job));
+  waitFor(job, 1e-6);
+  expectCancelled(job);
+  StippleModel* none = nullptr;
+  EXPECT_EQ(stipple_job_model(job, &none), STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(none, nullptr);
+  stipple_job_free(job);
+
+  STIPPLE_ASSERT_OK(stipple_model_from_cloud_start(context_, cloud, &options, &job));
+  stipple_job_free(job);  // cancels and waits
+
+  // The cloud is as it was, and a tree can still be made of it.
+  StippleModel* model = modelOf(cloud);
+  EXPECT_EQ(countAt(model, 700), 700u);
+  StippleCloud* all = cutOf(model, 2000);
+  EXPECT_EQ(valuesOf(all), before);
+  stipple_cloud_free(all);
+  stipple_model_free(model);
+  stipple_cloud_free(cloud);
+}
+
+TEST_F(HierarchyApi, ACancelledRefinementLosesNothing) {
+  StippleCloud* cloud = cloudOf(2000);
+  StippleModel* model = modelOf(cloud);
+  StippleCloud* cut = cutOf(model, 500);
+  const std::vector<float> before = valuesOf(cut);
+  StippleRefineOptions options;
+  stipple_refine_options_init(&options);
+  options.iterations = 1000000;  // hours
+  options.view_count = 2;
+  options.view_size = 64;
+  StippleJob* job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_cloud_refine_start(cut, cloud, &options, &job));
+  // Cancelled among the steps, which come after a fifth of the whole.
+  waitFor(job, 0.2);
+  expectCancelled(job);
+  StippleCloud* none = nullptr;
+  EXPECT_EQ(stipple_job_cloud(job, &none), STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(none, nullptr);
+  stipple_job_free(job);
+  EXPECT_EQ(valuesOf(cut), before);
+
+  options.iterations = 2;
+  STIPPLE_ASSERT_OK(stipple_cloud_refine_start(cut, cloud, &options, &job));
+  STIPPLE_EXPECT_OK(stipple_job_wait(job));
+  stipple_job_free(job);
+  stipple_cloud_free(cut);
+  stipple_model_free(model);
   stipple_cloud_free(cloud);
 }
 
