@@ -7,7 +7,6 @@
 #include "base/parallel.h"
 #include "data/cloud_comparison.h"
 #include "data/cloud_transform.h"
-#include "io/sog_levels.h"
 #include "io/splat_file.h"
 
 using namespace stipple;
@@ -53,6 +52,19 @@ SplatCloud fromArrays(const StippleCloudArrays& arrays) {
 
 void copyTo(const std::vector<float>& values, float* out) {
   if (out && !values.empty()) std::memcpy(out, values.data(), values.size() * sizeof(float));
+}
+
+SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options) {
+  StippleCloudSaveOptions defaults;
+  stipple_cloud_save_options_init(&defaults);
+  const StippleCloudSaveOptions given = completed(options, defaults, "options");
+  SplatWriteOptions write;
+  write.ascii = enumValue<uint32_t>(given.ascii, 1, "options->ascii") == 1;
+  write.sh_degree_limit = enumValue<int>(given.sh_degree_limit, static_cast<uint32_t>(kMaxShDegree),
+                                         "options->sh_degree_limit");
+  write.version = enumValue<int>(given.format_version, 255, "options->format_version");
+  write.frame = enumValue<Frame>(given.frame, kLastFrame, "options->frame");
+  return write;
 }
 
 }  // namespace
@@ -131,21 +143,14 @@ StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf
   return guarded([&] {
     require(cloud, "cloud");
     const std::string path = &require(path_utf8, "path_utf8");
-    StippleCloudSaveOptions defaults;
-    stipple_cloud_save_options_init(&defaults);
-    const StippleCloudSaveOptions given = completed(options, defaults, "options");
-    SplatWriteOptions write;
-    write.ascii = enumValue<uint32_t>(given.ascii, 1, "options->ascii") == 1;
-    write.sh_degree_limit = enumValue<int>(
-        given.sh_degree_limit, static_cast<uint32_t>(kMaxShDegree), "options->sh_degree_limit");
-    write.version = enumValue<int>(given.format_version, 255, "options->format_version");
-    write.frame = enumValue<Frame>(given.frame, kLastFrame, "options->frame");
+    const SplatWriteOptions write = writeOptions(options);
     withThreads(cloud->context->thread_count, [&] { writeSplatFile(*cloud->cloud, path, write); });
   });
 }
 
 StippleStatus stipple_cloud_save_levels(const StippleCloud* const* levels, uint64_t level_count,
-                                        const StippleCloud* environment, const char* path_utf8) {
+                                        const StippleCloud* environment, const char* path_utf8,
+                                        const StippleCloudSaveOptions* options) {
   return guarded([&] {
     const std::string path = &require(path_utf8, "path_utf8");
     if (level_count == 0) {
@@ -157,9 +162,10 @@ StippleStatus stipple_cloud_save_levels(const StippleCloud* const* levels, uint6
       clouds.push_back(
           require(levels[i], ("levels[" + std::to_string(i) + "]").c_str()).cloud.get());
     }
+    const SplatWriteOptions write = writeOptions(options);
     withThreads(levels[0]->context->thread_count, [&] {
-      writeSogLevels(clouds, environment != nullptr ? environment->cloud.get() : nullptr, path, {},
-                     nullptr);
+      writeSplatLevels(clouds, environment != nullptr ? environment->cloud.get() : nullptr, path,
+                       write);
     });
   });
 }

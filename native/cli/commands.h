@@ -18,5 +18,7 @@ void addCompare(CLI::App& app, const Context& context);
 /// What a file holds, told by its ending.
 enum class FileKind { kSplats, kMesh, kModel, kViews, kVolume, kImage };
 FileKind fileKind(const std::string& path);
+/// True for .safetensors.
+bool hasModelEnding(const std::string& path);
 
 }  // namespace stipple::cli

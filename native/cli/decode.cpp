@@ -5,6 +5,7 @@
 
 #include "cli/commands.h"
 #include "cli/formats.h"
+#include "cli/hierarchy.h"
 #include "cli/report.h"
 
 namespace stipple::cli {
@@ -29,14 +30,7 @@ Model modelFrom(const Context& context, const Arguments& arguments) {
   }
   if (kind == FileKind::kSplats) {
     const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
-    StippleModelFromCloudOptions options;
-    stipple_model_from_cloud_options_init(&options);
-    options.seed = arguments.seed;
-    const auto job = make<Job>(stipple_model_from_cloud_start, context.get(),
-                               const_cast<const StippleCloud*>(cloud.get()),
-                               const_cast<const StippleModelFromCloudOptions*>(&options));
-    finish(job);
-    return make<Model>(stipple_job_model, job.get());
+    return hierarchyOf(context, cloud, arguments.seed);
   }
   if (kind != FileKind::kMesh) {
     throw Failure("'" + arguments.in +
@@ -88,11 +82,7 @@ Cloud refined(const Cloud& cloud, const Model& model, const Arguments& arguments
   if (info.kind != STIPPLE_MODEL_HIERARCHY) {
     throw Failure("--refine fits to existing splats; a mesh has none");
   }
-  StippleDecodeOptions all;
-  stipple_decode_options_init(&all);
-  all.anchor_count = info.leaf_count;
-  const auto full =
-      make<Cloud>(stipple_model_decode, model.get(), const_cast<const StippleDecodeOptions*>(&all));
+  const Cloud full = cutOf(model, info.leaf_count);
   StippleRefineOptions options;
   stipple_refine_options_init(&options);
   options.iterations = static_cast<uint32_t>(counted(arguments.refine, "--refine", 1000000));

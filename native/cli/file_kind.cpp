@@ -6,11 +6,24 @@
 
 namespace stipple::cli {
 
-FileKind fileKind(const std::string& path) {
+namespace {
+
+std::string endingOf(const std::string& path) {
   const size_t dot = path.find_last_of("./");
   std::string ending = dot == std::string::npos || path[dot] == '/' ? "" : path.substr(dot);
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
+}  // namespace
+
+bool hasModelEnding(const std::string& path) {
+  return endingOf(path) == ".safetensors";
+}
+
+FileKind fileKind(const std::string& path) {
+  const std::string ending = endingOf(path);
   // A glTF file holds meshes, splats or both; splats go first, because fewer programs show them.
   if (ending == ".glb" || ending == ".gltf") {
     uint64_t index = 0;
@@ -20,7 +33,7 @@ FileKind fileKind(const std::string& path) {
     return splats ? FileKind::kSplats : FileKind::kMesh;
   }
   if (hasSplatEnding(path)) return FileKind::kSplats;
-  if (ending == ".safetensors") return FileKind::kModel;
+  if (hasModelEnding(path)) return FileKind::kModel;
   if (ending == ".json") return FileKind::kViews;
   if (ending == ".vdb") return FileKind::kVolume;
   for (const char* image : {".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}) {

@@ -33,19 +33,25 @@ std::vector<StippleFormatInfo> splatFormats() {
   return formats;
 }
 
-bool hasSplatEnding(const std::string& path) {
+std::string formatOfEnding(const std::string& path) {
   std::string name = path.substr(path.find_last_of('/') + 1);
   std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::string found;
+  size_t longest = 0;
   for (const StippleFormatInfo& format : splatFormats()) {
     for (const std::string& ending : words(format.endings)) {
-      if (name.size() >= ending.size() &&
-          name.compare(name.size() - ending.size(), ending.size(), ending) == 0) {
-        return true;
+      if (ending.size() > longest && name.ends_with(ending)) {
+        found = format.name;
+        longest = ending.size();
       }
     }
   }
-  return false;
+  return found;
+}
+
+bool hasSplatEnding(const std::string& path) {
+  return !formatOfEnding(path).empty();
 }
 
 std::string splatEndings(bool written) {

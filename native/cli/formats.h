@@ -10,7 +10,8 @@ namespace stipple::cli {
 /// The splat formats that the library knows.
 std::vector<StippleFormatInfo> splatFormats();
 
-/// The format whose ending the path has (the longest that fits), or nothing.
+/// Name of the format whose ending the path has (the longest that fits), or nothing.
+std::string formatOfEnding(const std::string& path);
 bool hasSplatEnding(const std::string& path);
 
 /// ".ply, .spz or .splat": the endings of all formats, or of those that can be written.

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cctype>
 #include <cstring>
+#include <deque>
 #include <filesystem>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "base/error.h"
@@ -121,6 +123,14 @@ std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& f
   return copy;
 }
 
+void checkDegreeLimit(const SplatWriteOptions& options) {
+  if (options.sh_degree_limit < 0 || options.sh_degree_limit > kMaxShDegree) {
+    fail(ErrorCode::kInvalidArgument, "the limit of the harmonic degree is " +
+                                          std::to_string(options.sh_degree_limit) +
+                                          "; 0 to 4 is allowed");
+  }
+}
+
 }  // namespace
 
 const std::vector<SplatFormat>& splatFormats() {
@@ -189,14 +199,34 @@ void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                                       lowerEnding(path) + "'; " + listOfFormats(true) +
                                       " can be written");
   }
-  if (options.sh_degree_limit < 0 || options.sh_degree_limit > kMaxShDegree) {
-    fail(ErrorCode::kInvalidArgument, "the limit of the harmonic degree is " +
-                                          std::to_string(options.sh_degree_limit) +
-                                          "; 0 to 4 is allowed");
-  }
+  checkDegreeLimit(options);
   validateInParallel(cloud, "cloud");
   const std::optional<SplatCloud> changed = prepared(cloud, *format, options);
   format->write(changed ? *changed : cloud, path, options, progress);
+}
+
+void writeSplatLevels(const std::vector<const SplatCloud*>& levels, const SplatCloud* environment,
+                      const std::string& path, const SplatWriteOptions& options,
+                      Progress* progress) {
+  const SplatFormat* format = splatFormatOfEnding(path);
+  if (format == nullptr || format->name != std::string_view("sog_levels")) {
+    fail(ErrorCode::kUnsupported,
+         path + " cannot be written as levels: it is not named lod-meta.json");
+  }
+  checkDegreeLimit(options);
+  std::vector<const SplatCloud*> clouds = levels;
+  clouds.push_back(environment);
+  std::deque<SplatCloud> changed;
+  for (const SplatCloud*& cloud : clouds) {
+    if (cloud == nullptr) continue;
+    validateInParallel(*cloud, cloud == environment ? "environment" : "level");
+    if (auto copy = prepared(*cloud, *format, options)) {
+      cloud = &changed.emplace_back(std::move(*copy));
+    }
+  }
+  environment = clouds.back();
+  clouds.pop_back();
+  writeSogLevels(clouds, environment, path, {}, progress);
 }
 
 }  // namespace stipple

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "base/progress.h"
 #include "data/splat_cloud.h"
@@ -17,5 +18,11 @@ SplatCloud readSplatFile(const std::string& path, Progress* progress = nullptr);
 /// or the options.
 void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress = nullptr);
+
+/// Writes the levels of a streamed SOG scene (sog_levels.h), each turned and cut off as
+/// writeSplatFile does it.
+void writeSplatLevels(const std::vector<const SplatCloud*>& levels, const SplatCloud* environment,
+                      const std::string& path, const SplatWriteOptions& options,
+                      Progress* progress = nullptr);
 
 }  // namespace stipple

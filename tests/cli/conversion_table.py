@@ -17,9 +17,12 @@ SPACING = 0.1      # metres; far more than any format moves a splat, so that pos
 DEGREE = 3
 
 
+def program():
+    return Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
+
+
 def tool(*arguments):
-    path = Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
-    result = subprocess.run([path, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    result = subprocess.run([program(), *map(str, arguments)], capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, (arguments, result.stderr)
     return result.stdout
 

@@ -72,6 +72,17 @@ def test_splat_transform_reads_our_streamed_sog_as_we_do(ply, tmp_path):
         numpy.testing.assert_allclose(theirs[column], ours[column], rtol=2e-6, atol=2e-6, err_msg=column)
 
 
+def test_splat_transform_reads_every_level_of_our_streamed_sog(ply, tmp_path):
+    run('convert', ply, tmp_path / 'lod-meta.json', '--levels', 3)
+    for level, count in enumerate((COUNT, COUNT // 4, COUNT // 16)):
+        splat_transform('-w', '-L', level, tmp_path / 'lod-meta.json', tmp_path / 'theirs.ply')
+        run('convert', tmp_path / f'{level}_0' / 'meta.json', tmp_path / 'ours.ply')
+        ours, theirs = read_ply(tmp_path / 'ours.ply'), read_ply(tmp_path / 'theirs.ply')
+        assert len(theirs['x']) == count
+        for column in ('x', 'f_dc_0', 'f_rest_44', 'scale_2', 'rot_3'):
+            numpy.testing.assert_allclose(theirs[column], ours[column], rtol=2e-6, atol=2e-6, err_msg=column)
+
+
 def test_we_read_the_streamed_sog_of_splat_transform_as_it_does(ply, tmp_path):
     splat_transform('-w', '-g', 'cpu', '-i', '1', ply, '-l', '0', ply, '-l', '1', tmp_path / 'lod' / 'lod-meta.json')
     splat_transform('-w', '-L', '0', tmp_path / 'lod' / 'lod-meta.json', tmp_path / 'theirs.ply')

@@ -109,6 +109,12 @@ def test_splats_come_down_to_any_share_of_themselves(scene):
     assert not (scene / 'never.ply').exists()
 
 
+def test_convert_names_decode_for_the_surface_of_a_mesh(scene):
+    run('decode', scene / 'cube.glb', scene / 'surface.stipple.safetensors')
+    assert 'stipple decode' in error('convert', scene / 'surface.stipple.safetensors', scene / 'lod-meta.json')
+    assert not (scene / 'lod-meta.json').exists()
+
+
 def test_convert_to_text_and_back_loses_only_rounding(scene):
     run('convert', scene / 'cube.ply', scene / 'text.ply', '--ascii')
     result = figures('compare', scene / 'cube.ply', scene / 'text.ply')

@@ -215,10 +215,12 @@ StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf
 
 /* Writes clouds as the levels of one streamed SOG scene: a file for each level and chunk of space, and
  * path_utf8, a lod-meta.json in a folder that is there. In: levels [level_count >= 1], finest first, of one
- * colour space, filter and frame; environment, drawn at every level, or NULL. stipple_cloud_load reads the
- * finest level back. A scene that was there before is kept until the new one is whole, then removed. */
+ * colour space, filter and frame; environment, drawn at every level, or NULL; options as of stipple_cloud_save,
+ * for every level, or NULL. stipple_cloud_load reads the finest level back. A scene that was there before is kept
+ * until the new one is whole, then removed. */
 StippleStatus stipple_cloud_save_levels(const StippleCloud* const* levels, uint64_t level_count,
-                                        const StippleCloud* environment, const char* path_utf8);
+                                        const StippleCloud* environment, const char* path_utf8,
+                                        const StippleCloudSaveOptions* options);
 
 /* One format of splat files. The texts live as long as the library. */
 typedef struct StippleFormatInfo {

@@ -61,7 +61,7 @@ TEST_F(Formats, LevelsAreSavedAndTheFinestIsRead) {
   StippleCloud* coarse = oneSplat(0, 1, 0);
   const StippleCloud* levels[] = {fine, coarse};
   const std::string file = path("lod-meta.json");
-  STIPPLE_ASSERT_OK(stipple_cloud_save_levels(levels, 2, coarse, file.c_str()));
+  STIPPLE_ASSERT_OK(stipple_cloud_save_levels(levels, 2, coarse, file.c_str(), nullptr));
   StippleCloud* back = nullptr;
   STIPPLE_ASSERT_OK(stipple_cloud_load(context_, file.c_str(), &back));
   auto info = sized<StippleCloudInfo>();
@@ -74,10 +74,10 @@ TEST_F(Formats, LevelsAreSavedAndTheFinestIsRead) {
   STIPPLE_ASSERT_OK(stipple_cloud_read(back, &buffers));
   EXPECT_GT(sh[0], sh[1]);
   EXPECT_LT(sh[3], sh[4]);
-  EXPECT_EQ(stipple_cloud_save_levels(levels, 0, nullptr, file.c_str()),
+  EXPECT_EQ(stipple_cloud_save_levels(levels, 0, nullptr, file.c_str(), nullptr),
             STIPPLE_ERROR_INVALID_ARGUMENT);
   const StippleCloud* missing[] = {fine, nullptr};
-  EXPECT_EQ(stipple_cloud_save_levels(missing, 2, nullptr, file.c_str()),
+  EXPECT_EQ(stipple_cloud_save_levels(missing, 2, nullptr, file.c_str(), nullptr),
             STIPPLE_ERROR_INVALID_ARGUMENT);
   EXPECT_NE(std::string(stipple_last_error_message()).find("levels[1]"), std::string::npos);
   for (StippleCloud* cloud : {fine, coarse, back}) stipple_cloud_free(cloud);
