@@ -108,12 +108,17 @@ std::vector<Camera> viewsOfCloud(const SplatCloud& cloud, const ViewRigOptions& 
              std::to_string(options.size) +
              " pixels; 1 to 4096 views of 1 to 65536 pixels are allowed");
   }
-  const ViewRig rig = options.rig == ViewRig::kAutomatic ? chooseRig(cloud) : options.rig;
+  // A hollow thing, as a mesh becomes, and a room are alike from their middle: seen both ways.
+  const bool is_automatic = options.rig == ViewRig::kAutomatic;
+  const bool is_hollow = is_automatic && chooseRig(cloud) == ViewRig::kInside;
   const CloudExtent extent = cloudExtent(cloud);
   const Mat3d turn = turnOf(options.seed);
   std::vector<Camera> cameras;
   for (uint32_t i = 0; i < options.count; ++i) {
     const Vec3d outward = direction(turn, i, options.count);
+    // Two of a kind in turn: who draws every second view in another way gets both kinds.
+    const ViewRig automatic = is_hollow && i / 2 % 2 == 1 ? ViewRig::kInside : ViewRig::kAround;
+    const ViewRig rig = is_automatic ? automatic : options.rig;
     if (rig == ViewRig::kAround) {
       const double distance = extent.radius / std::sin(0.5 * kAngleAround);
       cameras.push_back(lookingAlong(centreOf(extent) + distance * outward, -outward, kAngleAround,

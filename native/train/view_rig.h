@@ -9,9 +9,10 @@
 namespace stipple {
 
 enum class ViewRig : uint32_t {
-  kAutomatic = 0,  ///< inside where the cloud surrounds its own middle, around it otherwise
-  kAround = 1,     ///< from a sphere around the cloud, looking at its middle
-  kInside = 2,     ///< from places near the middle, looking out: rooms, landscapes
+  kAutomatic =
+      0,        ///< around; both in turn, two of a kind, where the cloud surrounds its own middle
+  kAround = 1,  ///< from a sphere around the cloud, looking at its middle
+  kInside = 2,  ///< from places near the middle, looking out: rooms, landscapes
 };
 
 struct ViewRigOptions {
@@ -25,8 +26,8 @@ struct ViewRigOptions {
 /// Errors: kInvalidArgument for an empty cloud, a count or size out of range.
 std::vector<Camera> viewsOfCloud(const SplatCloud& cloud, const ViewRigOptions& options);
 
-/// What kAutomatic chooses: kInside where at least half of the directions from the middle of the
-/// cloud end on a surface farther than 0.3 of its radius.
+/// How a cloud looks from its middle: kInside, a room or a hollow thing, where at least half of the
+/// directions from the middle of the cloud end on a surface farther than 0.3 of its radius.
 ViewRig chooseRig(const SplatCloud& cloud);
 
 }  // namespace stipple

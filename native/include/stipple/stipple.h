@@ -385,7 +385,7 @@ void stipple_model_from_mesh_options_init(StippleModelFromMeshOptions* options);
 
 /* From where an existing cloud is looked at. */
 typedef enum StippleViewRig {
-  STIPPLE_RIG_AUTOMATIC = 0, /* inside where the cloud surrounds its own middle, around it otherwise */
+  STIPPLE_RIG_AUTOMATIC = 0, /* around; both in turn where the cloud surrounds its own middle */
   STIPPLE_RIG_AROUND = 1,    /* from a sphere around the cloud */
   STIPPLE_RIG_INSIDE = 2     /* from places near the middle, looking out */
 } StippleViewRig;

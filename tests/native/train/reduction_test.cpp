@@ -97,6 +97,16 @@ TEST(ViewRig, LooksAtThingsFromAroundAndAtRoomsFromInside) {
     EXPECT_NO_THROW(validate(camera));
     EXPECT_LT(cameraCentre(camera).norm(), 0.5 * radius);
   }
+  // Hollow: a room, or a thing that was a mesh. Seen both ways.
+  options.rig = ViewRig::kAutomatic;
+  size_t inside_count = 0;
+  for (const Camera& camera : viewsOfCloud(sphere(3000, 1.0, 1), options)) {
+    inside_count += cameraCentre(camera).norm() < 1 ? 1 : 0;
+  }
+  EXPECT_EQ(inside_count, options.count / 2);
+  for (const Camera& camera : viewsOfCloud(thing, options)) {
+    EXPECT_GT(cameraCentre(camera).norm(), 1);
+  }
   options.count = 0;
   EXPECT_THROW(viewsOfCloud(thing, options), Error);
   EXPECT_THROW(viewsOfCloud({}, {}), Error);
