@@ -416,7 +416,7 @@ class PaletteMaker {
     }
   }
 
-  /// The whole palette to the means of what it stands for now.
+  /// The whole palette to the means of the vectors that chose its rows.
   void move() {
     const Groups groups(n_, palette_.count, [this](size_t i) { return best_[i].index; });
     std::vector<size_t> first(cells_.count() + 1, 0);

@@ -44,7 +44,7 @@ def sync(obj, depsgraph, mode, most=None):
     """Writes the attributes that an object's data should have now. Returns True where it wrote.
 
     depsgraph: evaluated settings (animation, drivers) are read through it; None: the settings as they are.
-    mode: 'VIEWPORT' or 'RENDER'. most: splats that are written at most for now, None for all. Errors: StippleError,
+    mode: 'VIEWPORT' or 'RENDER'. most: splats that are written at most while a slider is dragged, None for all. Errors: StippleError,
     with the splats as they were.
     """
     data = obj.data
