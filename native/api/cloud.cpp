@@ -4,6 +4,7 @@
 #include "api/bounds.h"
 #include "api/guard.h"
 #include "api/handles.h"
+#include "api/job.h"
 #include "base/parallel.h"
 #include "data/cloud_comparison.h"
 #include "data/cloud_transform.h"
@@ -67,6 +68,14 @@ SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options) {
   return write;
 }
 
+std::shared_ptr<const SplatCloud> loaded(const ContextState& context, const std::string& path,
+                                         Progress* progress) {
+  auto cloud = std::make_shared<const SplatCloud>(readSplatFile(path, progress));
+  const uint64_t floats = cloud->size() * (11 + cloud->shStride());
+  context.requireMemory(floats * sizeof(float), ("the splats of '" + path + "'").c_str());
+  return cloud;
+}
+
 }  // namespace
 
 extern "C" {
@@ -125,8 +134,18 @@ StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8,
     require(cloud, "cloud");
     const std::string path = &require(path_utf8, "path_utf8");
     withThreads(context->state->thread_count, [&] {
-      *cloud =
-          new StippleCloud{context->state, std::make_shared<const SplatCloud>(readSplatFile(path))};
+      *cloud = new StippleCloud{context->state, loaded(*context->state, path, nullptr)};
+    });
+  });
+}
+
+StippleStatus stipple_cloud_load_start(StippleContext* context, const char* path_utf8,
+                                       StippleJob** job) {
+  return guarded([&] {
+    const Context state = require(context, "context").state;
+    const std::string path = &require(path_utf8, "path_utf8");
+    require(job, "job") = startJob(state, [state, path](Progress& progress) -> JobResult {
+      return loaded(*state, path, &progress);
     });
   });
 }

@@ -5,10 +5,10 @@
 #include "api/instances.h"
 #include "api/job.h"
 #include "base/parallel.h"
+#include "data/cloud_selection.h"
 #include "mesh/floaters.h"
 #include "mesh/winding_number.h"
 #include "splat/cloud_merge.h"
-#include "data/cloud_selection.h"
 #include "splat/ground_plane.h"
 
 using namespace stipple;
@@ -167,6 +167,18 @@ StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask,
     withThreads(cloud->context->thread_count, [&] {
       *kept_cloud = new StippleCloud{
           cloud->context, std::make_shared<const SplatCloud>(kept(splats, {mask, splats.size()}))};
+    });
+  });
+}
+
+StippleStatus stipple_cloud_thin(const StippleCloud* cloud, uint64_t count, uint64_t seed,
+                                 StippleCloud** thinned_cloud) {
+  return guarded([&] {
+    const SplatCloud& splats = *require(cloud, "cloud").cloud;
+    require(thinned_cloud, "thinned");
+    withThreads(cloud->context->thread_count, [&] {
+      *thinned_cloud = new StippleCloud{
+          cloud->context, std::make_shared<const SplatCloud>(thinned(splats, count, seed))};
     });
   });
 }

@@ -123,6 +123,11 @@ SurfaceModel fromAsset(SurfaceAsset asset) {
   return surfaceModelFromParts(std::move(surface), std::move(density));
 }
 
+ModelParts loaded(const std::string& path) {
+  return readAssetKind(path) == kAssetHierarchy ? ModelParts(loadHierarchy(path))
+                                                : fromAsset(readSurfaceAsset(path));
+}
+
 }  // namespace
 
 extern "C" {
@@ -168,10 +173,17 @@ StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8,
     require(model, "model");
     const std::string path = &require(path_utf8, "path_utf8");
     withThreads(context->state->thread_count, [&] {
-      *model = new StippleModel{context->state, readAssetKind(path) == kAssetHierarchy
-                                                    ? ModelParts(loadHierarchy(path))
-                                                    : fromAsset(readSurfaceAsset(path))};
+      *model = new StippleModel{context->state, loaded(path)};
     });
+  });
+}
+
+StippleStatus stipple_model_load_start(StippleContext* context, const char* path_utf8,
+                                       StippleJob** job) {
+  return guarded([&] {
+    const Context state = require(context, "context").state;
+    const std::string path = &require(path_utf8, "path_utf8");
+    require(job, "job") = startJob(state, [path](Progress&) -> JobResult { return loaded(path); });
   });
 }
 

@@ -26,6 +26,7 @@ enum class RandomUse : uint32_t {
   kPalette = 9,
   kViewRig = 10,
   kViewOrder = 11,
+  kThinning = 12,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and

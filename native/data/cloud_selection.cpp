@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/random.h"
 #include "math/affine.h"
 
 namespace stipple {
@@ -44,6 +45,38 @@ std::vector<uint8_t> insideBox(const SplatCloud& cloud, const Mat4d& cloud_to_bo
     }
   });
   return mask;
+}
+
+std::vector<uint8_t> thinningMask(size_t total, size_t count, uint64_t seed) {
+  if (count > total) {
+    fail(ErrorCode::kInvalidArgument, "count is " + std::to_string(count) + "; the cloud has " +
+                                          std::to_string(total) +
+                                          " splats, at most as many can be kept");
+  }
+  if (count == total) return std::vector<uint8_t>(total, 1);
+  std::vector<uint8_t> mask(total, 0);
+  if (count == 0) return mask;
+  std::vector<uint64_t> keys(total);
+  parallelFor(total, kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) keys[i] = keyedBits(seed, RandomUse::kThinning, i);
+  });
+  // Keys are a permutation of 64-bit numbers, so none is there twice and the limit keeps exactly
+  // count of them.
+  std::vector<uint64_t> sorted = keys;
+  const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(count - 1);
+  std::nth_element(sorted.begin(), last, sorted.end());
+  const uint64_t limit = *last;
+  for (size_t i = 0; i < total; ++i) mask[i] = keys[i] <= limit ? 1 : 0;
+  return mask;
+}
+
+SplatCloud thinned(const SplatCloud& cloud, size_t count, uint64_t seed) {
+  SplatCloud result = kept(cloud, thinningMask(cloud.size(), count, seed));
+  if (count == cloud.size() || count == 0) return result;
+  const auto wider =
+      static_cast<float>(std::sqrt(static_cast<double>(cloud.size()) / static_cast<double>(count)));
+  for (float& scale : result.scales) scale *= wider;
+  return result;
 }
 
 SplatCloud kept(const SplatCloud& cloud, std::span<const uint8_t> mask) {

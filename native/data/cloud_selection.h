@@ -14,6 +14,16 @@ namespace stipple {
 /// 1. Evaluated in double.
 std::vector<uint8_t> insideBox(const SplatCloud& cloud, const Mat4d& cloud_to_box);
 
+/// Which of `total` splats a plain thinning to `count` keeps: 1 for those with the smallest numbers
+/// keyed by (seed, index). [total] A smaller count is a part of a larger one, and the choice looks
+/// at nothing but the index: frames of a series whose splats keep their places thin alike. Errors:
+/// kInvalidArgument where count is larger than total.
+std::vector<uint8_t> thinningMask(size_t total, size_t count, uint64_t seed);
+
+/// The splats of thinningMask(), in their order, each axis longer by sqrt(N / count): surfaces keep
+/// the area that their splats cover. All of them, bit for bit, where count is N.
+SplatCloud thinned(const SplatCloud& cloud, size_t count, uint64_t seed);
+
 /// The splats whose mask [N] is not 0, in their order, bit for bit.
 /// Errors: kInvalidArgument where the mask has another length than the cloud.
 SplatCloud kept(const SplatCloud& cloud, std::span<const uint8_t> mask);

@@ -8,6 +8,7 @@ import numpy as np
 
 from .errors import invalid
 from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
+from .job import Job
 from .structs import (Antialias, ColourSpace, Frame, StippleCloudArrays, StippleCloudBuffers,
                       StippleCloudComparison, StippleCloudInfo, StippleCloudSaveOptions)
 
@@ -66,6 +67,12 @@ class Cloud(Handle):
     def load(cls, context, path):
         return cls(context.library,
                    new_handle(context.library, 'stipple_cloud_load', context.pointer, path_bytes(path)))
+
+    @staticmethod
+    def load_start(context, path):
+        """A job whose cloud() is the file's: reads ahead."""
+        return Job(context.library,
+                   new_handle(context.library, 'stipple_cloud_load_start', context.pointer, path_bytes(path)))
 
     def info(self):
         info = StippleCloudInfo()

@@ -83,6 +83,13 @@ def keep(cloud, mask):
                                            len(mask)))
 
 
+def thin(cloud, count, seed=0):
+    """Exactly count splats of a cloud, chosen by their index alone and widened to cover what the others did."""
+    if count < 0:
+        raise invalid(f'Splats to keep are {count}; allowed are 0 and above.')
+    return Cloud(cloud.library, new_handle(cloud.library, 'stipple_cloud_thin', cloud.pointer, count, seed))
+
+
 def merge(instances, frame=Frame.UNKNOWN):
     """One cloud of [(cloud, 4x4 matrix)]; frame: what the matrices lead to."""
     if not instances:

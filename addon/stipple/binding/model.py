@@ -98,6 +98,12 @@ class Model(Handle):
         return cls(context.library,
                    new_handle(context.library, 'stipple_model_load', context.pointer, path_bytes(path)))
 
+    @staticmethod
+    def load_start(context, path):
+        """A job whose model() is the file's: reads ahead."""
+        return Job(context.library,
+                   new_handle(context.library, 'stipple_model_load_start', context.pointer, path_bytes(path)))
+
     def save(self, path):
         self._check(self.library.stipple_model_save(self.pointer, path_bytes(path)))
 

@@ -198,6 +198,9 @@ StippleStatus stipple_cloud_info(const StippleCloud* cloud, StippleCloudInfo* in
 StippleStatus stipple_cloud_read(const StippleCloud* cloud, const StippleCloudBuffers* buffers);
 /* Reads a splat file of any format that stipple_format_info lists. The format is told by its content. */
 StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8, StippleCloud** cloud);
+/* The same as a job (stipple_job_cloud), for reading ahead: a file that is missing or broken is an error of the
+ * job. Errors, of both: IO, FORMAT, UNSUPPORTED; MEMORY_LIMIT where the splats take more than the limit. */
+StippleStatus stipple_cloud_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);
 
 typedef struct StippleCloudSaveOptions {
   uint32_t struct_size;
@@ -440,6 +443,8 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
                                              const StippleModelFromCloudOptions* options,
                                              StippleJob** job);
 StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8, StippleModel** model);
+/* The same as a job (stipple_job_model). */
+StippleStatus stipple_model_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);
 StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf8);
 void stipple_model_free(StippleModel* model);
 StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* info);
@@ -626,6 +631,13 @@ StippleStatus stipple_cloud_select_floaters_start(const StippleCloud* cloud,
 /* The splats whose mask is not 0, in their order, bit for bit. */
 StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask, uint64_t mask_count,
                                  StippleCloud** kept);
+/* Plain thinning, for clouds that have no tree: exactly count splats, 0 to all, chosen by random numbers keyed by
+ * (seed, index) alone, in their order, each axis longer by sqrt(all / count) so that surfaces stay covered; bit for
+ * bit where all stay. A smaller count is a part of a larger one, and frames of a series whose splats keep their
+ * places thin alike. A tree's cut (stipple_model_from_cloud_start) looks better. Errors: INVALID_ARGUMENT
+ * where count is above the cloud's. Cost: O(N). */
+StippleStatus stipple_cloud_thin(const StippleCloud* cloud, uint64_t count, uint64_t seed,
+                                 StippleCloud** thinned);
 /* The hierarchy of a cloud without the splats whose mask is 0: no budget shows any of them, and its largest
  * budget is what is left, bit for bit. mask [mask_count], mask_count = leaf_count of the model. Errors:
  * UNSUPPORTED for the model of a mesh; INVALID_ARGUMENT for a mask that keeps nothing. Cost: O(N). */

@@ -95,6 +95,94 @@ TEST_F(Pipeline, AModelSurvivesItsFile) {
   stipple_model_free(loaded);
 }
 
+TEST_F(Pipeline, FilesThatAreReadAheadEqualThoseReadAtOnce) {
+  const TemporaryFolder folder;
+  const std::string splats = folder.file("a.ply"), asset = folder.file("a.stipple.safetensors");
+  StippleCloud* cloud = cubeSplats(context_, 3000);
+  STIPPLE_ASSERT_OK(stipple_cloud_save(cloud, splats.c_str(), nullptr));
+  StippleModel* model = cubeModel(context_);
+  STIPPLE_ASSERT_OK(stipple_model_save(model, asset.c_str()));
+
+  StippleContext* context = withThreadCount(1);
+  StippleJob *cloud_job = nullptr, *model_job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_cloud_load_start(context, splats.c_str(), &cloud_job));
+  STIPPLE_ASSERT_OK(stipple_model_load_start(context, asset.c_str(), &model_job));
+  stipple_context_free(context);
+  STIPPLE_EXPECT_OK(stipple_job_wait(cloud_job));
+  STIPPLE_EXPECT_OK(stipple_job_wait(model_job));
+  StippleCloud* ahead = nullptr;
+  StippleModel* model_ahead = nullptr;
+  STIPPLE_ASSERT_OK(stipple_job_cloud(cloud_job, &ahead));
+  STIPPLE_ASSERT_OK(stipple_job_model(model_job, &model_ahead));
+  StippleCloud* at_once = nullptr;
+  STIPPLE_ASSERT_OK(stipple_cloud_load(context_, splats.c_str(), &at_once));
+  EXPECT_EQ(positionsOf(ahead), positionsOf(at_once));
+  auto info = sized<StippleModelInfo>();
+  auto expected = sized<StippleModelInfo>();
+  STIPPLE_EXPECT_OK(stipple_model_info(model_ahead, &info));
+  STIPPLE_EXPECT_OK(stipple_model_info(model, &expected));
+  EXPECT_EQ(info.leaf_count, expected.leaf_count);
+  EXPECT_EQ(info.sample_count, expected.sample_count);
+  for (StippleCloud* each : {cloud, ahead, at_once}) stipple_cloud_free(each);
+  for (StippleModel* each : {model, model_ahead}) stipple_model_free(each);
+  for (StippleJob* each : {cloud_job, model_job}) stipple_job_free(each);
+}
+
+TEST_F(Pipeline, AFileThatCannotBeReadIsAnErrorOfTheJobThatNamesIt) {
+  const TemporaryFolder folder;
+  StippleJob* job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_cloud_load_start(context_, folder.file("gone.ply").c_str(), &job));
+  EXPECT_EQ(stipple_job_wait(job), STIPPLE_ERROR_IO);
+  EXPECT_NE(std::string(stipple_last_error_message()).find("gone.ply"), std::string::npos);
+  StippleCloud* cloud = nullptr;
+  EXPECT_EQ(stipple_job_cloud(job, &cloud), STIPPLE_ERROR_INVALID_ARGUMENT);
+  stipple_job_free(job);
+  STIPPLE_ASSERT_OK(
+      stipple_model_load_start(context_, folder.file("gone.safetensors").c_str(), &job));
+  EXPECT_EQ(stipple_job_wait(job), STIPPLE_ERROR_IO);
+  stipple_job_free(job);
+}
+
+TEST_F(Pipeline, AFileOfMoreSplatsThanTheMemoryLimitAllowsIsRefused) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.ply");
+  StippleCloud* cloud = cubeSplats(context_, 3000);
+  STIPPLE_ASSERT_OK(stipple_cloud_save(cloud, path.c_str(), nullptr));
+  StippleContextOptions options;
+  stipple_context_options_init(&options);
+  options.memory_limit_bytes = 3000 * 14 * sizeof(float) - 1;  // degree 0: 14 floats a splat
+  StippleContext* small = nullptr;
+  STIPPLE_ASSERT_OK(stipple_context_create(&options, &small));
+  StippleCloud* loaded = nullptr;
+  EXPECT_EQ(stipple_cloud_load(small, path.c_str(), &loaded), STIPPLE_ERROR_MEMORY_LIMIT);
+  EXPECT_NE(std::string(stipple_last_error_message()).find(path), std::string::npos);
+  StippleJob* job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_cloud_load_start(small, path.c_str(), &job));
+  EXPECT_EQ(stipple_job_wait(job), STIPPLE_ERROR_MEMORY_LIMIT);
+  stipple_job_free(job);
+  stipple_context_free(small);
+  options.memory_limit_bytes += 1;
+  STIPPLE_ASSERT_OK(stipple_context_create(&options, &small));
+  STIPPLE_EXPECT_OK(stipple_cloud_load(small, path.c_str(), &loaded));
+  stipple_cloud_free(loaded);
+  stipple_cloud_free(cloud);
+  stipple_context_free(small);
+}
+
+TEST_F(Pipeline, ThinningGivesExactlyTheCount) {
+  StippleCloud* cloud = cubeSplats(context_, 1000);
+  for (const uint64_t count : {1000u, 333u, 0u}) {
+    StippleCloud* thinned = nullptr;
+    STIPPLE_ASSERT_OK(stipple_cloud_thin(cloud, count, 0, &thinned));
+    EXPECT_EQ(positionsOf(thinned).size(), count * 3);
+    stipple_cloud_free(thinned);
+  }
+  StippleCloud* thinned = nullptr;
+  EXPECT_EQ(stipple_cloud_thin(cloud, 1001, 0, &thinned), STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(thinned, nullptr);
+  stipple_cloud_free(cloud);
+}
+
 TEST_F(Pipeline, AJobOutlivesEverythingItWasStartedWith) {
   StippleContext* context = withThreadCount(2);
   StippleModel* model = cubeModel(context);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -103,6 +104,44 @@ TEST(CloudSelection, SameForAnyNumberOfThreads) {
   withThreads(2, [&] { many = kept(cloud, two = insideBox(cloud, half)); });
   EXPECT_EQ(one, two);
   EXPECT_EQ(few.positions, many.positions);
+}
+
+TEST(CloudThinning, KeepsExactlyTheCountAndNests) {
+  std::vector<uint8_t> larger(10'007, 1);
+  for (const size_t count : {10'007u, 10'006u, 5000u, 17u, 1u, 0u}) {
+    const std::vector<uint8_t> mask = thinningMask(10'007, count, 5);
+    EXPECT_EQ(static_cast<size_t>(std::count(mask.begin(), mask.end(), 1)), count);
+    for (size_t i = 0; i < mask.size(); ++i) EXPECT_LE(mask[i], larger[i]) << i;
+    larger = mask;
+  }
+  EXPECT_NE(thinningMask(1000, 500, 1), thinningMask(1000, 500, 2));
+  EXPECT_THROW(thinningMask(10, 11, 0), Error);
+}
+
+TEST(CloudThinning, SpreadsOverTheOrderOfTheFile) {
+  // Of each tenth of the indices a tenth stays: 1,000 draws of p = 0.1 differ from 100 by less than
+  // six standard deviations of 9.5.
+  const std::vector<uint8_t> mask = thinningMask(10'000, 1000, 0);
+  for (size_t part = 0; part < 10; ++part) {
+    const auto begin = mask.begin() + static_cast<std::ptrdiff_t>(part * 1000);
+    EXPECT_NEAR(static_cast<double>(std::count(begin, begin + 1000, 1)), 100.0, 57.0);
+  }
+}
+
+TEST(CloudThinning, WidensWhatStaysSoThatTheCoveredAreaStays) {
+  CloudRecipe recipe;
+  recipe.count = 400;
+  const SplatCloud cloud = randomCloud(recipe, 2);
+  const SplatCloud quarter = thinned(cloud, 100, 9);
+  const SplatCloud plain = kept(cloud, thinningMask(400, 100, 9));
+  EXPECT_EQ(quarter.positions, plain.positions);
+  EXPECT_EQ(quarter.opacities, plain.opacities);
+  EXPECT_EQ(quarter.sh, plain.sh);
+  for (size_t i = 0; i < plain.scales.size(); ++i) {
+    EXPECT_EQ(quarter.scales[i], plain.scales[i] * 2.0f) << i;
+  }
+  EXPECT_EQ(thinned(cloud, 400, 9).scales, cloud.scales);
+  EXPECT_EQ(thinned(cloud, 0, 9).size(), 0u);
 }
 
 }  // namespace
