@@ -96,9 +96,19 @@ void goBack(const BackwardInput& input, unsigned threads) {
 struct LoopTimes {
   double blend = 1e300;  ///< seconds, front to back
   double take_off = 1e300;
-  double listed = 0;  ///< pixel-splat pairs of the lists
+  /// The same over all 256 pixels of every pair, and without rows outside the splat's box; of plain
+  /// gradients only.
+  double take_off_whole = 1e300;
+  double take_off_row_skip = 1e300;
+  double listed = 0;   ///< pixel-splat pairs of the lists
+  double reached = 0;  ///< of them, those in front of the last end of their tile's pixels
   double blended = 0;
 };
+
+/// Whether the loop can be timed with less culling.
+bool hasLesserCullings(BackwardWants wants) {
+  return wants.mode == BackwardMode::kGradients && !wants.depth;
+}
 
 void neverAsked(const void*, size_t, uint32_t, BackwardPixels&, float*) {}
 
@@ -116,12 +126,13 @@ LoopTimes measureLoops(const SplatCase& c, const BackwardKernel& kernel, const L
   const TileGrid grid(c.width, c.height);
   const auto blended = std::make_unique<TilePixels>();
   const auto pixels = std::make_unique<BackwardPixels>();
+  const auto state = std::make_unique<BackwardPixels>();
   std::vector<TileSplat> splats;
   std::vector<float> sums;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
     double blend = 0;
-    double take_off = 0;
-    times.listed = 0;
+    double take_off = 0, whole = 0, row_skip = 0;
+    times.listed = times.reached = 0;
     forEachTileGroup(visible, grid, nullptr, [&](const TileListGroup& group) {
       for (size_t index = group.first_tile; index < group.end_tile; ++index) {
         const Tile tile = tileOf(grid, index, group.tile(index));
@@ -133,38 +144,51 @@ LoopTimes measureLoops(const SplatCase& c, const BackwardKernel& kernel, const L
         blend += secondsOf([&] {
           kernel.blend(splats.data(), splats.size(), {true, false}, *blended);
         });
-        *pixels = {};
+        *state = {};
         for (uint32_t i = 0; i < kTilePixelCount; ++i) {
-          pixels->transmittance[i] = blended->transmittance[i];
-          pixels->end[i] = blended->end[i];
-          pixels->row_end[i / kTileSide] = std::max(pixels->row_end[i / kTileSide], pixels->end[i]);
+          state->transmittance[i] = blended->transmittance[i];
+          state->end[i] = blended->end[i];
+          state->row_end[i / kTileSide] = std::max(state->row_end[i / kTileSide], state->end[i]);
           for (size_t channel = 0; channel < 4; ++channel) {
-            pixels->gradient[channel][i] = loss.gradient[i * 4 + channel];
+            state->gradient[channel][i] = loss.gradient[i * 4 + channel];
           }
           for (size_t channel = 0; channel < 3; ++channel) {
             const float residual = loss.residual[i * 3 + channel];
-            pixels->signed_weight[channel][i] = residual < 0 ? -1.0f : 1.0f;
-            pixels->room[channel][i] = 2.0f * std::abs(residual);
+            state->signed_weight[channel][i] = residual < 0 ? -1.0f : 1.0f;
+            state->room[channel][i] = 2.0f * std::abs(residual);
           }
         }
-        const int32_t most = *std::max_element(pixels->row_end, pixels->row_end + kTileSide);
+        const int32_t most = *std::max_element(state->row_end, state->row_end + kTileSide);
         const size_t used = std::min(splats.size(), static_cast<size_t>(most));
-        take_off += secondsOf([&] {
-          kernel.take_off(splats.data(), used, {wants, 0, neverAsked, nullptr}, *pixels,
-                          sums.data());
-        });
+        const auto timeTakeOff = [&](TileCulling culling) {
+          *pixels = *state;
+          return secondsOf([&] {
+            kernel.take_off(splats.data(), used, {wants, 0, neverAsked, nullptr, culling}, *pixels,
+                            sums.data());
+          });
+        };
+        take_off += timeTakeOff(TileCulling::kAll);
+        if (hasLesserCullings(wants)) {
+          row_skip += timeTakeOff(TileCulling::kRows);
+          whole += timeTakeOff(TileCulling::kNothing);
+        }
         times.listed += static_cast<double>(splats.size()) * kTilePixelCount;
+        times.reached += static_cast<double>(used) * kTilePixelCount;
       }
     });
     times.blend = std::min(times.blend, blend);
     times.take_off = std::min(times.take_off, take_off);
+    times.take_off_whole = std::min(times.take_off_whole, whole);
+    times.take_off_row_skip = std::min(times.take_off_row_skip, row_skip);
   }
   return times;
 }
 
 /// Both calls over their loops on the same lists. The call of a step of training goes back from the
-/// picture that was drawn: its loop is the one that takes splats off. The call from nothing blends
-/// first, so both loops are its floor, as they are of a drawing and a call after it.
+/// picture that was drawn: its loop is the one that takes splats off, over all 256 pixels of every
+/// pair of splat and tile (floor), without rows outside the splat's box, and as it is (culled). The
+/// call from nothing blends first, so both loops are its floor, as they are of a drawing and a call
+/// after it.
 void againstFloor(benchmark::State& state, const SplatCase& c, BackwardWants wants) {
   const Loss loss(c);
   const BackwardInput input = loss.input(wants);
@@ -190,8 +214,19 @@ void againstFloor(benchmark::State& state, const SplatCase& c, BackwardWants wan
   state.counters["take_off_1_thread_ms"] = 1e3 * loops.take_off;
   state.counters["ns_per_listed_pair"] = 1e9 * loops.take_off / loops.listed;
   state.counters["ns_per_blended_pair"] = 1e9 * loops.take_off / loops.blended;
-  state.counters["ratio_after_drawing"] = backward / (loops.take_off / 2);
-  state.counters["limit_after_drawing"] = 2.0;
+  if (hasLesserCullings(wants)) {
+    state.counters["take_off_whole_1_thread_ms"] = 1e3 * loops.take_off_whole;
+    state.counters["take_off_row_skip_1_thread_ms"] = 1e3 * loops.take_off_row_skip;
+    state.counters["ns_per_reached_pair_whole"] = 1e9 * loops.take_off_whole / loops.reached;
+    state.counters["ns_per_reached_pair_row_skip"] = 1e9 * loops.take_off_row_skip / loops.reached;
+    state.counters["ratio_floor"] = backward / (loops.take_off_whole / 2);
+    state.counters["limit_floor"] = 2.0;
+    state.counters["ratio_row_skip_floor"] = backward / (loops.take_off_row_skip / 2);
+  }
+  state.counters["ns_per_listed_pair_call"] = 2e9 * backward / loops.listed;
+  state.counters["ns_per_reached_pair_culled"] = 1e9 * loops.take_off / loops.reached;
+  state.counters["ratio_culled_floor"] = backward / (loops.take_off / 2);
+  state.counters["limit_culled_floor"] = 2.0;
   state.counters["ratio_from_nothing"] = alone / ((loops.blend + loops.take_off) / 2);
   state.counters["ratio_drawing_and_after"] =
       (forward + backward) / ((loops.blend + loops.take_off) / 2);

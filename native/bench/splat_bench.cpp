@@ -50,7 +50,8 @@ void label(benchmark::State& state, const SplatCase& c) {
 }
 
 /// The whole call over the blending loop alone on the same pair list: with 16x16 tiles and nothing
-/// culled below them, and as the renderer culls; and the list over the exact one.
+/// culled below them, with rows skipped, and as the renderer culls; and the list over the exact
+/// one.
 void againstFloor(benchmark::State& state, const SplatCase& c) {
   const SplatInstance instance{&cloudOf(c)};
   draw(c, chosenTileKernel(), 2);
@@ -67,11 +68,18 @@ void againstFloor(benchmark::State& state, const SplatCase& c) {
   const double pixels = static_cast<double>(c.width) * c.height;
   state.counters["best_ms"] = 1e3 * best;
   state.counters["floor_ms"] = 1e3 * floor.seconds;
+  state.counters["row_skip_floor_ms"] = 1e3 * floor.row_skip_seconds;
   state.counters["culled_floor_ms"] = 1e3 * floor.culled_seconds;
   state.counters["tested_per_pixel"] =
       static_cast<double>(floor.listed_pairs) * kTilePixelCount / pixels;
   state.counters["ratio_floor"] = best / floor.seconds;
   state.counters["limit_floor"] = 2.0;
+  state.counters["ratio_row_skip_floor"] = best / floor.row_skip_seconds;
+  const double per_pair = 2e9 / (static_cast<double>(floor.listed_pairs) * kTilePixelCount);
+  state.counters["ns_per_listed_pair_call"] = best * per_pair;
+  state.counters["ns_per_listed_pair_whole"] = floor.seconds * per_pair;
+  state.counters["ns_per_listed_pair_row_skip"] = floor.row_skip_seconds * per_pair;
+  state.counters["ns_per_listed_pair_culled"] = floor.culled_seconds * per_pair;
   state.counters["ratio_culled_floor"] = best / floor.culled_seconds;
   state.counters["limit_culled_floor"] = 2.0;
   state.counters["ratio_exact_pairs"] =

@@ -75,6 +75,16 @@ constexpr float kMedianDoubt = 2e-4f;
 /// place in this call's list; pixel, row * kTileSide + column.
 using AlphaJudge = double (*)(const void* context, size_t splat, uint32_t pixel);
 
+/// What a kernel leaves out below the tile; what a splat does not reach is worked on under a mask
+/// otherwise, to the same bits. The renderer leaves out all that it can. The others are for
+/// benchmarks, which show by them what that saves; kernels have them where colour and depth
+/// (forward) or plain gradients (backward) are asked for, and "scalar" has none of them.
+enum class TileCulling {
+  kNothing,  ///< all 256 pixels of every splat
+  kRows,     ///< rows outside the splat's box
+  kAll,      ///< and rows and columns of lanes in which nothing shows
+};
+
 struct TileKernelOptions {
   bool with_depth;
   bool with_extras;  ///< median depth and counts
@@ -83,9 +93,7 @@ struct TileKernelOptions {
   const void* judge_context = nullptr;
   bool with_coverage = false;  ///< beside depth
   int32_t first = 0;           ///< place of this call's first splat in the tile's list
-  /// False: every pixel of the tile is blended, those that a splat does not reach under a mask. For
-  /// benchmarks, which show by it what culling below the tile saves.
-  bool culls_pixels = true;
+  TileCulling culling = TileCulling::kAll;
 };
 
 /// Blends the splats in order into the tile; stops early once every pixel is finished.

@@ -38,6 +38,7 @@ struct TakeOffOptions {
   int32_t first;  ///< place of this call's first splat in the tile's list
   TakeOffJudge judge;
   const void* judge_context;
+  TileCulling culling = TileCulling::kAll;
 };
 
 /// Takes splats [count], which follow each other in the tile's list, off its pixels, last first.

@@ -83,11 +83,13 @@ HWY_NOINLINE void judgeLanes(Tag d, hn::Mask<Tag> unclear, size_t splat, size_t 
   }
 }
 
-template <BackwardMode kMode, bool kDepth>
+template <BackwardMode kMode, bool kDepth, TileCulling kCulling = TileCulling::kAll>
 void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& options,
                    BackwardPixels& pixels, float* sums) {
   constexpr bool kContributions = kMode != BackwardMode::kGradients;
   constexpr bool kStatistics = kMode == BackwardMode::kStatistics;
+  constexpr bool kCullsRows = kCulling != TileCulling::kNothing;
+  constexpr bool kCullsLanes = kCulling == TileCulling::kAll;
   constexpr size_t kFieldCount = backwardFieldCount({kMode, kDepth});
   const Tag d;
   const IntTag di;
@@ -121,18 +123,20 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
       const Vec x = hn::Iota(d, static_cast<float>(column));
       const Vec g0 = hn::MulAdd(hn::Set(d, splat.l00), x, hn::Set(d, splat.g0));
       const Vec most = hn::NegMulAdd(g0, g0, hn::Set(d, splat.log2_opacity));
-      if (hn::AllFalse(d, hn::Gt(most, low))) continue;
+      if (kCullsLanes && hn::AllFalse(d, hn::Gt(most, low))) continue;
       const Vec g1_first = hn::MulAdd(hn::Set(d, splat.l10), x, hn::Set(d, splat.g1));
       // g0 is that of the column: it is multiplied in once the rows are summed.
       Vec column_s = zero, column_g1 = zero;
-      for (uint32_t y = splat.row_begin; y < splat.row_end; ++y) {
-        if (place >= pixels.row_end[y]) continue;
+      const uint32_t first_row = kCullsRows ? splat.row_begin : 0;
+      const uint32_t end_row = kCullsRows ? splat.row_end : kTileSide;
+      for (uint32_t y = first_row; y < end_row; ++y) {
+        if (kCullsLanes && place >= pixels.row_end[y]) continue;
         const size_t i = static_cast<size_t>(y) * kTileSide + column;
         const Vec g1 = hn::MulAdd(l11, hn::Set(d, kRows[y]), g1_first);
         const Vec exponent = hn::NegMulAdd(g1, g1, most);
         const auto reached = hn::Gt(hn::Load(di, pixels.end + i), this_place);
         auto shows = hn::And(hn::Gt(exponent, low), hn::RebindMask(d, reached));
-        if (hn::AllFalse(d, shows)) continue;
+        if (kCullsLanes && hn::AllFalse(d, shows)) continue;
         const auto unclear = hn::And(shows, hn::Lt(exponent, high));
         if (HWY_UNLIKELY(!hn::AllFalse(d, unclear))) {
           if (!is_judged) std::fill(judged, judged + kFieldCount, 0.0f);
@@ -246,7 +250,15 @@ void takeOffInMode(const TileSplat* splats, size_t count, const TakeOffOptions& 
 
 void takeOffTile(const TileSplat* splats, size_t count, const TakeOffOptions& options,
                  BackwardPixels& pixels, float* sums) {
-  if (options.wants.depth) {
+  if (options.culling != TileCulling::kAll && !options.wants.depth &&
+      options.wants.mode == BackwardMode::kGradients) {
+    constexpr BackwardMode kMode = BackwardMode::kGradients;
+    if (options.culling == TileCulling::kRows) {
+      takeOffSplats<kMode, false, TileCulling::kRows>(splats, count, options, pixels, sums);
+    } else {
+      takeOffSplats<kMode, false, TileCulling::kNothing>(splats, count, options, pixels, sums);
+    }
+  } else if (options.wants.depth) {
     takeOffInMode<true>(splats, count, options, pixels, sums);
   } else {
     takeOffInMode<false>(splats, count, options, pixels, sums);

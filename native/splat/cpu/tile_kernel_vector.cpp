@@ -35,9 +35,11 @@ HWY_NOINLINE Vec judgedAlpha(Tag d, hn::Mask<Tag> unclear, Vec alpha, size_t spl
   return hn::Load(d, values);
 }
 
-template <bool kDepth, bool kCoverage, bool kExtras, bool kCulls = true>
+template <bool kDepth, bool kCoverage, bool kExtras, TileCulling kCulling = TileCulling::kAll>
 void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions& options,
                  TilePixels& pixels) {
+  constexpr bool kCullsRows = kCulling != TileCulling::kNothing;
+  constexpr bool kCullsLanes = kCulling == TileCulling::kAll;
   const Tag d;
   const size_t lanes = hn::Lanes(d);
   const Vec max_alpha = hn::Set(d, static_cast<float>(kMaxAlpha));
@@ -58,17 +60,17 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
       const Vec x = hn::Iota(d, static_cast<float>(column));
       const Vec g0 = hn::MulAdd(hn::Set(d, splat.l00), x, hn::Set(d, splat.g0));
       const Vec most = hn::NegMulAdd(g0, g0, hn::Set(d, splat.log2_opacity));
-      if (kCulls && hn::AllFalse(d, hn::Gt(most, low))) continue;
+      if (kCullsLanes && hn::AllFalse(d, hn::Gt(most, low))) continue;
       const Vec g1_first = hn::MulAdd(hn::Set(d, splat.l10), x, hn::Set(d, splat.g1));
-      const uint32_t first_row = kCulls ? splat.row_begin : 0;
-      const uint32_t end_row = kCulls ? splat.row_end : kTileSide;
+      const uint32_t first_row = kCullsRows ? splat.row_begin : 0;
+      const uint32_t end_row = kCullsRows ? splat.row_end : kTileSide;
       for (uint32_t y = first_row; y < end_row; ++y) {
         const size_t i = static_cast<size_t>(y) * kTileSide + column;
         const Vec g1 = hn::MulAdd(l11, hn::Set(d, static_cast<float>(y)), g1_first);
         const Vec exponent = hn::NegMulAdd(g1, g1, most);
         const Vec cut = hn::Load(d, pixels.cut + i);
         const auto touched = hn::And(hn::Gt(exponent, low), hn::Lt(cut, finished));
-        if (kCulls && hn::AllFalse(d, touched)) continue;
+        if (kCullsLanes && hn::AllFalse(d, touched)) continue;
 
         auto unclear = hn::And(touched, hn::Lt(exponent, high));
         auto shows = hn::AndNot(unclear, touched);
@@ -137,8 +139,12 @@ void blendWithExtras(const TileSplat* splats, size_t count, const TileKernelOpti
 
 void blendTile(const TileSplat* splats, size_t count, TileKernelOptions options,
                TilePixels& pixels) {
-  if (!options.culls_pixels && options.with_depth && !options.with_extras) {
-    blendSplats<true, false, false, false>(splats, count, options, pixels);
+  if (options.culling != TileCulling::kAll && options.with_depth && !options.with_extras) {
+    if (options.culling == TileCulling::kRows) {
+      blendSplats<true, false, false, TileCulling::kRows>(splats, count, options, pixels);
+    } else {
+      blendSplats<true, false, false, TileCulling::kNothing>(splats, count, options, pixels);
+    }
   } else if (options.with_extras) {
     blendWithExtras<true>(splats, count, options, pixels);
   } else {

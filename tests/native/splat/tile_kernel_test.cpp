@@ -12,6 +12,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "splat/cpu/tile_kernel_backward.h"
 #include "splat/cpu/tile_splats.h"
 
 namespace stipple {
@@ -103,17 +104,71 @@ TEST(TileKernel, EveryTargetBlendsAsTheScalarOne) {
   }
 }
 
+/// Random splats whose boxes are as high as they can show: |g|^2 <= 8 + log2(opacity).
+std::vector<TileSplat> boxedSplats(size_t count) {
+  std::vector<TileSplat> splats = randomSplats(count, 0.005f, 12);
+  for (TileSplat& s : splats) {
+    const float x = -s.g0 / s.l00;
+    const float y = -(s.g1 + s.l10 * x) / s.l11;
+    const float half =
+        std::sqrt(8.0f + s.log2_opacity) * std::hypot(1.0f, s.l10 / s.l00) / s.l11 + 0.01f;
+    s.row_begin = static_cast<uint32_t>(std::clamp(std::ceil(y - half), 0.0f, 16.0f));
+    s.row_end = static_cast<uint32_t>(std::clamp(std::floor(y + half) + 1.0f, 0.0f, 16.0f));
+  }
+  return splats;
+}
+
+constexpr TileCulling kLesserCullings[] = {TileCulling::kNothing, TileCulling::kRows};
+
 TEST(TileKernel, GivesTheSameBitsWithoutCullingBelowTheTile) {
-  const std::vector<TileSplat> splats = randomSplats(300, 0.005f, 12);
+  const std::vector<TileSplat> splats = boxedSplats(300);
   for (const NamedTileKernel& named : tileKernels()) {
     SCOPED_TRACE(named.target);
     TileKernelOptions options{true, false};
-    TilePixels culled = emptyPixels(), whole = emptyPixels();
+    TilePixels culled = emptyPixels();
     named.kernel(splats.data(), splats.size(), options, culled);
-    options.culls_pixels = false;
-    named.kernel(splats.data(), splats.size(), options, whole);
     EXPECT_LT(culled.unfinished, kTilePixelCount - 1);
-    EXPECT_EQ(std::memcmp(&culled, &whole, sizeof(TilePixels)), 0);
+    for (const TileCulling culling : kLesserCullings) {
+      TilePixels whole = emptyPixels();
+      options.culling = culling;
+      named.kernel(splats.data(), splats.size(), options, whole);
+      EXPECT_EQ(std::memcmp(&culled, &whole, sizeof(TilePixels)), 0);
+    }
+  }
+}
+
+TEST(TileKernel, TakesOffTheSameBitsWithoutCullingBelowTheTile) {
+  const std::vector<TileSplat> splats = boxedSplats(300);
+  const BackwardWants wants{BackwardMode::kGradients, false};
+  const auto neverShows = [](const void*, size_t, uint32_t, BackwardPixels&, float*) {};
+  for (const BackwardKernel& kernel : backwardKernels()) {
+    SCOPED_TRACE(kernel.target);
+    TilePixels blended = emptyPixels();
+    std::fill_n(blended.end, kTilePixelCount - 1, kNeverEnded);
+    kernel.blend(splats.data(), splats.size(), {true, false}, blended);
+    BackwardPixels before{};
+    for (size_t i = 0; i < kTilePixelCount; ++i) {
+      before.transmittance[i] = blended.transmittance[i];
+      before.end[i] = blended.end[i];
+      int32_t& row_end = before.row_end[i / kTileSide];
+      row_end = std::max(row_end, before.end[i]);
+      for (size_t c = 0; c < 4; ++c)
+        before.gradient[c][i] = std::sin(static_cast<float>(i * 4 + c));
+    }
+    const auto takeOff = [&](TileCulling culling, BackwardPixels& pixels) {
+      std::vector<float> sums(splats.size() * backwardFieldCount(wants));
+      kernel.take_off(splats.data(), splats.size(), {wants, 0, neverShows, nullptr, culling},
+                      pixels, sums.data());
+      return sums;
+    };
+    BackwardPixels culled_pixels = before;
+    const std::vector<float> culled = takeOff(TileCulling::kAll, culled_pixels);
+    EXPECT_GT(std::count_if(culled.begin(), culled.end(), [](float sum) { return sum != 0; }), 500);
+    for (const TileCulling culling : kLesserCullings) {
+      BackwardPixels pixels = before;
+      EXPECT_EQ(takeOff(culling, pixels), culled);
+      EXPECT_EQ(std::memcmp(&pixels, &culled_pixels, sizeof pixels), 0);
+    }
   }
 }
 
