@@ -102,8 +102,8 @@ void decode(benchmark::State& state) {
         for (size_t i = 0; i < fixed.size(); ++i) {
           uint32_t index[2];
           float distance[2];
-          tree.knnSearch(&fixed.positions[i * 3], 2, index, distance);
-          benchmark::DoNotOptimize(distance[1]);
+          const size_t found = tree.knnSearch(&fixed.positions[i * 3], 2, index, distance);
+          benchmark::DoNotOptimize(distance[found - 1]);
         }
       });
 }

@@ -152,8 +152,7 @@ bool anyWithin(std::span<const float> points, std::span<const uint32_t> a,
     if (tree) {
       uint32_t nearest = 0;
       double squared = 0;
-      tree->knnSearch(p, 1, &nearest, &squared);
-      if (squared <= squared_radius) return true;
+      if (tree->knnSearch(p, 1, &nearest, &squared) == 1 && squared <= squared_radius) return true;
       continue;
     }
     for (const uint32_t j : b) {
@@ -218,8 +217,9 @@ std::vector<double> neighbourDistances(std::span<const float> points,
     std::vector<uint32_t> indices(wanted);
     std::vector<double> squared(wanted);
     for (size_t i = begin; i < end; ++i) {
-      tree.knnSearch(&points[size_t{queries[i]} * 3], wanted, indices.data(), squared.data());
-      result[i] = std::sqrt(squared[wanted - 1]);
+      const size_t found =
+          tree.knnSearch(&points[size_t{queries[i]} * 3], wanted, indices.data(), squared.data());
+      result[i] = std::sqrt(squared[found - 1]);
     }
   });
   return result;
