@@ -18,6 +18,7 @@
 #include "decode/surface_model.h"
 #include "density/octree_density.h"
 #include "io/camera_file.h"
+#include "splat/draw_order.h"
 #include "splat/render_backward.h"
 
 namespace stipple::api {
@@ -46,6 +47,9 @@ struct RendererMemory {
   RenderResult result;
   BackwardWorkspace backward_workspace;
   BackwardResult backward_result;
+
+  std::mutex order_mutex;  ///< of order_workspace: an order and a picture may be made at once
+  DrawOrderWorkspace order_workspace;
 };
 
 }  // namespace stipple::api

@@ -33,6 +33,8 @@ def c_layout(root, header, tmp_path_factory):
     lines.append('printf("constant ABI_VERSION %u\\n", (unsigned)STIPPLE_ABI_VERSION);')
     lines.append('printf("constant MAX_ANCHORS %u\\n", (unsigned)STIPPLE_MAX_ANCHORS);')
     lines.append('printf("constant NO_INDEX %u\\n", (unsigned)STIPPLE_NO_INDEX);')
+    for name in ('DRAW_GEOMETRY_FLOATS', 'DRAW_ROW_FLOATS', 'MAX_DRAW_ROWS'):
+        lines.append(f'printf("constant {name} %u\\n", (unsigned)STIPPLE_{name});')
     folder = tmp_path_factory.mktemp('abi')
     (folder / 'layout.c').write_text('#include <stddef.h>\n#include <stdio.h>\n#include <stipple/stipple.h>\n'
                                      'int main(void) {\n' + '\n'.join(lines) + '\nreturn 0;\n}\n')
@@ -128,7 +130,8 @@ def test_field_kinds_match(header):
     """Sizes alone do not tell a float from an integer, or what a pointer points to."""
     kinds = {'uint32_t': c_uint32, 'uint64_t': c_uint64, 'double': c_double, 'float': c_float, 'char': ctypes.c_char,
              'const float*': POINTER(c_float), 'float*': POINTER(c_float), 'const uint32_t*': POINTER(c_uint32),
-             'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const StippleCloud*': c_void_p, 'const char*': c_char_p}
+             'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
+             'const StippleCloud*': c_void_p, 'const char*': c_char_p}
     for name, body in re.findall(r'typedef struct (\w+) \{(.*?)\}', header, flags=re.S):
         mine = dict(structs.STRUCTS[name]._fields_)
         for statement in filter(None, (' '.join(part.split()) for part in body.split(';'))):
@@ -150,4 +153,5 @@ def test_enums_match(header, c_layout):
 def test_constants_match(c_layout):
     constants = {line[1]: int(line[2]) for line in c_layout if line[0] == 'constant'}
     assert constants == {'ABI_VERSION': structs.ABI_VERSION, 'MAX_ANCHORS': structs.MAX_ANCHORS,
-                         'NO_INDEX': structs.NO_INDEX}
+                         'NO_INDEX': structs.NO_INDEX, 'DRAW_GEOMETRY_FLOATS': structs.DRAW_GEOMETRY_FLOATS,
+                         'DRAW_ROW_FLOATS': structs.DRAW_ROW_FLOATS, 'MAX_DRAW_ROWS': structs.MAX_DRAW_ROWS}

@@ -92,6 +92,10 @@ class Cloud(Handle):
         self._check(self.library.stipple_cloud_read(self.pointer, byref(buffers)))
         return arrays
 
+    def pack_into(self, geometry):
+        """Fills rows [N,12] of a float texture that a graphics card draws the splats from."""
+        self._check(self.library.stipple_cloud_pack(self.pointer, pointer_to(geometry), len(geometry)))
+
     def save(self, path, **options_given):
         """Writes by the ending; options_given: fields of StippleCloudSaveOptions, such as ascii=1."""
         options = StippleCloudSaveOptions()

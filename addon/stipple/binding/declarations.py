@@ -100,6 +100,11 @@ FUNCTIONS = {
                                                 _out_handle]),
     'stipple_renderer_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                 POINTER(c_uint64)]),
+    # drawing by a graphics card
+    'stipple_cloud_pack': (_status, [_handle, _floats, c_uint64]),
+    'stipple_renderer_order_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
+                                               _to(s.StippleDrawOrderBuffers), _out_handle]),
+    'stipple_renderer_order_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64, POINTER(c_uint64)]),
     # editing splat clouds
     'stipple_cloud_select_box': (_status, [_handle, _matrix, c_uint32, _mask, c_uint64, POINTER(c_uint64)]),
     'stipple_cloud_select_mesh_start': (_status, [_handle, _matrix, _handle, c_uint32, _mask, c_uint64,

@@ -7,6 +7,9 @@ from enum import IntEnum
 ABI_VERSION = 1
 MAX_ANCHORS = 1 << 28
 NO_INDEX = 0xFFFFFFFF
+DRAW_GEOMETRY_FLOATS = 12
+DRAW_ROW_FLOATS = 4
+MAX_DRAW_ROWS = 1 << 24
 
 _floats = POINTER(c_float)
 _matrix = c_double * 16
@@ -271,6 +274,11 @@ class StippleRenderOptions(_Sized):
 class StippleRenderBuffers(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour', _floats), ('depth', _floats),
                 ('median_depth', _floats), ('counts', POINTER(c_uint32))]
+
+
+class StippleDrawOrderBuffers(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('sh_degree_limit', c_uint32), ('capacity', c_uint64),
+                ('order', POINTER(c_uint32)), ('rows', _floats), ('first_rows', POINTER(c_uint64))]
 
 
 class StippleFloaterOptions(_Sized):

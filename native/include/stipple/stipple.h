@@ -576,6 +576,51 @@ StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
                                             const StippleInstance* instances, uint64_t count,
                                             const StippleCamera* camera, uint64_t* bytes);
 
+/* ---- drawing by a graphics card ------------------------------------------------------------------ */
+
+/* A view that turns is drawn with splats projected by the card, blended back to front in an order that a
+ * worker makes. Geometry goes to the card once per cloud, order and colours once per order. */
+
+/* Floats per splat of stipple_cloud_pack: x, y, z, opacity | w, x, y, z | scales, 0. */
+#define STIPPLE_DRAW_GEOMETRY_FLOATS 12u
+/* Floats per splat of StippleDrawOrderBuffers.rows. */
+#define STIPPLE_DRAW_ROW_FLOATS 4u
+/* Rows are numbered in float32, exactly up to here. */
+#define STIPPLE_MAX_DRAW_ROWS 16777216u
+
+/* Geometry of all splats of a cloud for a float texture. In: capacity, splats that geometry [N,12] has room
+ * for. Errors: BUFFER_TOO_SMALL. Cost: O(N), memory bandwidth. */
+StippleStatus stipple_cloud_pack(const StippleCloud* cloud, float* geometry, uint64_t capacity);
+
+/* Must stay valid until the job has ended. N counts the splats of all instances. */
+typedef struct StippleDrawOrderBuffers {
+  uint32_t struct_size;
+  uint32_t sh_degree_limit;   /* 0..4: harmonics above are left out of the rows' colours */
+  uint64_t capacity;          /* splats that each given buffer has room for */
+  uint32_t* order;            /* [N] splats back to front, counted through the instances; or NULL */
+  float* rows;                /* [N,4] the same order: row of the geometry, number of the instance, and the
+                                 colour C (display values, from this camera) in two numbers: with
+                                 c = round(65535 sqrt(C / 64)) they are 256 r + floor(g / 256) and
+                                 65536 (g mod 256) + b; or NULL */
+  const uint64_t* first_rows; /* [count] row of each instance's splat 0; instances of one cloud may share
+                                 them; needed with rows */
+} StippleDrawOrderBuffers;
+
+/* Orders the splats of instances [count] together, as a job. Of the camera only model and world_to_camera
+ * count; splats behind it are there too. The exact reverse of the order in which stipple_renderer_render_start
+ * blends: view z of the centre as float32, ties by index. Matrices may be singular (an object scaled to zero).
+ * Errors of the start: INVALID_ARGUMENT for a value that is not finite, a row above STIPPLE_MAX_DRAW_ROWS;
+ * BUFFER_TOO_SMALL; MEMORY_LIMIT. Nothing is written unless the job ends well.
+ * Threads and determinism: the same bits for any number of threads. Cost: O(N); 32 bytes per splat, which the
+ * renderer keeps for the next order. Benchmark viewport.sort. */
+StippleStatus stipple_renderer_order_start(StippleRenderer* renderer, const StippleInstance* instances,
+                                           uint64_t count, const StippleCamera* camera,
+                                           const StippleDrawOrderBuffers* buffers, StippleJob** job);
+/* Bytes that it allocates at most, beside the caller's buffers. */
+StippleStatus stipple_renderer_order_memory_bound(const StippleRenderer* renderer,
+                                                  const StippleInstance* instances, uint64_t count,
+                                                  uint64_t* bytes);
+
 /* ---- editing splat clouds ---------------------------------------------------------------------- */
 
 /* Masks say for each splat of a cloud 1 (keep) or 0. They are the caller's, [mask_count] bytes where mask_count

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "splat/cpu/depth_sort.h"
 #include "splat/cpu/tile_grid.h"
 #include "splat/scene.h"
 
@@ -44,13 +45,6 @@ struct SplatSlots {
 /// Halves of boxes have a margin that is larger than this rounding.
 inline float heldHalf(double half) {
   return half < 3e38 ? static_cast<float>(half) : std::numeric_limits<float>::infinity();
-}
-
-/// Sorts as unsigned numbers: depthKey above, the splat's place in memory below.
-using DepthItem = uint64_t;
-
-inline DepthItem depthItem(double depth, size_t slot) {
-  return static_cast<uint64_t>(depthKey(depth)) << 32 | static_cast<uint32_t>(slot);
 }
 
 /// Where a projector puts what shows, by slot.
