@@ -27,6 +27,11 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
                               "mebibytes is refused before it starts, 0 for no limit", default=0, min=0)
     cache_folder: StringProperty(name="Cache Folder", description="Where sources of files that are not saved yet are "
                                  "kept, empty for Blender's user folder", subtype='DIR_PATH', options=version.RELATIVE_PATH)
+    sequence_cache: IntProperty(name="Sequence Cache", description="Mebibytes of memory in which files of splat "
+                                "sequences are kept, over all objects", default=1024, min=0)
+    read_ahead: IntProperty(name="Read Ahead", description="Files of a splat sequence that are read before they are "
+                            "shown, as far as the cache has room; 0 to read each when it is shown", default=4, min=0,
+                            max=64)
     library_path: StringProperty(name="Library", description="Path of libstipple.so, empty for the one inside the "
                                  "add-on", subtype='FILE_PATH', options=version.RELATIVE_PATH)
     formats: CollectionProperty(type=STIPPLE_PG_format)
@@ -39,6 +44,8 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
         column.prop(self, 'threads')
         column.prop(self, 'memory_limit', text="Memory Limit (MiB)")
         column.prop(self, 'cache_folder')
+        column.prop(self, 'sequence_cache', text="Sequence Cache (MiB)")
+        column.prop(self, 'read_ahead')
         column.prop(self, 'library_path')
         for entry in self.formats:
             column.prop(entry, 'up_axis', text=f"Up Axis of .{entry.name}")

@@ -6,7 +6,7 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
                        StringProperty)
 
 from . import version
-from .scene import sync
+from .scene import sequences, sync
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
 _CHANGEABLE = {'ANIMATABLE'}
@@ -71,6 +71,25 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     source_fingerprint: StringProperty(options={'HIDDEN'})
     source_changed: BoolProperty(name="Source Changed", description="The mesh differs from the one that the splats were "
                                  "made from", options={'HIDDEN'})
+    # A series of files, one for each frame; source is its first. Names and meaning as in Blender's volumes.
+    is_sequence: BoolProperty(name="Sequence", description="The source is the first of a numbered series of files, one "
+                              "for each frame", options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
+    frame_duration: IntProperty(name="Frames", description="Number of files of the series that are used", default=1,
+                                min=1, options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
+    frame_start: IntProperty(name="Start", description="Frame of the scene at which the series starts", default=1,
+                             options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
+    frame_offset: IntProperty(name="Offset", description="Added to the number of the file that is shown; keyframes "
+                              "here time the series freely", default=0, options=_CHANGEABLE, override=_OVERRIDABLE,
+                              update=sync.on_property_change)
+    frame_speed: FloatProperty(name="Speed", description="Files for each frame of the scene; below 0 backward",
+                               default=1.0, soft_min=-4.0, soft_max=4.0, options=set(), override=_OVERRIDABLE,
+                               update=sync.on_property_change)
+    sequence_mode: EnumProperty(name="Mode", description="What is shown before the first and after the last file",
+                                items=sequences.MODES, options=set(), override=_OVERRIDABLE,
+                                update=sync.on_property_change)
+    missing_frames: EnumProperty(name="Missing Files", description="What a gap in the series does",
+                                 items=sequences.GAPS, options=set(), override=_OVERRIDABLE,
+                                 update=sync.on_property_change)
     edited: BoolProperty(name="Edited", description="The splats were edited by hand", options={'HIDDEN'})
 
 

@@ -116,3 +116,23 @@ def test_edit_mode_is_one_clear_error(stipple):
         splat_data.write(data, arrays)
     bpy.ops.object.mode_set(mode='OBJECT')
     assert_equal(splat_data.read(data), arrays)
+
+
+@pytest.mark.parametrize('count', [50, 80])
+def test_linked_data_are_written_too(stipple, tmp_path, count):
+    splat_data = stipple.scene.splat_data
+    data = splat_data.new_data('splats')
+    splat_data.write(data, make_arrays(stipple))
+    data.use_fake_user = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'library.blend'))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    kind = 'pointclouds' if bpy.app.version >= (5, 2, 0) else 'meshes'
+    with bpy.data.libraries.load(str(tmp_path / 'library.blend'), link=True) as (_, here):
+        setattr(here, kind, ['splats'])
+    linked = getattr(here, kind)[0]
+    assert linked.library is not None
+    arrays = make_arrays(stipple, count, degree=1)
+    arrays.positions += np.float32(1)
+    splat_data.write(linked, arrays)
+    assert_equal(splat_data.read(linked), arrays)
+    assert len(getattr(bpy.data, kind)) == 1

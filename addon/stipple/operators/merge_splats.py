@@ -7,7 +7,7 @@ import numpy as np
 from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene import masks, sources, splat_data, sync
+from ..scene import edits, masks, sources, splat_data, sync
 
 
 class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
@@ -32,6 +32,8 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
         if not others:
             raise invalid('One splat object is selected; select at least two.')
         self._objects = [active] + others
+        for obj in self._objects:
+            edits.refuse_sequence(obj)
         inverse = np.linalg.inv(np.array(active.matrix_world))
         clouds = [sources.full_cloud(obj.data) for obj in self._objects]
         matrices = [np.eye(4)] + [inverse @ np.array(obj.matrix_world) for obj in others]

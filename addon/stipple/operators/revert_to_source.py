@@ -4,7 +4,7 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene import sources, splat_data, sync
+from ..scene import sequences, sources, splat_data, sync
 
 
 class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
@@ -21,13 +21,20 @@ class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
 
     def start(self, context):
         data = context.object.data
+        if data.stipple.is_sequence:
+            self._frame = sequences.shown_now(data)
+            self._splats = self._frame.arrays()
+            return None
         self._splats = sources.decode_data(data, sources.decode_settings(data.stipple)).read()
         return None
 
     def finish(self, context, _job):
         data = context.object.data
         data.stipple.edited = False
-        sync.write_decoded(data, self._splats)
+        if data.stipple.is_sequence:
+            sync.write(data, self._splats, self._frame.key)
+        else:
+            sync.write_decoded(data, self._splats)
         self.report({'INFO'}, f"{self._splats.count:,} splats from their source")
 
 

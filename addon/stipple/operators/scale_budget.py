@@ -19,16 +19,21 @@ class STIPPLE_OT_scale_budget(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return splat_data.is_splat_object(context.object) and (
-            context.object.data.stipple.source_kind in sources.MODEL_KINDS)
+        if not splat_data.is_splat_object(context.object):
+            return False
+        stipple = context.object.data.stipple
+        return stipple.is_sequence or stipple.source_kind in sources.MODEL_KINDS
 
     def execute(self, context):
         stipple = context.object.data.stipple
         mode = 'RENDER' if self.render else 'VIEWPORT'
-        name = 'ratio' if stipple.source_kind == 'TREE' and stipple.budget_by == 'RATIO' else 'anchors'
+        by_ratio = stipple.source_kind != 'MODEL' and stipple.budget_by == 'RATIO'
+        name = 'ratio' if by_ratio else 'anchors'
         before = getattr(stipple, name + '_render') if self.render else getattr(stipple, name)
         if name == 'ratio':
             after = min(1.0, before * self.factor)
+        elif stipple.is_sequence:
+            after = max(1, round((before or stipple.anchors) * self.factor))
         else:
             after = max(1, round(sources.decode_settings(stipple, mode).anchors * self.factor))
         setattr(stipple, name + '_render' if self.render else name, after)

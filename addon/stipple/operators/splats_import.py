@@ -4,7 +4,7 @@
 import os
 
 import bpy
-from bpy.props import CollectionProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 from mathutils import Matrix
 
@@ -12,7 +12,7 @@ from .. import preferences, version
 from ..binding.cloud import Cloud
 from ..binding.errors import StippleError
 from ..jobs import JobOperator, Task
-from ..scene import formats, frames, sources, splat_data, sync
+from ..scene import formats, frames, numbered, sequences, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
@@ -28,6 +28,10 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
     up_axis: EnumProperty(name="Up Axis", description="Which way is up in the files; objects are turned, their data stay "
                           "as they are", items=preferences.UP_AXES)
+
+    as_sequence: BoolProperty(name="As Sequence", description="Numbered files become one object that shows one of them "
+                              "for each frame. One file that is chosen alone stands for all of its series",
+                              default=False)
 
     _asked = False
 
@@ -45,13 +49,14 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
 
     def start(self, _context):
         native, paths = sources.context(), self._paths()
+        chosen = numbered.series_of(paths) if self.as_sequence else [(path, 1) for path in paths]
 
         def work(task):
             loaded, failed = [], []
-            for i, path in enumerate(paths):
-                task.advance(i / len(paths), f'Reading {os.path.basename(path)}')
+            for i, (path, frame_count) in enumerate(chosen):
+                task.advance(i / len(chosen), f'Reading {os.path.basename(path)}')
                 try:
-                    loaded.append((path, Cloud.load(native, path).read()))
+                    loaded.append((path, frame_count, Cloud.load(native, path).read()))
                 except StippleError as error:
                     failed.append(error)
             if not loaded:
@@ -63,24 +68,34 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
         loaded, failed = job.result
         for other in list(context.view_layer.objects.selected):
             other.select_set(False)
-        for path, splats in loaded:
-            obj = self._object(path, splats)
+        for path, frame_count, splats in loaded:
+            obj = self._object(path, splats, frame_count)
             context.collection.objects.link(obj)
             obj.select_set(True)
             context.view_layer.objects.active = obj
+            if frame_count > 1:
+                sync.try_sync(obj, None, 'VIEWPORT')
         for error in failed:
             self.report({'WARNING'}, str(error))
-        total = sum(splats.count for _, splats in loaded)
+        total = sum(splat_data.count(o.data) for o in context.view_layer.objects.selected)
         where = f"'{obj.name}'" if len(loaded) == 1 else f'{len(loaded)} objects'
-        self.report({'INFO'}, f'{total:,} splats in {where}')
+        in_all = sum(frame_count for _, frame_count, _ in loaded)
+        files = '' if in_all == len(loaded) else f' of {in_all} files'
+        self.report({'INFO'}, f'{total:,} splats in {where}{files}')
 
-    def _object(self, path, splats):
+    def _object(self, path, splats, frame_count):
         name = os.path.basename(path)
         form = formats.of_path(path)
         ending = next((e for e in form.endings if name.lower().endswith(e)), '') if form else os.path.splitext(name)[1]
-        data = splat_data.new_data(name[:len(name) - len(ending)])
+        name = name[:len(name) - len(ending)]
+        if frame_count > 1:
+            name = os.path.basename(numbered.parse(path).prefix).rstrip('_-. ') or name
+        data = splat_data.new_data(name)
         with sync.paused():
-            sources.attach_cloud(data, path)
+            if frame_count > 1:
+                sequences.attach(data, path, frame_count)
+            else:
+                sources.attach_cloud(data, path)
         sync.write(data, splats, '')
         obj = splat_data.new_object(data.name, data)
         axis = self.up_axis if self.up_axis != 'AUTO' or form is None else preferences.up_axis(form.name)

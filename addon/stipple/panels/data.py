@@ -84,7 +84,7 @@ def _draw_budget(self, context):
         box.label(text=line, icon='OUTLINER_DATA_POINTCLOUD' if i == 0 else 'BLANK1')
     _draw_hidden(box, data)
     _draw_warnings(box, data)
-    if stipple.source_kind == 'TREE':
+    if stipple.source_kind == 'TREE' or stipple.is_sequence:
         _draw_tree_budget(box, stipple)
         return
     if stipple.source_kind != 'MODEL':
@@ -100,6 +100,8 @@ def _draw_budget(self, context):
 
 def _shown_label(data):
     count = splat_data.count(data)
+    if data.stipple.is_sequence:
+        return f"{count:,} Gaussian Splats{SEPARATOR}frame of a series"
     if data.stipple.source_kind != 'TREE':
         return f"{count:,} Gaussian Splats"
     size = exporting.megabytes(count * splat_data.bytes_each(data))

@@ -94,10 +94,18 @@ def show(data, cloud=None):
     sync.write(data, splats.read(), sync.written_key(data, settings))
 
 
+def refuse_sequence(obj):
+    """Refuses what can only be done to the splats of one file."""
+    if obj.data.stipple.is_sequence:
+        raise invalid(f"'{obj.name}' is a series of files, and this changes the splats of one; choose Use as New "
+                      'Source first, which keeps the present frame alone.')
+
+
 def _check(obj):
     data = obj.data
     if data.library is not None:
         raise invalid(f"'{obj.name}' is linked from another file; make it local first.")
+    refuse_sequence(obj)
     if data.stipple.source_kind == 'MODEL':
         raise invalid(f"'{obj.name}' is made from meshes, so there are no splats of a file to hide; edit the meshes, or "
                       'choose Use as New Source first.')

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..binding import cloud_edit
 from ..binding.errors import StippleError, invalid
-from . import formats, frames, sources, splat_data, sync
+from . import formats, frames, sequences, sources, splat_data, sync
 
 
 def any_splats(context):
@@ -63,6 +63,9 @@ def _cloud(obj, budget):
     data = obj.original.data
     if budget == 'VIEWPORT' or data.stipple.source_kind == 'NONE' or data.stipple.edited or sync.is_edited(data):
         return sources.cloud_from_object(obj)
+    if data.stipple.is_sequence:
+        frame = sequences.frame_of(data, obj.data.stipple, bpy.context.scene.frame_current, budget)
+        return frame.cloud() or sources.cloud_from_object(obj)
     if budget == 'FULL':
         return sources.full_cloud(data)
     return sources.decode_data(data, sources.decode_settings(data.stipple, 'RENDER'))
@@ -89,7 +92,7 @@ def megabytes(size):
 
 
 def _count(data, budget):
-    if budget == 'VIEWPORT' or data.stipple.edited:
+    if budget == 'VIEWPORT' or data.stipple.edited or data.stipple.is_sequence:
         return splat_data.count(data)
     return sources.count_of(data, budget)
 

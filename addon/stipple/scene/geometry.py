@@ -27,7 +27,8 @@ def may_carry_splats(obj):
     """Cheap enough for a menu: modifiers are not looked into."""
     if obj is None or obj.library is not None or obj.type not in {'MESH', 'POINTCLOUD', 'CURVES'}:
         return False
-    if splat_data.is_splats(obj.data) and obj.data.stipple.source_kind in sources.MODEL_KINDS:
+    if splat_data.is_splats(obj.data) and (obj.data.stipple.is_sequence
+                                           or obj.data.stipple.source_kind in sources.MODEL_KINDS):
         return False
     return carries_splats(obj.data) or len(obj.modifiers) > 0
 

@@ -3,7 +3,7 @@
 
 from .. import version
 from ..binding.errors import StippleError
-from . import sources, splat_data, sync
+from . import sequences, sources, splat_data, sync
 
 
 def gather(depsgraph, mode, warn=lambda message: None):
@@ -24,21 +24,22 @@ def gather(depsgraph, mode, warn=lambda message: None):
         matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
         key = obj.data.as_pointer()
         if key not in clouds:
-            clouds[key] = _cloud_of(obj, mode)
+            clouds[key] = _cloud_of(obj, mode, depsgraph.scene.frame_current)
         if clouds[key] is not None:
             found.append((clouds[key], matrix))
     return found
 
 
-def _cloud_of(obj, mode):
-    """Native splats of an evaluated object, or None for none."""
+def _cloud_of(obj, mode, frame):
+    """Native splats of an evaluated object at a frame of the scene, or None for none."""
     data, original = obj.data, obj.original.data
     stipple = data.stipple
-    from_source = stipple.source_kind in sources.MODEL_KINDS and not stipple.edited and not _has_modifiers(obj)
-    if from_source and not sync.is_edited(original):
-        settings = sources.decode_settings(stipple, mode)
+    from_source = (stipple.is_sequence or stipple.source_kind in sources.MODEL_KINDS) and not stipple.edited
+    if from_source and not _has_modifiers(obj) and not sync.is_edited(original):
         try:
-            return sources.decode(original, settings)
+            if stipple.is_sequence:
+                return sequences.frame_of(original, stipple, frame, mode).cloud()
+            return sources.decode(original, sources.decode_settings(stipple, mode))
         except StippleError as error:
             raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
     if splat_data.count(data) == 0:

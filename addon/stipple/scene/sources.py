@@ -213,6 +213,7 @@ def attach_tree(data, path, count):
     stipple.source = blend_path(path)
     stipple.source_kind = 'TREE'
     stipple.source_count = count
+    stipple.is_sequence = False
     stipple.source_objects.clear()
     stipple.source_changed = stipple.edited = False
 
@@ -222,6 +223,7 @@ def attach_cloud(data, path):
     stipple = data.stipple
     stipple.source = blend_path(path)
     stipple.source_kind = 'CLOUD'
+    stipple.is_sequence = False
     stipple.source_objects.clear()
     stipple.source_changed = stipple.edited = False
     masks.clear(data)
@@ -260,6 +262,7 @@ def attach_model(data, path, objects):
     stipple.source_kind = 'MODEL'
     stipple.source_detail_weight = stipple.detail_weight
     stipple.source_color_from = stipple.color_from
+    stipple.is_sequence = False
     stipple.source_objects.clear()
     for obj in objects:
         stipple.source_objects.add().object = obj

@@ -82,6 +82,9 @@ def write(data, arrays):
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         raise StippleError(f"'{data.name}' is in Edit Mode; leave it before its splats are written.",
                            Status.ERROR_INVALID_ARGUMENT)
+    if isinstance(data, bpy.types.Mesh) and data.library is not None:
+        _write_linked(data, arrays)
+        return
     _resize(data, arrays.count)
     if isinstance(data, bpy.types.Mesh):
         data.vertices.foreach_set('co', _flat(arrays.positions))
@@ -99,6 +102,24 @@ def write(data, arrays):
     for name in [a.name for a in data.attributes if a.name.startswith('radiance:sh_')]:
         if int(name.rpartition('_')[2]) >= rest:
             data.attributes.remove(data.attributes[name])
+    _mark(data, arrays)
+
+
+def _write_linked(mesh, arrays):
+    """foreach_set passes linked data over in silence; BMesh does not."""
+    own = bpy.data.meshes.new(mesh.name)
+    try:
+        write(own, arrays)
+        carrier = bmesh.new()
+        carrier.from_mesh(own)
+        carrier.to_mesh(mesh)
+        carrier.free()
+    finally:
+        bpy.data.meshes.remove(own)
+    _mark(mesh, arrays)
+
+
+def _mark(data, arrays):
     data[LAYOUT_KEY] = LAYOUT
     data[COLOUR_SPACE_KEY] = _COLOUR_SPACES[ColourSpace(arrays.colour_space)]
     data[ANTIALIAS_KEY] = _ANTIALIAS[Antialias(arrays.antialias)]
@@ -179,7 +200,13 @@ def _set(data, name, kind, values):
     if attribute is None:
         data.attributes.new(name, kind, 'POINT')
     # Looked up again: references may be stale after new().
-    data.attributes[name].data.foreach_set(version.ATTRIBUTE_FIELDS[kind], _flat(values))
+    elements, field = data.attributes[name].data, version.ATTRIBUTE_FIELDS[kind]
+    if data.library is None:
+        elements.foreach_set(field, _flat(values))
+        return
+    # Linked point clouds: foreach_set passes them over in silence. Some 3 µs for each value.
+    for element, value in zip(elements, np.asarray(values).reshape(len(elements), -1).tolist()):
+        setattr(element, field, value)
 
 
 def _get(data, name, n, width):

@@ -6,6 +6,7 @@ property's update function is not called when the property is animated, undone o
 """
 
 import logging
+import sys
 import time
 from dataclasses import replace
 
@@ -13,7 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..binding.errors import StippleError
-from . import masks, meshes, sources, splat_data
+from . import masks, meshes, sequences, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -51,23 +52,37 @@ def sync(obj, depsgraph, mode, most=None):
     stipple = data.stipple
     if stipple.source_kind == 'NONE' or not stipple.source or stipple.edited:
         return False
-    settings = sources.decode_settings(_evaluated(data, depsgraph), mode)
-    if most is not None:
-        settings = replace(settings, anchors=min(settings.anchors, max(1, most // settings.gaussians_per_anchor)))
-    key = written_key(data, settings)
+    key, decode = _wanted(data, depsgraph, mode, most)
     if data.get(WRITTEN_KEY) == key:
         return False
-    settings.check()
     if is_edited(data):
         stipple.edited = True
         raise StippleError(f"The splats of '{data.name}' were edited by hand; use them as a new source, or revert to "
                            'the source, to change their settings.')
     begin = time.perf_counter()
-    splats = sources.decode_data(data, settings).read()
+    splats = decode()
     write(data, splats, key)
     if splats.count >= FEW:
         _state['seconds_per_splat'] = (time.perf_counter() - begin) / splats.count
     return True
+
+
+def _wanted(data, depsgraph, mode, most):
+    """(key of the splats that a datablock should have now, function that makes them)."""
+    stipple = _evaluated(data, depsgraph)
+    if stipple.is_sequence:
+        scene = bpy.context.scene if depsgraph is None else depsgraph.scene
+        frame = sequences.frame_of(data, stipple, scene.frame_current, mode, most)
+        return frame.key, frame.arrays
+    settings = sources.decode_settings(stipple, mode)
+    if most is not None:
+        settings = replace(settings, anchors=min(settings.anchors, max(1, most // settings.gaussians_per_anchor)))
+    return written_key(data, settings), lambda: _decoded(data, settings)
+
+
+def _decoded(data, settings):
+    settings.check()
+    return sources.decode_data(data, settings).read()
 
 
 def write(data, arrays, key):
@@ -138,12 +153,18 @@ def complete():
 
 
 def try_sync(obj, depsgraph, mode, most=None):
-    """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once."""
+    """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once.
+
+    In background a render has no panel, and an engine of Blender's own draws what is stored: there the process ends
+    with one line and status 1 instead, before a wrong picture is written.
+    """
     name = obj.data.name
     try:
         sync(obj, depsgraph, mode, most)
         problems.pop(name, None)
     except StippleError as error:
+        if mode == 'RENDER' and bpy.app.background:
+            sys.exit(f'Error: {name}: {error}')
         if problems.get(name) != str(error):
             log.error('%s: %s', name, error)
         problems[name] = str(error)
@@ -257,4 +278,5 @@ def unregister():
     if bpy.app.timers.is_registered(complete):
         bpy.app.timers.unregister(complete)
     problems.clear()
+    sequences.forget()
     sources.forget()

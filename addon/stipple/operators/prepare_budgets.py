@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every file of a series gets its tree of merges, in a folder beside the .blend."""
+
+import os
+import shutil
+
+import bpy
+
+from ..binding.cloud import Cloud
+from ..binding.errors import StippleError, invalid
+from ..binding.model import Model
+from ..binding.structs import Status
+from ..jobs import JobOperator, Task
+from ..scene import numbered, sequences, sources, splat_data, sync
+
+
+class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
+    """Make a tree of merges for every file of the series and keep them beside the .blend: budgets then show the least
+    visible loss, and each frame reads its tree instead of its file"""
+
+    bl_idname = 'stipple.prepare_budgets'
+    bl_label = "Prepare Budgets"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.object
+        return (context.mode == 'OBJECT' and splat_data.is_splat_object(obj) and obj.data.library is None
+                and obj.data.stipple.is_sequence and obj.data.stipple.source_kind == 'CLOUD')
+
+    def invoke(self, context, _event):
+        return self.run_in_window(context)
+
+    def start(self, context):
+        self._object = context.object
+        data = self._object.data
+        first = numbered.parse(sources.absolute_path(data.stipple.source, data))
+        numbers = first.numbers() if first is not None else []
+        if first is None or first.number not in numbers:
+            raise invalid(f"The series of '{self._object.name}' has no file '{data.stipple.source}'; relink it first.")
+        native = sources.context()
+        self._first = first.number
+        stem = sources.model_path_for(self._object.name)[:-len(sources.MODEL_SUFFIX)]
+        name = os.path.basename(stem)
+
+        def work(task):
+            folder = f'{stem}.{os.getpid()}.new'
+            try:
+                os.makedirs(folder)
+                for i, number in enumerate(numbers):
+                    part = (i / len(numbers), (i + 1) / len(numbers))
+                    task.advance(part[0], f'File {i + 1} of {len(numbers)}')
+                    cloud = Cloud.load(native, first.path(number))
+                    model = task.run(Model.from_cloud_start(native, cloud), *part).model()
+                    model.save(os.path.join(folder, f'{name}_{number:04d}{sources.MODEL_SUFFIX}'))
+                return _rename(folder, stem), len(numbers), name
+            except OSError as error:
+                raise StippleError(f"The folder '{folder}' cannot be written: {error.strerror}.",
+                                   Status.ERROR_IO) from None
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+        return Task(work)
+
+    def finish(self, _context, job):
+        folder, count, name = job.result
+        data = self._object.data
+        with sync.paused():
+            sequences.attach(data, os.path.join(folder, f'{name}_{self._first:04d}{sources.MODEL_SUFFIX}'),
+                             data.stipple.frame_duration, 'TREE')
+        sync.try_sync(self._object, None, 'VIEWPORT')
+        self.report({'INFO'}, f"Budgets of {count} files in '{folder}'")
+
+
+def _rename(folder, wanted):
+    """Gives a folder its final name; one that is there stays, as undo goes back to it."""
+    target, number = wanted, 0
+    while os.path.exists(target):
+        number += 1
+        target = f'{wanted}.{number:03d}'
+    os.rename(folder, target)
+    return target
+
+
+classes = (STIPPLE_OT_prepare_budgets,)
