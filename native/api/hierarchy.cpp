@@ -1,5 +1,6 @@
 #include "api/hierarchy.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -45,6 +46,14 @@ HierarchySettings hierarchySettings(const StippleModelFromCloudOptions& given) {
   }
   settings.tree.footprint = given.footprint;
   return settings;
+}
+
+/// Pictures are over when the tree begins; what they found stays.
+uint64_t hierarchyMemoryBound(const SplatCloud& cloud, const HierarchySettings& settings) {
+  const uint64_t pictures =
+      settings.view_count > 0 ? visibilityMemoryBound(cloud, settings.rig.size) : 0;
+  const uint64_t visibility = settings.view_count > 0 ? cloud.size() * sizeof(float) : 0;
+  return std::max(pictures, mergeTreeMemoryBound(cloud.size(), cloud.sh_degree) + visibility);
 }
 
 RefineOptions refineSettings(const StippleRefineOptions& given) {
@@ -126,7 +135,7 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
     if (leaves->size() == 0) {
       fail(ErrorCode::kInvalidArgument, "the cloud has 0 splats; a hierarchy needs at least 1");
     }
-    context->state->requireMemory(mergeTreeMemoryBound(leaves->size(), leaves->sh_degree),
+    context->state->requireMemory(hierarchyMemoryBound(*leaves, settings),
                                   "the hierarchy of this cloud");
     *job = startJob(context->state, [leaves, settings](Progress& progress) -> JobResult {
       return ModelParts(build(leaves, settings, progress));
@@ -156,6 +165,8 @@ StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const Stippl
     const RefineOptions settings = refineSettings(completed(options, defaults, "options"));
     const std::shared_ptr<const SplatCloud> start = cloud->cloud;
     const std::shared_ptr<const SplatCloud> whole = full->cloud;
+    cloud->context->requireMemory(refineMemoryBound(*start, *whole, settings),
+                                  "refining this cloud");
     *job = startJob(cloud->context, [start, whole, settings](Progress& progress) -> JobResult {
       return std::make_shared<const SplatCloud>(refineCloud(*start, *whole, settings, &progress));
     });

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/error.h"
 #include "base/random.h"
 #include "data/cloud_extent.h"
+#include "splat/render_backward.h"
 #include "train/adam.h"
 #include "train/render_backend.h"
 
@@ -122,6 +124,20 @@ double startingError(const std::vector<Camera>& views, const ImageLossOptions& l
   return sum / static_cast<double>(count);
 }
 
+/// As large as a view, anywhere: bounds of memory do not look at places.
+Camera cameraOfSize(uint32_t size) {
+  Camera camera;
+  camera.width = camera.height = size;
+  camera.fx = camera.fy = size;
+  return camera;
+}
+
+/// Bytes that the loss works with: half a megabyte per thread, and two sums per row of a tile.
+uint64_t lossBytes(uint64_t pixel_count) {
+  const uint64_t threads = std::max(1u, std::thread::hardware_concurrency());
+  return threads * (uint64_t{1} << 20) + pixel_count * sizeof(double);
+}
+
 /// All views once per round, each round in an order of its own.
 class ViewOrder {
  public:
@@ -146,6 +162,24 @@ class ViewOrder {
 };
 
 }  // namespace
+
+uint64_t refineMemoryBound(const SplatCloud& start, const SplatCloud& full,
+                           const RefineOptions& options) {
+  validateInput(start, full, options);
+  const uint64_t pixel_count = uint64_t{options.view_size} * options.view_size;
+  const Camera camera = cameraOfSize(options.view_size);
+  const SplatInstance whole{&full};
+  const SplatInstance cut{&start};
+  // The drawing of the targets is over when the steps begin, the targets stay.
+  const uint64_t drawing = renderMemoryBound({&whole, 1}, camera, renderOptions(0));
+  const uint64_t picture = pixel_count * (4 * sizeof(float));
+  const uint64_t pass = backwardMemoryBound({&cut, 1}, camera, renderOptions(0), {});
+  // Raw splats, their zeros and both moments, the cloud that is drawn and that is handed back.
+  const uint64_t row = sizeof(float) * (11 + start.shStride());
+  const uint64_t steps = 2 * picture + pass + 6 * row * start.size() + lossBytes(pixel_count);
+  return (options.view_count + uint64_t{1}) * pixel_count * (3 * sizeof(float)) +
+         std::max(drawing, steps) + (uint64_t{1} << 20);
+}
 
 SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
                        const RefineOptions& options, Progress* progress) {

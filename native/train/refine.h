@@ -11,7 +11,7 @@ namespace stipple {
 struct RefineOptions {
   uint32_t iterations = 100;  ///< steps, one view each; raising it fits better and takes longer
   uint32_t view_count = 32;   ///< pictures of the full cloud, 1..4096
-  uint32_t view_size = 512;   ///< pixels per side
+  uint32_t view_size = 800;   ///< pixels per side; larger ones fit what is seen from nearer by
   ViewRig rig = ViewRig::kAutomatic;
   uint64_t seed = 0;
   double ssim_share = 0.0;  ///< 0..1 of the loss beside L1
@@ -28,5 +28,10 @@ struct RefineOptions {
 /// (loss and Adam on activated attributes). Differs: no densification; targets are drawings.
 SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
                        const RefineOptions& options, Progress* progress = nullptr);
+
+/// Upper bound of the bytes that refineCloud allocates: targets, and what a step holds. Errors: as
+/// refineCloud.
+uint64_t refineMemoryBound(const SplatCloud& start, const SplatCloud& full,
+                           const RefineOptions& options);
 
 }  // namespace stipple

@@ -73,4 +73,16 @@ std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Came
   return visibility;
 }
 
+uint64_t visibilityMemoryBound(const SplatCloud& cloud, uint32_t view_size) {
+  Camera camera;
+  camera.width = camera.height = view_size;
+  camera.fx = camera.fy = view_size;
+  const SplatInstance instance{&cloud};
+  BackwardInput input;
+  input.with_blending_weights = true;
+  const uint64_t gradient = uint64_t{view_size} * view_size * (4 * sizeof(float));
+  return backwardMemoryBound({&instance, 1}, camera, {}, input) + gradient +
+         cloud.size() * (2 * sizeof(double) + sizeof(float)) + (uint64_t{1} << 16);
+}
+
 }  // namespace stipple

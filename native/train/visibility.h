@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -15,5 +16,9 @@ namespace stipple {
 /// show. Same values for any number of threads. Cost: one backward pass per view.
 std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Camera> views,
                                    Progress* progress = nullptr);
+
+/// Upper bound of the bytes that splatVisibility allocates for views of this many pixels per side,
+/// the result included.
+uint64_t visibilityMemoryBound(const SplatCloud& cloud, uint32_t view_size);
 
 }  // namespace stipple

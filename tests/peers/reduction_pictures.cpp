@@ -89,13 +89,18 @@ void print(const char* what, uint64_t budget, const Psnr& psnr, double seconds) 
   std::fflush(stdout);
 }
 
-/// As many steps as fit into a time, by the time that a few take.
+/// As many steps as fit into a time, by what a run of a few and one of more take.
 uint32_t stepsWithin(double seconds, const SplatCloud& cut, const SplatCloud& full) {
-  RefineOptions options;
-  options.iterations = 4;
-  options.view_count = 4;
-  const double few = secondsOf([&] { refineCloud(cut, full, options); }) / 4;
-  return static_cast<uint32_t>(std::clamp(0.85 * seconds / few - 32.0, 1.0, 2000.0));
+  const auto secondsFor = [&](uint32_t iterations) {
+    RefineOptions options;
+    options.iterations = iterations;
+    return secondsOf([&] { refineCloud(cut, full, options); });
+  };
+  secondsFor(1);
+  const double few = secondsFor(2);
+  const double more = secondsFor(12);
+  const double step = std::max((more - few) / 10, 1e-4);
+  return static_cast<uint32_t>(std::clamp((0.9 * seconds - few) / step + 2, 1.0, 2000.0));
 }
 
 void compare(int argc, char** argv) {

@@ -43,7 +43,7 @@ def _unsigned(value, name, least):
     return value
 
 
-def refine_start(cloud, full, iterations=100, view_count=32, view_size=512, view_rig=ViewRig.AUTOMATIC, seed=0):
+def refine_start(cloud, full, iterations=100, view_count=32, view_size=800, view_rig=ViewRig.AUTOMATIC, seed=0):
     """A job whose cloud() is the reduced cloud, fitted to pictures of the full one."""
     options = StippleRefineOptions()
     cloud.library.stipple_refine_options_init(byref(options))

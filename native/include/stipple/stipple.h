@@ -463,7 +463,7 @@ typedef struct StippleRefineOptions {
   uint32_t struct_size;
   uint32_t iterations;  /* steps, 0..1,000,000, default 100; 0 gives the cloud as it is */
   uint32_t view_count;  /* pictures of the full cloud, 1..4096, default 32 */
-  uint32_t view_size;   /* pixels per side, 1..65536, default 512 */
+  uint32_t view_size;   /* pixels per side, 1..65536, default 800 */
   uint32_t view_rig;    /* StippleViewRig, default automatic */
   uint32_t reserved;
   uint64_t seed;        /* of the views */
@@ -472,8 +472,10 @@ void stipple_refine_options_init(StippleRefineOptions* options);
 
 /* Fits a reduced cloud (a decoded model) to pictures of the full one, as a job (stipple_job_cloud): position,
  * rotation, scale, opacity and harmonics move, the count and the order stay. Same result for any number of
- * threads. Errors: INVALID_ARGUMENT for an empty cloud or clouds of different colour space. Cost: one drawing
- * of `full` per view, one drawing and one backward pass of `cloud` per iteration. */
+ * threads. Errors: INVALID_ARGUMENT for an empty cloud or clouds of different colour space; MEMORY_LIMIT before
+ * anything is allocated, where the pictures (12 bytes per pixel of every view) and the passes would need more
+ * than the context's limit. Cost: one drawing of `full` per view, one drawing and one backward pass of `cloud`
+ * per iteration. */
 StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const StippleCloud* full,
                                          const StippleRefineOptions* options, StippleJob** job);
 

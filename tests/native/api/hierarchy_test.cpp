@@ -190,6 +190,38 @@ TEST_F(HierarchyApi, RefusesBadInput) {
   stipple_cloud_free(cloud);
 }
 
+TEST_F(HierarchyApi, RefusesPicturesBeyondTheMemoryLimitBeforeItBegins) {
+  auto limits = sized<StippleContextOptions>();
+  limits.memory_limit_bytes = uint64_t{1} << 30;
+  StippleContext* small = nullptr;
+  STIPPLE_ASSERT_OK(stipple_context_create(&limits, &small));
+  std::swap(small, context_);
+  StippleCloud* cloud = cloudOf(200);
+  StippleJob* job = nullptr;
+  // 4096 pictures of 800 x 800 pixels, 12 bytes each, are 31 GB.
+  StippleRefineOptions refine;
+  stipple_refine_options_init(&refine);
+  refine.view_count = 4096;
+  EXPECT_EQ(stipple_cloud_refine_start(cloud, cloud, &refine, &job), STIPPLE_ERROR_MEMORY_LIMIT);
+  EXPECT_NE(std::string(stipple_last_error_message()).find("1073741824"), std::string::npos);
+  // A picture of 65536 x 65536 pixels is 69 GB.
+  StippleModelFromCloudOptions options;
+  stipple_model_from_cloud_options_init(&options);
+  options.view_size = 65536;
+  EXPECT_EQ(stipple_model_from_cloud_start(context_, cloud, &options, &job),
+            STIPPLE_ERROR_MEMORY_LIMIT);
+  EXPECT_EQ(job, nullptr);
+  refine.view_count = 2;
+  refine.view_size = 48;
+  refine.iterations = 1;
+  STIPPLE_ASSERT_OK(stipple_cloud_refine_start(cloud, cloud, &refine, &job));
+  STIPPLE_EXPECT_OK(stipple_job_wait(job));
+  stipple_job_free(job);
+  stipple_cloud_free(cloud);
+  std::swap(small, context_);
+  stipple_context_free(small);
+}
+
 TEST_F(HierarchyApi, ACancelledBuildLosesNothing) {
   // Pictures that would take minutes, so the job is still at work when it is asked to stop.
   StippleCloud* cloud = cloudOf(2000);

@@ -1,5 +1,8 @@
 #include "train/allocation_count.h"
 
+#include <malloc.h>
+
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <new>
@@ -7,6 +10,8 @@
 namespace {
 
 std::atomic<size_t> count{0};
+std::atomic<size_t> held_bytes{0};
+std::atomic<size_t> most_bytes{0};
 
 void* counted(size_t bytes, size_t alignment) {
   ++count;
@@ -16,7 +21,16 @@ void* counted(size_t bytes, size_t alignment) {
           ? std::malloc(bytes ? bytes : 1)
           : std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
   if (!memory) throw std::bad_alloc();
+  const size_t held = held_bytes += malloc_usable_size(memory);
+  size_t most = most_bytes;
+  while (held > most && !most_bytes.compare_exchange_weak(most, held)) {
+  }
   return memory;
+}
+
+void release(void* memory) {
+  held_bytes -= malloc_usable_size(memory);
+  std::free(memory);
 }
 
 }  // namespace
@@ -25,6 +39,13 @@ namespace stipple::testing {
 
 size_t allocationCount() {
   return count;
+}
+
+size_t mostBytesDuring(const std::function<void()>& work) {
+  const size_t before = held_bytes;
+  most_bytes = before;
+  work();
+  return most_bytes - before;
 }
 
 }  // namespace stipple::testing
@@ -36,14 +57,14 @@ void* operator new(size_t bytes, std::align_val_t alignment) {
   return counted(bytes, static_cast<size_t>(alignment));
 }
 void operator delete(void* memory) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete(void* memory, size_t) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
+  release(memory);
 }
 void operator delete(void* memory, size_t, std::align_val_t) noexcept {
-  std::free(memory);
+  release(memory);
 }

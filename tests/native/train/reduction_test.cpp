@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "data/cloud_extent.h"
 #include "splat/render.h"
+#include "train/allocation_count.h"
 #include "train/refine.h"
 #include "train/view_rig.h"
 #include "train/visibility.h"
@@ -186,6 +187,32 @@ TEST(Refine, IsTheSameForAnyNumberOfThreads) {
   EXPECT_THROW(refineCloud({}, full, options), Error);
   start.colour_space = ColourSpace::kLinear;
   EXPECT_THROW(refineCloud(start, full, options), Error);
+}
+
+TEST(Refine, StaysBelowItsMemoryBound) {
+  const SplatCloud full = sphere(3000, 1.0, 1);
+  const SplatCloud start = sphere(400, 1.0, 2);
+  RefineOptions options;
+  options.iterations = 2;
+  options.view_count = 6;
+  options.view_size = 160;
+  const size_t most = testing::mostBytesDuring([&] { refineCloud(start, full, options); });
+  EXPECT_LE(most, refineMemoryBound(start, full, options));
+  // The targets alone: more views are more memory, and the bound follows.
+  EXPECT_GE(most, 6u * 160 * 160 * 12);
+  RefineOptions more = options;
+  more.view_count = 12;
+  EXPECT_EQ(refineMemoryBound(start, full, more) - refineMemoryBound(start, full, options),
+            6u * 160 * 160 * 12);
+}
+
+TEST(Visibility, StaysBelowItsMemoryBound) {
+  const SplatCloud cloud = sphere(5000, 1.0, 1);
+  ViewRigOptions options;
+  options.size = 128;
+  const auto views = viewsOfCloud(cloud, options);
+  EXPECT_LE(testing::mostBytesDuring([&] { splatVisibility(cloud, views); }),
+            visibilityMemoryBound(cloud, options.size));
 }
 
 }  // namespace
