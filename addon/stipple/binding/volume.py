@@ -16,10 +16,7 @@ class Volume(Handle):
     @staticmethod
     def voxelize_start(context, instances, resolution=256, voxel_size=0.0):
         """A job (volume()) over instances [(cloud, matrix)]. voxel_size 0: from resolution."""
-        if voxel_size < 0:
-            raise invalid(f'Voxel size is {voxel_size:g} m; allowed are 0 (from the resolution) and above.')
-        if not 1 <= resolution <= 65536:
-            raise invalid(f'Resolution is {resolution}; allowed are 1 to 65,536.')
+        Volume.check_settings(resolution, voxel_size)
         options = StippleVoxelizeOptions()
         context.library.stipple_voxelize_options_init(byref(options))
         options.resolution, options.voxel_size = resolution, voxel_size
@@ -27,6 +24,14 @@ class Volume(Handle):
         return Job(context.library, new_handle(context.library, 'stipple_voxelize_start', context.pointer, array,
                                                len(instances), byref(options)),
                    keep=(array, [cloud for cloud, _ in instances]))
+
+    @staticmethod
+    def check_settings(resolution, voxel_size):
+        """Refuses what voxelize_start would."""
+        if voxel_size < 0:
+            raise invalid(f'Voxel size is {voxel_size:g} m; allowed are 0 (from the resolution) and above.')
+        if not 1 <= resolution <= 65536:
+            raise invalid(f'Resolution is {resolution}; allowed are 1 to 65,536.')
 
     @classmethod
     def load(cls, context, path):

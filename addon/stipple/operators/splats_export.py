@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Splat objects become a file."""
+"""Splat objects become a file, or one for each frame."""
+
+import os
 
 import bpy
 import numpy as np
@@ -9,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
 from ..preferences import UP_AXES
-from ..scene import exporting, formats, frames
+from ..scene import exporting, formats, frames, frames_out, numbered, sources
 
 BUDGETS = (('VIEWPORT', "Viewport", "The splats that are shown now"),
            ('RENDER', "Render", "The splats that renders show"),
@@ -37,6 +39,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
                           items=(('AUTO', "By Format", "As files of this format usually are"),) + UP_AXES[1:])
     max_degree: IntProperty(name="Harmonics", description="Highest degree of the colors' harmonics that is written, 0 for "
                             "colors that do not change with the view", default=4, min=0, max=4)
+    frames: EnumProperty(name="Frames", items=frames_out.FRAMES, options={'SKIP_SAVE'})
     ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger (.ply)", default=False)
 
     @classmethod
@@ -61,10 +64,12 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
             raise invalid(f"'{path}' has an ending that is no splat format to write; allowed are "
                           f"{', '.join(formats.WRITE_ENDINGS)}.")
         objects = exporting.chosen(context, self.collection, self.use_selection)
-        clouds = exporting.placed_clouds(context, objects, self.budget, self.apply_transform)
         options = {'ascii': self.ascii, 'sh_degree_limit': self.max_degree}
         if self.apply_transform and self.up_axis != 'AUTO':
             options['frame'] = frames.UP_AXES[self.up_axis]
+        if self.frames != 'CURRENT':
+            return self._start_series(context, objects, path, options)
+        clouds = exporting.placed_clouds(context, objects, self.budget, self.apply_transform)
 
         def work(task):
             task.advance(0.0, 'Joining splats')
@@ -72,6 +77,28 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
             task.advance(0.3, 'Writing splats')
             cloud.save(path, **options)
             return cloud.info().count
+        return Task(work)
+
+    def _start_series(self, context, objects, path, options):
+        found = frames_out.gather(context, objects, self.frames, self.budget)
+        native, apply_transform = sources.context(), self.apply_transform
+
+        def work(task):
+            total = 0
+            for i, frame in enumerate(found):
+                task.advance(i / len(found), f'Frame {i + 1} of {len(found)}')
+                clouds = frame.clouds(native)
+                if not clouds:
+                    continue
+                cloud = exporting.joined(exporting.in_frame(clouds, apply_transform))
+                to = numbered.frame_path(path, frame.number)
+                if os.path.dirname(to) != os.path.dirname(path):
+                    exporting.make_folder(to)
+                cloud.save(to, **options)
+                total += cloud.info().count
+            if total == 0:
+                raise invalid('No frame shows a splat; there is nothing to write.')
+            return total
         return Task(work)
 
     def finish(self, _context, job):
@@ -84,6 +111,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         if not self.collection:
             layout.prop(self, 'use_selection')
         layout.prop(self, 'budget')
+        layout.prop(self, 'frames')
         layout.prop(self, 'apply_transform')
         row = layout.row()
         row.enabled = self.apply_transform

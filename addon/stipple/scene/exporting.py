@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which splats go into a file, where, and how many."""
 
+import os
 import re
 
 import bpy
@@ -8,6 +9,7 @@ import numpy as np
 
 from ..binding import cloud_edit
 from ..binding.errors import StippleError, invalid
+from ..binding.structs import Status
 from . import formats, frames, sequences, sources, splat_data, sync
 
 
@@ -38,17 +40,31 @@ def placed_clouds(context, objects, budget, apply_transform):
     """([(cloud, 4x4 matrix)], frame that the matrices lead to): the world, or the first object's own space."""
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
-    clouds = [_cloud(obj, budget) for obj in evaluated]
+    return in_frame([(_cloud(obj, budget), np.array(obj.matrix_world)) for obj in evaluated], apply_transform)
+
+
+def in_frame(placed, apply_transform):
+    """placed_clouds() of [(cloud, object to world)]."""
+    first, matrix = placed[0]
     if apply_transform:
-        upright = frames.of_matrix(np.array(evaluated[0].matrix_world)) if len(objects) == 1 else None
+        upright = frames.of_matrix(matrix) if len(placed) == 1 else None
         if upright is not None:
             # Only turned upright: naming the frame instead keeps every bit.
-            return [(clouds[0], np.eye(4))], upright
-        return [(cloud, np.array(obj.matrix_world)) for cloud, obj in zip(clouds, evaluated)], frames.WORLD
-    inverse = np.linalg.inv(np.array(evaluated[0].matrix_world)) if len(objects) > 1 else None
-    placed = [(clouds[0], np.eye(4))]
-    placed += [(cloud, inverse @ np.array(obj.matrix_world)) for cloud, obj in zip(clouds[1:], evaluated[1:])]
-    return placed, clouds[0].info().frame
+            return [(first, np.eye(4))], upright
+        return placed, frames.WORLD
+    inverse = np.linalg.inv(matrix) if len(placed) > 1 else None
+    return [(first, np.eye(4))] + [(cloud, inverse @ other) for cloud, other in placed[1:]], first.info().frame
+
+
+def make_folder(path):
+    """The folder of a file whose name is fixed by its format, such as that of a_0001/meta.json."""
+    folder = os.path.dirname(path)
+    try:
+        os.mkdir(folder)
+    except FileExistsError:
+        pass
+    except OSError as error:
+        raise StippleError(f"The folder '{folder}' cannot be made: {error.strerror}.", Status.ERROR_IO) from None
 
 
 def joined(placed):

@@ -63,6 +63,16 @@ class Frame:
             return None
         entry = _read(self.path, self.stamp, self.kind)
         _read_ahead(self.ahead, self.kind, entry)
+        return self._cut(entry)
+
+    def read_anew(self, native):
+        """The same without the cache: for workers, which must not share it."""
+        if not self.path:
+            return None
+        load = Cloud.load if self.kind == 'CLOUD' else Model.load
+        return self._cut(_filled(_Entry(), load(native, self.path)))
+
+    def _cut(self, entry):
         count = entry.count
         if self.ratio is not None:
             count = min(count, max(1, round(count * self.ratio)))

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Volume files as Blender objects that emit and absorb what the splats did."""
 
+from dataclasses import dataclass
+
 import bpy
 
 from .. import version
@@ -8,14 +10,34 @@ from ..binding.errors import StippleError
 from ..binding.structs import Status
 
 
-def new_object(name, path, collection, voxel_size):
-    """A Volume object that shows an OpenVDB file with the grids `density` and `color`; voxels in metres."""
+@dataclass(frozen=True)
+class Timing:
+    """Of a volume sequence, as Blender's properties of these names."""
+
+    frame_start: int
+    frame_duration: int
+    frame_offset: int
+    sequence_mode: str
+
+
+def new_object(name, path, collection, voxel_size, timing=None):
+    """A Volume object that shows an OpenVDB file with the grids `density` and `color`; voxels in metres.
+
+    timing: makes it a sequence, of which the path is the first file; None for a single file.
+    """
     volume = bpy.data.volumes.new(name)
     volume.filepath = bpy.path.relpath(path) if bpy.data.filepath else path
     if not volume.grids.load():
         message = volume.grids.error_message or 'no grids'
         bpy.data.volumes.remove(volume)
         raise StippleError(f"Blender cannot read the volume '{path}': {message}.", Status.ERROR_FORMAT)
+    if timing is not None:
+        volume.is_sequence = True
+        volume.frame_start, volume.frame_duration = timing.frame_start, timing.frame_duration
+        volume.frame_offset = timing.frame_offset
+        # Blender divides by zero where one file plays to and fro.
+        single = timing.frame_duration == 1 and timing.sequence_mode == 'PING_PONG'
+        volume.sequence_mode = 'EXTEND' if single else timing.sequence_mode
     volume.materials.append(emission_absorption(name))
     obj = bpy.data.objects.new(name, volume)
     obj.delta_location = (-version.VOXEL_SHIFT * voxel_size,) * 3

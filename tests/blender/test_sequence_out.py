@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Series of splat files become volume sequences and series of files again."""
+
+import bpy
+import numpy as np
+import pytest
+
+import scenes
+import series
+from test_files import assert_close
+from test_volume import cycles_shows_volumes
+
+
+@pytest.fixture
+def swarm(stipple, tmp_path):
+    obj = series.load(series.write(stipple, tmp_path / 'swarm', range(1, 5)))
+    scenes.select(obj)
+    return obj
+
+
+def load(stipple, path):
+    return stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(), str(path)).read()
+
+
+def names(folder):
+    return sorted(p.name for p in folder.iterdir())
+
+
+# ---- volumes ------------------------------------------------------------------------------------
+
+def test_a_series_becomes_a_volume_sequence(stipple, swarm, tmp_path):
+    settings = swarm.data.stipple
+    settings.frame_start, settings.sequence_mode = 3, 'REPEAT'
+    out = tmp_path / 'out'
+    out.mkdir()
+    assert bpy.ops.stipple.splats_to_volume(filepath=str(out / 'v.vdb'), voxel_size=0.1, frames='SERIES') == {'FINISHED'}
+    assert names(out) == [f'v_000{i}.vdb' for i in (1, 2, 3, 4)]
+    volume = bpy.data.objects['v'].data
+    assert volume.is_sequence and (volume.frame_start, volume.frame_duration, volume.frame_offset,
+                                   volume.sequence_mode) == (3, 4, 0, 'REPEAT')
+    native = stipple.scene.sources.context()
+    for i in (1, 4):
+        info = stipple.binding.volume.Volume.load(native, str(out / f'v_000{i}.vdb')).info()
+        assert abs(info.voxel_size - 0.1) < 1e-6
+        assert info.bounds_min[0] < i - 1 < info.bounds_max[0] and info.bounds_max[0] - info.bounds_min[0] < 3
+    for frame in (3, 6, 7, 2):
+        bpy.context.scene.frame_set(frame)
+        grids = bpy.data.objects['v'].evaluated_get(bpy.context.evaluated_depsgraph_get()).data.grids
+        grids.load()
+        assert grids.frame == series.centre(stipple, swarm) + 1
+        assert grids.is_loaded and sorted(g.name for g in grids) == ['color', 'density']
+
+
+def test_voxels_have_one_size_over_all_frames(stipple, swarm, tmp_path):
+    swarm.scale = (2, 2, 2)
+    bpy.context.view_layer.update()
+    assert bpy.ops.stipple.splats_to_volume(filepath=str(tmp_path / 'v.vdb'), resolution=32, frames='SERIES') == {
+        'FINISHED'}
+    native = stipple.scene.sources.context()
+    sizes = {round(stipple.binding.volume.Volume.load(native, str(tmp_path / f'v_000{i}.vdb')).info().voxel_size, 7)
+             for i in (1, 2, 3, 4)}
+    longest = 2 * np.ptp(series.arrays_of(stipple, 1).positions, axis=0).max()
+    assert len(sizes) == 1 and abs(sizes.pop() - longest / 32) < 1e-3
+
+
+def test_scene_range_keeps_motion_speed_and_budget(stipple, swarm, tmp_path):
+    swarm.data.stipple.frame_speed = 0.5
+    for frame, height in ((1, 0.0), (6, 5.0)):
+        swarm.location.z = height
+        swarm.keyframe_insert('location', index=2, frame=frame)
+    for curve in scenes_fcurves(swarm):
+        for point in curve.keyframe_points:
+            point.interpolation = 'LINEAR'
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 2, 9
+    scene.frame_set(4)
+    assert bpy.ops.stipple.splats_to_volume(filepath=str(tmp_path / 'v.vdb'), voxel_size=0.1, frames='SCENE') == {
+        'FINISHED'}
+    assert scene.frame_current == 4 and series.centre(stipple, swarm) == 1
+    # Frame 9 is after the clip: there is nothing to write.
+    assert [p.name for p in sorted(tmp_path.glob('v_*'))] == [f'v_000{i}.vdb' for i in range(2, 9)]
+    volume = bpy.data.objects['v'].data
+    assert (volume.frame_start, volume.frame_duration, volume.frame_offset) == (2, 8, 1)
+    info = stipple.binding.volume.Volume.load(stipple.scene.sources.context(), str(tmp_path / 'v_0005.vdb')).info()
+    middle = [(a + b) / 2 for a, b in zip(info.bounds_min, info.bounds_max)]
+    assert abs(middle[0] - 2) < 0.3 and abs(middle[2] - 4) < 0.3
+
+
+def scenes_fcurves(obj):
+    """All animation curves of an object; since 5.0 they lie in slots of layered actions."""
+    action = obj.animation_data.action
+    if bpy.app.version < (5, 0, 0):
+        return list(action.fcurves)
+    return [curve for layer in action.layers for strip in layer.strips for bag in strip.channelbags
+            for curve in bag.fcurves]
+
+
+def test_cycles_shows_the_frame_of_the_volume_sequence(stipple, swarm, tmp_path):
+    if not cycles_shows_volumes():
+        pytest.skip('Cycles of this build does not read OpenVDB files')
+    bpy.ops.stipple.splats_to_volume(filepath=str(tmp_path / 'v.vdb'), voxel_size=0.1, frames='SERIES')
+    swarm.hide_render = True
+    scene = bpy.context.scene
+    scene.render.engine = 'CYCLES'
+    scene.cycles.samples, scene.cycles.use_denoising = 16, False
+    scene.render.film_transparent = True
+    for frame in (1, 4):
+        camera = series.camera(frame - 1)
+        scene.frame_set(frame)
+        alpha = scenes.render_pixels(tmp_path)[..., 3]
+        assert alpha[20:28, 20:28].mean() > 0.5
+        assert alpha[:, :4].max() == 0
+        bpy.data.objects.remove(camera)
+
+
+def test_nothing_that_changes_and_no_series(stipple, swarm, tmp_path):
+    still = scenes.make_splats(scenes.quad(), anchors=100)
+    scenes.select(still)
+    scenes.refuses(lambda: bpy.ops.stipple.splats_to_volume(filepath=str(tmp_path / 'v.vdb'), frames='SERIES'),
+                   'is no series of files')
+    assert not list(tmp_path.glob('v*'))
+
+
+def test_a_gap_stops_before_anything_is_written(stipple, swarm, tmp_path):
+    (tmp_path / 'swarm' / 'swarm_0003.ply').unlink()
+    for operator, path in ((bpy.ops.stipple.splats_to_volume, 'v.vdb'), (bpy.ops.stipple.splats_export, 'v.ply')):
+        scenes.refuses(lambda: operator(filepath=str(tmp_path / path), frames='SERIES'), 'swarm_0003.ply')
+    assert not list(tmp_path.glob('v*')) and len(bpy.data.objects) == 1
+    swarm.data.stipple.missing_frames = 'HOLD'
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'v.ply'), frames='SERIES')
+    assert len(list(tmp_path.glob('v*'))) == 4
+
+
+@pytest.mark.parametrize('operator, path', [('splats_to_volume', 'v.vdb'), ('splats_export', 'v.ply')])
+def test_cancel_leaves_whole_frames_only(stipple, swarm, tmp_path, monkeypatch, operator, path):
+    advance = stipple.jobs.Task.advance
+
+    def cancel_at_frame_3(self, fraction, stage):
+        if stage == 'Frame 3 of 4':
+            self.cancel()
+        advance(self, fraction, stage)
+
+    monkeypatch.setattr(stipple.jobs.Task, 'advance', cancel_at_frame_3)
+    assert getattr(bpy.ops.stipple, operator)(filepath=str(tmp_path / path), frames='SERIES') == {'CANCELLED'}
+    stem, ending = path.split('.')
+    assert [p.name for p in sorted(tmp_path.glob('v*'))] == [f'{stem}_0001.{ending}', f'{stem}_0002.{ending}']
+    assert len(bpy.data.objects) == 1
+    assert series.centre(stipple, swarm) == 0
+
+
+# ---- files --------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize('name, frame_3', [('out.ply', 'out_0003.ply'), ('out.spz', 'out_0003.spz'),
+                                           ('out.compressed.ply', 'out_0003.compressed.ply'),
+                                           ('out/meta.json', 'out_0003/meta.json'), ('out.glb', 'out_0003.glb')])
+def test_export_again_in_any_format(stipple, swarm, tmp_path, name, frame_3):
+    assert bpy.ops.stipple.splats_export(filepath=str(tmp_path / name), frames='SERIES') == {'FINISHED'}
+    there = load(stipple, tmp_path / frame_3)
+    assert there.count == series.COUNT
+    again = series.load(tmp_path, frame_3.replace('3', '1'))
+    assert again.data.stipple.frame_duration == 4
+
+
+def test_export_writes_the_series_own_splats(stipple, swarm, tmp_path):
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), frames='SERIES', up_axis='Z')
+    for i in (1, 4):
+        assert_close(load(stipple, tmp_path / f'out_000{i}.ply'),
+                     load(stipple, tmp_path / 'swarm' / f'swarm_000{i}.ply'))
+
+
+def test_export_of_the_scene_range_with_a_keyframed_budget(stipple, swarm, tmp_path):
+    settings = swarm.data.stipple
+    for frame, ratio in ((1, 0.5), (3, 1.0)):
+        settings.ratio_render = ratio
+        settings.keyframe_insert('ratio_render', frame=frame)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 3
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), frames='SCENE', budget='RENDER')
+    assert [load(stipple, tmp_path / f'out_000{i}.ply').count for i in (1, 2, 3)] == [30, 45, 60]
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'full.ply'), frames='SCENE', budget='FULL')
+    assert load(stipple, tmp_path / 'full_0001.ply').count == series.COUNT
+
+
+def test_export_of_a_model_with_a_keyframed_budget(stipple, tmp_path):
+    obj = scenes.make_splats(scenes.quad(), anchors=100)
+    for frame, budget in ((1, 100), (2, 300)):
+        obj.data.stipple.anchors = budget
+        obj.data.stipple.keyframe_insert('anchors', frame=frame)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 2
+    scene.frame_set(1)
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), frames='SCENE')
+    assert [load(stipple, tmp_path / f'out_000{i}.ply').count for i in (1, 2)] == [100, 300]
