@@ -1,8 +1,8 @@
 // Included inside a namespace, once by cpu/back_projector_scalar.cpp and once per instruction set
 // by cpu/back_projector_vector.cpp, hence no include guard. Needs there: loadLanes<T>(const
 // double*), storeLanes(T, double* or float*), laneCount<T>(), takeFootprintBack
-// (projectBackwardSteps of the same namespace) and takeHarmonicsBack. One order of operations in
-// double and nothing fused, so every instruction set gives the same bits.
+// (projectBackwardSteps of the same namespace), sumHarmonicsBack and storeHarmonicsBack. One order
+// of operations in double and nothing fused, so every instruction set gives the same bits.
 
 constexpr size_t kMaxLanes = 8;
 
@@ -71,10 +71,26 @@ struct HarmonicColumns {
   alignas(64) double slopes[25][3][kMaxLanes];    ///< [coefficient][axis]
 };
 
-/// Colour of one lane. In: sh and by_colour of its row. Out: by_sh of the row; along [axis] by the
-/// viewing direction, kMaxLanes apart.
-void takeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
-                       const float* sh, const float* by_colour, float* by_sh, double* along);
+/// Colour of one lane. In: sh and by_colour of its row. Out: by_sum [3], by the sums of harmonics;
+/// along [axis] by the viewing direction, kMaxLanes apart.
+void sumHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                      const float* sh, const float* by_colour, float* by_sum, double* along);
+
+/// Writes the row of coefficients of one lane. In: by_sum [4], of which the last does not count.
+void storeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                        const float* by_sum, float* by_sh);
+
+/// Numbers that one splat after another writes into columns are loaded as vectors, which waits
+/// until they have left the processor's store buffer, and everything that was stored before them,
+/// such as rows of the result that are not in the cache yet. So there are two of these: one is
+/// filled for the next block before this one is worked on.
+struct BlockColumns {
+  alignas(64) double in[kInCount][kMaxLanes];
+};
+
+constexpr size_t kLineFloats = 16;
+/// Blocks from this one to the one whose harmonics are asked for: 6 to 12 KB.
+constexpr size_t kBlocksAhead = 4;
 
 template <typename T>
 void directionSteps(const PlacedScene& scene, const PlacedCloud& placed, const T* position,
@@ -100,15 +116,16 @@ void directionSteps(const PlacedScene& scene, const PlacedCloud& placed, const T
   }
 }
 
-/// A block of at most laneCount<T>() splats.
+/// A block of at most laneCount<T>() splats. In: columns of its rows; rows_left, how many there are
+/// from its first on.
 template <typename T>
 void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Mat3d& normal_to_view,
-                   const uint32_t* rows, size_t count, const CloudSums& sums, SplatGradients& out,
+                   const uint32_t* rows, size_t count, size_t rows_left,
+                   const BlockColumns& columns_in, const CloudSums& sums, SplatGradients& out,
                    double* means, double* camera) {
   using std::max;
   using std::min;
-  alignas(64) double in[kInCount][kMaxLanes];
-  fillColumns<T>(placed, rows, count, sums, in);
+  const auto& in = columns_in.in;
   SplatGeometry<T> splat;
   for (size_t k = 0; k < 3; ++k) {
     splat.position[k] = loadLanes<T>(in[kInPosition + k]);
@@ -139,11 +156,20 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
     storeLanes(T(static_cast<double>(kShC0)), harmonics.stored_basis[0]);
   }
   const size_t stride = placed.cloud->shStride();
+  alignas(64) float by_sums[kMaxLanes][4] = {};
   for (size_t lane = 0; lane < count; ++lane) {
+    const size_t ahead = lane + kBlocksAhead * laneCount<T>();
+    if (ahead < rows_left) {
+      const size_t first = rows[ahead] * stride;
+      for (size_t i = 0; i < stride; i += kLineFloats) {
+        __builtin_prefetch(&placed.cloud->sh[first + i]);
+        __builtin_prefetch(&out.sh[first + i], 1);
+      }
+    }
     const size_t row = rows[lane];
     const float* by_colour = sums.values + row * sums.stride + kFieldRed;
-    takeHarmonicsBack(placed, harmonics, lane, &placed.cloud->sh[row * stride], by_colour,
-                      &out.sh[row * stride], &along[0][lane]);
+    sumHarmonicsBack(placed, harmonics, lane, &placed.cloud->sh[row * stride], by_colour,
+                     by_sums[lane], &along[0][lane]);
   }
   const bool perspective = scene.view.perspective;
   if (turns) {
@@ -188,6 +214,7 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
   for (size_t k = 0; k < 2; ++k) store(gradient.mean[k], kOutMean + k);
   for (size_t lane = 0; lane < count; ++lane) {
     const size_t row = rows[lane];
+    storeHarmonicsBack(placed, harmonics, lane, by_sums[lane], &out.sh[row * stride]);
     const auto value = [&](size_t column) { return static_cast<float>(columns[column][lane]); };
     for (size_t k = 0; k < 3; ++k) {
       out.positions[row * 3 + k] = value(kOutPosition + k);
@@ -206,8 +233,18 @@ void takeBackRows(const PlacedScene& scene, const PlacedCloud& placed, const uin
                   double* camera) {
   const Mat3d normal_to_view = inverse(placed.linear).transpose();
   const size_t lanes = laneCount<T>();
-  for (size_t i = 0; i < count; i += lanes) {
-    takeBackBlock<T>(scene, placed, normal_to_view, rows + i, std::min(lanes, count - i), sums, out,
-                     means + i * 2, camera);
+  BlockColumns columns[2];
+  const auto fill = [&](size_t block) {
+    const size_t first = block * lanes;
+    if (first >= count) return;
+    fillColumns<T>(placed, rows + first, std::min(lanes, count - first), sums,
+                   columns[block % 2].in);
+  };
+  fill(0);
+  for (size_t block = 0; block * lanes < count; ++block) {
+    fill(block + 1);
+    const size_t first = block * lanes;
+    takeBackBlock<T>(scene, placed, normal_to_view, rows + first, std::min(lanes, count - first),
+                     count - first, columns[block % 2], sums, out, means + first * 2, camera);
   }
 }

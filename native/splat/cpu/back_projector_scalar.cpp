@@ -39,8 +39,8 @@ void takeFootprintBack(const View<double>& view, const Mat3d& linear, const T* c
 
 #include "splat/cpu/back_projector-inl.h"
 
-void takeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
-                       const float* sh, const float* by_colour, float* by_sh, double* along) {
+void sumHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                      const float* sh, const float* by_colour, float* by_sum, double* along) {
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
   double by_axis[3] = {};
   for (size_t c = 0; c < 3; ++c) {
@@ -51,14 +51,21 @@ void takeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmoni
       sum += harmonics.basis[k][lane] * value;
       for (size_t axis = 0; axis < 3; ++axis) sums[axis] += harmonics.slopes[k][axis][lane] * value;
     }
-    const double by_sum = colourSumBackward(placed, sum, static_cast<double>(by_colour[c]));
-    for (size_t axis = 0; axis < 3; ++axis) by_axis[axis] += by_sum * sums[axis];
-    const float stored = static_cast<float>(by_sum);
-    for (size_t k = 0; k < coefficients; ++k) {
-      by_sh[k * 3 + c] = harmonics.stored_basis[k][lane] * stored;
-    }
+    const double by = colourSumBackward(placed, sum, static_cast<double>(by_colour[c]));
+    for (size_t axis = 0; axis < 3; ++axis) by_axis[axis] += by * sums[axis];
+    by_sum[c] = static_cast<float>(by);
   }
   for (size_t axis = 0; axis < 3; ++axis) along[axis * kMaxLanes] = by_axis[axis];
+}
+
+void storeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                        const float* by_sum, float* by_sh) {
+  const size_t coefficients = shCoefficientCount(placed.sh_degree);
+  for (size_t k = 0; k < coefficients; ++k) {
+    for (size_t c = 0; c < 3; ++c) {
+      by_sh[k * 3 + c] = harmonics.stored_basis[k][lane] * by_sum[c];
+    }
+  }
   std::fill(by_sh + coefficients * 3, by_sh + placed.cloud->shStride(), 0.0f);
 }
 

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "math/affine.h"
 #include "splat/blend_backward.h"
@@ -74,18 +75,24 @@ HWY_INLINE void addCoefficient(const HarmonicColumns& harmonics, size_t lane, si
   }
 }
 
+constexpr bool kHasQuads = hn::MaxLanes(Quad()) == 4;
+
+/// Coefficients that go in vectors: each is loaded and stored with the number behind it, so the
+/// last goes by itself.
+constexpr size_t inQuads(size_t coefficients) {
+  return kHasQuads ? coefficients - 1 : 0;
+}
+
 /// As in cpu/back_projector_scalar.cpp, in the same order for each colour.
 template <size_t kCoefficients>
-void takeCoefficientsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
-                          const float* sh, const float* by_colour, float* by_sh, double* along) {
+void sumCoefficientsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                         const float* sh, const float* by_colour, float* by_sum, double* along) {
   HWY_ALIGN double sums[4][4] = {{0.5, 0.5, 0.5}};
-  constexpr bool kHasQuads = hn::MaxLanes(Quad()) == 4;
-  // Each coefficient is loaded and stored with the number behind it, so the last goes by itself.
-  constexpr size_t kInQuads = kHasQuads ? kCoefficients - 1 : 0;
-  const Quad d;
-  const hn::Rebind<float, Quad> floats;
+  constexpr size_t kInQuads = inQuads(kCoefficients);
   if constexpr (kInQuads > 0) {
-    auto colour = hn::Load(d, sums[0]), by_x = hn::Zero(d), by_y = by_x, by_z = by_x;
+    const Quad d;
+    const hn::Rebind<float, Quad> floats;
+    auto colour = hn::Set(d, 0.5), by_x = hn::Zero(d), by_y = by_x, by_z = by_x;
     for (size_t k = 0; k < kInQuads; ++k) {
       const auto value = hn::PromoteTo(d, hn::LoadU(floats, sh + k * 3));
       const auto times = [&](double factor) HWY_ATTR { return hn::Mul(hn::Set(d, factor), value); };
@@ -102,43 +109,65 @@ void takeCoefficientsBack(const PlacedCloud& placed, const HarmonicColumns& harm
   }
   for (size_t k = kInQuads; k < kCoefficients; ++k) addCoefficient(harmonics, lane, k, sh, sums);
 
-  double by_sum[3];
-  HWY_ALIGN float stored[4] = {};
+  double by[3];
   for (size_t c = 0; c < 3; ++c) {
-    by_sum[c] = colourSumBackward(placed, sums[0][c], static_cast<double>(by_colour[c]));
-    stored[c] = static_cast<float>(by_sum[c]);
+    by[c] = colourSumBackward(placed, sums[0][c], static_cast<double>(by_colour[c]));
+    by_sum[c] = static_cast<float>(by[c]);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
     const double* own = sums[axis + 1];
-    along[axis * kMaxLanes] = by_sum[0] * own[0] + by_sum[1] * own[1] + by_sum[2] * own[2];
+    along[axis * kMaxLanes] = by[0] * own[0] + by[1] * own[1] + by[2] * own[2];
   }
+}
+
+template <size_t kCoefficients>
+void storeCoefficientsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                           const float* by_sum, float* by_sh) {
+  constexpr size_t kInQuads = inQuads(kCoefficients);
   if constexpr (kInQuads > 0) {
-    const auto by = hn::Load(floats, stored);
+    const hn::Rebind<float, Quad> floats;
+    const auto by = hn::Load(floats, by_sum);
     for (size_t k = 0; k < kInQuads; ++k) {
       hn::StoreU(hn::Mul(hn::Set(floats, harmonics.stored_basis[k][lane]), by), floats,
                  by_sh + k * 3);
     }
   }
   for (size_t k = kInQuads; k < kCoefficients; ++k) {
-    for (size_t c = 0; c < 3; ++c) by_sh[k * 3 + c] = harmonics.stored_basis[k][lane] * stored[c];
+    for (size_t c = 0; c < 3; ++c) by_sh[k * 3 + c] = harmonics.stored_basis[k][lane] * by_sum[c];
   }
   std::fill(by_sh + kCoefficients * 3, by_sh + placed.cloud->shStride(), 0.0f);
 }
 
-void takeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
-                       const float* sh, const float* by_colour, float* by_sh, double* along) {
-  switch (placed.sh_degree) {
+/// Calls use(number of coefficients of the degree, as a constant).
+template <typename Use>
+void withCoefficients(int degree, const Use& use) {
+  switch (degree) {
     case 0:
-      return takeCoefficientsBack<1>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+      return use(std::integral_constant<size_t, 1>());
     case 1:
-      return takeCoefficientsBack<4>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+      return use(std::integral_constant<size_t, 4>());
     case 2:
-      return takeCoefficientsBack<9>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+      return use(std::integral_constant<size_t, 9>());
     case 3:
-      return takeCoefficientsBack<16>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+      return use(std::integral_constant<size_t, 16>());
     default:
-      return takeCoefficientsBack<25>(placed, harmonics, lane, sh, by_colour, by_sh, along);
+      return use(std::integral_constant<size_t, 25>());
   }
+}
+
+void sumHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                      const float* sh, const float* by_colour, float* by_sum, double* along) {
+  withCoefficients(placed.sh_degree, [&](auto count) HWY_ATTR {
+    sumCoefficientsBack<decltype(count)::value>(placed, harmonics, lane, sh, by_colour, by_sum,
+                                                along);
+  });
+}
+
+void storeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
+                        const float* by_sum, float* by_sh) {
+  withCoefficients(placed.sh_degree, [&](auto count) HWY_ATTR {
+    storeCoefficientsBack<decltype(count)::value>(placed, harmonics, lane, by_sum, by_sh);
+  });
 }
 
 NamedBackProjector namedBackProjector() {
@@ -152,9 +181,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include <strings.h>
-
-#include <cstdlib>
+#include "splat/cpu/target_choice.h"
 
 namespace stipple {
 
@@ -162,33 +189,20 @@ HWY_EXPORT(namedBackProjector);
 
 namespace {
 
-BackProjector chooseBackProjector() {
-  // A name that no target has is refused by chosenTileKernel.
-  if (const char* forced = std::getenv("STIPPLE_FORCE_TARGET")) {
-    for (const NamedBackProjector& named : backProjectors()) {
-      if (strcasecmp(named.target, forced) == 0) return named.take_back;
-    }
-  }
-  return HWY_DYNAMIC_DISPATCH(namedBackProjector)().take_back;
+NamedBackProjector dispatched() {
+  return HWY_DYNAMIC_DISPATCH(namedBackProjector)();
 }
 
 }  // namespace
 
 std::vector<NamedBackProjector> backProjectors() {
-  std::vector<NamedBackProjector> list = {{"scalar", takeBackScalar}};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    list.push_back(HWY_DYNAMIC_DISPATCH(namedBackProjector)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return list;
+  return onEveryTarget<NamedBackProjector>({"scalar", takeBackScalar}, dispatched);
 }
 
 BackProjector chosenBackProjector() {
-  static const BackProjector projector = chooseBackProjector();
-  return projector;
+  static const BackProjector chosen =
+      chosenTarget<NamedBackProjector>(backProjectors, dispatched).take_back;
+  return chosen;
 }
 
 }  // namespace stipple

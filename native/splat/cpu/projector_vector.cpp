@@ -141,23 +141,34 @@ HWY_INLINE void directionBasis(const PlacedScene& scene, const PlacedCloud& plac
   for (size_t k = 0; k < count; ++k) hn::Store(values[k].v, Floats(), basis + k * kMaxLanes);
 }
 
+#if HWY_TARGET != HWY_SCALAR
+/// Sums of at least two coefficients; colours come in lanes 1..3: each row is loaded with the
+/// number before it, which belongs to the splat, and none behind it, which may lie outside the
+/// array. The first is moved up in a register: a vector that is loaded right after its numbers were
+/// stored one by one waits for every store before them, to splats that are not in the cache yet.
+HWY_INLINE void sumInQuads(size_t count, const float* sh, const float* basis, float (&sums)[4]) {
+  const Quad d;
+  const auto first = hn::ShiftLeftLanes<1>(d, hn::LoadU(d, sh));
+  auto sum = hn::Add(hn::Set(d, 0.5f), hn::Mul(hn::Set(d, kShC0), first));
+  for (size_t k = 1; k < count; ++k) {
+    sum = hn::Add(sum, hn::Mul(hn::Set(d, basis[k * kMaxLanes]), hn::LoadU(d, sh + k * 3 - 1)));
+  }
+  hn::StoreU(sum, d, sums);
+}
+constexpr bool kHasQuads = true;
+#else
+HWY_INLINE void sumInQuads(size_t, const float*, const float*, float (&)[4]) {}
+constexpr bool kHasQuads = false;
+#endif
+
 /// As splatColour<float>. In: basis of this lane, kMaxLanes apart.
 HWY_INLINE void sumHarmonics(const PlacedCloud& placed, const float* sh, const float* basis,
                              float* colour) {
   float sums[4];
-  if constexpr (hn::MaxLanes(Quad()) == 4) {
-    const Quad d;
-    // Lanes 1..3 are the colours: each row is loaded with the number before it, which belongs to
-    // the splat, and none behind it, which may lie outside the array.
-    HWY_ALIGN const float first[4] = {0.0f, sh[0], sh[1], sh[2]};
-    auto sum = hn::Add(hn::Set(d, 0.5f), hn::Mul(hn::Set(d, kShC0), hn::Load(d, first)));
-    const size_t count = shCoefficientCount(placed.sh_degree);
-    for (size_t k = 1; k < count; ++k) {
-      sum = hn::Add(sum, hn::Mul(hn::Set(d, basis[k * kMaxLanes]), hn::LoadU(d, sh + k * 3 - 1)));
-    }
-    hn::StoreU(sum, d, sums);
+  const size_t count = shCoefficientCount(placed.sh_degree);
+  if (kHasQuads && count > 1) {
+    sumInQuads(count, sh, basis, sums);
   } else {
-    const size_t count = shCoefficientCount(placed.sh_degree);
     for (size_t c = 0; c < 3; ++c) {
       float sum = 0.5f + kShC0 * sh[c];
       for (size_t k = 1; k < count; ++k) sum += basis[k * kMaxLanes] * sh[k * 3 + c];

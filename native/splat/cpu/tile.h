@@ -13,6 +13,7 @@ struct Tile {
   uint32_t x0, y0;                   ///< first pixel
   uint32_t width, height;            ///< pixels inside the picture
   std::span<const uint32_t> splats;  ///< slots of visible splats, front to back
+  size_t listed_behind = 0;  ///< slots that lie in memory right behind them: the next tile's
 };
 
 /// Tile `index` of the grid with its list.

@@ -14,7 +14,6 @@ namespace stipple {
 namespace {
 
 constexpr size_t kBatchSize = 128;
-constexpr size_t kPrefetchDistance = 24;
 /// At least ln(1e-4)/ln(1 - 1/255): more splats cannot blend before a pixel ends.
 constexpr size_t kMostBlended = 2352;
 constexpr double kGScale = 0.84932180028801904;  // sqrt(log2(e)/2): g = this times L d
@@ -267,7 +266,26 @@ void TileBackward::judge(const void* context, size_t splat, uint32_t pixel, Back
   }
 }
 
-void TileBackward::takeOff(const Tile& tile, size_t used, float* sums) {
+/// Rows of the derivative lie a picture's width apart, so the processor does not foresee them.
+void TileBackward::askForPixels(const Tile& tile) const {
+  constexpr size_t kLineFloats = 16;
+  for (uint32_t y = 0; y < tile.height; ++y) {
+    const float* row = &loss_->input->colour_gradient[pixelOf(*loss_, tile, 0, y) * 4];
+    for (size_t i = 0; i < tile.width * 4; i += kLineFloats) __builtin_prefetch(row + i);
+  }
+}
+
+/// The batch of a tile that is taken off first.
+WantedNext TileBackward::lastBatch(const Tile& tile, size_t index) const {
+  const int32_t* ends = loss_->picture->ends.get() + index * kTilePixelCount;
+  const int32_t most = *std::max_element(ends, ends + kTilePixelCount);
+  const size_t used = std::min(static_cast<size_t>(std::max(most, 0)), tile.splats.size());
+  if (used == 0) return {};
+  const size_t begin = (used - 1) / kBatchSize * kBatchSize;
+  return {slots_.splats, tile.splats.data() + begin, used - begin};
+}
+
+void TileBackward::takeOff(const Tile& tile, size_t used, WantedNext next, float* sums) {
   const size_t field_count = backwardFieldCount(loss_->wants);
   Judged judged{this, &tile, 0};
   TakeOffOptions options{loss_->wants, 0, judge, &judged};
@@ -276,12 +294,10 @@ void TileBackward::takeOff(const Tile& tile, size_t used, float* sums) {
     const size_t count = std::min(kBatchSize, used - begin);
     float largest = 0;
     makeTileSplats(slots_.splats, tile, begin, count, largest, splats_.data());
-    // A tile's splats lie far apart, so the first of the next batch would wait for memory.
-    for (size_t i = 0; begin > 0 && i < kPrefetchDistance; ++i) {
-      __builtin_prefetch(&slots_.splats[tile.splats[begin - kBatchSize + i]]);
-    }
     judged.begin = begin;
     options.first = static_cast<int32_t>(begin);
+    options.next =
+        batch == 0 ? next : WantedNext{slots_.splats, &tile.splats[begin - kBatchSize], kBatchSize};
     kernel_->take_off(splats_.data(), count, options, *pixels_, sums + begin * field_count);
   }
 }
@@ -316,13 +332,19 @@ void TileBackward::takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, flo
   }
 }
 
-uint32_t TileBackward::run(const Tile& tile, size_t index, float* sums, double* background) {
+uint32_t TileBackward::run(const Tile& tile, size_t index, const Tile* next, float* sums,
+                           double* background) {
   const uint32_t used = takeState(tile, index);
   if (!lossIsGood(tile)) input_is_good_ = false;
   if (!input_is_good_) return 0;
   takeLoss(tile, index, background);
   if (loss_->wants.mode != BackwardMode::kGradients) takeStatistics(tile);
-  takeOff(tile, used, sums);
+  WantedNext next_batch;
+  if (next) {
+    askForPixels(*next);
+    next_batch = lastBatch(*next, index + 1);
+  }
+  takeOff(tile, used, next_batch, sums);
   if (!has_doubt_) return used;
   const size_t field_count = backwardFieldCount(loss_->wants);
   std::fill(sums + used * field_count, sums + tile.splats.size() * field_count, 0.0f);

@@ -32,8 +32,9 @@ class TileBackward {
 
   /// Tile `index` of the picture. Out: sums [tile.splats.size()][backwardFieldCount(wants)], one
   /// entry per splat of the tile. Adds dL/dbackground of the tile to `background` [3]. Returns how
-  /// many entries were written: splats from there on show nowhere in the tile.
-  uint32_t run(const Tile& tile, size_t index, float* sums, double* background);
+  /// many entries were written: splats from there on show nowhere in the tile. In: next, tile
+  /// index + 1 of the picture, whose pixels and splats are fetched ahead, or nullptr.
+  uint32_t run(const Tile& tile, size_t index, const Tile* next, float* sums, double* background);
 
   /// False once a value of the loss was not within its range: what came out then has no meaning.
   bool inputIsGood() const { return input_is_good_; }
@@ -56,7 +57,9 @@ class TileBackward {
   bool lossIsGood(const Tile& tile) const;
   void takeLoss(const Tile& tile, size_t index, double* background);
   void takeStatistics(const Tile& tile);
-  void takeOff(const Tile& tile, size_t used, float* sums);
+  void askForPixels(const Tile& tile) const;
+  WantedNext lastBatch(const Tile& tile, size_t index) const;
+  void takeOff(const Tile& tile, size_t used, WantedNext next, float* sums);
   void takeOffInDouble(const Tile& tile, uint32_t x, uint32_t y, float* sums);
 
   const BackwardKernel* kernel_ = nullptr;

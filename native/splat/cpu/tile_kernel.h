@@ -85,6 +85,14 @@ enum class TileCulling {
   kAll,      ///< and rows and columns of lanes in which nothing shows
 };
 
+/// Splats that are wanted next. A kernel asks memory for one with each splat that it works on, so
+/// that they arrive meanwhile: they lie far apart, and asked for all at once they are waited for.
+struct WantedNext {
+  const VisibleSplat* visible = nullptr;
+  const uint32_t* slots = nullptr;  ///< [count]
+  size_t count = 0;
+};
+
 struct TileKernelOptions {
   bool with_depth;
   bool with_extras;  ///< median depth and counts
@@ -94,6 +102,7 @@ struct TileKernelOptions {
   bool with_coverage = false;  ///< beside depth
   int32_t first = 0;           ///< place of this call's first splat in the tile's list
   TileCulling culling = TileCulling::kAll;
+  WantedNext next = {};
 };
 
 /// Blends the splats in order into the tile; stops early once every pixel is finished.

@@ -39,6 +39,7 @@ struct TakeOffOptions {
   TakeOffJudge judge;
   const void* judge_context;
   TileCulling culling = TileCulling::kAll;
+  WantedNext next = {};
 };
 
 /// Takes splats [count], which follow each other in the tile's list, off its pixels, last first.

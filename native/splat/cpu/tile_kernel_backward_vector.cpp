@@ -103,6 +103,9 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
 
   for (size_t k = count; k-- > 0;) {
     const TileSplat& splat = splats[k];
+    if (k < options.next.count) {
+      __builtin_prefetch(&options.next.visible[options.next.slots[k]]);
+    }
     float* out = sums + k * kFieldCount;
     const int32_t place = options.first + static_cast<int32_t>(k);
     bool is_judged = false;

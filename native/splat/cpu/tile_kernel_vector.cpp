@@ -52,6 +52,9 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
 
   for (size_t s = 0; s < count && pixels.unfinished > 0; ++s) {
     const TileSplat& splat = splats[s];
+    if (s < options.next.count) {
+      __builtin_prefetch(&options.next.visible[options.next.slots[s]]);
+    }
     const Vec low = hn::Set(d, kLog2MinAlpha - splat.doubt_low);
     const Vec high = hn::Set(d, kLog2MinAlpha + splat.doubt_high);
     const Vec finish_doubt = hn::Set(d, static_cast<float>(kMinTransmittance) * splat.finish_doubt);

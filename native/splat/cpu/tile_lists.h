@@ -21,6 +21,10 @@ struct TileListGroup {
     const uint64_t begin = offsets[index - first_tile];
     return {entries.get() + begin, offsets[index - first_tile + 1] - begin};
   }
+  /// How many slots lie in memory behind those of a tile.
+  size_t listedBehind(size_t index) const {
+    return offsets.back() - offsets[index - first_tile + 1];
+  }
 };
 
 /// What forEachTileGroup works with; kept for the next picture. Afterwards it holds the last group,

@@ -145,10 +145,15 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, RenderWorkspace
         if (progress) progress->throwIfCancelled();
         std::unique_ptr<TileBackward> scratch = arrays.scratch.take();
         scratch->begin(kernel, visible.slots(), loss);
+        const auto tileAt = [&](size_t tile) { return tileOf(grid, tile, group.tile(tile)); };
+        Tile next = tileAt(first + from);
         for (size_t tile = first + from; tile < first + to; ++tile) {
+          const Tile current = next;
+          const bool is_last = tile + 1 == first + to;
+          if (!is_last) next = tileAt(tile + 1);
           const uint64_t entry = entriesBefore(tile) - entriesBefore(first);
           arrays.used[tile] =
-              scratch->run(tileOf(grid, tile, group.tile(tile)), tile,
+              scratch->run(current, tile, is_last ? nullptr : &next,
                            tile_sums + entry * field_count, &arrays.backgrounds[tile * 3]);
         }
         if (!scratch->inputIsGood()) input_is_good.store(false, std::memory_order_relaxed);

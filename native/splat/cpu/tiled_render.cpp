@@ -190,6 +190,8 @@ void renderTile(const SplatSlots& slots, const Tile& tile, size_t index, TileKer
     makeTileSplats(slots.splats, tile, begin, count, largest, batch);
     judged.begin = begin;
     kernel_options.first = static_cast<int32_t>(begin);
+    const size_t behind = tile.splats.size() - begin - count + tile.listed_behind;
+    kernel_options.next = {slots.splats, tile.splats.data() + begin + count, behind};
     kernel(batch, count, kernel_options, pixels);
   }
   replaceDoubtful(slots, tile, pixels);
@@ -314,7 +316,8 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
     const auto render_tiles = [&](size_t begin, size_t end) {
       for (size_t index = group.first_tile + begin; index < group.first_tile + end; ++index) {
         if (progress) progress->throwIfCancelled();
-        const Tile tile = tileOf(grid, index, group.tile(index));
+        Tile tile = tileOf(grid, index, group.tile(index));
+        tile.listed_behind = group.listedBehind(index);
         renderTile(visible.slots(), tile, index, kernel, options, result, kept);
         const size_t finished = finished_tiles.fetch_add(1, std::memory_order_relaxed) + 1;
         if (finished % grid.columns == 0) {
