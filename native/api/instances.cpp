@@ -1,5 +1,7 @@
 #include "api/instances.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <string>
 
 #include "api/guard.h"
@@ -22,19 +24,40 @@ bool isChecked(const StippleCloud& cloud) {
 
 }  // namespace
 
+ColourGrade gradeFrom(const StippleGrade& grade, const char* name) {
+  const StippleGrade given = complete(&grade, name);
+  ColourGrade made;
+  std::copy(given.matrix, given.matrix + 9, made.matrix.begin());
+  std::copy(given.offset, given.offset + 3, made.offset.begin());
+  made.opacity = given.opacity;
+  validate(made, name);
+  return made;
+}
+
 Instances instancesFrom(const StippleInstance* instances, uint64_t count) {
   Instances made;
   if (count == 0) return made;
-  require(instances, "instances");
+  // Older and newer callers have shorter and longer structs, which lie that far apart.
+  const size_t step = require(instances, "instances").struct_size;
+  if (step % alignof(StippleInstance) != 0) {
+    failStructSize("instances[0]", step, sizeof(StippleInstance));
+  }
+  const auto* bytes = reinterpret_cast<const std::byte*>(instances);
   for (uint64_t i = 0; i < count; ++i) {
     const std::string name = "instances[" + std::to_string(i) + "]";
-    const StippleInstance given = complete(instances + i, name.c_str());
+    const auto* entry = reinterpret_cast<const StippleInstance*>(bytes + i * step);
+    const StippleInstance given =
+        completeUpTo(entry, offsetof(StippleInstance, grade), name.c_str());
+    if (entry->struct_size != step) {
+      failStructSize(name.c_str(), entry->struct_size, sizeof(StippleInstance));
+    }
     const StippleCloud& cloud = require(given.cloud, (name + ".cloud").c_str());
     for (const double value : given.matrix) requireFinite(value, (name + ".matrix").c_str());
     SplatInstance placed;
     placed.cloud = cloud.cloud.get();
     placed.values_are_checked = isChecked(cloud);
     placed.object_to_world = Eigen::Map<const Mat4d>(given.matrix);
+    if (given.grade) placed.grade = gradeFrom(*given.grade, (name + ".grade").c_str());
     made.shares.push_back(cloud.cloud);
     made.list.push_back(placed);
   }

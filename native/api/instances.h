@@ -15,6 +15,9 @@ struct Instances {
   std::vector<SplatInstance> list;
 };
 
+/// In: name of the argument in the header. Errors: kInvalidArgument for values outside their range.
+ColourGrade gradeFrom(const StippleGrade& grade, const char* name);
+
 Instances instancesFrom(const StippleInstance* instances, uint64_t count);
 
 }  // namespace stipple::api

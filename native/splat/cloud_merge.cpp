@@ -90,12 +90,16 @@ SplatCloud merged(std::span<const SplatInstance> instances, Frame frame) {
   result.sh.reserve(count * result.shStride());
   for (size_t i = 0; i < instances.size(); ++i) {
     const SplatInstance& instance = instances[i];
-    if (instance.object_to_world == Mat4d::Identity()) {
-      validate(*instance.cloud, ("cloud " + std::to_string(i)).c_str());
+    const bool stays = instance.object_to_world == Mat4d::Identity();
+    if (stays) validate(*instance.cloud, ("cloud " + std::to_string(i)).c_str());
+    if (stays && instance.grade.isNeutral()) {
       append(*instance.cloud, result);
-    } else {
-      append(transformed(*instance.cloud, instance.object_to_world), result);
+      continue;
     }
+    SplatCloud moved =
+        stays ? *instance.cloud : transformed(*instance.cloud, instance.object_to_world);
+    bakeGrade(moved, instance.grade);
+    append(moved, result);
   }
   return result;
 }

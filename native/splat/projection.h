@@ -111,13 +111,13 @@ CovarianceFactor<T> factorise(const Eigen::Matrix<T, 2, 3>& a, T variance) {
 template <typename T>
 bool project(const View<T>& view, const Eigen::Matrix<T, 3, 3>& linear,
              const Eigen::Matrix<T, 3, 1>& translation, const float* position,
-             const float* rotation, const float* scales, float opacity, LowPass low_pass,
+             const float* rotation, const float* scales, T opacity, LowPass low_pass,
              Projected<T>& out) {
   SplatGeometry<T> splat;
   std::copy(position, position + 3, splat.position);
   std::copy(rotation, rotation + 4, splat.rotation);
   std::copy(scales, scales + 3, splat.scales);
-  splat.opacity = T(opacity);
+  splat.opacity = opacity;
   if (!(splat.opacity >= T(kMinAlpha))) return false;
   T centre[3];
   placePoint(linear, translation, splat.position, centre);

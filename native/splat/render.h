@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "data/colour_grade.h"
 #include "data/splat_cloud.h"
 #include "math/camera.h"
 #include "math/vec.h"
@@ -19,6 +20,7 @@ struct SplatInstance {
   /// True: rowsAreValid() has accepted all of the cloud and nothing has written to it since; the
   /// renderer then does not read its values a second time to check them.
   bool values_are_checked = false;
+  ColourGrade grade = {};  ///< of what the cloud stores; neutral costs nothing
 };
 
 enum class LowPass : uint32_t {

@@ -55,6 +55,8 @@ PlacedCloud place(const SplatInstance& instance, const Camera& camera,
   placed.first_index = 0;
   placed.low_pass = lowPassOf(cloud, options.low_pass);
   placed.sh_degree = std::min(cloud.sh_degree, options.sh_degree_limit);
+  placed.grades_colour = instance.grade.changesColour();
+  placed.grade = instance.grade;
   placed.linearise = options.blend_space == BlendSpace::kSceneLinear &&
                      cloud.colour_space == ColourSpace::kDisplay;
   return placed;
@@ -81,6 +83,7 @@ void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& ca
     std::snprintf(matrix_name, sizeof(matrix_name), "%s: matrix", name.c_str());
     validateAffine(instance.object_to_world, matrix_name);
     validateSizes(*instance.cloud, name.c_str());
+    validate(instance.grade, name.c_str());
     if (instance.cloud->size() == 0) continue;
     if (options.blend_space == BlendSpace::kAsTrained && !scene.clouds.empty() &&
         scene.clouds.front().cloud->colour_space != instance.cloud->colour_space) {

@@ -23,7 +23,14 @@ struct PlacedCloud {
   uint64_t first_index;  ///< of its splat 0 among all splats of the picture
   LowPass low_pass;      ///< never kFromCloud
   int sh_degree;
-  bool linearise;  ///< colours are stored for display and composited scene linear
+  bool linearise;      ///< colours are stored for display and composited scene linear
+  bool grades_colour;  ///< grade has more than an opacity
+  ColourGrade grade;
+
+  /// Opacity of a splat as it is drawn.
+  double opacity(size_t index) const {
+    return static_cast<double>(cloud->opacities[index]) * grade.opacity;
+  }
 };
 
 /// Everything of a picture that does not depend on the pixel. Geometry is double in both renderers:
@@ -58,20 +65,27 @@ inline bool projectSplat(const PlacedScene& scene, const PlacedCloud& placed, si
                          Projected<double>& out) {
   const SplatCloud& cloud = *placed.cloud;
   return project(scene.view, placed.linear, placed.translation, &cloud.positions[index * 3],
-                 &cloud.rotations[index * 4], &cloud.scales[index * 3], cloud.opacities[index],
+                 &cloud.rotations[index * 4], &cloud.scales[index * 3], placed.opacity(index),
                  placed.low_pass, out);
 }
 
-/// From the sum of the harmonics + 0.5 to the colour that is blended.
+/// From the sums of the harmonics + 0.5 to the colour that is blended. In and out: colour [3].
 template <typename T>
-T finishColour(const PlacedCloud& placed, T sum) {
-  sum = std::clamp(sum, T(0), T(1e12));
-  return placed.linearise ? srgbToLinear(sum) : sum;
+void finishColour(const PlacedCloud& placed, T* colour) {
+  if (placed.grades_colour) {
+    // So that no product of a harmonic sum and the matrix leaves float32.
+    for (size_t c = 0; c < 3; ++c) colour[c] = std::clamp(colour[c], T(-1e12), T(1e12));
+    applyGrade(placed.grade, colour);
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    const T held = std::clamp(colour[c], T(0), T(1e12));
+    colour[c] = placed.linearise ? srgbToLinear(held) : held;
+  }
 }
 
 /// Colour of a splat in the blending space: harmonics in the viewing direction, brought into object
-/// space, + 0.5, held to 0..1e12 (above, the linearised colour could leave float32). Out: colour
-/// [3].
+/// space, + 0.5, graded, held to 0..1e12 (above, the linearised colour could leave float32). Out:
+/// colour [3].
 template <typename T>
 void splatColour(const PlacedScene& scene, const PlacedCloud& placed, size_t index, T* colour) {
   const SplatCloud& cloud = *placed.cloud;
@@ -97,8 +111,9 @@ void splatColour(const PlacedScene& scene, const PlacedCloud& placed, size_t ind
   for (size_t c = 0; c < 3; ++c) {
     T sum = T(0.5);
     for (size_t k = 0; k < count; ++k) sum += basis[k] * T(sh[k * 3 + c]);
-    colour[c] = finishColour(placed, sum);
+    colour[c] = sum;
   }
+  finishColour(placed, colour);
 }
 
 /// Sorting key of a depth: unsigned order = order of the depth rounded to float32. Both renderers

@@ -67,6 +67,7 @@ void checkInstances(std::span<const SplatInstance> instances) {
     const std::string name = "instance " + std::to_string(i);
     if (!instance.cloud) refuse(name + " has no cloud");
     validateAffine(instance.object_to_world, (name + ": the matrix").c_str());
+    validate(instance.grade, name.c_str());
     if (std::find(checked.begin(), checked.end(), instance.cloud) == checked.end()) {
       validate(*instance.cloud, name.c_str());
       checked.push_back(instance.cloud);
@@ -131,10 +132,13 @@ void chooseSamples(VoxelSplat& splat, const Vec3d& lengths, double minus_log_opa
   }
 }
 
-void readColour(const SplatCloud& cloud, size_t i, float colour[3]) {
+void readColour(const SplatInstance& instance, size_t i, float colour[3]) {
+  const SplatCloud& cloud = *instance.cloud;
   const float* dc = &cloud.sh[i * cloud.shStride()];
+  for (int channel = 0; channel < 3; ++channel) colour[channel] = 0.5f + kShC0 * dc[channel];
+  if (instance.grade.changesColour()) applyGrade(instance.grade, colour);
   for (int channel = 0; channel < 3; ++channel) {
-    const float value = std::max(0.0f, 0.5f + kShC0 * dc[channel]);
+    const float value = std::clamp(colour[channel], 0.0f, 1e12f);
     colour[channel] = cloud.colour_space == ColourSpace::kDisplay ? srgbToLinear(value) : value;
   }
 }
@@ -143,7 +147,8 @@ void readColour(const SplatCloud& cloud, size_t i, float colour[3]) {
 bool prepareSplat(const SplatInstance& instance, size_t i, const VoxelizeOptions& options,
                   double voxel_size, VoxelSplat& splat) {
   const SplatCloud& cloud = *instance.cloud;
-  double opacity = std::min(kVoxelMaxOpacity, static_cast<double>(cloud.opacities[i]));
+  double opacity = static_cast<double>(cloud.opacities[i]) * instance.grade.opacity;
+  opacity = std::min(kVoxelMaxOpacity, opacity);
   if (opacity <= 0) return false;
   const Mat3d axes = worldAxes(instance, i) / voxel_size;
   splat.centre = worldCentre(instance, i) / voxel_size;
@@ -179,7 +184,7 @@ bool prepareSplat(const SplatInstance& instance, size_t i, const VoxelizeOptions
   if (options.cut_off_sigma > 0) splat.reach = std::min(splat.reach, options.cut_off_sigma);
   splat.minus_log_opacity = static_cast<float>(minus_log_opacity);
   splat.amplitude = static_cast<float>(amplitude);
-  readColour(cloud, i, splat.colour);
+  readColour(instance, i, splat.colour);
   chooseSamples(splat, principal.lengths, minus_log_opacity);
   Vec3d sample_extent = Vec3d::Zero();
   for (int axis = 0; axis < 3; ++axis) {
@@ -219,7 +224,7 @@ double chooseVoxelSize(std::span<const SplatInstance> instances, const VoxelizeO
         Vec3d& range_low = lows[begin / kGrain];
         Vec3d& range_high = highs[begin / kGrain];
         for (size_t i = begin; i < end; ++i) {
-          if (cloud.opacities[i] <= 0) continue;
+          if (cloud.opacities[i] <= 0 || instance.grade.opacity <= 0) continue;
           const Vec3d extent = worldAxes(instance, i).rowwise().norm() * sigma;
           const Vec3d centre = worldCentre(instance, i);
           range_low = range_low.cwiseMin(centre - extent);

@@ -53,7 +53,8 @@ std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Came
       for (size_t i = begin; i < end; ++i) {
         Projected<double> projected;
         if (!project(view, linear, translation, &cloud.positions[i * 3], &cloud.rotations[i * 4],
-                     &cloud.scales[i * 3], cloud.opacities[i], low_pass, projected)) {
+                     &cloud.scales[i * 3], static_cast<double>(cloud.opacities[i]), low_pass,
+                     projected)) {
           continue;
         }
         // Near views show a splat large without making it more important: areas, not pixels.

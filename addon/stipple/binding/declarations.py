@@ -52,6 +52,10 @@ FUNCTIONS = {
     'stipple_format_info': (_status, [c_uint64, _to(s.StippleFormatInfo)]),
     'stipple_format_of_file': (_status, [_path, POINTER(c_uint64)]),
     'stipple_cloud_transform': (_status, [_handle, _matrix, _out_handle]),
+    'stipple_grade_settings_init': (None, [_to(s.StippleGradeSettings)]),
+    'stipple_grade_init': (None, [_to(s.StippleGrade)]),
+    'stipple_grade_from_settings': (_status, [_to(s.StippleGradeSettings), c_uint32, _to(s.StippleGrade)]),
+    'stipple_cloud_grade': (_status, [_handle, _to(s.StippleGrade), _out_handle]),
     'stipple_cloud_compare': (_status, [_handle, _handle, _to(s.StippleCloudComparison)]),
     # meshes
     'stipple_mesh_create': (_status, [_handle, _out_handle]),

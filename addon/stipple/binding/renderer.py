@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of splats."""
 
-from ctypes import byref, c_double, c_uint64
+from ctypes import byref, c_double, c_uint64, pointer
 
 import numpy as np
 
@@ -14,10 +14,11 @@ EMPTY_DEPTH = 1e10  # metres; what Blender also writes where nothing is
 
 
 def instance_array(instances):
-    """[(cloud, 4x4 object to world)] as the header's array."""
+    """[(cloud, 4x4 object to world)] as the header's array; a GradedCloud brings its grade, which it must outlive."""
     array = (StippleInstance * max(len(instances), 1))()
     for entry, (cloud, matrix) in zip(array, instances):
-        entry.__init__(cloud=cloud.pointer, matrix=matrix16(matrix))
+        grade = getattr(cloud, 'grade', None)
+        entry.__init__(cloud=cloud.pointer, matrix=matrix16(matrix), grade=pointer(grade) if grade is not None else None)
     return array
 
 

@@ -198,6 +198,16 @@ class StippleCloudComparison(_Sized):
                 ('mean_sh', c_double)]
 
 
+class StippleGradeSettings(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('exposure', c_double), ('tint', c_double * 3),
+                ('saturation', c_double), ('opacity', c_double)]
+
+
+class StippleGrade(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('matrix', c_double * 9), ('offset', c_double * 3),
+                ('opacity', c_double)]
+
+
 class StippleMaterial(_Sized):
     _fields_ = [('struct_size', c_uint32), ('colour', c_uint32), ('base_colour', c_float * 4),
                 ('texture', c_uint32), ('reserved', c_uint32)]
@@ -262,7 +272,8 @@ class StippleCamera(_Sized):
 
 
 class StippleInstance(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('cloud', c_void_p), ('matrix', _matrix)]
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('cloud', c_void_p), ('matrix', _matrix),
+                ('grade', POINTER(StippleGrade))]
 
 
 class StippleRenderOptions(_Sized):

@@ -252,6 +252,39 @@ StippleStatus stipple_format_of_file(const char* path_utf8, uint64_t* index);
 StippleStatus stipple_cloud_transform(const StippleCloud* cloud, const double matrix[16],
                                       StippleCloud** moved);
 
+/* What an artist sets of a cloud's look. */
+typedef struct StippleGradeSettings {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double exposure;    /* stops, -16..16, default 0; +1 doubles the light */
+  double tint[3];     /* factor of the light of each channel, 0..16, default 1 */
+  double saturation;  /* 0 (grey)..16, default 1, about Rec.709 luma; applied after exposure and tint */
+  double opacity;     /* factor of every splat's opacity, 0..1, default 1 */
+} StippleGradeSettings;
+void stipple_grade_settings_init(StippleGradeSettings* settings);
+
+/* An affine map of colours as stored: matrix colour + offset, where colour is the sum of the harmonics in any
+ * direction + 0.5, before it is clamped; and a factor of opacities. Nothing is clamped by it. */
+typedef struct StippleGrade {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double matrix[9];  /* row-major, entries up to 1e9 */
+  double offset[3];  /* entries up to 1e9 */
+  double opacity;    /* 0..1 */
+} StippleGrade;
+/* Changes nothing. */
+void stipple_grade_init(StippleGrade* grade);
+/* The map of settings, for colours stored in a StippleColourSpace. With f = 2^exposure tint for each channel:
+ * scene linear colours become f colour; display colours g colour + 0.055 (g - 1), g = f^(1/2.4), exactly what f
+ * does to their light where they lie above the foot of the sRGB curve (0.04045) before and after. Below it the
+ * value is off by up to 0.055 |g - 1|. Then luma + saturation (colour - luma), on the stored values.
+ * Errors: INVALID_ARGUMENT for a setting outside its range. docs/methods/colour_grade.md. */
+StippleStatus stipple_grade_from_settings(const StippleGradeSettings* settings, uint32_t colour_space,
+                                          StippleGrade* grade);
+/* The cloud with the grade in its harmonics and opacities. Pictures equal those of an instance with that grade,
+ * up to rounding. Cost: O(N). */
+StippleStatus stipple_cloud_grade(const StippleCloud* cloud, const StippleGrade* grade, StippleCloud** graded);
+
 typedef struct StippleCloudComparison {
   uint32_t struct_size;
   uint32_t same_order;     /* 1: same count and degree, compared splat by splat */
@@ -517,6 +550,7 @@ typedef struct StippleInstance {
   uint32_t reserved;
   const StippleCloud* cloud;
   double matrix[16]; /* object to world; invertible */
+  const StippleGrade* grade; /* read during the call; NULL: none. Costs nothing where it changes nothing */
 } StippleInstance;
 
 typedef enum StippleLowPass {
@@ -691,7 +725,7 @@ StippleStatus stipple_cloud_thin(const StippleCloud* cloud, uint64_t count, uint
 StippleStatus stipple_model_keep(const StippleModel* model, const uint8_t* mask, uint64_t mask_count,
                                  StippleModel** kept);
 /* One cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity keeps
- * every bit), harmonics padded to the highest degree. frame: StippleFrame that the matrices lead to, the label
+ * every bit) with its grade baked in, harmonics padded to the highest degree. frame: StippleFrame that the matrices lead to, the label
  * of the result. Errors: UNSUPPORTED where colour spaces or antialias flags differ. */
 StippleStatus stipple_cloud_merge(const StippleInstance* instances, uint64_t count, uint32_t frame,
                                   StippleCloud** merged);

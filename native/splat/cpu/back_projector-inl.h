@@ -52,7 +52,7 @@ void fillColumns(const PlacedCloud& placed, const uint32_t* rows, size_t count,
     for (size_t k = 0; k < 4; ++k) {
       in[kInRotation + k][lane] = static_cast<double>(cloud.rotations[row * 4 + k]);
     }
-    in[kInOpacity][lane] = static_cast<double>(cloud.opacities[row]);
+    in[kInOpacity][lane] = placed.opacity(row);
     const float* sum = sums.values + row * sums.stride;
     in[kInS][lane] = static_cast<double>(sum[kFieldS]);
     for (size_t k = 0; k < 2; ++k) in[kInFirst + k][lane] = static_cast<double>(sum[kFieldG0 + k]);
@@ -210,7 +210,7 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
     storeLanes(gradient.centre[k], columns[kOutShift + k]);
   }
   for (size_t k = 0; k < 4; ++k) store(gradient.rotation[k], kOutRotation + k);
-  store(gradient.opacity, kOutOpacity);
+  store(gradient.opacity * T(placed.grade.opacity), kOutOpacity);
   for (size_t k = 0; k < 2; ++k) store(gradient.mean[k], kOutMean + k);
   for (size_t lane = 0; lane < count; ++lane) {
     const size_t row = rows[lane];

@@ -42,18 +42,24 @@ void takeFootprintBack(const View<double>& view, const Mat3d& linear, const T* c
 void sumHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
                       const float* sh, const float* by_colour, float* by_sum, double* along) {
   const size_t coefficients = shCoefficientCount(placed.sh_degree);
-  double by_axis[3] = {};
+  double sums[3];
+  double slopes[3][3] = {};  // [channel][axis]
   for (size_t c = 0; c < 3; ++c) {
-    double sum = 0.5 + harmonics.basis[0][lane] * static_cast<double>(sh[c]);
-    double sums[3] = {};
+    sums[c] = 0.5 + harmonics.basis[0][lane] * static_cast<double>(sh[c]);
     for (size_t k = 1; k < coefficients; ++k) {
       const double value = static_cast<double>(sh[k * 3 + c]);
-      sum += harmonics.basis[k][lane] * value;
-      for (size_t axis = 0; axis < 3; ++axis) sums[axis] += harmonics.slopes[k][axis][lane] * value;
+      sums[c] += harmonics.basis[k][lane] * value;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        slopes[c][axis] += harmonics.slopes[k][axis][lane] * value;
+      }
     }
-    const double by = colourSumBackward(placed, sum, static_cast<double>(by_colour[c]));
-    for (size_t axis = 0; axis < 3; ++axis) by_axis[axis] += by * sums[axis];
-    by_sum[c] = static_cast<float>(by);
+  }
+  double by[3];
+  colourSumsBackward(placed, sums, by_colour, by);
+  double by_axis[3] = {};
+  for (size_t c = 0; c < 3; ++c) {
+    for (size_t axis = 0; axis < 3; ++axis) by_axis[axis] += by[c] * slopes[c][axis];
+    by_sum[c] = static_cast<float>(by[c]);
   }
   for (size_t axis = 0; axis < 3; ++axis) along[axis * kMaxLanes] = by_axis[axis];
 }

@@ -110,10 +110,8 @@ void sumCoefficientsBack(const PlacedCloud& placed, const HarmonicColumns& harmo
   for (size_t k = kInQuads; k < kCoefficients; ++k) addCoefficient(harmonics, lane, k, sh, sums);
 
   double by[3];
-  for (size_t c = 0; c < 3; ++c) {
-    by[c] = colourSumBackward(placed, sums[0][c], static_cast<double>(by_colour[c]));
-    by_sum[c] = static_cast<float>(by[c]);
-  }
+  colourSumsBackward(placed, sums[0], by_colour, by);
+  for (size_t c = 0; c < 3; ++c) by_sum[c] = static_cast<float>(by[c]);
   for (size_t axis = 0; axis < 3; ++axis) {
     const double* own = sums[axis + 1];
     along[axis * kMaxLanes] = by[0] * own[0] + by[1] * own[1] + by[2] * own[2];

@@ -175,7 +175,8 @@ HWY_INLINE void sumHarmonics(const PlacedCloud& placed, const float* sh, const f
       sums[c + 1] = sum;
     }
   }
-  for (size_t c = 0; c < 3; ++c) colour[c] = finishColour(placed, sums[c + 1]);
+  std::copy(sums + 1, sums + 4, colour);
+  finishColour(placed, colour);
 }
 
 size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t begin, size_t end,
@@ -186,6 +187,7 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
   const View<double>& view = scene.view;
   const SplatCloud& cloud = *placed.cloud;
   const size_t sh_stride = cloud.shStride();
+  const bool fades = placed.grade.opacity != 1.0;
   HWY_ALIGN double columns[9][kMaxLanes];
   HWY_ALIGN TileSpan spans[kMaxLanes];
   HWY_ALIGN float log2_opacity[kMaxLanes];
@@ -197,6 +199,7 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
   for (; row + lanes <= end; row += lanes) {
     prefetchRows(cloud, row + kPrefetchGroups * lanes, lanes);
     SplatGeometry<Double> splat = loadGeometry(cloud, row);
+    if (fades) splat.opacity = splat.opacity * Double(placed.grade.opacity);
     Double centre[3];
     placePoint(placed.linear, placed.translation, splat.position, centre);
     auto shows =

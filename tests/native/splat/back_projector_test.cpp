@@ -62,15 +62,22 @@ struct Case {
   int degree;
   int degree_limit;
   BlendSpace space;
+  ColourGrade grade = {};
 };
 
-constexpr Case kCases[] = {
+/// With entries of either sign, and another opacity.
+const ColourGrade kGrade = {
+    {0.9, 0.2, -0.1, 0.05, 1.3, -0.2, -0.15, 0.3, 0.7}, {0.05, -0.02, 0.1}, 0.75};
+
+const Case kCases[] = {
     {CameraModel::kPerspective, LowPass::kClassic, 0, 4, BlendSpace::kAsTrained},
     {CameraModel::kPerspective, LowPass::kMip, 1, 4, BlendSpace::kSceneLinear},
     {CameraModel::kPerspective, LowPass::kNone, 2, 4, BlendSpace::kAsTrained},
     {CameraModel::kPerspective, LowPass::kClassic, 4, 2, BlendSpace::kAsTrained},
     {CameraModel::kOrthographic, LowPass::kMip, 3, 4, BlendSpace::kAsTrained},
-    {CameraModel::kOrthographic, LowPass::kNone, 4, 4, BlendSpace::kSceneLinear}};
+    {CameraModel::kOrthographic, LowPass::kNone, 4, 4, BlendSpace::kSceneLinear},
+    {CameraModel::kPerspective, LowPass::kMip, 0, 4, BlendSpace::kAsTrained, kGrade},
+    {CameraModel::kPerspective, LowPass::kClassic, 3, 4, BlendSpace::kSceneLinear, kGrade}};
 
 SplatCloud cloudFor(const Case& c) {
   CloudRecipe recipe;
@@ -81,6 +88,7 @@ SplatCloud cloudFor(const Case& c) {
 
 PlacedScene sceneFor(const Case& c, const SplatCloud& cloud) {
   SplatInstance instance{&cloud};
+  instance.grade = c.grade;
   instance.object_to_world.topLeftCorner<3, 3>() << 0.7, 0.2, -0.3, 0.1, -0.9, 0.2, 0.3, 0.1, 0.6;
   Camera camera = frontCamera(40, 30, 30, 3);
   camera.model = c.model;
@@ -138,7 +146,8 @@ TEST(BackProjector, GivesTheNumbersOfMatricesInLongDouble) {
       by.depth = sum[fields - 1];
       const testing::ProjectionVectors expected = testing::projectBackward(
           scene.view, placed.linear, placed.translation, &cloud.positions[i * 3],
-          &cloud.rotations[i * 4], &cloud.scales[i * 3], cloud.opacities[i], placed.low_pass, by);
+          &cloud.rotations[i * 4], &cloud.scales[i * 3], static_cast<float>(placed.opacity(i)),
+          placed.low_pass, by);
       std::vector<float> by_sh(cloud.shStride(), 0.0f);
       const Vec3d by_direction =
           testing::splatColourBackward(scene, placed, i, sum + kFieldRed, by_sh.data());
@@ -158,7 +167,7 @@ TEST(BackProjector, GivesTheNumbersOfMatricesInLongDouble) {
         near(seen.gradients.rotations[i * 4 + k], expected.rotation[static_cast<int>(k)],
              expected.rotation.norm());
       }
-      near(seen.gradients.opacities[i], expected.opacity, 1.0);
+      near(seen.gradients.opacities[i], expected.opacity * placed.grade.opacity, 1.0);
       EXPECT_NEAR(seen.means[n * 2], expected.mean[0], 1e-9 * expected.mean.norm());
       EXPECT_NEAR(seen.means[n * 2 + 1], expected.mean[1], 1e-9 * expected.mean.norm());
       for (size_t k = 0; k < by_sh.size(); ++k) {

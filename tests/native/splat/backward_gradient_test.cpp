@@ -30,10 +30,12 @@ struct Scene {
   Camera camera;
   RenderOptions options;
   std::vector<float> depth_weights = {};  ///< [H,W] by the expected depth, or empty
+  ColourGrade grade = {};                 ///< of every cloud
 
   std::vector<SplatInstance> instances() const {
     std::vector<SplatInstance> all;
-    for (size_t i = 0; i < clouds.size(); ++i) all.push_back({&clouds[i], matrices[i]});
+    for (size_t i = 0; i < clouds.size(); ++i)
+      all.push_back({&clouds[i], matrices[i], false, grade});
     return all;
   }
   ReferenceResult reference() const {
@@ -268,6 +270,20 @@ TEST(Backward, MatchesDifferencesThroughTheLinearisationOfColours) {
   Scene scene = oneCloud(smallCloud(12, 1, 60));
   scene.options.blend_space = BlendSpace::kSceneLinear;
   judge(scene, 2, 5);
+}
+
+TEST(Backward, MatchesDifferencesThroughAGrade) {
+  for (const BlendSpace blend : {BlendSpace::kAsTrained, BlendSpace::kSceneLinear}) {
+    Scene scene = oneCloud(smallCloud(12, 2, 62));
+    scene.options.blend_space = blend;
+    GradeSettings settings;
+    settings.exposure = -0.4;
+    settings.tint = {1.2, 0.9, 0.5};
+    settings.saturation = 1.6;
+    settings.opacity = 0.7;
+    scene.grade = gradeOf(settings, ColourSpace::kDisplay);
+    judge(scene, 2, 16);
+  }
 }
 
 TEST(Backward, MatchesDifferencesWhereTheSlopeIsHeld) {

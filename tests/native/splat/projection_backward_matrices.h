@@ -150,11 +150,25 @@ inline Vec3d splatColourBackward(const PlacedScene& scene, const PlacedCloud& pl
   }
   const size_t count = shCoefficientCount(placed.sh_degree);
   double by_basis[25] = {};
+  Vec3d sums(0.5, 0.5, 0.5);
   for (size_t c = 0; c < 3; ++c) {
-    double sum = 0.5;
-    for (size_t k = 0; k < count; ++k) sum += basis[k] * static_cast<double>(sh[k * 3 + c]);
-    if (!(sum > 0.0 && sum < 1e12)) continue;
-    const double by_sum = by_colour[c] * (placed.linearise ? srgbToLinearSlope(sum) : 1.0);
+    const Eigen::Index channel = static_cast<Eigen::Index>(c);
+    for (size_t k = 0; k < count; ++k) {
+      sums[channel] += basis[k] * static_cast<double>(sh[k * 3 + c]);
+    }
+  }
+  const Mat3d grading =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(placed.grade.matrix.data());
+  const Vec3d graded = grading * sums + Eigen::Map<const Vec3d>(placed.grade.offset.data());
+  Vec3d by_graded = Vec3d::Zero();
+  for (int c = 0; c < 3; ++c) {
+    if (!(graded[c] > 0.0 && graded[c] < 1e12)) continue;
+    by_graded[c] = by_colour[c] * (placed.linearise ? srgbToLinearSlope(graded[c]) : 1.0);
+  }
+  const Vec3d by_sums = grading.transpose() * by_graded;
+  for (size_t c = 0; c < 3; ++c) {
+    const double by_sum = by_sums[static_cast<Eigen::Index>(c)];
+    if (by_sum == 0.0) continue;
     for (size_t k = 0; k < count; ++k) by_sh[k * 3 + c] = storedGradient(by_sum * basis[k]);
     for (size_t k = 1; k < count; ++k) by_basis[k] += by_sum * static_cast<double>(sh[k * 3 + c]);
   }
