@@ -7,6 +7,7 @@ from bpy.props import CollectionProperty, EnumProperty, IntProperty, StringPrope
 from . import version
 
 
+POINTS_ABOVE = 1_000_000
 UP_AXES = (('AUTO', "From File", "As the file says, or as files of its format usually are"),
            ('Z', "Z Up", "As in Blender"), ('-Y', "-Y Up", "As most captured scenes: the frame of their first camera"),
            ('Y', "Y Up", "As in glTF and most game engines"))
@@ -34,6 +35,9 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
                             max=64)
     library_path: StringProperty(name="Library", description="Path of libstipple.so, empty for the one inside the "
                                  "add-on", subtype='FILE_PATH', options=version.RELATIVE_PATH)
+    points_above: IntProperty(name="Points Above", description="Splats that 3D views draw as ellipses at most; of more "
+                              "than this, the largest objects are drawn as colored points", default=POINTS_ABOVE, min=0,
+                              max=16_000_000)
     formats: CollectionProperty(type=STIPPLE_PG_format)
 
     def draw(self, _context):
@@ -43,6 +47,7 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
         column = layout.column()
         column.prop(self, 'threads')
         column.prop(self, 'memory_limit', text="Memory Limit (MiB)")
+        column.prop(self, 'points_above')
         column.prop(self, 'cache_folder')
         column.prop(self, 'sequence_cache', text="Sequence Cache (MiB)")
         column.prop(self, 'read_ahead')

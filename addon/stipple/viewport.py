@@ -1,163 +1,170 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawing in the 3D view: splats of the engine Stipple, and coloured points under every other shading."""
+"""Drawing in the 3D view, the door to it.
+
+Under Solid, Material Preview and the Rendered shading of other engines splats are drawn over Blender's
+picture as sorted ellipses; in Wireframe, and above a number of splats that the user sets, as coloured
+points. From Blender 5.3 on splats are data that Blender draws by itself. The engine Stipple shows a
+ViewPicture instead.
+"""
+
+import logging
 
 import bpy
-import numpy as np
+from bpy.app.handlers import persistent
 
-from . import version
+from . import preferences, version
 from .binding.errors import StippleError
-from .binding.renderer import Renderer
-from .binding.structs import JobState
-from .scene import cameras, facts, instances, sources, splat_data, sync
+from .scene import cameras, sources, sync, viewed
+from .view_picture import ViewPicture
 
-# While the view moves, pictures have one pixel for this many of the region's along each side.
-COARSE = 4
-# Points that Solid shading draws of one object; more would only hide each other.
-MAX_POINTS = 2_000_000
-POINT_SIZE_PX = 2.0
+__all__ = ('ViewPicture', 'register', 'unregister')
+
+POLL_SECONDS = 0.01
+# 3D views that keep their order of splats; more than a screen usually has.
+MAX_VIEWS = 8
+
+log = logging.getLogger('stipple')
+_state = {'handler': None, 'drawing': None}
 
 
-class ViewPicture:
-    """The picture of one 3D view: coarse at once, fine when the job behind it has ended."""
+class _Drawing:
+    """What the graphics card holds for all 3D views."""
 
     def __init__(self):
-        self._instances = []
-        self._version = 0
-        self._key = None
-        self._fine = None   # RenderTask that is being made
-        self._shown = None  # (texture, whether it is fine)
+        # Imported here: background Blender may have no graphics at all.
+        from . import splat_points, view_ellipses
+        self._ellipses = view_ellipses
+        self._points = splat_points.SplatPoints()
+        self._scene = viewed.ViewedScene()
+        self._shaders = None
+        self._views = {}  # by RegionView3D, the one that was drawn last at the end
 
-    def update(self, depsgraph, warn):
-        """Takes what the view shows now. Errors: StippleError."""
-        self._instances = instances.gather(depsgraph, 'VIEWPORT', warn)
-        self._version += 1
+    def draw(self, context, space, region_data):
+        depsgraph = context.evaluated_depsgraph_get()
+        scene = self._scene.update(depsgraph)
+        shown = viewed.shown(scene, space)
+        if not shown:
+            return
+        ellipses, points = split(shown, _points_above())
+        if space.shading.type == 'WIREFRAME' or viewed.state['graphics']:
+            ellipses, points = [], shown
+        if points:
+            self._points.draw(points, depsgraph)
+        if ellipses:
+            try:
+                self._draw_ellipses(context, depsgraph, ellipses, bool(points) or viewed.hides_splats(scene, space))
+            except StippleError as error:
+                note_problem(str(error))
+                self._points.draw(ellipses, depsgraph)
 
-    def draw(self, engine, context, depsgraph):
-        """Draws, and asks for another call while a finer picture is on its way. Errors: StippleError."""
-        region = context.region
-        camera = cameras.from_view(context.region_data, region.width, region.height)
-        scene = depsgraph.scene
-        key = (self._version, bytes(camera), facts.blend_space(scene), scene.render.film_transparent)
-        if key != self._key:
-            self.close()
-            self._key = key
-            small = cameras.from_view(context.region_data, max(region.width // COARSE, 1),
-                                      max(region.height // COARSE, 1))
-            task = self._start(scene, small)
-            task.job.wait()
-            self._shown = (_texture(task.colour), False)
-            self._fine = self._start(scene, camera)
-        if self._fine is not None:
-            state = self._fine.job.poll()[0]
-            if state == JobState.RUNNING:
-                engine.tag_redraw()
-            else:
-                self._fine.job.wait()
-                self._shown = (_texture(self._fine.colour), True)
-                self._fine = None
-        _draw_texture(engine, scene, self._shown[0], region)
+    def _draw_ellipses(self, context, depsgraph, entries, with_depth):
+        if self._shaders is None:
+            self._shaders = self._ellipses.Shaders()
+        key = context.region_data.as_pointer()
+        view = self._views.pop(key, None)
+        if view is None:
+            view = self._ellipses.ViewEllipses(sources.context())
+        self._views[key] = view
+        while len(self._views) > MAX_VIEWS:
+            self._views.pop(next(iter(self._views))).close()
+        if view.draw(self._shaders, context, depsgraph, entries, with_depth):
+            _poll_later()
+
+    def is_sorting(self):
+        return any(view.is_sorting() for view in self._views.values())
+
+    def has_new_order(self):
+        return any(view.has_new_order() for view in self._views.values())
 
     def close(self):
-        if self._fine is not None:
-            self._fine.job.close()
-            self._fine = None
-
-    def _start(self, scene, camera):
-        renderer = Renderer(sources.context())
-        background = None if scene.render.film_transparent else facts.world_colour(scene.world)
-        options = renderer.options(blend_space=facts.blend_space(scene), background=background)
-        return renderer.start(self._instances, camera, options, with_depth=False)
+        for view in self._views.values():
+            view.close()
+        self._views.clear()
 
 
-def _texture(pixels):
-    import gpu  # not there in every background Blender
-    flat = np.ascontiguousarray(pixels[::-1]).reshape(-1)
-    height, width = pixels.shape[:2]
-    return gpu.types.GPUTexture((width, height), format='RGBA16F', data=gpu.types.Buffer('FLOAT', flat.size, flat))
+def split(entries, most):
+    """(those drawn as ellipses, those drawn as points): the largest become points until the rest is `most` at most."""
+    total = sum(entry.count for entry in entries)
+    points = set()
+    for entry in sorted(entries, key=lambda e: -e.count):
+        if total <= most:
+            break
+        points.add(entry.key)
+        total -= entry.count
+    return [e for e in entries if e.key not in points], [e for e in entries if e.key in points]
 
 
-def _draw_texture(engine, scene, texture, region):
-    import gpu
-    from gpu_extras.presets import draw_texture_2d
-    gpu.state.blend_set('ALPHA_PREMULT')
-    engine.bind_display_space_shader(scene)
-    draw_texture_2d(texture, (0, 0), region.width, region.height)
-    engine.unbind_display_space_shader()
-    gpu.state.blend_set('NONE')
+def note_problem(message):
+    """Keeps what is wrong with the graphics for panels, and logs it once."""
+    if viewed.state['graphics'] != message:
+        log.error('%s', message)
+    viewed.state['graphics'] = message
 
 
-# ---- coloured points ----------------------------------------------------------------------------
+def _points_above():
+    chosen = preferences.get()
+    return chosen.points_above if chosen is not None else preferences.POINTS_ABOVE
 
-_batches = {}
-_handler = None
 
-
-def _draw_points():
-    """Under Solid and Wireframe shading splat meshes would be invisible: shows their centres."""
+def _draw():
+    """Called by Blender for every redraw of every 3D view: raises nothing."""
     context = bpy.context
-    space = context.space_data
-    if space is None or space.shading.type == 'RENDERED' and context.engine == sync.ENGINE:
+    space, region_data = context.space_data, context.region_data
+    if space is None or region_data is None or viewed.state['off']:
         return
-    depsgraph = context.evaluated_depsgraph_get()
-    drawn = []
-    for entry in depsgraph.object_instances:
-        obj = entry.object
-        if splat_data.is_splat_object(obj) and (entry.show_self or entry.is_instance):
-            drawn.append((obj.original.data, entry.matrix_world.copy()))
-    if not drawn:
-        _batches.clear()
+    if space.shading.type == 'RENDERED' and context.engine == sync.ENGINE:
         return
-    import gpu
-    shader = gpu.shader.from_builtin(version.FLAT_COLOR_SHADER)
-    gpu.state.depth_test_set('LESS_EQUAL')
-    gpu.state.depth_mask_set(True)
-    gpu.state.point_size_set(POINT_SIZE_PX)
-    for data, matrix in drawn:
-        batch = _batch_of(data, shader)
-        if batch is not None:
-            with gpu.matrix.push_pop():
-                gpu.matrix.multiply_matrix(matrix)
-                batch.draw(shader)
-    gpu.state.point_size_set(1.0)
-    gpu.state.depth_mask_set(False)
-    gpu.state.depth_test_set('NONE')
-
-
-def _batch_of(data, shader):
-    """The GPU points of a datablock; made again when its splats are."""
-    key = (data.get(sync.WRITTEN_KEY), data.get(sync.FINGERPRINT_KEY), splat_data.count(data))
-    known = _batches.get(data.name)
-    if known is not None and known[0] == key:
-        return known[1]
-    batch = None
     try:
-        arrays = splat_data.read(data)
-        if arrays.count:
-            batch = _points(arrays, shader)
-    except StippleError as error:
-        sync.problems[data.name] = str(error)
-    _batches[data.name] = (key, batch)
-    return batch
+        if _state['drawing'] is None:
+            _state['drawing'] = _Drawing()
+        _state['drawing'].draw(context, space, region_data)
+    except Exception as error:  # graphics fail in many ways: one message, then nothing is drawn
+        log.exception('Splats cannot be drawn in the 3D view')
+        note_problem(f'Splats cannot be drawn in the 3D view: {error}.')
+        viewed.state['off'] = True
 
 
-def _points(arrays, shader):
-    from gpu_extras.batch import batch_for_shader
-    step = -(-arrays.count // MAX_POINTS)
-    colours = np.ones((len(arrays.positions[::step]), 4), np.float32)
-    colours[:, :3] = facts.display_colours(arrays.sh[::step, 0])
-    return batch_for_shader(shader, 'POINTS', {'pos': np.ascontiguousarray(arrays.positions[::step]),
-                                               'color': colours})
+def _poll_later():
+    if not bpy.app.timers.is_registered(_poll):
+        bpy.app.timers.register(_poll, first_interval=POLL_SECONDS)
+
+
+def _poll():
+    """Redraws when a view's new order is there. A timer's function: it returns when to be called again."""
+    drawing = _state['drawing']
+    if drawing is None:
+        return None
+    if drawing.has_new_order():
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == 'VIEW_3D':
+                    area.tag_redraw()
+    return POLL_SECONDS if drawing.is_sorting() else None
+
+
+@persistent
+def _forget(*_):
+    """Another file: its views have other splats, and graphics that failed may work again."""
+    if _state['drawing'] is not None:
+        _state['drawing'].close()
+        _state['drawing'] = None
+    viewed.state.update(graphics='', off=False)
 
 
 def register():
-    global _handler
-    if not bpy.app.background:
-        _handler = bpy.types.SpaceView3D.draw_handler_add(_draw_points, (), 'WINDOW', 'POST_VIEW')
+    viewed.register()
+    if bpy.app.background or version.HAS_NATIVE_SPLATS:
+        return
+    _state['handler'] = bpy.types.SpaceView3D.draw_handler_add(_draw, (), 'WINDOW', 'POST_VIEW')
+    bpy.app.handlers.load_pre.append(_forget)
 
 
 def unregister():
-    global _handler
-    if _handler is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handler, 'WINDOW')
-        _handler = None
-    _batches.clear()
+    viewed.unregister()
+    if _state['handler'] is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_state['handler'], 'WINDOW')
+        _state['handler'] = None
+        bpy.app.handlers.load_pre.remove(_forget)
+    if bpy.app.timers.is_registered(_poll):
+        bpy.app.timers.unregister(_poll)
+    _forget()

@@ -76,14 +76,19 @@ def from_view(region_data, width, height):
         cx, cy = (1 + window[0, 3]) * width / 2, (1 - window[1, 3]) * height / 2
         near = (window[2, 3] + 1) / window[2, 2]
         far = (window[2, 3] - 1) / window[2, 2]
-        # An orthographic view also sees what is behind its centre: step back until all is in front.
-        back = max(0.0, 1.0 - near)
+        back = step_back(window)
         view = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -back], [0, 0, 0, 1]]) @ view
         near, far = near + back, far + back
     model = CameraModel.PERSPECTIVE if perspective else CameraModel.ORTHOGRAPHIC
     return StippleCamera(model=int(model), width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy,
                          world_to_camera=(c_double * 16)(*(_OPENGL_TO_OPENCV @ view).reshape(16)), near_plane=near,
                          far_plane=far)
+
+
+def step_back(window_matrix):
+    """Metres by which from_view() stands behind a view: an orthographic one also sees what is behind its centre."""
+    window = np.array(window_matrix, np.float64)
+    return 0.0 if window[3, 2] != 0 else max(0.0, 1.0 - (window[2, 3] + 1) / window[2, 2])
 
 
 def world_to_camera(matrix_world):

@@ -44,11 +44,11 @@ def new_object(name, data):
 
 
 def show_as_box(obj, box=True):
-    """Vertex meshes are drawn as black dots over everything: a box leaves room for the splats themselves.
+    """Vertices are drawn as black dots and points as balls: a box leaves room for the splats themselves.
 
     Objects that the user gave another display type keep it.
     """
-    if obj.type == 'MESH' and obj.display_type == ('TEXTURED' if box else 'BOUNDS'):
+    if not version.HAS_NATIVE_SPLATS and obj.display_type == ('TEXTURED' if box else 'BOUNDS'):
         obj.display_type = 'BOUNDS' if box else 'TEXTURED'
 
 
@@ -136,11 +136,7 @@ def read(data, original=None):
     """
     marked = data if original is None else original
     n = count(data)
-    if isinstance(data, bpy.types.Mesh):
-        positions = np.empty(n * 3, np.float32)
-        data.vertices.foreach_get('co', positions)
-    else:
-        positions = _get(data, 'position', n, 3)
+    positions = _positions(data, n)
     scales, rotations, base = _get(data, 'scale', n, 3), _get(data, 'rotation', n, 4), _get(data, 'radiance:base', n, 4)
     base = base.reshape(n, 4)
     rest = 0
@@ -155,6 +151,13 @@ def read(data, original=None):
                        _key_of(_COLOUR_SPACES, marked.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
                        _key_of(_ANTIALIAS, marked.get(ANTIALIAS_KEY), Antialias.CLASSIC),
                        Frame.__members__.get(marked.get(FRAME_KEY), Frame.UNKNOWN))
+
+
+def read_points(data, step=1):
+    """Positions [n,3] and DC harmonics [n,3] of every step-th splat. Errors: StippleError for missing attributes."""
+    n = count(data)
+    positions, base = _positions(data, n).reshape(n, 3), _get(data, 'radiance:base', n, 4).reshape(n, 4)
+    return np.ascontiguousarray(positions[::step]), np.ascontiguousarray(base[::step, :3])
 
 
 def fingerprint(data):
@@ -207,6 +210,14 @@ def _set(data, name, kind, values):
     # Linked point clouds: foreach_set passes them over in silence. Some 3 µs for each value.
     for element, value in zip(elements, np.asarray(values).reshape(len(elements), -1).tolist()):
         setattr(element, field, value)
+
+
+def _positions(data, n):
+    if isinstance(data, bpy.types.Mesh):
+        positions = np.empty(n * 3, np.float32)
+        data.vertices.foreach_get('co', positions)
+        return positions
+    return _get(data, 'position', n, 3)
 
 
 def _get(data, name, n, width):

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a 3D view shows of splat objects: instances, and native clouds of their attributes."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from .. import version
+from . import sources, splat_data, sync
+
+# Objects behind or before which splats can be, apart from splats themselves.
+SOLID_TYPES = {'MESH', 'CURVE', 'SURFACE', 'META', 'FONT', 'CURVES', 'POINTCLOUD', 'VOLUME', 'GPENCIL', 'GREASEPENCIL'}
+
+_state = {'version': 0}
+# graphics: what is wrong with the graphics card, for panels; off: nothing can be drawn at all.
+state = {'graphics': '', 'off': False}
+_geometry_versions = {}
+_clouds = {}
+
+
+@dataclass(frozen=True)
+class ViewedSplats:
+    """An instance of a splat object in the view layer, whether or not a certain view shows it."""
+
+    key: tuple          # stays while it is the same instance
+    owner: object       # the original object that is selected and hidden: instances belong to their instancer
+    obj: object         # the original object whose data they are
+    state: tuple        # changes with the splats
+    count: int
+    matrix: np.ndarray  # [4,4] object to world
+
+
+@dataclass(frozen=True)
+class Viewed:
+    splats: tuple
+    others: frozenset   # original objects that can stand before splats
+
+
+class ViewedScene:
+    """All splats of a view layer; gathered again only after something in the scene has changed."""
+
+    def __init__(self):
+        self._key = None
+        self._viewed = Viewed((), frozenset())
+
+    def update(self, depsgraph):
+        key = (_state['version'], depsgraph.scene.original.as_pointer(), depsgraph.view_layer.name)
+        if key != self._key:
+            self._viewed = gather(depsgraph)
+            self._key = key
+        return self._viewed
+
+
+def gather(depsgraph):
+    """Everything that the view layer shows."""
+    found, others = [], set()
+    for entry in depsgraph.object_instances:
+        obj = entry.object
+        if not (entry.show_self or entry.is_instance):
+            continue
+        original = obj.original
+        owner = entry.parent.original if entry.is_instance else original
+        if not splat_data.is_splat_object(obj):
+            if obj.type in SOLID_TYPES:
+                others.add(owner)
+            continue
+        count = splat_data.count(obj.data)
+        if count:
+            key = (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
+            found.append(ViewedSplats(key, owner, original, _state_of(obj, original, count), count,
+                                      version.copy_of_evaluated_matrix(entry.matrix_world)))
+    shown = {_cloud_key(entry) for entry in found}
+    for key in [key for key in _clouds if key not in shown]:
+        del _clouds[key]
+    return Viewed(tuple(found), frozenset(others))
+
+
+def shown(viewed, space):
+    """The splats that one view shows: local view, local collections, object types."""
+    types = {'MESH': space.show_object_viewport_mesh}
+    # Before point clouds had an entry of their own in the popover, they always showed.
+    types['POINTCLOUD'] = getattr(space, 'show_object_viewport_pointcloud', True)
+    return [v for v in viewed.splats if types[v.obj.type] and v.owner.visible_in_viewport_get(space)]
+
+
+def hides_splats(viewed, space):
+    """Whether anything in the view can stand before splats."""
+    return any(obj.visible_in_viewport_get(space) for obj in viewed.others)
+
+
+def cloud_of(entry, depsgraph):
+    """(native cloud, its info) of the splats as modifiers leave them; made again when they change.
+
+    Errors: StippleError for attributes that are missing or out of range.
+    """
+    key = _cloud_key(entry)
+    known = _clouds.get(key)
+    if known is None or known[0] != entry.state:
+        cloud = sources.cloud_from_object(entry.obj.evaluated_get(depsgraph))
+        known = _clouds[key] = (entry.state, cloud, cloud.info())
+    return known[1], known[2]
+
+
+def _cloud_key(entry):
+    return entry.obj.data.name_full, entry.obj.name_full if len(entry.obj.modifiers) else ''
+
+
+def _state_of(obj, original, count):
+    data = original.data
+    return (count, data.get(sync.WRITTEN_KEY), data.get(sync.FINGERPRINT_KEY), _geometry_versions.get(data.name_full, 0),
+            _geometry_versions.get(original.name_full, 0) if len(obj.modifiers) else 0)
+
+
+@persistent
+def _changed(_scene, depsgraph=None):
+    _state['version'] += 1
+    if depsgraph is None:
+        return
+    for update in depsgraph.updates:
+        if update.is_updated_geometry and isinstance(update.id, (bpy.types.Object, bpy.types.Mesh, bpy.types.PointCloud)):
+            name = update.id.original.name_full
+            _geometry_versions[name] = _geometry_versions.get(name, 0) + 1
+
+
+@persistent
+def _forget(*_):
+    """Another file, or another state of this one: nothing is known of it."""
+    _state['version'] += 1
+    _geometry_versions.clear()
+    _clouds.clear()
+
+
+_HANDLERS = (('depsgraph_update_post', _changed), ('frame_change_post', _changed), ('load_post', _forget),
+             ('undo_post', _forget), ('redo_post', _forget))
+
+
+def register():
+    for name, function in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(function)
+
+
+def unregister():
+    for name, function in _HANDLERS:
+        handlers = getattr(bpy.app.handlers, name)
+        if function in handlers:
+            handlers.remove(function)
+    _forget()
