@@ -148,7 +148,7 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
   const bool turns = placed.sh_degree > 0;
   HarmonicColumns harmonics;
   alignas(64) double along[3][kMaxLanes] = {};
-  DirectionLanes<T> direction;
+  DirectionLanes<T> direction = {};
   if (turns) {
     directionSteps(scene, placed, splat.position, direction, harmonics);
   } else {
