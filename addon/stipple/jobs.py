@@ -11,6 +11,7 @@ import time
 
 from .binding.errors import CancelledError, StippleError
 from .binding.structs import JobState
+from .scene import sources
 
 POLL_SECONDS = 0.05
 
@@ -69,7 +70,10 @@ class Task:
 
     def _run(self, work):
         try:
-            self.result = work(self)
+            result = work(self)
+            if self._cancelled.is_set():
+                raise CancelledError()
+            self.result = result
         except StippleError as error:
             self._error = error
         except Exception as error:  # the thread's end is wait(), which must hear of it
@@ -81,6 +85,19 @@ class JobOperator:
 
     _timer = None
     _job = None
+
+    def __init_subclass__(cls, **options):
+        """Without the library none of these operators can do anything: their menu entries are grey and say why."""
+        super().__init_subclass__(**options)
+        asked = cls.__dict__.get('poll')
+
+        def poll(cls, context):
+            problem = sources.library_problem()
+            if problem:
+                cls.poll_message_set(problem)
+                return False
+            return asked is None or asked.__get__(None, cls)(context)
+        cls.poll = classmethod(poll)
 
     def execute(self, context):
         try:

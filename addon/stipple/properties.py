@@ -37,6 +37,7 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                                                          ('TREE', "Splat Tree", "Splats of a file at any budget")),
                               default='NONE')
     source_count: IntProperty(options={'HIDDEN'})  # of a splat tree
+    source_stamp: StringProperty(options={'HIDDEN'})  # of the file as it was read
     budget_by: EnumProperty(name="Budget By", description="How the number of splats is given", items=BUDGET_KINDS,
                             options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
     ratio: FloatProperty(name="Ratio", description="Share of the source's splats that the viewport shows", default=1.0,

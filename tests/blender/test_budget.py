@@ -265,4 +265,4 @@ def test_a_missing_tree_is_reported_and_the_splats_stay(stipple, budgeted, tmp_p
         path.unlink()
     budgeted.data.stipple.ratio = 0.25
     assert count(stipple, budgeted) == COUNT // 2
-    assert 'cannot be read' in stipple.scene.sync.problems[budgeted.data.name]
+    assert 'is missing' in stipple.scene.sync.problems[budgeted.data.name]

@@ -13,6 +13,7 @@ FILE_NAME = 'libstipple.so'
 ENVIRONMENT_VARIABLE = 'STIPPLE_LIBRARY'
 
 _loaded = {}
+_refused = {}  # file → (time of the file, why it did not load)
 
 
 def find(path=''):
@@ -35,8 +36,32 @@ def load(path=''):
     if known is not None:
         return known
     if not file.is_file():
-        raise LibraryError(f"The Stipple library '{file}' is missing; install the add-on again or set the library's "
-                           "path in the add-on's preferences.")
+        raise LibraryError(_missing(file))
+    try:
+        _loaded[file] = _load(file)
+    except LibraryError as error:
+        _refused[file] = (file.stat().st_mtime_ns, str(error))
+        raise
+    return _loaded[file]
+
+
+def problem(path=''):
+    """Why the library cannot be used, '' where nothing is known to be wrong. Loads nothing: for menus and panels."""
+    file = find(path)
+    if file in _loaded:
+        return ''
+    if not file.is_file():
+        return _missing(file)
+    time, why = _refused.get(file, (None, ''))
+    return why if time == file.stat().st_mtime_ns else ''
+
+
+def _missing(file):
+    return (f"The Stipple library '{file}' is missing; install the add-on again or set the library's path in the "
+            "add-on's preferences.")
+
+
+def _load(file):
     try:
         library = CDLL(str(file))
     except OSError as error:
@@ -55,5 +80,4 @@ def load(path=''):
     except AttributeError as error:
         raise LibraryError(f"The Stipple library '{file}' says ABI version {version} but lacks a function: "
                            f"{error}.") from None
-    _loaded[file] = library
     return library

@@ -8,7 +8,7 @@ from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
-from ..scene import edits, frames, sources, sync
+from ..scene import edits, frames, placement, sources, sync
 
 
 class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
@@ -30,7 +30,7 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
         for obj in objects:
             if obj.data.users > 1:
                 raise invalid(f"The splats of '{obj.name}' have {obj.data.users} users; make them single-user first.")
-        wanted = [(target, obj.matrix_world.copy(), obj.data.stipple.source_kind == 'TREE',
+        wanted = [(target, placement.matrix_of(obj), obj.data.stipple.source_kind == 'TREE',
                    sources.model_path_for(obj.name)) for target, obj in zip(edits.targets(objects), objects)]
         native = sources.context()
 

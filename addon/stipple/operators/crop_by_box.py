@@ -9,7 +9,7 @@ from ..binding.errors import invalid
 from ..binding.structs import Side
 from ..jobs import JobOperator
 from ..properties import SIDES
-from ..scene import edits, shapes
+from ..scene import edits, placement, shapes
 
 
 class STIPPLE_OT_crop_by_box(JobOperator, bpy.types.Operator):
@@ -31,7 +31,7 @@ class STIPPLE_OT_crop_by_box(JobOperator, bpy.types.Operator):
             raise invalid('No box is selected; select an empty or any other object along with the splats.')
         self._edited = []
         for target in edits.targets(edits.selected_splats(context)):
-            to_world = np.array(target.obj.matrix_world)
+            to_world = placement.matrix_of(target.obj)
             inside = sum(cloud_edit.select_box(target.cloud, np.linalg.inv(box) @ to_world) for box in boxes) > 0
             self._edited.append((target, np.uint8(inside == (Side[self.keep] == Side.INSIDE))))
         return None

@@ -7,7 +7,7 @@ from ..binding import cloud_edit
 from ..binding.structs import Side
 from ..jobs import JobOperator, Task
 from ..properties import SIDES
-from ..scene import edits, shapes, sources
+from ..scene import edits, placement, shapes, sources
 
 
 class STIPPLE_OT_crop_by_mesh(JobOperator, bpy.types.Operator):
@@ -29,7 +29,7 @@ class STIPPLE_OT_crop_by_mesh(JobOperator, bpy.types.Operator):
     def start(self, context):
         mesh = shapes.bare_mesh(sources.context(), shapes.cutters(context), context.evaluated_depsgraph_get())
         side = Side[self.keep]
-        wanted = [(target, target.obj.matrix_world.copy()) for target in
+        wanted = [(target, placement.matrix_of(target.obj)) for target in
                   edits.targets(edits.selected_splats(context))]
 
         def work(task):

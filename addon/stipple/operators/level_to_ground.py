@@ -35,7 +35,7 @@ class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.O
             self._found, self._doubtful = 'three points', False
         else:
             cloud = sources.cloud_from_object(context.object)
-            plane = cloud_edit.ground_plane(cloud, context.object.matrix_world, max_tilt=self.max_tilt, seed=self.seed)
+            plane = cloud_edit.ground_plane(cloud, placement.matrix_of(context.object), max_tilt=self.max_tilt, seed=self.seed)
             self._matrix = cloud_edit.matrix_of(plane)
             self._found = f'{plane.inlier_count:,} of {plane.considered_count:,} splats'
             self._doubtful = plane.inlier_count < 0.03 * plane.considered_count

@@ -7,7 +7,7 @@ import numpy as np
 from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene import edits, masks, sources, splat_data, sync
+from ..scene import edits, masks, placement, sources, splat_data, sync
 
 
 class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
@@ -34,9 +34,9 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
         self._objects = [active] + others
         for obj in self._objects:
             edits.refuse_sequence(obj)
-        inverse = np.linalg.inv(np.array(active.matrix_world))
+        inverse = np.linalg.inv(placement.matrix_of(active))
         clouds = [sources.full_cloud(obj.data) for obj in self._objects]
-        matrices = [np.eye(4)] + [inverse @ np.array(obj.matrix_world) for obj in others]
+        matrices = [np.eye(4)] + [inverse @ placement.matrix_of(obj) for obj in others]
         frame = clouds[0].info().frame
 
         def work(task):

@@ -10,7 +10,7 @@ from bpy_extras.io_utils import ExportHelper
 from ..binding.errors import invalid
 from ..binding.volume import Volume
 from ..jobs import JobOperator, Task
-from ..scene import frames_out, numbered, sources, splat_data, volumes
+from ..scene import frames_out, numbered, placement, sources, splat_data, volumes
 
 
 class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper):
@@ -47,7 +47,7 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
             return self._start_series(context, sorted(selected, key=lambda obj: obj != active))
         depsgraph = context.evaluated_depsgraph_get()
         objects = [obj.evaluated_get(depsgraph) for obj in selected]
-        instances = [(sources.cloud_from_object(obj), obj.matrix_world) for obj in objects]
+        instances = [(sources.cloud_from_object(obj), placement.matrix_of(obj)) for obj in objects]
         return Volume.voxelize_start(sources.context(), instances, self.resolution, self.voxel_size)
 
     def _start_series(self, context, objects):

@@ -7,6 +7,7 @@ Shape Keys and all else that meshes have.
 
 import bpy
 
+from . import source_state
 from ..scene import exporting, geometry, masks, sources, splat_data, sync
 
 
@@ -33,6 +34,8 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
         layout.use_property_split = True
         stipple = context.object.data.stipple
         layout.prop(stipple, 'source')
+        if stipple.source_kind != 'NONE':
+            layout.operator('stipple.relink', icon='FILEBROWSER')
         if stipple.source_kind != 'MODEL':
             return
         column = layout.column()
@@ -143,6 +146,8 @@ def _draw_foreign(self, context):
 def _draw_warnings(layout, data):
     stipple = data.stipple
     problem = sync.problems.get(data.name)
+    if not stipple.edited and source_state.draw(layout, data):
+        return
     if stipple.edited:
         layout.label(text="Edited by hand", icon='LOCKED')
         column = layout.column(align=True)

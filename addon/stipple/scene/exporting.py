@@ -10,7 +10,7 @@ import numpy as np
 from ..binding import cloud_edit
 from ..binding.errors import StippleError, invalid
 from ..binding.structs import Status
-from . import formats, frames, sequences, sources, splat_data, sync
+from . import formats, frames, placement, sequences, sources, splat_data, sync
 
 
 def any_splats(context):
@@ -40,7 +40,11 @@ def placed_clouds(context, objects, budget, apply_transform):
     """([(cloud, 4x4 matrix)], frame that the matrices lead to): the world, or the first object's own space."""
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
-    return in_frame([(_cloud(obj, budget), np.array(obj.matrix_world)) for obj in evaluated], apply_transform)
+    if apply_transform or len(objects) > 1:
+        placed = [(_cloud(obj, budget), placement.matrix_of(obj)) for obj in evaluated]
+    else:
+        placed = [(_cloud(obj, budget), np.array(obj.matrix_world)) for obj in evaluated]
+    return in_frame(placed, apply_transform)
 
 
 def in_frame(placed, apply_transform):

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..binding.cloud import Cloud
 from ..binding.errors import StippleError, invalid
-from . import sequences, sources, splat_data, sync
+from . import placement, sequences, sources, splat_data, sync
 
 FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
           ('SERIES', "Whole Series", "Each file of the active object's series once, all objects placed as they are now"),
@@ -65,7 +65,7 @@ def gather(context, objects, frames, budget):
                 stipple = evaluated.data.stipple
                 path = sequences.file_path(obj.data, stipple, min(local, stipple.frame_duration))
                 source = sequences.frame_of_file(obj.data, stipple, path, budget)
-            placed.append((source, np.array(evaluated.matrix_world)))
+            placed.append((source, placement.matrix_of(evaluated)))
         result.append(FrameOut(local, placed))
     return result
 
@@ -82,7 +82,8 @@ def _of_scene(context, objects, budget):
                 for obj in objects:
                     evaluated = obj.evaluated_get(depsgraph)
                     source = fixed.get(obj) or _at_frame(obj.data, evaluated.data.stipple, number, budget)
-                    placed.append((source, np.array(evaluated.matrix_world)))
+                    if not placement.is_flat(evaluated.matrix_world):
+                        placed.append((source, np.array(evaluated.matrix_world)))
                 result.append(FrameOut(number, placed))
     finally:
         scene.frame_set(before[0], subframe=before[1])

@@ -7,7 +7,7 @@ from .. import version
 from ..binding import cloud_edit
 from ..binding.cloud import Cloud
 from ..binding.errors import invalid
-from . import sources, splat_data
+from . import placement, sources, splat_data
 
 _NAMES = ('scale', 'rotation', 'radiance:base')
 
@@ -40,7 +40,7 @@ def splats_of(obj, depsgraph):
         if splat_data.is_splats(data) and data.stipple.source_kind == 'CLOUD' and not data.stipple.edited:
             return sources.whole_cloud(data)
         return Cloud.create(sources.context(), splat_data.read(data))
-    inverse, found = np.linalg.inv(np.array(obj.matrix_world, np.float64)), []
+    inverse, found = np.linalg.inv(placement.matrix_of(obj)), []
     # Points that modifiers make come as instances of the object.
     for entry in depsgraph.object_instances:
         owner = entry.parent.original if entry.is_instance else entry.object.original

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splat objects that a view layer shows, with their instances, as native clouds."""
 
+import bpy
+
 from .. import version
 from ..binding.errors import StippleError
-from . import sequences, sources, splat_data, sync
+from . import placement, sequences, sources, splat_data, sync
 
 
 def gather(depsgraph, mode, warn=lambda message: None):
@@ -22,6 +24,9 @@ def gather(depsgraph, mode, warn=lambda message: None):
             warn(f"Splat object '{obj.name}' is a holdout, which splats do not support; it is left out.")
             continue
         matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
+        if placement.is_flat(matrix):
+            warn(f"Splat object '{obj.name}' is scaled to zero; it is left out.")
+            continue
         key = obj.data.as_pointer()
         if key not in clouds:
             clouds[key] = _cloud_of(obj, mode, depsgraph.scene.frame_current)
@@ -34,6 +39,9 @@ def _cloud_of(obj, mode, frame):
     """Native splats of an evaluated object at a frame of the scene, or None for none."""
     data, original = obj.data, obj.original.data
     stipple = data.stipple
+    if mode == 'RENDER' and bpy.app.background and not stipple.edited:
+        # Stored splats of a file that is gone or has changed: nobody would see the panel that says so.
+        sources.check_unchanged(original)
     from_source = (stipple.is_sequence or stipple.source_kind in sources.MODEL_KINDS) and not stipple.edited
     if from_source and not _has_modifiers(obj) and not sync.is_edited(original):
         try:

@@ -6,7 +6,7 @@ import numpy as np
 from .. import version
 from ..binding.errors import invalid
 from ..binding.mesh import Mesh
-from . import meshes, splat_data
+from . import meshes, placement, splat_data
 
 
 def cutters(context):
@@ -28,7 +28,7 @@ def box_matrix(obj):
     local = np.diag([*half, 1.0])
     local[:3, 3] = centre
     matrix = np.array(obj.matrix_world, np.float64) @ local
-    if abs(np.linalg.det(matrix[:3, :3])) <= 1e-12 * np.prod(np.linalg.norm(matrix[:3, :3], axis=0)):
+    if placement.is_flat(matrix):
         raise invalid(f"The box of '{obj.name}' is flat; one with some extent along each axis is needed.")
     return matrix
 

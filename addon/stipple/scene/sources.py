@@ -8,6 +8,7 @@ Blender data.
 import filecmp
 import os
 import re
+import zlib
 from collections import OrderedDict
 
 import bpy
@@ -28,17 +29,32 @@ _MAX_MODELS = 4
 # Splats kept decoded over all cached clouds; 60 bytes each, so 1.2 GB at most.
 _MAX_CACHED_SPLATS = 20_000_000
 
+# What tells whether a file has changed: its size and this many samples, the first and the last byte among them.
+_SAMPLE_BYTES = 1 << 16
+_MAX_SAMPLES = 32
+
 _contexts = {}
+_stamps = {}
 _models = OrderedDict()
 _clouds = OrderedDict()
+
+
+def library_problem():
+    """Why the library cannot be used, '' where nothing is known to be wrong. Loads nothing."""
+    return library.problem(_library_path())
+
+
+def _library_path():
+    chosen = preferences.get()
+    return '' if chosen is None else bpy.path.abspath(chosen.library_path)
 
 
 def context():
     """The native context of the current preferences. Errors: LibraryError."""
     chosen = preferences.get()
-    path, threads, limit = '', 0, 0
+    path, threads, limit = _library_path(), 0, 0
     if chosen is not None:
-        path, threads, limit = bpy.path.abspath(chosen.library_path), chosen.threads, chosen.memory_limit << 20
+        threads, limit = chosen.threads, chosen.memory_limit << 20
     key = (str(library.find(path)), threads, limit)
     if key not in _contexts:
         _contexts.clear()
@@ -56,6 +72,48 @@ def forget():
 def absolute_path(source, owner=None):
     """A source path of a datablock as the system wants it."""
     return os.path.normpath(bpy.path.abspath(source, library=owner.library if owner is not None else None))
+
+
+def state(data):
+    """What is with the file that a datablock's splats come from: 'FINE', 'MISSING' or 'CHANGED' since it was read.
+    Files of a series are read when they are shown, so none of them is old."""
+    stipple = data.stipple
+    if stipple.source_kind == 'NONE' or not stipple.source or stipple.is_sequence:
+        return 'FINE'
+    found = stamp(absolute_path(stipple.source, data))
+    if not found:
+        return 'MISSING'
+    return 'CHANGED' if stipple.source_stamp not in ('', found) else 'FINE'
+
+
+def check_unchanged(data):
+    """Errors: StippleError for a source that is not there or not the one that was read."""
+    found = state(data)
+    if found != 'FINE':
+        what = 'is missing' if found == 'MISSING' else 'has changed since it was read'
+        raise StippleError(f"The source '{absolute_path(data.stipple.source, data)}' of '{data.name}' {what}; choose "
+                           'Relink, or Use as New Source to keep the splats that are stored.', Status.ERROR_IO)
+
+
+def stamp(path):
+    """A short text that changes with a file's content, '' for a file that cannot be read. Of large files it looks at
+    samples: a splat file that is written again differs everywhere."""
+    try:
+        key = _file_key(path)
+        if key not in _stamps:
+            _stamps[key] = _stamp_of(path, key[2])
+        return _stamps[key]
+    except (StippleError, OSError):
+        return ''
+
+
+def _stamp_of(path, size):
+    value, count = 0, min(-(-size // _SAMPLE_BYTES), _MAX_SAMPLES)
+    with open(path, 'rb') as file:
+        for i in range(count):
+            file.seek(i * (size - _SAMPLE_BYTES) // max(count - 1, 1) if size > _SAMPLE_BYTES else 0)
+            value = zlib.crc32(file.read(_SAMPLE_BYTES), value)
+    return f'{size}:{value:08x}'
 
 
 def model(path):
@@ -92,7 +150,9 @@ def model_of(data):
 
 
 def decode(data, settings):
-    """The cloud of a datablock's model at these settings; kept for the next picture."""
+    """The cloud of a datablock's model at these settings; kept for the next picture. Errors: StippleError, also for a
+    source that has changed."""
+    check_unchanged(data)
     key = (_file_key(absolute_path(data.stipple.source, data)) + (masks.key(data),), settings)
     cloud = _clouds.get(key)
     if cloud is None:
@@ -211,6 +271,7 @@ def attach_tree(data, path, count):
     """Notes a splat tree of this many splats as the source of a datablock; its mask stays."""
     stipple = data.stipple
     stipple.source = blend_path(path)
+    stipple.source_stamp = stamp(path)
     stipple.source_kind = 'TREE'
     stipple.source_count = count
     stipple.is_sequence = False
@@ -222,6 +283,7 @@ def attach_cloud(data, path):
     """Notes a splat file as the source of a datablock, all of it shown."""
     stipple = data.stipple
     stipple.source = blend_path(path)
+    stipple.source_stamp = stamp(path)
     stipple.source_kind = 'CLOUD'
     stipple.is_sequence = False
     stipple.source_objects.clear()
@@ -259,6 +321,7 @@ def attach_model(data, path, objects):
     """Notes a model as the source of a datablock, with the meshes and settings that it was made from."""
     stipple = data.stipple
     stipple.source = blend_path(path)
+    stipple.source_stamp = stamp(path)
     stipple.source_kind = 'MODEL'
     stipple.source_detail_weight = stipple.detail_weight
     stipple.source_color_from = stipple.color_from

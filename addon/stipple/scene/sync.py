@@ -52,6 +52,9 @@ def sync(obj, depsgraph, mode, most=None):
     stipple = data.stipple
     if stipple.source_kind == 'NONE' or not stipple.source or stipple.edited:
         return False
+    if mode == 'RENDER' and bpy.app.background:
+        # Nobody sees a panel that says what is wrong, so old splats must not pass for the source's.
+        sources.check_unchanged(data)
     key, decode = _wanted(data, depsgraph, mode, most)
     if data.get(WRITTEN_KEY) == key:
         return False
@@ -82,6 +85,7 @@ def _wanted(data, depsgraph, mode, most):
 
 def _decoded(data, settings):
     settings.check()
+    sources.check_unchanged(data)
     return sources.decode_data(data, settings).read()
 
 

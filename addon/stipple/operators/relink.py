@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splats whose source file has moved or changed get it again, with their settings and their mask."""
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ..binding.cloud import Cloud
+from ..binding.errors import StippleError, invalid
+from ..binding.model import Model
+from ..binding.structs import ModelKind
+from ..jobs import JobOperator
+from ..scene import formats, masks, numbered, sequences, sources, splat_data, sync
+
+
+class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
+    """Read the source of the active splats from another place, or again where it has changed. Budget, mask and all
+    other settings stay"""
+
+    bl_idname = 'stipple.relink'
+    bl_label = "Relink Source"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    filename_ext = formats.READ_ENDINGS[0]
+    filter_glob: StringProperty(default=formats.glob((*formats.READ_ENDINGS, sources.MODEL_SUFFIX)), options={'HIDDEN'})
+    other_count: BoolProperty(name="Accept Another Count", description="Take a file of another number of splats, too; a "
+                              "mask, which says for each splat whether it is hidden, is cleared then", default=False)
+
+    again: BoolProperty(name="Again", description="Read the present source again, without asking for a file",
+                        default=False, options={'HIDDEN', 'SKIP_SAVE'})
+
+    _asked = False
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.object
+        return (splat_data.is_splat_object(obj) and context.mode == 'OBJECT' and obj.data.library is None
+                and obj.data.stipple.source_kind != 'NONE')
+
+    def invoke(self, context, event):
+        data = context.object.data
+        self.filepath = sources.absolute_path(data.stipple.source, data)
+        if self.again:
+            return self.run_in_window(context)
+        self._asked = True
+        return ImportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        if self._asked and not bpy.app.background:
+            return self.run_in_window(context)
+        return JobOperator.execute(self, context)
+
+    def start(self, context):
+        data = context.object.data
+        self._data, self._path = data, sources.absolute_path(data.stipple.source if self.again else self.filepath, data)
+        if data.stipple.is_sequence and numbered.parse(self._path) is None:
+            raise invalid(f"'{self._path}' has no number in its name, which the files of a series need.")
+        load = Cloud.load_start if data.stipple.source_kind == 'CLOUD' else Model.load_start
+        return load(sources.context(), self._path)
+
+    def finish(self, _context, job):
+        data, stipple = self._data, self._data.stipple
+        kind = stipple.source_kind
+        made = job.cloud() if kind == 'CLOUD' else job.model()
+        info = made.info()
+        if kind != 'CLOUD' and info.kind != (ModelKind.HIERARCHY if kind == 'TREE' else ModelKind.SURFACE):
+            raise invalid(f"'{self._path}' holds {'splats with a budget' if kind == 'MODEL' else 'splats of a mesh'}, "
+                          f"but '{data.name}' was made the other way; import it as an object of its own.")
+        count = info.count if kind == 'CLOUD' else info.leaf_count
+        clears_mask = False
+        edited = stipple.edited or sync.is_edited(data)
+        if kind != 'MODEL' and not stipple.is_sequence and not edited:
+            before = _count_before(data)
+            if count != before and not self.other_count:
+                raise invalid(f"'{self._path}' has {count:,} splats; the source of '{data.name}' had {before:,}. Choose "
+                              'another file, or Accept Another Count.')
+            clears_mask = count != before
+        kept = stipple.source, stipple.source_stamp, stipple.source_count
+        try:
+            with sync.paused():
+                stipple.source = sources.blend_path(self._path)
+                stipple.source_stamp = sources.stamp(self._path)
+                if kind == 'TREE' and clears_mask:
+                    stipple.source_count = count
+            if not edited:  # what was changed by hand is never written over
+                self._write(data, made, clears_mask)
+        except StippleError:
+            with sync.paused():
+                stipple.source, stipple.source_stamp, stipple.source_count = kept
+            raise
+        sync.problems.pop(data.name, None)
+        self.report({'INFO'}, f"'{data.name}' comes from '{self._path}' now: {count:,} splats")
+
+    @staticmethod
+    def _write(data, made, clears_mask):
+        stipple = data.stipple
+        if stipple.is_sequence:
+            frame = sequences.shown_now(data)
+            sync.write(data, frame.arrays(), frame.key)
+            return
+        if clears_mask:
+            masks.clear(data)
+        splats = sources.masked(made, data) if stipple.source_kind == 'CLOUD' else sources.decode_data(
+            data, sources.decode_settings(stipple))
+        sync.write_decoded(data, splats.read())
+
+
+def _count_before(data):
+    """Splats of the source as it was read."""
+    if data.stipple.source_kind == 'TREE':
+        return data.stipple.source_count
+    counts = masks.counts(data)
+    return splat_data.count(data) if counts is None else counts[0]
+
+
+classes = (STIPPLE_OT_relink,)
