@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# A Debian suite in a folder, with that suite's Blender: trixie has 4.3, sid has 5.2. Needs root.
+#   blender_suite.sh prepare trixie|sid DIR   makes it, or brings an unfinished one to its end (some minutes, 2.5 GB)
+#   blender_suite.sh run DIR COMMAND...       runs COMMAND inside, with the current folder at /project
+# Mounts live in a namespace of their own and end with the command, so that DIR can be removed like any other folder.
+set -euo pipefail
+
+# What Debian's Blender 4.3 and 5.2 ask for when they start, beside the packages that Stipple names.
+extra_packages=(python3-cattr python3-requests xvfb xauth)
+
+fail() {
+  echo "blender_suite.sh: $1" >&2
+  exit 1
+}
+
+inside() { # DIR COMMAND...: /proc, /dev and the project are there while the command runs
+  local dir=$1
+  shift
+  mkdir -p "$dir/project"
+  ln -sfn /proc/self/mounts "$dir/etc/mtab"
+  unshare --mount sh -c '
+    dir=$1 && shift
+    for folder in proc sys dev; do mount --rbind "/$folder" "$dir/$folder" || exit 1; done
+    mount -t tmpfs tmpfs "$dir/dev/shm" && mount --bind "$PWD" "$dir/project" || exit 1
+    exec chroot "$dir" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
+      STIPPLE_JOBS="${STIPPLE_JOBS:-}" sh -c '\''cd /project && exec "$@"'\'' sh "$@"' sh "$dir" "$@"
+}
+
+prepare() { # SUITE DIR
+  local suite=$1 dir=$2 mirror
+  if [[ -e $dir/stipple-suite && $(cat "$dir/stipple-suite") == "$suite" ]]; then
+    return
+  fi
+  command -v debootstrap >/dev/null || DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends debootstrap
+  mirror=$(sed -n 's/^URIs: *//p' /etc/apt/sources.list.d/debian.sources 2>/dev/null | head -1)
+  if [[ ! -e $dir/usr/bin/apt-get || -d $dir/debootstrap ]]; then
+    rm -rf --one-file-system "$dir"
+    mkdir -p "$dir"
+    debootstrap --variant=minbase "$suite" "$dir" "${mirror:-http://deb.debian.org/debian}"
+  fi
+  cp /etc/resolv.conf /etc/hosts "$dir/etc/"
+  # Packages must not start services here.
+  printf '#!/bin/sh\nexit 101\n' > "$dir/usr/sbin/policy-rc.d"
+  chmod +x "$dir/usr/sbin/policy-rc.d"
+  inside "$dir" bash native/install_dependencies.sh
+  inside "$dir" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${extra_packages[@]}"
+  inside "$dir" apt-get clean
+  echo "$suite" > "$dir/stipple-suite"
+}
+
+[[ $(id -u) == 0 ]] || fail "this takes root, for chroot and mounts."
+case ${1:-} in
+  prepare)
+    [[ $# == 3 && $2 =~ ^(trixie|sid)$ ]] || fail "usage: prepare trixie|sid DIR."
+    cd "$(dirname "${BASH_SOURCE[0]}")/.."
+    prepare "$2" "$(realpath -m "$3")"
+    ;;
+  run)
+    [[ $# -ge 3 ]] || fail "usage: run DIR COMMAND..."
+    [[ -e $2/stipple-suite ]] || fail "'$2' is not a prepared suite; make it with: blender_suite.sh prepare trixie|sid $2"
+    inside "$(realpath "$2")" "${@:3}"
+    ;;
+  *) fail "the verb is '${1:-}'; it must be prepare or run." ;;
+esac
