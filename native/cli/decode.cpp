@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "cli/commands.h"
 #include "cli/formats.h"
@@ -12,10 +13,12 @@ namespace stipple::cli {
 
 namespace {
 
+constexpr int64_t kMaxRefineSteps = 1'000'000;
+
 struct Arguments {
   std::string in, out, order = "systematic";
   int64_t anchors = 20000;
-  double ratio = 0;
+  std::optional<double> ratio;
   int64_t refine = 0;
   int64_t gaussians_per_anchor = 1;
   uint64_t seed = 0;
@@ -59,19 +62,25 @@ uint64_t counted(int64_t value, const char* name, int64_t last) {
   return static_cast<uint64_t>(value);
 }
 
+/// What can be said of the options before a long job begins.
+void checkBudget(const Arguments& arguments) {
+  counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
+  if (arguments.ratio && !(*arguments.ratio > 0 && *arguments.ratio <= 1)) {
+    throw Failure("--ratio is " + std::to_string(*arguments.ratio) +
+                  "; above 0 and up to 1 is allowed");
+  }
+  if (arguments.refine != 0) counted(arguments.refine, "--refine", kMaxRefineSteps);
+}
+
 /// The budget as it was asked for: a count, or a share of an existing cloud.
 uint64_t budgetOf(const Model& model, const Arguments& arguments) {
-  if (arguments.ratio == 0) return counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
+  if (!arguments.ratio) return counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
   auto info = sized<StippleModelInfo>();
   check(stipple_model_info(model.get(), &info));
   if (info.kind != STIPPLE_MODEL_HIERARCHY) {
     throw Failure("--ratio is a share of existing splats; a mesh takes --anchors");
   }
-  if (!(arguments.ratio > 0 && arguments.ratio <= 1)) {
-    throw Failure("--ratio is " + std::to_string(arguments.ratio) +
-                  "; above 0 and up to 1 is allowed");
-  }
-  const double count = std::round(arguments.ratio * static_cast<double>(info.leaf_count));
+  const double count = std::round(*arguments.ratio * static_cast<double>(info.leaf_count));
   return static_cast<uint64_t>(std::max(count, 1.0));
 }
 
@@ -85,7 +94,8 @@ Cloud refined(const Cloud& cloud, const Model& model, const Arguments& arguments
   const Cloud full = cutOf(model, info.leaf_count);
   StippleRefineOptions options;
   stipple_refine_options_init(&options);
-  options.iterations = static_cast<uint32_t>(counted(arguments.refine, "--refine", 1000000));
+  options.iterations =
+      static_cast<uint32_t>(counted(arguments.refine, "--refine", kMaxRefineSteps));
   options.seed = arguments.seed;
   const auto job =
       make<Job>(stipple_cloud_refine_start, const_cast<const StippleCloud*>(cloud.get()),
@@ -99,7 +109,7 @@ void decode(const Context& context, const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   StippleDecodeOptions options;
   stipple_decode_options_init(&options);
-  counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
+  checkBudget(arguments);
   options.gaussians_per_anchor =
       static_cast<uint32_t>(counted(arguments.gaussians_per_anchor, "--gaussians-per-anchor", 32));
   options.order =
