@@ -25,11 +25,21 @@ class ShownSplats:
     """One object or instance that a view shows."""
 
     key: tuple        # stays while it is the same instance
-    cloud: object     # native cloud
+    cloud: object     # native cloud, or a GradedCloud
     count: int
     antialias: int
     matrix: np.ndarray  # [4,4] object to world, float64
     selected: bool = False
+
+    @property
+    def plain(self):
+        """The cloud without its grade: what geometry is made of."""
+        return getattr(self.cloud, 'cloud', self.cloud)
+
+    @property
+    def grade(self):
+        """The grade's settings, or None."""
+        return getattr(self.cloud, 'settings', None)
 
 
 class Geometry:
@@ -38,7 +48,7 @@ class Geometry:
     def __init__(self, shown):
         clouds = {}
         for entry in shown:
-            clouds.setdefault(id(entry.cloud), (entry.cloud, entry.count))
+            clouds.setdefault(id(entry.plain), (entry.plain, entry.count))
         array, first_rows = draw_order.pack([cloud for cloud, _ in clouds.values()],
                                             [count for _, count in clouds.values()], TEXTURE_SPLATS)
         self.key = _geometry_key(shown)
@@ -47,11 +57,11 @@ class Geometry:
         self._clouds = clouds  # an id stays one cloud's while that lives
 
     def first_row(self, entry):
-        return self._first_rows[id(entry.cloud)]
+        return self._first_rows[id(entry.plain)]
 
 
 def _geometry_key(shown):
-    return tuple(dict.fromkeys(id(entry.cloud) for entry in shown))
+    return tuple(dict.fromkeys(id(entry.plain) for entry in shown))
 
 
 @dataclass
@@ -78,7 +88,10 @@ class SplatView:
         """Starts a sort where the view has changed, takes the one that has ended. wait: for tests and the first
         picture of a scene. Returns whether a sort is still on its way. Errors: StippleError."""
         self._take()
-        key = (_geometry_key(shown), tuple((e.key, e.matrix.tobytes()) for e in shown), camera.model,
+        if not shown:
+            self._order, self._key = None, None
+            return self._task is not None
+        key = (_geometry_key(shown), tuple((e.key, e.grade, e.matrix.tobytes()) for e in shown), camera.model,
                bytes(camera.world_to_camera))
         if self._task is None and key != self._key:
             self._start(shown, camera)
@@ -106,7 +119,7 @@ class SplatView:
         task, self._task = self._task, None
         task.job.wait()  # raises what went wrong
         self._order, self._pending = self._pending, None
-        self._order.rows = splat_shader.texture(task.rows, TEXTURE_SPLATS) if task.count else None
+        self._order.rows = splat_shader.texture(task.rows, TEXTURE_SPLATS)
 
     def is_sorting(self):
         return self._task is not None
@@ -121,7 +134,7 @@ class SplatView:
         camera: as the native renderer's. window_matrix: Blender's, for depths; depth_back: metres by which the camera
         stands behind Blender's view. clip_planes: [n,4] in the world, hidden where the plane is above 0."""
         order = self._order
-        if order is None or order.rows is None:
+        if order is None:
             return
         # A shader does not keep what it samples alive: this name does, until the draw call is made.
         instances = _instances(order.keys, shown, camera, clip_planes)
@@ -177,5 +190,6 @@ def _instances(keys, shown, camera, clip_planes):
         if entry is None:
             continue
         flat[i, :3] = (world_to_camera @ entry.matrix)[:3]
-        flat[i, 3] = (*_LOW_PASS[Antialias(entry.antialias)], 1.0, float(entry.selected))
+        opacity = 1.0 if entry.grade is None else entry.grade.opacity
+        flat[i, 3] = (*_LOW_PASS[Antialias(entry.antialias)], opacity, float(entry.selected))
     return splat_shader.texture(texels, INSTANCES_PER_ROW * INSTANCE_TEXELS)

@@ -47,7 +47,7 @@ void main()
   vec4 row = texelFetch(rows, ivec2(place % TEXTURE_SPLATS, place / TEXTURE_SPLATS), 0);
   int splat = int(row.x);
   int number = int(row.y);
-  vec4 state = instanceTexel(number, 3); /* low-pass variance, compensated, shown, selected */
+  vec4 state = instanceTexel(number, 3); /* low-pass variance, compensated, opacity, selected */
   if (state.z == 0.0) {
     return;
   }
@@ -96,7 +96,7 @@ void main()
   float r01 = dot(u.xyz, y);
   vec4 v = vec4(y - r01 * u.xyz, r01 * u.w);
   float r11 = sqrt(dot(v, v) + state.x);
-  float opacity = placed.w;
+  float opacity = placed.w * state.z;
   if (state.y != 0.0) {
     /* The low-pass keeps a splat's light. */
     float sharp00 = length(x);

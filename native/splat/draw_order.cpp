@@ -34,6 +34,7 @@ struct OrderedCloud {
   int sh_degree;
   bool to_display;  ///< colours are stored scene linear
   bool is_checked;
+  const ColourGrade* grade;  ///< NULL where it leaves colours alone
   float number;
   uint64_t first_row;
   uint64_t first_index;
@@ -74,6 +75,7 @@ OrderedCloud placeForOrder(const SplatInstance& instance, const Camera& camera,
   placed.sh_degree = std::min(cloud.sh_degree, sh_degree_limit);
   placed.to_display = cloud.colour_space == ColourSpace::kLinear;
   placed.is_checked = instance.values_are_checked;
+  placed.grade = instance.grade.changesColour() ? &instance.grade : nullptr;
   if (placed.sh_degree > 0 && !isInvertible(object)) placed.sh_degree = 0;
   if (placed.sh_degree > 0) {
     const Mat3d to_object = inverse(object);
@@ -120,6 +122,11 @@ void fillColour(const OrderedCloud& placed, size_t index, DrawRow& row) {
   const size_t count = shCoefficientCount(degree);
   for (size_t k = 1; k < count; ++k) {
     for (size_t c = 0; c < 3; ++c) sums[c] += basis[k] * sh[k * 3 + c];
+  }
+  if (placed.grade) {
+    // As finishColour does.
+    for (float& sum : sums) sum = std::clamp(sum, -1e12f, 1e12f);
+    applyGrade(*placed.grade, sums);
   }
   const uint32_t red = colourStep(placed, sums[0]);
   const uint32_t green = colourStep(placed, sums[1]);
@@ -172,6 +179,7 @@ uint64_t placeInstances(std::span<const SplatInstance> instances, const Camera& 
     if (!instances[i].cloud) fail(ErrorCode::kInvalidArgument, name + " has no cloud");
     validatePlacement(instances[i].object_to_world, name + ": matrix");
     validateSizes(*instances[i].cloud, name.c_str());
+    validate(instances[i].grade, name.c_str());
     OrderedCloud placed = placeForOrder(instances[i], camera, output.sh_degree_limit);
     placed.number = static_cast<float>(i);
     placed.first_index = count;

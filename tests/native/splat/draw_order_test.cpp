@@ -165,8 +165,10 @@ TEST(DrawOrder, TakesAnObjectScaledToZero) {
 TEST(DrawOrder, RowsNameGeometryInstanceAndTheColourFromTheCamera) {
   const CloudRecipe recipe{.count = 500, .degree = 3};
   const SplatCloud cloud = randomCloud(recipe, 6);
-  const SplatInstance instances[] = {{&cloud, placement(1.0, 0, 0, 0)},
-                                     {&cloud, placement(0.5, 0.2, 0.1, 0)}};
+  SplatInstance instances[] = {{&cloud, placement(1.0, 0, 0, 0)},
+                               {&cloud, placement(0.5, 0.2, 0.1, 0)}};
+  instances[1].grade.matrix = {0.5, 0.2, 0, 0, 1.5, 0, 0.1, 0, 0.7};
+  instances[1].grade.offset = {0.1, -0.05, 0};
   for (const CameraModel model : {CameraModel::kPerspective, CameraModel::kOrthographic}) {
     Camera camera = frontCamera(64, 48, 60, 3.0);
     camera.model = model;
