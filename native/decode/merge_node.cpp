@@ -22,120 +22,43 @@ namespace {
 
 /// Extent of the cloud over the default footprint: half a pixel where it fills a picture of 800.
 constexpr double kFootprintsPerRadius = 760;
-constexpr double kTwoPi = 2 * std::numbers::pi;
-constexpr double kLargestDepth = std::numbers::pi * std::numbers::pi / 6;
 
-/// Coverage counts beside colour, as what stands behind is not known; measured best on scans of
-/// people and things (0.1 to 1 are alike within 0.3 dB).
-constexpr double kCoverageShare = 0.3;
-/// Errors of shape show against a surrounding that is likely to be alike: this share of the merged
-/// colour is taken off.
-constexpr double kLikeSurrounding = 0.3;
-/// Variances below this of a degenerate splat, in units of the tree, cannot be told apart from 0.
-constexpr double kSmallestDeterminant = 1e-60;
-
-/// Entries of the covariance that a coordinate plane keeps, and its axes.
-constexpr size_t kPlaneEntries[3][3] = {{0, 1, 3}, {0, 2, 5}, {3, 4, 5}};
-constexpr size_t kPlaneAxes[3][2] = {{0, 1}, {0, 2}, {1, 2}};
-
-/// Opacity over depth as cubic Hermite pieces: d o / d depth = o / (-ln(1 - o)) is smooth.
-class OpacityTable {
- public:
-  OpacityTable() {
-    for (size_t i = 0; i <= kPieces; ++i) {
-      const double depth = kLargestDepth * static_cast<double>(i) / kPieces;
-      double low = 0;
-      double high = 1;
-      for (int step = 0; step < 60; ++step) {
-        const double middle = 0.5 * (low + high);
-        (opticalDepth(middle) < depth ? low : high) = middle;
-      }
-      values_[i] = low;
-      // Of o / u with u = -ln(1 - o): 1 at o = 0; 0 at o = 1.
-      const double u = i < kPieces ? -std::log1p(-low) : 0;
-      slopes_[i] = i == 0 ? 1.0 : i == kPieces ? 0.0 : low / u;
+OpacityTable makeOpacityTable() {
+  OpacityTable table;
+  for (size_t i = 0; i <= OpacityTable::kPieces; ++i) {
+    const double depth = OpacityTable::kStep * static_cast<double>(i);
+    double low = 0;
+    double high = 1;
+    for (int step = 0; step < 60; ++step) {
+      const double middle = 0.5 * (low + high);
+      (opticalDepth(middle) < depth ? low : high) = middle;
     }
+    table.ends[2 * i] = low;
+    // d o / d depth = o / (-ln(1 - o)) is smooth: 1 at o = 0; 0 at o = 1.
+    const double u = i < OpacityTable::kPieces ? -std::log1p(-low) : 0;
+    table.ends[2 * i + 1] = i == 0 ? 1.0 : i == OpacityTable::kPieces ? 0.0 : low / u;
   }
-
-  double at(double depth) const {
-    constexpr double kStep = kLargestDepth / kPieces;
-    const double x = std::clamp(depth, 0.0, kLargestDepth) / kStep;
-    const size_t piece = std::min<size_t>(static_cast<size_t>(x), kPieces - 1);
-    const double t = x - static_cast<double>(piece);
-    const double s = 1 - t;
-    return s * s * (1 + 2 * t) * values_[piece] + t * t * (1 + 2 * s) * values_[piece + 1] +
-           kStep * t * s * (s * slopes_[piece] - t * slopes_[piece + 1]);
-  }
-
- private:
-  static constexpr size_t kPieces = 512;
-  double values_[kPieces + 1];
-  double slopes_[kPieces + 1];
-};
-
-/// exp(x) for x <= 0, 0 below -40, where errors are far below those of moments. The reduced
-/// argument is within ln 2 / 2 of 0; the series ends at a relative error of 1e-9.
-double expNegative(double x) {
-  if (!(x > -40)) return 0;
-  constexpr double kLog2E = 1.4426950408889634;
-  const double n = std::floor(x * kLog2E + 0.5);
-  const double r = x - n * 0.6931471805599453;
-  double sum = 1 + r * (1.0 / 7) * (1 + r * (1.0 / 8));
-  sum = 1 + r * (1.0 / 6) * sum;
-  sum = 1 + r * (1.0 / 5) * sum;
-  sum = 1 + r * (1.0 / 4) * sum;
-  sum = 1 + r * (1.0 / 3) * sum;
-  sum = 1 + r * (1.0 / 2) * sum;
-  sum = 1 + r * sum;
-  return sum * std::bit_cast<double>(static_cast<uint64_t>(static_cast<int64_t>(n) + 1023) << 52);
+  return table;
 }
 
-/// Determinant of the symmetric matrix (xx xy; xy yy) after the low-pass of variance `blur`. Of a
-/// needle, rounding would leave anything of xx yy - xy^2: below 0 it is 0, what the blur adds
-/// stays.
-double blurredDeterminant(double xx, double xy, double yy, double blur) {
-  return std::max(std::max(xx * yy - xy * xy, 0.0) + blur * (xx + yy + blur), kSmallestDeterminant);
+using std::max;
+using std::min;
+using std::sqrt;
+
+double pick(bool condition, double yes, double no) {
+  return condition ? yes : no;
+}
+double wholePart(double value) {
+  return std::floor(value);
+}
+double powerOfTwo(double n) {
+  return std::bit_cast<double>(static_cast<uint64_t>(static_cast<int64_t>(n) + 1023) << 52);
+}
+void opacityEnds(double piece, double* ends) {
+  std::copy_n(&opacityTable().ends[2 * static_cast<size_t>(piece)], 4, ends);
 }
 
-/// Integral of the product of two unit-mass Gaussians over a coordinate plane, through the
-/// low-pass.
-double planeProduct(const MergeNode& a, const MergeNode& b, size_t plane, double footprint) {
-  const size_t* entries = kPlaneEntries[plane];
-  const double xx = a.covariance[entries[0]] + b.covariance[entries[0]];
-  const double xy = a.covariance[entries[1]] + b.covariance[entries[1]];
-  const double yy = a.covariance[entries[2]] + b.covariance[entries[2]];
-  const double blur = 2 * footprint;
-  const double determinant = blurredDeterminant(xx, xy, yy, blur);
-  const double dx = a.mean[kPlaneAxes[plane][0]] - b.mean[kPlaneAxes[plane][0]];
-  const double dy = a.mean[kPlaneAxes[plane][1]] - b.mean[kPlaneAxes[plane][1]];
-  const double squared =
-      ((yy + blur) * dx * dx - 2 * xy * dx * dy + (xx + blur) * dy * dy) / determinant;
-  // Along a needle rounding may leave less than 0.
-  return expNegative(-0.5 * std::max(squared, 0.0)) / (kTwoPi * std::sqrt(determinant));
-}
-
-/// Fills what follows from the covariance.
-void measure(MergeNode& node, double footprint) {
-  double squares = 0;
-  for (size_t plane = 0; plane < 3; ++plane) {
-    const size_t* entries = kPlaneEntries[plane];
-    const double determinant =
-        blurredDeterminant(node.covariance[entries[0]], node.covariance[entries[1]],
-                           node.covariance[entries[2]], footprint);
-    squares += determinant;
-    node.plane_size[plane] = std::sqrt(determinant);
-    // The square of a Gaussian is one of half the variance.
-    node.plane_energy[plane] = 1 / (2 * kTwoPi * node.plane_size[plane]);
-  }
-  // The sum of the squared areas over three orthogonal directions is the same for all of them.
-  node.area = std::sqrt(squares / 3);
-}
-
-double dotColours(const MergeNode& a, const MergeNode& b, const std::array<double, 3>& behind) {
-  double sum = kCoverageShare;
-  for (size_t c = 0; c < 3; ++c) sum += (a.colour[c] - behind[c]) * (b.colour[c] - behind[c]);
-  return sum;
-}
+#include "decode/merge_steps-inl.h"
 
 }  // namespace
 
@@ -165,9 +88,13 @@ double opticalDepth(double opacity) {
               s * (1.0 / 3600 - s * (1.0 / 211680 - s * (1.0 / 10886400 - s * (1.0 / 526901760)))));
 }
 
+const OpacityTable& opacityTable() {
+  static const OpacityTable table = makeOpacityTable();
+  return table;
+}
+
 double opacityOfDepth(double depth) {
-  static const OpacityTable table;
-  return std::min(table.at(depth), kMergeMaxOpacity);
+  return opacityByTable(depth);
 }
 
 MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,
@@ -185,7 +112,7 @@ MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,
     node.colour[axis] =
         std::max(0.0, 0.5 + static_cast<double>(kShC0) * static_cast<double>(sh[axis]));
   }
-  measure(node, scale.footprint);
+  measure<double>(node, scale.footprint);
   node.opacity = std::min(static_cast<double>(cloud.opacities[index]), kMergeMaxOpacity);
   node.depth = opticalDepth(node.opacity) * node.area;
   node.visibility = visibility;
@@ -196,59 +123,13 @@ MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,
 
 MergeNode mergedNode(const MergeNode& a, const MergeNode& b, const MergeScale& scale) {
   MergeNode node;
-  node.weight = a.weight + b.weight;
-  const double share_a = node.weight > 0 ? a.weight / node.weight : 0.5;
-  const double share_b = 1 - share_a;
-  std::array<double, 3> apart;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    node.mean[axis] = share_a * a.mean[axis] + share_b * b.mean[axis];
-    apart[axis] = a.mean[axis] - b.mean[axis];
-    node.colour[axis] = share_a * a.colour[axis] + share_b * b.colour[axis];
-  }
-  const double spread = share_a * share_b;
-  const double products[6] = {apart[0] * apart[0], apart[0] * apart[1], apart[0] * apart[2],
-                              apart[1] * apart[1], apart[1] * apart[2], apart[2] * apart[2]};
-  for (size_t i = 0; i < 6; ++i) {
-    node.covariance[i] =
-        share_a * a.covariance[i] + share_b * b.covariance[i] + spread * products[i];
-  }
-  measure(node, scale.footprint);
-  node.visibility = share_a * a.visibility + share_b * b.visibility;
-  node.contrast = share_a * a.contrast + share_b * b.contrast;
-  // What stands behind the others adds to the coverage only as far as it is seen beside them.
-  const double seen_a = a.visibility < node.visibility ? a.visibility / node.visibility : 1;
-  const double seen_b = b.visibility < node.visibility ? b.visibility / node.visibility : 1;
-  node.opacity = opacityOfDepth((seen_a * a.depth + seen_b * b.depth) / node.area);
-  node.depth = std::min(seen_a * a.depth + seen_b * b.depth, kLargestDepth * node.area);
+  mergeMoments<double>(a, b, scale.footprint, node);
   return node;
 }
 
 double mergeError(const MergeNode& a, const MergeNode& b, const MergeNode& merged,
                   const MergeScale& scale) {
-  std::array<double, 3> behind;
-  for (size_t c = 0; c < 3; ++c) behind[c] = kLikeSurrounding * merged.colour[c];
-  const double aa = dotColours(a, a, behind);
-  const double bb = dotColours(b, b, behind);
-  const double mm = dotColours(merged, merged, behind);
-  const double ab = dotColours(a, b, behind);
-  const double am = dotColours(a, merged, behind);
-  const double bm = dotColours(b, merged, behind);
-  const double in_a = kTwoPi * a.contrast * a.opacity;
-  const double in_b = kTwoPi * b.contrast * b.opacity;
-  const double in_m = kTwoPi * merged.contrast * merged.opacity;
-  double error = 0;
-  for (size_t plane = 0; plane < 3; ++plane) {
-    const double mass_a = in_a * a.plane_size[plane];
-    const double mass_b = in_b * b.plane_size[plane];
-    const double mass_m = in_m * merged.plane_size[plane];
-    error += mass_a * mass_a * aa * a.plane_energy[plane] +
-             mass_b * mass_b * bb * b.plane_energy[plane] +
-             mass_m * mass_m * mm * merged.plane_energy[plane] +
-             2 * (mass_a * mass_b * ab * planeProduct(a, b, plane, scale.footprint) -
-                  mass_a * mass_m * am * planeProduct(a, merged, plane, scale.footprint) -
-                  mass_b * mass_m * bm * planeProduct(b, merged, plane, scale.footprint));
-  }
-  return std::max(error, 0.0);
+  return errorOfMerge<double>(a, b, merged, scale.footprint);
 }
 
 void writeNode(const MergeNode& node, const MergeScale& scale, SplatCloud& cloud, size_t index) {

@@ -1,11 +1,13 @@
 #include "decode/merge_rounds.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <limits>
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "decode/merge_cost.h"
 #include "decode/merge_neighbours.h"
 
 // Based on: Murtagh, A Survey of Recent Advances in Hierarchical Clustering Algorithms, Computer
@@ -17,9 +19,9 @@ namespace stipple {
 
 namespace {
 
-constexpr size_t kNeighbourCount = 8;
+constexpr size_t kNeighbourCount = 6;
 /// Partners that are kept per node, the cheapest ones.
-constexpr size_t kListCapacity = 16;
+constexpr size_t kListCapacity = 10;
 /// Neighbours are searched afresh when this many times fewer nodes are left.
 constexpr size_t kSearchAgain = 4;
 constexpr size_t kGrain = 256;
@@ -40,7 +42,9 @@ class MergeRounds {
     for (size_t i = 0; i < count_; ++i) ids_[i] = active_[i] = static_cast<uint32_t>(i);
     entries_.resize(count_ * kListCapacity);
     sizes_.assign(count_, 0);
-    best_.assign(count_, kNone);
+    best_.assign(count_, {0.0f, kNone});
+    stale_.assign(count_, 1);
+    touched_.assign(count_, 0);
     alias_ = ids_;
     changed_.assign(count_, 0);
     errors_.assign(count_, 0.0f);
@@ -77,21 +81,29 @@ class MergeRounds {
   }
 
  private:
-  float costOf(uint32_t a, uint32_t b) const {
-    if (a > b) std::swap(a, b);
-    const MergeNode merged = mergedNode(nodes_[a], nodes_[b], scale_);
-    constexpr double kLargest = std::numeric_limits<float>::max();
-    return static_cast<float>(std::min(mergeError(nodes_[a], nodes_[b], merged, scale_), kLargest));
+  /// Costs of a node with the others of entries[0..count).
+  void fillCosts(uint32_t slot, Entry* entries, size_t count) const {
+    uint32_t others[2 * kListCapacity] = {};
+    float costs[2 * kListCapacity];
+    for (size_t k = 0; k < count; ++k) others[k] = entries[k].slot;
+    kernel_.costs(nodes_.data(), slot, others, count, scale_, costs);
+    for (size_t k = 0; k < count; ++k) entries[k].cost = costs[k];
   }
 
-  /// A total order of edges: by cost, ties shuffled so that equal costs leave many pairs.
-  uint64_t key(uint32_t slot, const Entry& entry) const {
-    const uint32_t low = std::min(slot, entry.slot);
-    const uint32_t high = std::max(slot, entry.slot);
-    uint32_t cost = std::bit_cast<uint32_t>(entry.cost);
-    if (coarse_) cost >>= 20;
-    const uint64_t shuffled = mixBits((static_cast<uint64_t>(low) << 32) | high);
-    return (static_cast<uint64_t>(cost) << 32) | (shuffled >> 32);
+  /// A total order of the edges of a slot: by cost, ties shuffled so that equal costs leave many
+  /// pairs, then by the other slot.
+  bool isCheaper(uint32_t slot, const Entry& x, const Entry& y) const {
+    const uint32_t shift = coarse_ ? 20 : 0;
+    const uint32_t cost_x = std::bit_cast<uint32_t>(x.cost) >> shift;
+    const uint32_t cost_y = std::bit_cast<uint32_t>(y.cost) >> shift;
+    if (cost_x != cost_y) return cost_x < cost_y;
+    const uint64_t shuffled_x = shuffled(slot, x.slot);
+    const uint64_t shuffled_y = shuffled(slot, y.slot);
+    return shuffled_x != shuffled_y ? shuffled_x < shuffled_y : x.slot < y.slot;
+  }
+
+  static uint64_t shuffled(uint32_t a, uint32_t b) {
+    return mixBits((static_cast<uint64_t>(std::min(a, b)) << 32) | std::max(a, b));
   }
 
   void searchNeighbours() {
@@ -104,52 +116,94 @@ class MergeRounds {
     }
     const std::vector<uint32_t> rows = nearestNeighbours(places, kNeighbourCount);
     const auto append = [&](uint32_t slot, uint32_t other) {
-      Entry* list = &entries_[slot * kListCapacity];
-      for (size_t k = 0; k < sizes_[slot]; ++k) {
-        if (list[k].slot == other) return;
-      }
-      if (sizes_[slot] < kListCapacity) list[sizes_[slot]++] = {0.0f, other};
+      if (sizes_[slot] == kListCapacity) return;
+      entries_[slot * kListCapacity + sizes_[slot]++] = {0.0f, other};
     };
-    const auto forEachRow = [&](const auto& use) {
-      for (size_t i = 0; i < count; ++i) {
+    std::vector<uint8_t> one_sided(count, 0);  // bit k: the neighbour k does not know the slot
+    static_assert(kNeighbourCount <= 8);
+    parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
         for (size_t k = 0; k < kNeighbourCount; ++k) {
           const uint32_t other = rows[i * kNeighbourCount + k];
-          if (other != kNoPlace) use(active_[i], active_[other]);
+          if (other == kNoPlace) break;
+          append(active_[i], active_[other]);
+          const uint32_t* back = &rows[other * kNeighbourCount];
+          const bool known = std::find(back, back + kNeighbourCount, i) != back + kNeighbourCount;
+          one_sided[i] = static_cast<uint8_t>(one_sided[i] | (known ? 0 : 1) << k);
         }
       }
-    };
-    forEachRow([&](uint32_t slot, uint32_t other) { append(slot, other); });
-    forEachRow([&](uint32_t slot, uint32_t other) { append(other, slot); });
-    keepMutual(active_, [](uint32_t) { return true; });
+    });
+    // Who is a neighbour's neighbour comes after the slot's own, in the order of the slots. Where
+    // there is no room, the edge is given up at its other end.
+    for (size_t i = 0; i < count; ++i) {
+      const uint8_t asking = one_sided[i];
+      one_sided[i] = 0;
+      for (size_t k = 0; asking >> k != 0; ++k) {
+        if (!(asking >> k & 1)) continue;
+        const uint32_t other = active_[rows[i * kNeighbourCount + k]];
+        if (sizes_[other] < kListCapacity) {
+          append(other, active_[i]);
+        } else {
+          one_sided[i] = static_cast<uint8_t>(one_sided[i] | 1 << k);
+        }
+      }
+    }
+    parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) keepEntries(active_[i], ~uint32_t{one_sided[i]});
+    });
+    // An edge costs the same from both ends: the lower slot finds out.
     parallelFor(count, kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const uint32_t slot = active_[i];
         Entry* list = &entries_[slot * kListCapacity];
-        for (size_t k = 0; k < sizes_[slot]; ++k) list[k].cost = costOf(slot, list[k].slot);
+        Entry* above = std::partition(list, list + sizes_[slot],
+                                      [&](const Entry& e) { return e.slot < slot; });
+        fillCosts(slot, above, static_cast<size_t>(list + sizes_[slot] - above));
+        stale_[slot] = 1;
+      }
+    });
+    parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        Entry* list = &entries_[active_[i] * kListCapacity];
+        for (Entry* entry = list; entry < list + sizes_[active_[i]]; ++entry) {
+          if (entry->slot < active_[i]) entry->cost = entryOf(entry->slot, active_[i])->cost;
+        }
       }
     });
   }
 
+  /// What a slot lists about another that it does list; null: it does not.
+  const Entry* entryOf(uint32_t slot, uint32_t other) const {
+    const Entry* list = &entries_[slot * kListCapacity];
+    for (size_t k = 0; k < sizes_[slot]; ++k) {
+      if (list[k].slot == other) return list + k;
+    }
+    return nullptr;
+  }
+
   void choosePairs() {
+    const bool all = coarse_ != was_coarse_;
+    was_coarse_ = coarse_;
     parallelFor(active_.size(), kGrain * 16, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const uint32_t slot = active_[i];
+        if (!all && !stale_[slot]) continue;
+        stale_[slot] = 0;
         const Entry* list = &entries_[slot * kListCapacity];
-        uint64_t least = std::numeric_limits<uint64_t>::max();
-        best_[slot] = kNone;
+        best_[slot] = {0.0f, kNone};
         for (size_t k = 0; k < sizes_[slot]; ++k) {
-          const uint64_t value = key(slot, list[k]);
-          if (value < least || best_[slot] == kNone) {
-            least = value;
-            best_[slot] = list[k].slot;
+          if (best_[slot].slot == kNone || isCheaper(slot, list[k], best_[slot])) {
+            best_[slot] = list[k];
           }
         }
       }
     });
     pairs_.clear();
     for (const uint32_t slot : active_) {
-      const uint32_t other = best_[slot];
-      if (other != kNone && slot < other && best_[other] == slot) pairs_.push_back({slot, other});
+      const uint32_t other = best_[slot].slot;
+      if (other != kNone && slot < other && best_[other].slot == slot) {
+        pairs_.push_back({slot, other});
+      }
     }
   }
 
@@ -164,7 +218,7 @@ class MergeRounds {
         const uint32_t id = static_cast<uint32_t>(count_ + first_merge + i);
         const MergeNode merged = mergedNode(nodes_[a], nodes_[b], scale_);
         // Never below that of the children, so that a cut refines from the top.
-        const float error = std::max({costOf(a, b), errors_[a], errors_[b]});
+        const float error = std::max({best_[a].cost, errors_[a], errors_[b]});
         merges_[first_merge + i] = {ids_[a], ids_[b], error};
         on_merge(id, merges_[first_merge + i], nodes_[a], nodes_[b], merged);
         nodes_[a] = merged;
@@ -182,44 +236,45 @@ class MergeRounds {
     });
     std::vector<uint32_t> merged(pairs_.size());
     for (size_t i = 0; i < merged.size(); ++i) merged[i] = pairs_[i].first;
-    keepMutual(merged, [&](uint32_t other) { return changed_[other] == round_; });
+    keepMutual(merged);
     std::erase_if(active_, [&](uint32_t slot) { return alias_[slot] != slot; });
     parallelFor(active_.size(), kGrain * 16, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        if (changed_[active_[i]] != round_) follow(active_[i]);
+        const uint32_t slot = active_[i];
+        if (touched_[slot] != round_ || changed_[slot] == round_) continue;
+        follow(slot);
+        stale_[slot] = 1;
       }
     });
   }
 
-  /// Drops entries that their partner does not list too; only partners that concerns() names are
-  /// looked at.
-  template <typename Concerns>
-  void keepMutual(const std::vector<uint32_t>& slots, const Concerns& concerns) {
+  /// Keeps those entries of a list whose bit is set.
+  void keepEntries(uint32_t slot, uint32_t kept) {
     static_assert(kListCapacity <= 32);
+    Entry* list = &entries_[slot * kListCapacity];
+    uint8_t count = 0;
+    for (size_t k = 0; k < sizes_[slot]; ++k) {
+      if (kept >> k & 1) list[count++] = list[k];
+    }
+    sizes_[slot] = count;
+  }
+
+  /// Of nodes that merged in this round: drops entries among each other that the partner did not
+  /// keep.
+  void keepMutual(const std::vector<uint32_t>& slots) {
     std::vector<uint32_t> kept(slots.size());
     parallelFor(slots.size(), kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const Entry* list = &entries_[slots[i] * kListCapacity];
         for (size_t k = 0; k < sizes_[slots[i]]; ++k) {
           const uint32_t other = list[k].slot;
-          const Entry* back = &entries_[other * kListCapacity];
-          const bool mutual =
-              !concerns(other) || std::any_of(back, back + sizes_[other], [&](const Entry& entry) {
-                return entry.slot == slots[i];
-              });
+          const bool mutual = changed_[other] != round_ || entryOf(other, slots[i]) != nullptr;
           kept[i] |= (mutual ? 1u : 0u) << k;
         }
       }
     });
     parallelFor(slots.size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        Entry* list = &entries_[slots[i] * kListCapacity];
-        uint8_t count = 0;
-        for (size_t k = 0; k < sizes_[slots[i]]; ++k) {
-          if (kept[i] >> k & 1) list[count++] = list[k];
-        }
-        sizes_[slots[i]] = count;
-      }
+      for (size_t i = begin; i < end; ++i) keepEntries(slots[i], kept[i]);
     });
   }
 
@@ -230,6 +285,8 @@ class MergeRounds {
     for (const uint32_t child : {a, b}) {
       const Entry* list = &entries_[child * kListCapacity];
       for (size_t k = 0; k < sizes_[child]; ++k) {
+        // Entries are mutual: these are all who have to look again.
+        std::atomic_ref(touched_[list[k].slot]).store(round_, std::memory_order_relaxed);
         const uint32_t slot = alias_[list[k].slot];
         if (slot == a) continue;
         bool known = false;
@@ -237,10 +294,11 @@ class MergeRounds {
         if (!known) candidates[count++] = {0.0f, slot};
       }
     }
-    for (size_t k = 0; k < count; ++k) candidates[k].cost = costOf(a, candidates[k].slot);
+    fillCosts(a, candidates, count);
+    stale_[a] = 1;
     if (count > kListCapacity) {
       std::nth_element(candidates, candidates + kListCapacity, candidates + count,
-                       [&](const Entry& x, const Entry& y) { return key(a, x) < key(a, y); });
+                       [&](const Entry& x, const Entry& y) { return isCheaper(a, x, y); });
       count = kListCapacity;
     }
     std::copy(candidates, candidates + count, &entries_[a * kListCapacity]);
@@ -260,12 +318,7 @@ class MergeRounds {
       bool known = false;
       for (size_t j = 0; j < kept; ++j) known |= list[j].slot == other;
       if (known) continue;
-      const Entry* back = &entries_[other * kListCapacity];
-      for (size_t j = 0; j < sizes_[other]; ++j) {
-        if (back[j].slot != slot) continue;
-        list[kept++] = {back[j].cost, other};
-        break;
-      }
+      if (const Entry* back = entryOf(other, slot)) list[kept++] = {back->cost, other};
     }
     sizes_[slot] = static_cast<uint8_t>(kept);
   }
@@ -282,7 +335,9 @@ class MergeRounds {
   std::vector<uint32_t> active_;   ///< slots in use, ascending
   std::vector<Entry> entries_;     ///< [slots, kListCapacity]
   std::vector<uint8_t> sizes_;     ///< [slots] entries in use
-  std::vector<uint32_t> best_;     ///< [slots]
+  std::vector<Entry> best_;        ///< [slots] the cheapest one
+  std::vector<uint8_t> stale_;     ///< [slots] 1: the list has changed since best_ was found
+  std::vector<uint32_t> touched_;  ///< [slots] last round in which a partner merged
   std::vector<uint32_t> alias_;    ///< [slots] itself, or where it merged into in this round
   std::vector<uint32_t> changed_;  ///< [slots] last round in which it merged
   std::vector<float> errors_;      ///< [slots]
@@ -290,6 +345,8 @@ class MergeRounds {
   std::vector<Merge> merges_;
   uint32_t round_ = 0;
   bool coarse_ = false;
+  bool was_coarse_ = false;
+  MergeCostKernel kernel_ = chosenMergeCostKernel();
 };
 
 }  // namespace

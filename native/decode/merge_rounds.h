@@ -30,6 +30,6 @@ std::vector<Merge> mergeInRounds(
     Progress* progress);
 
 /// Bytes that mergeInRounds holds per node, its argument included.
-constexpr uint64_t kMergeBytesPerNode = 640;
+constexpr uint64_t kMergeBytesPerNode = 512;
 
 }  // namespace stipple

@@ -25,8 +25,11 @@ bool orthogonalise(Mat3d& b, Mat3d& v, int p, int q) {
   if (!(std::abs(pq) > kOrthogonal * std::sqrt(pp) * std::sqrt(qq))) return false;
   // The smaller of the two angles, at most 45 degrees: columns keep their places.
   const double ratio = (qq - pp) / (2.0 * pq);
-  const double t = std::copysign(1.0, ratio) / (std::abs(ratio) + std::hypot(1.0, ratio));
-  const double c = 1.0 / std::hypot(1.0, t);
+  // Beyond 1e8 the root is the ratio to the last bit, and its square might not be a number.
+  const double size = std::abs(ratio);
+  const double root = size < 1e8 ? std::sqrt(1.0 + size * size) : size;
+  const double t = std::copysign(1.0, ratio) / (size + root);
+  const double c = 1.0 / std::sqrt(1.0 + t * t);
   const double s = c * t;
   for (Mat3d* m : {&b, &v}) {
     const Vec3d old_p = m->col(p);

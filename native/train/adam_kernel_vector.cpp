@@ -111,7 +111,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include "train/kernel_choice.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 

@@ -343,7 +343,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include "train/kernel_choice.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 

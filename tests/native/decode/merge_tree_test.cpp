@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "decode/hierarchy_decoder.h"
+#include "decode/merge_cost.h"
 #include "decode/merge_node.h"
 #include "decode/test_clouds.h"
 #include "math/covariance.h"
@@ -117,6 +118,45 @@ TEST(MergeNode, ErrorIsTheSquaredChangeOfThreeProjections) {
   }
   // The grid ends at eight standard deviations and its sums of Gaussians are exact to 1e-8.
   EXPECT_NEAR(mergeError(a, b, m, scale) / sum, 1.0, 1e-6);
+}
+
+TEST(MergeNode, CostsAreTheSameBitsByEveryKernelAndFromBothEnds) {
+  SplatCloud cloud = randomCloud(60, 8, 0);
+  for (size_t i = 0; i < 30 * 3; ++i) cloud.positions[i] *= 0.01f;
+  // A needle, a speck, one as large as the cloud, one that cannot be seen, twins, one far away.
+  cloud.scales[0] = 3.0f;
+  cloud.scales[1] = cloud.scales[2] = 1e-7f;
+  for (size_t k = 3; k < 6; ++k) cloud.scales[k] = 1e-9f;
+  for (size_t k = 6; k < 9; ++k) cloud.scales[k] = 2.0f;
+  cloud.opacities[3] = 0.0f;
+  std::copy_n(&cloud.positions[4 * 3], 3, &cloud.positions[5 * 3]);
+  cloud.positions[6 * 3] = 1e12f;
+  MergeScale scale;
+  scale.footprint = 1e-6;
+  std::vector<MergeNode> nodes;
+  for (size_t i = 0; i < 60; ++i) {
+    nodes.push_back(leafNode(cloud, i, i % 7 == 0 ? 0.003 : 0.1 + 0.01 * double(i), scale));
+  }
+  std::vector<uint32_t> others;
+  for (uint32_t i = 0; i < 60; ++i) others.push_back(i * 7 % 60);
+  const std::vector<MergeCostKernel> kernels = mergeCostKernels();
+  ASSERT_GE(kernels.size(), 2u);
+  for (const MergeCostKernel& kernel : kernels) {
+    for (uint32_t slot = 0; slot < 60; ++slot) {
+      // Every length: 1 to 60, so that vectors end anywhere.
+      std::vector<float> costs(slot + 1, -1.0f);
+      kernel.costs(nodes.data(), slot, others.data(), slot + 1, scale, costs.data());
+      for (size_t k = 0; k <= slot; ++k) {
+        const MergeNode& other = nodes[others[k]];
+        const double expected =
+            mergeError(nodes[slot], other, mergedNode(nodes[slot], other, scale), scale);
+        EXPECT_EQ(costs[k], static_cast<float>(expected)) << kernel.target;
+        float back = -1.0f;
+        kernel.costs(nodes.data(), others[k], &slot, 1, scale, &back);
+        EXPECT_EQ(costs[k], back) << kernel.target;
+      }
+    }
+  }
 }
 
 TEST(MergeTree, RootHasTheMomentsOfAllLeaves) {

@@ -1,4 +1,4 @@
-#include "train/kernel_choice.h"
+#include "base/kernel_choice.h"
 
 #include <gtest/gtest.h>
 
