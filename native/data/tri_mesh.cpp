@@ -91,7 +91,7 @@ bool hasArea(const TriMesh& mesh) {
 
 }  // namespace
 
-void validate(const TriMesh& mesh) {
+void validateArrays(const TriMesh& mesh) {
   const size_t triangles = mesh.triangleCount();
   const size_t vertices = mesh.vertexCount();
   requireCount(mesh.positions.size(), vertices * 3, "positions");
@@ -124,8 +124,12 @@ void validate(const TriMesh& mesh) {
   }
   for (size_t i = 0; i < mesh.textures.size(); ++i) requireTexture(mesh.textures[i], i);
   for (size_t i = 0; i < mesh.materials.size(); ++i) requireMaterial(mesh, i);
+}
+
+void validate(const TriMesh& mesh) {
+  validateArrays(mesh);
   if (!hasArea(mesh)) {
-    refuse("mesh: all faces have zero area (" + std::to_string(triangles) +
+    refuse("mesh: all faces have zero area (" + std::to_string(mesh.triangleCount()) +
            " triangles); at least 1 needs an area above 0");
   }
 }

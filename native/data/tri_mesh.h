@@ -42,5 +42,7 @@ struct TriMesh {
 /// Refuses: no triangle, index out of range, array sizes that disagree, non-finite values, a
 /// material that needs UVs, colours or a texture which are not there.
 void validate(const TriMesh& mesh);
+/// The same, but that triangles without area are let through: what every file gives.
+void validateArrays(const TriMesh& mesh);
 
 }  // namespace stipple

@@ -89,6 +89,11 @@ TriMesh readMeshFile(const std::string& path) {
   const StippleMediaTable& media = mediaTable();
   callMedia([&](StippleMediaStatus* status) { media.mesh_read(path.c_str(), sink.get(), status); });
   delivery.finish();
+  try {
+    validateArrays(delivery.mesh);
+  } catch (const Error& error) {
+    fail(ErrorCode::kFormat, path + ": " + error.what());
+  }
   return std::move(delivery.mesh);
 }
 

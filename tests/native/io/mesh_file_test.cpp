@@ -263,6 +263,7 @@ TEST_F(MeshFile, SaysWhatIsWrong) {
   refuse(scene("\"attributes\":{\"POSITION\":77}"), {"77"});
   refuse(scene("\"attributes\":{\"POSITION\":1}"), {"components; 3"});
   refuse(scene("\"attributes\":{\"POSITION\":0},\"material\":5"), {"material 5"});
+  refuse(scene("\"attributes\":{\"POSITION\":0}", "\"scale\":[1e39,1,1]"), {"a.glb", "inf"});
   refuse("\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"children\":[0]}]", {"ancestor"});
   refuse("\"scenes\":[{\"nodes\":[4]}],\"nodes\":[{}]", {"node 4"});
   refuse("\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":4}]", {"mesh 4"});
