@@ -17,6 +17,7 @@
 #include "decode/hierarchy_decoder.h"
 #include "decode/surface_model.h"
 #include "density/octree_density.h"
+#include "io/asset_header.h"
 #include "io/camera_file.h"
 #include "splat/draw_order.h"
 #include "splat/render_backward.h"
@@ -37,8 +38,17 @@ struct ContextState {
 };
 using Context = std::shared_ptr<const ContextState>;
 
+/// What an asset file holds beside the source, for saving it again.
+struct ModelNotes {
+  std::string settings_json = "{}";
+  AssetExtras extras;
+};
+
 /// A source of splats: of a mesh, or of an existing cloud.
-using ModelParts = std::variant<SurfaceModel, std::shared_ptr<const HierarchyDecoder>>;
+struct ModelParts {
+  std::variant<SurfaceModel, std::shared_ptr<const HierarchyDecoder>> source;
+  std::shared_ptr<const ModelNotes> notes = {};  ///< null where it was not loaded
+};
 
 /// What a renderer keeps from one picture to the next; its jobs hold a share.
 struct RendererMemory {

@@ -85,22 +85,28 @@ Hierarchy build(const std::shared_ptr<const SplatCloud>& cloud, const HierarchyS
 
 namespace stipple::api {
 
-Hierarchy loadHierarchy(const std::string& path) {
+ModelParts loadHierarchy(const std::string& path) {
   HierarchyAsset asset = readHierarchyAsset(path);
+  auto notes = std::make_shared<const ModelNotes>(
+      ModelNotes{std::move(asset.settings_json), std::move(asset.extras)});
   auto leaves = std::make_shared<const SplatCloud>(std::move(asset.leaves));
   auto tree = std::make_shared<MergeTree>();
   tree->nodes = std::move(asset.nodes);
   tree->parents = std::move(asset.parents);
   tree->errors = std::move(asset.errors);
   try {
-    return std::make_shared<const HierarchyDecoder>(std::move(leaves), std::move(tree));
+    return {std::make_shared<const HierarchyDecoder>(std::move(leaves), std::move(tree)),
+            std::move(notes)};
   } catch (const Error& error) {
     fail(ErrorCode::kFormat, path + ": " + error.what());
   }
 }
 
-void saveHierarchy(const HierarchyDecoder& hierarchy, const std::string& path) {
+void saveHierarchy(const HierarchyDecoder& hierarchy, const ModelNotes& notes,
+                   const std::string& path) {
   HierarchyAsset asset;
+  asset.settings_json = notes.settings_json;
+  asset.extras = notes.extras;
   asset.leaves = *hierarchy.leaves();
   asset.nodes = hierarchy.tree()->nodes;
   asset.parents = hierarchy.tree()->parents;
@@ -138,7 +144,7 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
     context->state->requireMemory(hierarchyMemoryBound(*leaves, settings),
                                   "the hierarchy of this cloud");
     *job = startJob(context->state, [leaves, settings](Progress& progress) -> JobResult {
-      return ModelParts(build(leaves, settings, progress));
+      return ModelParts{build(leaves, settings, progress)};
     });
   });
 }

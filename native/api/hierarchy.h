@@ -12,10 +12,11 @@ using Hierarchy = std::shared_ptr<const HierarchyDecoder>;
 
 /// The hierarchy that a model is, or null.
 inline const Hierarchy* hierarchyOf(const ModelParts& parts) {
-  return std::get_if<Hierarchy>(&parts);
+  return std::get_if<Hierarchy>(&parts.source);
 }
 
-Hierarchy loadHierarchy(const std::string& path);
-void saveHierarchy(const HierarchyDecoder& hierarchy, const std::string& path);
+ModelParts loadHierarchy(const std::string& path);
+void saveHierarchy(const HierarchyDecoder& hierarchy, const ModelNotes& notes,
+                   const std::string& path);
 
 }  // namespace stipple::api

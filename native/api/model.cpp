@@ -79,7 +79,7 @@ std::shared_ptr<const SplatCloud> decode(const ModelParts& parts, const DecodeSe
     request.gaussians_per_anchor = settings.gaussians_per_anchor;
     return std::make_shared<const SplatCloud>((*hierarchy)->decode(request));
   }
-  const auto& model = std::get<SurfaceModel>(parts);
+  const auto& model = std::get<SurfaceModel>(parts.source);
   const AnchorSet anchors = sampleAnchors(*model.density, settings.sampling, progress);
   DecodeRequest request;
   request.anchors = &anchors;
@@ -93,13 +93,15 @@ uint64_t decodeMemoryBound(const ModelParts& parts, const DecodeSettings& settin
   if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
     return (*hierarchy)->memoryBound(settings.sampling.count, settings.gaussians_per_anchor);
   }
-  const auto& model = std::get<SurfaceModel>(parts);
+  const auto& model = std::get<SurfaceModel>(parts.source);
   return sampleMemoryBound(settings.sampling.count, settings.sampling.with_ranks) +
          model.decoder->memoryBound(settings.sampling.count, settings.gaussians_per_anchor);
 }
 
-SurfaceAsset toAsset(const SurfaceModel& model) {
+SurfaceAsset toAsset(const SurfaceModel& model, const ModelNotes& notes) {
   SurfaceAsset asset;
+  asset.settings_json = notes.settings_json;
+  asset.extras = notes.extras;
   const OctreeDensity& density = *model.density;
   asset.root_origin = density.root().origin;
   asset.root_side = density.root().side;
@@ -113,19 +115,25 @@ SurfaceAsset toAsset(const SurfaceModel& model) {
   return asset;
 }
 
-SurfaceModel fromAsset(SurfaceAsset asset) {
+ModelParts loadSurface(const std::string& path) {
+  SurfaceAsset asset = readSurfaceAsset(path);
+  auto notes = std::make_shared<const ModelNotes>(
+      ModelNotes{std::move(asset.settings_json), std::move(asset.extras)});
   RootCube root;
   root.origin = asset.root_origin;
   root.side = asset.root_side;
-  auto density = std::make_shared<const OctreeDensity>(
-      OctreeDensity::fromLevels(root, std::move(asset.cells), std::move(asset.log_probabilities)));
-  auto surface = std::make_shared<const PointSet>(std::move(asset.surface));
-  return surfaceModelFromParts(std::move(surface), std::move(density));
+  try {
+    auto density = std::make_shared<const OctreeDensity>(OctreeDensity::fromLevels(
+        root, std::move(asset.cells), std::move(asset.log_probabilities)));
+    auto surface = std::make_shared<const PointSet>(std::move(asset.surface));
+    return {surfaceModelFromParts(std::move(surface), std::move(density)), std::move(notes)};
+  } catch (const Error& error) {
+    fail(ErrorCode::kFormat, path + ": " + error.what());
+  }
 }
 
 ModelParts loaded(const std::string& path) {
-  return readAssetKind(path) == kAssetHierarchy ? ModelParts(loadHierarchy(path))
-                                                : fromAsset(readSurfaceAsset(path));
+  return readAssetKind(path) == kAssetHierarchy ? loadHierarchy(path) : loadSurface(path);
 }
 
 }  // namespace
@@ -161,7 +169,7 @@ StippleStatus stipple_model_from_mesh_start(StippleContext* context, const Stipp
     const SurfaceModelOptions settings = modelOptions(completed(options, defaults, "options"));
     std::shared_ptr<const TriMesh> triangles = mesh->mesh;
     *job = startJob(context->state, [triangles, settings](Progress& progress) -> JobResult {
-      return ModelParts(buildSurfaceModel(*triangles, settings, &progress));
+      return ModelParts{buildSurfaceModel(*triangles, settings, &progress)};
     });
   });
 }
@@ -191,10 +199,11 @@ StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf
   return guarded([&] {
     const ModelParts& parts = require(model, "model").parts;
     const std::string path = &require(path_utf8, "path_utf8");
+    const ModelNotes notes = parts.notes ? *parts.notes : ModelNotes();
     if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
-      saveHierarchy(**hierarchy, path);
+      saveHierarchy(**hierarchy, notes, path);
     } else {
-      writeSurfaceAsset(toAsset(std::get<SurfaceModel>(parts)), path);
+      writeSurfaceAsset(toAsset(std::get<SurfaceModel>(parts.source), notes), path);
     }
   });
 }
@@ -214,7 +223,7 @@ StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* in
       out.sh_degree = static_cast<uint32_t>(leaves.sh_degree);
       fillBounds(leaves.positions, out.bounds_min, out.bounds_max);
     } else {
-      const auto& surface = std::get<SurfaceModel>(parts);
+      const auto& surface = std::get<SurfaceModel>(parts.source);
       out.kind = STIPPLE_MODEL_SURFACE;
       out.leaf_level = static_cast<uint32_t>(surface.density->leafLevel());
       out.leaf_count = surface.density->leafCount();
@@ -229,7 +238,7 @@ StippleStatus stipple_model_density(const StippleModel* model, StippleDensity** 
   return guarded([&] {
     require(model, "model");
     require(density, "density");
-    const auto* surface = std::get_if<SurfaceModel>(&model->parts);
+    const auto* surface = std::get_if<SurfaceModel>(&model->parts.source);
     if (!surface) {
       fail(ErrorCode::kUnsupported,
            "this model is the hierarchy of a cloud and has no density; that of a mesh has one");

@@ -27,9 +27,9 @@ StippleStatus stipple_model_keep(const StippleModel* model, const uint8_t* mask,
       MaskedTree masked =
           maskedTree(leaves, *(*hierarchy)->tree(), {mask, static_cast<size_t>(mask_count)});
       *kept = new StippleModel{model->context,
-                               Hierarchy(std::make_shared<const HierarchyDecoder>(
+                               {std::make_shared<const HierarchyDecoder>(
                                    std::make_shared<const SplatCloud>(std::move(masked.leaves)),
-                                   std::make_shared<const MergeTree>(std::move(masked.tree))))};
+                                   std::make_shared<const MergeTree>(std::move(masked.tree)))}};
     });
   });
 }

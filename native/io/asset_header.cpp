@@ -1,5 +1,7 @@
 #include "io/asset_header.h"
 
+#include <cstdlib>
+
 #include "base/error.h"
 
 namespace stipple {
@@ -8,9 +10,16 @@ namespace {
 
 constexpr int kMajorVersion = 1;
 constexpr char kVersion[] = "1.0";
+constexpr char kVersionKey[] = "stipple_version";
+
+/// Minor number of a version text that majorVersion() has accepted; 0 where there is none.
+int minorVersion(const std::string& text) {
+  const size_t dot = text.find('.');
+  return dot == std::string::npos ? 0 : std::atoi(text.c_str() + dot + 1);
+}
 
 int majorVersion(const SafeTensorsReader& file) {
-  const std::string& text = requireText(file, "stipple_version");
+  const std::string& text = requireText(file, kVersionKey);
   const size_t dot = text.find('.');
   const std::string major = text.substr(0, dot);
   const bool digits = !major.empty() && major.size() < 6 &&
@@ -55,8 +64,21 @@ void requireAssetKind(const SafeTensorsReader& file, const char* kind) {
   }
 }
 
+AssetExtras readAssetExtras(const SafeTensorsReader& file) {
+  return {file.metadata(), file.readOthers()};
+}
+
+void addAssetExtras(SafeTensorsWriter& file, const AssetExtras& extras) {
+  const auto version = extras.metadata.find(kVersionKey);
+  if (version != extras.metadata.end() && minorVersion(version->second) > minorVersion(kVersion)) {
+    file.setMetadata(kVersionKey, version->second);
+  }
+  for (const auto& [key, value] : extras.metadata) file.carryMetadata(key, value);
+  for (const auto& [name, tensor] : extras.tensors) file.carry(name, tensor);
+}
+
 void setAssetKind(SafeTensorsWriter& file, const char* kind) {
-  file.setMetadata("stipple_version", kVersion);
+  file.setMetadata(kVersionKey, kVersion);
   file.setMetadata("kind", kind);
 }
 

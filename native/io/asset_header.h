@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <string>
 
 #include "io/safetensors.h"
@@ -21,6 +22,19 @@ std::string readAssetKind(const std::string& path);
 
 /// Refuses assets of another kind. Errors: kUnsupported, those of assetKind.
 void requireAssetKind(const SafeTensorsReader& file, const char* kind);
+
+/// What a file says, and the tensors in it that this version does not know: kept from loading to
+/// saving, so that nothing that a newer version wrote is lost here.
+struct AssetExtras {
+  std::map<std::string, std::string> metadata;
+  std::map<std::string, CarriedTensor> tensors;
+};
+
+/// In: file, from which all tensors that are known have been read.
+AssetExtras readAssetExtras(const SafeTensorsReader& file);
+/// Adds what `file` does not have yet, and the file's version where it is newer. In: file, with all
+/// that this version writes; extras, which must live until it is written.
+void addAssetExtras(SafeTensorsWriter& file, const AssetExtras& extras);
 
 /// Writes version and kind.
 void setAssetKind(SafeTensorsWriter& file, const char* kind);

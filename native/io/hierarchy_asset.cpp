@@ -105,6 +105,7 @@ void writeHierarchyAsset(const HierarchyAsset& asset, const std::string& path) {
   addCloud(file, kNodes, asset.nodes);
   file.add("tree.parents", asset.parents, 1);
   file.add("tree.errors", asset.errors, 1);
+  addAssetExtras(file, asset.extras);
   file.write(path);
 }
 
@@ -118,6 +119,7 @@ HierarchyAsset readHierarchyAsset(const std::string& path) {
   asset.parents = file.readUint32s("tree.parents", 1);
   asset.errors = file.readFloats("tree.errors", 1);
   asset.settings_json = requireText(file, "settings");
+  asset.extras = readAssetExtras(file);
   validateAsset(asset, path, ErrorCode::kFormat);
   return asset;
 }

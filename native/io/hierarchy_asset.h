@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "data/splat_cloud.h"
+#include "io/asset_header.h"
 
 namespace stipple {
 
@@ -15,6 +16,7 @@ struct HierarchyAsset {
   std::vector<uint32_t> parents;     ///< [2N-1] inner nodes, then leaves; 2^32-1: the root
   std::vector<float> errors;         ///< [N-1]
   std::string settings_json = "{}";  ///< free for the caller (how the tree was made)
+  AssetExtras extras;                ///< of the file that it was read from
 };
 
 /// `.stipple.safetensors`, version 1, kind "hierarchy". Errors: kIo, kFormat, kUnsupported (newer

@@ -144,6 +144,7 @@ const SafeTensor& SafeTensorsReader::require(const std::string& name, const char
                                  shapeText(tensor.shape) + "; " + dtype + " [n" +
                                  (width > 1 ? ", " + std::to_string(width) : "") + "] is needed");
   }
+  read_.insert(name);
   return tensor;
 }
 
@@ -166,6 +167,15 @@ std::vector<uint32_t> SafeTensorsReader::readUint32s(const std::string& name,
 std::vector<uint64_t> SafeTensorsReader::readUint64s(const std::string& name,
                                                      uint64_t width) const {
   return readValues<uint64_t>(require(name, "U64", width));
+}
+
+std::map<std::string, CarriedTensor> SafeTensorsReader::readOthers() const {
+  std::map<std::string, CarriedTensor> others;
+  for (const auto& [name, tensor] : tensors_) {
+    if (read_.count(name) != 0) continue;
+    others[name] = {tensor.dtype, tensor.shape, readValues<uint8_t>(tensor)};
+  }
+  return others;
 }
 
 void SafeTensorsWriter::addEntry(const std::string& name, const char* dtype, uint64_t width,
@@ -193,6 +203,11 @@ void SafeTensorsWriter::add(const std::string& name, const std::vector<uint32_t>
 void SafeTensorsWriter::add(const std::string& name, const std::vector<uint64_t>& values,
                             uint64_t width) {
   addEntry(name, "U64", width, values.data(), sizeof(uint64_t), values.size());
+}
+
+void SafeTensorsWriter::carry(const std::string& name, const CarriedTensor& tensor) {
+  entries_.emplace(name,
+                   Entry{tensor.dtype, tensor.shape, tensor.bytes.data(), tensor.bytes.size()});
 }
 
 void SafeTensorsWriter::write(const std::string& path) const {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,13 @@ struct SafeTensor {
   std::vector<uint64_t> shape;
   uint64_t offset = 0;  ///< first byte in the file
   uint64_t bytes = 0;
+};
+
+/// A tensor as it lies in its file, of whatever type: for carrying it to another file.
+struct CarriedTensor {
+  std::string dtype;
+  std::vector<uint64_t> shape;
+  std::vector<uint8_t> bytes;
 };
 
 /// Opens a safetensors file and checks its header: every tensor lies inside the file and has the
@@ -33,6 +41,8 @@ class SafeTensorsReader {
   std::vector<float> readFloats(const std::string& name, uint64_t width) const;
   std::vector<uint32_t> readUint32s(const std::string& name, uint64_t width) const;
   std::vector<uint64_t> readUint64s(const std::string& name, uint64_t width) const;
+  /// The tensors that nobody has read yet.
+  std::map<std::string, CarriedTensor> readOthers() const;
 
  private:
   template <typename T>
@@ -42,6 +52,7 @@ class SafeTensorsReader {
   InputFile file_;
   std::map<std::string, std::string> metadata_;
   std::map<std::string, SafeTensor> tensors_;
+  mutable std::set<std::string> read_;
 };
 
 /// Collects tensors, then writes them in the order of their names. The arrays stay the caller's and
@@ -52,12 +63,18 @@ class SafeTensorsWriter {
   void add(const std::string& name, const std::vector<float>& values, uint64_t width);
   void add(const std::string& name, const std::vector<uint32_t>& values, uint64_t width);
   void add(const std::string& name, const std::vector<uint64_t>& values, uint64_t width);
+  /// Writes a tensor as it is, where none of this name has been added.
+  void carry(const std::string& name, const CarriedTensor& tensor);
+  /// Writes metadata where the key has no value yet.
+  void carryMetadata(const std::string& key, const std::string& value) {
+    metadata_.emplace(key, value);
+  }
   /// Errors: kIo; the old file stays.
   void write(const std::string& path) const;
 
  private:
   struct Entry {
-    const char* dtype;
+    std::string dtype;
     std::vector<uint64_t> shape;
     const void* data;
     size_t bytes;

@@ -110,6 +110,7 @@ void writeSurfaceAsset(const SurfaceAsset& asset, const std::string& path) {
   file.add("surface.opacities", asset.surface.opacities, 1);
   file.add("surface.areas", asset.surface.areas, 1);
   file.add("surface.weights", asset.surface.weights, 1);
+  addAssetExtras(file, asset.extras);
   file.write(path);
 }
 
@@ -134,6 +135,7 @@ SurfaceAsset readSurfaceAsset(const std::string& path) {
   asset.surface.areas = file.readFloats("surface.areas", 1);
   asset.surface.weights = file.readFloats("surface.weights", 1);
   asset.settings_json = requireText(file, "settings");
+  asset.extras = readAssetExtras(file);
   validateAsset(asset, path, ErrorCode::kFormat);
   return asset;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "data/point_set.h"
+#include "io/asset_header.h"
 
 namespace stipple {
 
@@ -17,6 +18,7 @@ struct SurfaceAsset {
   std::vector<std::vector<float>> log_probabilities;  ///< per level [cells, 8]
   PointSet surface;
   std::string settings_json = "{}";  ///< free for the caller (how the model was made)
+  AssetExtras extras;                ///< of the file that it was read from
 };
 
 /// `.stipple.safetensors`, version 1, kind "surface". Errors: kIo, kFormat, kUnsupported (newer

@@ -475,6 +475,9 @@ StippleStatus stipple_model_from_mesh_start(StippleContext* context, const Stipp
 StippleStatus stipple_model_from_cloud_start(StippleContext* context, const StippleCloud* cloud,
                                              const StippleModelFromCloudOptions* options,
                                              StippleJob** job);
+/* An asset file (docs/formats.md). Tensors and metadata of a newer minor version are kept with the model as it
+ * was loaded and saved with it; models made from it do not have them. Errors: UNSUPPORTED for a newer major
+ * version; FORMAT with what is wrong. */
 StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8, StippleModel** model);
 /* The same as a job (stipple_job_model). */
 StippleStatus stipple_model_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include "api/fixtures.h"
@@ -181,6 +183,52 @@ TEST_F(Pipeline, ThinningGivesExactlyTheCount) {
   EXPECT_EQ(stipple_cloud_thin(cloud, 1001, 0, &thinned), STIPPLE_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(thinned, nullptr);
   stipple_cloud_free(cloud);
+}
+
+TEST_F(Pipeline, WhatAModelsFileHoldsBesideIsSavedAgain) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"surface_1.0", "hierarchy_1.0"}) {
+    const std::string from = STIPPLE_TEST_DATA "/assets/" + name + ".stipple.safetensors";
+    const std::string path = folder.file("again.stipple.safetensors");
+    StippleModel *at_once = nullptr, *ahead = nullptr;
+    STIPPLE_ASSERT_OK(stipple_model_load(context_, from.c_str(), &at_once));
+    StippleJob* job = nullptr;
+    STIPPLE_ASSERT_OK(stipple_model_load_start(context_, from.c_str(), &job));
+    STIPPLE_ASSERT_OK(stipple_job_wait(job));
+    STIPPLE_ASSERT_OK(stipple_job_model(job, &ahead));
+    stipple_job_free(job);
+    for (StippleModel* model : {at_once, ahead}) {
+      SCOPED_TRACE(name + (model == ahead ? " ahead" : ""));
+      STIPPLE_ASSERT_OK(stipple_model_save(model, path.c_str()));
+      stipple_model_free(model);
+      std::ifstream file(path, std::ios::binary);
+      const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+      EXPECT_NE(bytes.find("\"future.labels\""), std::string::npos);
+      EXPECT_NE(bytes.find(std::string("\1\0\xfe\xff\x2c\1\4\0", 8)), std::string::npos);
+      EXPECT_NE(bytes.find("written by hand"), std::string::npos);
+      EXPECT_NE(bytes.find(name[0] == 's' ? "\\\"detail\\\": 0.5" : "\\\"views\\\": 16"),
+                std::string::npos);
+    }
+  }
+}
+
+TEST_F(Pipeline, ATreeThatFitsNothingIsNamedWithItsFile) {
+  const TemporaryFolder folder;
+  std::ifstream file(STIPPLE_TEST_DATA "/assets/surface_1.0.stipple.safetensors", std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  // Cells 0, 5 and 7 of the second level, as 8 bytes each.
+  const std::string cells("\0\0\0\0\0\0\0\0\5\0\0\0\0\0\0\0\7", 17);
+  ASSERT_NE(bytes.find(cells), std::string::npos);
+  bytes[bytes.find(cells) + 8] = 4;
+  const std::string path = folder.file("wrong.stipple.safetensors");
+  std::ofstream(path, std::ios::binary) << bytes;
+  StippleModel* model = nullptr;
+  EXPECT_EQ(stipple_model_load(context_, path.c_str(), &model), STIPPLE_ERROR_FORMAT);
+  EXPECT_EQ(model, nullptr);
+  EXPECT_NE(std::string(stipple_last_error_message())
+                .find("wrong.stipple.safetensors: octree cell 5 at level 1"),
+            std::string::npos)
+      << stipple_last_error_message();
 }
 
 TEST_F(Pipeline, AJobOutlivesEverythingItWasStartedWith) {

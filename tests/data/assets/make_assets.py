@@ -1,0 +1,83 @@
+"""Writes the asset files of this folder, one per version and kind, without any code of Stipple: what was
+written once must be readable for good. Run it in this folder to add those of a new version; never change
+the old ones. tests/native/io/golden_assets_test.cpp knows their numbers by the same formulas.
+"""
+import json
+import math
+
+import numpy
+
+
+def write(path, metadata, tensors):
+    """A safetensors file; tensors: name -> (type, array)."""
+    header, data = {'__metadata__': metadata}, b''
+    for name, (dtype, array) in tensors.items():
+        raw = array.tobytes()
+        header[name] = {'dtype': dtype, 'shape': list(array.shape), 'data_offsets': [len(data), len(data) + len(raw)]}
+        data += raw
+    text = json.dumps(header).encode()
+    text += b' ' * (-len(text) % 8)
+    with open(path, 'wb') as file:
+        file.write(len(text).to_bytes(8, 'little') + text + data)
+
+
+def numbers(rows, width, first):
+    """(first + 3 row + column) / 64: exact in float32, and different in every place of a row."""
+    row, column = numpy.mgrid[0:rows, 0:width]
+    return ((first + 3 * row + column) / 64).astype('<f4')
+
+
+def f32(array):
+    return 'F32', array
+
+
+def u64(values):
+    return 'U64', numpy.array(values, '<u8')
+
+
+# Halves, quarters and eighths of the mass; eight times minus infinity but for two children below the root.
+LEVELS = [([0], [[1 / 2, 0, 0, 0, 0, 1 / 4, 0, 1 / 4]]),
+          ([0, 5, 7], [[1 / 8] * 8, [1, 0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 1 / 2, 1 / 2, 0, 0, 0]])]
+
+
+def logarithms(rows):
+    return numpy.array([[math.log(p) if p > 0 else -math.inf for p in row] for row in rows], '<f4')
+
+
+def surface():
+    samples = 5
+    tensors = {'surface.positions': f32(numbers(samples, 3, 1)), 'surface.normals': f32(numpy.zeros((samples, 3), '<f4')),
+               'surface.colours': f32(numbers(samples, 3, 2)), 'surface.opacities': f32(numbers(samples, 1, 10)[:, 0]),
+               'surface.areas': f32(numbers(samples, 1, 20)[:, 0]), 'surface.weights': f32(numbers(samples, 1, 30)[:, 0]),
+               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+    tensors['surface.normals'][1][:, 2] = 1
+    for level, (cells, rows) in enumerate(LEVELS):
+        tensors[f'octree.cells.{level}'] = u64(cells)
+        tensors[f'octree.log_p.{level}'] = f32(logarithms(rows))
+    write('surface_1.0.stipple.safetensors',
+          {'stipple_version': '1.0', 'kind': 'surface', 'colour_space': 'lin_rec709_display',
+           'frame': 'right-handed, z up, metres', 'root_cube': '[-1.5, 0.25, 2.0, 4.0]', 'levels': '2',
+           'settings': '{"detail": 0.5}', 'provenance': 'written by hand'}, tensors)
+
+
+def hierarchy():
+    leaves, degree = 4, 1
+    tensors = {'tree.parents': ('U32', numpy.array([2**32 - 1, 0, 0, 1, 1, 2, 2], '<u4')),
+               'tree.errors': f32(numpy.array([0.75, 0.5, 0.25], '<f4')),
+               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+    for stem, rows, first in (('leaves', leaves, 1), ('nodes', leaves - 1, 101)):
+        rotations = numpy.zeros((rows, 4), '<f4')
+        rotations[:, 1] = 1
+        tensors[f'tree.{stem}.positions'] = f32(numbers(rows, 3, first))
+        tensors[f'tree.{stem}.rotations'] = f32(rotations)
+        tensors[f'tree.{stem}.scales'] = f32(numbers(rows, 3, first + 7))
+        tensors[f'tree.{stem}.opacities'] = f32(numbers(rows, 1, 20)[:, 0])
+        tensors[f'tree.{stem}.sh'] = f32(numbers(rows, 3 * (degree + 1)**2, first + 13))
+    write('hierarchy_1.0.stipple.safetensors',
+          {'stipple_version': '1.0', 'kind': 'hierarchy', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
+           'frame': 'RUB', 'sh_degree': str(degree), 'settings': '{"views": 16}', 'provenance': 'written by hand'}, tensors)
+
+
+if __name__ == '__main__':
+    surface()
+    hierarchy()

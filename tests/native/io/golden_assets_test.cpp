@@ -1,0 +1,139 @@
+// Asset files of every version that was ever written, which must stay readable. Their numbers come
+// from the formulas of tests/data/assets/make_assets.py, not from our writer.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "io/hierarchy_asset.h"
+#include "io/surface_asset.h"
+#include "scratch_folder.h"
+
+namespace stipple {
+namespace {
+
+class GoldenAssets : public ScratchFolder {
+ protected:
+  static std::string golden(const std::string& name) {
+    return STIPPLE_TEST_DATA "/assets/" + name + ".stipple.safetensors";
+  }
+};
+
+/// (first + 3 row + column) / 64: exact in float32.
+std::vector<float> numbers(size_t rows, size_t width, int first) {
+  std::vector<float> values;
+  for (size_t row = 0; row < rows; ++row) {
+    for (size_t column = 0; column < width; ++column) {
+      values.push_back((static_cast<float>(first) + static_cast<float>(3 * row + column)) / 64.0f);
+    }
+  }
+  return values;
+}
+
+void expectLogarithms(const std::vector<float>& seen, const std::vector<double>& probabilities) {
+  ASSERT_EQ(seen.size(), probabilities.size());
+  for (size_t i = 0; i < seen.size(); ++i) {
+    if (probabilities[i] == 0) {
+      EXPECT_EQ(seen[i], -HUGE_VALF);
+    } else {
+      // The file was written with another library's logarithm: one step of float32 at -2.08.
+      EXPECT_NEAR(seen[i], std::log(probabilities[i]), 2.4e-7);
+    }
+  }
+}
+
+/// What the golden files hold beside the parts of their models.
+void expectExtras(const AssetExtras& extras) {
+  EXPECT_EQ(extras.metadata.at("provenance"), "written by hand");
+  ASSERT_EQ(extras.tensors.size(), 1u);
+  const CarriedTensor& labels = extras.tensors.at("future.labels");
+  EXPECT_EQ(labels.dtype, "I16");
+  EXPECT_EQ(labels.shape, (std::vector<uint64_t>{2, 2}));
+  EXPECT_EQ(labels.bytes, (std::vector<uint8_t>{1, 0, 0xfe, 0xff, 0x2c, 1, 4, 0}));
+}
+
+void expectSurface(const SurfaceAsset& asset) {
+  EXPECT_EQ(asset.root_origin, (std::array<double, 3>{-1.5, 0.25, 2.0}));
+  EXPECT_EQ(asset.root_side, 4.0);
+  EXPECT_EQ(asset.cells, (std::vector<std::vector<uint64_t>>{{0}, {0, 5, 7}}));
+  ASSERT_EQ(asset.log_probabilities.size(), 2u);
+  expectLogarithms(asset.log_probabilities[0], {0.5, 0, 0, 0, 0, 0.25, 0, 0.25});
+  const double e = 0.125;
+  expectLogarithms(asset.log_probabilities[1],
+                   {e, e, e, e, e, e, e, e, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.5, 0.5, 0, 0, 0});
+  EXPECT_EQ(asset.surface.positions, numbers(5, 3, 1));
+  EXPECT_EQ(asset.surface.normals,
+            (std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}));
+  EXPECT_EQ(asset.surface.colours, numbers(5, 3, 2));
+  EXPECT_EQ(asset.surface.opacities, numbers(5, 1, 10));
+  EXPECT_EQ(asset.surface.areas, numbers(5, 1, 20));
+  EXPECT_EQ(asset.surface.weights, numbers(5, 1, 30));
+  EXPECT_EQ(asset.settings_json, "{\"detail\": 0.5}");
+  expectExtras(asset.extras);
+}
+
+void expectSplats(const SplatCloud& cloud, size_t rows, int first) {
+  EXPECT_EQ(cloud.sh_degree, 1);
+  EXPECT_EQ(cloud.colour_space, ColourSpace::kDisplay);
+  EXPECT_EQ(cloud.antialias, Antialias::kMip);
+  EXPECT_EQ(cloud.frame, Frame::kRUB);
+  EXPECT_EQ(cloud.positions, numbers(rows, 3, first));
+  ASSERT_EQ(cloud.rotations.size(), rows * 4);
+  for (size_t i = 0; i < rows * 4; ++i) EXPECT_EQ(cloud.rotations[i], i % 4 == 1 ? 1.0f : 0.0f);
+  EXPECT_EQ(cloud.scales, numbers(rows, 3, first + 7));
+  EXPECT_EQ(cloud.opacities, numbers(rows, 1, 20));
+  EXPECT_EQ(cloud.sh, numbers(rows, 12, first + 13));
+}
+
+void expectHierarchy(const HierarchyAsset& asset) {
+  expectSplats(asset.leaves, 4, 1);
+  expectSplats(asset.nodes, 3, 101);
+  EXPECT_EQ(asset.parents, (std::vector<uint32_t>{UINT32_MAX, 0, 0, 1, 1, 2, 2}));
+  EXPECT_EQ(asset.errors, (std::vector<float>{0.75f, 0.5f, 0.25f}));
+  EXPECT_EQ(asset.settings_json, "{\"views\": 16}");
+  expectExtras(asset.extras);
+}
+
+TEST_F(GoldenAssets, ReadsASurfaceOfVersion1AndKeepsAllOfIt) {
+  const SurfaceAsset asset = readSurfaceAsset(golden("surface_1.0"));
+  expectSurface(asset);
+  writeSurfaceAsset(asset, path("again"));
+  expectSurface(readSurfaceAsset(path("again")));
+}
+
+TEST_F(GoldenAssets, ReadsAHierarchyOfVersion1AndKeepsAllOfIt) {
+  const HierarchyAsset asset = readHierarchyAsset(golden("hierarchy_1.0"));
+  expectHierarchy(asset);
+  writeHierarchyAsset(asset, path("again"));
+  expectHierarchy(readHierarchyAsset(path("again")));
+}
+
+TEST_F(GoldenAssets, KeepsTheVersionOfANewerFileAndRefusesTheNextMajorOne) {
+  const auto withVersion = [&](const char* name, const std::string& version) {
+    std::string bytes = load(golden(name));
+    bytes.replace(bytes.find("\"1.0\""), 5, version);
+    return store(name, bytes);
+  };
+  writeHierarchyAsset(readHierarchyAsset(withVersion("hierarchy_1.0", "\"1.7\"")), path("a"));
+  EXPECT_NE(load(path("a")).find("\"stipple_version\":\"1.7\""), std::string::npos);
+  writeSurfaceAsset(readSurfaceAsset(withVersion("surface_1.0", "\"1.7\"")), path("a"));
+  EXPECT_NE(load(path("a")).find("\"stipple_version\":\"1.7\""), std::string::npos);
+  expectError(ErrorCode::kUnsupported, {"hierarchy_1.0", "version 2", "version 1"},
+              [&] { readHierarchyAsset(withVersion("hierarchy_1.0", "\"2.0\"")); });
+  expectError(ErrorCode::kUnsupported, {"surface_1.0", "version 2", "version 1"},
+              [&] { readSurfaceAsset(withVersion("surface_1.0", "\"2.0\"")); });
+}
+
+TEST_F(GoldenAssets, WhatIsKeptNeverReplacesWhatIsKnown) {
+  HierarchyAsset asset = readHierarchyAsset(golden("hierarchy_1.0"));
+  asset.errors = {3, 2, 1};
+  asset.leaves.frame = asset.nodes.frame = Frame::kRDF;
+  asset.extras.tensors["tree.errors"] = {"F32", {0}, {}};
+  writeHierarchyAsset(asset, path("a"));
+  const HierarchyAsset back = readHierarchyAsset(path("a"));
+  EXPECT_EQ(back.errors, asset.errors);
+  EXPECT_EQ(back.leaves.frame, Frame::kRDF);
+}
+
+}  // namespace
+}  // namespace stipple
