@@ -12,6 +12,10 @@ namespace stipple {
 namespace {
 
 constexpr size_t kSize = 256;
+// The squared error hardly grows where these few are kept out of the k-means, and the largest error
+// falls by far: the ends of a distribution are too rare for the k-means to spend values on.
+constexpr size_t kForTheRare = 8;
+constexpr size_t kMeans = kSize - kForTheRare;
 constexpr int kMaxRounds = 1000;
 constexpr size_t kHistogramBins = 512;
 
@@ -42,8 +46,13 @@ struct Sorted {
   }
 };
 
-/// Bounds of the ranges that the codebook's values stand for: [kSize + 1] into sorted.values.
-using Bounds = std::array<size_t, kSize + 1>;
+/// Bounds of the ranges that the codebook's values stand for, into sorted.values: of kMeans, of
+/// kSize in the end.
+using Bounds = std::vector<size_t>;
+
+constexpr auto kIsBelow = [](double value, float element) {
+  return value < static_cast<double>(element);
+};
 
 Bounds startBounds(const Sorted& sorted) {
   const double low = static_cast<double>(sorted.values.front());
@@ -61,35 +70,51 @@ Bounds startBounds(const Sorted& sorted) {
     }
     below[bin + 1] = below[bin] + std::cbrt(sorted.counts[at] - sorted.counts[first[bin]]);
   }
-  Bounds bounds{};
+  Bounds bounds(kMeans + 1, 0);
   size_t bin = 0;
-  for (size_t k = 1; k < kSize; ++k) {
-    const double share = below.back() * static_cast<double>(k) / kSize;
+  for (size_t k = 1; k < kMeans; ++k) {
+    const double share = below.back() * static_cast<double>(k) / kMeans;
     while (bin + 1 < kHistogramBins && below[bin + 1] < share) ++bin;
     const double fraction = (share - below[bin]) / (below[bin + 1] - below[bin]);
     const double width = static_cast<double>(first[bin + 1] - first[bin]);
     const size_t bound = first[bin] + static_cast<size_t>(std::clamp(fraction, 0.0, 1.0) * width);
     // Every value of the codebook stands for at least one of the data.
-    bounds[k] = std::clamp(bound, bounds[k - 1] + 1, sorted.values.size() - (kSize - k));
+    bounds[k] = std::clamp(bound, bounds[k - 1] + 1, sorted.values.size() - (kMeans - k));
   }
-  bounds[kSize] = sorted.values.size();
+  bounds[kMeans] = sorted.values.size();
   return bounds;
 }
 
 /// One round of Lloyd's: ranges end half-way between the means. False where nothing moved.
 bool improve(const Sorted& sorted, Bounds& bounds) {
-  std::array<double, kSize> means{};
-  for (size_t k = 0; k < kSize; ++k) means[k] = sorted.mean(bounds[k], bounds[k + 1]);
+  std::array<double, kMeans> means{};
+  for (size_t k = 0; k < kMeans; ++k) means[k] = sorted.mean(bounds[k], bounds[k + 1]);
   const Bounds before = bounds;
-  for (size_t k = 1; k < kSize; ++k) {
+  for (size_t k = 1; k < kMeans; ++k) {
     const double half = 0.5 * (means[k - 1] + means[k]);
-    const auto found = std::upper_bound(
-        sorted.values.begin(), sorted.values.end(), half,
-        [](double value, float element) { return value < static_cast<double>(element); });
+    const auto found = std::upper_bound(sorted.values.begin(), sorted.values.end(), half, kIsBelow);
     bounds[k] = std::clamp(static_cast<size_t>(found - sorted.values.begin()), bounds[k - 1] + 1,
-                           sorted.values.size() - (kSize - k));
+                           sorted.values.size() - (kMeans - k));
   }
   return bounds != before;
+}
+
+/// Halves the widest range, which holds different values where there are more values than ranges.
+void splitWidest(const Sorted& sorted, Bounds& bounds) {
+  const auto end = [&](size_t k, size_t back) {
+    return static_cast<double>(sorted.values[bounds[k + back] - back]);
+  };
+  size_t widest = 0;
+  for (size_t k = 1; k + 1 < bounds.size(); ++k) {
+    if (end(k, 1) - end(k, 0) > end(widest, 1) - end(widest, 0)) widest = k;
+  }
+  const double half = 0.5 * (end(widest, 0) + end(widest, 1));
+  const auto first = sorted.values.begin() + static_cast<std::ptrdiff_t>(bounds[widest]);
+  const auto last = sorted.values.begin() + static_cast<std::ptrdiff_t>(bounds[widest + 1]);
+  // Above the middle; not the first, so that both halves hold a value, nor behind the last.
+  const auto middle = std::upper_bound(first + 1, last - 1, half, kIsBelow);
+  bounds.insert(bounds.begin() + static_cast<std::ptrdiff_t>(widest) + 1,
+                static_cast<size_t>(middle - sorted.values.begin()));
 }
 
 }  // namespace
@@ -116,6 +141,7 @@ Codebook makeCodebook(std::vector<float> values) {
   Bounds bounds = startBounds(sorted);
   for (int round = 0; round < kMaxRounds && improve(sorted, bounds); ++round) {
   }
+  while (bounds.size() <= kSize) splitWidest(sorted, bounds);
   for (size_t k = 0; k < kSize; ++k) {
     codebook.values[k] = static_cast<float>(sorted.mean(bounds[k], bounds[k + 1]));
   }

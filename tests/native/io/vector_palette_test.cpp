@@ -184,6 +184,19 @@ TEST(Codebook, ComesCloseToTheBestForAGaussian) {
   EXPECT_LT(sum / 200000.0, 1.10 * std::sqrt(3.0) * M_PI / 2.0 / 65536.0);
 }
 
+TEST(Codebook, StandsForRareValuesToo) {
+  std::vector<float> values = randomVectors(5000, 1, 11);
+  const Codebook codebook = makeCodebook(values);
+  double largest = 0;
+  for (const float value : values) {
+    largest = std::max(largest,
+                       std::abs(double(codebook.values[codebook.nearest(value)]) - double(value)));
+  }
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  // Even steps have 1/512 of the range; k-means alone has 1/30 of it, out where values are few.
+  EXPECT_LT(largest, 3.0 / 512.0 * (double(*high) - double(*low)));
+}
+
 TEST(Codebook, SurvivesOutliers) {
   // Scales of 0 have the logarithm -104 in files.
   std::vector<float> values = randomVectors(100000, 1, 10);
