@@ -226,9 +226,21 @@ std::vector<CameraView> readTransforms(const std::string& path) {
   return views;
 }
 
-}  // namespace
+/// Refuses what no picture can be made with, such as focal lengths beyond all measure. Cameras of a
+/// file without a size of its pictures are in units of the picture.
+void requireUsable(const std::vector<CameraView>& views, const std::string& path) {
+  for (size_t i = 0; i < views.size(); ++i) {
+    Camera camera = views[i].camera;
+    if (camera.width == 0 && camera.height == 0) camera.width = camera.height = 1;
+    try {
+      validate(camera);
+    } catch (const Error& error) {
+      fail(ErrorCode::kFormat, path + ": view " + std::to_string(i) + ": " + error.what());
+    }
+  }
+}
 
-std::vector<CameraView> readCameraFile(const std::string& path) {
+std::vector<CameraView> readViews(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) {
@@ -244,6 +256,14 @@ std::vector<CameraView> readCameraFile(const std::string& path) {
                                  "of COLMAP (there or in sparse/0) is needed");
   }
   return readTransforms(path);
+}
+
+}  // namespace
+
+std::vector<CameraView> readCameraFile(const std::string& path) {
+  std::vector<CameraView> views = readViews(path);
+  requireUsable(views, path);
+  return views;
 }
 
 }  // namespace stipple

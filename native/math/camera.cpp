@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <cstdio>
 #include <string>
 
 #include "base/error.h"
@@ -15,6 +16,12 @@ constexpr uint32_t kMaxSide = 65536;
 constexpr double kMaxFocal = 1e9;
 constexpr double kMinNear = 1e-9;
 
+std::string shown(double value) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%g", value);
+  return text;
+}
+
 void requireRigid(const Mat4d& matrix) {
   const Mat3d rotation = matrix.topLeftCorner<3, 3>();
   // 1e-4: a matrix that went through float32 and a JSON file is off by about 1e-6.
@@ -22,7 +29,7 @@ void requireRigid(const Mat4d& matrix) {
   if (!(error < 1e-4) || rotation.determinant() < 0) {
     fail(ErrorCode::kInvalidArgument,
          "camera.world_to_camera is not a rotation and a translation (it differs by " +
-             std::to_string(error) + " from orthonormal; at most 0.0001 is allowed)");
+             shown(error) + " from orthonormal; at most 0.0001 is allowed)");
   }
   const Eigen::Matrix<double, 1, 4> last(0, 0, 0, 1);
   if (matrix.row(3) != last) {
@@ -42,7 +49,7 @@ void validate(const Camera& camera) {
   }
   for (const double focal : {camera.fx, camera.fy}) {
     if (!std::isfinite(focal) || focal <= 0 || focal > kMaxFocal) {
-      fail(ErrorCode::kInvalidArgument, "camera focal length is " + std::to_string(focal) +
+      fail(ErrorCode::kInvalidArgument, "camera focal length is " + shown(focal) +
                                             " pixels; it must be positive and at most 1e9");
     }
   }
