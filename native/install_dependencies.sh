@@ -14,6 +14,8 @@ packages=(
   zlib1g-dev libzstd-dev libwebp-dev
   # The command-line tool.
   libcli11-dev
+  # Fuzzing the readers: libFuzzer and the sanitizers come with clang alone.
+  clang libclang-rt-dev
   # Tests and benchmarks; readelf and nm look at what the libraries need and export.
   libgtest-dev libgmock-dev libbenchmark-dev binutils python3-numpy python3-pytest
   # Blender, with what it needs to draw without a screen.

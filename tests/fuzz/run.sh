@@ -1,42 +1,79 @@
 #!/usr/bin/env bash
-# Runs the fuzzer of every reader of splat files for so many seconds each (default 60), from a corpus of
-# small valid files. Needs clang with libFuzzer (Debian: clang libclang-rt-dev), and says so where it is missing.
-#   bash tests/fuzz/run.sh [SECONDS] [FORMAT...]
-# What a fuzzer finds lies in build/fuzz/found, named after its format.
+# Runs the fuzzer of every reader, or of those that are named, for so many seconds each (default 60).
+#   bash tests/fuzz/run.sh [SECONDS] [READER...]
+#   bash tests/fuzz/run.sh --build READER...          builds only, and checks that these are all readers
+#   bash tests/fuzz/run.sh --run SECONDS READER...    runs what is built
+# They start from small valid files (build/fuzz/corpus, where what they discover stays) and from the
+# files that once were faults (tests/fuzz/found). What they find lies in build/fuzz/found, named after its
+# reader. Needs clang with libFuzzer (Debian: clang libclang-rt-dev), and says so where it is missing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-seconds=${1:-60}
-shift || true
+build() {
+  local jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
+  cmake --preset fuzz
+  cmake --build build/fuzz --target fuzzers --parallel "$jobs"
+  local work
+  work=$(mktemp -d)
+  build/fuzz/bin/make_corpus build/fuzz/corpus "$work"
+  rm -r "$work"
+}
+
+readers() {
+  (cd build/fuzz/corpus && printf '%s\n' *)
+}
+
+# Runs one fuzzer; its whole output goes to a log, the end of it is shown where it finds something.
+fuzz() {
+  local seconds=$1 reader=$2 work status=0
+  local log=build/fuzz/found/$reader.log
+  mkdir -p build/fuzz/found
+  if [ ! -d "build/fuzz/corpus/$reader" ]; then
+    echo "There is no reader '$reader'; there are: $(readers | tr '\n' ' ')" >&2
+    return 2
+  fi
+  # In memory where possible: thousands of files are written per second.
+  work=$(mktemp -d -p "$([ -w /dev/shm ] && echo /dev/shm || echo /tmp)")
+  local from=("build/fuzz/corpus/$reader")
+  if [ -d "tests/fuzz/found/$reader" ]; then from+=("tests/fuzz/found/$reader"); fi
+  # Limits: a file of a few kilobytes takes no second and no gigabyte.
+  STIPPLE_FUZZ_READER=$reader STIPPLE_FUZZ_FOLDER=$work ASAN_OPTIONS=detect_leaks=0 \
+    build/fuzz/bin/fuzz_reader -max_total_time="$seconds" -timeout=25 -rss_limit_mb=2048 \
+    -max_len=16384 -artifact_prefix="build/fuzz/found/$reader-" -print_final_stats=1 \
+    "${from[@]}" >"$log" 2>&1 || status=1
+  rm -r "$work"
+  if [ $status -ne 0 ]; then tail -60 "$log"; fi
+  echo "$reader: $(sed -n 's/^stat::number_of_executed_units: *//p' "$log") files," \
+    "coverage $(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$log" | tail -1)"
+  return $status
+}
+
 if ! command -v clang++ >/dev/null ||
     ! echo 'extern "C" int LLVMFuzzerTestOneInput(const unsigned char*, unsigned long) { return 0; }' |
       clang++ -x c++ -fsanitize=fuzzer,address - -o /dev/null 2>/dev/null; then
   echo "Fuzzing is skipped: clang++ with libFuzzer is not installed (Debian: clang libclang-rt-dev)."
   exit 0
 fi
-jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
-cmake --preset fuzz
-cmake --build build/fuzz --target fuzzers --parallel "$jobs"
-# The packing libraries come through libstipple_media, which the plain build makes.
-cmake --preset release
-cmake --build build/release --target stipple_media --parallel "$jobs"
-mkdir -p build/fuzz/lib build/fuzz/found
-ln -sf ../../release/lib/libstipple_media.so build/fuzz/lib/libstipple_media.so
-build/fuzz/bin/make_corpus build/fuzz/corpus
+mode=${1:-}
+case $mode in
+  --build)
+    build
+    if ! diff <(printf '%s\n' "${@:2}" | sort) <(readers | sort); then
+      echo "The readers that are named (<) are not those that can be fuzzed (>)" >&2
+      exit 1
+    fi
+    exit 0 ;;
+  --run)
+    seconds=$2
+    shift 2 ;;
+  *)
+    seconds=${1:-60}
+    shift || true
+    build ;;
+esac
+[ $# -gt 0 ] || mapfile -t all < <(readers)
 failed=0
-for fuzzer in build/fuzz/bin/fuzz_*; do
-  format=${fuzzer##*/fuzz_}
-  [ $# -eq 0 ] || [[ " $* " == *" $format "* ]] || continue
-  mkdir -p "build/fuzz/corpus/$format"
-  echo "Fuzzing $format for $seconds s"
-  # Limits: a file of a few kilobytes takes no second and no gigabyte.
-  log=build/fuzz/found/$format.log
-  if ! ASAN_OPTIONS=detect_leaks=0 "$fuzzer" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 \
-      -max_len=16384 -artifact_prefix="build/fuzz/found/$format-" -print_final_stats=1 \
-      "build/fuzz/corpus/$format" >"$log" 2>&1; then
-    failed=1
-    tail -40 "$log"
-  fi
-  grep -E '^stat::number_of_executed_units' "$log" || true
+for reader in "${@:-${all[@]}}"; do
+  fuzz "$seconds" "$reader" || failed=1
 done
 exit $failed

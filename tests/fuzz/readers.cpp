@@ -1,0 +1,359 @@
+#include "readers.h"
+
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <memory>
+
+#include "base/error.h"
+#include "decode/hierarchy_decoder.h"
+#include "decode/surface_model.h"
+#include "density/octree_density.h"
+#include "io/camera_file.h"
+#include "io/glb_builder.h"
+#include "io/hierarchy_asset.h"
+#include "io/image_file.h"
+#include "io/ksplat_builder.h"
+#include "io/mesh_file.h"
+#include "io/random_cloud.h"
+#include "io/sog_levels.h"
+#include "io/sog_scene.h"
+#include "io/splat_file.h"
+#include "io/surface_asset.h"
+
+namespace stipple::fuzz {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string load(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+auto storeAs(const char* name) {
+  return
+      [name](const fs::path& folder, const std::string& bytes) { storeFile(folder / name, bytes); };
+}
+
+/// A result that breaks its promises is no fault of the file: it must not look like one.
+template <typename Check>
+void keepsPromises(const Check& check) {
+  try {
+    check();
+  } catch (const Error& error) {
+    fail(ErrorCode::kInternal, error.what());
+  }
+}
+
+// ---- Splats -------------------------------------------------------------------------------------
+
+void readSplats(const fs::path& path) {
+  const SplatCloud cloud = readSplatFile(path.string());
+  keepsPromises([&] { validate(cloud, "cloud"); });
+}
+
+std::vector<std::string> splatSeeds(const SplatFormat& format, const fs::path& folder) {
+  std::vector<std::string> made;
+  const std::string endings = format.endings;
+  const std::string ending = endings.substr(0, endings.find(' '));
+  if (format.write == nullptr) {
+    for (unsigned level = 0; level < 3; ++level) {
+      RawKsplat raw;
+      raw.level = level;
+      raw.degree = level;
+      made.push_back(raw.bytes());
+    }
+    return made;
+  }
+  for (const int degree : {0, 1, 3}) {
+    SplatCloud cloud = randomCloud(5, degree, 1);
+    const auto add = [&](const SplatWriteOptions& options) {
+      writeSplatFile(cloud, (folder / ("seed" + ending)).string(), options);
+      made.push_back(load(folder / ("seed" + ending)));
+    };
+    add({});
+    cloud.antialias = Antialias::kMip;
+    add({.ascii = ending == ".ply", .version = ending == ".spz" ? 3 : 0});
+    add({.frame = Frame::kRFU});
+  }
+  return made;
+}
+
+void addSplatReaders(std::vector<Reader>& all) {
+  for (const SplatFormat& format : splatFormats()) {
+    const std::string endings = format.endings;
+    const std::string ending = endings.substr(0, endings.find(' '));
+    // Streamed scenes are many files: below.
+    if (ending[0] != '.') continue;
+    all.push_back({format.name, nullptr,
+                   [ending](const fs::path& folder, const std::string& bytes) {
+                     storeFile(folder / ("input" + ending), bytes);
+                   },
+                   // By the format's own reader, whatever the first bytes say.
+                   [ending, &format](const fs::path& folder) {
+                     const SplatCloud cloud =
+                         format.read((folder / ("input" + ending)).string(), nullptr);
+                     keepsPromises([&] { validate(cloud, "cloud"); });
+                   },
+                   [&format](const fs::path& folder) { return splatSeeds(format, folder); }});
+  }
+}
+
+void addSceneReaders(std::vector<Reader>& all) {
+  all.push_back({"sog-meta", [](const fs::path& folder) { SogScene::second().store(folder); },
+                 storeAs("meta.json"),
+                 [](const fs::path& folder) { readSplats(folder / "meta.json"); },
+                 [](const fs::path&) {
+                   return std::vector<std::string>{SogScene::first().files["meta.json"],
+                                                   SogScene::second().files["meta.json"]};
+                 }});
+  const auto writeLevels = [](const fs::path& folder) {
+    const SplatCloud fine = randomCloud(40, 1, 1), coarse = randomCloud(9, 0, 2);
+    writeSogLevels({&fine, &coarse}, &coarse, (folder / "lod-meta.json").string(),
+                   {.chunk_splats = 20, .chunk_side = 1e9}, nullptr);
+  };
+  all.push_back({"sog-levels", writeLevels, storeAs("lod-meta.json"),
+                 [](const fs::path& folder) { readSplats(folder / "lod-meta.json"); },
+                 [writeLevels](const fs::path& folder) {
+                   writeLevels(folder);
+                   return std::vector<std::string>{load(folder / "lod-meta.json")};
+                 }});
+}
+
+// ---- Meshes -------------------------------------------------------------------------------------
+
+std::string png(const fs::path& folder) {
+  Image image;
+  image.width = image.height = 2;
+  image.channels = 4;
+  image.transfer = Transfer::kSrgb;
+  image.pixels = {1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1, 1, 1, 1, 1};
+  writeImageFile(image, (folder / "texture.png").string());
+  return load(folder / "texture.png");
+}
+
+/// Two triangles of four corners; without and with everything that a primitive can have.
+std::vector<std::string> meshSeeds(const fs::path& folder) {
+  GlbBuilder file;
+  file.addFloats({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}, 3);
+  file.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, 3);
+  file.addFloats({0, 0, 1, 0, 1, 1, 0, 1}, 2);
+  file.addFloats({1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1, 1, 1, 1, 1}, 4);
+  file.addIndices({0, 1, 2, 0, 2, 3});
+  const int indices = file.addView(std::string("\1\0", 2));
+  const int values = file.addView(std::string(12, '\0'));
+  file.addAccessor(
+      "\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\","
+      "\"sparse\":{\"count\":1,\"indices\":{\"bufferView\":" +
+      std::to_string(indices) +
+      ",\"componentType\":5121},\"values\":{\"bufferView\":" + std::to_string(values) + "}}");
+  const int picture = file.addView(png(folder));
+  const auto scene = [picture](const std::string& primitive) {
+    return "\"scenes\":[{\"nodes\":[0]}],\"scene\":0,\"nodes\":[{\"children\":[1],\"scale\":[2,1,1]"
+           "},"
+           "{\"mesh\":0,\"translation\":[0,0,1],\"rotation\":[0,0,1,0]}],"
+           "\"meshes\":[{\"primitives\":[" +
+           primitive +
+           "]}],\"images\":[{\"mimeType\":\"image/png\",\"bufferView\":" + std::to_string(picture) +
+           "}],\"textures\":[{\"source\":0}],"
+           "\"materials\":[{\"alphaMode\":\"MASK\",\"alphaCutoff\":0.5,"
+           "\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,0.5,0,1]}},{\"alphaMode\":\"BLEND\","
+           "\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0,\"extensions\":"
+           "{\"KHR_texture_transform\":{\"offset\":[0.5,0.25],\"scale\":[2,3],\"rotation\":1}}}}}]";
+  };
+  return {file.glb(scene("{\"attributes\":{\"POSITION\":0},\"mode\":5}")),
+          file.glb(scene("{\"attributes\":{\"POSITION\":0,\"NORMAL\":1,\"TEXCOORD_0\":2,"
+                         "\"COLOR_0\":3},\"indices\":4,\"material\":0}")),
+          file.glb(scene("{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":2},\"material\":1,"
+                         "\"mode\":6}")),
+          file.glb(scene("{\"attributes\":{\"POSITION\":5},\"indices\":4,\"mode\":6}"))};
+}
+
+// ---- Asset files --------------------------------------------------------------------------------
+
+/// What loading a model does with an asset, as far as a wrong file can reach.
+void readSurface(const fs::path& path) {
+  SurfaceAsset asset = readSurfaceAsset(path.string());
+  RootCube root;
+  root.origin = asset.root_origin;
+  root.side = asset.root_side;
+  try {
+    auto density = std::make_shared<const OctreeDensity>(OctreeDensity::fromLevels(
+        root, std::move(asset.cells), std::move(asset.log_probabilities)));
+    surfaceModelFromParts(std::make_shared<const PointSet>(std::move(asset.surface)), density);
+  } catch (const Error& error) {
+    fail(ErrorCode::kFormat, error.what());
+  }
+}
+
+void readHierarchy(const fs::path& path) {
+  HierarchyAsset asset = readHierarchyAsset(path.string());
+  auto leaves = std::make_shared<const SplatCloud>(std::move(asset.leaves));
+  auto tree = std::make_shared<MergeTree>();
+  tree->nodes = std::move(asset.nodes);
+  tree->parents = std::move(asset.parents);
+  tree->errors = std::move(asset.errors);
+  std::shared_ptr<const HierarchyDecoder> decoder;
+  try {
+    decoder = std::make_shared<const HierarchyDecoder>(leaves, tree);
+  } catch (const Error& error) {
+    fail(ErrorCode::kFormat, error.what());
+  }
+  keepsPromises([&] {
+    DecodeRequest request;
+    for (const uint64_t budget : {size_t{1}, (leaves->size() + 1) / 2, leaves->size()}) {
+      request.budget = budget;
+      const SplatCloud cut = decoder->decode(request);
+      validate(cut, "cut");
+      if (cut.size() != budget) fail(ErrorCode::kInternal, "the cut has another size");
+    }
+  });
+}
+
+std::vector<std::string> surfaceSeeds(const fs::path& folder) {
+  SurfaceAsset asset;
+  const float all = std::log(1.0f / 8.0f), none = -HUGE_VALF;
+  asset.cells = {{0}, {2}};
+  asset.log_probabilities = {{none, none, 0.0f, none, none, none, none, none},
+                             std::vector<float>(8, all)};
+  asset.surface.positions = {0, 0, 0, 1, 1, 1};
+  asset.surface.normals = {0, 0, 1, 1, 0, 0};
+  asset.surface.colours = {0.5f, 0.5f, 0.5f, 1, 0, 0};
+  asset.surface.opacities = {1, 0.5f};
+  asset.surface.areas = {1, 2};
+  asset.surface.weights = {0.5f, 0.5f};
+  writeSurfaceAsset(asset, (folder / "seed").string());
+  return {load(folder / "seed")};
+}
+
+std::vector<std::string> hierarchySeeds(const fs::path& folder) {
+  std::vector<std::string> made;
+  for (const int degree : {0, 2}) {
+    HierarchyAsset asset;
+    asset.leaves = randomCloud(3, degree, 1);
+    asset.nodes = randomCloud(2, degree, 2);
+    asset.parents = {UINT32_MAX, 0, 0, 1, 1};
+    asset.errors = {0.5f, 0.25f};
+    writeHierarchyAsset(asset, (folder / "seed").string());
+    made.push_back(load(folder / "seed"));
+  }
+  return made;
+}
+
+// ---- Cameras ------------------------------------------------------------------------------------
+
+void readCameras(const fs::path& path) {
+  const std::vector<CameraView> views = readCameraFile(path.string());
+  keepsPromises([&] {
+    for (CameraView view : views) {
+      // Files without a size of the pictures give cameras in units of the picture.
+      if (view.camera.width == 0 && view.camera.height == 0) {
+        view.camera.width = view.camera.height = 1;
+      }
+      validate(view.camera);
+    }
+  });
+}
+
+/// One input for two files: the length of the first in two bytes, the first, the second.
+auto storePair(const char* first, const char* second) {
+  return [first, second](const fs::path& folder, const std::string& bytes) {
+    size_t length = 0;
+    for (size_t b = 0; b < 2 && b < bytes.size(); ++b) {
+      length |= static_cast<size_t>(static_cast<unsigned char>(bytes[b])) << (8 * b);
+    }
+    const std::string both = bytes.size() > 2 ? bytes.substr(2) : "";
+    length = std::min(length, both.size());
+    storeFile(folder / first, both.substr(0, length));
+    storeFile(folder / second, both.substr(length));
+  };
+}
+
+std::string pair(const std::string& first, const std::string& second) {
+  return ByteText().u16(first.size()).text(first).text(second).bytes;
+}
+
+std::vector<std::string> colmapSeeds(const fs::path&) {
+  const auto f64 = [](ByteText& to, std::initializer_list<double> values) {
+    for (const double value : values) to.u64(std::bit_cast<uint64_t>(value));
+  };
+  ByteText cameras;
+  cameras.u64(2).u32(7).u32(0).u64(640).u64(480);
+  f64(cameras, {500.0, 320.25, 240.5});
+  cameras.u32(3).u32(4).u64(100).u64(50);
+  f64(cameras, {80.0, 90.0, 51.0, 24.0, 0.0, 0.0, 0.0, 0.0});
+  ByteText images;
+  images.u64(2).u32(11);
+  f64(images, {1.0, 1.0, 0.0, 0.0, 1.0, 2.0, 3.0});
+  images.u32(3).text("b.png").u8(0).u64(1);
+  f64(images, {1.5, 2.5});
+  images.u64(UINT64_MAX).u32(12);
+  f64(images, {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0});
+  images.u32(7).text("a.png").u8(0).u64(0);
+  return {pair(cameras.bytes, images.bytes)};
+}
+
+std::vector<std::string> colmapTextSeeds(const fs::path&) {
+  return {
+      pair("# Camera list\n7 SIMPLE_PINHOLE 640 480 500 320.25 240.5\n"
+           "3 OPENCV 100 50 80 90 51 24 0 0 0 0\r\n",
+           "# Images\n11 1 1 0 0 1 2 3 3 b c.png\n1.5 2.5 -1\n12 1 0 0 0 0 0 4 7 a.png\n\n")};
+}
+
+std::vector<std::string> transformsSeeds(const fs::path&) {
+  const std::string frames =
+      "\"frames\":[{\"file_path\":\"a.png\",\"transform_matrix\":"
+      "[[1,0,0,1],[0,0,-1,2],[0,1,0,3],[0,0,0,1]]},{\"file_path\":\"b\",\"cx\":9,"
+      "\"transform_matrix\":[[2,0,0,1],[0,2,0,2],[0,0,2,3],[0,0,0,1]]}]}";
+  return {
+      "{\"fl_x\":500,\"fl_y\":510,\"cx\":300.5,\"cy\":250,\"w\":640,\"h\":480,\"k1\":0.0,"
+      "\"camera_model\":\"OPENCV\"," +
+          frames,
+      "{\"camera_angle_x\":1.2," + frames,
+      "{\"camera_model\":\"ORTHOGRAPHIC\",\"ortho_scale\":3,\"w\":8,\"h\":8," + frames};
+}
+
+std::vector<Reader> makeReaders() {
+  std::vector<Reader> all;
+  addSplatReaders(all);
+  addSceneReaders(all);
+  all.push_back({"mesh", nullptr, storeAs("input.glb"),
+                 [](const fs::path& folder) {
+                   const TriMesh mesh = readMeshFile((folder / "input.glb").string());
+                   keepsPromises([&] { validateArrays(mesh); });
+                 },
+                 meshSeeds});
+  const char* asset = "input.stipple.safetensors";
+  all.push_back({"surface", nullptr, storeAs(asset),
+                 [asset](const fs::path& folder) { readSurface(folder / asset); }, surfaceSeeds});
+  all.push_back({"hierarchy", nullptr, storeAs(asset),
+                 [asset](const fs::path& folder) { readHierarchy(folder / asset); },
+                 hierarchySeeds});
+  all.push_back({"transforms", nullptr, storeAs("transforms.json"),
+                 [](const fs::path& folder) { readCameras(folder / "transforms.json"); },
+                 transformsSeeds});
+  all.push_back({"colmap", nullptr, storePair("cameras.bin", "images.bin"),
+                 [](const fs::path& folder) { readCameras(folder); }, colmapSeeds});
+  all.push_back({"colmap-text", nullptr, storePair("cameras.txt", "images.txt"),
+                 [](const fs::path& folder) { readCameras(folder); }, colmapTextSeeds});
+  return all;
+}
+
+}  // namespace
+
+void storeFile(const fs::path& path, const std::string& bytes) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file << bytes;
+  file.close();
+  if (!file) fail(ErrorCode::kIo, path.string() + " cannot be written");
+}
+
+const std::vector<Reader>& readers() {
+  static const std::vector<Reader> kReaders = makeReaders();
+  return kReaders;
+}
+
+}  // namespace stipple::fuzz
