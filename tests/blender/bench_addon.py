@@ -12,8 +12,10 @@ import time
 
 import bpy
 import numpy as np
+import pytest
 
 import scenes
+from test_splat_data import make_arrays
 
 
 def best_of(runs, action):
@@ -84,3 +86,36 @@ def test_slider_and_surface(stipple, tmp_path):
         settings.anchors = next(budgets)
 
     report('slider move at 50 k anchors', best_of(10, move), 0.1)
+
+
+SERIES_FRAMES = 24
+
+
+@pytest.mark.parametrize('degree', [0, 3])
+def test_frame_step_of_a_series(stipple, tmp_path, degree, monkeypatch):
+    """100 k splats a frame: how long a step takes, with files read ahead and without, each file new to the cache.
+
+    A view takes 1/24 s between frames to draw; the same time passes here between steps.
+    """
+    sequences, native = stipple.scene.sequences, stipple.scene.sources.context()
+    random = np.random.default_rng(1)
+    arrays = make_arrays(stipple, 100_000, degree)
+    for frame in range(1, SERIES_FRAMES + 1):
+        arrays.positions = random.normal(size=(100_000, 3)).astype(np.float32)
+        stipple.binding.cloud.Cloud.create(native, arrays).save(str(tmp_path / f's_{frame:04d}.ply'))
+    bpy.ops.stipple.splats_import(filepath=str(tmp_path / 's_0001.ply'), as_sequence=True)
+    reading = best_of(5, lambda: stipple.binding.cloud.Cloud.load(native, str(tmp_path / 's_0005.ply')))
+
+    def steps(ahead):
+        monkeypatch.setattr(sequences, '_limits', lambda: (4 << 30, ahead))
+        sequences.forget()
+        bpy.context.scene.frame_set(1)
+        times = []
+        for frame in range(2, SERIES_FRAMES + 1):
+            time.sleep(1 / 24)
+            times.append(best_of(1, lambda: bpy.context.scene.frame_set(frame)))
+        return sorted(times)[len(times) // 2]
+
+    without, ahead = steps(0), steps(4)
+    print(f'\ndegree {degree}: reading a file {reading[0] * 1e3:.0f} ms; a step without reading ahead '
+          f'{without[0] * 1e3:.0f} ms, with it {ahead[0] * 1e3:.0f} ms, ratio {without[0] / ahead[0]:.2f}x', flush=True)
