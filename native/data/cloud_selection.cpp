@@ -74,7 +74,7 @@ SplatCloud thinned(const SplatCloud& cloud, size_t count, uint64_t seed) {
   SplatCloud result = kept(cloud, thinningMask(cloud.size(), count, seed));
   if (count == cloud.size() || count == 0) return result;
   const auto wider =
-      static_cast<float>(std::sqrt(static_cast<double>(cloud.size()) / static_cast<double>(count)));
+      static_cast<float>(std::cbrt(static_cast<double>(cloud.size()) / static_cast<double>(count)));
   for (float& scale : result.scales) scale *= wider;
   return result;
 }

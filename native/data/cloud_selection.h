@@ -20,8 +20,10 @@ std::vector<uint8_t> insideBox(const SplatCloud& cloud, const Mat4d& cloud_to_bo
 /// kInvalidArgument where count is larger than total.
 std::vector<uint8_t> thinningMask(size_t total, size_t count, uint64_t seed);
 
-/// The splats of thinningMask(), in their order, each axis longer by sqrt(N / count): surfaces keep
-/// the area that their splats cover. All of them, bit for bit, where count is N.
+/// The splats of thinningMask(), in their order, each axis longer by the cube root of N / count:
+/// together they keep their volume. All of them, bit for bit, where count is N. (Keeping the area
+/// that they cover, by the square root, blurs scans whose splats overlap: 1 dB less on one of 150 k
+/// splats at every share from 5 to 50 %, and as much as not widening them at all.)
 SplatCloud thinned(const SplatCloud& cloud, size_t count, uint64_t seed);
 
 /// The splats whose mask [N] is not 0, in their order, bit for bit.

@@ -84,7 +84,7 @@ def keep(cloud, mask):
 
 
 def thin(cloud, count, seed=0):
-    """Exactly count splats of a cloud, chosen by their index alone and widened to cover what the others did."""
+    """Exactly count splats of a cloud, chosen by their index alone and widened to keep the volume of all."""
     if count < 0:
         raise invalid(f'Splats to keep are {count}; allowed are 0 and above.')
     return Cloud(cloud.library, new_handle(cloud.library, 'stipple_cloud_thin', cloud.pointer, count, seed))

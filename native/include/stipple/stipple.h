@@ -716,8 +716,8 @@ StippleStatus stipple_cloud_select_floaters_start(const StippleCloud* cloud,
 StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask, uint64_t mask_count,
                                  StippleCloud** kept);
 /* Plain thinning, for clouds that have no tree: exactly count splats, 0 to all, chosen by random numbers keyed by
- * (seed, index) alone, in their order, each axis longer by sqrt(all / count) so that surfaces stay covered; bit for
- * bit where all stay. A smaller count is a part of a larger one, and frames of a series whose splats keep their
+ * (seed, index) alone, in their order, each axis longer by the cube root of all / count, so that their volume stays; bit
+ * for bit where all stay. A smaller count is a part of a larger one, and frames of a series whose splats keep their
  * places thin alike. A tree's cut (stipple_model_from_cloud_start) looks better. Errors: INVALID_ARGUMENT
  * where count is above the cloud's. Cost: O(N). */
 StippleStatus stipple_cloud_thin(const StippleCloud* cloud, uint64_t count, uint64_t seed,
