@@ -18,8 +18,8 @@ packages=(
   clang libclang-rt-dev
   # Tests and benchmarks; readelf and nm look at what the libraries need and export.
   libgtest-dev libgmock-dev libbenchmark-dev binutils python3-numpy python3-pytest
-  # Blender, with what it needs to draw without a screen.
-  blender libegl1 libegl-mesa0 libgl1-mesa-dri
+  # Blender, with what it needs to draw without a screen, and a virtual screen for its windows.
+  blender libegl1 libegl-mesa0 libgl1-mesa-dri xvfb
 )
 
 missing=()

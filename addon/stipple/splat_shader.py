@@ -186,8 +186,12 @@ void main()
 '''
 
 
+class ShaderError(StippleError):
+    """This machine's graphics cannot compile the shaders."""
+
+
 class Shaders:
-    """The compiled shaders. Errors: StippleError where this machine's graphics cannot compile them."""
+    """The compiled shaders. Errors: ShaderError."""
 
     def __init__(self):
         self.instanced = hasattr(gpu.types.GPUBatch, 'draw_instanced')
@@ -289,7 +293,7 @@ def _compile(info_and_kept):
     try:
         return gpu.shader.create_from_info(info_and_kept[0])
     except Exception as error:  # Blender raises plain exceptions of several types here
-        raise StippleError(f'The graphics driver cannot compile the shader of splats ({error}); splats are drawn as '
+        raise ShaderError(f'The graphics driver cannot compile the shader of splats ({error}); splats are drawn as '
                            'points.', Status.ERROR_UNAVAILABLE) from None
 
 

@@ -8,11 +8,12 @@ in display space in a picture of their own, against the scene's depth, and laid 
 import gpu
 import numpy as np
 
-from .scene import cameras, viewed
+from .binding.errors import StippleError
+from .scene import cameras, sync, viewed
 from .splat_drawing import ShownSplats, SplatView
-from .splat_shader import Shaders
+from .splat_shader import ShaderError, Shaders
 
-__all__ = ('Shaders', 'ViewEllipses')
+__all__ = ('ShaderError', 'Shaders', 'ViewEllipses')
 
 
 class ViewEllipses:
@@ -34,7 +35,7 @@ class ViewEllipses:
             self._target = Target(width, height)
         with self._target.bound(depth, with_selection):
             self._sorted.draw(shaders, shown, camera, region_data.window_matrix,
-                              cameras.step_back(region_data.window_matrix), clip_planes(region_data), with_selection)
+                              cameras.step_back(region_data.window_matrix), viewed.clip_planes(region_data), with_selection)
         self._target.show(shaders, (x, y), _outline_colour(context) if with_selection else None)
         return is_sorting
 
@@ -95,19 +96,15 @@ class Target:
         return np.array(values, np.float32).reshape(height, width, 4)
 
 
-def clip_planes(region_data):
-    """[n,4] in the world: what lies above 0 is hidden (Alt+B)."""
-    if not region_data.use_clip_planes:
-        return ()
-    planes = np.array([tuple(plane) for plane in region_data.clip_planes], np.float64)
-    return planes[np.abs(planes[:, :3]).sum(axis=1) > 0]
-
-
 def _shown(entries, depsgraph, view_layer):
     """view_layer: whose selection is shown, None for no selection."""
     shown = []
     for entry in entries:
-        cloud, info = viewed.cloud_of(entry, depsgraph)
+        try:
+            cloud, info = viewed.cloud_of(entry, depsgraph)
+        except StippleError as error:
+            sync.problems[entry.obj.data.name] = str(error)
+            continue
         selected = view_layer is not None and entry.owner.select_get(view_layer=view_layer)
         shown.append(ShownSplats(entry.key, cloud, entry.count, info.antialias, entry.matrix, selected))
     return shown

@@ -1,66 +1,163 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The engine Stipple's picture of a 3D view, by the native renderer."""
+"""The engine Stipple's picture of a 3D view, by the native renderer.
+
+A view that changes gets a coarse picture, one that rests a fine one. Both are made by jobs; the view shows
+the last picture until the next is there, so turning it never waits for more than a moment.
+"""
+
+import time
 
 import numpy as np
 
+from .binding import cloud_edit
+from .binding.grade import GradedCloud
 from .binding.renderer import Renderer
 from .binding.structs import JobState
-from .scene import cameras, facts, instances, sources
+from .scene import cameras, facts, instances, sources, viewed
 
-# While the view moves, pictures have one pixel for this many of the region's along each side.
-COARSE = 4
+# Coarse pictures have one pixel for this many of the region's along each side: the least, the first and the most.
+# Beyond the most, ordering the splats takes the time and not their pixels.
+COARSE = (2, 4, 8)
+# Seconds that a coarse picture should take: above, the next is coarser; far below, finer.
+COARSE_SECONDS = 0.04
+# Seconds that a redraw waits for a coarse picture before it shows the last one instead.
+PATIENCE = 0.02
+# Seconds without a change after which a view rests.
+REST_SECONDS = 0.15
 
 
 class ViewPicture:
-    """The picture of one 3D view: coarse at once, fine when the job behind it has ended."""
+    """The picture of one 3D view: coarse at once, fine when the view rests."""
 
     def __init__(self):
         self._instances = []
         self._version = 0
-        self._key = None
-        self._fine = None   # RenderTask that is being made
-        self._shown = None  # (texture, whether it is fine)
+        self._coarse = COARSE[1]
+        self._renderer = None
+        self._clipped = {}
+        self._key = None       # of what the view shows now
+        self._changed = 0.0    # when that was last another
+        self._task = None      # _Making, or None
+        self._shown = None     # _Shown, or None
 
     def update(self, depsgraph, warn):
         """Takes what the view shows now. Errors: StippleError."""
-        self._instances = instances.gather(depsgraph, 'VIEWPORT', warn)
+        self._instances = instances.gather_owned(depsgraph, 'VIEWPORT', warn)
         self._version += 1
 
     def draw(self, engine, context, depsgraph):
         """Draws, and asks for another call while a finer picture is on its way. Errors: StippleError."""
-        region = context.region
+        region, space, scene = context.region, context.space_data, depsgraph.scene
         camera = cameras.from_view(context.region_data, region.width, region.height)
-        scene = depsgraph.scene
-        key = (self._version, bytes(camera), facts.blend_space(scene), scene.render.film_transparent)
+        border = cameras.view_border(context, region)
+        planes = viewed.clip_planes(context.region_data)
+        entries = [entry for entry in self._instances if viewed.shows(space, depsgraph, *entry[:2])]
+        key = (self._version, tuple(id(entry) for entry in entries), bytes(camera), border, planes.tobytes(),
+               facts.blend_space(scene), scene.render.film_transparent)
+        now = time.perf_counter()
         if key != self._key:
-            self.close()
-            self._key = key
-            small = cameras.from_view(context.region_data, max(region.width // COARSE, 1),
-                                      max(region.height // COARSE, 1))
-            task = self._start(scene, small)
-            task.job.wait()
-            self._shown = (_texture(task.colour), False)
-            self._fine = self._start(scene, camera)
-        if self._fine is not None:
-            state = self._fine.job.poll()[0]
-            if state == JobState.RUNNING:
-                engine.tag_redraw()
-            else:
-                self._fine.job.wait()
-                self._shown = (_texture(self._fine.colour), True)
-                self._fine = None
-        _draw_texture(engine, scene, self._shown[0], region)
+            self._key, self._changed = key, now
+        self._take()
+        if self._task is not None and self._task.is_fine and self._task.key != key:
+            self._task.close()
+            self._task = None
+        if self._task is None and (self._shown is None or self._shown.key != key):
+            self._start(scene, camera, border, entries, planes, self._coarse)
+            self._take(PATIENCE)
+        if (self._task is None and self._shown is not None and self._shown.key == key and not self._shown.is_fine
+                and now - self._changed >= REST_SECONDS):
+            self._start(scene, camera, border, entries, planes, 1)
+        if self._task is not None or self._shown is None or not self._shown.is_fine or self._shown.key != key:
+            engine.tag_redraw()
+        if self._shown is not None:
+            _draw_texture(engine, scene, self._shown.texture, self._shown.border)
 
     def close(self):
-        if self._fine is not None:
-            self._fine.job.close()
-            self._fine = None
+        if self._task is not None:
+            self._task.close()
+            self._task = None
 
-    def _start(self, scene, camera):
-        renderer = Renderer(sources.context())
+    def _start(self, scene, camera, border, entries, planes, coarse):
+        """Starts the picture of the border's pixels with one pixel for coarse x coarse of them."""
+        if self._renderer is None:
+            self._renderer = Renderer(sources.context())
         background = None if scene.render.film_transparent else facts.world_colour(scene.world)
-        options = renderer.options(blend_space=facts.blend_space(scene), background=background)
-        return renderer.start(self._instances, camera, options, with_depth=False)
+        options = self._renderer.options(blend_space=facts.blend_space(scene), background=background)
+        task = self._renderer.start(self._placed(entries, planes), cameras.part_of(camera, border, coarse), options,
+                                    with_depth=False)
+        self._task = _Making(task, self._key, border, coarse)
+
+    def _placed(self, entries, planes):
+        """[(cloud, matrix)] of what the clipping planes leave."""
+        if not len(planes):
+            self._clipped.clear()
+            return [(cloud, matrix) for _, _, cloud, matrix in entries]
+        placed, used = [], {}
+        for _, _, cloud, matrix in entries:
+            local = planes @ matrix
+            key = (id(cloud), local.tobytes())
+            used[key] = self._clipped.get(key) or (cloud, _clipped(cloud, local))
+            placed.append((used[key][1], matrix))
+        self._clipped = used
+        return placed
+
+    def _take(self, patience=0.0):
+        """Shows the picture in the making if it is done, or gets done within some seconds."""
+        if self._task is None:
+            return
+        until = time.perf_counter() + patience
+        while self._task.is_running():
+            if time.perf_counter() >= until:
+                return
+            time.sleep(0.001)
+        task, self._task = self._task, None
+        task.wait()
+        if not task.is_fine:
+            self._adapt(time.perf_counter() - task.begun)
+        self._shown = _Shown(_texture(task.colour), task.key, task.is_fine, task.border)
+
+    def _adapt(self, seconds):
+        """Chooses how coarse the next picture is by what the last one took."""
+        if seconds > COARSE_SECONDS:
+            self._coarse = min(2 * self._coarse, COARSE[2])
+        elif seconds < COARSE_SECONDS / 6:
+            # Twice the pixels along both sides take four times as long at most.
+            self._coarse = max(self._coarse // 2, COARSE[0])
+
+
+class _Making:
+    """A picture that a job makes."""
+
+    def __init__(self, task, key, border, coarse):
+        self._task = task
+        self.key, self.border = key, border
+        self.is_fine = coarse == 1
+        self.begun = time.perf_counter()
+
+    @property
+    def colour(self):
+        return self._task.colour
+
+    def is_running(self):
+        return self._task.job.poll()[0] == JobState.RUNNING
+
+    def wait(self):
+        self._task.job.wait()
+
+    def close(self):
+        self._task.job.close()
+
+
+class _Shown:
+    def __init__(self, texture, key, is_fine, border):
+        self.texture, self.key, self.is_fine, self.border = texture, key, is_fine, border
+
+
+def _clipped(cloud, planes):
+    """The cloud, with its grade where it has one, without what lies above planes of its own space."""
+    plain = getattr(cloud, 'cloud', cloud)
+    kept = cloud_edit.clipped(plain, planes)
+    return kept if plain is cloud else GradedCloud(kept, cloud.settings)
 
 
 def _texture(pixels):
@@ -70,11 +167,11 @@ def _texture(pixels):
     return gpu.types.GPUTexture((width, height), format='RGBA16F', data=gpu.types.Buffer('FLOAT', flat.size, flat))
 
 
-def _draw_texture(engine, scene, texture, region):
+def _draw_texture(engine, scene, texture, border):
     import gpu
     from gpu_extras.presets import draw_texture_2d
     gpu.state.blend_set('ALPHA_PREMULT')
     engine.bind_display_space_shader(scene)
-    draw_texture_2d(texture, (0, 0), region.width, region.height)
+    draw_texture_2d(texture, (border.x, border.y), border.width, border.height)
     engine.unbind_display_space_shader()
     gpu.state.blend_set('NONE')

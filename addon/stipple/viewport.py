@@ -37,23 +37,27 @@ class _Drawing:
         self._points = splat_points.SplatPoints()
         self._scene = viewed.ViewedScene()
         self._shaders = None
+        self._shaders_failed = False
         self._views = {}  # by RegionView3D, the one that was drawn last at the end
 
     def draw(self, context, space, region_data):
         depsgraph = context.evaluated_depsgraph_get()
         scene = self._scene.update(depsgraph)
-        shown = viewed.shown(scene, space)
+        shown = viewed.shown(scene, space, depsgraph)
         if not shown:
             return
         ellipses, points = split(shown, _points_above())
-        if space.shading.type == 'WIREFRAME' or viewed.state['graphics']:
+        if space.shading.type == 'WIREFRAME' or self._shaders_failed:
             ellipses, points = [], shown
         if points:
             self._points.draw(points, depsgraph)
         if ellipses:
+            hidden = bool(points) or viewed.hides_splats(scene, space, depsgraph)
             try:
-                self._draw_ellipses(context, depsgraph, ellipses, bool(points) or viewed.hides_splats(scene, space))
+                self._draw_ellipses(context, depsgraph, ellipses, hidden)
+                note_problem('')
             except StippleError as error:
+                self._shaders_failed = isinstance(error, self._ellipses.ShaderError)
                 note_problem(str(error))
                 self._points.draw(ellipses, depsgraph)
 
@@ -95,8 +99,8 @@ def split(entries, most):
 
 
 def note_problem(message):
-    """Keeps what is wrong with the graphics for panels, and logs it once."""
-    if viewed.state['graphics'] != message:
+    """Keeps what is wrong with the graphics for panels, and logs it once; '' for nothing."""
+    if message and viewed.state['graphics'] != message:
         log.error('%s', message)
     viewed.state['graphics'] = message
 

@@ -21,8 +21,8 @@ def run_steps(steps_file, folder, blender, timeout=300):
         pytest.skip('Xvfb is not installed: nothing can be shown in a window')
     with Screen(folder) as screen:
         environment = dict(os.environ, DISPLAY=screen.display, LIBGL_ALWAYS_SOFTWARE='1')
-        command = [blender, '--factory-startup', '--window-geometry', '0', '0', str(WIDTH), str(HEIGHT), '--addons',
-                   'stipple', '--python', str(HERE / 'window.py'), '--', str(steps_file), str(folder), str(screen.file)]
+        command = [blender, '--factory-startup', '--window-geometry', '0', '0', str(WIDTH), str(HEIGHT), '--python',
+                   str(HERE / 'window.py'), '--', str(steps_file), str(folder), str(screen.file)]
         with open(folder / 'log.txt', 'w') as log:
             process = subprocess.Popen(command, env=environment, cwd=folder, stdout=log, stderr=subprocess.STDOUT)
             try:

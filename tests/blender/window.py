@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs steps in a Blender with a window and takes pictures of its screen.
 
-    blender --factory-startup --addons stipple --python window.py -- STEPS.py FOLDER SCREEN
+    blender --factory-startup --python window.py -- STEPS.py FOLDER SCREEN
 
 STEPS.py defines `steps`: a list of functions of a Window, called one after the other with a pause for
 Blender to draw. A step that returns a name gets its picture, FOLDER/name.xwd, a copy of SCREEN: the frame
@@ -65,6 +65,7 @@ def main():
     steps_file, folder, screen = sys.argv[sys.argv.index('--') + 1:][:3]
     folder = Path(folder)
     bpy.context.preferences.view.show_splash = False
+    bpy.ops.preferences.addon_enable(module='stipple')
     state = {'step': 0, 'shot': None, 'until': 0}
 
     def finish(name, text=''):

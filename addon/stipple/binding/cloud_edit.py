@@ -50,6 +50,15 @@ def select_box(cloud, cloud_to_box, side=Side.INSIDE):
     return mask
 
 
+def clipped(cloud, planes):
+    """The cloud without splats whose centre lies above 0 of one of the planes [n,4] in its own space."""
+    positions = cloud.positions()
+    mask = np.ones(len(positions), np.uint8)
+    for plane in np.asarray(planes, np.float64):
+        mask &= positions @ plane[:3].astype(np.float32) + np.float32(plane[3]) <= 0
+    return cloud if mask.all() else keep(cloud, mask)
+
+
 def select_mesh_start(cloud, cloud_to_mesh, mesh, side=Side.INSIDE):
     """A task for the mask of splats inside a mesh, or of the others."""
     mask, count = _new_mask(cloud), c_uint64()

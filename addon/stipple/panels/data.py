@@ -8,7 +8,7 @@ Shape Keys and all else that meshes have.
 import bpy
 
 from . import source_state
-from ..scene import exporting, geometry, masks, sources, splat_data, sync
+from ..scene import exporting, geometry, masks, sources, splat_data, sync, viewed
 
 
 SEPARATOR = ' \u00b7 '
@@ -145,7 +145,7 @@ def _draw_foreign(self, context):
 
 def _draw_warnings(layout, data):
     stipple = data.stipple
-    problem = sync.problems.get(data.name)
+    problem = sync.problems.get(data.name) or viewed.state['graphics']
     if not stipple.edited and source_state.draw(layout, data):
         return
     if stipple.edited:

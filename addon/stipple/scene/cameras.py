@@ -85,6 +85,49 @@ def from_view(region_data, width, height):
                          far_plane=far)
 
 
+def view_border(context, region):
+    """The rectangle of a 3D view's pixels that its render border leaves, from the bottom left corner; the whole region
+    without one. The camera's view has the scene's border, others their own (Ctrl+B)."""
+    whole = Border(0, 0, region.width, region.height)
+    space, render = context.space_data, context.scene.render
+    if context.region_data.view_perspective == 'CAMERA':
+        if not render.use_border or space.camera is None:
+            return whole
+        frame = _camera_frame(context, region, space.camera)
+        edges = render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y
+    else:
+        if not space.use_render_border:
+            return whole
+        frame = (0, region.width, 0, region.height)
+        edges = (space.render_border_min_x, space.render_border_max_x, space.render_border_min_y,
+                 space.render_border_max_y)
+    x0, x1 = (frame[0] + edge * (frame[1] - frame[0]) for edge in edges[:2])
+    y0, y1 = (frame[2] + edge * (frame[3] - frame[2]) for edge in edges[2:])
+    x0, y0 = min(max(int(x0), 0), region.width - 1), min(max(int(y0), 0), region.height - 1)
+    return Border(x0, y0, min(max(int(x1), x0 + 1), region.width) - x0, min(max(int(y1), y0 + 1), region.height) - y0)
+
+
+def _camera_frame(context, region, camera_object):
+    """(left, right, bottom, top) of the camera's picture in the region's pixels."""
+    matrix = np.array(camera_object.matrix_world.normalized(), np.float64)
+    corners = np.ones((4, 4))
+    corners[:, :3] = [tuple(corner) for corner in camera_object.data.view_frame(scene=context.scene)]
+    clip = corners @ matrix.T @ np.array(context.region_data.perspective_matrix, np.float64).T
+    x, y = (0.5 + 0.5 * clip[:, axis] / clip[:, 3] for axis in (0, 1))
+    return (x.min() * region.width, x.max() * region.width, y.min() * region.height, y.max() * region.height)
+
+
+def part_of(camera, border, coarse=1):
+    """The camera of a part of its picture, with one pixel for coarse x coarse of its own."""
+    part = StippleCamera.from_buffer_copy(camera)
+    part.width, part.height = max(border.width // coarse, 1), max(border.height // coarse, 1)
+    x, y = part.width / border.width, part.height / border.height
+    part.fx, part.fy = camera.fx * x, camera.fy * y
+    part.cx = (camera.cx - border.x) * x
+    part.cy = (camera.cy - (camera.height - border.y - border.height)) * y
+    return part
+
+
 def step_back(window_matrix):
     """Metres by which from_view() stands behind a view: an orthographic one also sees what is behind its centre."""
     window = np.array(window_matrix, np.float64)

@@ -13,6 +13,12 @@ def gather(depsgraph, mode, warn=lambda message: None):
 
     mode: 'VIEWPORT' or 'RENDER', which budget. warn: called with a sentence per object that is left out.
     """
+    return [(cloud, matrix) for _, _, cloud, matrix in gather_owned(depsgraph, mode, warn)]
+
+
+def gather_owned(depsgraph, mode, warn=lambda message: None):
+    """[(owner, object, cloud, matrix)] with the original object, and the original one that it is selected and hidden
+    with: itself or its instancer."""
     clouds, found = {}, []
     for entry in depsgraph.object_instances:
         obj = entry.object
@@ -31,7 +37,9 @@ def gather(depsgraph, mode, warn=lambda message: None):
         if key not in clouds:
             clouds[key] = _cloud_of(obj, mode, depsgraph.scene.frame_current)
         if clouds[key] is not None:
-            found.append((clouds[key], matrix))
+            original = obj.original
+            owner = entry.parent.original if entry.is_instance else original
+            found.append((owner, original, clouds[key], matrix))
     return found
 
 

@@ -77,17 +77,36 @@ def gather(depsgraph):
     return Viewed(tuple(found), frozenset(others))
 
 
-def shown(viewed, space):
-    """The splats that one view shows: local view, local collections, object types."""
-    types = {'MESH': space.show_object_viewport_mesh}
+def shown(viewed, space, depsgraph):
+    """The splats that one view shows."""
+    return [v for v in viewed.splats if shows(space, depsgraph, v.owner, v.obj)]
+
+
+def shows(space, depsgraph, owner, obj):
+    """Whether a view shows an object: local view, local collections, object types. owner: the original object itself, or
+    the instancer that it belongs to."""
     # Before point clouds had an entry of their own in the popover, they always showed.
-    types['POINTCLOUD'] = getattr(space, 'show_object_viewport_pointcloud', True)
-    return [v for v in viewed.splats if types[v.obj.type] and v.owner.visible_in_viewport_get(space)]
+    of_type = space.show_object_viewport_mesh if obj.type == 'MESH' else getattr(
+        space, 'show_object_viewport_pointcloud', True)
+    return of_type and _is_in(space, depsgraph, owner)
 
 
-def hides_splats(viewed, space):
+def hides_splats(viewed, space, depsgraph):
     """Whether anything in the view can stand before splats."""
-    return any(obj.visible_in_viewport_get(space) for obj in viewed.others)
+    return any(_is_in(space, depsgraph, obj) for obj in viewed.others)
+
+
+def _is_in(space, depsgraph, original):
+    # Only evaluated objects know whether they are in a local view.
+    return original.evaluated_get(depsgraph).visible_in_viewport_get(space)
+
+
+def clip_planes(region_data):
+    """[n,4] in the world: what lies above 0 is hidden (Alt+B). Blender's own planes face the other way."""
+    if not region_data.use_clip_planes:
+        return np.zeros((0, 4))
+    planes = -np.array([tuple(plane) for plane in region_data.clip_planes], np.float64)
+    return planes[np.abs(planes[:, :3]).sum(axis=1) > 0]
 
 
 def cloud_of(entry, depsgraph):
