@@ -123,8 +123,8 @@ void stipple_model_from_cloud_options_init(StippleModelFromCloudOptions* options
   *options = {};
   options->struct_size = sizeof(StippleModelFromCloudOptions);
   options->view_rig = STIPPLE_RIG_AUTOMATIC;
-  options->view_count = 16;
-  options->view_size = 256;
+  options->view_count = 12;
+  options->view_size = 400;
 }
 
 StippleStatus stipple_model_from_cloud_start(StippleContext* context, const StippleCloud* cloud,

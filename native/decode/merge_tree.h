@@ -39,7 +39,7 @@ constexpr size_t kMaxTreeLeaves = (size_t{1} << 31) - 1;
 /// In: leaves: a cloud that validate() accepts, at least one splat. visibility [N] 0..1, how much
 /// of a splat is seen on average (train/visibility.h), or empty: 1 everywhere. Errors:
 /// kInvalidArgument for an empty cloud, sizes that disagree, values outside 0..1. Same tree for any
-/// number of threads. Cost: O(N log N), about 6 us per splat on two threads.
+/// number of threads. Cost: O(N log N), about 3 us per splat on two threads.
 MergeTree buildMergeTree(const SplatCloud& leaves, std::span<const float> visibility,
                          const MergeTreeOptions& options, Progress* progress = nullptr);
 

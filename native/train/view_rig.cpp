@@ -23,6 +23,12 @@ constexpr double kAngleAround = 40.0 * std::numbers::pi / 180;
 constexpr double kAngleInside = 75.0 * std::numbers::pi / 180;
 /// Places of cameras inside lie within this share of the radius.
 constexpr double kInsideShare = 0.25;
+/// Of this many places the one farthest from everything is taken: a camera with its nose to a wall
+/// sees a few splats only, and those far larger than anybody looks at them.
+constexpr uint32_t kPlacesToTry = 16;
+/// At most this many splats are asked, and one in so many of them may be nearer: floaters.
+constexpr size_t kSplatsToAsk = 8192;
+constexpr size_t kMayBeNearer = 256;
 /// Nothing within this many radii is cut off behind.
 constexpr double kFarRadii = 1e3;
 constexpr uint32_t kProbeSize = 48;
@@ -69,6 +75,33 @@ Vec3d direction(const Mat3d& turn, uint32_t index, uint32_t count) {
 
 Vec3d centreOf(const CloudExtent& extent) {
   return {extent.centre[0], extent.centre[1], extent.centre[2]};
+}
+
+/// A place near the middle with room around it. Other indices give other places.
+Vec3d insidePlace(const SplatCloud& cloud, const CloudExtent& extent, uint64_t seed,
+                  uint32_t index) {
+  const size_t stride = (cloud.size() + kSplatsToAsk - 1) / kSplatsToAsk;
+  std::vector<double> squared((cloud.size() + stride - 1) / stride);
+  const auto kept = squared.begin() + static_cast<long>(squared.size() / kMayBeNearer);
+  Vec3d best = centreOf(extent);
+  double farthest = -1;
+  for (uint32_t attempt = 0; attempt < kPlacesToTry; ++attempt) {
+    Vec3d place = centreOf(extent);
+    for (uint64_t axis = 0; axis < 3; ++axis) {
+      const uint64_t key = 3 + (uint64_t{index} * kPlacesToTry + attempt) * 3 + axis;
+      const double u = unitDouble(keyedBits(seed, RandomUse::kViewRig, key));
+      place[static_cast<int>(axis)] += kInsideShare * extent.radius * (2 * u - 1);
+    }
+    for (size_t i = 0; i < squared.size(); ++i) {
+      const float* p = &cloud.positions[i * stride * 3];
+      squared[i] = (Vec3d(p[0], p[1], p[2]) - place).squaredNorm();
+    }
+    std::nth_element(squared.begin(), kept, squared.end());
+    if (*kept <= farthest) continue;
+    farthest = *kept;
+    best = place;
+  }
+  return best;
 }
 
 }  // namespace
@@ -124,12 +157,7 @@ std::vector<Camera> viewsOfCloud(const SplatCloud& cloud, const ViewRigOptions& 
       cameras.push_back(lookingAlong(centreOf(extent) + distance * outward, -outward, kAngleAround,
                                      options.size, extent.radius));
     } else {
-      Vec3d eye = centreOf(extent);
-      for (uint64_t axis = 0; axis < 3; ++axis) {
-        const double u =
-            unitDouble(keyedBits(options.seed, RandomUse::kViewRig, 3 + uint64_t{i} * 3 + axis));
-        eye[static_cast<int>(axis)] += kInsideShare * extent.radius * (2 * u - 1);
-      }
+      const Vec3d eye = insidePlace(cloud, extent, options.seed, i);
       cameras.push_back(lookingAlong(eye, outward, kAngleInside, options.size, extent.radius));
     }
   }

@@ -17,8 +17,8 @@ enum class ViewRig : uint32_t {
 
 struct ViewRigOptions {
   ViewRig rig = ViewRig::kAutomatic;
-  uint32_t count = 16;  ///< views, 1..4096
-  uint32_t size = 256;  ///< pixels per side, 1..65536
+  uint32_t count = 12;  ///< views, 1..4096
+  uint32_t size = 400;  ///< pixels per side, 1..65536
   uint64_t seed = 0;    ///< other seeds give other views, spread as evenly
 };
 

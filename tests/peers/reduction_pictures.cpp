@@ -1,7 +1,8 @@
 // Reduces a cloud by its merge tree, with and without refinement, and compares pictures of 16 views
 // with the full cloud, beside files that another program made at the same counts.
 //   reduction_pictures --count FILE
-//   reduction_pictures FILE (BUDGET RULE SECONDS RESULT)...
+//   reduction_pictures FILE VIEWS (BUDGET RULE SECONDS RESULT)...
+// VIEWS: 0 automatic, 1 from around, 2 from inside.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -39,8 +40,9 @@ struct Psnr {
 /// Views of other seeds than those that visibility and refinement look from.
 class Judge {
  public:
-  explicit Judge(const SplatCloud& full) {
+  Judge(const SplatCloud& full, ViewRig kind) {
     ViewRigOptions rig;
+    rig.rig = kind;
     rig.count = 16;
     rig.size = 800;
     rig.seed = 1234567;
@@ -105,10 +107,10 @@ uint32_t stepsWithin(double seconds, const SplatCloud& cut, const SplatCloud& fu
 
 void compare(int argc, char** argv) {
   const auto full = std::make_shared<const SplatCloud>(readSplatFile(argv[1]));
-  const Judge judge(*full);
+  const Judge judge(*full, static_cast<ViewRig>(std::clamp(std::atoi(argv[2]), 0, 2)));
   std::printf("%-26s %9s %7s %7s %9s\n", "", "splats", "frame", "foregr.", "seconds");
   std::map<uint64_t, double> peer_seconds;
-  for (int i = 2; i + 3 < argc; i += 4) {
+  for (int i = 3; i + 3 < argc; i += 4) {
     const uint64_t budget = std::strtoull(argv[i], nullptr, 10);
     const double seconds = std::strtod(argv[i + 2], nullptr);
     print(argv[i + 1], budget, judge.psnr(readSplatFile(argv[i + 3])), seconds);
@@ -149,8 +151,9 @@ int main(int argc, char** argv) {
       std::printf("%zu\n", stipple::readSplatFile(argv[2]).size());
       return 0;
     }
-    if (argc < 6 || argc % 4 != 2) {
-      std::fprintf(stderr, "usage: reduction_pictures FILE (BUDGET RULE SECONDS RESULT)...\n");
+    if (argc < 7 || argc % 4 != 3) {
+      std::fprintf(stderr,
+                   "usage: reduction_pictures FILE VIEWS (BUDGET RULE SECONDS RESULT)...\n");
       return 2;
     }
     stipple::compare(argc, argv);

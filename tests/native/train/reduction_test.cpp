@@ -113,6 +113,25 @@ TEST(ViewRig, LooksAtThingsFromAroundAndAtRoomsFromInside) {
   EXPECT_THROW(viewsOfCloud({}, {}), Error);
 }
 
+TEST(ViewRig, LooksOutFromPlacesWithRoomAround) {
+  // A shell with a wall through its middle: places near the wall would see little else.
+  SplatCloud cloud = sphere(4000, 1.0, 1);
+  SplatCloud wall = sphere(1000, 1.0, 2);
+  for (size_t i = 0; i < wall.size(); ++i) wall.positions[i * 3] = 0.0f;
+  append(cloud, wall);
+  ViewRigOptions options;
+  options.rig = ViewRig::kInside;
+  options.count = 16;
+  double sum = 0;
+  for (const Camera& camera : viewsOfCloud(cloud, options)) {
+    sum += std::abs(cameraCentre(camera)[0]);
+  }
+  // Places are spread evenly over a quarter of the radius to both sides, so one alone is an eighth
+  // away on average; the farthest of sixteen is mostly in the last fifth.
+  const double reach = 0.25 * cloudExtent(cloud).radius;
+  EXPECT_GT(sum / 16, 0.75 * reach);
+}
+
 TEST(Visibility, IsNearOneInFrontAndNearZeroBehind) {
   SplatCloud cloud = sphere(4000, 1.0, 1);
   const size_t front_count = cloud.size();
