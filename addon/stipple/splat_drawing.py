@@ -5,6 +5,7 @@ A view keeps the order of its last sort and draws with it while the next one is 
 library's own thread: turning a view never waits. Nothing here knows of Blender's objects.
 """
 
+import weakref
 from dataclasses import dataclass
 
 import gpu
@@ -42,6 +43,10 @@ class ShownSplats:
         return getattr(self.cloud, 'settings', None)
 
 
+# Views of the same splats share them; an entry lives as long as a view's order does.
+_geometries = weakref.WeakValueDictionary()
+
+
 class Geometry:
     """The splats of some clouds in one texture, each cloud once however many instances it has."""
 
@@ -51,7 +56,6 @@ class Geometry:
             clouds.setdefault(id(entry.plain), (entry.plain, entry.count))
         array, first_rows = draw_order.pack([cloud for cloud, _ in clouds.values()],
                                             [count for _, count in clouds.values()], TEXTURE_SPLATS)
-        self.key = _geometry_key(shown)
         self.texture = splat_shader.texture(array, GEOMETRY_TEXELS * TEXTURE_SPLATS)
         self._first_rows = dict(zip(clouds, first_rows))
         self._clouds = clouds  # an id stays one cloud's while that lives
@@ -94,20 +98,21 @@ class SplatView:
         key = (_geometry_key(shown), tuple((e.key, e.grade, e.matrix.tobytes()) for e in shown), camera.model,
                bytes(camera.world_to_camera))
         if self._task is None and key != self._key:
-            self._start(shown, camera)
-            self._key = key
-        if self._task is not None and (wait or self._order is None or self._order.geometry is not
-                                       self._pending.geometry):
-            # There is nothing else to show: the first sort of these splats.
+            self._start(shown, camera, key)
+        # With nothing else to show, the first sort of these splats is waited for.
+        while self._task is not None and (wait or self._order is None
+                                          or self._order.geometry is not self._pending.geometry):
             self._task.job.wait()
             self._take()
+            if key != self._key:
+                self._start(shown, camera, key)
         return self._task is not None
 
-    def _start(self, shown, camera):
-        known = [order.geometry for order in (self._order,) if order is not None]
-        geometry = next((g for g in known if g.key == _geometry_key(shown)), None)
+    def _start(self, shown, camera, key):
+        self._key = key
+        geometry = _geometries.get(_geometry_key(shown))
         if geometry is None:
-            geometry = Geometry(shown)
+            geometry = _geometries[_geometry_key(shown)] = Geometry(shown)
         count = sum(entry.count for entry in shown)
         self._pending = _Order(geometry, [entry.key for entry in shown], count)
         self._task = draw_order.start(self._renderer, [(e.cloud, e.matrix) for e in shown], count,
@@ -116,8 +121,9 @@ class SplatView:
     def _take(self):
         if self._task is None or self._task.job.poll()[0] == JobState.RUNNING:
             return
-        task, self._task = self._task, None
-        task.job.wait()  # raises what went wrong
+        task, self._task, key, self._key = self._task, None, self._key, None
+        task.job.wait()  # raises what went wrong; the next update() tries again
+        self._key = key
         self._order, self._pending = self._pending, None
         self._order.rows = splat_shader.texture(task.rows, TEXTURE_SPLATS)
 

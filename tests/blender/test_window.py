@@ -76,6 +76,16 @@ def test_hidden_objects_are_not_drawn(shots):
     assert not is_color(pixel(shots, 'hidden', 'left'), window_steps.RED)
 
 
+def test_a_click_on_its_box_selects_a_splat_object(shots):
+    assert shots[1]['clicked'] == [shots[1]['left'][1]]
+
+
+def test_edit_mode_leaves_splats_as_they_are(shots):
+    assert shots[1]['problems'] == {}
+    assert is_color(pixel(shots, 'left_edit_mode', 'left'), window_steps.RED)
+    assert is_color(pixel(shots, 'edited', 'right'), window_steps.BLUE)
+
+
 def test_above_the_chosen_count_the_largest_are_points(shots):
     """Both squares have 4,000 splats: the first becomes points, which leave gaps."""
     def noise(picture, name):

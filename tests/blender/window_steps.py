@@ -83,25 +83,27 @@ def rested(_window):
     return 'native'
 
 
-def clipped_native(window):
+def clipped(window):
+    window.space.shading.type = 'SOLID'  # where Blender offers the operator
     region = window.region
     scale = facts['clipped'][0][1] - facts['right'][0][1]  # pixels of half a metre, downwards
     with window.context():
         bpy.ops.view3d.clip_border(xmin=0, xmax=region.width - 1, ymin=0,
                                    ymax=int(region.height / 2 + abs(scale) * 1.2))
     assert window.region_data.use_clip_planes
+    return 'clipped'
+
+
+def clipped_native(window):
+    window.space.shading.type = 'RENDERED'
 
 
 def clipped_native_shot(_window):
     return 'clipped_native'
 
 
-def clipped(window):
-    window.space.shading.type = 'SOLID'
-    return 'clipped'
-
-
 def local(window):
+    window.space.shading.type = 'SOLID'
     window.region_data.use_clip_planes = False
     scenes.select(window.right)
     with window.context():
@@ -157,5 +159,36 @@ def finish(_window):
     (folder / 'facts.json').write_text(json.dumps(facts))
 
 
-steps = [build, points_of_interest, outlined, rendered_by_another_engine, native, rested, clipped_native,
-         clipped_native_shot, clipped, local, local_native, local_native_shot, hidden, points, panel, broken_shader, finish]
+def clicked(window):
+    """A click on the edge of its box selects a splat object."""
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+    window.left.hide_set(False)
+    scenes.select(window.right)
+    corner = location_3d_to_region_2d(window.region, window.region_data, (-1.5, 0, 1.0))
+    with window.context():
+        bpy.ops.view3d.select(location=(int(corner.x), int(corner.y)))
+    facts['clicked'] = [obj.name for obj in bpy.context.view_layer.objects if obj.select_get()]
+    facts['left'].append(window.left.name)
+
+
+def edit_mode(window):
+    """Blender draws the points of what is edited: no problem is reported, and leaving is seen."""
+    if window.left.type == 'MESH':
+        scenes.select(window.left)
+        with window.context():
+            bpy.ops.object.mode_set(mode='EDIT')
+    return 'edited'
+
+
+def left_edit_mode(window):
+    if window.left.type == 'MESH':
+        with window.context():
+            bpy.ops.object.mode_set(mode='OBJECT')
+    scenes.select(window.right)
+    facts['problems'] = dict(addon().scene.sync.problems)
+    return 'left_edit_mode'
+
+
+steps = [build, points_of_interest, outlined, rendered_by_another_engine, native, rested, clipped, clipped_native,
+         clipped_native_shot, local, local_native, local_native_shot, hidden, clicked,
+         edit_mode, left_edit_mode, points, panel, broken_shader, finish]
