@@ -67,7 +67,7 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
         with sync.paused():
             sequences.attach(data, os.path.join(folder, f'{name}_{self._first:04d}{sources.MODEL_SUFFIX}'),
                              data.stipple.frame_duration, 'TREE')
-        sync.try_sync(self._object, None, 'VIEWPORT')
+        sync.write_shown(data)
         self.report({'INFO'}, f"Budgets of {count} files in '{folder}'")
 
 

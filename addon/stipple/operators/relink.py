@@ -10,7 +10,7 @@ from ..binding.errors import StippleError, invalid
 from ..binding.model import Model
 from ..binding.structs import ModelKind
 from ..jobs import JobOperator
-from ..scene import formats, masks, numbered, sequences, sources, splat_data, sync
+from ..scene import formats, masks, numbered, sources, splat_data, sync
 
 
 class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
@@ -95,8 +95,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
     def _write(data, made, clears_mask):
         stipple = data.stipple
         if stipple.is_sequence:
-            frame = sequences.shown_now(data)
-            sync.write(data, frame.arrays(), frame.key)
+            sync.write_shown(data)
             return
         if clears_mask:
             masks.clear(data)

@@ -4,7 +4,7 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene import sequences, sources, splat_data, sync
+from ..scene import sources, splat_data, sync
 
 
 class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
@@ -22,20 +22,19 @@ class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
     def start(self, context):
         data = context.object.data
         if data.stipple.is_sequence:
-            self._frame = sequences.shown_now(data)
-            self._splats = self._frame.arrays()
+            self._splats = None
             return None
         self._splats = sources.decode_data(data, sources.decode_settings(data.stipple)).read()
         return None
 
     def finish(self, context, _job):
         data = context.object.data
-        data.stipple.edited = False
         if data.stipple.is_sequence:
-            sync.write(data, self._splats, self._frame.key)
+            sync.write_shown(data)
         else:
             sync.write_decoded(data, self._splats)
-        self.report({'INFO'}, f"{self._splats.count:,} splats from their source")
+        data.stipple.edited = False
+        self.report({'INFO'}, f"{splat_data.count(data):,} splats from their source")
 
 
 classes = (STIPPLE_OT_revert_to_source,)

@@ -74,7 +74,10 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
             obj.select_set(True)
             context.view_layer.objects.active = obj
             if frame_count > 1:
-                sync.try_sync(obj, None, 'VIEWPORT')
+                try:
+                    sync.write_shown(obj.data)
+                except StippleError as error:
+                    failed.append(error)
         for error in failed:
             self.report({'WARNING'}, str(error))
         total = sum(splat_data.count(o.data) for o in context.view_layer.objects.selected)

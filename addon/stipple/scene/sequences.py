@@ -10,7 +10,6 @@ import os
 from collections import OrderedDict
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
 
 from .. import preferences
@@ -288,8 +287,3 @@ def _limits():
     """(bytes of the cache, files that are read ahead)."""
     chosen = preferences.get()
     return (1 << 30, 4) if chosen is None else (chosen.sequence_cache << 20, chosen.read_ahead)
-
-
-def shown_now(data, mode='VIEWPORT'):
-    """The Frame of a datablock at the present frame of the scene. Errors: StippleError."""
-    return frame_of(data, data.stipple, bpy.context.scene.frame_current, mode)

@@ -71,7 +71,11 @@ def forget():
 
 def absolute_path(source, owner=None):
     """A source path of a datablock as the system wants it."""
-    return os.path.normpath(bpy.path.abspath(source, library=owner.library if owner is not None else None))
+    library_of = None if owner is None else owner.library
+    override = None if owner is None else owner.override_library
+    if override is not None and override.reference.stipple.source == source:
+        library_of = override.reference.library  # a path that the override has not changed is still the library's
+    return os.path.normpath(bpy.path.abspath(source, library=library_of))
 
 
 def state(data):

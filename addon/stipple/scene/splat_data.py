@@ -82,7 +82,7 @@ def write(data, arrays):
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         raise StippleError(f"'{data.name}' is in Edit Mode; leave it before its splats are written.",
                            Status.ERROR_INVALID_ARGUMENT)
-    if isinstance(data, bpy.types.Mesh) and data.library is not None:
+    if isinstance(data, bpy.types.Mesh) and not _is_editable(data):
         _write_linked(data, arrays)
         return
     _resize(data, arrays.count)
@@ -105,8 +105,13 @@ def write(data, arrays):
     _mark(data, arrays)
 
 
+def _is_editable(data):
+    """False for linked and overridden data: foreach_set passes them over in silence."""
+    return data.library is None and data.override_library is None
+
+
 def _write_linked(mesh, arrays):
-    """foreach_set passes linked data over in silence; BMesh does not."""
+    """BMesh writes data that foreach_set does not."""
     own = bpy.data.meshes.new(mesh.name)
     try:
         write(own, arrays)
@@ -204,10 +209,10 @@ def _set(data, name, kind, values):
         data.attributes.new(name, kind, 'POINT')
     # Looked up again: references may be stale after new().
     elements, field = data.attributes[name].data, version.ATTRIBUTE_FIELDS[kind]
-    if data.library is None:
+    if _is_editable(data):
         elements.foreach_set(field, _flat(values))
         return
-    # Linked point clouds: foreach_set passes them over in silence. Some 3 µs for each value.
+    # Point clouds have no BMesh. Some 3 µs for each value.
     for element, value in zip(elements, np.asarray(values).reshape(len(elements), -1).tolist()):
         setattr(element, field, value)
 

@@ -101,6 +101,12 @@ def write_decoded(data, arrays):
     write(data, arrays, written_key(data, sources.decode_settings(data.stipple)))
 
 
+def write_shown(data):
+    """Stores what a series shows at the present frame of the scene. Errors: StippleError for its file."""
+    frame = sequences.frame_of(data, data.stipple, bpy.context.scene.frame_current, 'VIEWPORT')
+    write(data, frame.arrays(), frame.key)
+
+
 def written_key(data, settings):
     """A text that is equal for equal splats."""
     stipple = data.stipple
