@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <iterator>
 #include <span>
 #include <string>
 #include <utility>
@@ -19,26 +20,22 @@ using namespace stipple::api;
 
 namespace {
 
-/// A buffer of the caller and what fills it.
-struct Output {
-  float* StippleSplatGradients::*buffer;
-  std::vector<float> SplatGradients::*values;
-};
-
-constexpr Output kOutputs[] = {
-    {&StippleSplatGradients::positions, &SplatGradients::positions},
-    {&StippleSplatGradients::rotations, &SplatGradients::rotations},
-    {&StippleSplatGradients::scales, &SplatGradients::scales},
-    {&StippleSplatGradients::opacities, &SplatGradients::opacities},
-    {&StippleSplatGradients::sh, &SplatGradients::sh},
-    {&StippleSplatGradients::contributions, &SplatGradients::contributions},
-    {&StippleSplatGradients::blending_weights, &SplatGradients::blending_weights},
-    {&StippleSplatGradients::edge_weights, &SplatGradients::edge_weights},
-    {&StippleSplatGradients::screen_gradients, &SplatGradients::screen_gradients},
-    {&StippleSplatGradients::absolute_screen_gradients, &SplatGradients::absolute_screen_gradients},
-    {&StippleSplatGradients::screen_gradient_norms, &SplatGradients::screen_gradient_norms},
-    {&StippleSplatGradients::errors, &SplatGradients::errors},
-    {&StippleSplatGradients::largest_errors, &SplatGradients::largest_errors}};
+/// The caller's buffers, each for the array of kGradientArrays in its place.
+constexpr float* StippleSplatGradients::*kBuffers[] = {
+    &StippleSplatGradients::positions,
+    &StippleSplatGradients::rotations,
+    &StippleSplatGradients::scales,
+    &StippleSplatGradients::opacities,
+    &StippleSplatGradients::sh,
+    &StippleSplatGradients::contributions,
+    &StippleSplatGradients::blending_weights,
+    &StippleSplatGradients::edge_weights,
+    &StippleSplatGradients::screen_gradients,
+    &StippleSplatGradients::absolute_screen_gradients,
+    &StippleSplatGradients::screen_gradient_norms,
+    &StippleSplatGradients::errors,
+    &StippleSplatGradients::largest_errors};
+static_assert(std::size(kBuffers) == std::size(kGradientArrays));
 
 using Buffers = std::vector<StippleSplatGradients>;
 
@@ -122,9 +119,9 @@ void requireDerivative(const RenderSettings& settings) {
 void deliverGradients(const BackwardResult& made, const Buffers& buffers,
                       StippleBackwardResult* result) {
   for (size_t i = 0; i < buffers.size(); ++i) {
-    for (const Output& output : kOutputs) {
-      float* out = buffers[i].*output.buffer;
-      const std::vector<float>& values = made.instances[i].*output.values;
+    for (size_t k = 0; k < std::size(kBuffers); ++k) {
+      float* out = buffers[i].*kBuffers[k];
+      const std::vector<float>& values = made.instances[i].*kGradientArrays[k].values;
       if (out) std::copy(values.begin(), values.end(), out);
     }
   }

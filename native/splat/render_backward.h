@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -58,6 +59,28 @@ struct SplatGradients {
   std::vector<float> largest_errors;             ///< [N] largest error times T alpha of one pixel
 };
 
+/// Every array of SplatGradients.
+struct GradientArray {
+  const char* name;
+  std::vector<float> SplatGradients::*values;
+  size_t per_splat;   ///< values; 0: SplatCloud::shStride()
+  bool is_statistic;  ///< on request; else a derivative by the cloud's array of the same name
+};
+inline constexpr GradientArray kGradientArrays[] = {
+    {"positions", &SplatGradients::positions, 3, false},
+    {"rotations", &SplatGradients::rotations, 4, false},
+    {"scales", &SplatGradients::scales, 3, false},
+    {"opacities", &SplatGradients::opacities, 1, false},
+    {"sh", &SplatGradients::sh, 0, false},
+    {"contributions", &SplatGradients::contributions, 1, true},
+    {"blending_weights", &SplatGradients::blending_weights, 1, true},
+    {"edge_weights", &SplatGradients::edge_weights, 1, true},
+    {"screen_gradients", &SplatGradients::screen_gradients, 2, true},
+    {"absolute_screen_gradients", &SplatGradients::absolute_screen_gradients, 2, true},
+    {"screen_gradient_norms", &SplatGradients::screen_gradient_norms, 1, true},
+    {"errors", &SplatGradients::errors, 1, true},
+    {"largest_errors", &SplatGradients::largest_errors, 1, true}};
+
 struct BackwardResult {
   /// One per instance, in their order. Those of a cloud that is placed twice are to be added.
   std::vector<SplatGradients> instances;
@@ -95,9 +118,10 @@ class BackwardWorkspace {
 /// the picture found out (projection, order, lists, ends of pixels) is used again. May be called
 /// several times for one picture.
 /// Same bits for any number of threads. Errors: kInvalidArgument where `drawn` does not hold that
-/// picture or its clouds have changed since, an array has another size than the picture or holds a
-/// value outside its range; kMemoryLimit where backwardMemoryBound(drawn, input) is above
-/// memory_limit_bytes; `result` is then as it was. Cost: O(pairs of tiles and splats).
+/// picture or its clouds have changed since (any position or opacity is seen; rotations, scales and
+/// harmonics where a step of training changed all of them), an array has another size than the
+/// picture or holds a value outside its range; kMemoryLimit where backwardMemoryBound(drawn, input)
+/// is above memory_limit_bytes; `result` is then as it was. Cost: O(pairs of tiles and splats).
 void renderBackward(RenderWorkspace& drawn, const RenderResult& picture, const BackwardInput& input,
                     BackwardWorkspace& workspace, BackwardResult& result,
                     uint64_t memory_limit_bytes = UINT64_MAX, Progress* progress = nullptr);

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -23,17 +25,12 @@ struct Target {
 /// What has been done since the splats changed last; each pass needs the one before it.
 enum class Stage { kSplats, kDrawn, kLoss, kGradients };
 
-constexpr struct {
-  const char* name;
-  std::vector<float> SplatGradients::*values;
-} kStatistics[] = {{"contributions", &SplatGradients::contributions},
-                   {"blending_weights", &SplatGradients::blending_weights},
-                   {"edge_weights", &SplatGradients::edge_weights},
-                   {"screen_gradients", &SplatGradients::screen_gradients},
-                   {"absolute_screen_gradients", &SplatGradients::absolute_screen_gradients},
-                   {"screen_gradient_norms", &SplatGradients::screen_gradient_norms},
-                   {"errors", &SplatGradients::errors},
-                   {"largest_errors", &SplatGradients::largest_errors}};
+/// The arrays of Statistic, in its order.
+constexpr const GradientArray* kStatistics =
+    std::find_if(std::begin(kGradientArrays), std::end(kGradientArrays),
+                 [](const GradientArray& array) { return array.is_statistic; });
+static_assert(std::end(kGradientArrays) - kStatistics ==
+              static_cast<ptrdiff_t>(Statistic::kLargestErrors) + 1);
 
 /// Arrays of one checkpoint, which must belong together.
 void requireLike(const RawSplats& splats, const RawSplats& others, const char* what) {
@@ -200,11 +197,11 @@ class CpuBackend final : public RenderBackend {
 
   std::vector<float> statistic(Statistic statistic) const override {
     requireStage(Stage::kGradients, "there are no statistics; call backward first");
-    const auto& [name, values] = kStatistics[static_cast<size_t>(statistic)];
-    const std::vector<float>& seen = gradients_.instances[0].*values;
+    const GradientArray& array = kStatistics[static_cast<size_t>(statistic)];
+    const std::vector<float>& seen = gradients_.instances[0].*array.values;
     if (seen.empty() && splatCount() > 0) {
       fail(ErrorCode::kInvalidArgument,
-           std::string(name) + " were not asked for in the last backward pass");
+           std::string(array.name) + " were not asked for in the last backward pass");
     }
     return seen;
   }

@@ -1,8 +1,9 @@
 // Included inside a namespace, once by cpu/back_projector_scalar.cpp and once per instruction set
 // by cpu/back_projector_vector.cpp, hence no include guard. Needs there: loadLanes<T>(const
-// double*), storeLanes(T, double* or float*), laneCount<T>(), takeFootprintBack
-// (projectBackwardSteps of the same namespace), sumHarmonicsBack and storeHarmonicsBack. One order
-// of operations in double and nothing fused, so every instruction set gives the same bits.
+// double*), storeLanes(T, double* or float*), laneCount<T>(), loadGeometry and storeGradient of
+// rows that follow each other, takeFootprintBack (projectBackwardSteps of the same namespace),
+// sumHarmonicsBack and storeHarmonicsBack. One order of operations in double and nothing fused, so
+// every instruction set gives the same bits.
 
 constexpr size_t kMaxLanes = 8;
 
@@ -38,13 +39,30 @@ struct DirectionLanes {
   T inverse_length;
 };
 
+/// Whether a block is a whole vector of rows that follow each other.
 template <typename T>
-void fillColumns(const PlacedCloud& placed, const uint32_t* rows, size_t count,
-                 const CloudSums& sums, double (*in)[kMaxLanes]) {
+bool areTogether(const SummedRows& rows, size_t first, size_t count) {
+  return count == laneCount<T>() && rows.rows[first + count - 1] - rows.rows[first] == count - 1;
+}
+
+/// Of rows [first, first + count). Where they are together, geometry is loaded as vectors instead.
+template <typename T>
+void fillColumns(const PlacedCloud& placed, const SummedRows& rows, size_t first, size_t count,
+                 double (*in)[kMaxLanes]) {
   const SplatCloud& cloud = *placed.cloud;
+  const bool together = areTogether<T>(rows, first, count);
   for (size_t lane = 0; lane < laneCount<T>(); ++lane) {
     // Lanes behind the last splat repeat it.
-    const size_t row = rows[lane < count ? lane : count - 1];
+    const size_t i = first + (lane < count ? lane : count - 1);
+    const float* sum = rows.sumsOf(i);
+    in[kInS][lane] = static_cast<double>(sum[kFieldS]);
+    for (size_t k = 0; k < 2; ++k) in[kInFirst + k][lane] = static_cast<double>(sum[kFieldG0 + k]);
+    for (size_t k = 0; k < 3; ++k) {
+      in[kInSecond + k][lane] = static_cast<double>(sum[kFieldG00 + k]);
+    }
+    in[kInDepth][lane] = rows.depth_field ? static_cast<double>(sum[*rows.depth_field]) : 0.0;
+    if (together) continue;
+    const size_t row = rows.rows[i];
     for (size_t k = 0; k < 3; ++k) {
       in[kInPosition + k][lane] = static_cast<double>(cloud.positions[row * 3 + k]);
       in[kInScales + k][lane] = static_cast<double>(cloud.scales[row * 3 + k]);
@@ -52,13 +70,7 @@ void fillColumns(const PlacedCloud& placed, const uint32_t* rows, size_t count,
     for (size_t k = 0; k < 4; ++k) {
       in[kInRotation + k][lane] = static_cast<double>(cloud.rotations[row * 4 + k]);
     }
-    in[kInOpacity][lane] = placed.opacity(row);
-    const float* sum = sums.values + row * sums.stride;
-    in[kInS][lane] = static_cast<double>(sum[kFieldS]);
-    for (size_t k = 0; k < 2; ++k) in[kInFirst + k][lane] = static_cast<double>(sum[kFieldG0 + k]);
-    for (size_t k = 0; k < 3; ++k)
-      in[kInSecond + k][lane] = static_cast<double>(sum[kFieldG00 + k]);
-    in[kInDepth][lane] = sums.depth_field ? static_cast<double>(sum[*sums.depth_field]) : 0.0;
+    in[kInOpacity][lane] = static_cast<double>(cloud.opacities[row]);
   }
 }
 
@@ -89,8 +101,8 @@ struct BlockColumns {
 };
 
 constexpr size_t kLineFloats = 16;
-/// Blocks from this one to the one whose harmonics are asked for: 6 to 12 KB.
-constexpr size_t kBlocksAhead = 4;
+/// Blocks from this one to the one whose harmonics are asked for.
+constexpr size_t kBlocksAhead = 2;
 
 template <typename T>
 void directionSteps(const PlacedScene& scene, const PlacedCloud& placed, const T* position,
@@ -116,23 +128,27 @@ void directionSteps(const PlacedScene& scene, const PlacedCloud& placed, const T
   }
 }
 
-/// A block of at most laneCount<T>() splats. In: columns of its rows; rows_left, how many there are
-/// from its first on.
+/// Rows [first, first + count), at most laneCount<T>(), whose columns are filled.
 template <typename T>
 void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Mat3d& normal_to_view,
-                   const uint32_t* rows, size_t count, size_t rows_left,
-                   const BlockColumns& columns_in, const CloudSums& sums, SplatGradients& out,
-                   double* means, double* camera) {
+                   const SummedRows& rows, size_t first, size_t count, const BlockColumns& filled,
+                   SplatGradients& out, double* means, double* camera) {
   using std::max;
   using std::min;
-  const auto& in = columns_in.in;
+  const auto& in = filled.in;
+  const bool together = areTogether<T>(rows, first, count);
   SplatGeometry<T> splat;
-  for (size_t k = 0; k < 3; ++k) {
-    splat.position[k] = loadLanes<T>(in[kInPosition + k]);
-    splat.scales[k] = loadLanes<T>(in[kInScales + k]);
+  if (together) {
+    loadGeometry(*placed.cloud, rows.rows[first], splat);
+  } else {
+    for (size_t k = 0; k < 3; ++k) {
+      splat.position[k] = loadLanes<T>(in[kInPosition + k]);
+      splat.scales[k] = loadLanes<T>(in[kInScales + k]);
+    }
+    for (size_t k = 0; k < 4; ++k) splat.rotation[k] = loadLanes<T>(in[kInRotation + k]);
+    splat.opacity = loadLanes<T>(in[kInOpacity]);
   }
-  for (size_t k = 0; k < 4; ++k) splat.rotation[k] = loadLanes<T>(in[kInRotation + k]);
-  splat.opacity = loadLanes<T>(in[kInOpacity]);
+  splat.opacity = splat.opacity * T(placed.grade.opacity);
   FootprintGradient<T> by;
   // e = L d is sqrt(2 ln 2) g.
   by.s = loadLanes<T>(in[kInS]);
@@ -158,18 +174,16 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
   const size_t stride = placed.cloud->shStride();
   alignas(64) float by_sums[kMaxLanes][4] = {};
   for (size_t lane = 0; lane < count; ++lane) {
-    const size_t ahead = lane + kBlocksAhead * laneCount<T>();
-    if (ahead < rows_left) {
-      const size_t first = rows[ahead] * stride;
+    const size_t ahead = first + lane + kBlocksAhead * laneCount<T>();
+    if (ahead < rows.count) {
+      const size_t start = rows.rows[ahead] * stride;
       for (size_t i = 0; i < stride; i += kLineFloats) {
-        __builtin_prefetch(&placed.cloud->sh[first + i]);
-        __builtin_prefetch(&out.sh[first + i], 1);
+        __builtin_prefetch(&placed.cloud->sh[start + i]);
+        __builtin_prefetch(&out.sh[start + i], 1);
       }
     }
-    const size_t row = rows[lane];
-    const float* by_colour = sums.values + row * sums.stride + kFieldRed;
-    sumHarmonicsBack(placed, harmonics, lane, &placed.cloud->sh[row * stride], by_colour,
-                     by_sums[lane], &along[0][lane]);
+    sumHarmonicsBack(placed, harmonics, lane, &placed.cloud->sh[rows.rows[first + lane] * stride],
+                     rows.sumsOf(first + lane) + kFieldRed, by_sums[lane], &along[0][lane]);
   }
   const bool perspective = scene.view.perspective;
   if (turns) {
@@ -200,21 +214,38 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
   }
 
   alignas(64) double columns[kOutCount][kMaxLanes];
-  const auto store = [&](const T& value, size_t column) {
-    storeLanes(max(min(value, T(kLargestStored)), T(-kLargestStored)), columns[column]);
+  const auto hold = [](T& value) {
+    value = max(min(value, T(kLargestStored)), T(-kLargestStored));
   };
   for (size_t k = 0; k < 3; ++k) {
-    store(gradient.position[k], kOutPosition + k);
-    store(gradient.scales[k], kOutScales + k);
+    hold(gradient.position[k]);
+    hold(gradient.scales[k]);
     storeLanes(gradient.turn[k], columns[kOutTurn + k]);
     storeLanes(gradient.centre[k], columns[kOutShift + k]);
   }
-  for (size_t k = 0; k < 4; ++k) store(gradient.rotation[k], kOutRotation + k);
-  store(gradient.opacity * T(placed.grade.opacity), kOutOpacity);
-  for (size_t k = 0; k < 2; ++k) store(gradient.mean[k], kOutMean + k);
+  for (size_t k = 0; k < 4; ++k) hold(gradient.rotation[k]);
+  gradient.opacity = gradient.opacity * T(placed.grade.opacity);
+  hold(gradient.opacity);
+  for (size_t k = 0; k < 2; ++k) {
+    hold(gradient.mean[k]);
+    storeLanes(gradient.mean[k], columns[kOutMean + k]);
+  }
+  if (together) {
+    storeGradient(gradient, rows.rows[first], out);
+  } else {
+    for (size_t k = 0; k < 3; ++k) {
+      storeLanes(gradient.position[k], columns[kOutPosition + k]);
+      storeLanes(gradient.scales[k], columns[kOutScales + k]);
+    }
+    for (size_t k = 0; k < 4; ++k) storeLanes(gradient.rotation[k], columns[kOutRotation + k]);
+    storeLanes(gradient.opacity, columns[kOutOpacity]);
+  }
   for (size_t lane = 0; lane < count; ++lane) {
-    const size_t row = rows[lane];
+    const size_t row = rows.rows[first + lane];
     storeHarmonicsBack(placed, harmonics, lane, by_sums[lane], &out.sh[row * stride]);
+    for (size_t k = 0; k < 2; ++k) means[lane * 2 + k] = columns[kOutMean + k][lane];
+    for (size_t k = 0; k < 6; ++k) camera[k] += columns[kOutTurn + k][lane];
+    if (together) continue;
     const auto value = [&](size_t column) { return static_cast<float>(columns[column][lane]); };
     for (size_t k = 0; k < 3; ++k) {
       out.positions[row * 3 + k] = value(kOutPosition + k);
@@ -222,29 +253,23 @@ void takeBackBlock(const PlacedScene& scene, const PlacedCloud& placed, const Ma
     }
     for (size_t k = 0; k < 4; ++k) out.rotations[row * 4 + k] = value(kOutRotation + k);
     out.opacities[row] = value(kOutOpacity);
-    for (size_t k = 0; k < 2; ++k) means[lane * 2 + k] = columns[kOutMean + k][lane];
-    for (size_t k = 0; k < 6; ++k) camera[k] += columns[kOutTurn + k][lane];
   }
 }
 
 template <typename T>
-void takeBackRows(const PlacedScene& scene, const PlacedCloud& placed, const uint32_t* rows,
-                  size_t count, const CloudSums& sums, SplatGradients& out, double* means,
-                  double* camera) {
+void takeBackRows(const PlacedScene& scene, const PlacedCloud& placed, const SummedRows& rows,
+                  SplatGradients& out, double* means, double* camera) {
   const Mat3d normal_to_view = inverse(placed.linear).transpose();
   const size_t lanes = laneCount<T>();
   BlockColumns columns[2];
-  const auto fill = [&](size_t block) {
-    const size_t first = block * lanes;
-    if (first >= count) return;
-    fillColumns<T>(placed, rows + first, std::min(lanes, count - first), sums,
-                   columns[block % 2].in);
-  };
-  fill(0);
-  for (size_t block = 0; block * lanes < count; ++block) {
-    fill(block + 1);
-    const size_t first = block * lanes;
-    takeBackBlock<T>(scene, placed, normal_to_view, rows + first, std::min(lanes, count - first),
-                     count - first, columns[block % 2], sums, out, means + first * 2, camera);
+  const auto countFrom = [&](size_t first) { return std::min(lanes, rows.count - first); };
+  if (rows.count > 0) fillColumns<T>(placed, rows, 0, countFrom(0), columns[0].in);
+  for (size_t first = 0, block = 0; first < rows.count; first += lanes, ++block) {
+    const size_t next = first + lanes;
+    if (next < rows.count) {
+      fillColumns<T>(placed, rows, next, countFrom(next), columns[(block + 1) % 2].in);
+    }
+    takeBackBlock<T>(scene, placed, normal_to_view, rows, first, countFrom(first),
+                     columns[block % 2], out, means + first * 2, camera);
   }
 }

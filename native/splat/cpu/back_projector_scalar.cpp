@@ -37,6 +37,28 @@ void takeFootprintBack(const View<double>& view, const Mat3d& linear, const T* c
   projectBackwardSteps(view, linear, centre, splat, low_pass, by, out);
 }
 
+void loadGeometry(const SplatCloud& cloud, size_t row, SplatGeometry<double>& splat) {
+  for (size_t k = 0; k < 3; ++k) {
+    splat.position[k] = static_cast<double>(cloud.positions[row * 3 + k]);
+    splat.scales[k] = static_cast<double>(cloud.scales[row * 3 + k]);
+  }
+  for (size_t k = 0; k < 4; ++k) {
+    splat.rotation[k] = static_cast<double>(cloud.rotations[row * 4 + k]);
+  }
+  splat.opacity = static_cast<double>(cloud.opacities[row]);
+}
+
+void storeGradient(const ProjectionGradient<double>& gradient, size_t row, SplatGradients& out) {
+  for (size_t k = 0; k < 3; ++k) {
+    out.positions[row * 3 + k] = static_cast<float>(gradient.position[k]);
+    out.scales[row * 3 + k] = static_cast<float>(gradient.scales[k]);
+  }
+  for (size_t k = 0; k < 4; ++k) {
+    out.rotations[row * 4 + k] = static_cast<float>(gradient.rotation[k]);
+  }
+  out.opacities[row] = static_cast<float>(gradient.opacity);
+}
+
 #include "splat/cpu/back_projector-inl.h"
 
 void sumHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmonics, size_t lane,
@@ -77,10 +99,9 @@ void storeHarmonicsBack(const PlacedCloud& placed, const HarmonicColumns& harmon
 
 }  // namespace
 
-void takeBackScalar(const PlacedScene& scene, const PlacedCloud& placed, const uint32_t* rows,
-                    size_t count, const CloudSums& sums, SplatGradients& out, double* means,
-                    double* camera) {
-  takeBackRows<double>(scene, placed, rows, count, sums, out, means, camera);
+void takeBackScalar(const PlacedScene& scene, const PlacedCloud& placed, const SummedRows& rows,
+                    SplatGradients& out, double* means, double* camera) {
+  takeBackRows<double>(scene, placed, rows, out, means, camera);
 }
 
 }  // namespace stipple

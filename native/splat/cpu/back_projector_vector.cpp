@@ -14,6 +14,7 @@
 #include "math/affine.h"
 #include "splat/blend_backward.h"
 #include "splat/cpu/lanes-inl.h"
+#include "splat/cpu/load_geometry-inl.h"
 #include "splat/projection_backward.h"
 #include "splat/scene_backward.h"
 
@@ -57,6 +58,22 @@ HWY_INLINE void takeFootprintBack(const View<double>& view, const Mat3d& linear,
                                   const SplatGeometry<T>& splat, LowPass low_pass,
                                   const FootprintGradient<T>& by, ProjectionGradient<T>& out) {
   HWY_NAMESPACE::projectBackwardSteps(view, linear, centre, splat, low_pass, by, out);
+}
+
+HWY_INLINE void storeGradient(const ProjectionGradient<Double>& gradient, size_t row,
+                              SplatGradients& out) {
+  const hn::Rebind<float, Doubles> d;
+  const auto narrow = [&](const Double& value) HWY_ATTR { return hn::DemoteTo(d, value.v); };
+  const Double* position = gradient.position;
+  hn::StoreInterleaved3(narrow(position[0]), narrow(position[1]), narrow(position[2]), d,
+                        &out.positions[row * 3]);
+  const Double* rotation = gradient.rotation;
+  hn::StoreInterleaved4(narrow(rotation[0]), narrow(rotation[1]), narrow(rotation[2]),
+                        narrow(rotation[3]), d, &out.rotations[row * 4]);
+  const Double* scales = gradient.scales;
+  hn::StoreInterleaved3(narrow(scales[0]), narrow(scales[1]), narrow(scales[2]), d,
+                        &out.scales[row * 3]);
+  hn::StoreU(narrow(gradient.opacity), d, &out.opacities[row]);
 }
 
 #include "splat/cpu/back_projector-inl.h"

@@ -1,6 +1,7 @@
 #include "splat/cpu/backward_sums.h"
 
 #include <algorithm>
+#include <bit>
 #include <functional>
 
 #include "base/parallel.h"
@@ -18,12 +19,12 @@ size_t strideOf(BackwardWants wants) {
 
 }  // namespace
 
-void BackwardSums::reset(size_t splat_count, BackwardWants wants) {
+void BackwardSums::reset(size_t slot_count, BackwardWants wants) {
   field_count_ = backwardFieldCount(wants);
   stride_ = strideOf(wants);
-  sums_.resize(splat_count * stride_);
-  uint8_t* touched = touched_.resize(splat_count);
-  std::fill(touched, touched + splat_count, uint8_t{0});
+  sums_.resize(slot_count * stride_);
+  uint8_t* touched = touched_.resize(slot_count);
+  std::fill(touched, touched + slot_count, uint8_t{0});
 }
 
 namespace {
@@ -51,40 +52,68 @@ void addEntry(const float* from, double* to) {
   }
 }
 
+/// Size of the largest of some numbers, as its bits, which are in the same order.
+template <size_t kFieldCount>
+uint64_t largestBits(const double* sums) {
+  uint64_t largest = 0;
+  for (size_t field = 0; field < kFieldCount; ++field) {
+    largest = std::max(largest, std::bit_cast<uint64_t>(sums[field]) & ~(uint64_t{1} << 63));
+  }
+  return largest;
+}
+
 }  // namespace
+
+template <size_t kFieldCount>
+void BackwardSums::storeSums(size_t slot, bool is_first, double* sums) {
+  constexpr double kLargest = 3.4e38;
+  uint64_t largest = largestBits<kFieldCount>(sums);
+  if (largest == 0) return;
+  float* to = sums_.get() + slot * stride_;
+  if (!is_first && touched_[slot] != 0) {
+    addEntry<kFieldCount>(to, sums);
+    largest = largestBits<kFieldCount>(sums);
+  }
+  touched_[slot] = 1;
+  if (largest > std::bit_cast<uint64_t>(kLargest)) {
+    for (size_t field = 0; field < kFieldCount; ++field) {
+      sums[field] = std::clamp(sums[field], -kLargest, kLargest);
+    }
+  }
+  for (size_t field = 0; field < kFieldCount; ++field) to[field] = static_cast<float>(sums[field]);
+}
 
 template <size_t kFieldCount>
 void BackwardSums::addFields(const VisibleSplats& visible, const TileGrid& grid,
                              const TileListMemory& lists, const TileSums& tiles) {
   const TileListGroup& group = lists.group;
   const size_t group_tiles = group.end_tile - group.first_tile;
+  const size_t tile_count = tiles.end_tile - tiles.first_tile;
   const bool is_first = tiles.first_tile == 0;
-  const uint64_t first_entry = group.offsets[tiles.first_tile - group.first_tile];
-  cursors_.resize(rangeCount(visible.count, lists.chunk_size) * group_tiles);
+  const size_t skipped = tiles.first_tile - group.first_tile;
+  const uint64_t first_entry = group.offsets[skipped];
+  cursors_.resize(rangeCount(visible.count, lists.chunk_size) * tile_count);
+  ends_.resize(tile_count);
+  for (size_t tile = 0; tile < tile_count; ++tile) {
+    ends_[tile] = group.offsets[skipped + tile] + tiles.used[tiles.first_tile + tile];
+  }
   // By reference where it is handed over: a std::function of a large capture allocates.
   const auto add_chunk = [&](size_t begin, size_t end) {
     // Entries of a chunk begin where those of the chunk before it end.
     const size_t chunk = begin / lists.chunk_size;
-    uint64_t* cursors = &cursors_[chunk * group_tiles];
+    uint64_t* cursors = &cursors_[chunk * tile_count];
     const uint64_t* starts =
         chunk == 0 ? group.offsets.data() : &lists.cursors[(chunk - 1) * group_tiles];
-    std::copy_n(starts, group_tiles, cursors);
+    std::copy_n(starts + skipped, tile_count, cursors);
+    const uint64_t* ends = ends_.data();
 
     AskedEntry asked[kEntriesAhead];
     size_t asked_count = 0;
     size_t current = begin;  // whose sums these are
     double sums[kFieldCount] = {};
     const auto store_sums = [&] {
-      if (std::none_of(sums, sums + kFieldCount, [](double sum) { return sum != 0.0; })) return;
-      const uint32_t splat = visible.extraAt(current).index;
-      float* to = sums_.get() + splat * stride_;
-      if (!is_first && touched_[splat] != 0) addEntry<kFieldCount>(to, sums);
-      touched_[splat] = 1;
-      for (size_t field = 0; field < kFieldCount; ++field) {
-        constexpr double kLargest = 3.4e38;
-        to[field] = static_cast<float>(std::clamp(sums[field], -kLargest, kLargest));
-        sums[field] = 0;
-      }
+      storeSums<kFieldCount>(visible.slotAt(current), is_first, sums);
+      std::fill(sums, sums + kFieldCount, 0.0);
     };
     const auto add_asked = [&] {
       for (size_t i = 0; i < asked_count; ++i) {
@@ -98,18 +127,18 @@ void BackwardSums::addFields(const VisibleSplats& visible, const TileGrid& grid,
     };
     for (size_t i = begin; i < end; ++i) {
       forEachTileOf(visible, i, grid, [&](size_t tile) {
-        if (tile < tiles.first_tile || tile >= tiles.end_tile) return;
-        const size_t own = tile - group.first_tile;
+        // One comparison: a tile before the first wraps around.
+        const size_t own = tile - tiles.first_tile;
+        if (own >= tile_count) return;
         const uint64_t entry = cursors[own]++;
-        if (entry - group.offsets[own] >= tiles.used[tile]) return;
-        const float* values = tiles.values + (entry - first_entry) * kFieldCount;
-        __builtin_prefetch(values);
-        __builtin_prefetch(values + kFieldCount - 1);
-        asked[asked_count++] = {static_cast<uint32_t>(i), values};
+        if (entry >= ends[own]) return;
+        const float* here = tiles.values + (entry - first_entry) * kFieldCount;
+        __builtin_prefetch(here);
+        __builtin_prefetch(here + kFieldCount - 1);
+        asked[asked_count++] = {static_cast<uint32_t>(i), here};
         if (asked_count == kEntriesAhead) add_asked();
       });
-      __builtin_prefetch(of(visible.extraAt(i).index), 1);
-      __builtin_prefetch(&visible.extraAt(std::min(i + kEntriesAhead, end - 1)).index);
+      __builtin_prefetch(of(visible.slotAt(i)), 1);
     }
     add_asked();
     if (begin < end) store_sums();
@@ -137,7 +166,8 @@ uint64_t BackwardSums::memoryBound(uint64_t splat_count, const TileGrid& grid,
                                    BackwardWants wants) {
   // As many cursors as the lists have themselves; the last term: huge pages round up.
   return splat_count * (strideOf(wants) * sizeof(float) + 1) +
-         tileListsBound(splat_count, grid).other_bytes + 2 * (uint64_t{2} << 20);
+         tileListsBound(splat_count, grid).other_bytes + grid.tileCount() * sizeof(uint64_t) +
+         2 * (uint64_t{2} << 20);
 }
 
 }  // namespace stipple

@@ -17,24 +17,24 @@ struct TileSums {
   const uint32_t* used;  ///< [tiles of the picture] entries from there on have none
 };
 
-/// Sums of every splat over the tiles, by its place among all splats of the picture. Each splat
-/// walks its own entries in the order of the tiles, as they were listed, so no atomics are needed
-/// and the result does not depend on the threads. They are summed in double and stored in float32,
-/// a cache line each: a splat's place is random, so lines are what they cost.
+/// Sums of every splat over the tiles, by its slot. Each splat walks its own entries in the order
+/// of the tiles, as they were listed, so no atomics are needed and the result does not depend on
+/// the threads. They are summed in double and stored in float32, a cache line each: splats come in
+/// the order of depth, so slots are random and lines are what they cost.
 class BackwardSums {
  public:
-  /// For this many splats of the picture, in memory that may hold an earlier picture's.
-  void reset(size_t splat_count, BackwardWants wants);
+  /// For this many slots, in memory that may hold an earlier picture's.
+  void reset(size_t slot_count, BackwardWants wants);
 
   /// Adds some tiles of the group that `lists` holds.
   void add(const VisibleSplats& visible, const TileGrid& grid, const TileListMemory& lists,
            const TileSums& tiles);
 
   /// Sums of a splat; they have a meaning where it is touched.
-  const float* of(size_t splat) const { return sums_.get() + splat * stride_; }
+  const float* of(size_t slot) const { return sums_.get() + slot * stride_; }
 
   /// Whether a tile handed in a sum that is not 0: many splats in view are hidden by others.
-  bool isTouched(size_t splat) const { return touched_[splat] != 0; }
+  bool isTouched(size_t slot) const { return touched_[slot] != 0; }
 
   size_t fieldCount() const { return field_count_; }
   size_t stride() const { return stride_; }
@@ -46,11 +46,16 @@ class BackwardSums {
   void addFields(const VisibleSplats& visible, const TileGrid& grid, const TileListMemory& lists,
                  const TileSums& tiles);
 
+  /// In: sums [fields], held to float32.
+  template <size_t kFieldCount>
+  void storeSums(size_t slot, bool is_first, double* sums);
+
   size_t field_count_ = 0;
   size_t stride_ = 0;
-  ReusedArray<float> sums_;        ///< [splats][stride]
-  ReusedArray<uint8_t> touched_;   ///< [splats]
-  std::vector<uint64_t> cursors_;  ///< [chunk][tile of the group]
+  ReusedArray<float> sums_;        ///< [slots][stride]
+  ReusedArray<uint8_t> touched_;   ///< [slots]
+  std::vector<uint64_t> cursors_;  ///< [chunk][tile]
+  std::vector<uint64_t> ends_;     ///< [tile] behind the last entry that has sums
 };
 
 }  // namespace stipple

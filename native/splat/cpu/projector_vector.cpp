@@ -11,6 +11,7 @@
 
 #include "hwy/contrib/math/math-inl.h"
 #include "splat/cpu/lanes-inl.h"
+#include "splat/cpu/load_geometry-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stipple {
@@ -81,32 +82,6 @@ HWY_INLINE hn::Vec<Word> tileSpans(const Projected<Double>& splat, const TileGri
   const auto meets = hn::Ne(mask, hn::Zero(dw));
   return hn::IfThenElse(hn::RebindMask(dw, fits), hn::IfThenElseZero(meets, hn::Or(mask, place)),
                         hn::Set(dw, kWideSpan));
-}
-
-HWY_INLINE Double promoted(hn::Vec<Floats> v) {
-  return Double(hn::PromoteTo(Doubles(), v));
-}
-
-/// The next lanes of splats, columns apart.
-HWY_INLINE SplatGeometry<Double> loadGeometry(const SplatCloud& cloud, size_t row) {
-  const Floats d;
-  SplatGeometry<Double> splat;
-  hn::Vec<Floats> a, b, c, e;
-  hn::LoadInterleaved3(d, &cloud.positions[row * 3], a, b, c);
-  splat.position[0] = promoted(a);
-  splat.position[1] = promoted(b);
-  splat.position[2] = promoted(c);
-  hn::LoadInterleaved4(d, &cloud.rotations[row * 4], a, b, c, e);
-  splat.rotation[0] = promoted(a);
-  splat.rotation[1] = promoted(b);
-  splat.rotation[2] = promoted(c);
-  splat.rotation[3] = promoted(e);
-  hn::LoadInterleaved3(d, &cloud.scales[row * 3], a, b, c);
-  splat.scales[0] = promoted(a);
-  splat.scales[1] = promoted(b);
-  splat.scales[2] = promoted(c);
-  splat.opacity = promoted(hn::LoadU(d, &cloud.opacities[row]));
-  return splat;
 }
 
 /// Asks for the harmonics of rows [row, row + count), which may lie behind the end: they are much
@@ -198,7 +173,8 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
   size_t row = begin;
   for (; row + lanes <= end; row += lanes) {
     prefetchRows(cloud, row + kPrefetchGroups * lanes, lanes);
-    SplatGeometry<Double> splat = loadGeometry(cloud, row);
+    SplatGeometry<Double> splat;
+    loadGeometry(cloud, row, splat);
     if (fades) splat.opacity = splat.opacity * Double(placed.grade.opacity);
     Double centre[3];
     placePoint(placed.linear, placed.translation, splat.position, centre);

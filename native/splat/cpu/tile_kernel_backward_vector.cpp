@@ -282,19 +282,16 @@ HWY_AFTER_NAMESPACE();
 
 #include <string>
 
+#include "splat/cpu/target_choice.h"
+
 namespace stipple {
 
 HWY_EXPORT(backwardKernel);
 
 std::vector<BackwardKernel> backwardKernels() {
-  std::vector<BackwardKernel> kernels = {{"scalar", nullptr, takeOffTileScalar}};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(backwardKernel)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  std::vector<BackwardKernel> kernels =
+      onEveryTarget<BackwardKernel>({"scalar", nullptr, takeOffTileScalar},
+                                    [] { return HWY_DYNAMIC_DISPATCH(backwardKernel)(); });
   const std::vector<NamedTileKernel> forward = tileKernels();
   for (BackwardKernel& kernel : kernels) {
     const auto same = std::find_if(forward.begin(), forward.end(), [&](const NamedTileKernel& f) {

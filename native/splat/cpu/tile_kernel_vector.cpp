@@ -171,6 +171,7 @@ HWY_AFTER_NAMESPACE();
 #include <string>
 
 #include "base/error.h"
+#include "splat/cpu/target_choice.h"
 
 namespace stipple {
 
@@ -198,15 +199,8 @@ TileKernel chooseTileKernel() {
 }  // namespace
 
 std::vector<NamedTileKernel> tileKernels() {
-  std::vector<NamedTileKernel> kernels = {{"scalar", blendTileScalar}};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(namedKernel)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return kernels;
+  return onEveryTarget<NamedTileKernel>({"scalar", blendTileScalar},
+                                        [] { return HWY_DYNAMIC_DISPATCH(namedKernel)(); });
 }
 
 TileKernel chosenTileKernel() {

@@ -27,7 +27,6 @@ namespace {
 /// Entries whose tile sums are held at once, unless a single tile has more.
 constexpr uint64_t kHeldEntries = 1u << 20;
 constexpr size_t kTileGrain = 4;
-constexpr size_t kSplatGrain = 2048;
 /// Rows that a back projector is given at once.
 constexpr size_t kRowsAtOnce = 256;
 
@@ -83,40 +82,29 @@ BackwardWants wantsOf(const BackwardInput& input) {
           with_depth};
 }
 
+bool isWanted(const GradientArray& array, const BackwardInput& input) {
+  const auto isOneOf = [&](auto... arrays) { return ((array.values == arrays) || ...); };
+  using G = SplatGradients;
+  if (!array.is_statistic) return true;
+  if (isOneOf(&G::contributions)) return !input.residual.empty();
+  if (isOneOf(&G::blending_weights)) return input.with_blending_weights;
+  if (isOneOf(&G::edge_weights)) return !input.edge_weights.empty();
+  if (isOneOf(&G::errors, &G::largest_errors)) return !input.errors.empty();
+  return input.with_screen_gradients;
+}
+
 /// Calls use(array, values per splat) for every array of the result that is wanted.
 template <typename Use>
 void forEachArray(const SplatCloud& cloud, const BackwardInput& input, const Use& use) {
-  use(&SplatGradients::positions, 3);
-  use(&SplatGradients::rotations, 4);
-  use(&SplatGradients::scales, 3);
-  use(&SplatGradients::opacities, 1);
-  use(&SplatGradients::sh, cloud.shStride());
-  if (!input.residual.empty()) use(&SplatGradients::contributions, 1);
-  if (input.with_blending_weights) use(&SplatGradients::blending_weights, 1);
-  if (!input.edge_weights.empty()) use(&SplatGradients::edge_weights, 1);
-  if (input.with_screen_gradients) {
-    use(&SplatGradients::screen_gradients, 2);
-    use(&SplatGradients::absolute_screen_gradients, 2);
-    use(&SplatGradients::screen_gradient_norms, 1);
-  }
-  if (!input.errors.empty()) {
-    use(&SplatGradients::errors, 1);
-    use(&SplatGradients::largest_errors, 1);
+  for (const GradientArray& array : kGradientArrays) {
+    if (!isWanted(array, input)) continue;
+    use(array.values, array.per_splat == 0 ? cloud.shStride() : array.per_splat);
   }
 }
 
 void clearUnwanted(const BackwardInput& input, SplatGradients& gradients) {
-  if (input.residual.empty()) gradients.contributions.clear();
-  if (!input.with_blending_weights) gradients.blending_weights.clear();
-  if (input.edge_weights.empty()) gradients.edge_weights.clear();
-  if (!input.with_screen_gradients) {
-    gradients.screen_gradients.clear();
-    gradients.absolute_screen_gradients.clear();
-    gradients.screen_gradient_norms.clear();
-  }
-  if (input.errors.empty()) {
-    gradients.errors.clear();
-    gradients.largest_errors.clear();
+  for (const GradientArray& array : kGradientArrays) {
+    if (!isWanted(array, input)) (gradients.*array.values).clear();
   }
 }
 
@@ -149,7 +137,8 @@ std::array<double, 3> takeOffTiles(const BackwardKernel& kernel, RenderWorkspace
         Tile next = tileAt(first + from);
         for (size_t tile = first + from; tile < first + to; ++tile) {
           const Tile current = next;
-          const bool is_last = tile + 1 == first + to;
+          // The tile behind this range is most often this thread's next.
+          const bool is_last = tile + 1 == end;
           if (!is_last) next = tileAt(tile + 1);
           const uint64_t entry = entriesBefore(tile) - entriesBefore(first);
           arrays.used[tile] =
@@ -197,56 +186,71 @@ void storeStatistics(const BackwardInput& input, const float* sums, const double
   }
 }
 
-/// Writes rows [begin, end) of one cloud's result; adds to the camera's derivative [6].
+/// Slots [begin, end).
+struct SlotRange {
+  size_t begin, end;
+};
+
+/// Writes rows [begin, end) of one cloud's result, whose splats have the first of `slots`; takes
+/// those away. Adds to the camera's derivative [6].
 void takeBackRows(BackProjector project, const PlacedScene& scene, const PlacedCloud& placed,
-                  const BackwardInput& input, const BackwardSums& sums, size_t begin, size_t end,
-                  SplatGradients& out, double* camera) {
-  CloudSums cloud_sums{sums.of(placed.first_index), sums.stride(), {}};
-  if (!input.depth_gradient.empty()) cloud_sums.depth_field = sums.fieldCount() - 1;
+                  const BackwardInput& input, const SplatSlots& all, const BackwardSums& sums,
+                  SlotRange& slots, size_t begin, size_t end, SplatGradients& out, double* camera) {
   uint32_t rows[kRowsAtOnce];
+  uint32_t places[kRowsAtOnce];
   double means[kRowsAtOnce * 2];
-  size_t count = 0;
+  SummedRows summed{rows, places, 0, sums.of(0), sums.stride(), {}};
+  if (!input.depth_gradient.empty()) summed.depth_field = sums.fieldCount() - 1;
   const auto flush = [&] {
-    project(scene, placed, rows, count, cloud_sums, out, means, camera);
-    for (size_t i = 0; i < count; ++i) {
-      storeStatistics(input, sums.of(placed.first_index + rows[i]), means + i * 2, rows[i], out);
+    project(scene, placed, summed, out, means, camera);
+    for (size_t i = 0; i < summed.count; ++i) {
+      storeStatistics(input, summed.sumsOf(i), means + i * 2, rows[i], out);
     }
-    count = 0;
+    summed.count = 0;
   };
-  for (size_t row = begin; row < end;) {
-    if (sums.isTouched(placed.first_index + row)) {
-      rows[count++] = static_cast<uint32_t>(row++);
-      if (count == kRowsAtOnce) flush();
-      continue;
-    }
-    const size_t first = row;
-    while (row < end && !sums.isTouched(placed.first_index + row)) ++row;
+  const auto clear = [&](size_t first, size_t last) {
+    if (first == last) return;
     forEachArray(*placed.cloud, input,
                  [&](std::vector<float> SplatGradients::*array, size_t per_splat) {
                    float* values = (out.*array).data();
-                   std::fill(values + first * per_splat, values + row * per_splat, 0.0f);
+                   std::fill(values + first * per_splat, values + last * per_splat, 0.0f);
                  });
+  };
+  size_t written = begin;
+  for (; slots.begin < slots.end; ++slots.begin) {
+    const size_t row = all.extras[slots.begin].index - placed.first_index;
+    if (row >= end) break;
+    if (!sums.isTouched(slots.begin)) continue;
+    clear(written, row);
+    written = row + 1;
+    rows[summed.count] = static_cast<uint32_t>(row);
+    places[summed.count++] = static_cast<uint32_t>(slots.begin);
+    if (summed.count == kRowsAtOnce) flush();
   }
-  if (count > 0) flush();
+  clear(written, end);
+  if (summed.count > 0) flush();
 }
 
 /// Writes the result of every splat.
-void takeBackSplats(BackProjector project, const PlacedScene& scene, const BackwardInput& input,
-                    BackwardWorkspace::Arrays& arrays, BackwardResult& result, Progress* progress) {
-  arrays.cameras.assign(rangeCount(scene.splat_count, kSplatGrain), {});
+void takeBackSplats(BackProjector project, const RenderWorkspace::Arrays& drawn,
+                    const BackwardInput& input, BackwardWorkspace::Arrays& arrays,
+                    BackwardResult& result, Progress* progress) {
+  const PlacedScene& scene = drawn.scene;
+  arrays.cameras.assign(rangeCount(scene.splat_count, kRangeSplats), {});
   const auto take_back = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
-    double* camera = arrays.cameras[begin / kSplatGrain].data();
+    double* camera = arrays.cameras[begin / kRangeSplats].data();
+    SlotRange slots{begin, begin + drawn.visible.slotCount(begin)};
     for (size_t cloud = cloudOfSplat(scene, begin); begin < end; ++cloud) {
       const PlacedCloud& placed = scene.clouds[cloud];
       const size_t first = begin - placed.first_index;
       const size_t last = std::min(end - placed.first_index, placed.cloud->size());
-      takeBackRows(project, scene, placed, input, arrays.sums, first, last,
-                   result.instances[placed.instance], camera);
+      takeBackRows(project, scene, placed, input, drawn.visible.slots(), arrays.sums, slots, first,
+                   last, result.instances[placed.instance], camera);
       begin = placed.first_index + last;
     }
   };
-  parallelFor(scene.splat_count, kSplatGrain, std::ref(take_back));
+  parallelFor(scene.splat_count, kRangeSplats, std::ref(take_back));
   result.camera = {};
   for (const std::array<double, 6>& part : arrays.cameras) {
     for (size_t k = 0; k < 6; ++k) result.camera[k] += part[k];
@@ -299,7 +303,7 @@ uint64_t backwardBound(uint64_t splat_count, const TileGrid& grid, const Backwar
          entries * backwardFieldCount(wants) * sizeof(float) +
          grid.tileCount() * (3 * sizeof(double) + sizeof(uint32_t)) +
          threads * (TileBackward::memoryBound() + sizeof(TileBackward)) +
-         rangeCount(splat_count, kSplatGrain) * sizeof(std::array<double, 6>);
+         rangeCount(splat_count, kRangeSplats) * sizeof(std::array<double, 6>);
 }
 
 void requireMemory(uint64_t needed, uint64_t limit, size_t splat_count) {
@@ -319,7 +323,7 @@ void goBackward(const BackwardKernel& kernel, BackProjector project, RenderWorks
   prepareResult(drawn.kept, input, result);
   result.background = background;
   result.visible_count = drawn.visible.count;
-  takeBackSplats(project, drawn.scene, input, arrays, result, progress);
+  takeBackSplats(project, drawn, input, arrays, result, progress);
   advance(progress, 1.0, "Taking splats off");
 }
 

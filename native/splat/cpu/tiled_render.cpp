@@ -251,26 +251,55 @@ uint64_t keptPictureBound(const TileGrid& grid, bool with_depth, size_t instance
          3 * (uint64_t{2} << 20);  // arrays on huge pages are rounded up
 }
 
+namespace {
+
+/// One more number: no two numbers, and no two sums, lead to the same.
+uint64_t mixed(uint64_t sum, float value) {
+  return (sum ^ std::bit_cast<uint32_t>(value)) * 0x9e3779b97f4a7c15u;
+}
+
+uint64_t stirred(uint64_t sum) {
+  sum ^= sum >> 32;
+  sum *= 0xd6e8feb86659fd93u;
+  return sum ^ sum >> 32;
+}
+
+/// Of positions and opacities of rows [begin, end).
+uint64_t hashOfRows(const SplatCloud& cloud, size_t begin, size_t end) {
+  uint64_t sums[4] = {begin, 1, 2, 3};  // side by side: each waits for itself only
+  for (size_t row = begin; row < end; ++row) {
+    for (size_t k = 0; k < 3; ++k) sums[k] = mixed(sums[k], cloud.positions[row * 3 + k]);
+    sums[3] = mixed(sums[3], cloud.opacities[row]);
+  }
+  uint64_t hash = 0;
+  for (const uint64_t sum : sums) hash = stirred(hash ^ stirred(sum));
+  return hash;
+}
+
+}  // namespace
+
 uint64_t fingerprintOf(const PlacedScene& scene, const VisibleSplats& visible) {
   constexpr size_t kSamples = 32;
+  constexpr size_t kHashedRows = 8192;
   uint64_t sum = visible.count;
-  const auto mix = [&sum](const float* values, size_t count) {
-    for (size_t k = 0; k < count; ++k) {
-      sum = (sum ^ std::bit_cast<uint32_t>(values[k])) * 0x9e3779b97f4a7c15u;
-      sum ^= sum >> 32;
-    }
-  };
+  for (const PlacedCloud& placed : scene.clouds) {
+    // Added up, which has the same result in every order.
+    std::atomic<uint64_t> hashes{0};
+    const auto hash_rows = [&](size_t begin, size_t end) {
+      hashes.fetch_add(hashOfRows(*placed.cloud, begin, end), std::memory_order_relaxed);
+    };
+    parallelFor(placed.cloud->size(), kHashedRows, std::cref(hash_rows));
+    sum = stirred(sum ^ hashes.load());
+  }
   for (size_t i = 0; i < std::min(kSamples, visible.count); ++i) {
     const uint32_t splat = visible.extraAt(i * visible.count / kSamples % visible.count).index;
     const PlacedCloud& placed = scene.clouds[cloudOfSplat(scene, splat)];
     const size_t row = splat - placed.first_index;
     const SplatCloud& cloud = *placed.cloud;
-    if (row >= cloud.size()) return ~sum;  // fewer splats than were drawn
-    mix(&cloud.positions[row * 3], 3);
-    mix(&cloud.rotations[row * 4], 4);
-    mix(&cloud.scales[row * 3], 3);
-    mix(&cloud.opacities[row], 1);
-    mix(&cloud.sh[row * cloud.shStride()], 3);
+    for (size_t k = 0; k < 4; ++k) sum = mixed(sum, cloud.rotations[row * 4 + k]);
+    for (size_t k = 0; k < 3; ++k) sum = mixed(sum, cloud.scales[row * 3 + k]);
+    for (size_t k = 0; k < 3; ++k) sum = mixed(sum, cloud.sh[row * cloud.shStride() + k]);
+    sum = stirred(sum);
   }
   return sum;
 }

@@ -9,9 +9,6 @@ namespace stipple {
 
 namespace {
 
-/// Splats of one task; their inputs (up to 340 bytes each) stay in the second-level cache between
-/// the check of their values and the projection.
-constexpr size_t kRangeSplats = 2048;
 constexpr size_t kGatherSplats = 8192;
 
 /// Checks and projects splats [begin, end) into slots from `begin` on. Returns how many are

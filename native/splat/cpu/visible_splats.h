@@ -11,6 +11,11 @@
 
 namespace stipple {
 
+/// Splats that are projected by one task; each range begins at its own number among the slots.
+/// Their inputs (up to 340 bytes each) stay in the second-level cache between the check of their
+/// values and the projection.
+constexpr size_t kRangeSplats = 2048;
+
 /// The splats that can show, and the order of blending: front to back by depthKey, ties by splat
 /// index. They stay in memory where they were projected, in slots by ranges of the clouds' rows,
 /// which lists of tiles name: to bring them into the order of depth would read and write each once
@@ -21,6 +26,10 @@ struct VisibleSplats {
   const DepthItem* order = nullptr;  ///< [count] front to back; lies in one of `items`
   const TileSpan* spans = nullptr;   ///< [count] front to back; lies in the other
   size_t count = 0;
+
+  /// How many slots, from `begin` on, the range that begins there has; they are in the order of the
+  /// splats.
+  size_t slotCount(size_t begin) const { return filled[begin / kRangeSplats]; }
 
   /// The slot of the splat that is `place` from the front.
   uint32_t slotAt(size_t place) const { return static_cast<uint32_t>(order[place]); }

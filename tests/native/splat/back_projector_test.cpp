@@ -49,10 +49,10 @@ Taken takeBack(BackProjector project, const PlacedScene& scene, const std::vecto
   taken.gradients.opacities.resize(cloud.size());
   taken.gradients.sh.resize(cloud.sh.size(), -1.0f);
   taken.means.resize(rows.size() * 2);
-  CloudSums all{sums.data(), sums.size() / cloud.size(), {}};
+  SummedRows all{rows.data(), rows.data(), rows.size(), sums.data(), sums.size() / cloud.size(),
+                 {}};
   if (with_depth) all.depth_field = all.stride - 1;
-  project(scene, scene.clouds[0], rows.data(), rows.size(), all, taken.gradients,
-          taken.means.data(), taken.camera.data());
+  project(scene, scene.clouds[0], all, taken.gradients, taken.means.data(), taken.camera.data());
   return taken;
 }
 

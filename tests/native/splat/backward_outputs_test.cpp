@@ -19,26 +19,6 @@ using testing::pixelCount;
 using testing::randomCloud;
 using testing::randomWeights;
 
-struct NamedOutput {
-  const char* name;
-  std::vector<float> SplatGradients::*values;
-};
-
-constexpr NamedOutput kOutputs[] = {
-    {"positions", &SplatGradients::positions},
-    {"rotations", &SplatGradients::rotations},
-    {"scales", &SplatGradients::scales},
-    {"opacities", &SplatGradients::opacities},
-    {"sh", &SplatGradients::sh},
-    {"contributions", &SplatGradients::contributions},
-    {"blending_weights", &SplatGradients::blending_weights},
-    {"edge_weights", &SplatGradients::edge_weights},
-    {"screen_gradients", &SplatGradients::screen_gradients},
-    {"absolute_screen_gradients", &SplatGradients::absolute_screen_gradients},
-    {"screen_gradient_norms", &SplatGradients::screen_gradient_norms},
-    {"errors", &SplatGradients::errors},
-    {"largest_errors", &SplatGradients::largest_errors}};
-
 enum class Wanted { kGradients, kContributions, kEverything };
 
 /// A scene of two clouds with pixels that end early, over a background.
@@ -92,7 +72,7 @@ TEST(BackwardOutputs, AreTheSameBitsForAnyNumberOfThreads) {
     EXPECT_EQ(results[0].camera, results[1].camera);
     EXPECT_EQ(results[0].background, results[1].background);
     for (size_t instance : {0u, 1u}) {
-      for (const NamedOutput& output : kOutputs) {
+      for (const GradientArray& output : kGradientArrays) {
         EXPECT_EQ(results[0].instances[instance].*output.values,
                   results[1].instances[instance].*output.values)
             << output.name;
@@ -126,7 +106,7 @@ TEST(BackwardOutputs, AreThoseOfTheScalarKernelOnEveryTarget) {
         EXPECT_NEAR(seen.camera[k], expected.camera[k], 3e-5 * most_camera);
       }
       for (size_t instance : {0u, 1u}) {
-        for (const NamedOutput& output : kOutputs) {
+        for (const GradientArray& output : kGradientArrays) {
           const std::vector<float>& of_scalar = expected.instances[instance].*output.values;
           const std::vector<float>& values = seen.instances[instance].*output.values;
           ASSERT_EQ(values.size(), of_scalar.size()) << output.name;

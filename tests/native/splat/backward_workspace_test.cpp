@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
@@ -134,6 +136,22 @@ TEST(BackwardFromDrawing, RefusesSplatsThatChangedAndLeavesTheResultAlone) {
     stepped.resize(100);
     EXPECT_NE(drawn.refusal(drawn.input()).find("the splats changed"), std::string::npos);
   }
+}
+
+TEST(BackwardFromDrawing, NoticesOneBitOfOnePositionOrOpacity) {
+  SplatCloud cloud = smallCloud(9000, 0, 9);  // more than are looked at together
+  const SplatInstance instance{&cloud};
+  Drawn drawn;
+  drawn.draw({&instance, 1});
+  for (std::vector<float>* array : {&cloud.positions, &cloud.opacities}) {
+    for (const size_t at : {size_t{0}, array->size() / 2 + 1, array->size() - 1}) {
+      const float before = (*array)[at];
+      (*array)[at] = std::nextafter(before, 2.0f);
+      EXPECT_NE(drawn.refusal(drawn.input()).find("the splats changed"), std::string::npos);
+      (*array)[at] = before;
+    }
+  }
+  drawn.goBack(drawn.input());
 }
 
 TEST(BackwardFromDrawing, RefusesADepthGradientWithoutDepthAndTooLittleMemory) {

@@ -295,24 +295,9 @@ void expectNothingDrawn(const SplatCloud& cloud, const Camera& camera) {
   EXPECT_NEAR(result.background[0], by_red, 1e-5 * by_red);
   for (const double value : result.camera) EXPECT_EQ(value, 0.0);
   const SplatGradients& gradients = result.instances[0];
-  EXPECT_EQ(gradients.sh, std::vector<float>(cloud.sh.size(), 0.0f));
-  struct Array {
-    std::vector<float> SplatGradients::*values;
-    size_t per_splat;
-  };
-  for (const auto& [values, per_splat] : {Array{&SplatGradients::positions, 3},
-                                          {&SplatGradients::rotations, 4},
-                                          {&SplatGradients::scales, 3},
-                                          {&SplatGradients::opacities, 1},
-                                          {&SplatGradients::contributions, 1},
-                                          {&SplatGradients::blending_weights, 1},
-                                          {&SplatGradients::edge_weights, 1},
-                                          {&SplatGradients::screen_gradients, 2},
-                                          {&SplatGradients::absolute_screen_gradients, 2},
-                                          {&SplatGradients::screen_gradient_norms, 1},
-                                          {&SplatGradients::errors, 1},
-                                          {&SplatGradients::largest_errors, 1}}) {
-    EXPECT_EQ(gradients.*values, std::vector<float>(cloud.size() * per_splat, 0.0f));
+  for (const GradientArray& array : kGradientArrays) {
+    const size_t per_splat = array.per_splat == 0 ? cloud.shStride() : array.per_splat;
+    EXPECT_EQ(gradients.*array.values, std::vector<float>(cloud.size() * per_splat, 0.0f));
   }
 }
 
