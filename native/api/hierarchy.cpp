@@ -123,7 +123,7 @@ void stipple_model_from_cloud_options_init(StippleModelFromCloudOptions* options
   *options = {};
   options->struct_size = sizeof(StippleModelFromCloudOptions);
   options->view_rig = STIPPLE_RIG_AUTOMATIC;
-  options->view_count = 12;
+  options->view_count = 10;
   options->view_size = 400;
 }
 

@@ -17,7 +17,7 @@ enum class ViewRig : uint32_t {
 
 struct ViewRigOptions {
   ViewRig rig = ViewRig::kAutomatic;
-  uint32_t count = 12;  ///< views, 1..4096
+  uint32_t count = 10;  ///< views, 1..4096
   uint32_t size = 400;  ///< pixels per side, 1..65536
   uint64_t seed = 0;    ///< other seeds give other views, spread as evenly
 };

@@ -22,6 +22,19 @@ double unhiddenWeight(const Projected<double>& splat) {
   return 2 * std::numbers::pi * f.opacity / (f.l00 * f.l11);
 }
 
+/// The same splats in a medium grey, seen alike from everywhere.
+SplatCloud withoutColours(const SplatCloud& cloud) {
+  SplatCloud grey;
+  grey.positions = cloud.positions;
+  grey.rotations = cloud.rotations;
+  grey.scales = cloud.scales;
+  grey.opacities = cloud.opacities;
+  grey.sh.assign(cloud.size() * 3, 0.0f);
+  grey.colour_space = cloud.colour_space;
+  grey.antialias = cloud.antialias;
+  return grey;
+}
+
 }  // namespace
 
 std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Camera> views,
@@ -31,20 +44,23 @@ std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Came
   std::vector<double> whole(count, 0.0);
   RenderOptions options;
   options.with_depth = false;
-  const SplatInstance instance{&cloud};
+  // The derivative of the sum of a picture's red by a splat's constant harmonic is what it adds
+  // where all are grey: the cheapest of the backward passes, and harmonics above need no look.
+  const SplatCloud grey = withoutColours(cloud);
+  const SplatInstance instance{&grey};
   BackwardWorkspace workspace;
   BackwardResult result;
-  std::vector<float> no_gradient;
+  std::vector<float> red;
   for (size_t v = 0; v < views.size(); ++v) {
     advance(progress, static_cast<double>(v) / static_cast<double>(views.size()),
             "Looking at the splats");
     const Camera& camera = views[v];
-    no_gradient.assign(size_t{4} * camera.width * camera.height, 0.0f);
+    red.assign(size_t{4} * camera.width * camera.height, 0.0f);
+    for (size_t i = 0; i < red.size(); i += 4) red[i] = 1.0f;
     BackwardInput input;
-    input.colour_gradient = no_gradient;
-    input.with_blending_weights = true;
+    input.colour_gradient = red;
     renderBackward({&instance, 1}, camera, options, input, workspace, result, UINT64_MAX, nullptr);
-    const std::vector<float>& weights = result.instances[0].blending_weights;
+    const std::vector<float>& by_colour = result.instances[0].sh;
     const View<double> view = makeView<double>(camera);
     const Mat3d linear = camera.world_to_camera.topLeftCorner<3, 3>();
     const Vec3d translation = camera.world_to_camera.topRightCorner<3, 1>();
@@ -59,7 +75,8 @@ std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Came
         }
         // Near views show a splat large without making it more important: areas, not pixels.
         const double pixel = view.perspective ? projected.depth / view.fx : 1 / view.fx;
-        seen[i] += static_cast<double>(weights[i]) * pixel * pixel;
+        seen[i] +=
+            static_cast<double>(by_colour[i * 3]) / static_cast<double>(kShC0) * pixel * pixel;
         whole[i] += unhiddenWeight(projected) * pixel * pixel;
       }
     });
@@ -79,11 +96,10 @@ uint64_t visibilityMemoryBound(const SplatCloud& cloud, uint32_t view_size) {
   camera.width = camera.height = view_size;
   camera.fx = camera.fy = view_size;
   const SplatInstance instance{&cloud};
-  BackwardInput input;
-  input.with_blending_weights = true;
+  const BackwardInput input;
   const uint64_t gradient = uint64_t{view_size} * view_size * (4 * sizeof(float));
   return backwardMemoryBound({&instance, 1}, camera, {}, input) + gradient +
-         cloud.size() * (2 * sizeof(double) + sizeof(float)) + (uint64_t{1} << 16);
+         cloud.size() * (2 * sizeof(double) + 15 * sizeof(float)) + (uint64_t{1} << 16);
 }
 
 }  // namespace stipple

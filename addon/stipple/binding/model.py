@@ -74,7 +74,7 @@ class Model(Handle):
                                                mesh.pointer, byref(options)))
 
     @staticmethod
-    def from_cloud_start(context, cloud, view_count=12, view_size=400, view_rig=ViewRig.AUTOMATIC, seed=0,
+    def from_cloud_start(context, cloud, view_count=10, view_size=400, view_rig=ViewRig.AUTOMATIC, seed=0,
                          footprint=0.0):
         """A job whose model() is the merge tree of an existing cloud."""
         options = StippleModelFromCloudOptions()

@@ -429,7 +429,7 @@ typedef enum StippleViewRig {
 typedef struct StippleModelFromCloudOptions {
   uint32_t struct_size;
   uint32_t view_rig;    /* StippleViewRig, default automatic */
-  uint32_t view_count;  /* pictures that tell which splats are seen, 0..4096, default 12; 0: all count as seen */
+  uint32_t view_count;  /* pictures that tell which splats are seen, 0..4096, default 10; 0: all count as seen */
   uint32_t view_size;   /* pixels per side, 1..65536, default 400 */
   uint64_t seed;        /* of the views */
   double footprint;     /* metres: standard deviation of the low-pass through which errors are judged; 0, the

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "data/cloud_extent.h"
 #include "splat/render.h"
+#include "splat/render_backward.h"
 #include "train/allocation_count.h"
 #include "train/refine.h"
 #include "train/view_rig.h"
@@ -152,6 +153,51 @@ TEST(Visibility, IsNearOneInFrontAndNearZeroBehind) {
   EXPECT_GT(front / static_cast<double>(front_count), 0.02);
   // Four overlapping splats of opacity 0.9 let through little, the rims of two a few hundredths.
   EXPECT_LT(behind / 500, 0.01);
+}
+
+TEST(Visibility, IsThatOfTheShapesWhateverTheirColours) {
+  SplatCloud cloud = sphere(500, 1.0, 1);
+  const auto views = viewsOfCloud(cloud, {});
+  const std::vector<float> seen = splatVisibility(cloud, views);
+  // Black beyond black, and harmonics that brighten one side.
+  for (float& x : cloud.sh) x = -5.0f;
+  cloud.sh_degree = 1;
+  cloud.sh.resize(cloud.size() * cloud.shStride(), 3.0f);
+  EXPECT_EQ(splatVisibility(cloud, views), seen);
+}
+
+TEST(Visibility, MatchesTheBlendingWeights) {
+  const SplatCloud cloud = sphere(300, 1.0, 4);
+  ViewRigOptions options;
+  options.count = 1;
+  options.size = 96;
+  const auto views = viewsOfCloud(cloud, options);
+  const SplatInstance instance{&cloud};
+  std::vector<float> zeros(size_t{4} * 96 * 96, 0.0f);
+  BackwardInput input;
+  input.colour_gradient = zeros;
+  input.with_blending_weights = true;
+  RenderOptions plain;
+  plain.with_depth = false;
+  const BackwardResult result = renderBackward({&instance, 1}, views[0], plain, input);
+  const std::vector<float>& weights = result.instances[0].blending_weights;
+  const std::vector<float> visibility = splatVisibility(cloud, views);
+  size_t shown = 0;
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    SplatCloud alone = sphere(300, 1.0, 4);
+    // What the splat adds with nothing in front: all others are too faint to show.
+    std::fill(alone.opacities.begin(), alone.opacities.end(), 0.0f);
+    alone.opacities[i] = cloud.opacities[i];
+    if (i % 30 != 0 || weights[i] < 1.0f) continue;
+    ++shown;
+    const SplatInstance single{&alone};
+    const BackwardResult free = renderBackward({&single, 1}, views[0], plain, input);
+    const double expected = static_cast<double>(weights[i]) /
+                            static_cast<double>(free.instances[0].blending_weights[i]);
+    // Whole weights come from the area of the Gaussian: the cut-off at 1/255 takes off 1/230.
+    EXPECT_NEAR(static_cast<double>(visibility[i]), expected, 0.02);
+  }
+  EXPECT_GE(shown, 4u);
 }
 
 TEST(Visibility, OfSplatsApartIsNearlyOne) {
