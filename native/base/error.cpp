@@ -7,7 +7,12 @@
 namespace stipple {
 
 void fail(ErrorCode code, const std::string& message) {
-  throw Error(code, message);
+  // Names from damaged files may hold anything; a message is one line all the same.
+  std::string line = message;
+  for (char& letter : line) {
+    if (static_cast<unsigned char>(letter) < 32 || letter == 127) letter = '?';
+  }
+  throw Error(code, line);
 }
 
 void requireFinite(double value, const char* what) {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "io/media_library.h"
 #include "readers.h"
 
 namespace {
@@ -37,6 +38,12 @@ std::filesystem::path preparedFolder(const stipple::fuzz::Reader& reader) {
 }
 
 }  // namespace
+
+extern "C" int LLVMFuzzerInitialize(int*, char***) {
+  // Loading it takes longer than any input may.
+  stipple::mediaTable();
+  return 0;
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
   static const stipple::fuzz::Reader& kReader = chosenReader();

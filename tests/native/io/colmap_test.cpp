@@ -191,6 +191,15 @@ TEST_F(Colmap, RefusesCountsThatLie) {
               [&] { readCameraFile(folder()); });
 }
 
+TEST_F(Colmap, SaysItInOneLineWhateverANameHolds) {
+  std::string broken = images();
+  broken.replace(broken.find("second view"), 11, "second\n\x1b\r\tv");
+  storeBinary();
+  store("images.bin", broken.substr(0, broken.find("\tv.png") + 20));
+  expectError(ErrorCode::kFormat, {"images.bin", "'second????v.png'"},
+              [&] { readCameraFile(folder()); });
+}
+
 TEST_F(Colmap, NamesTheFaultOfEachLine) {
   const auto refused = [&](const std::string& cameras, const std::string& images,
                            std::initializer_list<const char*> texts) {
