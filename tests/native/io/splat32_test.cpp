@@ -42,6 +42,16 @@ TEST_F(Splat32, ReadsRecordsByTheirQuantities) {
   EXPECT_FLOAT_EQ(cloud.sh[2], -0.3f / kShC0);
 }
 
+TEST_F(Splat32, CountsTheBytesOfRotationsFrom128) {
+  // Turns about the axes as other programs write them, q * 128 + 128: 0 is 128, and 1 becomes 255.
+  for (size_t axis = 0; axis < 4; ++axis) {
+    std::string bytes = record().bytes;
+    for (size_t k = 0; k < 4; ++k) bytes[28 + k] = k == axis ? '\xff' : '\x80';
+    const SplatCloud cloud = readSplatFile(store("a.splat", bytes));
+    for (size_t k = 0; k < 4; ++k) EXPECT_EQ(cloud.rotations[k], k == axis ? 1.0f : 0.0f);
+  }
+}
+
 TEST_F(Splat32, GivesBackWhatTheStepsOfTheFormatAllow) {
   SplatCloud cloud = randomCloud(5000, 2, 21);
   for (float& value : cloud.sh) value = std::clamp(value, -0.5f / kShC0, 0.5f / kShC0);
