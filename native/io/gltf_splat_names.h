@@ -9,6 +9,8 @@ namespace stipple {
 
 /// The words of KHR_gaussian_splatting, and ours beside them.
 constexpr char kGltfSplats[] = "KHR_gaussian_splatting";
+/// Draft: the splats of a primitive as the bytes of an SPZ file.
+constexpr char kGltfSpz[] = "KHR_gaussian_splatting_compression_spz_2";
 constexpr char kGltfRotation[] = "KHR_gaussian_splatting:ROTATION";
 constexpr char kGltfScale[] = "KHR_gaussian_splatting:SCALE";
 constexpr char kGltfOpacity[] = "KHR_gaussian_splatting:OPACITY";

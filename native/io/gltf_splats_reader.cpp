@@ -8,11 +8,13 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "data/cloud_transform.h"
+#include "data/splat_frame.h"
 #include "io/cloud_parts.h"
 #include "io/gltf_splat_names.h"
 #include "io/gltf_splats.h"
 #include "io/input_file.h"
 #include "io/media_library.h"
+#include "io/spz_file.h"
 
 namespace stipple {
 
@@ -28,14 +30,21 @@ constexpr char kGlbMagic[] = "glTF";
 struct Delivery {
   std::vector<StippleMediaSplatPart> infos;
   std::vector<SplatCloud> clouds;
+  std::vector<ByteVector> packed;  ///< of the parts that are packed
 
   void* take(uint32_t array, uint64_t bytes) {
     if (array == kMediaSplatParts) {
       infos.resize(static_cast<size_t>(bytes / sizeof(StippleMediaSplatPart)));
       clouds.resize(infos.size());
+      packed.resize(infos.size());
       return infos.data();
     }
-    SplatCloud& cloud = clouds.at((array - kMediaSplatPositions) / 5);
+    const size_t part = (array - kMediaSplatPositions) / 5;
+    if (infos.at(part).packing == kMediaSplatsInSpz) {
+      packed[part].resize(static_cast<size_t>(bytes));
+      return packed[part].data();
+    }
+    SplatCloud& cloud = clouds[part];
     std::vector<float>* const arrays[] = {&cloud.positions, &cloud.rotations, &cloud.scales,
                                           &cloud.opacities, &cloud.sh};
     std::vector<float>& values = *arrays[(array - kMediaSplatPositions) % 5];
@@ -60,13 +69,27 @@ void finishRotations(SplatCloud& cloud) {
   });
 }
 
+/// The splats of an SPZ file inside of a glTF file, in glTF's frame. In: what, the part in
+/// messages.
+SplatCloud unpacked(ByteVector bytes, const StippleMediaSplatPart& info, const std::string& what) {
+  SplatCloud cloud = readSpzBytes(std::move(bytes), what, nullptr);
+  if (info.count != UINT64_MAX && info.count != cloud.size()) {
+    fail(ErrorCode::kFormat, what + " has accessors of " + std::to_string(info.count) +
+                                 " elements; its SPZ data holds " + std::to_string(cloud.size()) +
+                                 " splats");
+  }
+  // As the SPZ library turns it: the file has its own frame, the scene glTF's.
+  convertFrame(cloud, kGltfFrame);
+  if (cloud.antialias == Antialias::kClassic) {
+    cloud.antialias = static_cast<Antialias>(info.antialias);
+  }
+  return cloud;
+}
+
 /// The part in the file's scene. In: what, the part in messages.
 SplatCloud placed(SplatCloud cloud, const StippleMediaSplatPart& info, const std::string& what) {
-  cloud.sh_degree = static_cast<int>(info.sh_degree);
   cloud.colour_space = static_cast<ColourSpace>(info.colour_space);
-  cloud.antialias = static_cast<Antialias>(info.antialias);
   cloud.frame = static_cast<Frame>(info.frame);
-  finishRotations(cloud);
   const Mat4d matrix = Eigen::Map<const Mat4d>(info.matrix);
   try {
     validate(cloud, "part");
@@ -107,9 +130,17 @@ SplatCloud readGltfSplats(const std::string& path, Progress* progress) {
   std::vector<SplatCloud> parts;
   for (size_t p = 0; p < delivery.clouds.size(); ++p) {
     const StippleMediaSplatPart& info = delivery.infos[p];
-    parts.push_back(placed(std::move(delivery.clouds[p]), info,
-                           path + ": mesh " + std::to_string(info.mesh) + ", primitive " +
-                               std::to_string(info.primitive)));
+    const std::string what = path + ": mesh " + std::to_string(info.mesh) + ", primitive " +
+                             std::to_string(info.primitive);
+    SplatCloud& cloud = delivery.clouds[p];
+    if (info.packing == kMediaSplatsInSpz) {
+      cloud = unpacked(std::move(delivery.packed[p]), info, what);
+    } else {
+      cloud.sh_degree = static_cast<int>(info.sh_degree);
+      cloud.antialias = static_cast<Antialias>(info.antialias);
+      finishRotations(cloud);
+    }
+    parts.push_back(placed(std::move(cloud), info, what));
     const SplatCloud& first = parts.front();
     const SplatCloud& part = parts.back();
     if (part.colour_space != first.colour_space || part.antialias != first.antialias ||

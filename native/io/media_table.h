@@ -9,7 +9,7 @@
 
 namespace stipple {
 
-constexpr uint32_t kMediaTableVersion = 2;
+constexpr uint32_t kMediaTableVersion = 3;
 
 extern "C" {
 
@@ -85,9 +85,16 @@ enum StippleMediaWebpArray : uint32_t {
   kMediaWebpBytes = 0,  ///< uint8: the encoded file
 };
 
+/// How the splats of a glTF primitive are stored.
+enum StippleMediaSplatPacking : uint32_t {
+  kMediaSplatsInArrays = 0,
+  kMediaSplatsInSpz = 1,  ///< an SPZ file; its bytes take the place of the positions
+};
+
 /// The splats of one use of a glTF primitive.
 struct StippleMediaSplatPart {
-  uint64_t count;
+  uint64_t count;    ///< packed: what the accessors say, or UINT64_MAX
+  uint32_t packing;  ///< StippleMediaSplatPacking
   uint32_t sh_degree;
   uint32_t colour_space;  ///< ColourSpace
   uint32_t antialias;     ///< Antialias

@@ -6,6 +6,7 @@
 
 #include "base/progress.h"
 #include "data/splat_cloud.h"
+#include "io/compression.h"
 #include "io/splat_format.h"
 
 namespace stipple {
@@ -14,6 +15,9 @@ bool startsAsSpz(const SplatFileStart& start);
 
 /// Reads SPZ of versions 1 to 4, degrees 0 to 4, with its coordinate system.
 SplatCloud readSpzSplats(const std::string& path, Progress* progress);
+
+/// The same of a file in memory. In: what, which messages call it.
+SplatCloud readSpzBytes(ByteVector bytes, const std::string& what, Progress* progress);
 
 /// Writes version 3 or 4 (the default). Another frame than RUB takes version 4, whose extension
 /// SPZ_ADOBE_coordinate_system says so.

@@ -36,15 +36,14 @@ struct Header {
 
 class Reader {
  public:
-  Reader(const std::string& path, Progress* progress) : file_(path), progress_(progress) {}
+  Reader(ByteVector bytes, const std::string& what, Progress* progress)
+      : what_(what), file_bytes_(bytes.size()), progress_(progress), bytes_(std::move(bytes)) {}
 
   SplatCloud read() {
-    if (file_.size() < kSpzOldHeaderBytes) {
-      failHere("holds " + std::to_string(file_.size()) + " bytes; a header takes " +
+    if (file_bytes_ < kSpzOldHeaderBytes) {
+      failHere("holds " + std::to_string(file_bytes_) + " bytes; a header takes " +
                std::to_string(kSpzOldHeaderBytes));
     }
-    bytes_.resize(static_cast<size_t>(file_.size()));
-    file_.readAt(0, bytes_.data(), bytes_.size());
     advance(progress_, 0.1, "Reading splats");
     if (loadLittleEndian<uint32_t>(bytes_.data()) == kSpzMagic) {
       if (loadLittleEndian<uint32_t>(&bytes_[4]) >= 4) {
@@ -62,7 +61,7 @@ class Reader {
 
  private:
   [[noreturn]] void failHere(const std::string& what) const {
-    fail(ErrorCode::kFormat, file_.path() + " is not a valid SPZ file: it " + what);
+    fail(ErrorCode::kFormat, what_ + " is not a valid SPZ file: it " + what);
   }
 
   /// In: at least kSpzOldHeaderBytes bytes. All versions agree on these fields.
@@ -76,7 +75,7 @@ class Reader {
     header_.fractional_bits = bytes[13];
     header_.flags = bytes[14];
     if (header_.version < 1 || header_.version > kSpzNewestVersion) {
-      fail(ErrorCode::kUnsupported, file_.path() + " is SPZ of version " +
+      fail(ErrorCode::kUnsupported, what_ + " is SPZ of version " +
                                         std::to_string(header_.version) + "; 1 to 4 can be read");
     }
     if (degree > static_cast<unsigned>(kMaxShDegree)) {
@@ -102,10 +101,10 @@ class Reader {
   /// A lying count is refused before anything is allocated for it. In: bytes that the splats unpack
   /// to, and how many of them a byte of the file can hold.
   void requireRoom(uint64_t unpacked, uint64_t ratio) const {
-    const uint64_t possible = file_.size() * ratio;
+    const uint64_t possible = file_bytes_ * ratio;
     if (unpacked > possible) {
       failHere("claims " + std::to_string(header_.count) + " splats, " + std::to_string(unpacked) +
-               " bytes unpacked; its " + std::to_string(file_.size()) + " bytes can hold at most " +
+               " bytes unpacked; its " + std::to_string(file_bytes_) + " bytes can hold at most " +
                std::to_string(possible));
     }
   }
@@ -113,7 +112,7 @@ class Reader {
   void readGzip() {
     std::array<uint8_t, kSpzOldHeaderBytes> start;
     const size_t got = unpackBytes(Compression::kGzip, bytes_.data(), bytes_.size(), start.data(),
-                                   start.size(), file_.path());
+                                   start.size(), what_);
     if (got < start.size()) {
       failHere("unpacks to " + std::to_string(got) + " bytes; a header takes " +
                std::to_string(start.size()));
@@ -123,7 +122,7 @@ class Reader {
     const uint64_t wanted = kSpzOldHeaderBytes + allArrayBytes() + kExtensionRoom;
     ByteVector plain(static_cast<size_t>(wanted));
     plain.resize(unpackBytes(Compression::kGzip, bytes_.data(), bytes_.size(), plain.data(),
-                             plain.size(), file_.path()));
+                             plain.size(), what_));
     advance(progress_, 0.6, "Reading splats");
     bytes_ = ByteVector();
     readPlain(plain.data(), plain.size());
@@ -208,8 +207,8 @@ class Reader {
         const Stream& stream = streams[s];
         ByteVector& out = plain[stream.array];
         out.resize(static_cast<size_t>(arrayBytes(stream.array)));
-        const std::string what = file_.path() + ": stream " + std::to_string(s) + " at byte " +
-                                 std::to_string(stream.offset);
+        const std::string what =
+            what_ + ": stream " + std::to_string(s) + " at byte " + std::to_string(stream.offset);
         const size_t got = unpackBytes(Compression::kZstd, &bytes_[stream.offset], stream.size,
                                        out.data(), out.size(), what);
         if (got != out.size()) {
@@ -348,7 +347,8 @@ class Reader {
       q[k] = static_cast<float>(static_cast<double>(q[k]) / std::sqrt(squares));
   }
 
-  InputFile file_;
+  std::string what_;
+  uint64_t file_bytes_;
   Progress* progress_;
   ByteVector bytes_;
   Header header_;
@@ -381,7 +381,14 @@ size_t spzBytesPerSplat(size_t array, uint32_t version, int degree) {
 }
 
 SplatCloud readSpzSplats(const std::string& path, Progress* progress) {
-  return Reader(path, progress).read();
+  const InputFile file(path);
+  ByteVector bytes(static_cast<size_t>(file.size()));
+  file.readAt(0, bytes.data(), bytes.size());
+  return readSpzBytes(std::move(bytes), path, progress);
+}
+
+SplatCloud readSpzBytes(ByteVector bytes, const std::string& what, Progress* progress) {
+  return Reader(std::move(bytes), what, progress).read();
 }
 
 }  // namespace stipple

@@ -79,6 +79,16 @@ std::vector<std::string> splatSeeds(const SplatFormat& format, const fs::path& f
     add({.ascii = ending == ".ply", .version = ending == ".spz" ? 3 : 0});
     add({.frame = Frame::kRFU});
   }
+  if (ending == ".glb") {
+    writeSplatFile(randomCloud(5, 1, 1), (folder / "seed.spz").string(), {.version = 3});
+    GlbBuilder file;
+    file.addView(load(folder / "seed.spz"));
+    made.push_back(
+        file.glb("\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{"
+                 "\"primitives\":[{\"mode\":0,"
+                 "\"attributes\":{},\"extensions\":{\"KHR_gaussian_splatting\":{\"extensions\":"
+                 "{\"KHR_gaussian_splatting_compression_spz_2\":{\"bufferView\":0}}}}}]}]"));
+  }
   return made;
 }
 

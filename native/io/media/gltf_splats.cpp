@@ -4,6 +4,7 @@
 #include <tiny_gltf.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,7 +26,7 @@ constexpr uint64_t kMaxUses = 64;
 constexpr int kMaxDegree = 3;
 constexpr size_t kBlock = 1024;
 
-const std::set<std::string> kKnownExtensions = {kGltfSplats, "KHR_mesh_quantization",
+const std::set<std::string> kKnownExtensions = {kGltfSplats, kGltfSpz, "KHR_mesh_quantization",
                                                 "KHR_materials_unlit", "KHR_texture_transform"};
 
 /// One use of a splat primitive.
@@ -33,6 +34,7 @@ struct Part {
   StippleMediaSplatPart info{};
   const tinygltf::Primitive* primitive = nullptr;
   std::string what;
+  int packed_view = -1;  ///< buffer view of an SPZ file
 };
 
 class SplatReader {
@@ -105,9 +107,12 @@ class SplatReader {
       fail(ErrorCode::kFormat, part.what + " has mode " + std::to_string(part.primitive->mode) +
                                    "; splats are points, mode 0");
     }
-    const std::string kernel = text(extension, "kernel", "");
+    readPacking(part, extension);
+    // The draft of SPZ is older than both words, and its files may be without.
+    const bool is_packed = part.info.packing != kMediaSplatsInArrays;
+    const std::string kernel = text(extension, "kernel", is_packed ? kGltfKernel : "");
     if (kernel != kGltfKernel) failUnsupported(part, "kernel", kernel, "'ellipse' is supported");
-    const std::string space = text(extension, "colorSpace", "");
+    const std::string space = text(extension, "colorSpace", is_packed ? kColourSpaceDisplay : "");
     if (space != kColourSpaceDisplay && space != kColourSpaceLinear) {
       failUnsupported(
           part, "colorSpace", space,
@@ -118,11 +123,6 @@ class SplatReader {
       failUnsupported(part, "projection", projection, "'perspective' is supported");
     }
     // Which way to sort is how to draw, not what the splats are.
-    if (extension.IsObject() && extension.Has("extensions") &&
-        extension.Get("extensions").IsObject() && extension.Get("extensions").Size() > 0) {
-      failUnsupported(part, "compression", extension.Get("extensions").Keys().front(),
-                      "splats as accessors are supported");
-    }
     part.info.colour_space = static_cast<uint32_t>(
         space == kColourSpaceLinear ? ColourSpace::kLinear : ColourSpace::kDisplay);
     const tinygltf::Value& extras = part.primitive->extras;
@@ -132,6 +132,24 @@ class SplatReader {
     part.info.frame = static_cast<uint32_t>(frameFromName(frame).value_or(Frame::kUnknown));
     if (part.info.frame == 0) {
       failUnsupported(part, "frame", frame, "three letters such as LUF or RDF are known");
+    }
+  }
+
+  void readPacking(Part& part, const tinygltf::Value& extension) const {
+    if (!extension.IsObject() || !extension.Has("extensions")) return;
+    const tinygltf::Value& inner = extension.Get("extensions");
+    if (!inner.IsObject()) return;
+    for (const std::string& name : inner.Keys()) {
+      if (name != kGltfSpz) {
+        failUnsupported(part, "compression", name,
+                        std::string("splats as accessors and ") + kGltfSpz + " are supported");
+      }
+      const tinygltf::Value& spz = inner.Get(name);
+      if (!spz.IsObject() || !spz.Has("bufferView") || !spz.Get("bufferView").IsInt()) {
+        fail(ErrorCode::kFormat, part.what + ": " + kGltfSpz + " has no 'bufferView'");
+      }
+      part.packed_view = spz.Get("bufferView").Get<int>();
+      part.info.packing = kMediaSplatsInSpz;
     }
   }
 
@@ -159,6 +177,11 @@ class SplatReader {
 
   void readShape(Part& part) const {
     const int position = find(part, "POSITION");
+    if (part.info.packing != kMediaSplatsInArrays) {
+      part.info.count = position < 0 ? std::numeric_limits<uint64_t>::max()
+                                     : accessorCount(model_, position, part.what + ", POSITION");
+      return;
+    }
     if (position < 0) fail(ErrorCode::kFormat, part.what + " has no attribute POSITION");
     part.info.count = accessorCount(model_, position, part.what + ", POSITION");
     require(part, "POSITION", 3);
@@ -176,6 +199,11 @@ class SplatReader {
 
   void readPart(const StippleMediaSink& sink, size_t index) const {
     const Part& part = parts_[index];
+    if (part.info.packing != kMediaSplatsInArrays) {
+      give(sink, kMediaSplatPositions + static_cast<uint32_t>(index) * 5,
+           readView(model_, part.packed_view, part.what + ", " + kGltfSpz));
+      return;
+    }
     const auto array = [&](StippleMediaSplatArray which, size_t width) {
       const size_t floats = static_cast<size_t>(part.info.count) * width;
       return static_cast<float*>(

@@ -76,6 +76,24 @@ class GltfSplats : public ScratchFolder {
     expectError(code, texts, [&] { read(bytes); });
   }
 
+  /// A primitive whose splats are an SPZ file. In: claimed, the splats that its accessor has.
+  static std::string packedGlb(const std::string& spz, size_t claimed, const std::string& more = "",
+                               const std::string& nodes = "{\"mesh\":0}") {
+    GlbBuilder file;
+    const int view = file.addView(spz);
+    Primitive primitive;
+    primitive.add("POSITION", file.addAccessor("\"componentType\":5126,\"count\":" +
+                                               std::to_string(claimed) + ",\"type\":\"VEC3\""));
+    primitive.extension = std::string(more)
+                              .append(
+                                  "\"extensions\":{\"KHR_gaussian_splatting_compression_spz_2\":"
+                                  "{\"bufferView\":")
+                              .append(std::to_string(view))
+                              .append("}}");
+    return file.glb("\"extensionsRequired\":[\"KHR_gaussian_splatting_compression_spz_2\"]," +
+                    scene(primitive.text(), nodes));
+  }
+
   /// Two splats of degree 1 as floats.
   static Primitive twoSplats(GlbBuilder& file) {
     Primitive primitive;
@@ -292,6 +310,50 @@ TEST_F(GltfSplats, IsToldFromMeshesByContent) {
           {"a.glb", "no splats", "KHR_gaussian_splatting"});
 }
 
+TEST_F(GltfSplats, ReadsSplatsThatArePackedAsSpz) {
+  for (const int version : {3, 4}) {
+    SplatCloud cloud = randomCloud(50, 2, 6);
+    cloud.antialias = Antialias::kMip;
+    writeSplatFile(cloud, path("a.spz"), {.version = version});
+    SplatCloud expected = readSplatFile(path("a.spz"));
+    ASSERT_EQ(expected.frame, Frame::kRUB);
+    convertFrame(expected, Frame::kLUF);
+    const SplatCloud seen = read(packedGlb(load(path("a.spz")), 50));
+    EXPECT_EQ(seen.positions, expected.positions);
+    EXPECT_EQ(seen.rotations, expected.rotations);
+    EXPECT_EQ(seen.scales, expected.scales);
+    EXPECT_EQ(seen.opacities, expected.opacities);
+    EXPECT_EQ(seen.sh, expected.sh);
+    EXPECT_EQ(seen.sh_degree, 2);
+    EXPECT_EQ(seen.frame, Frame::kLUF);
+    EXPECT_EQ(seen.antialias, Antialias::kMip);
+    EXPECT_EQ(seen.colour_space, ColourSpace::kDisplay);
+    const SplatCloud moved =
+        read(packedGlb(load(path("a.spz")), 50, "\"colorSpace\":\"lin_rec709_display\",",
+                       "{\"mesh\":0,\"translation\":[8,0,0]}"));
+    EXPECT_EQ(moved.colour_space, ColourSpace::kLinear);
+    // One rounding to float32 of numbers up to 40.
+    EXPECT_NEAR(moved.positions[0], expected.positions[0] + 8.0f, 4e-6);
+  }
+}
+
+TEST_F(GltfSplats, SaysWhatIsWrongWithPackedSplats) {
+  writeSplatFile(randomCloud(50, 1, 7), path("a.spz"), {.version = 3});
+  const std::string spz = load(path("a.spz"));
+  const char* part = "a.glb: mesh 0, primitive 0";
+  refused(packedGlb(spz, 51), {part, "accessors of 51", "50 splats"});
+  refused(packedGlb("no splats at all", 50), {part, "SPZ", "NGSP"});
+  std::string glb = packedGlb(spz, 50);
+  glb.replace(glb.find("_2\":{\"bufferView\":0"), 19, "_2\":{\"bufferView\":7");
+  refused(glb, {part, "spz_2", "buffer view 7"});
+  glb = packedGlb(spz, 50);
+  glb.replace(glb.find("_2\":{\"bufferView\""), 17, "_2\":{\"bufferLook\"");
+  refused(glb, {part, "spz_2", "'bufferView'"});
+  for (size_t length = 1; length < spz.size(); length += 1 + length / 16) {
+    refused(packedGlb(spz.substr(0, length), 50), {part});
+  }
+}
+
 TEST_F(GltfSplats, SaysWhatIsMissingOrUnknown) {
   GlbBuilder file;
   const Primitive good = twoSplats(file);
@@ -313,7 +375,7 @@ TEST_F(GltfSplats, SaysWhatIsMissingOrUnknown) {
   refused(changed("\"kernel\"", "\"projection\":\"fish\",\"kernel\""), {"projection 'fish'"},
           ErrorCode::kUnsupported);
   refused(changed("\"kernel\"", "\"extensions\":{\"KHR_packed\":{\"bufferView\":0}},\"kernel\""),
-          {"compression 'KHR_packed'"}, ErrorCode::kUnsupported);
+          {"compression 'KHR_packed'", "compression_spz_2"}, ErrorCode::kUnsupported);
   Primitive primitive = good;
   primitive.mode = "4";
   refused(file.glb(scene(primitive.text())), {"mode 4", "mode 0"});
