@@ -1,0 +1,30 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes the pictures of windows in docs/images.
+
+    python3 tests/blender/run.py tests/blender/make_pictures.py
+
+Not a test of the suite: its name keeps it out.
+"""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+import picture_steps
+import screen
+
+IMAGES = Path(__file__).resolve().parent.parent.parent / 'docs' / 'images'
+
+
+def test_pictures_of_windows(tmp_path):
+    shots, _ = screen.run_steps(Path(picture_steps.__file__), tmp_path, bpy.app.binary_path)
+    for name, shot in shots.items():
+        height, width = shot.shape[:2]
+        pixels = np.ones((height, width, 4), np.float32)
+        pixels[..., :3] = shot[::-1] / 255
+        image = bpy.data.images.new(name, width, height)
+        image.pixels.foreach_set(pixels.reshape(-1))
+        image.filepath_raw, image.file_format = str(IMAGES / f'{name}.png'), 'PNG'
+        image.save()
