@@ -2,8 +2,8 @@
 """Settings of splat data and of scenes. Names are forever: files store them."""
 
 import bpy
-from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty,
-                       StringProperty)
+from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty,
+                       PointerProperty, StringProperty)
 
 from . import version
 from .scene import sequences, sync
@@ -91,6 +91,19 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     missing_frames: EnumProperty(name="Missing Files", description="What a gap in the series does",
                                  items=sequences.GAPS, options=set(), override=_OVERRIDABLE,
                                  update=sync.on_property_change)
+    # The colour grade: limits are those of the native library.
+    exposure: FloatProperty(name="Exposure", description="Brightness in stops, +1 doubles the light of every splat",
+                            default=0.0, min=-16.0, max=16.0, soft_min=-5.0, soft_max=5.0, step=10, precision=2,
+                            options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
+    tint: FloatVectorProperty(name="Tint", description="Color that the light of every splat is multiplied by, white for "
+                              "none", size=3, default=(1.0, 1.0, 1.0), min=0.0, max=16.0, soft_max=1.0, subtype='COLOR',
+                              options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
+    saturation: FloatProperty(name="Saturation", description="Strength of colors, 0 for grey, 1 for as they are",
+                              default=1.0, min=0.0, max=16.0, soft_max=2.0, options=_CHANGEABLE, override=_OVERRIDABLE,
+                              update=sync.on_property_change)
+    grade_opacity: FloatProperty(name="Opacity", description="Share of every splat's opacity, 0 hides the object",
+                                 default=1.0, min=0.0, max=1.0, subtype='FACTOR', options=_CHANGEABLE,
+                                 override=_OVERRIDABLE, update=sync.on_property_change)
     edited: BoolProperty(name="Edited", description="The splats were edited by hand", options={'HIDDEN'})
 
 

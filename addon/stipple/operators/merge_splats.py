@@ -7,7 +7,7 @@ import numpy as np
 from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene import edits, masks, placement, sources, splat_data, sync
+from ..scene import edits, grades, masks, placement, sources, splat_data, sync
 
 
 class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
@@ -35,7 +35,7 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
         for obj in self._objects:
             edits.refuse_sequence(obj)
         inverse = np.linalg.inv(placement.matrix_of(active))
-        clouds = [sources.full_cloud(obj.data) for obj in self._objects]
+        clouds = [grades.apply(sources.full_cloud(obj.data), obj.data.stipple) for obj in self._objects]
         matrices = [np.eye(4)] + [inverse @ placement.matrix_of(obj) for obj in others]
         frame = clouds[0].info().frame
 

@@ -35,6 +35,8 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     budget: EnumProperty(name="Budget", items=BUDGETS)
     apply_transform: BoolProperty(name="Apply Transform", description="Write the splats where their objects put them, with "
                                   "their harmonics turned; otherwise in the active object's own space", default=True)
+    apply_grade: BoolProperty(name="Apply Grade", description="Write colors and opacities with the Color Grade of each "
+                              "object, which the file then has for good; otherwise as they were before it", default=True)
     up_axis: EnumProperty(name="Up Axis", description="Which way is up in the file, where the transform is applied",
                           items=(('AUTO', "By Format", "As files of this format usually are"),) + UP_AXES[1:])
     max_degree: IntProperty(name="Harmonics", description="Highest degree of the colors' harmonics that is written, 0 for "
@@ -69,7 +71,8 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
             options['frame'] = frames.UP_AXES[self.up_axis]
         if self.frames != 'CURRENT':
             return self._start_series(context, objects, path, options)
-        clouds = exporting.placed_clouds(context, objects, self.budget, self.apply_transform)
+        clouds = exporting.placed_clouds(context, objects, self.budget, self.apply_transform,
+                                         self.apply_grade)
 
         def work(task):
             task.advance(0.0, 'Joining splats')
@@ -80,7 +83,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         return Task(work)
 
     def _start_series(self, context, objects, path, options):
-        found = frames_out.gather(context, objects, self.frames, self.budget)
+        found = frames_out.gather(context, objects, self.frames, self.budget, self.apply_grade)
         native, apply_transform = sources.context(), self.apply_transform
 
         def work(task):
@@ -116,6 +119,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         row = layout.row()
         row.enabled = self.apply_transform
         row.prop(self, 'up_axis')
+        layout.prop(self, 'apply_grade')
         layout.prop(self, 'max_degree')
         if self.filepath.lower().endswith('.ply'):
             layout.prop(self, 'ascii')

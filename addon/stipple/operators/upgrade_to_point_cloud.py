@@ -21,7 +21,7 @@ class STIPPLE_OT_upgrade_to_point_cloud(JobOperator, bpy.types.Operator):
                 and context.object.type == 'MESH' and context.mode == 'OBJECT')
 
     def start(self, context):
-        self._splats = splat_data.read(context.object.data)
+        self._splats = splat_data.read_ungraded(context.object.data)
         return None
 
     def finish(self, context, _job):

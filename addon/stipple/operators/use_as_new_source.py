@@ -4,7 +4,7 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene import sources, splat_data, sync
+from ..scene import grades, sources, splat_data, sync
 
 
 class STIPPLE_OT_use_as_new_source(JobOperator, bpy.types.Operator):
@@ -20,14 +20,19 @@ class STIPPLE_OT_use_as_new_source(JobOperator, bpy.types.Operator):
 
     def start(self, context):
         obj = context.object
-        self._arrays = splat_data.read(obj.data)
-        self._path = sources.save_cloud(sources.cloud_from_object(obj), obj.name)
+        # Colors that were painted over a grade are kept as they are; otherwise the grade stays a setting.
+        self._bakes = grades.colours_are_edited(obj.data)
+        self._arrays = (splat_data.read if self._bakes else splat_data.read_ungraded)(obj.data)
+        cloud = sources.cloud_from_object(obj) if self._bakes else sources.ungraded_cloud(obj)
+        self._path = sources.save_cloud(cloud, obj.name)
         return None
 
     def finish(self, context, _job):
         data = context.object.data
         with sync.paused():
             sources.attach_cloud(data, self._path)
+            if self._bakes:
+                grades.clear(data.stipple)
         sync.write(data, self._arrays, '')
         self.report({'INFO'}, f"{self._arrays.count:,} splats are their own source now, in '{self._path}'")
 

@@ -45,6 +45,17 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
         column.operator('stipple.update_from_source', icon='FILE_REFRESH')
 
 
+class STIPPLE_PT_grade(_SplatPanel, bpy.types.Panel):
+    bl_label = "Color Grade"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        stipple = context.object.data.stipple
+        for name in ('exposure', 'tint', 'saturation', 'grade_opacity'):
+            layout.prop(stipple, name)
+
+
 class STIPPLE_PT_clean_up(_SplatPanel, bpy.types.Panel):
     bl_label = "Splat Clean Up"
 
@@ -201,4 +212,4 @@ def unregister():
             host.remove(_draw_foreign)
 
 
-classes = (STIPPLE_PT_source, STIPPLE_PT_clean_up, STIPPLE_PT_advanced)
+classes = (STIPPLE_PT_source, STIPPLE_PT_grade, STIPPLE_PT_clean_up, STIPPLE_PT_advanced)

@@ -117,7 +117,7 @@ def _source_of(obj):
     """The whole cloud of the source; splats that have none get a file of their own first."""
     data = obj.data
     if data.stipple.source_kind == 'NONE' or not data.stipple.source:
-        path = sources.save_cloud(sources.cloud_from_object(obj), obj.name)
+        path = sources.save_cloud(sources.ungraded_cloud(obj), obj.name)
         with sync.paused():
             sources.attach_cloud(data, path)
     return sources.whole_cloud(data)

@@ -10,7 +10,7 @@ import numpy as np
 from ..binding import cloud_edit
 from ..binding.errors import StippleError, invalid
 from ..binding.structs import Status
-from . import formats, frames, placement, sequences, sources, splat_data, sync
+from . import formats, frames, grades, placement, sequences, sources, splat_data, sync
 
 
 def any_splats(context):
@@ -36,14 +36,14 @@ def chosen(context, collection, selected_only):
     return found
 
 
-def placed_clouds(context, objects, budget, apply_transform):
+def placed_clouds(context, objects, budget, apply_transform, apply_grade=True):
     """([(cloud, 4x4 matrix)], frame that the matrices lead to): the world, or the first object's own space."""
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
     if apply_transform or len(objects) > 1:
-        placed = [(_cloud(obj, budget), placement.matrix_of(obj)) for obj in evaluated]
+        placed = [(_cloud(obj, budget, apply_grade), placement.matrix_of(obj)) for obj in evaluated]
     else:
-        placed = [(_cloud(obj, budget), np.array(obj.matrix_world)) for obj in evaluated]
+        placed = [(_cloud(obj, budget, apply_grade), np.array(obj.matrix_world)) for obj in evaluated]
     return in_frame(placed, apply_transform)
 
 
@@ -79,13 +79,20 @@ def joined(placed):
     return cloud_edit.merge(instances, frame)
 
 
-def _cloud(obj, budget):
+def _cloud(obj, budget, apply_grade):
     data = obj.original.data
-    if budget == 'VIEWPORT' or data.stipple.source_kind == 'NONE' or data.stipple.edited or sync.is_edited(data):
-        return sources.cloud_from_object(obj)
+    cloud = None
+    if not (budget == 'VIEWPORT' or data.stipple.source_kind == 'NONE' or data.stipple.edited or sync.is_edited(data)):
+        cloud = _decoded(obj, data, budget)
+    if cloud is None:
+        return sources.cloud_from_object(obj) if apply_grade else sources.ungraded_cloud(obj)
+    return grades.apply(cloud, obj.data.stipple) if apply_grade else cloud
+
+
+def _decoded(obj, data, budget):
+    """The splats of a source at a budget, not graded; None for a series that shows nothing."""
     if data.stipple.is_sequence:
-        frame = sequences.frame_of(data, obj.data.stipple, bpy.context.scene.frame_current, budget)
-        return frame.cloud() or sources.cloud_from_object(obj)
+        return sequences.frame_of(data, obj.data.stipple, bpy.context.scene.frame_current, budget).cloud()
     if budget == 'FULL':
         return sources.full_cloud(data)
     return sources.decode_data(data, sources.decode_settings(data.stipple, 'RENDER'))

@@ -7,7 +7,8 @@ import numpy as np
 
 from ..binding.cloud import Cloud
 from ..binding.errors import StippleError, invalid
-from . import placement, sequences, sources, splat_data, sync
+from ..binding.grade import GradeSettings, graded
+from . import grades, placement, sequences, sources, splat_data, sync
 
 FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
           ('SERIES', "Whole Series", "Each file of the active object's series once, all objects placed as they are now"),
@@ -27,7 +28,8 @@ class Decoded:
 
 @dataclass
 class FrameOut:
-    """One frame: its number, and [(source, 4x4 object to world)]; a source is a Cloud, a Frame of a series or Decoded."""
+    """One frame: its number, and [(source, 4x4 object to world, grade)]; a source is a Cloud, a Frame of a series or
+    Decoded."""
 
     number: int
     placed: list
@@ -35,21 +37,21 @@ class FrameOut:
     def clouds(self, native):
         """[(cloud, matrix)] without what shows nothing. Errors: StippleError, with the frame."""
         found = []
-        for source, matrix in self.placed:
+        for source, matrix, grade in self.placed:
             try:
                 cloud = source if isinstance(source, Cloud) else source.read_anew(native)
             except StippleError as error:
                 raise StippleError(f'Frame {self.number}: {error}', error.status) from None
             if cloud is not None and cloud.info().count:
-                found.append((cloud, matrix))
+                found.append((graded(cloud, grade), matrix))
         return found
 
 
-def gather(context, objects, frames, budget):
+def gather(context, objects, frames, budget, apply_grade=True):
     """[FrameOut] of splat objects, the active one first; frames: a key of FRAMES but 'CURRENT'; budget: 'VIEWPORT',
-    'RENDER' or 'FULL'. Reads no file. Errors: StippleError for a gap in a series."""
+    'RENDER' or 'FULL'; apply_grade: with the objects' grades. Reads no file. Errors: StippleError for a gap in a series."""
     if frames == 'SCENE':
-        return _of_scene(context, objects, budget)
+        return _of_scene(context, objects, budget, apply_grade)
     data = objects[0].data
     if not data.stipple.is_sequence:
         raise invalid(f"'{objects[0].name}' is no series of files; make one active, or choose another range of frames.")
@@ -65,12 +67,12 @@ def gather(context, objects, frames, budget):
                 stipple = evaluated.data.stipple
                 path = sequences.file_path(obj.data, stipple, min(local, stipple.frame_duration))
                 source = sequences.frame_of_file(obj.data, stipple, path, budget)
-            placed.append((source, placement.matrix_of(evaluated)))
+            placed.append((source, placement.matrix_of(evaluated), _grade_of(evaluated, apply_grade)))
         result.append(FrameOut(local, placed))
     return result
 
 
-def _of_scene(context, objects, budget):
+def _of_scene(context, objects, budget, apply_grade):
     scene = context.scene
     before, fixed, result = (scene.frame_current, scene.frame_subframe), _fixed_clouds(objects, with_models=False), []
     try:
@@ -83,11 +85,16 @@ def _of_scene(context, objects, budget):
                     evaluated = obj.evaluated_get(depsgraph)
                     source = fixed.get(obj) or _at_frame(obj.data, evaluated.data.stipple, number, budget)
                     if not placement.is_flat(evaluated.matrix_world):
-                        placed.append((source, np.array(evaluated.matrix_world)))
+                        placed.append((source, np.array(evaluated.matrix_world),
+                                       _grade_of(evaluated, apply_grade)))
                 result.append(FrameOut(number, placed))
     finally:
         scene.frame_set(before[0], subframe=before[1])
     return result
+
+
+def _grade_of(evaluated, apply_grade):
+    return grades.settings_of(evaluated.data.stipple) if apply_grade else GradeSettings()
 
 
 def _at_frame(data, stipple, number, budget):
@@ -105,7 +112,7 @@ def _fixed_clouds(objects, with_models):
         stipple = obj.data.stipple
         changes = stipple.is_sequence or (stipple.source_kind in sources.MODEL_KINDS and not with_models)
         if not changes or stipple.edited or sync.is_edited(obj.data):
-            fixed[obj] = sources.cloud_from_object(obj)
+            fixed[obj] = sources.ungraded_cloud(obj)
     return fixed
 
 

@@ -5,7 +5,7 @@ import bpy
 
 from .. import version
 from ..binding.errors import StippleError
-from . import placement, sequences, sources, splat_data, sync
+from . import grades, placement, sequences, sources, splat_data, sync
 
 
 def gather(depsgraph, mode, warn=lambda message: None):
@@ -54,13 +54,17 @@ def _cloud_of(obj, mode, frame):
     if from_source and not _has_modifiers(obj) and not sync.is_edited(original):
         try:
             if stipple.is_sequence:
-                return sequences.frame_of(original, stipple, frame, mode).cloud()
-            return sources.decode(original, sources.decode_settings(stipple, mode))
+                cloud = sequences.frame_of(original, stipple, frame, mode).cloud()
+            else:
+                cloud = sources.decode(original, sources.decode_settings(stipple, mode))
+            return cloud and grades.apply(cloud, stipple)
         except StippleError as error:
             raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
     if splat_data.count(data) == 0:
         return None
-    return sources.cloud_from_object(obj)
+    if _has_modifiers(obj):
+        return sources.cloud_from_object(obj)  # modifiers see the attributes, which carry the grade
+    return grades.cloud_of(obj)
 
 
 def _has_modifiers(obj):

@@ -187,10 +187,10 @@ def whole_cloud(data):
 
 def full_cloud(data):
     """A datablock at full count: the whole source without what is hidden, splats of meshes at the render budget, and
-    what is stored where there is no source."""
+    what is stored where there is no source. Not graded."""
     stipple = data.stipple
     if stipple.source_kind == 'NONE' or stipple.edited:
-        return Cloud.create(context(), splat_data.read(data))
+        return Cloud.create(context(), splat_data.read_ungraded(data))
     return decode_data(data, decode_settings(stipple, 'FULL' if stipple.source_kind == 'TREE' else 'RENDER'))
 
 
@@ -237,8 +237,13 @@ def visible_count(stipple):
 
 
 def cloud_from_object(obj):
-    """The cloud of an object's attributes as they are, evaluated where the object is."""
+    """The cloud of an object's attributes as they are, evaluated where the object is: graded."""
     return Cloud.create(context(), splat_data.read(obj.data, obj.original.data))
+
+
+def ungraded_cloud(obj):
+    """The same without the grade of the attributes."""
+    return Cloud.create(context(), splat_data.read_ungraded(obj.data, obj.original.data))
 
 
 def model_path_for(name, given=''):

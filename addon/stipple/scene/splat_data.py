@@ -3,7 +3,8 @@
 
 5.2 and later: a point cloud with the attributes of Blender's own splats. Before: a mesh of vertices
 with the same names. `rotation` is w,x,y,z; `radiance:base` holds the DC harmonics and the opacity;
-`radiance:sh_<i>` the other coefficients, one colour each.
+`radiance:sh_<i>` the other coefficients, one colour each. Under a grade these are what is shown, and
+`ungraded:base` and `ungraded:sh_<i>` keep the colours and opacities as they were.
 """
 
 import zlib
@@ -77,13 +78,13 @@ def degree(data):
     return sh_degree_of(1 + sum(a.name.startswith('radiance:sh_') for a in data.attributes))
 
 
-def write(data, arrays):
-    """Replaces the splats of a datablock."""
+def write(data, arrays, ungraded=None):
+    """Replaces the splats of a datablock. ungraded: the same splats before their grade, to be kept beside them."""
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         raise StippleError(f"'{data.name}' is in Edit Mode; leave it before its splats are written.",
                            Status.ERROR_INVALID_ARGUMENT)
     if isinstance(data, bpy.types.Mesh) and not _is_editable(data):
-        _write_linked(data, arrays)
+        _write_linked(data, arrays, ungraded)
         return
     _resize(data, arrays.count)
     if isinstance(data, bpy.types.Mesh):
@@ -92,17 +93,27 @@ def write(data, arrays):
         _set(data, 'position', 'FLOAT_VECTOR', arrays.positions)
     _set(data, 'scale', 'FLOAT_VECTOR', np.maximum(arrays.scales, np.float32(MIN_SCALE)))
     _set(data, 'rotation', version.ROTATION_TYPE, arrays.rotations)
-    base = np.empty((arrays.count, 4), np.float32)
-    base[:, :3] = arrays.sh[:, 0]
-    base[:, 3] = arrays.opacities
-    _set(data, 'radiance:base', version.BASE_TYPE, base)
-    rest = arrays.sh.shape[1] - 1
-    for i in range(rest):
-        _set(data, f'radiance:sh_{i}', 'FLOAT_VECTOR', arrays.sh[:, i + 1])
-    for name in [a.name for a in data.attributes if a.name.startswith('radiance:sh_')]:
+    _write_colours(data, 'radiance', arrays)
+    _write_colours(data, 'ungraded', ungraded)
+    _mark(data, arrays)
+
+
+def _write_colours(data, prefix, arrays):
+    """Colours and opacities under names with this prefix; None removes them."""
+    rest = -1
+    if arrays is not None:
+        base = np.empty((arrays.count, 4), np.float32)
+        base[:, :3] = arrays.sh[:, 0]
+        base[:, 3] = arrays.opacities
+        _set(data, f'{prefix}:base', version.BASE_TYPE, base)
+        rest = arrays.sh.shape[1] - 1
+        for i in range(rest):
+            _set(data, f'{prefix}:sh_{i}', 'FLOAT_VECTOR', arrays.sh[:, i + 1])
+    elif f'{prefix}:base' in data.attributes:
+        data.attributes.remove(data.attributes[f'{prefix}:base'])
+    for name in [a.name for a in data.attributes if a.name.startswith(f'{prefix}:sh_')]:
         if int(name.rpartition('_')[2]) >= rest:
             data.attributes.remove(data.attributes[name])
-    _mark(data, arrays)
 
 
 def _is_editable(data):
@@ -110,11 +121,11 @@ def _is_editable(data):
     return data.library is None and data.override_library is None
 
 
-def _write_linked(mesh, arrays):
+def _write_linked(mesh, arrays, ungraded):
     """BMesh writes data that foreach_set does not."""
     own = bpy.data.meshes.new(mesh.name)
     try:
-        write(own, arrays)
+        write(own, arrays, ungraded)
         carrier = bmesh.new()
         carrier.from_mesh(own)
         carrier.to_mesh(mesh)
@@ -135,23 +146,33 @@ def _mark(data, arrays):
 
 
 def read(data, original=None):
-    """The splats of a datablock. original: the datablock that tells the colour space, where data is evaluated.
+    """The splats of a datablock as they are shown. original: the datablock that tells the colour space, where data is
+    evaluated.
 
     Errors: StippleError for attributes that are missing.
     """
+    return _read(data, original, 'radiance')
+
+
+def read_ungraded(data, original=None):
+    """The same before the grade that the attributes carry."""
+    return _read(data, original, 'ungraded' if data.attributes.get('ungraded:base') is not None else 'radiance')
+
+
+def _read(data, original, prefix):
     marked = data if original is None else original
     n = count(data)
     positions = _positions(data, n)
-    scales, rotations, base = _get(data, 'scale', n, 3), _get(data, 'rotation', n, 4), _get(data, 'radiance:base', n, 4)
+    scales, rotations, base = _get(data, 'scale', n, 3), _get(data, 'rotation', n, 4), _get(data, f'{prefix}:base', n, 4)
     base = base.reshape(n, 4)
     rest = 0
-    while data.attributes.get(f'radiance:sh_{rest}') is not None:
+    while data.attributes.get(f'{prefix}:sh_{rest}') is not None:
         rest += 1
     sh_degree_of(rest + 1)
     sh = np.empty((n, rest + 1, 3), np.float32)
     sh[:, 0] = base[:, :3]
     for i in range(rest):
-        sh[:, i + 1] = _get(data, f'radiance:sh_{i}', n, 3).reshape(n, 3)
+        sh[:, i + 1] = _get(data, f'{prefix}:sh_{i}', n, 3).reshape(n, 3)
     return SplatArrays(positions.reshape(n, 3), rotations.reshape(n, 4), scales.reshape(n, 3), base[:, 3].copy(), sh,
                        _key_of(_COLOUR_SPACES, marked.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
                        _key_of(_ANTIALIAS, marked.get(ANTIALIAS_KEY), Antialias.CLASSIC),

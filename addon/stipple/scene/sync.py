@@ -14,7 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..binding.errors import StippleError
-from . import masks, meshes, sequences, sources, splat_data
+from . import grades, masks, meshes, sequences, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -50,21 +50,22 @@ def sync(obj, depsgraph, mode, most=None):
     """
     data = obj.data
     stipple = data.stipple
+    grade = grades.settings_of(_evaluated(data, depsgraph))
     if stipple.source_kind == 'NONE' or not stipple.source or stipple.edited:
-        return False
+        return regrade(data, grade)
     if mode == 'RENDER' and bpy.app.background:
         # Nobody sees a panel that says what is wrong, so old splats must not pass for the source's.
         sources.check_unchanged(data)
     key, decode = _wanted(data, depsgraph, mode, most)
     if data.get(WRITTEN_KEY) == key:
-        return False
+        return regrade(data, grade)
     if is_edited(data):
         stipple.edited = True
         raise StippleError(f"The splats of '{data.name}' were edited by hand; use them as a new source, or revert to "
                            'the source, to change their settings.')
     begin = time.perf_counter()
     splats = decode()
-    write(data, splats, key)
+    write(data, splats, key, grade)
     if splats.count >= FEW:
         _state['seconds_per_splat'] = (time.perf_counter() - begin) / splats.count
     return True
@@ -89,9 +90,20 @@ def _decoded(data, settings):
     return sources.decode_data(data, settings).read()
 
 
-def write(data, arrays, key):
-    """Stores splats together with what they were made from."""
-    splat_data.write(data, arrays)
+def regrade(data, grade):
+    """Gives the stored splats another grade, edited ones too. Returns True where it wrote. Errors: StippleError."""
+    if grades.is_shown(data, grade):
+        return False
+    edited = is_edited(data)
+    grades.write_again(data, grade)
+    if not edited and FINGERPRINT_KEY in data:
+        data[FINGERPRINT_KEY] = splat_data.fingerprint(data)
+    return True
+
+
+def write(data, arrays, key, grade=None):
+    """Stores splats, which are not graded, together with what they were made from. grade: None for the present one."""
+    grades.write(data, arrays, grades.settings_of(data.stipple) if grade is None else grade)
     data[FINGERPRINT_KEY] = splat_data.fingerprint(data)
     data[WRITTEN_KEY] = key
 
@@ -184,7 +196,7 @@ def splat_objects():
     """One object for every splat datablock that has users in this file."""
     found = {}
     for obj in bpy.data.objects:
-        if splat_data.is_splat_object(obj) and obj.data.stipple.source:
+        if splat_data.is_splat_object(obj):
             found.setdefault(obj.data.name_full, obj)
     return found.values()
 
@@ -210,8 +222,17 @@ def _frame_change_post(scene, depsgraph):
     if depsgraph.mode == 'VIEWPORT':
         sync_all(depsgraph, 'VIEWPORT')
     elif scene.render.engine != ENGINE:
-        # The engine Stipple decodes for itself; every other one draws the stored attributes.
+        # The engine Stipple decodes and grades for itself; every other one draws the stored attributes.
         sync_all(depsgraph, 'RENDER')
+    else:
+        _regrade_modified(depsgraph)
+
+
+def _regrade_modified(depsgraph):
+    """Modifiers see attributes under every engine."""
+    for obj in list(splat_objects()):
+        if len(obj.modifiers) and not _state['paused']:
+            regrade(obj.data, grades.settings_of(_evaluated(obj.data, depsgraph)))
 
 
 @persistent
