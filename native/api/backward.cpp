@@ -109,6 +109,10 @@ void requireDerivative(const RenderSettings& settings) {
     fail(ErrorCode::kInvalidArgument, "options->method is " + std::to_string(settings.method) +
                                           "; derivatives have 0 (tiled) only");
   }
+  if (settings.options.surface.depth || settings.splat_light) {
+    fail(ErrorCode::kInvalidArgument,
+         "options has a surface or a splat_light; derivatives are those of splats alone");
+  }
   if (settings.linearise) {
     fail(ErrorCode::kInvalidArgument,
          "options->output_colour is 0 (scene linear), which converts the composited picture; "

@@ -2,6 +2,7 @@
 
 #include "api/guard.h"
 #include "math/colour.h"
+#include "splat/surface.h"
 
 namespace stipple::api {
 
@@ -38,7 +39,25 @@ RenderSettings renderSettings(const StippleRenderOptions* options, const Instanc
     settings.options.background[c] =
         settings.linearise ? linearToSrgb(given.background[c]) : given.background[c];
   }
+  settings.options.surface = {given.surface_width, given.surface_height, given.surface_depth,
+                              given.surface_colour};
+  settings.options.splats_apart = given.surface_colour != nullptr;
+  settings.splat_light = given.splat_light;
   return settings;
+}
+
+void validateLayers(const RenderSettings& settings, const Camera& camera) {
+  validateSurface(settings.options.surface, camera);
+  if (!settings.splat_light) return;
+  const size_t pixel_count = static_cast<size_t>(camera.width) * camera.height;
+  requireFinite(settings.splat_light, pixel_count * 3, 3, "options->splat_light at pixel");
+  for (size_t i = 0; i < pixel_count * 3; ++i) {
+    if (settings.splat_light[i] < 0.0f) {
+      fail(ErrorCode::kInvalidArgument, "options->splat_light at pixel " + std::to_string(i / 3) +
+                                            " is " + std::to_string(settings.splat_light[i]) +
+                                            "; 0 and more is allowed");
+    }
+  }
 }
 
 }  // namespace stipple::api

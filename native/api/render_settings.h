@@ -11,9 +11,13 @@ struct RenderSettings {
   RenderOptions options;
   StippleRenderMethod method = STIPPLE_RENDER_TILED;
   bool linearise = false;  ///< the composited values are display values and light is asked for
+  const float* splat_light = nullptr;  ///< [H,W,3]
 };
 
 /// The options of the caller in the library's own terms. NULL: defaults.
 RenderSettings renderSettings(const StippleRenderOptions* options, const Instances& instances);
+
+/// Refuses a surface or light that is not one of the camera's picture.
+void validateLayers(const RenderSettings& settings, const Camera& camera);
 
 }  // namespace stipple::api

@@ -32,6 +32,23 @@ void copyTo(const std::vector<From>& values, To* out) {
   for (size_t i = 0; i < values.size(); ++i) out[i] = static_cast<To>(values[i]);
 }
 
+/// From the splats to the picture, in place: their colours times `light`, then the surface.
+template <typename Weight>
+void finishLayers(float* colour, const RenderSettings& settings,
+                  const std::vector<Weight>& surface_weight, size_t pixel_count) {
+  const float* surface = settings.options.surface.colour;
+  const float* light = settings.splat_light;
+  parallelFor(pixel_count, 1 << 14, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      float* pixel = colour + i * 4;
+      for (size_t c = 0; light && c < 3; ++c) pixel[c] *= light[i * 3 + c];
+      if (!surface) continue;
+      const float weight = static_cast<float>(surface_weight[i]);
+      for (size_t c = 0; c < 4; ++c) pixel[c] += weight * surface[i * 4 + c];
+    }
+  });
+}
+
 template <typename Result>
 void deliverPicture(const Result& picture, const RenderSettings& settings,
                     const StippleRenderBuffers& buffers) {
@@ -39,8 +56,11 @@ void deliverPicture(const Result& picture, const RenderSettings& settings,
   copyTo(picture.depth, buffers.depth);
   copyTo(picture.median_depth, buffers.median_depth);
   copyTo(picture.counts, buffers.counts);
-  if (settings.linearise && buffers.colour) {
-    lineariseColour(buffers.colour, static_cast<size_t>(picture.width) * picture.height);
+  if (!buffers.colour) return;
+  const size_t pixel_count = static_cast<size_t>(picture.width) * picture.height;
+  if (settings.linearise) lineariseColour(buffers.colour, pixel_count);
+  if (settings.options.surface.colour || settings.splat_light) {
+    finishLayers(buffers.colour, settings, picture.surface_weight, pixel_count);
   }
 }
 
@@ -92,6 +112,7 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     RenderSettings settings = renderSettings(options, placed);
     const Camera view = cameraFrom(camera);
     validate(view);
+    validateLayers(settings, view);
     const StippleRenderBuffers out = complete(buffers, "buffers");
     settings.options.with_depth = out.depth != nullptr;
     settings.options.with_median_depth = out.median_depth != nullptr;

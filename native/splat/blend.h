@@ -10,8 +10,16 @@
 // skipped below 1/255. Splats come front to back; T starts at 1:
 //   colour += T alpha c,   T <- T (1 - alpha),
 // and a splat that would bring T below 1e-4 is left out and ends the pixel.
-// Based on: Zwicker, Pfister, van Baar and Gross, EWA Volume Splatting, Visualization 2001;
-// Kerbl, Kopanas, Leimkuehler and Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section 6.
+//
+// Something else, a mesh, may stand between the splats: a surface of premultiplied colour S,
+// opacity a and depth z. It comes after the splats whose centres are no deeper than z and before
+// the others, as if it were one more splat, except that it is never left out:
+//   w = T,   T <- T (1 - a),
+// and the pixel is what the splats summed up to, plus w S; T below 1e-4 ends it. Without a colour
+// the surface is a matte: a = 1, and nothing is added. Depths compare as the numbers of single
+// precision by which splats are sorted; a splat at exactly z comes first. Based on: Zwicker,
+// Pfister, van Baar and Gross, EWA Volume Splatting, Visualization 2001; Kerbl, Kopanas,
+// Leimkuehler and Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section 6.
 
 namespace stipple {
 
@@ -48,14 +56,32 @@ T splatAlpha(T opacity, T half_squared_distance) {
   return alpha < T(kMinAlpha) ? T(0) : alpha;
 }
 
+/// The depth of a splat that its place between surfaces goes by.
+inline float orderingDepth(double depth) {
+  return static_cast<float>(std::min(depth, 1e38));
+}
+
+/// A surface at one pixel.
+template <typename T>
+struct SurfaceAtPixel {
+  float depth;       ///< planar z, metres; kNoSurface: behind everything
+  T transmittance;   ///< 1 - a
+  bool shows;        ///< false: a matte
+  T opacity = T(0);  ///< a, with every digit of a little; for depthWithSurface
+};
+
+/// Above every orderingDepth.
+constexpr float kNoSurface = 3e38f;
+
 /// One pixel while splats are blended into it.
 template <typename T>
 struct PixelBlend {
   T transmittance = T(1);
   T colour[3] = {T(0), T(0), T(0)};
-  T weighted_depth = T(0);  ///< sum of w z
-  T median_depth = T(-1);   ///< meaningful where has_median
-  uint32_t count = 0;       ///< splats blended
+  T weighted_depth = T(0);   ///< sum of w z
+  T median_depth = T(-1);    ///< meaningful where has_median
+  T surface_weight = T(-1);  ///< w of the surface; below 0 while it has not come
+  uint32_t count = 0;        ///< splats blended
   bool has_median = false;
   bool finished = false;  ///< no further splat counts
 
@@ -77,6 +103,39 @@ struct PixelBlend {
     transmittance = next;
     ++count;
   }
+
+  bool isBefore(const SurfaceAtPixel<T>& surface, float ordering_depth) const {
+    return surface_weight >= T(0) || !(ordering_depth > surface.depth);
+  }
+
+  /// The surface's turn: a splat behind it, or the end of the pixel.
+  void addSurface(const SurfaceAtPixel<T>& surface) {
+    surface_weight = transmittance;
+    transmittance *= surface.transmittance;
+    if (surface.shows && surface.depth < kNoSurface && !has_median && transmittance < T(0.5)) {
+      has_median = true;
+      median_depth = T(surface.depth);
+    }
+    if (transmittance < T(kMinTransmittance)) finished = true;
+  }
+
+  /// What the splats alone cover, once the surface has come: every digit of a little is kept, and
+  /// it is exactly 0 where no splat blends.
+  T splatCoverage(const SurfaceAtPixel<T>& surface) const {
+    return (T(1) - surface_weight) + (surface_weight * surface.transmittance - transmittance);
+  }
 };
+
+/// Expected depth with a surface: as given where no splat blends; that of the splats alone for a
+/// matte and for a surface behind everything. In: empty, the depth of nothing.
+template <typename T>
+T depthWithSurface(T weighted_depth, T splat_coverage, const SurfaceAtPixel<T>& surface,
+                   T surface_weight, T empty) {
+  const bool has_depth = surface.shows && surface.depth < kNoSurface;
+  if (splat_coverage == T(0)) return has_depth ? T(surface.depth) : empty;
+  if (!has_depth) return weighted_depth / splat_coverage;
+  const T own = surface_weight * surface.opacity;
+  return (weighted_depth + own * T(surface.depth)) / (splat_coverage + own);
+}
 
 }  // namespace stipple

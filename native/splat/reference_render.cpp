@@ -3,6 +3,7 @@
 
 #include "splat/render.h"
 #include "splat/scene.h"
+#include "splat/surface.h"
 
 // The definition of correct: every visible splat in order at every pixel, in double.
 
@@ -48,6 +49,8 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
   if (options.with_depth) result.depth.resize(pixel_count);
   if (options.with_median_depth) result.median_depth.resize(pixel_count);
   if (options.with_counts) result.counts.resize(pixel_count);
+  const bool with_surface = hasSurface(options);
+  result.surface_weight.resize(with_surface ? pixel_count : 0);
 
   std::vector<const ReferenceSplat*> row;
   for (uint32_t y = 0; y < camera.height; ++y) {
@@ -62,28 +65,46 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
     }
     for (uint32_t x = 0; x < camera.width; ++x) {
       const double px = x + 0.5;
+      const size_t i = static_cast<size_t>(y) * camera.width + x;
       PixelBlend<double> pixel;
+      SurfaceAtPixel<double> surface{};
+      if (with_surface) surface = surfaceAt<double>(options.surface, i);
       for (const ReferenceSplat* splat : row) {
         const Projected<double>& p = splat->projected;
         const double dx = px - p.footprint.mean_x;
         if (std::abs(dx) > p.half_x) continue;
         const double alpha = splatAlpha(
             p.footprint.opacity, halfSquaredDistance(p.footprint, dx, py - p.footprint.mean_y));
-        if (alpha > 0) pixel.add(alpha, splat->colour, p.depth);
+        if (!(alpha > 0)) continue;
+        if (with_surface && !pixel.isBefore(surface, orderingDepth(p.depth))) {
+          pixel.addSurface(surface);
+          if (pixel.finished) break;
+        }
+        pixel.add(alpha, splat->colour, p.depth);
         if (pixel.finished) break;
       }
-      const size_t i = static_cast<size_t>(y) * camera.width + x;
-      const double coverage = 1.0 - pixel.transmittance;
+      if (with_surface && pixel.surface_weight < 0) pixel.addSurface(surface);
+      const double coverage =
+          with_surface ? pixel.splatCoverage(surface) : 1.0 - pixel.transmittance;
       for (size_t c = 0; c < 3; ++c) {
         result.colour[i * 4 + c] =
             pixel.colour[c] +
             (options.with_background ? pixel.transmittance * options.background[c] : 0.0);
       }
       result.colour[i * 4 + 3] = options.with_background ? 1.0 : coverage;
+      if (with_surface) {
+        result.surface_weight[i] = pixel.surface_weight;
+        result.colour[i * 4 + 3] =
+            alphaApart(surface, pixel.surface_weight, coverage, options.with_background);
+      }
       const double empty = static_cast<double>(kEmptyDepth);
       if (options.with_depth) {
         // Sum of w = 1 - T.
         result.depth[i] = pixel.count > 0 ? pixel.weighted_depth / coverage : empty;
+        if (with_surface) {
+          result.depth[i] = depthWithSurface(pixel.weighted_depth, coverage, surface,
+                                             pixel.surface_weight, empty);
+        }
       }
       if (options.with_median_depth) {
         result.median_depth[i] = pixel.has_median ? pixel.median_depth : empty;
@@ -91,6 +112,11 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
       if (options.with_counts) result.counts[i] = pixel.count;
     }
   }
+  if (with_surface && options.surface.colour && !options.splats_apart) {
+    addSurface(options.surface.colour, result.surface_weight.data(), pixel_count,
+               result.colour.data());
+  }
+  if (!options.splats_apart) result.surface_weight.clear();
   advance(progress, 1.0, "Rendering the reference");
   return result;
 }

@@ -9,6 +9,7 @@
 #include "data/colour_grade.h"
 #include "data/splat_cloud.h"
 #include "math/camera.h"
+#include "math/empty_depth.h"
 #include "math/vec.h"
 
 namespace stipple {
@@ -35,6 +36,19 @@ enum class BlendSpace : uint32_t {
   kSceneLinear = 1,  ///< linearise each display-space splat colour, then composite
 };
 
+/// What something else drew, to stand at its depth between the splats: see splat/blend.h. The order
+/// is that of the splats' centres, as among the splats themselves, so a splat is before or behind
+/// as a whole. Row 0 is the top; the arrays are the caller's.
+struct SurfaceLayer {
+  uint32_t width = 0;  ///< pixels; those of the camera
+  uint32_t height = 0;
+  /// [H,W] planar z, metres; kEmptyDepth and more: behind everything. Null: no layer.
+  const float* depth = nullptr;
+  /// [H,W,4] premultiplied, alpha 0..1, in the blending space (see RenderOptions::splats_apart).
+  /// Null: a matte, which hides what is behind it and leaves a hole.
+  const float* colour = nullptr;
+};
+
 /// Settings that change the picture; both the tiled and the reference renderer follow them.
 struct RenderOptions {
   LowPass low_pass = LowPass::kFromCloud;
@@ -45,21 +59,23 @@ struct RenderOptions {
   bool with_depth = true;
   bool with_median_depth = false;
   bool with_counts = false;  ///< also the number of splats blended per pixel
+  SurfaceLayer surface = {};
+  /// True: the colour is left without the surface's, and surface_weight tells what that counts for:
+  /// for who changes the splats' colours before addSurface. Depth has the surface all the same.
+  bool splats_apart = false;
 };
-
-/// Depth of pixels that nothing covers, metres (Blender's value for empty pixels).
-constexpr float kEmptyDepth = 1e10f;
 
 /// Row 0 is the top of the picture.
 struct RenderResult {
   uint32_t width = 0;
   uint32_t height = 0;
-  std::vector<float> colour;        ///< [H,W,4] premultiplied RGBA in the blending space
-  std::vector<float> depth;         ///< [H,W] expected planar z: sum(w z)/sum(w), metres
-  std::vector<float> median_depth;  ///< [H,W] planar z where transmittance passes 1/2, metres
-  std::vector<uint32_t> counts;     ///< [H,W]
-  uint64_t visible_count = 0;       ///< splats that passed culling
-  uint64_t number = 0;              ///< of this drawing, another for every call; 0: none
+  std::vector<float> colour;          ///< [H,W,4] premultiplied RGBA in the blending space
+  std::vector<float> depth;           ///< [H,W] expected planar z: sum(w z)/sum(w), metres
+  std::vector<float> median_depth;    ///< [H,W] planar z where transmittance passes 1/2, metres
+  std::vector<uint32_t> counts;       ///< [H,W]
+  std::vector<float> surface_weight;  ///< [H,W] transmittance before the surface; if splats_apart
+  uint64_t visible_count = 0;         ///< splats that passed culling
+  uint64_t number = 0;                ///< of this drawing, another for every call; 0: none
 };
 
 /// Tiled CPU renderer: culling, one depth sort, tiles in parallel.
@@ -121,10 +137,11 @@ uint64_t renderMemoryBound(std::span<const SplatInstance> instances, const Camer
 struct ReferenceResult {
   uint32_t width = 0;
   uint32_t height = 0;
-  std::vector<double> colour;        ///< [H,W,4]
-  std::vector<double> depth;         ///< [H,W]
-  std::vector<double> median_depth;  ///< [H,W]
-  std::vector<uint32_t> counts;      ///< [H,W]
+  std::vector<double> colour;          ///< [H,W,4]
+  std::vector<double> depth;           ///< [H,W]
+  std::vector<double> median_depth;    ///< [H,W]
+  std::vector<uint32_t> counts;        ///< [H,W]
+  std::vector<double> surface_weight;  ///< [H,W]
 };
 ReferenceResult renderReference(std::span<const SplatInstance> instances, const Camera& camera,
                                 const RenderOptions& options, Progress* progress = nullptr);

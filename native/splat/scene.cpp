@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "math/affine.h"
+#include "splat/surface.h"
 
 namespace stipple {
 
@@ -72,6 +73,7 @@ void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& ca
                       const RenderOptions& options, PlacedScene& scene) {
   validate(camera);
   validateOptions(options);
+  validateSurface(options.surface, camera);
   scene.view = makeView<double>(camera);
   scene.clouds.clear();
   scene.splat_count = 0;

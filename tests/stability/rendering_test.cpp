@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -260,6 +262,54 @@ TEST(RenderStability, EveryKernelKeepsDeadLanesQuiet) {
     EXPECT_NEAR(pixels.transmittance[3 * kTileSide + 3], 0.01f, 1e-6);
     EXPECT_EQ(pixels.transmittance[0], 1.0f);
     EXPECT_EQ(pixels.unfinished, kTilePixelCount);
+  }
+}
+
+TEST(RenderStability, SurfacesAtSplatsDepthsAtInfinityAndAtTheEnds) {
+  CloudRecipe recipe;
+  recipe.count = 800;
+  const SplatCloud cloud = randomCloud(recipe, 31);
+  const Camera camera = frontCamera(40, 30, 30, 3);
+  const size_t pixel_count = 40 * 30;
+  std::vector<float> depth(pixel_count), colour(pixel_count * 4);
+  // Exactly at a splat's depth, one float beside it, at the ends of float, behind everything.
+  const float odd[] = {kInfinity, 1e10f, 3e38f, -3e38f, 0.0f, -0.0f, 1e-40f, 1e38f};
+  const float alphas[] = {0.0f, 1.0f, 0.5f, 1e-38f, 0.99999994f, 0.9999f, 1e-4f};
+  for (size_t i = 0; i < pixel_count; ++i) {
+    const float at =
+        static_cast<float>(3.0 + static_cast<double>(cloud.positions[i % 800 * 3 + 1]));
+    depth[i] = i % 4 == 0   ? odd[i / 4 % std::size(odd)]
+               : i % 4 == 1 ? at
+                            : std::nextafter(at, i % 4 == 2 ? 0.0f : 9.0f);
+    colour[i * 4 + 3] = alphas[i % std::size(alphas)];
+    colour[i * 4] = i % 5 == 0 ? -1e30f : i % 3 == 0 ? 1e30f * colour[i * 4 + 3] : 0.25f;
+  }
+  const SurfaceLayer layers[] = {{40, 30, depth.data(), nullptr},
+                                 {40, 30, depth.data(), colour.data()}};
+  for (const SurfaceLayer& layer : layers) {
+    RenderOptions options = everything();
+    options.surface = layer;
+    const SplatInstance instance{&cloud};
+    const RenderResult tiled = renderTiled({&instance, 1}, camera, options);
+    const ReferenceResult reference = renderReference({&instance, 1}, camera, options);
+    for (size_t i = 0; i < pixel_count; ++i) {
+      SCOPED_TRACE(::testing::Message() << "pixel " << i);
+      EXPECT_EQ(tiled.counts[i], reference.counts[i]);
+      for (size_t c = 0; c < 4; ++c) {
+        const double expected = reference.colour[i * 4 + c];
+        EXPECT_NEAR(static_cast<double>(tiled.colour[i * 4 + c]), expected,
+                    1e-4 * std::max(1.0, std::abs(expected)));
+      }
+      EXPECT_NEAR(static_cast<double>(tiled.depth[i]), reference.depth[i],
+                  1e-4 * std::abs(reference.depth[i]) + 1e-30);
+    }
+    for (const float bad : {kNan, -kInfinity}) {
+      std::vector<float> spoilt = depth;
+      spoilt[77] = bad;
+      options.surface.depth = spoilt.data();
+      EXPECT_THROW(renderTiled({&instance, 1}, camera, options), Error);
+      EXPECT_THROW(renderReference({&instance, 1}, camera, options), Error);
+    }
   }
 }
 

@@ -66,6 +66,8 @@ FUNCTIONS = {
     'stipple_mesh_add_part': (_status, [_handle, _to(s.StippleMeshPart)]),
     'stipple_mesh_load': (_status, [_handle, _path, _out_handle]),
     'stipple_mesh_info': (_status, [_handle, _to(s.StippleMeshInfo)]),
+    'stipple_mesh_depth_start': (_status, [_handle, _to(s.StippleMeshInstance), c_uint64, _to(s.StippleCamera), _floats,
+                                           _out_handle]),
     # density and anchors
     'stipple_sample_options_init': (None, [_to(s.StippleSampleOptions)]),
     'stipple_density_from_points': (_status, [_handle, _floats, _floats, c_uint64, c_uint32, _out_handle]),

@@ -7,7 +7,28 @@ import numpy as np
 
 from .errors import invalid
 from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
-from .structs import NO_INDEX, MaterialColour, StippleMaterial, StippleMeshInfo, StippleMeshPart
+from .job import Job
+from .structs import (NO_INDEX, MaterialColour, StippleMaterial, StippleMeshInfo, StippleMeshInstance,
+                      StippleMeshPart)
+
+
+class DepthTask:
+    """The depth of meshes while it is drawn: poll, cancel or wait through `job`, then read `depth`."""
+
+    def __init__(self, job, depth):
+        self.job = job
+        self.depth = depth  # [H,W] metres, row 0 = top, 1e10 where no mesh is
+
+
+def start_depth(context, placed, camera):
+    """Starts drawing how far meshes [(mesh, 4x4 object to world)] are; they must outlive the start only."""
+    depth = np.empty((camera.height, camera.width), np.float32)
+    array = (StippleMeshInstance * max(len(placed), 1))()
+    for entry, (mesh, matrix) in zip(array, placed):
+        entry.__init__(mesh=mesh.pointer, matrix=matrix16(matrix))
+    job = Job(context.library, new_handle(context.library, 'stipple_mesh_depth_start', context.pointer, array,
+                                          len(placed), byref(camera), pointer_to(depth)), keep=(depth, array))
+    return DepthTask(job, depth)
 
 
 class Mesh(Handle):

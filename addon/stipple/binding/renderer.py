@@ -5,7 +5,8 @@ from ctypes import byref, c_double, c_uint64, pointer
 
 import numpy as np
 
-from .handle import Handle, matrix16, new_handle, pointer_to
+from .errors import invalid
+from .handle import Handle, contiguous, matrix16, new_handle, pointer_to
 from .job import Job
 from .structs import (BlendSpace, LowPass, OutputColour, RenderMethod, StippleInstance, StippleRenderBuffers,
                       StippleRenderOptions)
@@ -20,6 +21,35 @@ def instance_array(instances):
         grade = getattr(cloud, 'grade', None)
         entry.__init__(cloud=cloud.pointer, matrix=matrix16(matrix), grade=pointer(grade) if grade is not None else None)
     return array
+
+
+class Surface:
+    """Something else between the splats, a mesh: arrays as in StippleRenderOptions, row 0 = top.
+
+    depth [H,W] metres; colour [H,W,4] premultiplied, or None for a matte; light [H,W,3] factors of the splats, or None.
+    """
+
+    def __init__(self, depth, colour=None, light=None):
+        self.depth = contiguous(depth)
+        shape = self.depth.shape
+        self.colour = _layer('colour', colour, shape + (4,))
+        self.light = _layer('light', light, shape + (3,))
+
+    def put_into(self, options):
+        """A copy of the options, with this surface; the arrays must outlive its use."""
+        options = type(options).from_buffer_copy(options)
+        options.surface_height, options.surface_width = self.depth.shape
+        options.surface_depth = pointer_to(self.depth)
+        options.surface_colour, options.splat_light = pointer_to(self.colour), pointer_to(self.light)
+        return options
+
+
+def _layer(name, array, shape):
+    if array is None:
+        return None
+    if array.shape != shape:
+        raise invalid(f'Surface array {name} has shape {array.shape}; allowed is {shape}.')
+    return contiguous(array)
 
 
 class RenderTask:
@@ -49,12 +79,14 @@ class Renderer(Handle):
             options.background = (c_double * 3)(*background)
         return options
 
-    def start(self, instances, camera, options, with_depth=True, median_depth=False):
+    def start(self, instances, camera, options, with_depth=True, median_depth=False, surface=None):
         """Starts the picture of instances [(cloud, matrix)]; clouds must outlive the start only.
 
-        median_depth: where light is half gone, instead of the mean depth of what is seen.
+        median_depth: where light is half gone, instead of the mean depth of what is seen. surface: a Surface that stands
+        between the splats.
         """
         shape = (camera.height, camera.width)
+        options = surface.put_into(options) if surface is not None else options
         colour = np.empty(shape + (4,), np.float32)
         depth = np.empty(shape, np.float32) if with_depth else None
         buffers = StippleRenderBuffers(colour=pointer_to(colour))
@@ -62,7 +94,7 @@ class Renderer(Handle):
         array = instance_array(instances)
         job = Job(self.library, new_handle(self.library, 'stipple_renderer_render_start', self.pointer, array,
                                            len(instances), byref(camera), byref(options), byref(buffers)),
-                  keep=(colour, depth, buffers, array, [cloud for cloud, _ in instances]))
+                  keep=(colour, depth, buffers, array, surface, [cloud for cloud, _ in instances]))
         return RenderTask(job, colour, depth)
 
     def memory_bound(self, instances, camera):

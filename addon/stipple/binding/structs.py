@@ -279,7 +279,13 @@ class StippleInstance(_Sized):
 class StippleRenderOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('method', c_uint32), ('low_pass', c_uint32), ('blend_space', c_uint32),
                 ('output_colour', c_uint32), ('sh_degree_limit', c_uint32), ('with_background', c_uint32),
-                ('reserved', c_uint32), ('background', c_double * 3)]
+                ('reserved', c_uint32), ('background', c_double * 3), ('surface_width', c_uint32),
+                ('surface_height', c_uint32), ('surface_depth', _floats), ('surface_colour', _floats),
+                ('splat_light', _floats)]
+
+
+class StippleMeshInstance(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('mesh', c_void_p), ('matrix', _matrix)]
 
 
 class StippleRenderBuffers(_Sized):

@@ -588,6 +588,19 @@ typedef struct StippleRenderOptions {
   uint32_t with_background; /* 1: composite over background, alpha becomes 1 */
   uint32_t reserved;
   double background[3];     /* in output_colour's space */
+  /* A surface of something else, a mesh, between the splats. Splats whose centres are no deeper than it come
+   * before it, then it with its own alpha, then the others: alpha 1 ends the pixel. As among splats, each is
+   * before or behind as a whole. Pixels where no splat shows have the surface's values bit for bit. Depths
+   * include it. Arrays must stay valid until the job has ended. */
+  uint32_t surface_width; /* pixels; those of the camera */
+  uint32_t surface_height;
+  const float* surface_depth; /* [H,W] planar z, metres; 1e10 and more: behind everything. NULL: no surface */
+  /* [H,W,4] premultiplied, alpha 0..1, in output_colour's space: it is added to the splats as those come out.
+   * NULL: a matte, which hides what is behind it, the background too, and shows nothing itself. */
+  const float* surface_colour;
+  /* [H,W,3] >= 0, factors of all that is not the surface, in output_colour's space: shadows that fall on
+   * splats. NULL: 1. */
+  const float* splat_light;
 } StippleRenderOptions;
 void stipple_render_options_init(StippleRenderOptions* options);
 
@@ -596,7 +609,7 @@ typedef struct StippleRenderBuffers {
   uint32_t struct_size;
   uint32_t reserved;
   float* colour;        /* [H,W,4] premultiplied RGBA */
-  float* depth;         /* [H,W] expected planar z, metres; 1e10 where nothing is */
+  float* depth;         /* [H,W] expected planar z, metres, of splats and surface; 1e10 where nothing is */
   float* median_depth;  /* [H,W] planar z where transmittance passes 1/2; 1e10 where it does not */
   uint32_t* counts;     /* [H,W] splats blended */
 } StippleRenderBuffers;
@@ -605,8 +618,8 @@ StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer**
 void stipple_renderer_free(StippleRenderer* renderer);
 /* Renders instances [count] together. Clouds of different colour spaces in one picture:
  * UNSUPPORTED with STIPPLE_BLEND_AS_TRAINED. count 0 gives an empty picture.
- * Errors of the start: INVALID_ARGUMENT for a camera, matrix or option outside its range; MEMORY_LIMIT,
- * with the numbers, before anything is allocated. */
+ * Errors of the start: INVALID_ARGUMENT for a camera, matrix, surface or option outside its range;
+ * MEMORY_LIMIT, with the numbers, before anything is allocated. */
 StippleStatus stipple_renderer_render_start(StippleRenderer* renderer, const StippleInstance* instances,
                                             uint64_t count, const StippleCamera* camera,
                                             const StippleRenderOptions* options,
@@ -614,6 +627,23 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer, const Sti
 StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
                                             const StippleInstance* instances, uint64_t count,
                                             const StippleCamera* camera, uint64_t* bytes);
+
+typedef struct StippleMeshInstance {
+  uint32_t struct_size;
+  uint32_t reserved;
+  const StippleMesh* mesh;
+  double matrix[16]; /* object to world, on top of that of its parts; invertible */
+} StippleMeshInstance;
+
+/* How far meshes are: planar z of the nearest triangle, either side, that the ray through each pixel's centre
+ * meets between the near and far plane. Out: depth [H,W] metres, row 0 = top, 1e10 where there is none; it must
+ * stay valid until the job has ended. As a matte for stipple_renderer_render_start.
+ * Same bits for any number of threads. Cost: O(vertices + pixels of the triangles' bounding boxes); 24 bytes
+ * per vertex of the largest mesh.
+ * Errors of the start: INVALID_ARGUMENT for a camera or matrix outside its range; MEMORY_LIMIT. */
+StippleStatus stipple_mesh_depth_start(StippleContext* context, const StippleMeshInstance* instances,
+                                       uint64_t count, const StippleCamera* camera, float* depth,
+                                       StippleJob** job);
 
 /* ---- drawing by a graphics card ------------------------------------------------------------------ */
 

@@ -46,6 +46,10 @@ struct TilePixels {
   /// Place in the tile's list of the splat that ended the pixel and was not blended.
   alignas(64) int32_t end[kTilePixelCount];
   uint32_t unfinished;  ///< pixels whose cut is not kFinished
+  // Only with a surface; otherwise neither written nor read.
+  alignas(64) float wall[kTilePixelCount];    ///< its depth; kNoSurface once it has come
+  alignas(64) float passes[kTilePixelCount];  ///< its transmittance
+  alignas(64) float before[kTilePixelCount];  ///< T before it; kNotYet until it has come
 };
 
 constexpr int32_t kNeverEnded = std::numeric_limits<int32_t>::max();
@@ -53,6 +57,7 @@ constexpr int32_t kNeverEnded = std::numeric_limits<int32_t>::max();
 constexpr float kLog2MinAlpha = -7.9943534368588579f;  ///< log2(1/255)
 constexpr float kFinished = 1e30f;
 constexpr float kNoMedian = -1e38f;
+constexpr float kNotYet = -1.0f;
 /// How far ln T may be off after `count` splats whose g, l and 15 l sum to at most `largest`, at
 /// most kMaxFloatReach, in one tile. Alpha is off by |g| 3.3e-7 largest + 1e-6, relative: g by 4
 /// roundings of largest, the exponent by 1e-6, 2^x by 3e-7. That moves ln T by alpha/(1 - alpha)
@@ -100,6 +105,8 @@ struct TileKernelOptions {
   AlphaJudge judge = nullptr;
   const void* judge_context = nullptr;
   bool with_coverage = false;  ///< beside depth
+  bool with_surface = false;   ///< without coverage
+  bool surface_shows = false;  ///< false: a matte
   int32_t first = 0;           ///< place of this call's first splat in the tile's list
   TileCulling culling = TileCulling::kAll;
   WantedNext next = {};

@@ -53,6 +53,30 @@ void blendPixel(const TileSplat& splat, float alpha, const TileKernelOptions& op
   }
 }
 
+/// The surface of a pixel that a splat behind it touches. Returns false where the pixel ends.
+bool passSurface(const TileSplat& splat, const TileKernelOptions& options, TilePixels& pixels,
+                 size_t i, int32_t place) {
+  PixelBlend<float> pixel;
+  pixel.transmittance = pixels.transmittance[i];
+  pixel.has_median = pixels.median_depth[i] != kNoMedian;
+  const bool had_median = pixel.has_median;
+  pixel.addSurface({pixels.wall[i], pixels.passes[i], options.surface_shows});
+  pixels.before[i] = pixel.surface_weight;
+  pixels.transmittance[i] = pixel.transmittance;
+  if (options.with_extras && pixel.has_median && !had_median) {
+    pixels.median_depth[i] = pixels.wall[i];
+  }
+  pixels.wall[i] = kNoSurface;
+  const float next = pixel.transmittance;
+  if (near(next, static_cast<float>(kMinTransmittance), splat.finish_doubt) ||
+      (options.with_extras && near(next, 0.5f, kMedianDoubt))) {
+    finishInDoubt(pixels, i, place);
+    return false;
+  }
+  if (pixel.finished) finish(pixels, i, place);
+  return !pixel.finished;
+}
+
 }  // namespace
 
 void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions options,
@@ -69,6 +93,10 @@ void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions op
         const float g1 = splat.g1 + splat.l10 * column + splat.l11 * static_cast<float>(y);
         const float exponent = splat.log2_opacity - (g0 * g0 + g1 * g1);
         if (exponent <= kLog2MinAlpha - splat.doubt_low) continue;
+        if (options.with_surface && splat.depth > pixels.wall[i] &&
+            !passSurface(splat, options, pixels, i, place)) {
+          continue;
+        }
         if (exponent >= kLog2MinAlpha + splat.doubt_high) {
           const float alpha = std::min(static_cast<float>(kMaxAlpha), std::exp2(exponent));
           blendPixel(splat, alpha, options, pixels, i, place);

@@ -35,7 +35,51 @@ HWY_NOINLINE Vec judgedAlpha(Tag d, hn::Mask<Tag> unclear, Vec alpha, size_t spl
   return hn::Load(d, values);
 }
 
-template <bool kDepth, bool kCoverage, bool kExtras, TileCulling kCulling = TileCulling::kAll>
+/// Where splats end pixels, in `ends`; `doubtful` are those of them that float32 cannot decide.
+template <typename Mask>
+void endPixels(Tag d, Mask ends, Mask doubtful, int32_t place, size_t i, TilePixels& pixels) {
+  const Vec cut = hn::Load(d, pixels.cut + i);
+  hn::Store(hn::IfThenElse(ends, hn::Set(d, kFinished), cut), d, pixels.cut + i);
+  const hn::RebindToSigned<Tag> di;
+  hn::BlendedStore(hn::Set(di, place), hn::RebindMask(di, ends), di, pixels.end + i);
+  const Vec doubt = hn::Load(d, pixels.doubt + i);
+  hn::Store(hn::IfThenElse(doubtful, hn::Set(d, 1.0f), doubt), d, pixels.doubt + i);
+  pixels.unfinished -= static_cast<uint32_t>(hn::CountTrue(d, ends));
+}
+
+/// The surfaces in the lanes of `behind`, whose splats are behind them: once for every pixel.
+/// Returns the lanes that end.
+template <bool kExtras>
+HWY_NOINLINE hn::Mask<Tag> passSurfaces(Tag d, hn::Mask<Tag> behind, const TileSplat& splat,
+                                        const TileKernelOptions& options, int32_t place, size_t i,
+                                        TilePixels& pixels) {
+  const Vec min_transmittance = hn::Set(d, static_cast<float>(kMinTransmittance));
+  const Vec before = hn::Load(d, pixels.transmittance + i);
+  const Vec next = hn::Mul(before, hn::Load(d, pixels.passes + i));
+  const Vec wall = hn::Load(d, pixels.wall + i);
+  hn::Store(hn::IfThenElse(behind, before, hn::Load(d, pixels.before + i)), d, pixels.before + i);
+  hn::Store(hn::IfThenElse(behind, next, before), d, pixels.transmittance + i);
+  hn::Store(hn::IfThenElse(behind, hn::Set(d, kNoSurface), wall), d, pixels.wall + i);
+  const Vec finish_doubt = hn::Set(d, static_cast<float>(kMinTransmittance) * splat.finish_doubt);
+  auto near = hn::Lt(hn::Abs(hn::Sub(next, min_transmittance)), finish_doubt);
+  if constexpr (kExtras) {
+    const Vec half = hn::Set(d, 0.5f), median_doubt = hn::Set(d, 0.5f * kMedianDoubt);
+    near = hn::Or(near, hn::Lt(hn::Abs(hn::Sub(next, half)), median_doubt));
+    const Vec median = hn::Load(d, pixels.median_depth + i);
+    const auto passes =
+        hn::And(behind, hn::And(hn::Lt(next, half), hn::Eq(median, hn::Set(d, kNoMedian))));
+    if (options.surface_shows) {
+      hn::Store(hn::IfThenElse(passes, wall, median), d, pixels.median_depth + i);
+    }
+  }
+  const auto doubtful = hn::And(behind, near);
+  const auto ends = hn::Or(doubtful, hn::And(behind, hn::Lt(next, min_transmittance)));
+  if (!hn::AllFalse(d, ends)) endPixels(d, ends, doubtful, place, i, pixels);
+  return ends;
+}
+
+template <bool kDepth, bool kCoverage, bool kExtras, bool kSurface = false,
+          TileCulling kCulling = TileCulling::kAll>
 void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions& options,
                  TilePixels& pixels) {
   constexpr bool kCullsRows = kCulling != TileCulling::kNothing;
@@ -72,8 +116,17 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
         const Vec g1 = hn::MulAdd(l11, hn::Set(d, static_cast<float>(y)), g1_first);
         const Vec exponent = hn::NegMulAdd(g1, g1, most);
         const Vec cut = hn::Load(d, pixels.cut + i);
-        const auto touched = hn::And(hn::Gt(exponent, low), hn::Lt(cut, finished));
+        auto touched = hn::And(hn::Gt(exponent, low), hn::Lt(cut, finished));
         if (kCullsLanes && hn::AllFalse(d, touched)) continue;
+        if constexpr (kSurface) {
+          const auto behind =
+              hn::And(touched, hn::Gt(hn::Set(d, splat.depth), hn::Load(d, pixels.wall + i)));
+          if (HWY_UNLIKELY(!hn::AllFalse(d, behind))) {
+            const auto ended = passSurfaces<kExtras>(
+                d, behind, splat, options, options.first + static_cast<int32_t>(s), i, pixels);
+            touched = hn::AndNot(ended, touched);
+          }
+        }
 
         auto unclear = hn::And(touched, hn::Lt(exponent, high));
         auto shows = hn::AndNot(unclear, touched);
@@ -115,13 +168,7 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
           hn::Store(hn::Add(hn::Load(d, pixels.count + i), counted), d, pixels.count + i);
         }
         if (!hn::AllFalse(d, ends)) {
-          hn::Store(hn::IfThenElse(ends, finished, cut), d, pixels.cut + i);
-          const hn::RebindToSigned<Tag> di;
-          hn::BlendedStore(hn::Set(di, options.first + static_cast<int32_t>(s)),
-                           hn::RebindMask(di, ends), di, pixels.end + i);
-          const Vec doubt = hn::Load(d, pixels.doubt + i);
-          hn::Store(hn::IfThenElse(doubtful, hn::Set(d, 1.0f), doubt), d, pixels.doubt + i);
-          pixels.unfinished -= static_cast<uint32_t>(hn::CountTrue(d, ends));
+          endPixels(d, ends, doubtful, options.first + static_cast<int32_t>(s), i, pixels);
         }
       }
     }
@@ -131,7 +178,11 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
 template <bool kExtras>
 void blendWithExtras(const TileSplat* splats, size_t count, const TileKernelOptions& options,
                      TilePixels& pixels) {
-  if (!options.with_depth) {
+  if (options.with_surface && options.with_depth) {
+    blendSplats<true, false, kExtras, true>(splats, count, options, pixels);
+  } else if (options.with_surface) {
+    blendSplats<false, false, kExtras, true>(splats, count, options, pixels);
+  } else if (!options.with_depth) {
     blendSplats<false, false, kExtras>(splats, count, options, pixels);
   } else if (!options.with_coverage) {
     blendSplats<true, false, kExtras>(splats, count, options, pixels);
@@ -144,9 +195,9 @@ void blendTile(const TileSplat* splats, size_t count, TileKernelOptions options,
                TilePixels& pixels) {
   if (options.culling != TileCulling::kAll && options.with_depth && !options.with_extras) {
     if (options.culling == TileCulling::kRows) {
-      blendSplats<true, false, false, TileCulling::kRows>(splats, count, options, pixels);
+      blendSplats<true, false, false, false, TileCulling::kRows>(splats, count, options, pixels);
     } else {
-      blendSplats<true, false, false, TileCulling::kNothing>(splats, count, options, pixels);
+      blendSplats<true, false, false, false, TileCulling::kNothing>(splats, count, options, pixels);
     }
   } else if (options.with_extras) {
     blendWithExtras<true>(splats, count, options, pixels);

@@ -6,11 +6,14 @@
 #include <cmath>
 #include <functional>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "splat/cpu/tile.h"
 #include "splat/cpu/tile_lists.h"
+#include "splat/cpu/tile_surface.h"
 #include "splat/cpu/visible_splats.h"
 #include "splat/scene.h"
+#include "splat/surface.h"
 
 // Based on: Kerbl et al., 3D Gaussian Splatting, SIGGRAPH 2023 (tiles). Differs: one sort by depth
 // followed by counting by tile; and where float32 rounding could decide a threshold, double does,
@@ -28,9 +31,11 @@ constexpr size_t kBatchSize = 128;
 struct DoubtfulPixel {
   uint32_t x, y;
   PixelBlend<double> blend;
+  SurfaceAtPixel<double> surface;  ///< if there is one
 };
 
 /// Goes over the tile's splats once for all of them.
+template <bool kSurface>
 void blendInDouble(const SplatSlots& slots, const Tile& tile, DoubtfulPixel* pixels, size_t count) {
   constexpr size_t kAhead = 8;
   for (size_t i = 0; i < tile.splats.size() && count > 0; ++i) {
@@ -44,6 +49,13 @@ void blendInDouble(const SplatSlots& slots, const Tile& tile, DoubtfulPixel* pix
       if (!mayShow(splat, tile, pixels[k].x, pixels[k].y, distance)) continue;
       const double alpha = splatAlpha(slots.extras[slot].opacity, distance);
       if (alpha == 0) continue;
+      if (kSurface && !pixels[k].blend.isBefore(pixels[k].surface, splat.depth)) {
+        pixels[k].blend.addSurface(pixels[k].surface);
+        if (pixels[k].blend.finished) {
+          std::swap(pixels[k--], pixels[--count]);
+          continue;
+        }
+      }
       pixels[k].blend.add(alpha, splat.colour, static_cast<double>(splat.depth));
       // A pixel that has ended changes places with the last that has not.
       if (pixels[k].blend.finished) std::swap(pixels[k--], pixels[--count]);
@@ -51,7 +63,8 @@ void blendInDouble(const SplatSlots& slots, const Tile& tile, DoubtfulPixel* pix
   }
 }
 
-void replaceDoubtful(const SplatSlots& slots, const Tile& tile, TilePixels& pixels) {
+void replaceDoubtful(const SplatSlots& slots, const Tile& tile, const RenderOptions& options,
+                     TilePixels& pixels) {
   uint32_t any = 0;
   for (const float doubt : pixels.doubt) any |= std::bit_cast<uint32_t>(doubt);
   if (any == 0) return;
@@ -62,12 +75,24 @@ void replaceDoubtful(const SplatSlots& slots, const Tile& tile, TilePixels& pixe
     for (; next < kTilePixelCount && count < kAtOnce; ++next) {
       // Pixels outside the picture are never in doubt.
       if (pixels.doubt[next] == 0.0f) continue;
-      doubtful[count++] = {next % kTileSide, next / kTileSide, {}};
+      doubtful[count++] = {next % kTileSide, next / kTileSide, {}, {}};
     }
-    blendInDouble(slots, tile, doubtful, count);
+    if (hasSurface(options)) {
+      for (size_t k = 0; k < count; ++k) {
+        const size_t row = static_cast<size_t>(tile.y0 + doubtful[k].y) * options.surface.width;
+        doubtful[k].surface = surfaceAt<double>(options.surface, row + tile.x0 + doubtful[k].x);
+      }
+      blendInDouble<true>(slots, tile, doubtful, count);
+    } else {
+      blendInDouble<false>(slots, tile, doubtful, count);
+    }
     for (size_t k = 0; k < count; ++k) {
       const size_t i = static_cast<size_t>(doubtful[k].y) * kTileSide + doubtful[k].x;
-      const PixelBlend<double>& pixel = doubtful[k].blend;
+      PixelBlend<double>& pixel = doubtful[k].blend;
+      if (hasSurface(options)) {
+        if (pixel.surface_weight < 0) pixel.addSurface(doubtful[k].surface);
+        pixels.before[i] = static_cast<float>(pixel.surface_weight);
+      }
       pixels.transmittance[i] = static_cast<float>(pixel.transmittance);
       pixels.red[i] = static_cast<float>(pixel.colour[0]);
       pixels.green[i] = static_cast<float>(pixel.colour[1]);
@@ -140,6 +165,7 @@ void writePixels(const Tile& tile, const TilePixels& pixels, const RenderOptions
     const size_t out = static_cast<size_t>(tile.y0 + y) * result.width + tile.x0;
     writeRow(pixels, static_cast<size_t>(y) * kTileSide, tile.width, options, result, out);
   }
+  if (hasSurface(options)) writeWithSurface(tile, pixels, options, result);
 }
 
 /// The batch that the kernel works on, for judgeAlpha.
@@ -172,16 +198,19 @@ void keepTile(size_t index, const TilePixels& pixels, KeptPicture& kept) {
 }
 
 /// Out: result and kept, where not null.
-void renderTile(const SplatSlots& slots, const Tile& tile, size_t index, TileKernel kernel,
+void renderTile(const SplatSlots& slots, Tile tile, size_t index, TileKernel kernel,
                 const RenderOptions& options, RenderResult* result, KeptPicture* kept) {
   // Scratch of this thread: 10 KiB of pixels and 8 KiB of splats, in the first-level cache.
   TilePixels pixels;
   TileSplat batch[kBatchSize];
   clearPixels(tile, pixels);
+  if (hasSurface(options)) takeSurface(options.surface, slots.splats, tile, pixels);
   Judged judged{&slots, &tile, 0};
   TileKernelOptions kernel_options = {options.with_depth,
                                       options.with_median_depth || options.with_counts};
   kernel_options.with_coverage = kept != nullptr;
+  kernel_options.with_surface = hasSurface(options);
+  kernel_options.surface_shows = options.surface.colour != nullptr;
   kernel_options.judge = judgeAlpha;
   kernel_options.judge_context = &judged;
   float largest = 0;
@@ -194,7 +223,10 @@ void renderTile(const SplatSlots& slots, const Tile& tile, size_t index, TileKer
     kernel_options.next = {slots.splats, tile.splats.data() + begin + count, behind};
     kernel(batch, count, kernel_options, pixels);
   }
-  replaceDoubtful(slots, tile, pixels);
+  if (hasSurface(options)) {
+    endWithSurface(options.surface, tile, kernel_options.with_extras, pixels);
+  }
+  replaceDoubtful(slots, tile, options, pixels);
   if (result) writePixels(tile, pixels, options, *result);
   if (kept) keepTile(index, pixels, *kept);
 }
@@ -207,12 +239,14 @@ void prepareResult(const Camera& camera, const RenderOptions& options, RenderRes
   result.depth.resize(options.with_depth ? pixel_count : 0);
   result.median_depth.resize(options.with_median_depth ? pixel_count : 0);
   result.counts.resize(options.with_counts ? pixel_count : 0);
+  result.surface_weight.resize(hasSurface(options) && options.splats_apart ? pixel_count : 0);
 }
 
 uint64_t resultBytes(const Camera& camera, const RenderOptions& options) {
   const uint64_t pixel_count = static_cast<uint64_t>(camera.width) * camera.height;
   const uint64_t planes = 4u + (options.with_depth ? 1u : 0u) +
-                          (options.with_median_depth ? 1u : 0u) + (options.with_counts ? 1u : 0u);
+                          (options.with_median_depth ? 1u : 0u) + (options.with_counts ? 1u : 0u) +
+                          (hasSurface(options) && options.splats_apart ? 1u : 0u);
   return pixel_count * planes * sizeof(float);
 }
 
@@ -328,6 +362,10 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
                const Camera& camera, const RenderOptions& options, RenderWorkspace& workspace,
                RenderResult* result, KeptPicture* kept, Progress* progress) {
   static std::atomic<uint64_t> pictures{0};
+  if (kept && hasSurface(options)) {
+    fail(ErrorCode::kUnsupported,
+         "the picture has a surface; pictures that a backward pass goes on from can have none");
+  }
   auto& [scene, visible, lists, last] = workspace.arrays();
   last.number = 0;  // also where this fails on the way
   placeSceneUnread(instances, camera, options, scene);

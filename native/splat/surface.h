@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "math/camera.h"
+#include "splat/blend.h"
+#include "splat/render.h"
+
+namespace stipple {
+
+/// Refuses a layer of another size than the camera's picture, NaN and minus infinity among its
+/// depths, colours that are not finite and opacities outside 0..1. Errors: kInvalidArgument.
+void validateSurface(const SurfaceLayer& surface, const Camera& camera);
+
+inline bool hasSurface(const RenderOptions& options) {
+  return options.surface.depth != nullptr;
+}
+
+/// The layer at pixel `index`.
+template <typename T>
+SurfaceAtPixel<T> surfaceAt(const SurfaceLayer& layer, size_t index) {
+  const float depth = layer.depth[index];
+  const bool is_there = depth < kEmptyDepth;
+  SurfaceAtPixel<T> surface;
+  surface.depth = is_there ? depth : kNoSurface;
+  surface.shows = layer.colour != nullptr;
+  surface.opacity = surface.shows ? T(layer.colour[index * 4 + 3]) : is_there ? T(1) : T(0);
+  surface.transmittance = T(1) - surface.opacity;
+  return surface;
+}
+
+/// Alpha of what is not the surface, which the colour goes with until addSurface: of the splats,
+/// and of the background behind them.
+template <typename T>
+T alphaApart(const SurfaceAtPixel<T>& surface, T surface_weight, T splat_coverage,
+             bool with_background) {
+  return with_background ? T(1) - surface_weight * (T(1) - surface.transmittance) : splat_coverage;
+}
+
+/// Adds the surface to pixels that were drawn without it. In and out: colour [count,4]; in: weight
+/// [count], the layer's colour [count,4].
+template <typename T>
+void addSurface(const float* surface_colour, const T* weight, size_t count, T* colour) {
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t c = 0; c < 4; ++c) colour[i * 4 + c] += weight[i] * T(surface_colour[i * 4 + c]);
+  }
+}
+
+}  // namespace stipple
