@@ -13,10 +13,11 @@ bl_info = {
 
 import bpy
 
-from . import engine, operators, panels, preferences, properties, viewport
+from . import cycles_engine, engine, operators, panels, preferences, properties, viewport
 from .scene import sync
 
-_classes = preferences.classes + properties.classes + operators.classes + panels.classes + engine.classes
+_classes = (preferences.classes + properties.classes + operators.classes + panels.classes + engine.classes
+            + cycles_engine.classes)
 
 
 def register():

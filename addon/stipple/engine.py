@@ -10,16 +10,44 @@ import bpy
 
 from . import version
 from .binding.errors import CancelledError, StippleError
-from .binding.renderer import Renderer
+from .binding.renderer import Renderer, Surface
 from .binding.structs import JobState
-from .scene import cameras, facts, instances, sources
+from .scene import cameras, facts, instances, mattes, sources
 from .viewport import ViewPicture
 
 # How often a render looks whether it was cancelled.
 POLL_SECONDS = 0.01
 
 
-class STIPPLE_RE_engine(bpy.types.RenderEngine):
+class NativeWork:
+    """What the engines share: native jobs that Blender can cancel, and one message for what goes wrong."""
+
+    def _wait(self, job):
+        """Until the job ends; a cancel in Blender cancels it."""
+        while True:
+            state, fraction, stage = job.poll()
+            if state != JobState.RUNNING:
+                job.wait()
+                return
+            if self._cancelled():
+                job.cancel()
+            self.update_stats('', stage)
+            self.update_progress(fraction)
+            time.sleep(POLL_SECONDS)
+
+    def _cancelled(self):
+        return self.test_break()
+
+    def _warn(self, message):
+        self.report({'WARNING'}, message)
+
+    def _fail(self, error):
+        """One message; the render ends without a picture."""
+        self.error_set(str(error))
+        self.report({'ERROR'}, str(error))
+
+
+class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
     bl_idname = 'STIPPLE'
     bl_label = "Stipple"
     bl_use_preview = False
@@ -35,6 +63,7 @@ class STIPPLE_RE_engine(bpy.types.RenderEngine):
         """Decodes what the view layer shows, from the evaluated settings."""
         self._instances = None
         try:
+            self._mattes = mattes.gather(depsgraph) if depsgraph.scene.stipple.meshes_as_mattes else []
             self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
         except StippleError as error:
             self._fail(error)
@@ -48,7 +77,7 @@ class STIPPLE_RE_engine(bpy.types.RenderEngine):
             camera = cameras.camera_of(self.camera_override or scene.camera, scene.render, picture.border)
             renderer = Renderer(sources.context())
             options = renderer.options(blend_space=picture.blend_space, background=picture.background)
-            task = renderer.start(self._instances, camera, options, picture.with_depth)
+            task = renderer.start(self._instances, camera, options, picture.with_depth, surface=self._matte(camera))
             self._wait(task.job)
         except CancelledError:
             return
@@ -78,21 +107,13 @@ class STIPPLE_RE_engine(bpy.types.RenderEngine):
             return False
         return True
 
-    def _wait(self, job):
-        """Until the job ends; a cancel in Blender cancels it."""
-        while True:
-            state, fraction, stage = job.poll()
-            if state != JobState.RUNNING:
-                job.wait()
-                return
-            if self._cancelled():
-                job.cancel()
-            self.update_stats('', stage)
-            self.update_progress(fraction)
-            time.sleep(POLL_SECONDS)
-
-    def _cancelled(self):
-        return self.test_break()
+    def _matte(self, camera):
+        """The meshes as this camera sees them, or None for none."""
+        if not self._mattes:
+            return None
+        task = mattes.start_depth(self._mattes, camera)
+        self._wait(task.job)
+        return Surface(task.depth)
 
     def _deliver(self, task, picture):
         """Hands the picture over; Blender's first row is the bottom one."""
@@ -102,14 +123,6 @@ class STIPPLE_RE_engine(bpy.types.RenderEngine):
         if task.depth is not None and 'Depth' in passes:
             version.fill_pass(passes['Depth'], task.depth[::-1])
         self.end_result(result)
-
-    def _warn(self, message):
-        self.report({'WARNING'}, message)
-
-    def _fail(self, error):
-        """One message; the render ends without a picture."""
-        self.error_set(str(error))
-        self.report({'ERROR'}, str(error))
 
 
 classes = (STIPPLE_RE_engine,)

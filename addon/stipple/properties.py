@@ -113,6 +113,10 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         items=(('AS_TRAINED', "As Trained", "Blend in display space, as splats are trained and web viewers show them"),
                ('SCENE_LINEAR', "Scene Linear", "Blend light, as all other objects are")),
         options=set(), override=_OVERRIDABLE)
+    meshes_as_mattes: BoolProperty(
+        name="Meshes as Mattes", description="Meshes hide the splats behind them and leave a hole in the picture, for "
+        "putting a render of the meshes there. Shadow catchers hide nothing", default=True, options=set(),
+        override=_OVERRIDABLE)
 
 
 classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_scene)

@@ -24,6 +24,8 @@ FLAT_COLOR_SHADER = 'FLAT_COLOR' if VERSION >= (4, 0, 0) else '3D_FLAT_COLOR'
 VOXEL_SHIFT = 0.5 if VERSION < (5, 0, 0) else 0.0
 # Files dropped into a window and Collection Exporters find their operators by a FileHandler.
 HAS_FILE_HANDLERS = VERSION >= (4, 1, 0)
+# What Cycles calls the light of the world that the camera sees.
+ENVIRONMENT_PASS = 'Environment' if VERSION >= (5, 0, 0) else 'Env'
 EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BLENDER_EEVEE'
 
 
@@ -96,6 +98,15 @@ def fill_pass(render_pass, array):
     render_pass.rect.foreach_set(flat[:pixel_count])
 
 
+def read_pass(render_pass, width, height):
+    """The values of a render pass as [height,width,channels], bottom row first."""
+    values = np.empty(width * height * render_pass.channels, np.float32)
+    # As in fill_pass.
+    short = VERSION < (4, 0, 0) and render_pass.channels > 1
+    render_pass.rect.foreach_get(values[:width * height] if short else values)
+    return values.reshape(height, width, render_pass.channels)
+
+
 def pixel_border(border_minimum, border_maximum, size):
     """First and last+1 pixel of a render border along one side; Blender truncates single floats."""
     low = int(np.float32(border_minimum) * np.float32(size))
@@ -109,8 +120,9 @@ def use_nodes(material):
         material.use_nodes = True
 
 
-def has_nodes(material):
-    return material.node_tree is not None and (VERSION >= (5, 0, 0) or material.use_nodes)
+def has_nodes(owner):
+    """Of a material or world."""
+    return owner.node_tree is not None and (VERSION >= (5, 0, 0) or owner.use_nodes)
 
 
 def copy_of_evaluated_matrix(matrix):

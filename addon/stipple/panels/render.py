@@ -6,6 +6,7 @@ import bpy
 from ..scene import facts
 
 ENGINE = 'STIPPLE'
+CYCLES_ENGINE = 'STIPPLE_CYCLES'
 # Blender's panels that name BLENDER_RENDER but do nothing for this engine.
 _EXCLUDED = {'VIEWLAYER_PT_filter', 'VIEWLAYER_PT_layer_passes', 'RENDER_PT_freestyle', 'RENDER_PT_simplify',
              'RENDER_PT_gpencil', 'RENDER_PT_stereoscopy'}
@@ -16,7 +17,7 @@ class STIPPLE_PT_render_splats(bpy.types.Panel):
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
     bl_context = 'render'
-    COMPAT_ENGINES = {ENGINE}
+    COMPAT_ENGINES = {ENGINE, CYCLES_ENGINE}
 
     @classmethod
     def poll(cls, context):
@@ -27,6 +28,11 @@ class STIPPLE_PT_render_splats(bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         scene = context.scene
+        if context.engine == CYCLES_ENGINE:
+            layout.prop(scene.cycles, 'device')
+            layout.label(text="Splats do not appear in reflections", icon='INFO')
+        else:
+            layout.prop(scene.stipple, 'meshes_as_mattes')
         layout.prop(scene.stipple, 'splat_color')
         if scene.stipple.splat_color == 'AS_TRAINED' and not facts.uses_standard_view(scene):
             box = layout.box()
@@ -71,21 +77,25 @@ class STIPPLE_PT_view_layer_passes(bpy.types.Panel):
         column.prop(context.view_layer, 'use_pass_z')
 
 
-def _compatible_panels():
-    for panel in bpy.types.Panel.__subclasses__():
-        engines = getattr(panel, 'COMPAT_ENGINES', None)
-        if engines is not None and 'BLENDER_RENDER' in engines and panel.__name__ not in _EXCLUDED:
-            yield engines
+def _panels(base=bpy.types.Panel):
+    """Blender's panels that say which engines they are for."""
+    for panel in base.__subclasses__():
+        if getattr(panel, 'COMPAT_ENGINES', None) is not None and panel not in classes:
+            yield panel
+        yield from _panels(panel)
 
 
 def register():
-    for engines in _compatible_panels():
-        engines.add(ENGINE)
+    for panel in _panels():
+        if 'BLENDER_RENDER' in panel.COMPAT_ENGINES and panel.__name__ not in _EXCLUDED:
+            panel.COMPAT_ENGINES.add(ENGINE)
+        if 'CYCLES' in panel.COMPAT_ENGINES:
+            panel.COMPAT_ENGINES.add(CYCLES_ENGINE)
 
 
 def unregister():
-    for panel in bpy.types.Panel.__subclasses__():
-        getattr(panel, 'COMPAT_ENGINES', set()).discard(ENGINE)
+    for panel in _panels():
+        panel.COMPAT_ENGINES.difference_update({ENGINE, CYCLES_ENGINE})
 
 
 classes = (STIPPLE_PT_render_splats, STIPPLE_PT_render_film, STIPPLE_PT_view_layer_passes)

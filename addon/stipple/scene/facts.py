@@ -68,6 +68,18 @@ def world_colour(world):
     return tuple(world.color)
 
 
+def plain_world_colour(world):
+    """Scene linear colour of a world that is the same everywhere, or None."""
+    if world is None or not version.has_nodes(world):
+        return world_colour(world)
+    output = next((n for n in world.node_tree.nodes if n.type == 'OUTPUT_WORLD' and n.is_active_output), None)
+    if output is None or not output.inputs['Surface'].is_linked:
+        return world_colour(world)
+    node = output.inputs['Surface'].links[0].from_node
+    plain = node.type == 'BACKGROUND' and not any(node.inputs[name].is_linked for name in ('Color', 'Strength'))
+    return world_colour(world) if plain else None
+
+
 def uses_standard_view(scene):
     """True where the view shows scene colours as they are, which As Trained counts on."""
     view = scene.view_settings

@@ -20,6 +20,7 @@ WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
 
 ENGINE = 'STIPPLE'
+CYCLES_ENGINE = 'STIPPLE_CYCLES'
 MOVE_SECONDS = 0.05  # that one move of a slider may take
 REST_SECONDS = 0.25  # after which a slider rests
 FEW = 1000           # fewer splats say nothing about the time that each takes
@@ -221,8 +222,8 @@ def _frame_change_post(scene, depsgraph):
     """
     if depsgraph.mode == 'VIEWPORT':
         sync_all(depsgraph, 'VIEWPORT')
-    elif scene.render.engine != ENGINE:
-        # The engine Stipple decodes and grades for itself; every other one draws the stored attributes.
+    elif scene.render.engine not in {ENGINE, CYCLES_ENGINE}:
+        # Our engines decode and grade for themselves; every other one draws the stored attributes.
         sync_all(depsgraph, 'RENDER')
     else:
         _regrade_modified(depsgraph)

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine Cycles + Stipple: Cycles renders meshes, lights and world; splats are put between them by depth.
+
+Cycles is made to see another scene than the file's in the evaluated copies alone, for as long as it looks.
+"""
+
+import contextlib
+import inspect
+
+import bpy
+
+from . import version
+from .binding.errors import CancelledError, StippleError
+from .binding.renderer import Renderer
+from .engine import NativeWork
+from .scene import cameras, facts, instances, layers, sources, splat_data
+
+try:
+    from cycles import CyclesRender
+except ImportError:  # a Blender that was built without Cycles
+    CyclesRender = None
+
+_VISIBILITY = ('visible_camera', 'visible_diffuse', 'visible_glossy', 'visible_transmission',
+               'visible_volume_scatter', 'visible_shadow')
+_SHADOW_PASS = 'Shadow Catcher'
+
+
+@contextlib.contextmanager
+def _without_splats(depsgraph, is_kept=True):
+    """Cycles would draw splats as the points that they are stored as: while this lasts, no ray sees them.
+
+    The film is transparent meanwhile, so that the world's light comes apart from the meshes', and the picture is made in
+    one piece, so that it can be read when Cycles has ended. is_kept: False where the depsgraph may be gone at the end.
+    """
+    originals = set()
+    for entry in depsgraph.object_instances:
+        # Instances take their visibility from the object that is instanced.
+        obj = entry.instance_object if entry.is_instance else entry.object
+        if splat_data.is_splat_object(obj):
+            originals.add(obj.original)
+
+    def owners():
+        # References to evaluated things do not outlive what Cycles does.
+        yield depsgraph.scene_eval.render, {'film_transparent': True}
+        yield depsgraph.scene_eval.cycles, {'use_auto_tile': False}
+        for original in originals:
+            yield original.evaluated_get(depsgraph), dict.fromkeys(_VISIBILITY, False)
+
+    kept = [{name: getattr(owner, name) for name in wanted} for owner, wanted in owners()]
+    try:
+        for owner, wanted in owners():
+            _set(owner, wanted)
+        yield
+    finally:
+        for (owner, _), values in zip(owners() if is_kept else (), kept):
+            _set(owner, values)
+
+
+def _set(owner, values):
+    for name, value in values.items():
+        setattr(owner, name, value)
+
+
+def _has_shadow_catchers():
+    return any(obj.is_shadow_catcher for obj in bpy.data.objects)
+
+
+def _make_engine():
+    # Registering a subclass of a registered class takes the latter's Python away from Blender: Cycles itself would
+    # render no more. So this one has Cycles' functions without being derived from it.
+    functions = {name: value for name, value in vars(CyclesRender).items()
+                 if name.startswith('bl_use_') or name != '__init__' and inspect.isfunction(value)}
+    cycles_functions = type('CyclesFunctions', (), functions)
+
+    class STIPPLE_RE_cycles(NativeWork, cycles_functions, bpy.types.RenderEngine):
+        bl_idname = 'STIPPLE_CYCLES'
+        bl_label = "Cycles + Stipple"
+
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            self.session = None  # Cycles' own
+
+        def update_render_passes(self, scene=None, srl=None):
+            """Cycles' own passes, and those that the splats need."""
+            super().update_render_passes(scene, srl)
+            if not srl.use_pass_z:
+                self.register_pass(scene, srl, 'Depth', 1, 'Z', 'VALUE')
+            if not srl.use_pass_environment and not scene.render.film_transparent:
+                self.register_pass(scene, srl, version.ENVIRONMENT_PASS, 3, 'RGB', 'COLOR')
+            if not srl.cycles.use_pass_shadow_catcher and _has_shadow_catchers():
+                self.register_pass(scene, srl, _SHADOW_PASS, 3, 'RGB', 'COLOR')
+
+        def update(self, data=None, depsgraph=None):
+            """Decodes the splats of the view layer, then hands the rest to Cycles."""
+            self._instances, self._failed = [], False
+            if self.is_preview:
+                super().update(data, depsgraph)
+                return
+            try:
+                self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
+                if self._instances:
+                    self._camera(depsgraph, None)
+            except StippleError as error:
+                self._failed = True
+                self._fail(error)
+                return
+            with _without_splats(depsgraph) if self._instances else contextlib.nullcontext():
+                super().update(data, depsgraph)
+
+        def render(self, depsgraph):
+            if getattr(self, '_failed', False):
+                return
+            if not self._instances:
+                super().render(depsgraph)
+                return
+            # In the background Cycles frees the depsgraph as soon as it has its own copy, unless data are persistent:
+            # nothing of it is touched afterwards.
+            scene = depsgraph.scene.original
+            layer_name = depsgraph.view_layer.name
+            picture = facts.picture_facts(scene, depsgraph.view_layer)
+            camera = self._camera(depsgraph, picture.border)
+            world = facts.plain_world_colour(depsgraph.scene_eval.world)
+            with _without_splats(depsgraph, is_kept=scene.render.use_persistent_data):
+                super().render(depsgraph)
+            if self._cancelled():
+                return
+            try:
+                self._insert_splats(layer_name, picture, camera, world)
+            except CancelledError:
+                return
+            except StippleError as error:
+                self._fail(error)
+
+        def _camera(self, depsgraph, border):
+            scene = depsgraph.scene
+            return cameras.camera_of(self.camera_override or scene.camera, scene.render, border)
+
+        def _insert_splats(self, layer_name, picture, camera, world):
+            result = self.get_result()
+            layer = next(layer for layer in result.layers if layer.name == layer_name)
+            passes = {render_pass.name: render_pass for render_pass in layer.passes}
+            cycles = self._layers_of(passes, picture, world)
+            renderer = Renderer(sources.context())
+            task = renderer.start(self._instances, camera, renderer.options(blend_space=picture.blend_space),
+                                  surface=cycles.surface())
+            self._wait(task.job)
+            combined, depth = cycles.picture(task)
+            version.fill_pass(passes['Combined'], combined)
+            version.fill_pass(passes['Depth'], depth)
+
+        def _layers_of(self, passes, picture, world):
+            """What Cycles has drawn."""
+            def read(name):
+                found = passes.get(name)
+                return None if found is None else version.read_pass(found, picture.border.width, picture.border.height)
+
+            cycles = layers.CyclesLayers(read('Combined'), read('Depth')[..., 0], read(_SHADOW_PASS))
+            if picture.background is not None:
+                cycles.take_world(read(version.ENVIRONMENT_PASS), world)
+            return cycles
+
+    return STIPPLE_RE_cycles
+
+
+classes = () if CyclesRender is None else (_make_engine(),)

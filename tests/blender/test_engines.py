@@ -1,0 +1,484 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splats with meshes: Cycles + Stipple, and meshes as mattes under Stipple."""
+
+import bpy
+import numpy as np
+import pytest
+
+import scenes
+
+DC = 0.28209479177387814
+EMPTY = np.float32(1e10)
+SPLAT = (0.1, 0.6, 0.2)  # scene linear
+MESH = (0.8, 0.2, 0.05)
+
+
+def splat_wall(stipple, name, z, side=2.0, colour=SPLAT, count=60, opacity=0.98):
+    """A square of splats in a plane of constant z, opaque in its middle."""
+    across = np.linspace(-side / 2, side / 2, count, dtype=np.float32)
+    x, y = np.meshgrid(across, across)
+    positions = np.stack([x.ravel(), y.ravel(), np.full(x.size, z)], axis=1).astype(np.float32)
+    display = np.where(np.array(colour) <= 0.0031308, 12.92 * np.array(colour),
+                       1.055 * np.array(colour) ** (1 / 2.4) - 0.055)
+    n = len(positions)
+    spacing = side / count
+    arrays = stipple.binding.cloud.SplatArrays(
+        positions, np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
+        np.tile(np.float32([spacing, spacing, 1e-3]), (n, 1)), np.full(n, opacity, np.float32),
+        np.tile(((display - 0.5) / DC).astype(np.float32), (n, 1))[:, None, :])
+    data = stipple.scene.splat_data.new_data(name)
+    stipple.scene.splat_data.write(data, arrays)
+    return scenes.link(bpy.data.objects.new(name, data))
+
+
+def emission(obj, colour=MESH):
+    """Light that is the same from everywhere: pictures without noise."""
+    made = bpy.data.materials.new('emission')
+    if bpy.app.version < (5, 0, 0):
+        made.use_nodes = True
+    tree = made.node_tree
+    node = tree.nodes.new('ShaderNodeEmission')
+    node.inputs['Color'].default_value = (*colour, 1.0)
+    tree.links.new(node.outputs[0], tree.get_output_node('ALL').inputs['Surface'])
+    obj.data.materials.append(made)
+
+
+def set_world(colour=(0.2, 0.4, 0.8)):
+    scene = bpy.context.scene
+    scene.world = bpy.data.worlds.new('world')
+    if bpy.app.version < (5, 0, 0):
+        scene.world.use_nodes = True
+    node = next(n for n in scene.world.node_tree.nodes if n.type == 'BACKGROUND')
+    node.inputs['Color'].default_value = (*colour, 1.0)
+    return node
+
+
+def prepare(engine, transparent=True, samples=4):
+    scene = bpy.context.scene
+    scene.render.engine = engine
+    scene.render.film_transparent = transparent
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = samples, False, False
+    scene.cycles.seed = 0
+    return scene
+
+
+@pytest.fixture
+def camera():
+    """60 x 60 pixels over 3 x 3 metres of every plane of constant z, from z = 6."""
+    return scenes.camera((0, 0, 6), width=60, height=60, type='ORTHO', ortho_scale=3.0)
+
+
+@pytest.fixture
+def depths(stipple, monkeypatch):
+    """Depth pictures as the engines hand them to Blender, row 0 = bottom."""
+    found, fill = [], stipple.version.fill_pass
+
+    def note(render_pass, array):
+        if render_pass.name == 'Depth':
+            found.append(np.array(array))
+        fill(render_pass, array)
+
+    monkeypatch.setattr(stipple.version, 'fill_pass', note)
+    return found
+
+
+def mesh_between(stipple, opacity=0.98):
+    """Splats at z = 1 on the left, an emitting quad of 1 x 1 metre at 0, splats at z = -1 on the whole."""
+    splat_wall(stipple, 'behind', -1.0, opacity=opacity)
+    front = splat_wall(stipple, 'front', 1.0, side=1.0, colour=(0.1, 0.1, 0.7), opacity=opacity)
+    front.location.x = -0.5
+    quad = scenes.quad(size=1.0)
+    emission(quad)
+    return quad
+
+
+# ---- Cycles + Stipple ---------------------------------------------------------------------------
+
+def test_splats_before_and_behind_a_mesh(stipple, camera, tmp_path, depths):
+    mesh_between(stipple)
+    prepare('STIPPLE_CYCLES')
+    picture = scenes.render_pixels(tmp_path)
+    # Pixels of 1/20 metre: the quad covers 20..40, the front splats 10..30 in x.
+    np.testing.assert_allclose(picture[30, 35], (*MESH, 1.0), atol=1e-5)  # no splat in front: Cycles' own
+    np.testing.assert_allclose(picture[30, 25, :3], (0.1, 0.1, 0.7), atol=0.03)
+    np.testing.assert_allclose(picture[30, 45, :3], SPLAT, atol=0.03)
+    assert picture[30, 45, 3] > 0.98 and picture[30, 25, 3] == 1.0 and picture[3, 3, 3] == 0.0
+    assert abs(depths[-1][30, 35] - 6.0) < 1e-4 and abs(depths[-1][30, 45] - 7.0) < 0.01
+    assert abs(depths[-1][30, 25] - 5.0) < 0.05 and depths[-1][3, 3] == EMPTY
+
+
+@pytest.mark.parametrize('transparent', [True, False])
+def test_without_splats_in_view_the_picture_is_cycles_own(stipple, camera, tmp_path, transparent):
+    splat_wall(stipple, 'far away', 0.0).location.x = 50.0
+    ball = scenes.sphere(radius=0.8)
+    ball.rotation_euler.x = 0.3
+    set_world()
+    scene = prepare('CYCLES', transparent, samples=8)
+    expected = scenes.render_pixels(tmp_path, 'cycles')
+    scene.render.engine = 'STIPPLE_CYCLES'
+    seen = scenes.render_pixels(tmp_path, 'both')
+    if transparent:
+        np.testing.assert_array_equal(seen, expected)
+    else:
+        # The world's light comes apart and is added again: rounding of one sum.
+        np.testing.assert_allclose(seen, expected, atol=2e-6)
+    assert scene.render.film_transparent == transparent
+
+
+def test_the_world_is_behind_splats(stipple, camera, tmp_path):
+    splat_wall(stipple, 'half', 0.0, opacity=0.2, count=20)
+    set_world()
+    scene = prepare('STIPPLE_CYCLES', True)
+    scene.stipple.splat_color = 'SCENE_LINEAR'
+    alone = scenes.render_pixels(tmp_path, 'alone')
+    scene.render.film_transparent = False
+    over = scenes.render_pixels(tmp_path, 'over')
+    expected = alone[..., :3] + (1 - alone[..., 3:]) * np.float32((0.2, 0.4, 0.8))
+    assert 0.3 < alone[30, 30, 3] < 0.98
+    np.testing.assert_allclose(over[..., :3], expected, atol=1e-5)
+    assert (over[..., 3] == 1).all()
+
+
+def test_both_engines_draw_splats_alike(stipple, camera, tmp_path):
+    splat_wall(stipple, 'half', 0.0, opacity=0.3, count=25)
+    scene = prepare('STIPPLE')
+    for blending in ('AS_TRAINED', 'SCENE_LINEAR'):
+        scene.stipple.splat_color = blending
+        scene.render.engine = 'STIPPLE'
+        expected = scenes.render_pixels(tmp_path, 'stipple')
+        scene.render.engine = 'STIPPLE_CYCLES'
+        np.testing.assert_allclose(scenes.render_pixels(tmp_path, 'both'), expected, atol=2e-6)
+
+
+def test_splats_are_no_points_to_cycles(stipple, camera, tmp_path):
+    """Splats that other modifiers turn into points, also as an instance, and a mirror that would show them."""
+    wall = splat_wall(stipple, 'wall', 0.0, count=10, opacity=0.003)  # too faint to show as splats
+    add_points(wall)
+    kept = bpy.data.collections.new('kept')
+    kept.objects.link(wall)
+    empty = scenes.link(bpy.data.objects.new('empty', None))
+    empty.instance_type, empty.instance_collection = 'COLLECTION', kept
+    empty.location.x = 0.3
+    set_world()
+    scene = prepare('CYCLES')
+    with_points = scenes.render_pixels(tmp_path, 'points')
+    assert with_points[..., 3].max() > 0.5
+    scene.render.engine = 'STIPPLE_CYCLES'
+    assert scenes.render_pixels(tmp_path, 'both')[..., 3].max() == 0
+    # And Cycles sees them again afterwards.
+    scene.render.engine = 'CYCLES'
+    np.testing.assert_array_equal(scenes.render_pixels(tmp_path, 'again'), with_points)
+
+
+def add_points(obj):
+    tree = bpy.data.node_groups.new('points', 'GeometryNodeTree')
+    if bpy.app.version >= (4, 0, 0):
+        for side in ('INPUT', 'OUTPUT'):
+            tree.interface.new_socket('Geometry', in_out=side, socket_type='NodeSocketGeometry')
+    else:
+        tree.inputs.new('NodeSocketGeometry', 'Geometry')
+        tree.outputs.new('NodeSocketGeometry', 'Geometry')
+    source, target = tree.nodes.new('NodeGroupInput'), tree.nodes.new('NodeGroupOutput')
+    if isinstance(obj.data, bpy.types.Mesh):
+        points = tree.nodes.new('GeometryNodeMeshToPoints')
+    else:
+        points = tree.nodes.new('GeometryNodeSetPointRadius')
+    points.inputs['Radius'].default_value = 0.1
+    tree.links.new(source.outputs[0], points.inputs[0])
+    tree.links.new(points.outputs[0], target.inputs[0])
+    obj.modifiers.new('points', 'NODES').node_group = tree
+
+
+def shadow_scene(stipple):
+    """A ball over a floor of splats, and under the sun; the floor's place is held by a shadow catcher."""
+    floor = splat_wall(stipple, 'floor', 0.0, side=4.0, colour=(0.5, 0.5, 0.5), count=80)
+    catcher = scenes.quad('catcher', size=4.0)
+    catcher.is_shadow_catcher = True
+    ball = scenes.sphere(radius=0.4)
+    ball.location = (0, 0, 1.0)
+    sun = scenes.link(bpy.data.objects.new('sun', bpy.data.lights.new('sun', 'SUN')))
+    sun.data.energy, sun.data.angle = 5.0, 0.0
+    sun.rotation_euler = (0.0, 0.7, 0.0)  # shadows fall towards -x
+    return floor, catcher, ball
+
+
+def test_characters_cast_shadows_on_splats(stipple, camera, tmp_path):
+    floor, catcher, ball = shadow_scene(stipple)
+    camera.data.ortho_scale = 3.0
+    scene = prepare('STIPPLE_CYCLES', samples=16)
+    picture = scenes.render_pixels(tmp_path)
+    shadow_x = 30 - round(np.tan(0.7) * 1.0 * 20)
+    lit, dark = picture[10, 50], picture[30, shadow_x]
+    assert np.all(picture[5:55, 5:55, 3] > 0.98)
+    assert 0.47 < lit[:3].min() and lit[:3].max() < 0.6  # a little brighter than the floor: light from the ball
+    assert dark[:3].max() < 0.1 * lit[:3].min()  # only the sun lights this scene
+    # The catcher hides nothing and the mesh is there.
+    ball.hide_render = True
+    np.testing.assert_allclose(scenes.render_pixels(tmp_path, 'without')[30, shadow_x, :3], 0.5, atol=0.03)
+
+
+@pytest.mark.parametrize('transparent', [True, False])
+def test_a_shadow_catcher_without_splats_is_cycles_own(stipple, camera, tmp_path, transparent):
+    floor, _, _ = shadow_scene(stipple)
+    floor.location.z = 50.0  # behind the camera
+    set_world((0.2, 0.3, 0.4))
+    scene = prepare('CYCLES', transparent, samples=16)
+    expected = scenes.render_pixels(tmp_path, 'cycles')
+    scene.render.engine = 'STIPPLE_CYCLES'
+    seen = scenes.render_pixels(tmp_path, 'both')
+    differs = np.abs(seen - expected).max(axis=2) > 2e-6
+    if transparent:
+        assert not differs.any()
+        assert expected[..., 3].max() == 1.0 and 0 < np.median(expected[..., 3][expected[..., 3] > 0.01]) < 1
+    else:
+        # At the ball's edge Cycles counts what is behind twice over: its catcher is an approximation there.
+        assert differs.mean() < 0.06 and not differs[:, :5].any()
+
+
+def test_border_and_resolution_are_those_of_blender(stipple, camera, tmp_path):
+    mesh_between(stipple)
+    scene = prepare('STIPPLE_CYCLES')
+    whole = scenes.render_pixels(tmp_path, 'whole')
+    render = scene.render
+    render.use_border = True
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.2, 0.7, 0.3, 0.55
+    part = scenes.render_pixels(tmp_path, 'part')
+    np.testing.assert_allclose(part[18:33, 12:42], whole[18:33, 12:42], atol=1e-6)
+    assert np.abs(part[:18]).max() == 0 and np.abs(part[33:]).max() == 0 and np.abs(part[:, :12]).max() == 0
+    render.use_crop_to_border = True
+    np.testing.assert_allclose(scenes.render_pixels(tmp_path, 'crop'), whole[18:33, 12:42], atol=1e-6)
+    render.use_border = False
+    render.resolution_percentage = 50
+    half = scenes.render_pixels(tmp_path, 'half')
+    assert half.shape == (30, 30, 4)
+    np.testing.assert_allclose(half[15, 17], (*MESH, 1.0), atol=1e-5)
+
+
+def test_large_pictures_are_made_in_one_piece(stipple, camera, tmp_path):
+    mesh_between(stipple)
+    scene = prepare('STIPPLE_CYCLES')
+    whole = scenes.render_pixels(tmp_path, 'whole')
+    scene.cycles.use_auto_tile, scene.cycles.tile_size = True, 16
+    np.testing.assert_array_equal(scenes.render_pixels(tmp_path, 'tiles'), whole)
+    assert scene.cycles.use_auto_tile
+
+
+def test_every_view_layer_has_its_own_picture(stipple, camera, tmp_path, monkeypatch):
+    mesh_between(stipple)
+    scene = prepare('STIPPLE_CYCLES')
+    only = bpy.data.collections.new('only')
+    scene.collection.children.link(only)
+    front = bpy.data.objects['front']
+    scene.collection.objects.unlink(front)
+    only.objects.link(front)
+    second = scene.view_layers.new('second')
+    second.layer_collection.children['only'].exclude = True
+    made = {}
+    insert = stipple.cycles_engine.classes[0]._insert_splats
+
+    def note(self, layer_name, *others):
+        insert(self, layer_name, *others)
+        layer = next(x for x in self.get_result().layers if x.name == layer_name)
+        found = next(p for p in layer.passes if p.name == 'Combined')
+        made[layer_name] = stipple.version.read_pass(found, 60, 60)
+
+    monkeypatch.setattr(stipple.cycles_engine.classes[0], '_insert_splats', note)
+    bpy.ops.render.render()
+    assert sorted(made) == ['ViewLayer', 'second']
+    assert made['ViewLayer'][30, 25, 2] > 0.6
+    np.testing.assert_allclose(made['second'][30, 25], (*MESH, 1.0), atol=1e-5)
+
+
+def test_an_animation_moves_meshes_and_splats(stipple, camera, tmp_path):
+    quad = mesh_between(stipple)
+    for frame, z in ((1, 0.0), (2, 2.0)):
+        quad.location.z = z
+        quad.keyframe_insert('location', frame=frame)
+    scene = prepare('STIPPLE_CYCLES')
+    scene.frame_start, scene.frame_end = 1, 2
+    scene.render.image_settings.file_format = 'PNG'
+    scene.view_settings.view_transform = 'Standard'
+    scene.render.filepath = str(tmp_path / 'frame_')
+    bpy.ops.render.render(animation=True)
+    blue = []
+    for frame in (1, 2):
+        image = bpy.data.images.load(str(tmp_path / f'frame_{frame:04d}.png'))
+        blue.append(np.array(image.pixels[:]).reshape(60, 60, 4)[30, 25, 2])
+    assert blue[0] > 0.75 and blue[1] < 0.4  # the mesh passes before the front splats
+
+
+def test_a_render_can_be_cancelled_between_cycles_and_splats(stipple, camera, tmp_path, monkeypatch):
+    mesh_between(stipple)
+    prepare('STIPPLE_CYCLES')
+    before = scenes.render_pixels(tmp_path, 'before')
+    engine = stipple.cycles_engine.classes[0]
+    looks = []
+
+    def cancelled(self):
+        looks.append(True)
+        return len(looks) > 1
+
+    with monkeypatch.context() as patch:
+        patch.setattr(engine, '_cancelled', cancelled, raising=False)
+        bpy.context.scene.render.resolution_percentage = 1000
+        bpy.ops.render.render()
+    assert looks
+    bpy.context.scene.render.resolution_percentage = 100
+    np.testing.assert_array_equal(scenes.render_pixels(tmp_path, 'after'), before)
+
+
+def test_a_panoramic_camera_is_one_error(stipple, camera, tmp_path):
+    mesh_between(stipple)
+    prepare('STIPPLE_CYCLES')
+    camera.data.type = 'PANO'
+    scenes.refuses(lambda: scenes.render_pixels(tmp_path), 'is of type PANO')
+
+
+def test_cycles_itself_renders_on(stipple, camera, tmp_path):
+    """Blender forgets a render engine that another is derived from."""
+    emission(scenes.quad(size=1.0))
+    prepare('CYCLES')
+    np.testing.assert_allclose(scenes.render_pixels(tmp_path)[30, 30], (*MESH, 1.0), atol=1e-5)
+
+
+def test_cycles_panels_are_there(stipple):
+    panels = {panel.__name__: panel for panel in stipple.panels.render._panels()}
+    for name in ('CYCLES_RENDER_PT_sampling', 'CYCLES_OBJECT_PT_visibility', 'CYCLES_WORLD_PT_settings',
+                 'RENDER_PT_color_management', 'CYCLES_RENDER_PT_light_paths', 'CYCLES_LIGHT_PT_light'):
+        assert 'STIPPLE_CYCLES' in panels[name].COMPAT_ENGINES, name
+    assert 'STIPPLE' not in panels['CYCLES_RENDER_PT_sampling'].COMPAT_ENGINES
+    missing = [name for name, panel in panels.items()
+               if ('CYCLES' in panel.COMPAT_ENGINES) != ('STIPPLE_CYCLES' in panel.COMPAT_ENGINES)]
+    assert missing == []
+
+
+def edge_scene(stipple):
+    """A ball that passes through the middle of a wall of splats, half of which stands before it."""
+    splat_wall(stipple, 'behind', -1.0, side=3.4, count=40)
+    front = splat_wall(stipple, 'front', 1.0, side=1.7, colour=(0.1, 0.1, 0.7), count=20)
+    front.location.x = -0.85
+    ball = scenes.sphere(segments=64, rings=32, radius=0.8)
+    for polygon in ball.data.polygons:
+        polygon.use_smooth = True
+    emission(ball)
+
+
+def errors_at_edges(tmp_path, engine, names):
+    """(PSNR in dB of the whole, mean and largest error where 4 x 4 finer pixels differ) of pictures against finer ones."""
+    scene = prepare(engine, samples=16)
+    seen = scenes.render_pixels(tmp_path, names + 'seen')
+    scene.render.resolution_percentage = 400
+    fine = scenes.render_pixels(tmp_path, names + 'fine')
+    height, width = seen.shape[:2]
+    blocks = fine.reshape(height, 4, width, 4, 4)
+    error = np.abs(seen - blocks.mean(axis=(1, 3))).max(axis=2)
+    edges = np.ptp(blocks, axis=(1, 3)).max(axis=2) > 0.2
+    scene.render.resolution_percentage = 100
+    psnr = -10 * np.log10(np.mean((seen - blocks.mean(axis=(1, 3))) ** 2))
+    return psnr, error[edges].mean(), error[edges].max(), edges.mean()
+
+
+def test_edges_are_as_smooth_as_the_depth_allows(stipple, camera, tmp_path):
+    """Against pictures of 4 x 4 times the pixels.
+
+    The ball's edge before splats is smooth: its alpha is Cycles'. Between splats there is an error where one sample's
+    depth stands for a pixel of two, at most the difference of the two.
+    """
+    edge_scene(stipple)
+    psnr, mean, largest, share = errors_at_edges(tmp_path, 'STIPPLE_CYCLES', 'cycles')
+    print(f'Cycles + Stipple: {psnr:.2f} dB, at edges ({share:.1%}) {mean:.4f} mean, {largest:.3f} largest')
+    matte_psnr, matte_mean, matte_largest, _ = errors_at_edges(tmp_path, 'STIPPLE', 'matte')
+    print(f'Stipple, matte: {matte_psnr:.2f} dB, at edges {matte_mean:.4f} mean, {matte_largest:.3f} largest')
+    assert psnr > 30.0
+
+
+# ---- meshes as mattes ---------------------------------------------------------------------------
+
+def test_meshes_hide_the_splats_behind_them(stipple, camera, tmp_path, depths):
+    mesh_between(stipple)
+    prepare('STIPPLE')
+    bpy.context.view_layer.use_pass_z = True
+    picture = scenes.render_pixels(tmp_path)
+    np.testing.assert_array_equal(picture[21:39, 33:39], 0.0)  # the quad, without splats before it
+    assert picture[30, 25, 3] > 0.98 and picture[30, 45, 3] > 0.98
+    assert depths[-1][30, 35] == EMPTY and abs(depths[-1][30, 25] - 5.0) < 0.05
+    bpy.context.scene.stipple.meshes_as_mattes = False
+    assert scenes.render_pixels(tmp_path, 'off')[30, 35, 3] > 0.98
+
+
+def test_mattes_are_instances_curves_and_modified_meshes(stipple, camera, tmp_path):
+    splat_wall(stipple, 'behind', -1.0, side=3.0)
+    prepare('STIPPLE')
+    quad = scenes.quad(size=0.25)
+    array = quad.modifiers.new('array', 'ARRAY')
+    array.use_relative_offset, array.use_constant_offset = False, True
+    array.constant_offset_displace = (1.0, 0.0, 0.0)
+    kept = bpy.data.collections.new('kept')
+    bpy.context.scene.collection.objects.unlink(quad)
+    kept.objects.link(quad)
+    for y in (-0.5, 0.5):
+        empty = scenes.link(bpy.data.objects.new('empty', None))
+        empty.instance_type, empty.instance_collection, empty.location.y = 'COLLECTION', kept, y
+    curve = bpy.data.curves.new('disc', 'CURVE')
+    curve.dimensions, curve.fill_mode = '2D', 'BOTH'
+    spline = curve.splines.new('POLY')
+    spline.points.add(3)
+    for point, (x, y) in zip(spline.points, ((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1))):
+        point.co = (x - 0.5, y, 0.0, 1.0)
+    spline.use_cyclic_u = True
+    scenes.link(bpy.data.objects.new('disc', curve))
+    alpha = scenes.render_pixels(tmp_path)[..., 3]
+    for x, y in ((30, 20), (50, 20), (30, 40), (50, 40), (20, 30)):
+        assert alpha[y, x] == 0, (x, y)
+    for x, y in ((40, 20), (30, 30), (20, 45)):
+        assert alpha[y, x] > 0.98, (x, y)
+
+
+@pytest.mark.parametrize('hide', ['hide_render', 'visible_camera', 'is_shadow_catcher', 'scale'])
+def test_what_does_not_show_is_no_matte(stipple, camera, tmp_path, hide):
+    quad = mesh_between(stipple)
+    if hide == 'scale':
+        quad.scale.x = 0.0
+    else:
+        setattr(quad, hide, hide != 'visible_camera')
+    prepare('STIPPLE')
+    assert scenes.render_pixels(tmp_path)[30, 35, 3] > 0.98
+
+
+def test_what_splats_were_made_from_does_not_hide_them(camera, tmp_path):
+    quad = scenes.quad()
+    scenes.material('red', (0.8, 0.1, 0.05), quad)
+    scenes.make_splats(quad, anchors=20000, hide_source=False)
+    prepare('STIPPLE')
+    assert scenes.render_pixels(tmp_path)[30, 30, 3] > 0.98
+
+
+def test_a_scene_without_meshes_draws_no_depth(stipple, camera, tmp_path, monkeypatch):
+    splat_wall(stipple, 'wall', 0.0)
+    prepare('STIPPLE')
+
+    def refuse(*_):
+        raise AssertionError('depth was drawn')
+
+    monkeypatch.setattr(stipple.scene.mattes, 'start_depth', refuse)
+    assert scenes.render_pixels(tmp_path)[30, 30, 3] > 0.98
+
+
+def test_each_mesh_is_read_once(stipple, camera, tmp_path, monkeypatch):
+    splat_wall(stipple, 'behind', -1.0)
+    quad = scenes.quad(size=0.2)
+    for i in range(20):
+        copy = scenes.link(bpy.data.objects.new('copy', quad.data))
+        copy.location.x = -1 + 0.1 * i
+    read, reader = [], stipple.scene.mattes._read
+    monkeypatch.setattr(stipple.scene.mattes, '_read', lambda obj: read.append(obj.name) or reader(obj))
+    prepare('STIPPLE')
+    scenes.render_pixels(tmp_path)
+    assert len(read) == 1
+
+
+def test_a_mesh_with_numbers_that_are_none_is_one_error(stipple, camera, tmp_path):
+    quad = mesh_between(stipple)
+    quad.data.vertices[0].co.x = float('nan')
+    prepare('STIPPLE')
+    scenes.refuses(lambda: scenes.render_pixels(tmp_path), f"Object '{quad.name}'")
