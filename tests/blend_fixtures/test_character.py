@@ -1,0 +1,47 @@
+"""A character on a splat floor, rendered in background Blender under both engines, against stored pictures.
+
+The stored pictures were looked at: the character stands behind the one column of splats and before the other, casts a
+shadow on the floor, and is a hole in the picture of the engine Stipple. What lacks the shadow, or has the character
+before both columns, must not pass.
+"""
+import os
+import subprocess
+
+import pytest
+
+from test_pictures import BLENDER, BLENDER_SECONDS, FIXTURES, compare, scripts  # noqa: F401 (a fixture)
+
+# Path tracing: another Blender has another noise. The wrong pictures get WRONG_DB at most.
+CYCLES_FLOOR_DB = 34.0
+# No noise: only rounding differs.
+MATTE_FLOOR_DB = 50.0
+
+
+@pytest.fixture(scope='module')
+def pictures(scripts, tmp_path_factory):  # noqa: F811
+    out = tmp_path_factory.mktemp('character')
+    command = [BLENDER, '-b', '--factory-startup', '--addons', 'stipple', '--python-exit-code', '1', '--python',
+               str(FIXTURES / 'render_character.py'), '--', str(out)]
+    environment = {key: value for key, value in os.environ.items() if key != 'STIPPLE_LIBRARY'}
+    environment.update(BLENDER_USER_SCRIPTS=str(scripts), PATH=f"/usr/bin:{os.environ['PATH']}")
+    result = subprocess.run(command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                            timeout=BLENDER_SECONDS)
+    assert result.returncode == 0, result.stdout[-4000:]
+    return out
+
+
+def psnr(pictures, name, stored):
+    return compare(FIXTURES / 'reference' / f'character_{stored}.png', pictures / f'{name}.png')['psnr']
+
+
+def test_cycles_and_splats_are_the_stored_picture(pictures):
+    assert psnr(pictures, 'cycles', 'cycles') >= CYCLES_FLOOR_DB
+
+
+def test_mattes_are_the_stored_picture(pictures):
+    assert psnr(pictures, 'matte', 'matte') >= MATTE_FLOOR_DB
+
+
+@pytest.mark.parametrize('name', ['without_shadow', 'before_column'])
+def test_wrong_pictures_do_not_pass(pictures, name):
+    assert psnr(pictures, name, 'cycles') < CYCLES_FLOOR_DB - 3
