@@ -22,6 +22,8 @@ except ImportError:  # a Blender that was built without Cycles
 
 _VISIBILITY = ('visible_camera', 'visible_diffuse', 'visible_glossy', 'visible_transmission',
                'visible_volume_scatter', 'visible_shadow')
+# From 5.0 on Cycles makes tiles of this size at most whatever the setting says.
+_LARGEST_TILE = 8192
 _SHADOW_PASS = 'Shadow Catcher'
 
 
@@ -29,8 +31,9 @@ _SHADOW_PASS = 'Shadow Catcher'
 def _without_splats(depsgraph, is_kept=True):
     """Cycles would draw splats as the points that they are stored as: while this lasts, no ray sees them.
 
-    The film is transparent meanwhile, so that the world's light comes apart from the meshes', and the picture is made in
-    one piece, so that it can be read when Cycles has ended. is_kept: False where the depsgraph may be gone at the end.
+    The film is transparent meanwhile, so that the world's light comes apart from the meshes', and the picture is made
+    in one piece, so that it can be read when Cycles has ended. is_kept: False where the depsgraph may be gone at the
+    end.
     """
     originals = set()
     for entry in depsgraph.object_instances:
@@ -42,7 +45,9 @@ def _without_splats(depsgraph, is_kept=True):
     def owners():
         # References to evaluated things do not outlive what Cycles does.
         yield depsgraph.scene_eval.render, {'film_transparent': True}
-        yield depsgraph.scene_eval.cycles, {'use_auto_tile': False}
+        yield depsgraph.scene_eval.cycles, {'use_auto_tile': False, 'tile_size': _LARGEST_TILE}
+        # Where the artist wants the pass, Cycles shows the catcher as a mesh; it fills the pass all the same.
+        yield depsgraph.view_layer_eval.cycles, {'use_pass_shadow_catcher': False}
         for original in originals:
             yield original.evaluated_get(depsgraph), dict.fromkeys(_VISIBILITY, False)
 

@@ -10,7 +10,7 @@ import bpy
 
 from . import version
 from .binding.errors import CancelledError, StippleError
-from .binding.renderer import Renderer, Surface
+from .binding.renderer import Renderer
 from .binding.structs import JobState
 from .scene import cameras, facts, instances, mattes, sources
 from .viewport import ViewPicture
@@ -84,7 +84,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
         except StippleError as error:
             self._fail(error)
             return
-        self._deliver(task, picture)
+        self._deliver(task, picture, depsgraph.view_layer.name)
 
     def view_update(self, context, depsgraph):
         """Something in the scene of a 3D view has changed."""
@@ -109,15 +109,11 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
 
     def _matte(self, camera):
         """The meshes as this camera sees them, or None for none."""
-        if not self._mattes:
-            return None
-        task = mattes.start_depth(self._mattes, camera)
-        self._wait(task.job)
-        return Surface(task.depth)
+        return mattes.surface(self._mattes, camera, self._wait) if self._mattes else None
 
-    def _deliver(self, task, picture):
+    def _deliver(self, task, picture, layer_name):
         """Hands the picture over; Blender's first row is the bottom one."""
-        result = self.begin_result(0, 0, picture.border.width, picture.border.height)
+        result = self.begin_result(0, 0, picture.border.width, picture.border.height, layer=layer_name)
         passes = result.layers[0].passes
         version.fill_pass(passes['Combined'], task.colour[::-1])
         if task.depth is not None and 'Depth' in passes:

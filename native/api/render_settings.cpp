@@ -40,7 +40,7 @@ RenderSettings renderSettings(const StippleRenderOptions* options, const Instanc
         settings.linearise ? linearToSrgb(given.background[c]) : given.background[c];
   }
   settings.options.surface = {given.surface_width, given.surface_height, given.surface_depth,
-                              given.surface_colour};
+                              given.surface_colour, given.matte_opacity};
   settings.options.splats_apart = given.surface_colour != nullptr;
   settings.splat_light = given.splat_light;
   return settings;

@@ -1,6 +1,8 @@
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "base/parallel.h"
 #include "bench/comparison.h"
@@ -25,14 +27,16 @@ constexpr SplatCase kCases[] = {
 };
 constexpr int kRepeats = 5;
 
-void draw(const SplatCase& c, TileKernel kernel, unsigned threads) {
+void draw(const SplatCase& c, TileKernel kernel, unsigned threads,
+          const RenderOptions& options = {}) {
   SplatInstance instance{&cloudOf(c)};
   instance.values_are_checked = true;  // as every cloud handle is drawn, once it has been read
   withThreads(threads, [&] {
     // As a renderer keeps them from one picture to the next.
     static RenderWorkspace workspace;
     static RenderResult picture;
-    renderTiledWith(kernel, chosenProjector(), {&instance, 1}, cameraOf(c), {}, workspace, picture);
+    renderTiledWith(kernel, chosenProjector(), {&instance, 1}, cameraOf(c), options, workspace,
+                    picture);
     benchmark::DoNotOptimize(picture.colour.data());
   });
 }
@@ -130,6 +134,30 @@ void againstOneThread(benchmark::State& state, const SplatCase& c) {
       [&] { draw(c, chosenTileKernel(), 1); });
 }
 
+/// A half transparent surface through the middle of the scene over the whole picture, the most that
+/// a surface can cost, against the picture without; and an opaque one, which ends every pixel
+/// there.
+void withSurface(benchmark::State& state, const SplatCase& c) {
+  const Camera camera = cameraOf(c);
+  const size_t pixel_count = static_cast<size_t>(c.width) * c.height;
+  const float middle = static_cast<float>(camera.world_to_camera(2, 3));
+  const std::vector<float> depth(pixel_count, middle);
+  const std::vector<float> colour(pixel_count * 4, 0.5f);
+  RenderOptions half, matte;
+  half.surface = {c.width, c.height, depth.data(), colour.data(), nullptr};
+  matte.surface = {c.width, c.height, depth.data(), nullptr, nullptr};
+  const TileKernel kernel = chosenTileKernel();
+  draw(c, kernel, 2);
+  compare(
+      state, "surface_to_none", 0.7, [&] { draw(c, kernel, 2, half); },
+      [&] { draw(c, kernel, 2); });
+  double matte_seconds = 1e300;
+  for (int i = 0; i < kRepeats; ++i) {
+    matte_seconds = std::min(matte_seconds, secondsOf([&] { draw(c, kernel, 2, matte); }));
+  }
+  state.counters["matte_ms"] = 1e3 * matte_seconds;
+}
+
 void add(const std::string& name, void (*run)(benchmark::State&, const SplatCase&),
          const SplatCase& c, int iterations) {
   benchmark::RegisterBenchmark(name.c_str(), run, c)
@@ -144,6 +172,7 @@ const bool registered = [] {
     add(std::string("splat.forward_2_threads_") + c.name, againstOneThread, c, kRepeats);
     add(std::string("splat.forward_avx2_") + c.name, againstNarrow, c, 2);
     add(std::string("splat.forward_scalar_") + c.name, againstScalar, c, 2);
+    add(std::string("splat.surface_") + c.name, withSurface, c, kRepeats);
   }
   return true;
 }();

@@ -47,6 +47,8 @@ struct SurfaceLayer {
   /// [H,W,4] premultiplied, alpha 0..1, in the blending space (see RenderOptions::splats_apart).
   /// Null: a matte, which hides what is behind it and leaves a hole.
   const float* colour = nullptr;
+  /// [H,W] 0..1, of a matte where it covers pixels in part; null: 1.
+  const float* matte_opacity = nullptr;
 };
 
 /// Settings that change the picture; both the tiled and the reference renderer follow them.

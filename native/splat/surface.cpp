@@ -22,15 +22,26 @@ bool isDepth(float depth) {
   return (bits & ~kSign) <= kInfinity && bits != (kInfinity | kSign);
 }
 
+void requireOpacity(const char* array, const SurfaceLayer& surface, size_t pixel, float opacity) {
+  // NaN and everything above 1 have larger bits than 1, the negative ones too.
+  if (std::bit_cast<uint32_t>(opacity + 0.0f) <= std::bit_cast<uint32_t>(1.0f)) return;
+  fail(ErrorCode::kInvalidArgument,
+       nameOf(array, surface, pixel) + std::to_string(opacity) + "; 0 to 1 is allowed");
+}
+
 }  // namespace
 
 void validateSurface(const SurfaceLayer& surface, const Camera& camera) {
   if (!surface.depth) {
-    if (surface.colour) {
+    if (surface.colour || surface.matte_opacity) {
       fail(ErrorCode::kInvalidArgument,
-           "the surface has a colour and no depth; it needs both, or depth alone");
+           "the surface has a colour or an opacity and no depth; it needs a depth");
     }
     return;
+  }
+  if (surface.colour && surface.matte_opacity) {
+    fail(ErrorCode::kInvalidArgument,
+         "the surface has a colour and the opacity of a matte; it can have one of them");
   }
   if (surface.width != camera.width || surface.height != camera.height) {
     fail(ErrorCode::kInvalidArgument,
@@ -46,14 +57,15 @@ void validateSurface(const SurfaceLayer& surface, const Camera& camera) {
                                             "; metres are allowed, or 1e10 and more for nothing");
     }
   }
+  if (surface.matte_opacity) {
+    for (size_t i = 0; i < count; ++i) {
+      requireOpacity("matte opacity", surface, i, surface.matte_opacity[i]);
+    }
+  }
   if (!surface.colour) return;
   requireFinite(surface.colour, count * 4, 4, "the surface's colour at pixel");
   for (size_t i = 0; i < count; ++i) {
-    const float alpha = surface.colour[i * 4 + 3];
-    if (alpha < 0.0f || alpha > 1.0f) {
-      fail(ErrorCode::kInvalidArgument,
-           nameOf("alpha", surface, i) + std::to_string(alpha) + "; 0 to 1 is allowed");
-    }
+    requireOpacity("alpha", surface, i, surface.colour[i * 4 + 3]);
   }
 }
 

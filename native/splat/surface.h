@@ -25,7 +25,11 @@ SurfaceAtPixel<T> surfaceAt(const SurfaceLayer& layer, size_t index) {
   SurfaceAtPixel<T> surface;
   surface.depth = is_there ? depth : kNoSurface;
   surface.shows = layer.colour != nullptr;
-  surface.opacity = surface.shows ? T(layer.colour[index * 4 + 3]) : is_there ? T(1) : T(0);
+  if (surface.shows) {
+    surface.opacity = T(layer.colour[index * 4 + 3]);
+  } else if (is_there) {
+    surface.opacity = layer.matte_opacity ? T(layer.matte_opacity[index]) : T(1);
+  }
   surface.transmittance = T(1) - surface.opacity;
   return surface;
 }

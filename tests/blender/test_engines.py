@@ -212,6 +212,8 @@ def test_characters_cast_shadows_on_splats(stipple, camera, tmp_path):
     assert np.all(picture[5:55, 5:55, 3] > 0.98)
     assert 0.47 < lit[:3].min() and lit[:3].max() < 0.6  # a little brighter than the floor: light from the ball
     assert dark[:3].max() < 0.1 * lit[:3].min()  # only the sun lights this scene
+    bpy.context.view_layer.cycles.use_pass_shadow_catcher = True
+    np.testing.assert_array_equal(scenes.render_pixels(tmp_path, 'with pass'), picture)
     # The catcher hides nothing and the mesh is there.
     ball.hide_render = True
     np.testing.assert_allclose(scenes.render_pixels(tmp_path, 'without')[30, shadow_x, :3], 0.5, atol=0.03)
@@ -228,7 +230,9 @@ def test_a_shadow_catcher_without_splats_is_cycles_own(stipple, camera, tmp_path
     seen = scenes.render_pixels(tmp_path, 'both')
     differs = np.abs(seen - expected).max(axis=2) > 2e-6
     if transparent:
-        assert not differs.any()
+        # From 5.0 on a few pixels at the ball's edge sum up otherwise when the pass of shadows is there.
+        assert differs.mean() < 0.01 and np.abs(seen - expected).max() < 0.01
+        assert bpy.app.version >= (5, 0, 0) or not differs.any()
         assert expected[..., 3].max() == 1.0 and 0 < np.median(expected[..., 3][expected[..., 3] > 0.01]) < 1
     else:
         # At the ball's edge Cycles counts what is behind twice over: its catcher is an approximation there.
@@ -263,6 +267,11 @@ def test_large_pictures_are_made_in_one_piece(stipple, camera, tmp_path):
     assert scene.cycles.use_auto_tile
 
 
+def combined_of(stipple, engine, layer_name):
+    layer = next(layer for layer in engine.get_result().layers if layer.name == layer_name)
+    return stipple.version.read_pass(next(p for p in layer.passes if p.name == 'Combined'), 60, 60)
+
+
 def test_every_view_layer_has_its_own_picture(stipple, camera, tmp_path, monkeypatch):
     mesh_between(stipple)
     scene = prepare('STIPPLE_CYCLES')
@@ -278,9 +287,7 @@ def test_every_view_layer_has_its_own_picture(stipple, camera, tmp_path, monkeyp
 
     def note(self, layer_name, *others):
         insert(self, layer_name, *others)
-        layer = next(x for x in self.get_result().layers if x.name == layer_name)
-        found = next(p for p in layer.passes if p.name == 'Combined')
-        made[layer_name] = stipple.version.read_pass(found, 60, 60)
+        made[layer_name] = combined_of(stipple, self, layer_name)
 
     monkeypatch.setattr(stipple.cycles_engine.classes[0], '_insert_splats', note)
     bpy.ops.render.render()
@@ -352,8 +359,8 @@ def test_cycles_panels_are_there(stipple):
     assert missing == []
 
 
-def edge_scene(stipple):
-    """A ball that passes through the middle of a wall of splats, half of which stands before it."""
+def edge_scene(stipple, with_backdrop):
+    """A ball between a wall of splats and another, of half the size, before it; perhaps a mesh behind all."""
     splat_wall(stipple, 'behind', -1.0, side=3.4, count=40)
     front = splat_wall(stipple, 'front', 1.0, side=1.7, colour=(0.1, 0.1, 0.7), count=20)
     front.location.x = -0.85
@@ -361,10 +368,13 @@ def edge_scene(stipple):
     for polygon in ball.data.polygons:
         polygon.use_smooth = True
     emission(ball)
+    if with_backdrop:
+        backdrop = scenes.quad('backdrop', size=4.0, offset=(0, 0, -2))
+        emission(backdrop, (0.9, 0.9, 0.9))
 
 
 def errors_at_edges(tmp_path, engine, names):
-    """(PSNR in dB of the whole, mean and largest error where 4 x 4 finer pixels differ) of pictures against finer ones."""
+    """Against pictures of 4 x 4 times the pixels: PSNR in dB, mean and largest error where those differ, how many."""
     scene = prepare(engine, samples=16)
     seen = scenes.render_pixels(tmp_path, names + 'seen')
     scene.render.resolution_percentage = 400
@@ -378,18 +388,17 @@ def errors_at_edges(tmp_path, engine, names):
     return psnr, error[edges].mean(), error[edges].max(), edges.mean()
 
 
-def test_edges_are_as_smooth_as_the_depth_allows(stipple, camera, tmp_path):
-    """Against pictures of 4 x 4 times the pixels.
-
-    The ball's edge before splats is smooth: its alpha is Cycles'. Between splats there is an error where one sample's
-    depth stands for a pixel of two, at most the difference of the two.
-    """
-    edge_scene(stipple)
-    psnr, mean, largest, share = errors_at_edges(tmp_path, 'STIPPLE_CYCLES', 'cycles')
-    print(f'Cycles + Stipple: {psnr:.2f} dB, at edges ({share:.1%}) {mean:.4f} mean, {largest:.3f} largest')
-    matte_psnr, matte_mean, matte_largest, _ = errors_at_edges(tmp_path, 'STIPPLE', 'matte')
-    print(f'Stipple, matte: {matte_psnr:.2f} dB, at edges {matte_mean:.4f} mean, {matte_largest:.3f} largest')
-    assert psnr > 30.0
+@pytest.mark.parametrize('engine, with_backdrop, floor_db, worst', [
+    ('STIPPLE_CYCLES', False, 40.0, 0.2), ('STIPPLE_CYCLES', True, 25.0, 1.0), ('STIPPLE', False, 40.0, 0.2)])
+def test_edges_are_as_smooth_as_one_depth_per_pixel_allows(stipple, camera, tmp_path, engine, with_backdrop, floor_db,
+                                                           worst):
+    """A mesh's edge before splats is as smooth as its alpha. Where splats are between two meshes, one depth stands for
+    both, and the error is up to their difference."""
+    edge_scene(stipple, with_backdrop)
+    psnr, mean, largest, share = errors_at_edges(tmp_path, engine, '')
+    print(f'{engine}, backdrop {with_backdrop}: {psnr:.1f} dB; at edges ({share:.1%} of all) {mean:.3f} in the mean, '
+          f'{largest:.2f} at most')
+    assert psnr > floor_db and largest < worst
 
 
 # ---- meshes as mattes ---------------------------------------------------------------------------
@@ -445,6 +454,27 @@ def test_what_does_not_show_is_no_matte(stipple, camera, tmp_path, hide):
     assert scenes.render_pixels(tmp_path)[30, 35, 3] > 0.98
 
 
+def test_every_view_layer_of_stipple_has_its_own_picture(stipple, camera, tmp_path, monkeypatch):
+    """One layer without the splats in front; each picture goes to its layer."""
+    mesh_between(stipple)
+    scene = prepare('STIPPLE')
+    only = bpy.data.collections.new('only')
+    scene.collection.children.link(only)
+    front = bpy.data.objects['front']
+    scene.collection.objects.unlink(front)
+    only.objects.link(front)
+    scene.view_layers.new('second').layer_collection.children['only'].exclude = True
+    made, deliver = {}, stipple.engine.STIPPLE_RE_engine._deliver
+
+    def note(self, task, picture, layer_name):
+        deliver(self, task, picture, layer_name)
+        made[layer_name] = combined_of(stipple, self, layer_name)
+
+    monkeypatch.setattr(stipple.engine.STIPPLE_RE_engine, '_deliver', note)
+    bpy.ops.render.render()
+    assert made['ViewLayer'][30, 25, 3] > 0.98 and made['second'][30, 25, 3] == 0.0
+
+
 def test_what_splats_were_made_from_does_not_hide_them(camera, tmp_path):
     quad = scenes.quad()
     scenes.material('red', (0.8, 0.1, 0.05), quad)
@@ -460,7 +490,7 @@ def test_a_scene_without_meshes_draws_no_depth(stipple, camera, tmp_path, monkey
     def refuse(*_):
         raise AssertionError('depth was drawn')
 
-    monkeypatch.setattr(stipple.scene.mattes, 'start_depth', refuse)
+    monkeypatch.setattr(stipple.scene.mattes, 'surface', refuse)
     assert scenes.render_pixels(tmp_path)[30, 30, 3] > 0.98
 
 

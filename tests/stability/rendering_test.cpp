@@ -284,8 +284,8 @@ TEST(RenderStability, SurfacesAtSplatsDepthsAtInfinityAndAtTheEnds) {
     colour[i * 4 + 3] = alphas[i % std::size(alphas)];
     colour[i * 4] = i % 5 == 0 ? -1e30f : i % 3 == 0 ? 1e30f * colour[i * 4 + 3] : 0.25f;
   }
-  const SurfaceLayer layers[] = {{40, 30, depth.data(), nullptr},
-                                 {40, 30, depth.data(), colour.data()}};
+  const SurfaceLayer layers[] = {{40, 30, depth.data(), nullptr, nullptr},
+                                 {40, 30, depth.data(), colour.data(), nullptr}};
   for (const SurfaceLayer& layer : layers) {
     RenderOptions options = everything();
     options.surface = layer;

@@ -26,13 +26,15 @@ def instance_array(instances):
 class Surface:
     """Something else between the splats, a mesh: arrays as in StippleRenderOptions, row 0 = top.
 
-    depth [H,W] metres; colour [H,W,4] premultiplied, or None for a matte; light [H,W,3] factors of the splats, or None.
+    depth [H,W] metres; colour [H,W,4] premultiplied, or None for a matte, of opacity [H,W]; light [H,W,3] factors of the
+    splats, or None.
     """
 
-    def __init__(self, depth, colour=None, light=None):
+    def __init__(self, depth, colour=None, light=None, opacity=None):
         self.depth = contiguous(depth)
         shape = self.depth.shape
         self.colour = _layer('colour', colour, shape + (4,))
+        self.opacity = _layer('opacity', opacity, shape)
         self.light = _layer('light', light, shape + (3,))
 
     def put_into(self, options):
@@ -40,6 +42,7 @@ class Surface:
         options = type(options).from_buffer_copy(options)
         options.surface_height, options.surface_width = self.depth.shape
         options.surface_depth = pointer_to(self.depth)
+        options.matte_opacity = pointer_to(self.opacity)
         options.surface_colour, options.splat_light = pointer_to(self.colour), pointer_to(self.light)
         return options
 

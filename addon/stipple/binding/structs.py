@@ -281,7 +281,7 @@ class StippleRenderOptions(_Sized):
                 ('output_colour', c_uint32), ('sh_degree_limit', c_uint32), ('with_background', c_uint32),
                 ('reserved', c_uint32), ('background', c_double * 3), ('surface_width', c_uint32),
                 ('surface_height', c_uint32), ('surface_depth', _floats), ('surface_colour', _floats),
-                ('splat_light', _floats)]
+                ('matte_opacity', _floats), ('splat_light', _floats)]
 
 
 class StippleMeshInstance(_Sized):

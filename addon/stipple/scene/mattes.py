@@ -6,7 +6,13 @@ import numpy as np
 from .. import version
 from ..binding import mesh as native
 from ..binding.errors import StippleError
-from . import geometry, meshes, sources, splat_data
+from ..binding.renderer import EMPTY_DEPTH, Surface
+from . import cameras, geometry, meshes, placement, sources, splat_data
+
+# Samples of a pixel along each side, and of a picture that are held at a time (64 MB).
+SIDE = 4
+MOST_SAMPLES = 16_000_000
+LONGEST_SIDE = 65536  # of a native picture, pixels
 
 
 def gather(depsgraph):
@@ -27,8 +33,8 @@ def gather(depsgraph):
         if not evaluated.visible_camera or evaluated.is_shadow_catcher:
             continue
         matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
-        if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
-            continue  # scaled to nothing
+        if placement.is_flat(matrix):
+            continue
         key = evaluated.data.as_pointer()
         if key not in read:
             read[key] = _read(evaluated)
@@ -37,9 +43,23 @@ def gather(depsgraph):
     return placed
 
 
-def start_depth(placed, camera):
-    """Starts drawing their depth: a DepthTask."""
-    return native.start_depth(sources.context(), placed, camera)
+def surface(placed, camera, wait):
+    """What they hide as this camera sees them: a Surface.
+
+    Edges are smooth: a pixel is hidden as far as its SIDE x SIDE samples are. wait: called with each job on the way.
+    """
+    height, width = camera.height, camera.width
+    depth, opacity = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    side = SIDE if max(width, height) * SIDE <= LONGEST_SIDE else 1
+    rows = max(1, MOST_SAMPLES // (width * side * side))
+    for first in range(0, height, rows):
+        count = min(rows, height - first)
+        task = native.start_depth(sources.context(), placed, cameras.finer_rows(camera, first, count, side))
+        wait(task.job)
+        samples = task.depth.reshape(count, side, width, side)
+        depth[first:first + count] = samples.min(axis=(1, 3))
+        opacity[first:first + count] = (samples < EMPTY_DEPTH).mean(axis=(1, 3))
+    return Surface(depth, opacity=opacity)
 
 
 def _sources_of_splats(depsgraph):

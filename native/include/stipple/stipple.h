@@ -598,6 +598,8 @@ typedef struct StippleRenderOptions {
   /* [H,W,4] premultiplied, alpha 0..1, in output_colour's space: it is added to the splats as those come out.
    * NULL: a matte, which hides what is behind it, the background too, and shows nothing itself. */
   const float* surface_colour;
+  /* [H,W] 0..1, of a matte whose edges cover pixels in part. NULL: 1. */
+  const float* matte_opacity;
   /* [H,W,3] >= 0, factors of all that is not the surface, in output_colour's space: shadows that fall on
    * splats. NULL: 1. */
   const float* splat_light;

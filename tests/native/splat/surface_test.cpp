@@ -39,8 +39,8 @@ struct Surface {
     for (size_t i = 0; i < depth.size(); ++i) colour.insert(colour.end(), rgba.begin(), rgba.end());
   }
 
-  SurfaceLayer layer() const { return {width, height, depth.data(), colour.data()}; }
-  SurfaceLayer matte() const { return {width, height, depth.data(), nullptr}; }
+  SurfaceLayer layer() const { return {width, height, depth.data(), colour.data(), nullptr}; }
+  SurfaceLayer matte() const { return {width, height, depth.data(), nullptr, nullptr}; }
 };
 
 /// Depths that cut a cloud in the middle; opacities 0, a part, 1; some pixels with nothing.
@@ -150,6 +150,23 @@ TEST(Surface, MatteHidesWhatIsBehindAndLeavesAHole) {
   EXPECT_EQ(over.colour[3], 0.0f);
   EXPECT_EQ(over.depth[0], kEmptyDepth);
   EXPECT_EQ(over.colour[kCentre * 4 + 3], 0.5f);
+}
+
+TEST(Surface, MatteThatCoversAPartLetsTheRestThrough) {
+  const TwoSplats scene;
+  const Surface surface(scene.camera, 3.0f, {});
+  const std::vector<float> opacity(surface.depth.size(), 0.25f);
+  RenderOptions options = everything(surface.matte());
+  options.surface.matte_opacity = opacity.data();
+  const RenderResult picture = renderTiled(scene.instances, scene.camera, options);
+  // 1/2 in front; behind, 3/4 of the other half, of which the splat covers 3/4.
+  EXPECT_NEAR(picture.colour[kCentre * 4 + 3], 0.5 + 0.5 * 0.75 * 0.75, 1e-6);
+  EXPECT_NEAR(picture.depth[kCentre], (0.5 * 2 + 0.28125 * 4) / 0.78125, 1e-5);
+  expectEqual(picture, renderReference(scene.instances, scene.camera, options));
+  options.with_background = true;
+  const RenderResult over = renderTiled(scene.instances, scene.camera, options);
+  EXPECT_NEAR(over.colour[kCentre * 4 + 3], 1.0 - 0.5 * 0.25, 1e-6);
+  EXPECT_EQ(over.colour[3], 0.75f);
 }
 
 TEST(Surface, PixelsWithoutSplatsKeepEveryBit) {
@@ -298,7 +315,17 @@ TEST(Surface, RefusesOtherSizesAndNumbersThatAreNone) {
   EXPECT_THAT(messageOf(surface.layer()), HasSubstr("alpha at pixel (5, 0) is 1.5"));
   surface.colour[23] = kInfinity;
   EXPECT_THAT(messageOf(surface.layer()), HasSubstr("colour at pixel"));
-  EXPECT_THAT(messageOf({9, 9, nullptr, surface.colour.data()}), HasSubstr("colour and no depth"));
+  EXPECT_THAT(messageOf({9, 9, nullptr, surface.colour.data(), nullptr}), HasSubstr("no depth"));
+  SurfaceLayer matte = surface.matte();
+  std::vector<float> opacity(81, 0.5f);
+  matte.matte_opacity = opacity.data();
+  matte.colour = surface.colour.data();
+  EXPECT_THAT(messageOf(matte), HasSubstr("can have one of them"));
+  matte.colour = nullptr;
+  for (const float bad : {kNan, -0.5f, 1.25f, kInfinity}) {
+    opacity[10] = bad;
+    EXPECT_THAT(messageOf(matte), HasSubstr("matte opacity at pixel (1, 1) is "));
+  }
 }
 
 TEST(Surface, IsRefusedWhereABackwardPassIsToGoOn) {
