@@ -69,13 +69,12 @@ void writePng(const Image& image, const std::string& path, bool keep_values) {
     }
   });
   const StippleMediaTable& media = mediaTable();
-  OutputFile file(path);
-  file.handOver();
   const StippleMediaImage info = infoOf(image);
-  callMedia([&](StippleMediaStatus* status) {
-    media.png_write(file.temporaryPath().c_str(), &info, bytes.data(), status);
+  writeByLibrary(path, [&](const char* temporary) {
+    callMedia([&](StippleMediaStatus* status) {
+      media.png_write(temporary, &info, bytes.data(), status);
+    });
   });
-  file.commit();
 }
 
 /// Display sRGB → linear. The transfer function belongs to the straight colour.
@@ -100,14 +99,12 @@ void writeExr(const Image& image, const std::string& path, bool keep_values) {
   const bool decode = image.transfer == Transfer::kSrgb && !keep_values;
   const std::vector<float> converted = decode ? linearPixels(image) : std::vector<float>();
   const StippleMediaTable& media = mediaTable();
-  OutputFile file(path);
-  file.handOver();
   const StippleMediaImage info = infoOf(image);
-  callMedia([&](StippleMediaStatus* status) {
-    media.exr_write(file.temporaryPath().c_str(), &info,
-                    decode ? converted.data() : image.pixels.data(), status);
+  writeByLibrary(path, [&](const char* temporary) {
+    callMedia([&](StippleMediaStatus* status) {
+      media.exr_write(temporary, &info, decode ? converted.data() : image.pixels.data(), status);
+    });
   });
-  file.commit();
 }
 
 }  // namespace

@@ -108,4 +108,20 @@ void OutputFile::commit() {
   committed_ = true;
 }
 
+void writeByLibrary(const std::string& path, const std::function<void(const char*)>& write) {
+  OutputFile file(path);
+  file.handOver();
+  const std::string& temporary = file.temporaryPath();
+  try {
+    write(temporary.c_str());
+  } catch (const Error& error) {
+    std::string message = error.what();
+    for (size_t at = 0; (at = message.find(temporary, at)) != message.npos; at += path.size()) {
+      message.replace(at, temporary.size(), path);
+    }
+    fail(error.code(), message);
+  }
+  file.commit();
+}
+
 }  // namespace stipple

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdio>
+#include <functional>
 #include <string>
 
 namespace stipple {
@@ -28,5 +29,9 @@ class OutputFile {
   std::FILE* file_ = nullptr;
   bool committed_ = false;
 };
+
+/// A file that a library makes whole: `write` gets the temporary name, in whose place messages have
+/// the path. Errors: those of OutputFile and of `write`.
+void writeByLibrary(const std::string& path, const std::function<void(const char*)>& write);
 
 }  // namespace stipple

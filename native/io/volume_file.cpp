@@ -50,8 +50,6 @@ void validateVolume(const SparseVolume& volume) {
 void writeVolumeFile(const SparseVolume& volume, const std::string& path) {
   validateVolume(volume);
   const StippleMediaTable& media = mediaTable();
-  OutputFile file(path);
-  file.handOver();
   StippleMediaVolume view{};
   view.voxel_size = volume.voxel_size;
   for (size_t axis = 0; axis < 3; ++axis) view.origin[axis] = volume.origin[axis];
@@ -59,10 +57,9 @@ void writeVolumeFile(const SparseVolume& volume, const std::string& path) {
   view.bricks = volume.bricks.empty() ? nullptr : volume.bricks.front().data();
   view.density = volume.density.data();
   view.colour = volume.colour.data();
-  callMedia([&](StippleMediaStatus* status) {
-    media.volume_write(file.temporaryPath().c_str(), &view, status);
+  writeByLibrary(path, [&](const char* temporary) {
+    callMedia([&](StippleMediaStatus* status) { media.volume_write(temporary, &view, status); });
   });
-  file.commit();
 }
 
 SparseVolume readVolumeFile(const std::string& path) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -120,9 +121,16 @@ void write(const char* path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, c
   if (!output) {
     fail(ErrorCode::kUnsupported, std::string(path) + " cannot be written: " + OIIO::geterror());
   }
-  if (!output->open(path, spec) || !output->write_image(type, pixels) || !output->close()) {
+  // Into memory first: on a full disk OpenImageIO ends a PNG file early and says nothing.
+  OIIO::Filesystem::IOVecOutput bytes;
+  if (!output->set_ioproxy(&bytes) || !output->open(path, spec) ||
+      !output->write_image(type, pixels) || !output->close()) {
     fail(ErrorCode::kIo, std::string(path) + " cannot be written: " + output->geterror());
   }
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file.write(reinterpret_cast<const char*>(bytes.buffer().data()),
+             static_cast<std::streamsize>(bytes.buffer().size()));
+  finishFile(file, path);
 }
 
 OIIO::ImageSpec specFor(const StippleMediaImage& image, OIIO::TypeDesc type) {

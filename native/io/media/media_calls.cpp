@@ -1,9 +1,11 @@
 #include "io/media/media_calls.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <exception>
 #include <new>
+#include <system_error>
 
 #include "base/error.h"
 
@@ -34,6 +36,16 @@ void reportCurrentException(const char* path, StippleMediaStatus* status) {
     report(status, static_cast<int>(ErrorCode::kInternal),
            std::string(path) + ": a library failed without a reason");
   }
+}
+
+void finishFile(std::ofstream& file, const char* path) {
+  if (file) errno = 0;
+  file.close();
+  if (file) return;
+  // A failure further up may have been followed by calls that reset the reason.
+  const std::string reason = errno != 0 ? std::generic_category().message(errno)
+                                        : std::string("the system took only a part of it");
+  fail(ErrorCode::kIo, std::string(path) + " cannot be written: " + reason);
 }
 
 void* allocate(const StippleMediaSink& sink, uint32_t array, size_t bytes) {

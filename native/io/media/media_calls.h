@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -59,6 +60,9 @@ void guard(const char* path, StippleMediaStatus* status, const Work& work) {
     reportCurrentException(path, status);
   }
 }
+
+/// Ends a file that was written by a library or for it. Errors: kIo where not all of it is there.
+void finishFile(std::ofstream& file, const char* path);
 
 /// Hands an array to the caller. Errors: kOutOfMemory.
 void giveBytes(const StippleMediaSink& sink, uint32_t array, const void* data, size_t bytes);

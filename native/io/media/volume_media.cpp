@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <string>
@@ -67,6 +68,16 @@ void fillTree(Tree& tree, const StippleMediaVolume& volume, const float* values,
   for (Leaf* leaf : leaves) tree.addLeaf(leaf);
 }
 
+/// OpenVDB's own file does not look whether the system takes what it writes; ours does.
+class CheckedArchive : public openvdb::io::Archive {
+ public:
+  void writeFile(const char* path, const openvdb::GridPtrVec& grids) const {
+    std::ofstream file(path, std::ios::binary | std::ios::trunc);
+    if (file) write(file, grids, /*seekable=*/true);
+    finishFile(file, path);
+  }
+};
+
 void writeVolume(const char* path, const StippleMediaVolume& volume) {
   const auto transform = openvdb::math::Transform::createLinearTransform(volume.voxel_size);
   transform->postTranslate(openvdb::Vec3d(volume.origin[0], volume.origin[1], volume.origin[2]));
@@ -88,13 +99,12 @@ void writeVolume(const char* path, const StippleMediaVolume& volume) {
     grid->setSaveFloatAsHalf(false);
     grid->setCreator("Stipple");
   }
-  openvdb::io::File file(path);
+  CheckedArchive archive;
   const uint32_t codec = openvdb::io::Archive::hasBloscCompression()  ? openvdb::io::COMPRESS_BLOSC
                          : openvdb::io::Archive::hasZLibCompression() ? openvdb::io::COMPRESS_ZIP
                                                                       : openvdb::io::COMPRESS_NONE;
-  file.setCompression(codec | openvdb::io::COMPRESS_ACTIVE_MASK);
-  file.write(openvdb::GridPtrVec{density, colour});
-  file.close();
+  archive.setCompression(codec | openvdb::io::COMPRESS_ACTIVE_MASK);
+  archive.writeFile(path, {density, colour});
 }
 
 /// The grid of this name and type, its active tiles turned into leaves.
