@@ -70,10 +70,7 @@ class Task:
 
     def _run(self, work):
         try:
-            result = work(self)
-            if self._cancelled.is_set():
-                raise CancelledError()
-            self.result = result
+            self.result = work(self)
         except StippleError as error:
             self._error = error
         except Exception as error:  # the thread's end is wait(), which must hear of it
