@@ -134,6 +134,60 @@ TEST(MaskedTree, KeepsNodesThatLoseNothing) {
   EXPECT_LT(same, tree.nodes.size());
 }
 
+TEST(MaskedTree, KeepsWhatWasFittedOfNodesThatLoseNothing) {
+  const SplatCloud cloud = cloudOf(700, 9);
+  MergeTree tree = buildMergeTree(cloud, {}, {});
+  // Nodes that no merge of their children would give, as a fit to pictures leaves them.
+  const auto shift = [](std::vector<float>& values, float factor) {
+    for (size_t i = 0; i < values.size(); ++i) {
+      values[i] *= 1 + factor * static_cast<float>(i % 11) / 11;
+    }
+  };
+  shift(tree.nodes.positions, 0.05f);
+  shift(tree.nodes.rotations, 0.3f);
+  shift(tree.nodes.scales, 0.4f);
+  shift(tree.nodes.opacities, -0.3f);
+  shift(tree.nodes.sh, 0.5f);
+  const std::vector<uint8_t> mask = leftOf(cloud, 0.3f);
+  const MaskedTree masked = maskedTree(cloud, tree, mask);
+
+  const size_t inner_count = tree.nodes.size();
+  std::vector<size_t> kept_below(tree.parents.size(), 0);
+  std::vector<size_t> leaves_below(tree.parents.size(), 0);
+  std::vector<size_t> sides_left(inner_count, 0);
+  for (size_t id = tree.parents.size(); id-- > 0;) {
+    if (id >= inner_count) {
+      leaves_below[id] = 1;
+      kept_below[id] = mask[id - inner_count];
+    }
+    const uint32_t parent = tree.parents[id];
+    if (parent == MergeTree::kNoParent) continue;
+    leaves_below[parent] += leaves_below[id];
+    kept_below[parent] += kept_below[id];
+    sides_left[parent] += kept_below[id] > 0 ? 1 : 0;
+  }
+  const auto expectRow = [](const std::vector<float>& a, size_t i, const std::vector<float>& b,
+                            size_t j, size_t stride) {
+    EXPECT_TRUE(std::equal(&a[i * stride], &a[i * stride] + stride, &b[j * stride]));
+  };
+  size_t at = 0;
+  size_t untouched = 0;
+  for (size_t id = 0; id < inner_count; ++id) {
+    if (sides_left[id] < 2) continue;  // gone, or its one child stands for it
+    if (kept_below[id] == leaves_below[id]) {
+      ++untouched;
+      expectRow(tree.nodes.positions, id, masked.tree.nodes.positions, at, 3);
+      expectRow(tree.nodes.rotations, id, masked.tree.nodes.rotations, at, 4);
+      expectRow(tree.nodes.scales, id, masked.tree.nodes.scales, at, 3);
+      expectRow(tree.nodes.opacities, id, masked.tree.nodes.opacities, at, 1);
+      expectRow(tree.nodes.sh, id, masked.tree.nodes.sh, at, tree.nodes.shStride());
+    }
+    ++at;
+  }
+  EXPECT_EQ(at, masked.tree.nodes.size());
+  EXPECT_GT(untouched, 200u);
+}
+
 TEST(MaskedTree, OneSplatIsATreeWithoutInnerNodes) {
   const SplatCloud cloud = cloudOf(50, 6);
   const MergeTree tree = buildMergeTree(cloud, {}, {});
