@@ -4,7 +4,7 @@
 #   bash tests/peers/reduce.sh [FILE | room]
 # room: a furnished room that make_room.py builds, as 150,000 splats, looked at from inside.
 # SPLAT_TRANSFORM: its command (default node_modules/.bin/splat-transform in build/peers/npm, installed where npm
-# is there). STIPPLE_BUILD_DIR: our build (default build/release). Exit 77: something is missing, and which.
+# is there). PYTHON: one with numpy (default /usr/bin/python3). STIPPLE_BUILD_DIR: our build (default build/release). Exit 77: something is missing, and which.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 build=${STIPPLE_BUILD_DIR:-$root/build/release}
@@ -27,7 +27,7 @@ mkdir -p "$work"
 if [[ $file == room ]]; then
   views=2
   file=$work/room.ply
-  python3 "$root/tests/peers/make_room.py" "$work/room.glb" || missing "make_room.py failed (it needs numpy)."
+  "${PYTHON:-/usr/bin/python3}" "$root/tests/peers/make_room.py" "$work/room.glb" || missing "make_room.py failed (it needs numpy)."
   "$tool" decode "$work/room.glb" "$file" --anchors 150000 >/dev/null
 fi
 [[ -n $file && -f $file ]] || missing "'$file' is no file of splats; give one as the argument."
