@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,40 @@ double secondsOf(const Work& work) {
   const auto begin = std::chrono::steady_clock::now();
   work();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// Work to compare with. A target of 0 is none: the ratio is printed and not judged.
+struct Reference {
+  std::string name;
+  double target;
+  std::function<void()> work;
+};
+
+/// Times `ours` and every reference in turn, so that all meet the same machine, and reports the
+/// ratios of the best times as counters `ratio_<name>` beside `target_<name>`; `reference_ms` is
+/// the first one's. The benchmark must use manual time.
+template <class Ours>
+void compareWithAll(benchmark::State& state, const Ours& ours,
+                    const std::vector<Reference>& references) {
+  double best_ours = 1e300;
+  std::vector<double> best(references.size(), 1e300);
+  for (auto step : state) {
+    (void)step;
+    for (size_t r = 0; r < references.size(); ++r) {
+      best[r] = std::min(best[r], secondsOf(references[r].work));
+    }
+    const double seconds = secondsOf(ours);
+    best_ours = std::min(best_ours, seconds);
+    state.SetIterationTime(seconds);
+  }
+  state.counters["best_ms"] = 1e3 * best_ours;
+  state.counters["reference_ms"] = 1e3 * best.front();
+  for (size_t r = 0; r < references.size(); ++r) {
+    state.counters["ratio_" + references[r].name] = best[r] / best_ours;
+    if (references[r].target > 0.0) {
+      state.counters["target_" + references[r].name] = references[r].target;
+    }
+  }
 }
 
 /// Times `ours` and `reference` in turn, so that both meet the same machine, and reports the ratio

@@ -1,17 +1,17 @@
 // Splat files against what the disk cache gives: the same bytes through fread and fwrite alone, and
-// through the packing library where the format packs.
+// through the packing library where the format packs. Beside it a second ratio, without a target:
+// the same and one copy of the cloud's arrays, which a reader has to fill and a writer to read.
 // Files lie in memory (/dev/shm), so that a slow disk does not hide the work of the reader.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
-#include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "base/parallel.h"
 #include "base/random.h"
 #include "bench/comparison.h"
+#include "bench/plain_file.h"
 #include "io/compression.h"
 #include "io/little_endian.h"
 #include "io/splat_file.h"
@@ -26,42 +26,27 @@ std::string scratchPath(const std::string& ending) {
   return "/dev/shm/stipple_bench_" + std::to_string(::getpid()) + ending;
 }
 
-const SplatCloud& cloud() {
-  static const SplatCloud kCloud = [] {
-    SplatCloud made;
-    made.sh_degree = kDegree;
-    made.resize(kSplats);
-    uint64_t index = 0;
-    const auto next = [&index] {
-      return unitFloat(keyedBits(1, RandomUse::kDecoder, index++)) * 0.98f + 0.01f;
-    };
-    for (float& value : made.positions) value = next();
-    for (float& value : made.scales) value = next();
-    for (float& value : made.opacities) value = next();
-    for (float& value : made.sh) value = next();
-    for (size_t i = 0; i < kSplats; ++i) made.rotations[i * 4] = 1.0f;
-    return made;
-  }();
-  return kCloud;
+SplatCloud makeCloud(int degree) {
+  SplatCloud made;
+  made.sh_degree = degree;
+  made.resize(kSplats);
+  uint64_t index = 0;
+  const auto next = [&index] {
+    return unitFloat(keyedBits(1, RandomUse::kDecoder, index++)) * 0.98f + 0.01f;
+  };
+  for (float& value : made.positions) value = next();
+  for (float& value : made.scales) value = next();
+  for (float& value : made.opacities) value = next();
+  for (float& value : made.sh) value = next();
+  for (size_t i = 0; i < kSplats; ++i) made.rotations[i * 4] = 1.0f;
+  return made;
 }
 
-struct Closer {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, Closer>;
-
-std::vector<char> readWhole(const std::string& path) {
-  const File file(std::fopen(path.c_str(), "rb"));
-  std::fseek(file.get(), 0, SEEK_END);
-  std::vector<char> bytes(static_cast<size_t>(std::ftell(file.get())));
-  std::rewind(file.get());
-  bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file.get()));
-  return bytes;
-}
-
-void writeWhole(const std::string& path, const std::vector<char>& bytes) {
-  const File file(std::fopen(path.c_str(), "wb"));
-  std::fwrite(bytes.data(), 1, bytes.size(), file.get());
+/// The same cloud with harmonics and without.
+const SplatCloud& cloudOf(int degree) {
+  static const SplatCloud kPlain = makeCloud(0);
+  static const SplatCloud kFull = makeCloud(kDegree);
+  return degree == 0 ? kPlain : kFull;
 }
 
 void finish(benchmark::State& state, size_t bytes) {
@@ -76,7 +61,7 @@ struct Stream {
 };
 
 /// The streams of an SPZ file of version 3 (one of gzip) or 4 (zstd, listed in a table).
-std::vector<Stream> streamsOf(const std::vector<char>& file) {
+std::vector<Stream> streamsOf(const PlainBytes& file) {
   if (file[0] != 'N') {
     const auto* end = file.data() + file.size() - 4;
     return {{Compression::kGzip, 0, file.size(), loadLittleEndian<uint32_t>(end)}};
@@ -95,8 +80,7 @@ std::vector<Stream> streamsOf(const std::vector<char>& file) {
 }
 
 /// All streams unpacked, several at a time where there are several.
-std::vector<ByteVector> unpackAll(const std::vector<char>& file,
-                                  const std::vector<Stream>& streams) {
+std::vector<ByteVector> unpackAll(const PlainBytes& file, const std::vector<Stream>& streams) {
   std::vector<ByteVector> plain(streams.size());
   parallelFor(streams.size(), 1, [&](size_t begin, size_t end) {
     for (size_t s = begin; s < end; ++s) {
@@ -124,51 +108,62 @@ struct Case {
   const char* ending;
   SplatWriteOptions options;
   bool packed;  ///< the floor unpacks (or packs) the file's streams too
+  int degree;   ///< of the cloud that is written
 };
 
 /// Reading against fread, and unpacking where the format packs.
 void readCase(benchmark::State& state, const Case& which) {
   const std::string path = scratchPath(which.ending);
-  writeSplatFile(cloud(), path, which.options);
+  writeSplatFile(cloudOf(which.degree), path, which.options);
+  const SplatCloud decoded = readSplatFile(path);
   size_t bytes = 0;
-  compare(
-      state, which.packed ? "fread+unpack" : "fread", 0.6,
-      [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
-      [&] {
-        const std::vector<char> file = readWhole(path);
-        bytes = file.size();
-        if (which.packed) benchmark::DoNotOptimize(unpackAll(file, streamsOf(file)));
-      });
+  const auto plain = [&] {
+    const PlainBytes file = readPlainly(path);
+    bytes = file.size();
+    if (which.packed) benchmark::DoNotOptimize(unpackAll(file, streamsOf(file)));
+  };
+  const std::string name = which.packed ? "fread+unpack" : "fread";
+  compareWithAll(state, [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
+                 {{name, 0.6, plain}, {name + "+arrays", 0.0, [&] {
+                                         plain();
+                                         copyArrays(decoded);
+                                       }}});
   ::unlink(path.c_str());
   finish(state, bytes);
 }
 
 /// Writing against fwrite, and packing the same bytes where the format packs.
 void writeCase(benchmark::State& state, const Case& which) {
+  const SplatCloud& cloud = cloudOf(which.degree);
   const std::string path = scratchPath(which.ending);
-  writeSplatFile(cloud(), path, which.options);
-  const std::vector<char> bytes = readWhole(path);
+  writeSplatFile(cloud, path, which.options);
+  const PlainBytes bytes = readPlainly(path);
   std::vector<Stream> streams;
   if (which.packed) streams = streamsOf(bytes);
   const std::vector<ByteVector> plain = unpackAll(bytes, streams);
   const std::string floor_path = path + ".floor";
-  compare(
-      state, which.packed ? "pack+fwrite" : "fwrite", 0.6,
-      [&] { writeSplatFile(cloud(), path, which.options); },
-      [&] {
-        packAll(plain, streams);
-        writeWhole(floor_path, bytes);
-      });
+  const auto write = [&] {
+    packAll(plain, streams);
+    writePlainly(floor_path, bytes);
+  };
+  const std::string name = which.packed ? "pack+fwrite" : "fwrite";
+  compareWithAll(state, [&] { writeSplatFile(cloud, path, which.options); },
+                 {{name, 0.6, write}, {name + "+arrays", 0.0, [&] {
+                                         copyArrays(cloud);
+                                         write();
+                                       }}});
   ::unlink(floor_path.c_str());
   ::unlink(path.c_str());
   finish(state, bytes.size());
 }
 
-const Case kCases[] = {{"ply", ".ply", {}, false},
-                       {"compressed_ply", ".compressed.ply", {}, false},
-                       {"splat", ".splat", {}, false},
-                       {"spz3", ".spz", {.version = 3}, true},
-                       {"spz4", ".spz", {.version = 4}, true}};
+const Case kCases[] = {{"ply", ".ply", {}, false, kDegree},
+                       {"compressed_ply", ".compressed.ply", {}, false, kDegree},
+                       {"compressed_ply_degree0", ".compressed.ply", {}, false, 0},
+                       {"splat", ".splat", {}, false, kDegree},
+                       {"splat_degree0", ".splat", {}, false, 0},
+                       {"spz3", ".spz", {.version = 3}, true, kDegree},
+                       {"spz4", ".spz", {.version = 4}, true, kDegree}};
 
 const bool kRegistered = [] {
   for (const Case& which : kCases) {

@@ -4,14 +4,13 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "base/parallel.h"
 #include "base/random.h"
 #include "bench/comparison.h"
+#include "bench/plain_file.h"
 #include "io/sog_file.h"
 #include "io/splat_file.h"
 #include "io/webp_image.h"
@@ -91,9 +90,16 @@ std::string scratch(const char* name) {
 void sogRead(benchmark::State& state) {
   const std::string path = scratch(".sog");
   writeSog(sogCloud(), path, {}, nullptr);
-  compare(
-      state, "libwebp", 0.6, [&] { benchmark::DoNotOptimize(readSog(path, nullptr)); },
-      [&] { benchmark::DoNotOptimize(decodeAll()); });
+  const SplatCloud decoded = readSog(path, nullptr);
+  const auto plain = [&] {
+    benchmark::DoNotOptimize(readPlainly(path));
+    benchmark::DoNotOptimize(decodeAll());
+  };
+  compareWithAll(state, [&] { benchmark::DoNotOptimize(readSog(path, nullptr)); },
+                 {{"fread+libwebp", 0.6, plain}, {"fread+libwebp+arrays", 0.0, [&] {
+                                                    plain();
+                                                    copyArrays(decoded);
+                                                  }}});
   ::unlink(path.c_str());
   state.SetItemsProcessed(static_cast<int64_t>(kSogSplats) * state.iterations());
 }
@@ -106,31 +112,32 @@ void sogWrite(benchmark::State& state, int degree) {
     if (part.name != "meta.json")
       pictures.push_back(decodeWebp(part.bytes, kMostPixels, part.name));
   }
+  writeSog(cloud, path, {}, nullptr);
+  const PlainBytes bytes = readPlainly(path);
+  const std::string floor_path = path + ".floor";
   compare(
-      state, "libwebp", 0.6, [&] { writeSog(cloud, path, {}, nullptr); },
+      state, "libwebp+fwrite", 0.6, [&] { writeSog(cloud, path, {}, nullptr); },
       [&] {
         parallelFor(pictures.size(), 1, [&](size_t i, size_t) {
           benchmark::DoNotOptimize(encodeWebp(pictures[i], "picture"));
         });
+        writePlainly(floor_path, bytes);
       });
+  ::unlink(floor_path.c_str());
   ::unlink(path.c_str());
   state.SetItemsProcessed(static_cast<int64_t>(kSogSplats) * state.iterations());
-}
-
-std::vector<char> readWhole(const std::string& path) {
-  std::vector<char> bytes(std::filesystem::file_size(path));
-  std::FILE* file = std::fopen(path.c_str(), "rb");
-  bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file));
-  std::fclose(file);
-  return bytes;
 }
 
 void glbRead(benchmark::State& state) {
   const std::string path = scratch(".glb");
   writeSplatFile(makeCloud(kGlbSplats, 3), path, {.frame = Frame::kLUF});
-  compare(
-      state, "fread", 0.6, [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
-      [&] { benchmark::DoNotOptimize(readWhole(path)); });
+  const SplatCloud decoded = readSplatFile(path);
+  const auto plain = [&] { benchmark::DoNotOptimize(readPlainly(path)); };
+  compareWithAll(state, [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
+                 {{"fread", 0.6, plain}, {"fread+arrays", 0.0, [&] {
+                                            plain();
+                                            copyArrays(decoded);
+                                          }}});
   ::unlink(path.c_str());
   state.SetItemsProcessed(static_cast<int64_t>(kGlbSplats) * state.iterations());
 }
@@ -140,15 +147,11 @@ void glbWrite(benchmark::State& state) {
   cloud.frame = Frame::kLUF;
   const std::string path = scratch(".glb");
   writeSplatFile(cloud, path, {});
-  const std::vector<char> bytes = readWhole(path);
+  const PlainBytes bytes = readPlainly(path);
   const std::string plain = scratch(".plain");
   compare(
       state, "fwrite", 0.6, [&] { writeSplatFile(cloud, path, {}); },
-      [&] {
-        std::FILE* file = std::fopen(plain.c_str(), "wb");
-        std::fwrite(bytes.data(), 1, bytes.size(), file);
-        std::fclose(file);
-      });
+      [&] { writePlainly(plain, bytes); });
   ::unlink(path.c_str());
   ::unlink(plain.c_str());
   state.SetItemsProcessed(static_cast<int64_t>(kGlbSplats) * state.iterations());
