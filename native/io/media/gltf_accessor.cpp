@@ -2,16 +2,13 @@
 // accessors, sparse accessors, normalised integers).
 #include "io/media/gltf_accessor.h"
 
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#include <tiny_gltf.h>
-
 #include <algorithm>
 #include <cstring>
 #include <limits>
 #include <type_traits>
 
 #include "base/error.h"
+#include "io/media/gltf_model.h"
 
 namespace stipple::media {
 
@@ -24,8 +21,7 @@ constexpr size_t kMaxZeroElements = size_t{1} << 26;
   fail(ErrorCode::kFormat, what);
 }
 
-const tinygltf::Accessor& accessorAt(const tinygltf::Model& model, int index,
-                                     const std::string& what) {
+const tinygltf::Accessor& accessorAt(const GltfModel& model, int index, const std::string& what) {
   if (index < 0 || static_cast<size_t>(index) >= model.accessors.size()) {
     failHere(what + " names accessor " + std::to_string(index) + "; the file has " +
              std::to_string(model.accessors.size()));
@@ -39,7 +35,7 @@ struct Range {
   size_t stride = 0;
 };
 
-Range rangeOf(const tinygltf::Model& model, int view_index, size_t offset, size_t count,
+Range rangeOf(const GltfModel& model, int view_index, size_t offset, size_t count,
               size_t element_bytes, const std::string& what) {
   if (view_index < 0 || static_cast<size_t>(view_index) >= model.bufferViews.size()) {
     failHere(what + " names buffer view " + std::to_string(view_index) + "; the file has " +
@@ -50,7 +46,7 @@ Range rangeOf(const tinygltf::Model& model, int view_index, size_t offset, size_
     failHere(what + " names buffer " + std::to_string(view.buffer) + "; the file has " +
              std::to_string(model.buffers.size()));
   }
-  const std::vector<unsigned char>& bytes = model.buffers[static_cast<size_t>(view.buffer)].data;
+  const std::span<const unsigned char> bytes = model.bytesOf(static_cast<size_t>(view.buffer));
   const size_t stride = view.byteStride != 0 ? view.byteStride : element_bytes;
   if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset) {
     failHere(what + " lies in a buffer view of " + std::to_string(view.byteLength) +
@@ -99,6 +95,15 @@ float asFloat(T value, bool normalized) {
 template <typename T>
 void convert(const unsigned char* bytes, size_t stride, size_t count, size_t width, bool normalized,
              float* out, size_t out_stride) {
+  if constexpr (std::is_same_v<T, float>) {
+    const size_t row = width * sizeof(float);
+    if (out_stride == width && stride == row) {
+      std::memcpy(out, bytes, count * row);
+      return;
+    }
+    for (size_t i = 0; i < count; ++i) std::memcpy(out + i * out_stride, bytes + i * stride, row);
+    return;
+  }
   for (size_t i = 0; i < count; ++i) {
     for (size_t c = 0; c < width; ++c) {
       out[i * out_stride + c] = asFloat(load<T>(bytes + i * stride + c * sizeof(T)), normalized);
@@ -145,7 +150,7 @@ uint32_t wholeNumber(const unsigned char* bytes, int type, const std::string& wh
   }
 }
 
-void applySparse(const tinygltf::Model& model, const tinygltf::Accessor& accessor, size_t width,
+void applySparse(const GltfModel& model, const tinygltf::Accessor& accessor, size_t width,
                  const std::string& what, float* out, size_t out_stride) {
   const auto& sparse = accessor.sparse;
   // Signed in one version of tinygltf, unsigned in the next.
@@ -177,18 +182,17 @@ void applySparse(const tinygltf::Model& model, const tinygltf::Accessor& accesso
 
 }  // namespace
 
-size_t accessorWidth(const tinygltf::Model& model, int accessor, const std::string& what) {
+size_t accessorWidth(const GltfModel& model, int accessor, const std::string& what) {
   const int width = tinygltf::GetNumComponentsInType(
       static_cast<uint32_t>(accessorAt(model, accessor, what).type));
   return width > 0 ? static_cast<size_t>(width) : 0;
 }
 
-size_t accessorCount(const tinygltf::Model& model, int index, const std::string& what) {
+size_t accessorCount(const GltfModel& model, int index, const std::string& what) {
   return accessorAt(model, index, what).count;
 }
 
-void requireAccessor(const tinygltf::Model& model, int index, size_t width,
-                     const std::string& what) {
+void requireAccessor(const GltfModel& model, int index, size_t width, const std::string& what) {
   const tinygltf::Accessor& accessor = accessorAt(model, index, what);
   const size_t seen = accessorWidth(model, index, what);
   if (seen != width) {
@@ -205,8 +209,7 @@ void requireAccessor(const tinygltf::Model& model, int index, size_t width,
   }
 }
 
-FloatSource::FloatSource(const tinygltf::Model& model, int index, size_t width,
-                         const std::string& what)
+FloatSource::FloatSource(const GltfModel& model, int index, size_t width, const std::string& what)
     : model_(model), accessor_(accessorAt(model, index, what)), width_(width), what_(what) {
   requireAccessor(model, index, width, what);
   if (accessor_.bufferView < 0) return;
@@ -224,11 +227,24 @@ void FloatSource::readDense(size_t begin, size_t end, float* out, size_t out_str
   for (size_t i = 0; i < end - begin; ++i) std::fill_n(out + i * out_stride, width_, 0.0f);
 }
 
+bool FloatSource::join(const FloatSource& next) {
+  const auto areFloats = [](const FloatSource& source) {
+    return source.first_ != nullptr && !source.accessor_.sparse.isSparse &&
+           source.accessor_.componentType == TINYGLTF_COMPONENT_TYPE_FLOAT;
+  };
+  const bool behind = areFloats(*this) && areFloats(next) && next.stride_ == stride_ &&
+                      next.accessor_.count == accessor_.count &&
+                      next.first_ == first_ + width_ * sizeof(float) &&
+                      (width_ + next.width_) * sizeof(float) <= stride_;
+  if (behind) width_ += next.width_;
+  return behind;
+}
+
 void FloatSource::readSparse(float* out, size_t out_stride) const {
   if (accessor_.sparse.isSparse) applySparse(model_, accessor_, width_, what_, out, out_stride);
 }
 
-std::vector<float> readFloats(const tinygltf::Model& model, int index, size_t width,
+std::vector<float> readFloats(const GltfModel& model, int index, size_t width,
                               const std::string& what) {
   requireAccessor(model, index, width, what);
   std::vector<float> values(accessorAt(model, index, what).count * width);
@@ -238,8 +254,7 @@ std::vector<float> readFloats(const tinygltf::Model& model, int index, size_t wi
   return values;
 }
 
-std::vector<uint32_t> readIndices(const tinygltf::Model& model, int index,
-                                  const std::string& what) {
+std::vector<uint32_t> readIndices(const GltfModel& model, int index, const std::string& what) {
   const tinygltf::Accessor& accessor = accessorAt(model, index, what);
   const size_t bytes = componentBytes(accessor.componentType, what);
   if (accessorWidth(model, index, what) != 1 || accessor.bufferView < 0 ||
@@ -255,8 +270,7 @@ std::vector<uint32_t> readIndices(const tinygltf::Model& model, int index,
   return values;
 }
 
-std::vector<unsigned char> readView(const tinygltf::Model& model, int view,
-                                    const std::string& what) {
+std::vector<unsigned char> readView(const GltfModel& model, int view, const std::string& what) {
   const Range range = rangeOf(model, view, 0, 0, 1, what);
   const size_t length = model.bufferViews[static_cast<size_t>(view)].byteLength;
   return std::vector<unsigned char>(range.first, range.first + length);

@@ -2,16 +2,13 @@
 // modes), and the extension KHR_texture_transform.
 #include "io/media/gltf_material.h"
 
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#include <tiny_gltf.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "io/media/gltf_model.h"
 #include "io/media/media_calls.h"
 #include "math/colour.h"
 

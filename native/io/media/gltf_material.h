@@ -8,11 +8,9 @@
 
 #include "data/tri_mesh.h"
 
-namespace tinygltf {
-class Model;
-}
-
 namespace stipple::media {
+
+struct GltfModel;
 
 /// How a glTF material is used by one primitive.
 struct MaterialUse {
@@ -27,7 +25,7 @@ struct MaterialUse {
 class MaterialReader {
  public:
   /// In: images, the undecoded bytes of each image; empty where the file was not found.
-  MaterialReader(const tinygltf::Model& model, const std::string& path,
+  MaterialReader(const GltfModel& model, const std::string& path,
                  const std::vector<std::vector<unsigned char>>& images, TriMesh& mesh)
       : model_(model), path_(path), images_(images), mesh_(mesh) {}
 
@@ -41,7 +39,7 @@ class MaterialReader {
   Base baseOf(int material) const;
   uint32_t texture(int image, const Base& base);
 
-  const tinygltf::Model& model_;
+  const GltfModel& model_;
   const std::string& path_;
   const std::vector<std::vector<unsigned char>>& images_;
   TriMesh& mesh_;

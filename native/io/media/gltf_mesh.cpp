@@ -1,9 +1,5 @@
 // Based on: The Khronos 3D Formats Working Group, glTF 2.0 Specification, sections 3.5 (scenes and
 // node transforms) and 3.7 (primitives, strips and fans).
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#include <tiny_gltf.h>
-
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -16,6 +12,7 @@
 #include "base/error.h"
 #include "io/media/gltf_accessor.h"
 #include "io/media/gltf_material.h"
+#include "io/media/gltf_model.h"
 #include "io/media/gltf_scene.h"
 #include "io/media/media_calls.h"
 #include "math/vec.h"
@@ -58,7 +55,7 @@ class GltfReader {
  public:
   explicit GltfReader(const std::string& path)
       : path_(path),
-        scene_(path, kKnownExtensions, "mesh"),
+        scene_(path, kKnownExtensions, GltfScene::Content::kMesh),
         model_(scene_.model()),
         materials_(model_, path_, scene_.images(), mesh_) {}
 
@@ -256,7 +253,7 @@ class GltfReader {
 
   std::string path_;
   GltfScene scene_;
-  const tinygltf::Model& model_;
+  const GltfModel& model_;
   TriMesh mesh_;
   MaterialReader materials_;
   bool any_normals_ = false;

@@ -2,22 +2,39 @@
 // node transforms).
 #include "io/media/gltf_scene.h"
 
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#include <tiny_gltf.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/parallel.h"
+#include "io/input_file.h"
+#include "io/little_endian.h"
 #include "io/media/gltf_accessor.h"
+#include "io/media/gltf_model.h"
 
 namespace stipple::media {
 
 namespace {
 
 constexpr int kMaxDepth = 1000;
+constexpr size_t kGlbHeadBytes = 20;  // with the head of its first part
+constexpr size_t kChunkHeadBytes = 8;
+constexpr uint32_t kGlbMagic = 0x46546c67;
+constexpr uint32_t kJsonChunk = 0x4e4f534a;
+constexpr uint32_t kBinaryChunk = 0x004e4942;
+constexpr uint64_t kMaxJsonBytes = uint64_t{1} << 26;
+// Text is made from parsed JSON by recursion.
+constexpr int kMaxJsonDepth = 256;
+constexpr size_t kReadBytes = size_t{1} << 21;
+
+[[noreturn]] void failLoading(const std::string& path, const std::string& error) {
+  fail(ErrorCode::kFormat,
+       path + " is not a valid glTF file: " + (error.empty() ? "no reason is given" : error));
+}
 
 Mat4d localMatrix(const tinygltf::Node& node) {
   Mat4d matrix = Mat4d::Identity();
@@ -54,10 +71,10 @@ struct GltfScene::Walk {
   size_t visited = 0;
 };
 
-GltfScene::GltfScene(const std::string& path, const std::set<std::string>& known,
-                     const std::string& kind)
-    : path_(path), model_(std::make_unique<tinygltf::Model>()) {
-  load();
+GltfScene::GltfScene(const std::string& path, const std::set<std::string>& known, Content content)
+    : path_(path), model_(std::make_unique<GltfModel>()) {
+  load(content);
+  const std::string kind = content == Content::kSplats ? "splats" : "mesh";
   for (const std::string& name : model_->extensionsRequired) {
     if (known.count(name) == 0) {
       fail(ErrorCode::kUnsupported, path_ + " requires the glTF extension '" + name.substr(0, 80) +
@@ -69,7 +86,82 @@ GltfScene::GltfScene(const std::string& path, const std::set<std::string>& known
 
 GltfScene::~GltfScene() = default;
 
-void GltfScene::load() {
+/// Reads the binary part of a GLB straight to where accessors look for it, and gives tinygltf the
+/// rest. False, and nothing done, for files that are not plainly made of JSON and one binary part:
+/// tinygltf has the words for what is wrong with them.
+bool GltfScene::loadBinaryBeside() {
+  const InputFile file(path_);
+  std::array<uint8_t, kGlbHeadBytes> head;
+  if (file.size() < head.size() + kChunkHeadBytes) return false;
+  file.readAt(0, head.data(), head.size());
+  const uint64_t json_bytes = loadLittleEndian<uint32_t>(&head[12]);
+  const uint64_t binary_head = head.size() + json_bytes;
+  if (loadLittleEndian<uint32_t>(&head[0]) != kGlbMagic ||
+      loadLittleEndian<uint32_t>(&head[4]) != 2 ||
+      loadLittleEndian<uint32_t>(&head[16]) != kJsonChunk || json_bytes > kMaxJsonBytes ||
+      json_bytes % 4 != 0 || loadLittleEndian<uint32_t>(&head[8]) != file.size() ||
+      binary_head + kChunkHeadBytes > file.size()) {
+    return false;
+  }
+  std::array<uint8_t, kChunkHeadBytes> chunk;
+  file.readAt(binary_head, chunk.data(), chunk.size());
+  const uint64_t binary_at = binary_head + chunk.size();
+  const uint64_t binary_bytes = loadLittleEndian<uint32_t>(&chunk[0]);
+  if (loadLittleEndian<uint32_t>(&chunk[4]) != kBinaryChunk ||
+      binary_bytes > file.size() - binary_at) {
+    return false;
+  }
+  std::string text(static_cast<size_t>(json_bytes), '\0');
+  file.readAt(head.size(), text.data(), text.size());
+  bool deep = false;
+  const auto judge = [&deep](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
+    deep = deep || depth > kMaxJsonDepth;
+    return !deep;
+  };
+  nlohmann::json root = nlohmann::json::parse(text, judge, false);
+  if (deep || !root.is_object() || !root.contains("buffers") || !root["buffers"].is_array() ||
+      root["buffers"].empty()) {
+    return false;
+  }
+  for (const nlohmann::json& buffer : root["buffers"]) {
+    const bool first = &buffer == &root["buffers"].front();
+    if (!buffer.is_object() || buffer.contains("uri") == first) return false;
+  }
+  nlohmann::json& buffer = root["buffers"].front();
+  if (!buffer.contains("byteLength") || !buffer["byteLength"].is_number_unsigned()) return false;
+  const uint64_t used = buffer["byteLength"].get<uint64_t>();
+  if (used == 0 || used > binary_bytes) return false;
+  buffer["byteLength"] = 4;
+  for (const char* unused : {"images", "textures", "samplers", "materials"}) root.erase(unused);
+
+  text = root.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  std::vector<uint8_t> small(head.size() + text.size() + kChunkHeadBytes + 4, 0);
+  std::copy(head.begin(), head.end(), small.begin());
+  storeLittleEndian(static_cast<uint32_t>(small.size()), &small[8]);
+  storeLittleEndian(static_cast<uint32_t>(text.size()), &small[12]);
+  std::copy(text.begin(), text.end(), small.begin() + head.size());
+  uint8_t* const small_chunk = &small[head.size() + text.size()];
+  storeLittleEndian(uint32_t{4}, small_chunk);
+  storeLittleEndian(kBinaryChunk, small_chunk + 4);
+  std::string error;
+  std::string warning;
+  tinygltf::TinyGLTF loader;
+  const std::string folder = std::filesystem::path(path_).parent_path().string();
+  if (!loader.LoadBinaryFromMemory(model_.get(), &error, &warning, small.data(),
+                                   static_cast<unsigned>(small.size()), folder)) {
+    failLoading(path_, error);
+  }
+  model_->has_binary = true;
+  model_->binary.resize(static_cast<size_t>(used));
+  parallelFor(model_->binary.size(), kReadBytes, [&](size_t begin, size_t end) {
+    file.readAt(binary_at + begin, &model_->binary[begin], end - begin);
+  });
+  return true;
+}
+
+void GltfScene::load(Content content) {
+  if (content == Content::kSplats && loadBinaryBeside()) return;
   tinygltf::TinyGLTF loader;
   // Images are only kept here; those that a base colour needs are decoded later. The ranges of
   // images inside the file's own buffers are not checked by tinygltf, so they are not touched
@@ -92,10 +184,7 @@ void GltfScene::load() {
   const bool loaded = std::string(magic, sizeof(magic)) == "glTF"
                           ? loader.LoadBinaryFromFile(model_.get(), &error, &warning, path_)
                           : loader.LoadASCIIFromFile(model_.get(), &error, &warning, path_);
-  if (!loaded) {
-    fail(ErrorCode::kFormat,
-         path_ + " is not a valid glTF file: " + (error.empty() ? "no reason is given" : error));
-  }
+  if (!loaded) failLoading(path_, error);
   images_.resize(model_->images.size());
   for (size_t i = 0; i < images_.size(); ++i) {
     if (model_->images[i].bufferView < 0) continue;

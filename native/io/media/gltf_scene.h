@@ -8,23 +8,23 @@
 
 #include "math/vec.h"
 
-namespace tinygltf {
-class Model;
-}
-
 namespace stipple::media {
+
+struct GltfModel;
 
 /// A glTF or GLB file in memory, and walks through its default scene.
 /// Errors: kFormat with what tinygltf says, kUnsupported (a required extension that is not known).
 class GltfScene {
  public:
-  /// In: known, extensions that a file may require; kind, what messages call what is read.
-  GltfScene(const std::string& path, const std::set<std::string>& known, const std::string& kind);
+  /// What is read; messages call it so.
+  enum class Content { kMesh, kSplats };
+  /// In: known, extensions that a file may require. Splats come without pictures and materials.
+  GltfScene(const std::string& path, const std::set<std::string>& known, Content content);
   ~GltfScene();
   GltfScene(const GltfScene&) = delete;
   GltfScene& operator=(const GltfScene&) = delete;
 
-  const tinygltf::Model& model() const { return *model_; }
+  const GltfModel& model() const { return *model_; }
   /// The files of the pictures, still encoded.
   const std::vector<std::vector<unsigned char>>& images() const { return images_; }
 
@@ -35,12 +35,13 @@ class GltfScene {
  private:
   struct Walk;
 
-  void load();
+  void load(Content content);
+  bool loadBinaryBeside();
   std::vector<int> rootNodes() const;
   void visitNode(int index, const Mat4d& parent, int depth, Walk& walk) const;
 
   std::string path_;
-  std::unique_ptr<tinygltf::Model> model_;
+  std::unique_ptr<GltfModel> model_;
   std::vector<std::vector<unsigned char>> images_;
 };
 

@@ -1,8 +1,4 @@
 // Based on: The Khronos Group, glTF extension KHR_gaussian_splatting, release candidate of 2026.
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#include <tiny_gltf.h>
-
 #include <algorithm>
 #include <limits>
 #include <string>
@@ -14,6 +10,7 @@
 #include "data/splat_cloud.h"
 #include "io/gltf_splat_names.h"
 #include "io/media/gltf_accessor.h"
+#include "io/media/gltf_model.h"
 #include "io/media/gltf_scene.h"
 #include "io/media/media_calls.h"
 
@@ -40,7 +37,9 @@ struct Part {
 class SplatReader {
  public:
   explicit SplatReader(const std::string& path)
-      : path_(path), scene_(path, kKnownExtensions, "splats"), model_(scene_.model()) {}
+      : path_(path),
+        scene_(path, kKnownExtensions, GltfScene::Content::kSplats),
+        model_(scene_.model()) {}
 
   void read(const StippleMediaSink& sink) {
     scene_.visitMeshes(Mat4d::Identity(), [this](size_t mesh, const Mat4d& matrix) {
@@ -216,8 +215,11 @@ class SplatReader {
     };
     std::vector<Column> columns;
     const auto take = [&](const std::string& name, size_t width, float* out, size_t stride) {
-      columns.push_back(
-          {FloatSource(model_, find(part, name), width, part.what + ", " + name), out, stride});
+      FloatSource source(model_, find(part, name), width, part.what + ", " + name);
+      const bool follows = !columns.empty() && columns.back().stride == stride &&
+                           out == columns.back().out + columns.back().source.width();
+      if (follows && columns.back().source.join(source)) return;
+      columns.push_back({std::move(source), out, stride});
     };
     take("POSITION", 3, array(kMediaSplatPositions, 3), 3);
     take(kGltfRotation, 4, array(kMediaSplatRotations, 4), 4);
@@ -242,7 +244,7 @@ class SplatReader {
 
   std::string path_;
   GltfScene scene_;
-  const tinygltf::Model& model_;
+  const GltfModel& model_;
   std::vector<Part> parts_;
 };
 
