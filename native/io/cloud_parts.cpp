@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <utility>
 
 #include "base/parallel.h"
+#include "io/radix_order.h"
 #include "math/morton.h"
 
 namespace stipple {
@@ -78,7 +78,7 @@ void sortAlongMortonCurve(const std::vector<float>& positions, uint32_t* indices
     side[axis] = high - low[axis];
   }
   constexpr double kCells = (1 << 21) - 1;
-  std::vector<std::pair<uint64_t, uint32_t>> keys(count);
+  KeyedIndices keys(count);
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {
     for (size_t k = begin; k < end; ++k) {
       uint32_t cell[3];
@@ -90,8 +90,8 @@ void sortAlongMortonCurve(const std::vector<float>& positions, uint32_t* indices
       keys[k] = {mortonEncode(cell[0], cell[1], cell[2]), indices[k]};
     }
   });
-  std::sort(keys.begin(), keys.end());
-  for (size_t k = 0; k < count; ++k) indices[k] = keys[k].second;
+  sortByKey(keys);
+  for (size_t k = 0; k < count; ++k) indices[k] = keys[k].index;
 }
 
 }  // namespace stipple

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "io/radix_order.h"
+
 namespace stipple {
 
 namespace {
@@ -19,6 +21,10 @@ constexpr size_t kMeans = kSize - kForTheRare;
 constexpr int kMaxRounds = 1000;
 constexpr size_t kHistogramBins = 512;
 
+constexpr auto kIsBelow = [](double value, float element) {
+  return value < static_cast<double>(element);
+};
+
 /// Sorted different values with running sums, so that the mean of a range takes two look-ups.
 struct Sorted {
   std::vector<float> values;
@@ -26,9 +32,12 @@ struct Sorted {
   std::vector<double> sums;    ///< [values + 1]
 
   explicit Sorted(std::vector<float>& all) {
-    std::sort(all.begin(), all.end());
-    counts.push_back(0);
-    sums.push_back(0);
+    sortFloats(all);
+    for (std::vector<double>* running : {&counts, &sums}) {
+      running->reserve(all.size() + 1);
+      running->push_back(0);
+    }
+    values.reserve(all.size());
     for (size_t i = 0; i < all.size();) {
       size_t end = i;
       while (end < all.size() && all[end] == all[i]) ++end;
@@ -41,6 +50,23 @@ struct Sorted {
     }
   }
 
+  /// The first value above a limit. In: near, about where it is; the search grows from there.
+  size_t firstAbove(double limit, size_t near) const {
+    size_t begin = near;
+    size_t end = near;
+    for (size_t step = 1; begin > 0 && static_cast<double>(values[begin - 1]) > limit; step *= 2) {
+      begin -= std::min(begin, step);
+    }
+    for (size_t step = 1; end < values.size() && static_cast<double>(values[end]) <= limit;
+         step *= 2) {
+      end = std::min(values.size(), end + step);
+    }
+    const auto found =
+        std::upper_bound(values.begin() + static_cast<std::ptrdiff_t>(begin),
+                         values.begin() + static_cast<std::ptrdiff_t>(end), limit, kIsBelow);
+    return static_cast<size_t>(found - values.begin());
+  }
+
   double mean(size_t begin, size_t end) const {
     return (sums[end] - sums[begin]) / (counts[end] - counts[begin]);
   }
@@ -49,10 +75,6 @@ struct Sorted {
 /// Bounds of the ranges that the codebook's values stand for, into sorted.values: of kMeans, of
 /// kSize in the end.
 using Bounds = std::vector<size_t>;
-
-constexpr auto kIsBelow = [](double value, float element) {
-  return value < static_cast<double>(element);
-};
 
 Bounds startBounds(const Sorted& sorted) {
   const double low = static_cast<double>(sorted.values.front());
@@ -92,8 +114,7 @@ bool improve(const Sorted& sorted, Bounds& bounds) {
   const Bounds before = bounds;
   for (size_t k = 1; k < kMeans; ++k) {
     const double half = 0.5 * (means[k - 1] + means[k]);
-    const auto found = std::upper_bound(sorted.values.begin(), sorted.values.end(), half, kIsBelow);
-    bounds[k] = std::clamp(static_cast<size_t>(found - sorted.values.begin()), bounds[k - 1] + 1,
+    bounds[k] = std::clamp(sorted.firstAbove(half, before[k]), bounds[k - 1] + 1,
                            sorted.values.size() - (kMeans - k));
   }
   return bounds != before;
@@ -117,16 +138,44 @@ void splitWidest(const Sorted& sorted, Bounds& bounds) {
                 static_cast<size_t>(middle - sorted.values.begin()));
 }
 
+/// The value or the one before, whichever is nearer. In: above, the first that is not below.
+uint8_t nearerOf(const Codebook& codebook, size_t above, float value) {
+  if (above == 0) return 0;
+  if (above == kSize) return static_cast<uint8_t>(kSize - 1);
+  const double up = static_cast<double>(codebook.values[above]) - static_cast<double>(value);
+  const double down = static_cast<double>(value) - static_cast<double>(codebook.values[above - 1]);
+  return static_cast<uint8_t>(up < down ? above : above - 1);
+}
+
 }  // namespace
 
 uint8_t Codebook::nearest(float value) const {
   const auto found = std::lower_bound(values.begin(), values.end(), value);
-  if (found == values.begin()) return 0;
-  if (found == values.end()) return static_cast<uint8_t>(kSize - 1);
-  const auto index = static_cast<uint8_t>(found - values.begin());
-  const double above = static_cast<double>(*found) - static_cast<double>(value);
-  const double below = static_cast<double>(value) - static_cast<double>(*(found - 1));
-  return above < below ? index : static_cast<uint8_t>(index - 1);
+  return nearerOf(*this, static_cast<size_t>(found - values.begin()), value);
+}
+
+NearestCode::NearestCode(const Codebook& codebook)
+    : codebook_(codebook), low_(codebook.values.front()) {
+  const float extent = codebook.values.back() - low_;
+  const float scale = static_cast<float>(kBins) / extent;
+  bins_per_value_ = extent > 0.0f && std::isfinite(scale) ? scale : 0.0f;
+  size_t k = 0;
+  for (size_t bin = 0; bin < kBins; ++bin) {
+    while (k < kSize && binOf(codebook.values[k]) < bin) ++k;
+    first_[bin] = static_cast<uint16_t>(k);
+  }
+}
+
+/// Never falls where values rise, so that all before first_[binOf(value)] lie below the value.
+size_t NearestCode::binOf(float value) const {
+  const float place = (value - low_) * bins_per_value_;
+  return place > 0.0f ? static_cast<size_t>(std::min(place, static_cast<float>(kBins - 1))) : 0;
+}
+
+uint8_t NearestCode::operator()(float value) const {
+  size_t k = first_[binOf(value)];
+  while (k < kSize && codebook_.values[k] < value) ++k;
+  return nearerOf(codebook_, k, value);
 }
 
 Codebook makeCodebook(std::vector<float> values) {

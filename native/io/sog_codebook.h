@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -11,6 +12,22 @@ struct Codebook {
   std::array<float, 256> values{};
   /// The nearest one; of two as near, the lower.
   uint8_t nearest(float value) const;
+};
+
+/// Codebook::nearest with a table that says where to begin: for many values.
+class NearestCode {
+ public:
+  explicit NearestCode(const Codebook& codebook);
+  uint8_t operator()(float value) const;
+
+ private:
+  static constexpr size_t kBins = 1024;
+  size_t binOf(float value) const;
+
+  const Codebook& codebook_;
+  float low_;
+  float bins_per_value_;
+  std::array<uint16_t, kBins> first_;  ///< the first of the codebook in this bin or a later one
 };
 
 /// A codebook of small squared error: 1-D k-means of 248 values, from a start that is the best in

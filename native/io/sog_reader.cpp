@@ -193,10 +193,13 @@ class Reader {
 
   void fillPositionTables() {
     if (meta_.count < kCodes) return;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      positions_[axis].resize(kCodes);
-      for (uint32_t code = 0; code < kCodes; ++code) positions_[axis][code] = position(axis, code);
-    }
+    for (std::vector<float>& table : positions_) table.resize(kCodes);
+    parallelFor(3 * kCodes, kGrain, [this](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const size_t axis = i / kCodes;
+        positions_[axis][i % kCodes] = position(axis, static_cast<uint32_t>(i % kCodes));
+      }
+    });
   }
 
   void fillPalette() {

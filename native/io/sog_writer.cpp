@@ -195,9 +195,10 @@ class Encoder {
   }
 
   void encodeScales() {
+    const NearestCode code(scale_codebook_);
     fillPixels(addPicture("scales.webp"), [&](uint8_t* pixel, size_t i) {
       for (size_t axis = 0; axis < 3; ++axis) {
-        pixel[axis] = scale_codebook_.nearest(logarithms_[i * 3 + axis]);
+        pixel[axis] = code(logarithms_[i * 3 + axis]);
       }
       pixel[3] = 255;
     });
@@ -228,9 +229,10 @@ class Encoder {
   }
 
   void encodeColours() {
+    const NearestCode code(colour_codebook_);
     fillPixels(addPicture("sh0.webp"), [&](uint8_t* pixel, size_t i) {
       for (size_t c = 0; c < 3; ++c) {
-        pixel[c] = colour_codebook_.nearest(colours_[i * 3 + c]);
+        pixel[c] = code(colours_[i * 3 + c]);
       }
       pixel[3] =
           static_cast<uint8_t>(std::lround(static_cast<double>(cloud_.opacities[i]) * 255.0));
@@ -252,28 +254,34 @@ class Encoder {
     PaletteOptions palette_options;
     palette_options.max_count = paletteLimit(cloud_.size());
     palette_options.rounds = options_.palette_rounds;
-    const VectorPalette palette =
-        makeVectorPalette(vectors.data(), cloud_.size(), width, palette_options, nullptr);
+    palette_ = makeVectorPalette(vectors.data(), cloud_.size(), width, palette_options, nullptr);
     advance(progress_, 0.7, kStage);
-    const Codebook codebook = makeCodebook(palette.vectors);
+    // Its codebook is one thread's work, done while others pack the rest.
+    pictures_.push_back({"shN_centroids.webp", {}});
+    centroids_ = pictures_.size() - 1;
+    fillPixels(addPicture("shN_labels.webp"), [&](uint8_t* pixel, size_t i) {
+      pixel[0] = static_cast<uint8_t>(palette_.labels[i] & 0xff);
+      pixel[1] = static_cast<uint8_t>(palette_.labels[i] >> 8);
+      pixel[3] = 255;
+    });
+  }
 
-    RgbaBytes centroids;
+  /// The palette as a picture, 64 vectors in a row.
+  void encodeCentroids(RgbaBytes& centroids) {
+    const int bands = std::min(cloud_.sh_degree, kMaxBands);
+    const size_t row = shCoefficientCount(bands) - 1;
+    const Codebook codebook = makeCodebook(palette_.vectors);
+    const NearestCode code(codebook);
     centroids.width = static_cast<uint32_t>(kPaletteRow * row);
-    centroids.height = static_cast<uint32_t>((palette.count + kPaletteRow - 1) / kPaletteRow);
+    centroids.height = static_cast<uint32_t>((palette_.count + kPaletteRow - 1) / kPaletteRow);
     centroids.bytes.assign(static_cast<size_t>(centroids.pixelCount() * 4), 0);
-    for (size_t pixel = 0; pixel < palette.count * row; ++pixel) {
+    for (size_t pixel = 0; pixel < palette_.count * row; ++pixel) {
       for (size_t c = 0; c < 3; ++c) {
-        centroids.bytes[pixel * 4 + c] = codebook.nearest(palette.vectors[pixel * 3 + c]);
+        centroids.bytes[pixel * 4 + c] = code(palette_.vectors[pixel * 3 + c]);
       }
       centroids.bytes[pixel * 4 + 3] = 255;
     }
-    pictures_.push_back({"shN_centroids.webp", std::move(centroids)});
-    fillPixels(addPicture("shN_labels.webp"), [&](uint8_t* pixel, size_t i) {
-      pixel[0] = static_cast<uint8_t>(palette.labels[i] & 0xff);
-      pixel[1] = static_cast<uint8_t>(palette.labels[i] >> 8);
-      pixel[3] = 255;
-    });
-    meta_["shN"] = {{"count", palette.count},
+    meta_["shN"] = {{"count", palette_.count},
                     {"bands", bands},
                     {"codebook", toJson(codebook)},
                     {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
@@ -284,6 +292,7 @@ class Encoder {
     std::atomic<size_t> done{0};
     parallelFor(pictures_.size(), 1, [&](size_t begin, size_t) {
       Picture& picture = pictures_[begin];
+      if (begin == centroids_) encodeCentroids(picture.image);
       parts[begin] = {picture.name, encodeWebp(picture.image, picture.name)};
       picture.image = {};
       advance(progress_,
@@ -305,8 +314,11 @@ class Encoder {
   std::vector<float> colours_;     ///< [N,3]
   Codebook scale_codebook_;
   Codebook colour_codebook_;
+  VectorPalette palette_;
   Json meta_;
   std::vector<Picture> pictures_;
+  size_t centroids_ =
+      std::numeric_limits<size_t>::max();  ///< which picture; none without harmonics
 };
 
 void writeZip(const std::vector<SogPart>& parts, const std::string& path) {

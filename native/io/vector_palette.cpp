@@ -14,6 +14,8 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "io/centre_search.h"
+#include "io/radix_order.h"
 
 namespace stipple {
 
@@ -22,12 +24,12 @@ namespace {
 using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using ConstMap = Eigen::Map<const Matrix>;
 
-// Vectors per matrix product: the scores against 256 others stay in the second cache.
+// Vectors that are gathered at a time: 46 KB of width 45, which stay in the second cache.
 constexpr size_t kBlock = 256;
 // Cells are placed by a sample of this many vectors each.
 constexpr size_t kSamplePerCell = 128;
 constexpr int kCellRounds = 10;
-// Cells whose palettes a vector is compared with in the end.
+// Cells whose palettes a vector is compared with in the end; as many as NearestTwo holds.
 constexpr size_t kProbes = 2;
 constexpr int kFinalRounds = 1;
 
@@ -36,34 +38,28 @@ struct Best {
   uint32_t index;
 };
 
-/// Centres around an origin, with half their squared distances from it: near centres of far vectors
-/// would lose their difference to rounding otherwise.
+/// Centres around an origin: near centres of far vectors would lose their difference to rounding
+/// otherwise.
 struct Centres {
   Eigen::RowVectorXf origin;
   Matrix rows;  ///< relative to the origin
-  Eigen::RowVectorXf half_squares;
+  CentreTable table;
 
-  void measure() { half_squares = 0.5f * rows.rowwise().squaredNorm().transpose(); }
+  void measure() { table = CentreTable(rows.data(), count(), static_cast<size_t>(rows.cols())); }
   size_t count() const { return static_cast<size_t>(rows.rows()); }
 };
 
-/// Of equal scores the first. In: half_square, what the scores lack.
-Best lowest(const float* scores, size_t count, float half_square) {
-  const float least = Eigen::Map<const Eigen::RowVectorXf>(scores, Eigen::Index(count)).minCoeff();
-  const float* found = std::find(scores, scores + count, least);
-  return {std::max(0.0f, half_square + least), static_cast<uint32_t>(found - scores)};
-}
-
-/// Scores of gathered vectors against all centres, row by row: with the vector's own half square
-/// they are halved squared distances.
+/// The nearest centres of gathered vectors.
 class Scorer {
  public:
-  explicit Scorer(size_t width) : width_(width) {}
+  explicit Scorer(size_t width) : width_(width), found_(kBlock) {}
 
-  /// In: index(k), which vector is the k-th; use(k, scores, count, half_square) takes each.
+  /// In: index(k), which vector is the k-th; use(k, nearest, half_square) takes each: with the
+  /// vector's own half square, scores are halved squared distances.
   template <typename Index, typename Use>
   void run(const float* vectors, size_t count, const Centres& centres, const Index& index,
            const Use& use) {
+    const CentreSearch search = chosenCentreSearch();
     for (size_t begin = 0; begin < count; begin += kBlock) {
       const size_t rows = std::min(kBlock, count - begin);
       gathered_.resize(Eigen::Index(rows), Eigen::Index(width_));
@@ -72,11 +68,9 @@ class Scorer {
                     width_ * sizeof(float));
       }
       gathered_.rowwise() -= centres.origin;
-      scores_.noalias() = gathered_ * centres.rows.transpose();
-      scores_ = (-scores_).rowwise() + centres.half_squares;
+      search(gathered_.data(), rows, centres.table, found_.data());
       for (size_t k = 0; k < rows; ++k) {
-        use(begin + k, scores_.data() + k * centres.count(), centres.count(),
-            0.5f * gathered_.row(Eigen::Index(k)).squaredNorm());
+        use(begin + k, found_[k], 0.5f * gathered_.row(Eigen::Index(k)).squaredNorm());
       }
     }
   }
@@ -84,8 +78,12 @@ class Scorer {
  private:
   size_t width_;
   Matrix gathered_;
-  Matrix scores_;
+  std::vector<NearestTwo> found_;
 };
+
+Best nearestOf(const NearestTwo& found, float half_square) {
+  return {std::max(0.0f, half_square + found.score[0]), found.index[0]};
+}
 
 /// Numbers 0..n-1 grouped by key, ascending inside a group.
 struct Groups {
@@ -132,7 +130,7 @@ class PaletteMaker {
 
   /// The palette of all different vectors, where they are few enough.
   bool keepAll() {
-    std::vector<std::pair<uint64_t, uint32_t>> order(n_);
+    KeyedIndices order(n_);
     parallelFor(n_, kBlock * 16, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         uint64_t hash = 0;
@@ -144,16 +142,16 @@ class PaletteMaker {
         order[i] = {hash, static_cast<uint32_t>(i)};
       }
     });
-    std::sort(order.begin(), order.end());
+    sortByKey(order);
     palette_.labels.resize(n_);
     std::vector<uint32_t> kept;
     for (size_t k = 0; k < n_; ++k) {
       // Different vectors of one hash would part a group and cost an entry, never an error.
-      if (k == 0 || order[k].first != order[k - 1].first || !same(order[k].second, kept.back())) {
+      if (k == 0 || order[k].key != order[k - 1].key || !same(order[k].index, kept.back())) {
         if (kept.size() == options_.max_count) return false;
-        kept.push_back(order[k].second);
+        kept.push_back(order[k].index);
       }
-      palette_.labels[order[k].second] = static_cast<uint16_t>(kept.size() - 1);
+      palette_.labels[order[k].index] = static_cast<uint16_t>(kept.size() - 1);
     }
     palette_.count = kept.size();
     for (const uint32_t i : kept) {
@@ -249,8 +247,8 @@ class PaletteMaker {
       parallelFor(sample.size(), kBlock * 4, [&](size_t begin, size_t end) {
         Scorer(width_).run(
             vectors_, end - begin, cells_, [&](size_t k) { return index(begin + k); },
-            [&](size_t k, const float* scores, size_t count, float half_square) {
-              best[begin + k] = lowest(scores, count, half_square);
+            [&](size_t k, const NearestTwo& found, float half_square) {
+              best[begin + k] = nearestOf(found, half_square);
             });
       });
       moveCentres(cells_, sample.size(), best, index);
@@ -260,27 +258,13 @@ class PaletteMaker {
     parallelFor(n_, kBlock * 16, [&](size_t begin, size_t end) {
       Scorer(width_).run(
           vectors_, end - begin, cells_, [&](size_t k) { return begin + k; },
-          [&](size_t k, const float* scores, size_t count, float) {
-            nearestOf(scores, count, &nearest_cells_[(begin + k) * probes_]);
+          [&](size_t k, const NearestTwo& found, float) {
+            for (size_t p = 0; p < probes_; ++p) {
+              nearest_cells_[(begin + k) * probes_ + p] = static_cast<uint16_t>(found.index[p]);
+            }
           });
     });
     advance(progress_, 0.1, kStage);
-  }
-
-  /// The probes_ lowest scores, best first.
-  void nearestOf(const float* scores, size_t count, uint16_t* nearest) const {
-    float kept[kProbes];
-    size_t size = 0;
-    for (size_t c = 0; c < count; ++c) {
-      if (size == probes_ && !(scores[c] < kept[size - 1])) continue;
-      size_t at = size < probes_ ? size++ : size - 1;
-      for (; at > 0 && scores[c] < kept[at - 1]; --at) {
-        kept[at] = kept[at - 1];
-        nearest[at] = nearest[at - 1];
-      }
-      kept[at] = scores[c];
-      nearest[at] = static_cast<uint16_t>(c);
-    }
   }
 
   /// Second level: each cell gets a share of the palette and k-means of its own.
@@ -362,8 +346,8 @@ class PaletteMaker {
     std::vector<Best> best(count);
     for (int round = 0; round < options_.rounds; ++round) {
       scorer.run(vectors_, count, palette, index,
-                 [&](size_t k, const float* scores, size_t size, float half_square) {
-                   best[k] = lowest(scores, size, half_square);
+                 [&](size_t k, const NearestTwo& found, float half_square) {
+                   best[k] = nearestOf(found, half_square);
                  });
       moveCentres(palette, count, best, index);
     }
@@ -391,8 +375,8 @@ class PaletteMaker {
         Scorer(width_).run(
             vectors_, visitors.size(cell), palettes_[cell],
             [&](size_t k) { return members[k] / probes_; },
-            [&](size_t k, const float* scores, size_t count, float half_square) {
-              Best best = lowest(scores, count, half_square);
+            [&](size_t k, const NearestTwo& found, float half_square) {
+              Best best = nearestOf(found, half_square);
               best.index += static_cast<uint32_t>(first[cell]);
               candidates_[members[k]] = best;
             });
