@@ -1,13 +1,23 @@
 #include "data/splat_cloud.h"
 
+#include <sys/mman.h>
+
+#include <atomic>
 #include <bit>
+#include <cstdint>
 #include <string>
 
 #include "base/error.h"
+#include "base/parallel.h"
 
 namespace stipple {
 
 namespace {
+
+constexpr size_t kGrain = 8192;
+// Below four huge pages the rounding would cost more memory than the faults cost time.
+constexpr size_t kHugePageBytes = size_t{2} << 20;
+constexpr size_t kHugeFromBytes = 4 * kHugePageBytes;
 
 void requireSize(size_t seen, size_t expected, const char* what, const char* array) {
   if (seen != expected) {
@@ -17,14 +27,35 @@ void requireSize(size_t seen, size_t expected, const char* what, const char* arr
   }
 }
 
+/// resize() of an array that was empty. The first touch of a page of 4 KiB takes longer than
+/// filling it: pages of 2 MiB, where the system has them, touched by all threads.
+void resizeFresh(std::vector<float>& values, size_t count) {
+  if (!values.empty() || count <= values.capacity() || count * sizeof(float) < kHugeFromBytes) {
+    values.resize(count);
+    return;
+  }
+  values.reserve(count);
+  const auto begin = reinterpret_cast<uintptr_t>(values.data());
+  // Whole huge pages inside, so that nothing else of the heap changes.
+  const uintptr_t first = (begin + kHugePageBytes - 1) / kHugePageBytes * kHugePageBytes;
+  const uintptr_t last = (begin + count * sizeof(float)) / kHugePageBytes * kHugePageBytes;
+  // Advice only: refused where there are no huge pages. Populating is what a write does.
+  madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
+  parallelFor((last - first) / kHugePageBytes, 1, [&](size_t page, size_t) {
+    madvise(reinterpret_cast<void*>(first + page * kHugePageBytes), kHugePageBytes,
+            MADV_POPULATE_WRITE);
+  });
+  values.resize(count);
+}
+
 }  // namespace
 
 void SplatCloud::resize(size_t count) {
-  positions.resize(count * 3);
-  rotations.resize(count * 4);
-  scales.resize(count * 3);
-  opacities.resize(count);
-  sh.resize(count * shStride());
+  resizeFresh(positions, count * 3);
+  resizeFresh(rotations, count * 4);
+  resizeFresh(scales, count * 3);
+  resizeFresh(opacities, count);
+  resizeFresh(sh, count * shStride());
 }
 
 void validateSizes(const SplatCloud& cloud, const char* what) {
@@ -71,6 +102,12 @@ void validate(const SplatCloud& cloud, const char* what) {
   const std::string name(what);
   const size_t count = cloud.size();
   validateSizes(cloud, what);
+  std::atomic<bool> valid{true};
+  parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+    if (!rowsAreValid(cloud, begin, end)) valid.store(false, std::memory_order_relaxed);
+  });
+  if (valid.load(std::memory_order_relaxed)) return;
+  // Once more in order, for the first value that is wrong.
   requireFinite(cloud.positions.data(), count * 3, 3, (name + ": position of splat").c_str());
   requireFinite(cloud.rotations.data(), count * 4, 4, (name + ": rotation of splat").c_str());
   requireFinite(cloud.scales.data(), count * 3, 3, (name + ": scale of splat").c_str());

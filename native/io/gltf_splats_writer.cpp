@@ -2,6 +2,7 @@
 // and glTF 2.0 Specification, section 4 (GLB).
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cctype>
 #include <cmath>
@@ -17,6 +18,7 @@
 #include "io/gltf_splats.h"
 #include "io/input_file.h"
 #include "io/output_file.h"
+#include "io/splat_check.h"
 #include "math/colour.h"
 
 namespace stipple {
@@ -30,8 +32,6 @@ constexpr int kFloat = 5126;
 constexpr int kUnsignedShort = 5123;
 constexpr int kArrayBuffer = 34962;
 constexpr size_t kGrain = 4096;
-// Splats per round of writing: 12 MB of harmonics of degree 3.
-constexpr size_t kChunk = kGrain * 16;
 constexpr size_t kGlbHead = 12;
 constexpr size_t kChunkHead = 8;
 constexpr char kStage[] = "Writing splats";
@@ -216,35 +216,39 @@ class Writer {
     return root.dump();
   }
 
-  void writeData(OutputFile& file) {
+  /// All views, the rows of one task at a time. In: offset, where the first view begins.
+  void writeData(OutputFile& file, uint64_t offset) {
     constexpr bool kAsTheyLie = std::endian::native == std::endian::little;
-    std::vector<char> bytes;
-    uint64_t done = 0;
-    for (const View& view : views_) {
-      for (size_t chunk = 0; chunk < cloud_.size(); chunk += kChunk) {
-        const size_t rows = std::min(kChunk, cloud_.size() - chunk);
-        const size_t count = rows * view.row_bytes;
+    RowCheck check(cloud_, "cloud");
+    std::atomic<size_t> done{0};
+    parallelFor(cloud_.size(), kGrain, [&](size_t begin, size_t end) {
+      if (!check.look(begin, end)) return;
+      std::vector<char> bytes;
+      uint64_t place = offset;
+      for (const View& view : views_) {
+        const size_t count = (end - begin) * view.row_bytes;
         const size_t floats = view.row_bytes / sizeof(float);
+        const uint64_t at = place + begin * uint64_t{view.row_bytes};
         if (view.floats != nullptr && kAsTheyLie) {
-          file.write(view.floats->data() + chunk * floats, count);
+          file.writeAt(at, view.floats->data() + begin * floats, count);
         } else {
           bytes.resize(count);
-          parallelFor(rows, kGrain, [&](size_t begin, size_t end) {
-            for (size_t i = begin; i < end; ++i) {
-              char* row = &bytes[i * view.row_bytes];
-              if (view.floats != nullptr) {
-                putFloats(view.floats->data() + (chunk + i) * floats, floats, row);
-              } else {
-                view.fill(cloud_, chunk + i, row);
-              }
+          for (size_t i = begin; i < end; ++i) {
+            char* row = &bytes[(i - begin) * view.row_bytes];
+            if (view.floats != nullptr) {
+              putFloats(view.floats->data() + i * floats, floats, row);
+            } else {
+              view.fill(cloud_, i, row);
             }
-          });
-          file.write(bytes.data(), bytes.size());
+          }
+          file.writeAt(at, bytes.data(), count);
         }
-        done += count;
-        advance(progress_, static_cast<double>(done) / static_cast<double>(data_bytes_), kStage);
+        place += view.row_bytes * cloud_.size();
       }
-    }
+      const size_t rows = done.fetch_add(end - begin) + (end - begin);
+      advance(progress_, static_cast<double>(rows) / static_cast<double>(cloud_.size()), kStage);
+    });
+    check.require();
   }
 
   static void putNumber(std::string& bytes, uint64_t value) {
@@ -267,8 +271,8 @@ class Writer {
     head += "JSON" + text;
     putNumber(head, data_bytes_);
     head += std::string("BIN\0", 4);
-    file.write(head.data(), head.size());
-    writeData(file);
+    file.writeAt(0, head.data(), head.size());
+    writeData(file, head.size());
     file.commit();
   }
 
@@ -277,7 +281,7 @@ class Writer {
     const std::string text = json(percentEncoded(data_path.filename().string()));
     OutputFile data(data_path.string());
     OutputFile file(path_);
-    writeData(data);
+    writeData(data, 0);
     file.write(text.data(), text.size());
     file.handOver();
     data.commit();

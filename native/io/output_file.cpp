@@ -86,6 +86,22 @@ void OutputFile::write(const void* bytes, size_t count) {
   }
 }
 
+void OutputFile::writeAt(uint64_t offset, const void* bytes, size_t count) {
+  if (file_ == nullptr) {
+    fail(ErrorCode::kInternal, path_ + " is written after its handle was given away");
+  }
+  const int descriptor = ::fileno(file_);
+  const auto* source = static_cast<const char*>(bytes);
+  while (count > 0) {
+    const ssize_t put = ::pwrite(descriptor, source, count, static_cast<off_t>(offset));
+    if (put < 0 && errno == EINTR) continue;
+    if (put <= 0) failWriting(path_, reason(put < 0 ? errno : ENOSPC));
+    source += put;
+    offset += static_cast<uint64_t>(put);
+    count -= static_cast<size_t>(put);
+  }
+}
+
 void OutputFile::handOver() {
   if (file_ == nullptr) return;
   std::FILE* file = file_;

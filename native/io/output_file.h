@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <functional>
 #include <string>
@@ -17,6 +18,9 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
   void write(const void* bytes, size_t count);
+  /// Writes at a place of the file, from any thread, so that some encode while one writes. Not
+  /// together with write().
+  void writeAt(uint64_t offset, const void* bytes, size_t count);
   void commit();
   /// The temporary name, for libraries that open files themselves (then `adopt` before commit).
   const std::string& temporaryPath() const { return temporary_path_; }

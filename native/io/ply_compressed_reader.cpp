@@ -1,6 +1,7 @@
 // Based on: the compressed PLY of PlayCanvas (developer.playcanvas.com, Compressed PLY format).
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -28,10 +29,24 @@ struct Rows {
   size_t stride = 0;
 };
 
+/// 0..1 in even steps.
+template <size_t kCount>
+std::array<double, kCount> sharesOf() {
+  std::array<double, kCount> shares;
+  for (size_t i = 0; i < kCount; ++i) {
+    shares[i] = static_cast<double>(i) / static_cast<double>(kCount - 1);
+  }
+  return shares;
+}
+
 class Reader {
  public:
   Reader(const std::string& path, Progress* progress)
-      : file_(path), progress_(progress), header_(readPlyHeader(file_)) {}
+      : file_(path), progress_(progress), header_(readPlyHeader(file_)) {
+    for (size_t byte = 0; byte < 256; ++byte) {
+      harmonic_of_[byte] = static_cast<float>(plyHarmonicOf(static_cast<uint8_t>(byte)));
+    }
+  }
 
   SplatCloud read() {
     if (header_.encoding != PlyEncoding::kLittleEndian) {
@@ -47,20 +62,15 @@ class Reader {
     for (size_t k = 0; k < 4; ++k) {
       columns[k] = column(vertices_, kPackedProperties[k], PlyType::kUint32);
     }
+    const std::vector<size_t> harmonics = harmonicColumns();
+    std::atomic<size_t> done{0};
     parallelFor(cloud_.size(), kPlyChunkSplats * 16, [&](size_t begin, size_t end) {
-      ByteVector block((end - begin) * vertices_.stride);
-      file_.readAt(vertices_.offset + begin * uint64_t{vertices_.stride}, block.data(),
-                   block.size());
-      for (size_t i = begin; i < end; ++i) {
-        const uint8_t* row = &block[(i - begin) * vertices_.stride];
-        std::array<uint32_t, 4> packed;
-        for (size_t k = 0; k < 4; ++k) packed[k] = loadLittleEndian<uint32_t>(row + columns[k]);
-        decode(packed, i);
-      }
+      decodeRows(columns, begin, end);
+      if (!harmonics.empty()) decodeHarmonics(harmonics, begin, end);
+      const size_t rows = done.fetch_add(end - begin) + (end - begin);
+      advance(progress_, static_cast<double>(rows) / static_cast<double>(cloud_.size()),
+              "Reading splats");
     });
-    advance(progress_, 0.5, "Reading splats");
-    if (cloud_.sh_degree > 0) readHarmonics();
-    advance(progress_, 1.0, "Reading splats");
     return std::move(cloud_);
   }
 
@@ -150,10 +160,28 @@ class Reader {
     }
   }
 
+  /// Rows [begin, end) of an element.
+  ByteVector bytesOf(const Rows& rows, size_t begin, size_t end) const {
+    ByteVector block((end - begin) * rows.stride);
+    file_.readAt(rows.offset + begin * uint64_t{rows.stride}, block.data(), block.size());
+    return block;
+  }
+
+  void decodeRows(const std::array<size_t, 4>& columns, size_t begin, size_t end) {
+    const ByteVector block = bytesOf(vertices_, begin, end);
+    for (size_t i = begin; i < end; ++i) {
+      const uint8_t* row = &block[(i - begin) * vertices_.stride];
+      std::array<uint32_t, 4> packed;
+      for (size_t k = 0; k < 4; ++k) packed[k] = loadLittleEndian<uint32_t>(row + columns[k]);
+      decode(packed, i);
+    }
+  }
+
   /// The three numbers of 11, 10 and 11 bits, between the ranges that start at `first`.
-  static std::array<double, 3> unpack(uint32_t packed, const PlyChunkRange& range, size_t first) {
-    const std::array<double, 3> shares = {(packed >> 21) / 2047.0, (packed >> 11 & 1023) / 1023.0,
-                                          (packed & 2047) / 2047.0};
+  std::array<double, 3> unpack(uint32_t packed, const PlyChunkRange& range, size_t first) const {
+    const std::array<double, 3> shares = {shares_of_11_[packed >> 21],
+                                          shares_of_10_[packed >> 11 & 1023],
+                                          shares_of_11_[packed & 2047]};
     std::array<double, 3> values;
     for (size_t k = 0; k < 3; ++k) values[k] = between(range, first + k, shares[k]);
     return values;
@@ -172,21 +200,21 @@ class Reader {
     for (size_t k = 0; k < 3; ++k) {
       cloud_.positions[i * 3 + k] = static_cast<float>(position[k]);
       cloud_.scales[i * 3 + k] = static_cast<float>(std::exp(logarithm[k]));
-      const double colour = between(range, 12 + k, (packed[3] >> (24 - 8 * k) & 255) / 255.0);
+      const double colour = between(range, 12 + k, shares_of_8_[packed[3] >> (24 - 8 * k) & 255]);
       sh[k] = static_cast<float>((colour - 0.5) / kPlyChunkC0);
     }
-    cloud_.opacities[i] = static_cast<float>((packed[3] & 255) / 255.0);
+    cloud_.opacities[i] = static_cast<float>(shares_of_8_[packed[3] & 255]);
     decodeRotation(packed[1], &cloud_.rotations[i * 4]);
   }
 
   /// Index of the largest of w, x, y, z in 2 bits, then the others in 10 bits each, between
   /// -sqrt(1/2) and sqrt(1/2).
-  static void decodeRotation(uint32_t packed, float* q) {
+  void decodeRotation(uint32_t packed, float* q) const {
     const size_t largest = packed >> 30;
     double squares = 0;
     for (size_t k = 4; k-- > 0;) {
       if (k == largest) continue;
-      const double value = ((packed & 1023) / 1023.0 - 0.5) * std::sqrt(2.0);
+      const double value = (shares_of_10_[packed & 1023] - 0.5) * std::sqrt(2.0);
       packed >>= 10;
       squares += value * value;
       q[k] = static_cast<float>(value);
@@ -198,30 +226,27 @@ class Reader {
     }
   }
 
-  void readHarmonics() {
-    const size_t rest = shCoefficientCount(cloud_.sh_degree) - 1;
-    std::array<float, 256> value_of;
-    for (size_t byte = 0; byte < 256; ++byte) {
-      value_of[byte] = static_cast<float>(plyHarmonicOf(static_cast<uint8_t>(byte)));
-    }
+  /// Where in a row the harmonics lie: all of red, then all of green, then all of blue.
+  std::vector<size_t> harmonicColumns() const {
     std::vector<size_t> columns;
-    for (size_t k = 0; k < rest * 3; ++k) {
+    for (size_t k = 0; k < cloud_.shStride() - 3; ++k) {
       columns.push_back(column(harmonics_, "f_rest_" + std::to_string(k), PlyType::kUint8));
     }
-    parallelFor(cloud_.size(), kPlyChunkSplats * 16, [&](size_t begin, size_t end) {
-      ByteVector block((end - begin) * harmonics_.stride);
-      file_.readAt(harmonics_.offset + begin * uint64_t{harmonics_.stride}, block.data(),
-                   block.size());
-      for (size_t i = begin; i < end; ++i) {
-        const uint8_t* row = &block[(i - begin) * harmonics_.stride];
-        float* sh = &cloud_.sh[i * cloud_.shStride()];
-        // The file holds all of red, then all of green, then all of blue.
-        const size_t* at = columns.data();
-        for (size_t channel = 0; channel < 3; ++channel) {
-          for (size_t k = 1; k <= rest; ++k) sh[k * 3 + channel] = value_of[row[*at++]];
-        }
-      }
-    });
+    return columns;
+  }
+
+  void decodeHarmonics(const std::vector<size_t>& columns, size_t begin, size_t end) {
+    const ByteVector block = bytesOf(harmonics_, begin, end);
+    const size_t stride = cloud_.shStride();
+    const size_t rest = columns.size() / 3;
+    // In the order of the cloud, so that it is written from front to back.
+    std::array<size_t, 45> from;
+    for (size_t k = 0; k < columns.size(); ++k) from[k] = columns[k % 3 * rest + k / 3];
+    for (size_t i = begin; i < end; ++i) {
+      const uint8_t* row = &block[(i - begin) * harmonics_.stride];
+      float* sh = &cloud_.sh[i * stride + 3];
+      for (size_t k = 0; k < columns.size(); ++k) sh[k] = harmonic_of_[row[from[k]]];
+    }
   }
 
   InputFile file_;
@@ -230,6 +255,11 @@ class Reader {
   Rows chunks_, vertices_, harmonics_;
   std::vector<PlyChunkRange> ranges_;
   SplatCloud cloud_;
+  // Divisions take longer than these look-ups.
+  const std::array<double, 2048> shares_of_11_ = sharesOf<2048>();
+  const std::array<double, 1024> shares_of_10_ = sharesOf<1024>();
+  const std::array<double, 256> shares_of_8_ = sharesOf<256>();
+  std::array<float, 256> harmonic_of_;
 };
 
 }  // namespace

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -9,20 +11,24 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "io/compression.h"
 #include "io/output_file.h"
 #include "io/ply_comments.h"
 #include "io/ply_file.h"
+#include "io/splat_check.h"
 
 namespace stipple {
 
 namespace {
 
-// Rows per task, and tasks per round of writing: 4 MB at degree 3.
+// Rows per task, and rows per round of writing text: 4 MB and more at degree 3.
 constexpr size_t kBlockRows = 1024;
 constexpr size_t kChunkRows = kBlockRows * 16;
 
 // nx ny nz are zero: no reader uses them, some count on their place.
 constexpr size_t kNormalCount = 3;
+
+constexpr size_t kMaxRowLength = 3 + kNormalCount + 75 + 1 + 3 + 4;  // harmonics of degree 4
 
 size_t rowLength(const SplatCloud& cloud) {
   return 3 + kNormalCount + cloud.shStride() + 1 + 3 + 4;
@@ -81,7 +87,7 @@ void appendText(const float* row, size_t length, std::string* text) {
   }
 }
 
-void storeLittleEndian(const float* row, size_t length, char* bytes) {
+void storeFloats(const float* row, size_t length, uint8_t* bytes) {
   if constexpr (std::endian::native == std::endian::little) {
     std::memcpy(bytes, row, length * sizeof(float));
     return;
@@ -89,7 +95,68 @@ void storeLittleEndian(const float* row, size_t length, char* bytes) {
   for (size_t k = 0; k < length; ++k) {
     uint32_t bits = 0;
     std::memcpy(&bits, row + k, 4);
-    for (unsigned b = 0; b < 4; ++b) bytes[k * 4 + b] = static_cast<char>(bits >> (8 * b));
+    for (unsigned b = 0; b < 4; ++b) bytes[k * 4 + b] = static_cast<uint8_t>(bits >> (8 * b));
+  }
+}
+
+class RowProgress {
+ public:
+  RowProgress(size_t count, Progress* progress) : count_(count), progress_(progress) {}
+  void add(size_t rows) {
+    const size_t done = done_.fetch_add(rows) + rows;
+    advance(progress_, static_cast<double>(done) / static_cast<double>(count_), "Writing splats");
+  }
+
+ private:
+  size_t count_;
+  Progress* progress_;
+  std::atomic<size_t> done_{0};
+};
+
+/// Blocks of rows, each to its place by the thread that made it.
+void writeBinary(const SplatCloud& cloud, const std::string& head, OutputFile& file,
+                 Progress* progress) {
+  file.writeAt(0, head.data(), head.size());
+  const size_t length = rowLength(cloud);
+  RowCheck check(cloud, "cloud");
+  RowProgress done(cloud.size(), progress);
+  parallelFor(cloud.size(), kBlockRows, [&](size_t begin, size_t end) {
+    if (!check.look(begin, end)) return;
+    ByteVector block((end - begin) * length * sizeof(float));
+    std::array<float, kMaxRowLength> row;
+    for (size_t i = begin; i < end; ++i) {
+      fillRow(cloud, i, row.data());
+      storeFloats(row.data(), length, &block[(i - begin) * length * sizeof(float)]);
+    }
+    file.writeAt(head.size() + begin * length * uint64_t{sizeof(float)}, block.data(),
+                 block.size());
+    done.add(end - begin);
+  });
+  check.require();
+}
+
+void writeText(const SplatCloud& cloud, const std::string& head, OutputFile& file,
+               Progress* progress) {
+  file.write(head.data(), head.size());
+  validate(cloud, "cloud");
+  const size_t length = rowLength(cloud);
+  std::vector<std::string> blocks(kChunkRows / kBlockRows);
+  RowProgress done(cloud.size(), progress);
+  for (size_t chunk = 0; chunk < cloud.size(); chunk += kChunkRows) {
+    const size_t rows = std::min(kChunkRows, cloud.size() - chunk);
+    parallelFor(rows, kBlockRows, [&](size_t begin, size_t end) {
+      std::string& block = blocks[begin / kBlockRows];
+      block.clear();
+      std::array<float, kMaxRowLength> row;
+      for (size_t i = begin; i < end; ++i) {
+        fillRow(cloud, chunk + i, row.data());
+        appendText(row.data(), length, &block);
+      }
+    });
+    for (size_t b = 0; b < rangeCount(rows, kBlockRows); ++b) {
+      file.write(blocks[b].data(), blocks[b].size());
+    }
+    done.add(rows);
   }
 }
 
@@ -100,32 +167,10 @@ void writePlySplats(const SplatCloud& cloud, const std::string& path,
   const bool ascii = options.ascii;
   OutputFile file(path);
   const std::string head = header(cloud, ascii);
-  file.write(head.data(), head.size());
-
-  const size_t count = cloud.size();
-  const size_t length = rowLength(cloud);
-  std::vector<std::string> blocks(kChunkRows / kBlockRows);
-  for (size_t chunk = 0; chunk < count; chunk += kChunkRows) {
-    const size_t rows = std::min(kChunkRows, count - chunk);
-    parallelFor(rows, kBlockRows, [&](size_t begin, size_t end) {
-      std::string& block = blocks[begin / kBlockRows];
-      if (ascii) block.clear();
-      if (!ascii) block.resize((end - begin) * length * 4);
-      std::vector<float> row(length);
-      for (size_t i = begin; i < end; ++i) {
-        fillRow(cloud, chunk + i, row.data());
-        if (ascii) {
-          appendText(row.data(), length, &block);
-        } else {
-          storeLittleEndian(row.data(), length, &block[(i - begin) * length * 4]);
-        }
-      }
-    });
-    for (size_t b = 0; b < rangeCount(rows, kBlockRows); ++b) {
-      file.write(blocks[b].data(), blocks[b].size());
-    }
-    advance(progress, static_cast<double>(chunk + rows) / static_cast<double>(count),
-            "Writing splats");
+  if (ascii) {
+    writeText(cloud, head, file, progress);
+  } else {
+    writeBinary(cloud, head, file, progress);
   }
   file.commit();
 }

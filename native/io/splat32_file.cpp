@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <vector>
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "io/compression.h"
 #include "io/input_file.h"
 #include "io/little_endian.h"
 #include "io/output_file.h"
@@ -25,25 +25,25 @@ constexpr size_t kRecordBytes = 32;
 constexpr size_t kScaleAt = 12;
 constexpr size_t kColourAt = 24;
 constexpr size_t kRotationAt = 28;
-// Rows of one task, and of one round of writing: 4 MB.
+// Rows of one task: 128 KB.
 constexpr size_t kBlockRows = 4096;
-constexpr size_t kRoundRows = kBlockRows * 32;
 constexpr double kC0 = 0.28209479177387814;
 
 void encodeRow(const SplatCloud& cloud, size_t i, uint8_t* record) {
+  const float* sh = &cloud.sh[i * cloud.shStride()];
   for (size_t k = 0; k < 3; ++k) {
     storeFloat(cloud.positions[i * 3 + k], record + k * 4);
     storeFloat(cloud.scales[i * 3 + k], record + kScaleAt + k * 4);
-    const double colour = kC0 * static_cast<double>(cloud.sh[i * 3 + k]) + 0.5;
+    const double colour = kC0 * static_cast<double>(sh[k]) + 0.5;
     record[kColourAt + k] = nearestByte(colour * 255.0);
   }
   record[kColourAt + 3] = nearestByte(static_cast<double>(cloud.opacities[i]) * 255.0);
   const float* q = &cloud.rotations[i * 4];
   double squares = 0;
   for (size_t k = 0; k < 4; ++k) squares += static_cast<double>(q[k]) * static_cast<double>(q[k]);
+  const double length = std::sqrt(squares);
   for (size_t k = 0; k < 4; ++k) {
-    record[kRotationAt + k] =
-        nearestByte(static_cast<double>(q[k]) / std::sqrt(squares) * 128.0 + 128.0);
+    record[kRotationAt + k] = nearestByte(static_cast<double>(q[k]) / length * 128.0 + 128.0);
   }
 }
 
@@ -92,16 +92,20 @@ void writeSplat32(const SplatCloud& cloud, const std::string& path, const SplatW
          path + " cannot be written: the cloud has 0 splats; .splat holds 1 or more");
   }
   OutputFile file(path);
-  ByteVector round(std::min(cloud.size(), kRoundRows) * kRecordBytes);
-  for (size_t first = 0; first < cloud.size(); first += kRoundRows) {
-    const size_t rows = std::min(kRoundRows, cloud.size() - first);
-    parallelFor(rows, kBlockRows, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) encodeRow(cloud, first + i, &round[i * kRecordBytes]);
-    });
-    file.write(round.data(), rows * kRecordBytes);
-    advance(progress, static_cast<double>(first + rows) / static_cast<double>(cloud.size()),
+  RowCheck check(cloud, "cloud");
+  std::atomic<size_t> rows_done{0};
+  parallelFor(cloud.size(), kBlockRows, [&](size_t begin, size_t end) {
+    if (!check.look(begin, end)) return;
+    std::array<uint8_t, kBlockRows * kRecordBytes> block;
+    for (size_t i = begin; i < end; ++i) {
+      encodeRow(cloud, i, block.data() + (i - begin) * kRecordBytes);
+    }
+    file.writeAt(begin * uint64_t{kRecordBytes}, block.data(), (end - begin) * kRecordBytes);
+    const size_t done = rows_done.fetch_add(end - begin) + (end - begin);
+    advance(progress, static_cast<double>(done) / static_cast<double>(cloud.size()),
             "Writing splats");
-  }
+  });
+  check.require();
   file.commit();
 }
 

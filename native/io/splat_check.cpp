@@ -1,26 +1,26 @@
 #include "io/splat_check.h"
 
-#include <atomic>
-
 #include "base/error.h"
-#include "base/parallel.h"
 
 namespace stipple {
 
-void validateInParallel(const SplatCloud& cloud, const char* what) {
-  constexpr size_t kGrain = 8192;
+RowCheck::RowCheck(const SplatCloud& cloud, const char* what) : cloud_(cloud), what_(what) {
   validateSizes(cloud, what);
-  std::atomic<bool> valid{true};
-  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
-    if (!rowsAreValid(cloud, begin, end)) valid.store(false, std::memory_order_relaxed);
-  });
-  // Once more in order, for the first splat that is wrong.
-  if (!valid.load(std::memory_order_relaxed)) validate(cloud, what);
+}
+
+bool RowCheck::look(size_t begin, size_t end) {
+  if (rowsAreValid(cloud_, begin, end)) return true;
+  valid_.store(false, std::memory_order_relaxed);
+  return false;
+}
+
+void RowCheck::require() const {
+  if (!valid_.load(std::memory_order_relaxed)) validate(cloud_, what_);
 }
 
 void requireValidSplats(const SplatCloud& cloud, const std::string& path) {
   try {
-    validateInParallel(cloud, path.c_str());
+    validate(cloud, path.c_str());
   } catch (const Error& error) {
     fail(ErrorCode::kFormat, error.what());
   }

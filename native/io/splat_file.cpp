@@ -21,7 +21,6 @@
 #include "io/sog_file.h"
 #include "io/sog_levels.h"
 #include "io/splat32_file.h"
-#include "io/splat_check.h"
 #include "io/spz_file.h"
 
 namespace stipple {
@@ -106,20 +105,36 @@ SplatCloud copyOf(const SplatCloud& cloud, int degree) {
   return copy;
 }
 
-/// The cloud as a format takes it, where that differs from the cloud as it is.
-std::optional<SplatCloud> prepared(const SplatCloud& cloud, const SplatFormat& format,
-                                   const SplatWriteOptions& options) {
-  const int degree = std::min(options.sh_degree_limit, format.max_sh_degree);
-  const Frame wanted = options.frame == Frame::kUnknown ? format.frame : options.frame;
+/// What a cloud needs before a format takes it.
+struct Changes {
+  int degree;  ///< of harmonics that are kept
+  Frame frame;
+  bool cuts, turns, recolours;
+
+  bool any() const { return cuts || turns || recolours; }
+};
+
+Changes changesFor(const SplatCloud& cloud, const SplatFormat& format,
+                   const SplatWriteOptions& options) {
+  Changes changes;
+  changes.degree = std::min(options.sh_degree_limit, format.max_sh_degree);
+  changes.frame = options.frame == Frame::kUnknown ? format.frame : options.frame;
   // Without a frame, a cloud stays so where the format's own is what it counts as.
-  const bool turns = cloud.frame == Frame::kUnknown
-                         ? wanted != kConventionalFrame || options.frame != Frame::kUnknown
-                         : cloud.frame != wanted;
-  const bool recolours = cloud.colour_space == ColourSpace::kLinear && !format.holds_linear;
-  if (cloud.sh_degree <= degree && !turns && !recolours) return std::nullopt;
-  SplatCloud copy = copyOf(cloud, degree);
-  if (recolours) convertColours(copy, ColourSpace::kDisplay);
-  if (turns) convertFrame(copy, wanted);
+  changes.turns = cloud.frame == Frame::kUnknown
+                      ? changes.frame != kConventionalFrame || options.frame != Frame::kUnknown
+                      : cloud.frame != changes.frame;
+  changes.recolours = cloud.colour_space == ColourSpace::kLinear && !format.holds_linear;
+  changes.cuts = cloud.sh_degree > changes.degree &&
+                 !(format.takes_any_degree && format.max_sh_degree <= options.sh_degree_limit);
+  return changes;
+}
+
+/// The cloud as a format takes it, where that differs from the cloud as it is. In: a valid cloud.
+std::optional<SplatCloud> prepared(const SplatCloud& cloud, const Changes& changes) {
+  if (!changes.any()) return std::nullopt;
+  SplatCloud copy = copyOf(cloud, changes.degree);
+  if (changes.recolours) convertColours(copy, ColourSpace::kDisplay);
+  if (changes.turns) convertFrame(copy, changes.frame);
   return copy;
 }
 
@@ -135,15 +150,16 @@ void checkDegreeLimit(const SplatWriteOptions& options) {
 
 const std::vector<SplatFormat>& splatFormats() {
   static const std::vector<SplatFormat> kFormats = {
-      {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, true, startsAsPly, readPlySplats, writePlySplats},
+      {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, true, startsAsPly, readPlySplats, writePlySplats,
+       true},
       {"compressed-ply", "compressed PLY", ".compressed.ply", 3, Frame::kRDF, true,
-       startsAsCompressedPly, readCompressedPly, writeCompressedPly},
+       startsAsCompressedPly, readCompressedPly, writeCompressedPly, true},
       {"spz", "SPZ", ".spz", 4, Frame::kRUB, false, startsAsSpz, readSpzSplats, writeSpzSplats},
       {"splat", "splat records", ".splat", 0, Frame::kRDF, false, nullptr, readSplat32,
-       writeSplat32},
+       writeSplat32, true, true},
       {"ksplat", "ksplat", ".ksplat", 3, Frame::kRDF, false, nullptr, readKsplat, nullptr},
       {"gltf", "glTF with KHR_gaussian_splatting", ".glb .gltf", 3, kGltfFrame, true,
-       startsAsGltfSplats, readGltfSplats, writeGltfSplats},
+       startsAsGltfSplats, readGltfSplats, writeGltfSplats, true},
       {"sog_levels", "streamed SOG", "lod-meta.json", 3, Frame::kRDF, true, startsAsSogLevels,
        readSogLevels,
        [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
@@ -200,8 +216,10 @@ void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                                       " can be written");
   }
   checkDegreeLimit(options);
-  validateInParallel(cloud, "cloud");
-  const std::optional<SplatCloud> changed = prepared(cloud, *format, options);
+  validateSizes(cloud, "cloud");
+  const Changes changes = changesFor(cloud, *format, options);
+  if (!format->checks_values || changes.any()) validate(cloud, "cloud");
+  const std::optional<SplatCloud> changed = prepared(cloud, changes);
   format->write(changed ? *changed : cloud, path, options, progress);
 }
 
@@ -219,8 +237,8 @@ void writeSplatLevels(const std::vector<const SplatCloud*>& levels, const SplatC
   std::deque<SplatCloud> changed;
   for (const SplatCloud*& cloud : clouds) {
     if (cloud == nullptr) continue;
-    validateInParallel(*cloud, cloud == environment ? "environment" : "level");
-    if (auto copy = prepared(*cloud, *format, options)) {
+    validate(*cloud, cloud == environment ? "environment" : "level");
+    if (auto copy = prepared(*cloud, changesFor(*cloud, *format, options))) {
       cloud = &changed.emplace_back(std::move(*copy));
     }
   }

@@ -42,9 +42,13 @@ struct SplatFormat {
   /// nothing but the ending tells.
   bool (*sniff)(const SplatFileStart& start);
   SplatCloud (*read)(const std::string& path, Progress* progress);  ///< null: not read
-  /// In: a cloud that is valid, in its frame, colour space and degree. Null: not written.
+  /// In: a cloud in its frame and colour space, of its degree (of any, where takes_any_degree) and
+  /// valid, unless checks_values: then its sizes are, and the writer refuses values that are not
+  /// valid. Null: not written.
   void (*write)(const SplatCloud& cloud, const std::string& path, const SplatWriteOptions& options,
                 Progress* progress);
+  bool checks_values = false;     ///< with a RowCheck, which saves a pass through memory
+  bool takes_any_degree = false;  ///< passes over higher harmonics itself, without a copy
 };
 
 /// All formats, in the order in which files are tried.

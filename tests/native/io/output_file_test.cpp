@@ -32,6 +32,14 @@ TEST_F(OutputFileTest, AppearsUnderItsNameOnlyWhenCommitted) {
   EXPECT_EQ(fileCount(), 1u);
 }
 
+TEST_F(OutputFileTest, TakesItsPartsInAnyOrder) {
+  OutputFile file(path("a.ply"));
+  file.writeAt(6, "end", 3);
+  file.writeAt(0, "start ", 6);
+  file.commit();
+  EXPECT_EQ(load(path("a.ply")), "start end");
+}
+
 TEST_F(OutputFileTest, LeavesTheOldFileAndNothingElseWithoutCommit) {
   store("a.ply", "old");
   {
