@@ -42,6 +42,7 @@ class ViewPicture:
 
     def update(self, depsgraph, warn):
         """Takes what the view shows now. Errors: StippleError."""
+        viewed.note_changes(depsgraph)
         self._instances = instances.gather_owned(depsgraph, 'VIEWPORT', warn)
         self._version += 1
 

@@ -5,7 +5,7 @@ import bpy
 
 from .. import version
 from ..binding.errors import StippleError
-from . import grades, placement, sequences, sources, splat_data, sync
+from . import grades, placement, sequences, sources, splat_data, sync, viewed
 
 
 def gather(depsgraph, mode, warn=lambda message: None):
@@ -51,7 +51,7 @@ def _cloud_of(obj, mode, frame):
         # Stored splats of a file that is gone or has changed: nobody would see the panel that says so.
         sources.check_unchanged(original)
     from_source = (stipple.is_sequence or stipple.source_kind in sources.MODEL_KINDS) and not stipple.edited
-    if from_source and not _has_modifiers(obj) and not sync.is_edited(original):
+    if from_source and not _has_modifiers(obj) and not _is_edited(original, mode):
         try:
             if stipple.is_sequence:
                 cloud = sequences.frame_of(original, stipple, frame, mode).cloud()
@@ -62,9 +62,15 @@ def _cloud_of(obj, mode, frame):
             raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
     if splat_data.count(data) == 0:
         return None
-    if _has_modifiers(obj):
-        return sources.cloud_from_object(obj)  # modifiers see the attributes, which carry the grade
+    if _has_modifiers(obj) or mode == 'VIEWPORT' and grades.is_shown(original, grades.settings_of(stipple)):
+        # Attributes carry the grade, and modifiers see them. Views are drawn again whenever anything changes: theirs
+        # are kept.
+        return viewed.stored_cloud(obj) if mode == 'VIEWPORT' else sources.cloud_from_object(obj)
     return grades.cloud_of(obj)
+
+
+def _is_edited(data, mode):
+    return viewed.is_edited(data) if mode == 'VIEWPORT' else sync.is_edited(data)
 
 
 def _has_modifiers(obj):

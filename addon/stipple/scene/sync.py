@@ -14,7 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..binding.errors import StippleError
-from . import grades, masks, meshes, sequences, sources, splat_data
+from . import grades, handlers, masks, meshes, sequences, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -298,15 +298,11 @@ _HANDLERS = (('frame_change_post', _frame_change_post), ('render_init', _render_
 
 
 def register():
-    for name, function in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(function)
+    handlers.add(_HANDLERS)
 
 
 def unregister():
-    for name, function in _HANDLERS:
-        handlers = getattr(bpy.app.handlers, name)
-        if function in handlers:
-            handlers.remove(function)
+    handlers.remove(_HANDLERS)
     if bpy.app.timers.is_registered(complete):
         bpy.app.timers.unregister(complete)
     problems.clear()

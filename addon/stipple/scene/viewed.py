@@ -8,7 +8,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from .. import version
-from . import sources, splat_data, sync
+from . import grades, handlers, sources, splat_data, sync
 
 # Objects behind or before which splats can be, apart from splats themselves.
 SOLID_TYPES = {'MESH', 'CURVE', 'SURFACE', 'META', 'FONT', 'CURVES', 'POINTCLOUD', 'VOLUME', 'GPENCIL', 'GREASEPENCIL'}
@@ -18,6 +18,7 @@ _state = {'version': 0}
 state = {'graphics': '', 'off': False}
 _geometry_versions = {}
 _clouds = {}
+_edited = {}
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def gather(depsgraph):
             key = (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
             found.append(ViewedSplats(key, owner, original, _state_of(obj, original, count), count,
                                       version.copy_of_evaluated_matrix(entry.matrix_world)))
-    shown = {_cloud_key(entry) for entry in found}
+    shown = {_cloud_key(entry.obj) for entry in found}
     for key in [key for key in _clouds if key not in shown]:
         del _clouds[key]
     return Viewed(tuple(found), frozenset(others))
@@ -114,33 +115,60 @@ def cloud_of(entry, depsgraph):
 
     Errors: StippleError for attributes that are missing or out of range.
     """
-    key = _cloud_key(entry)
+    return _stored(entry.obj.evaluated_get(depsgraph), entry.obj, entry.state)
+
+
+def stored_cloud(obj):
+    """The cloud of an evaluated object's attributes, kept until they change. Errors: as cloud_of."""
+    original = obj.original
+    return _stored(obj, original, _state_of(obj, original, splat_data.count(obj.data)))[0]
+
+
+def is_edited(data):
+    """sync.is_edited, which reads all attributes, asked once for every change of a datablock."""
+    state = _written_state(data)
+    known = _edited.get(data.name_full)
+    if known is None or known[0] != state:
+        known = _edited[data.name_full] = (state, sync.is_edited(data))
+    return known[1]
+
+
+def _stored(obj, original, state):
+    key = _cloud_key(original)
     known = _clouds.get(key)
-    if known is None or known[0] != entry.state:
-        cloud = sources.cloud_from_object(entry.obj.evaluated_get(depsgraph))
-        known = _clouds[key] = (entry.state, cloud, cloud.info())
+    if known is None or known[0] != state:
+        cloud = sources.cloud_from_object(obj)
+        known = _clouds[key] = (state, cloud, cloud.info())
     return known[1], known[2]
 
 
-def _cloud_key(entry):
-    return entry.obj.data.name_full, entry.obj.name_full if len(entry.obj.modifiers) else ''
+def _cloud_key(original):
+    return original.data.name_full, original.name_full if len(original.modifiers) else ''
 
 
 def _state_of(obj, original, count):
-    data = original.data
-    return (count, data.get(sync.WRITTEN_KEY), data.get(sync.FINGERPRINT_KEY), _geometry_versions.get(data.name_full, 0),
-            _geometry_versions.get(original.name_full, 0) if len(obj.modifiers) else 0)
+    by_modifiers = _geometry_versions.get(original.name_full, 0) if len(obj.modifiers) else 0
+    return count, by_modifiers, *_written_state(original.data)
+
+
+def _written_state(data):
+    return (data.get(sync.WRITTEN_KEY), data.get(sync.FINGERPRINT_KEY), data.get(grades.GRADE_KEY),
+            _geometry_versions.get(data.name_full, 0))
+
+
+def note_changes(depsgraph):
+    """Notices which datablocks an evaluation has changed."""
+    for update in depsgraph.updates:
+        if update.is_updated_geometry and isinstance(update.id, (bpy.types.Object, bpy.types.Mesh, bpy.types.PointCloud)):
+            name = update.id.original.name_full
+            _geometry_versions[name] = _geometry_versions.get(name, 0) + 1
 
 
 @persistent
 def _changed(_scene, depsgraph=None):
     _state['version'] += 1
-    if depsgraph is None:
-        return
-    for update in depsgraph.updates:
-        if update.is_updated_geometry and isinstance(update.id, (bpy.types.Object, bpy.types.Mesh, bpy.types.PointCloud)):
-            name = update.id.original.name_full
-            _geometry_versions[name] = _geometry_versions.get(name, 0) + 1
+    if depsgraph is not None:
+        note_changes(depsgraph)
 
 
 @persistent
@@ -149,6 +177,7 @@ def _forget(*_):
     _state['version'] += 1
     _geometry_versions.clear()
     _clouds.clear()
+    _edited.clear()
 
 
 _HANDLERS = (('depsgraph_update_post', _changed), ('frame_change_post', _changed), ('load_post', _forget),
@@ -156,13 +185,9 @@ _HANDLERS = (('depsgraph_update_post', _changed), ('frame_change_post', _changed
 
 
 def register():
-    for name, function in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(function)
+    handlers.add(_HANDLERS)
 
 
 def unregister():
-    for name, function in _HANDLERS:
-        handlers = getattr(bpy.app.handlers, name)
-        if function in handlers:
-            handlers.remove(function)
+    handlers.remove(_HANDLERS)
     _forget()
