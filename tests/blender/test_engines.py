@@ -296,22 +296,25 @@ def test_every_view_layer_has_its_own_picture(stipple, camera, tmp_path, monkeyp
     np.testing.assert_allclose(made['second'][30, 25], (*MESH, 1.0), atol=1e-5)
 
 
-def test_an_animation_moves_meshes_and_splats(stipple, camera, tmp_path):
+@pytest.mark.parametrize('is_kept', [False, True])
+def test_an_animation_moves_meshes_and_splats(stipple, camera, tmp_path, is_kept):
     quad = mesh_between(stipple)
-    for frame, z in ((1, 0.0), (2, 2.0)):
+    bpy.context.scene.render.use_persistent_data = is_kept
+    for frame, z in ((1, 0.0), (2, 2.0), (3, 0.0)):
         quad.location.z = z
         quad.keyframe_insert('location', frame=frame)
     scene = prepare('STIPPLE_CYCLES')
-    scene.frame_start, scene.frame_end = 1, 2
+    scene.frame_start, scene.frame_end = 1, 3
     scene.render.image_settings.file_format = 'PNG'
     scene.view_settings.view_transform = 'Standard'
     scene.render.filepath = str(tmp_path / 'frame_')
     bpy.ops.render.render(animation=True)
     blue = []
-    for frame in (1, 2):
+    for frame in (1, 2, 3):
         image = bpy.data.images.load(str(tmp_path / f'frame_{frame:04d}.png'))
         blue.append(np.array(image.pixels[:]).reshape(60, 60, 4)[30, 25, 2])
-    assert blue[0] > 0.75 and blue[1] < 0.4  # the mesh passes before the front splats
+    assert blue[0] > 0.75 and blue[2] > 0.75  # the front splats
+    assert blue[1] < 0.4  # the mesh passes before them
 
 
 def test_a_render_can_be_cancelled_between_cycles_and_splats(stipple, camera, tmp_path, monkeypatch):
