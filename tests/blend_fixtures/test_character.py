@@ -11,9 +11,10 @@ import pytest
 
 from test_pictures import BLENDER, BLENDER_SECONDS, FIXTURES, compare, scripts  # noqa: F401 (a fixture)
 
-# Path tracing: another Blender has another noise. The wrong pictures get WRONG_DB at most.
-CYCLES_FLOOR_DB = 34.0
-# No noise: only rounding differs.
+# Path tracing: another Blender has another noise. 5.2.2 gets 43.5 dB against 3.4.1's picture; without the shadow it is
+# 30.8 dB, and 21.4 dB with the character before both columns.
+CYCLES_FLOOR_DB = 38.0
+# No noise: only rounding differs (5.2.2: 86 dB). One step of 8 bits everywhere would be 48 dB.
 MATTE_FLOOR_DB = 50.0
 
 
