@@ -22,9 +22,9 @@ def writes(stipple, monkeypatch):
     """Counts of splats, in the order in which they were written into Blender data."""
     found, write = [], stipple.scene.splat_data.write
 
-    def note(data, arrays):
+    def note(data, arrays, *more, **named):
         found.append(arrays.count)
-        write(data, arrays)
+        write(data, arrays, *more, **named)
 
     monkeypatch.setattr(stipple.scene.splat_data, 'write', note)
     return found
