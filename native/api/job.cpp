@@ -30,19 +30,6 @@ void run(StippleJob& job, JobWork work) {
   job.ended.notify_all();
 }
 
-/// The result of the wanted kind, or an error that says what the job is or did.
-template <typename T>
-const T& resultOf(const StippleJob& job, const char* kind) {
-  std::lock_guard<std::mutex> lock(job.mutex);
-  if (job.state != STIPPLE_JOB_DONE) {
-    fail(ErrorCode::kInvalidArgument,
-         "the job has not ended well; wait for it and look at its status before its result");
-  }
-  const T* value = std::get_if<T>(&job.result);
-  if (!value) fail(ErrorCode::kInvalidArgument, std::string("this job does not make a ") + kind);
-  return *value;
-}
-
 }  // namespace
 
 StippleJob* startJob(Context context, JobWork work) {
@@ -101,7 +88,7 @@ void stipple_job_free(StippleJob* job) {
 
 StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model) {
   return guarded([&] {
-    const auto& made = resultOf<ModelParts>(require(job, "job"), "model");
+    const auto& made = jobResult<ModelParts>(require(job, "job"), "model");
     require(model, "model") = new StippleModel{job->context, made};
   });
 }
@@ -109,7 +96,7 @@ StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model) {
 StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud) {
   return guarded([&] {
     const auto& made =
-        resultOf<std::shared_ptr<const stipple::SplatCloud>>(require(job, "job"), "cloud");
+        jobResult<std::shared_ptr<const stipple::SplatCloud>>(require(job, "job"), "cloud");
     require(cloud, "cloud") = new StippleCloud{job->context, made};
   });
 }
@@ -117,7 +104,7 @@ StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud) {
 StippleStatus stipple_job_volume(const StippleJob* job, StippleVolume** volume) {
   return guarded([&] {
     const auto& made =
-        resultOf<std::shared_ptr<const stipple::SparseVolume>>(require(job, "job"), "volume");
+        jobResult<std::shared_ptr<const stipple::SparseVolume>>(require(job, "job"), "volume");
     require(volume, "volume") = new StippleVolume{job->context, made};
   });
 }

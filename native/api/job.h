@@ -10,14 +10,16 @@
 #include <thread>
 #include <variant>
 
+#include "api/guard.h"
 #include "api/handles.h"
 #include "base/progress.h"
 
 namespace stipple::api {
 
-/// What a job leaves: nothing (it filled the caller's buffers), a model, a cloud or a volume.
+/// What a job leaves: nothing (it filled the caller's buffers), a model, a cloud, a volume or a
+/// mesh.
 using JobResult = std::variant<std::monostate, ModelParts, std::shared_ptr<const SplatCloud>,
-                               std::shared_ptr<const SparseVolume>>;
+                               std::shared_ptr<const SparseVolume>, std::shared_ptr<const TriMesh>>;
 
 /// Work of a job: runs on the job's own thread within the context's thread limit. It owns shares of
 /// all that it uses, apart from the caller's buffers.
@@ -41,3 +43,20 @@ struct StippleJob {
   std::string message;
   stipple::api::JobResult result;
 };
+
+namespace stipple::api {
+
+/// The result of the wanted kind, or an error that says what the job is or did.
+template <typename T>
+const T& jobResult(const StippleJob& job, const char* kind) {
+  std::lock_guard<std::mutex> lock(job.mutex);
+  if (job.state != STIPPLE_JOB_DONE) {
+    fail(ErrorCode::kInvalidArgument,
+         "the job has not ended well; wait for it and look at its status before its result");
+  }
+  const T* value = std::get_if<T>(&job.result);
+  if (!value) fail(ErrorCode::kInvalidArgument, std::string("this job does not make a ") + kind);
+  return *value;
+}
+
+}  // namespace stipple::api

@@ -32,6 +32,7 @@ int run(int argc, char** argv) {
   addDecode(app, context);
   addRender(app, context);
   addVoxelize(app, context);
+  addMesh(app, context);
   addCompare(app, context);
   try {
     app.parse(argc, argv);

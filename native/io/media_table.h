@@ -9,7 +9,7 @@
 
 namespace stipple {
 
-constexpr uint32_t kMediaTableVersion = 3;
+constexpr uint32_t kMediaTableVersion = 4;
 
 extern "C" {
 
@@ -81,6 +81,13 @@ enum StippleMediaVolumeArray : uint32_t {
   kMediaColour = 2,
 };
 
+/// Of the surface of a volume: faces of four corners, or of three, whose last is kMediaNoCorner.
+enum StippleMediaSurfaceArray : uint32_t {
+  kMediaSurfacePoints = 0,  ///< float [V,3] metres
+  kMediaSurfaceFaces = 1,   ///< uint32 [F,4], all the same way round
+};
+constexpr uint32_t kMediaNoCorner = UINT32_MAX;
+
 enum StippleMediaWebpArray : uint32_t {
   kMediaWebpBytes = 0,  ///< uint8: the encoded file
 };
@@ -129,6 +136,10 @@ struct StippleMediaTable {
                        StippleMediaStatus* status);
   void (*volume_read)(const char* path, double* voxel_size, double* origin,
                       const StippleMediaSink* sink, StippleMediaStatus* status);
+  /// The surface where the density of a volume (its colour is not read) passes `threshold`, per
+  /// metre. In: adaptivity 0..1, larger faces where it is flat.
+  void (*volume_surface)(const StippleMediaVolume* volume, double threshold, double adaptivity,
+                         const StippleMediaSink* sink, StippleMediaStatus* status);
   /// Compressed streams. In: what, which messages name; bytes [count]. Unpacking writes at most
   /// `capacity` bytes to `out` and says how many; packing hands one array to the sink.
   void (*gzip_unpack)(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,

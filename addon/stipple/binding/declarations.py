@@ -37,6 +37,7 @@ FUNCTIONS = {
     'stipple_job_model': (_status, [_handle, _out_handle]),
     'stipple_job_cloud': (_status, [_handle, _out_handle]),
     'stipple_job_volume': (_status, [_handle, _out_handle]),
+    'stipple_job_mesh': (_status, [_handle, _out_handle]),
     # splat clouds
     'stipple_cloud_create': (_status, [_handle, _to(s.StippleCloudArrays), _out_handle]),
     'stipple_cloud_free': (None, [_handle]),
@@ -68,6 +69,9 @@ FUNCTIONS = {
     'stipple_mesh_info': (_status, [_handle, _to(s.StippleMeshInfo)]),
     'stipple_mesh_depth_start': (_status, [_handle, _to(s.StippleMeshInstance), c_uint64, _to(s.StippleCamera), _floats,
                                            _out_handle]),
+    'stipple_mesh_read': (_status, [_handle, _to(s.StippleMeshBuffers)]),
+    'stipple_mesh_topology': (_status, [_handle, _to(s.StippleMeshTopology)]),
+    'stipple_mesh_save': (_status, [_handle, _path]),
     # density and anchors
     'stipple_sample_options_init': (None, [_to(s.StippleSampleOptions)]),
     'stipple_density_from_points': (_status, [_handle, _floats, _floats, c_uint64, c_uint32, _out_handle]),
@@ -148,6 +152,9 @@ FUNCTIONS = {
     'stipple_volume_info': (_status, [_handle, _to(s.StippleVolumeInfo)]),
     'stipple_volume_save': (_status, [_handle, _path]),
     'stipple_volume_load': (_status, [_handle, _path, _out_handle]),
+    'stipple_volume_to_mesh_options_init': (None, [_to(s.StippleVolumeToMeshOptions)]),
+    'stipple_volume_to_mesh_start': (_status, [_handle, _to(s.StippleVolumeToMeshOptions), _out_handle]),
+    'stipple_volume_to_mesh_memory_bound': (_status, [_handle, _to(s.StippleVolumeToMeshOptions), POINTER(c_uint64)]),
     # pictures
     'stipple_image_create': (_status, [_handle, c_uint32, c_uint32, c_uint32, c_uint32, _floats, _out_handle]),
     'stipple_image_load': (_status, [_handle, _path, _out_handle]),

@@ -40,3 +40,7 @@ class Job(Handle):
     def volume(self):
         from .volume import Volume
         return Volume(self.library, new_handle(self.library, 'stipple_job_volume', self.pointer))
+
+    def mesh(self):
+        from .mesh import Mesh
+        return Mesh(self.library, new_handle(self.library, 'stipple_job_mesh', self.pointer))

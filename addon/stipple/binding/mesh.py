@@ -8,8 +8,8 @@ import numpy as np
 from .errors import invalid
 from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
 from .job import Job
-from .structs import (NO_INDEX, MaterialColour, StippleMaterial, StippleMeshInfo, StippleMeshInstance,
-                      StippleMeshPart)
+from .structs import (NO_INDEX, MaterialColour, StippleMaterial, StippleMeshBuffers, StippleMeshInfo,
+                      StippleMeshInstance, StippleMeshPart, StippleMeshTopology)
 
 
 class DepthTask:
@@ -85,3 +85,21 @@ class Mesh(Handle):
         info = StippleMeshInfo()
         self._check(self.library.stipple_mesh_info(self.pointer, byref(info)))
         return info
+
+    def read(self):
+        """(positions [V,3], triangles [T,3]) as new arrays."""
+        info = self.info()
+        positions, triangles = np.empty((info.vertex_count, 3), np.float32), np.empty((info.triangle_count, 3), np.uint32)
+        buffers = StippleMeshBuffers(vertex_capacity=info.vertex_count, triangle_capacity=info.triangle_count,
+                                     positions=pointer_to(positions), triangles=pointer_to(triangles))
+        self._check(self.library.stipple_mesh_read(self.pointer, byref(buffers)))
+        return positions, triangles
+
+    def topology(self):
+        topology = StippleMeshTopology()
+        self._check(self.library.stipple_mesh_topology(self.pointer, byref(topology)))
+        return topology
+
+    def save(self, path):
+        """Writes positions and triangles: .ply or .glb."""
+        self._check(self.library.stipple_mesh_save(self.pointer, path_bytes(path)))

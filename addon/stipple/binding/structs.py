@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Enumerations and structs of stipple.h, field by field; tests/addon compares them with the header."""
 
-from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_uint32, c_uint64, c_void_p, sizeof
+from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p, sizeof
 from enum import IntEnum
 
 ABI_VERSION = 1
@@ -225,6 +225,16 @@ class StippleMeshInfo(_Sized):
                 ('triangle_count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3)]
 
 
+class StippleMeshBuffers(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('vertex_capacity', c_uint64),
+                ('triangle_capacity', c_uint64), ('positions', _floats), ('triangles', POINTER(c_uint32))]
+
+
+class StippleMeshTopology(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('edge_count', c_uint64),
+                ('open_edge_count', c_uint64), ('piece_count', c_uint64), ('euler', c_int64), ('volume', c_double)]
+
+
 class StippleDensityInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('leaf_count', c_uint64),
                 ('root_origin', c_double * 3), ('root_side', c_double)]
@@ -358,6 +368,11 @@ class StippleVolumeInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('brick_count', c_uint64),
                 ('active_voxel_count', c_uint64), ('voxel_size', c_double), ('bounds_min', c_double * 3),
                 ('bounds_max', c_double * 3), ('max_density', c_double)]
+
+
+class StippleVolumeToMeshOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('largest_only', c_uint32), ('opacity', c_double), ('density', c_double),
+                ('adaptivity', c_double)]
 
 
 class StippleImageInfo(_Sized):

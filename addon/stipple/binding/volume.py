@@ -7,7 +7,7 @@ from .errors import invalid
 from .handle import Handle, new_handle, path_bytes
 from .job import Job
 from .renderer import instance_array
-from .structs import StippleVolumeInfo, StippleVoxelizeOptions
+from .structs import StippleVolumeInfo, StippleVolumeToMeshOptions, StippleVoxelizeOptions
 
 
 class Volume(Handle):
@@ -37,6 +37,13 @@ class Volume(Handle):
     def load(cls, context, path):
         return cls(context.library,
                    new_handle(context.library, 'stipple_volume_load', context.pointer, path_bytes(path)))
+
+    def mesh_start(self, opacity=0.5, adaptivity=0.0, largest_only=False):
+        """A job (mesh()) for the closed surface where a voxel has this opacity, 0..1."""
+        options = StippleVolumeToMeshOptions()
+        self.library.stipple_volume_to_mesh_options_init(byref(options))
+        options.opacity, options.adaptivity, options.largest_only = opacity, adaptivity, int(largest_only)
+        return Job(self.library, new_handle(self.library, 'stipple_volume_to_mesh_start', self.pointer, byref(options)))
 
     def info(self):
         info = StippleVolumeInfo()

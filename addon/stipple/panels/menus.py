@@ -50,6 +50,7 @@ def _draw_convert(self, _context):
     self.layout.operator_context = 'INVOKE_DEFAULT'
     self.layout.operator('stipple.splats_from_mesh', text="Gaussian Splats", icon='OUTLINER_DATA_POINTCLOUD')
     self.layout.operator('stipple.splats_to_volume', text="Splats to Volume", icon='OUTLINER_DATA_VOLUME')
+    self.layout.operator('stipple.splats_to_mesh', text="Splats to Mesh", icon='OUTLINER_OB_MESH')
 
 
 def _draw_import(self, _context):

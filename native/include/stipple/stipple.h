@@ -114,6 +114,7 @@ void stipple_job_free(StippleJob* job);
 StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model);
 StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud);
 StippleStatus stipple_job_volume(const StippleJob* job, StippleVolume** volume);
+StippleStatus stipple_job_mesh(const StippleJob* job, StippleMesh** mesh);
 
 /* ---- splat clouds ------------------------------------------------------------------------------ */
 
@@ -363,6 +364,32 @@ StippleStatus stipple_mesh_add_part(StippleMesh* mesh, const StippleMeshPart* pa
 /* Reads glTF or GLB. Errors: UNAVAILABLE where libstipple_media cannot be loaded. */
 StippleStatus stipple_mesh_load(StippleContext* context, const char* path_utf8, StippleMesh** mesh);
 StippleStatus stipple_mesh_info(const StippleMesh* mesh, StippleMeshInfo* info);
+
+/* Any pointer may be NULL (not wanted). */
+typedef struct StippleMeshBuffers {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t vertex_capacity;    /* that positions has room for */
+  uint64_t triangle_capacity;
+  float* positions;            /* [V,3] metres */
+  uint32_t* triangles;         /* [T,3] vertex indices, counterclockwise from outside */
+} StippleMeshBuffers;
+/* Errors: BUFFER_TOO_SMALL. */
+StippleStatus stipple_mesh_read(const StippleMesh* mesh, const StippleMeshBuffers* buffers);
+
+typedef struct StippleMeshTopology {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t edge_count;
+  uint64_t open_edge_count; /* that two triangles, running against each other, do not share; 0: closed */
+  uint64_t piece_count;     /* of triangles that share vertices */
+  int64_t euler;            /* vertices - edges + triangles; 2 for a sphere */
+  double volume;            /* enclosed, cubic metres; hollows take theirs away */
+} StippleMeshTopology;
+/* Cost: O(T log T). */
+StippleStatus stipple_mesh_topology(const StippleMesh* mesh, StippleMeshTopology* topology);
+/* Writes positions and triangles by the ending: .ply, or .glb (Z up becomes Y up). */
+StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8);
 
 /* ---- density and anchors ----------------------------------------------------------------------- */
 
@@ -935,6 +962,26 @@ StippleStatus stipple_volume_info(const StippleVolume* volume, StippleVolumeInfo
 /* OpenVDB file with the grids `density` and `color`. */
 StippleStatus stipple_volume_save(const StippleVolume* volume, const char* path_utf8);
 StippleStatus stipple_volume_load(StippleContext* context, const char* path_utf8, StippleVolume** volume);
+
+typedef struct StippleVolumeToMeshOptions {
+  uint32_t struct_size;
+  uint32_t largest_only; /* 1: only the piece that encloses most, without hollows; default 0 */
+  double opacity;        /* of one voxel, between 0 and 1, at which the surface lies; default 0.5 */
+  double density;        /* the same per metre; 0, the default: from opacity, -ln(1 - opacity) / voxel size */
+  double adaptivity;     /* 0..1, default 0; larger faces where the surface is flat */
+} StippleVolumeToMeshOptions;
+void stipple_volume_to_mesh_options_init(StippleVolumeToMeshOptions* options);
+
+/* The closed surface of a volume's density, for shadows and collisions, as a job (stipple_job_mesh). Every edge
+ * has two triangles, which run against each other. Colours are not read. Same result for any number of threads.
+ * Errors of the start: INVALID_ARGUMENT, MEMORY_LIMIT; of the job: INVALID_ARGUMENT for an empty volume and,
+ * with the largest value, for a threshold that no voxel reaches; UNAVAILABLE where libstipple_media cannot be
+ * loaded. A cancel waits for the surface itself, which is one call of OpenVDB. docs/methods/proxy_mesh.md. */
+StippleStatus stipple_volume_to_mesh_start(const StippleVolume* volume,
+                                           const StippleVolumeToMeshOptions* options, StippleJob** job);
+StippleStatus stipple_volume_to_mesh_memory_bound(const StippleVolume* volume,
+                                                  const StippleVolumeToMeshOptions* options,
+                                                  uint64_t* bytes);
 
 /* ---- pictures ---------------------------------------------------------------------------------- */
 

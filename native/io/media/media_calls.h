@@ -24,6 +24,9 @@ void stipple_media_volume_write(const char* path, const StippleMediaVolume* volu
                                 StippleMediaStatus* status);
 void stipple_media_volume_read(const char* path, double* voxel_size, double* origin,
                                const StippleMediaSink* sink, StippleMediaStatus* status);
+void stipple_media_volume_surface(const StippleMediaVolume* volume, double threshold,
+                                  double adaptivity, const StippleMediaSink* sink,
+                                  StippleMediaStatus* status);
 void stipple_media_gzip_unpack(const char* what, const uint8_t* bytes, uint64_t count, uint8_t* out,
                                uint64_t capacity, uint64_t* produced, StippleMediaStatus* status);
 void stipple_media_gzip_pack(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,

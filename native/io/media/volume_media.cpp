@@ -1,5 +1,6 @@
 // The only file that sees OpenVDB's headers: they take half a minute to compile.
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/VolumeToMesh.h>
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
@@ -214,7 +215,61 @@ void readVolume(const char* path, double* voxel_size, double* origin,
              static_cast<float*>(allocate(sink, kMediaColour, bytes * 3)));
 }
 
+/// OpenVDB takes what is below an isovalue for inside, and a background that is outside closes the
+/// surface where the stored voxels end.
+openvdb::FloatGrid::Ptr depthGrid(const StippleMediaVolume& volume, float threshold) {
+  const auto grid = openvdb::FloatGrid::create(threshold);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  const auto transform = openvdb::math::Transform::createLinearTransform(volume.voxel_size);
+  transform->postTranslate(openvdb::Vec3d(volume.origin[0], volume.origin[1], volume.origin[2]));
+  grid->setTransform(transform);
+  const size_t count = static_cast<size_t>(volume.brick_count);
+  std::vector<FloatLeaf*> leaves(count, nullptr);
+  parallelFor(count, kBricksPerTask, [&](size_t begin, size_t end) {
+    for (size_t b = begin; b < end; ++b) {
+      const int32_t* at = volume.bricks + b * 3;
+      leaves[b] = new FloatLeaf(openvdb::Coord(at[0], at[1], at[2]), threshold, true);
+      float* values = leaves[b]->buffer().data();
+      for (size_t v = 0; v < kVoxels; ++v) values[v] = threshold - volume.density[b * kVoxels + v];
+    }
+  });
+  for (FloatLeaf* leaf : leaves) grid->tree().addLeaf(leaf);
+  return grid;
+}
+
+void surfaceOf(const StippleMediaVolume& volume, double threshold, double adaptivity,
+               const StippleMediaSink& sink) {
+  const auto grid = depthGrid(volume, static_cast<float>(threshold));
+  openvdb::tools::VolumeToMesh mesher(0.0, adaptivity, false);
+  mesher(*grid);
+  give(sink, kMediaSurfacePoints,
+       std::vector<openvdb::Vec3s>(mesher.pointList().get(),
+                                   mesher.pointList().get() + mesher.pointListSize()));
+  std::vector<std::array<uint32_t, 4>> faces;
+  for (size_t p = 0; p < mesher.polygonPoolListSize(); ++p) {
+    const openvdb::tools::PolygonPool& pool = mesher.polygonPoolList()[p];
+    for (size_t i = 0; i < pool.numQuads(); ++i) {
+      const openvdb::Vec4I& quad = pool.quad(i);
+      faces.push_back({quad[0], quad[1], quad[2], quad[3]});
+    }
+    for (size_t i = 0; i < pool.numTriangles(); ++i) {
+      const openvdb::Vec3I& triangle = pool.triangle(i);
+      faces.push_back({triangle[0], triangle[1], triangle[2], kMediaNoCorner});
+    }
+  }
+  give(sink, kMediaSurfaceFaces, faces);
+}
+
 }  // namespace
+
+void stipple_media_volume_surface(const StippleMediaVolume* volume, double threshold,
+                                  double adaptivity, const StippleMediaSink* sink,
+                                  StippleMediaStatus* status) {
+  guard("the volume's surface", status, [&] {
+    initialiseOnce();
+    surfaceOf(*volume, threshold, adaptivity, *sink);
+  });
+}
 
 void stipple_media_volume_write(const char* path, const StippleMediaVolume* volume,
                                 StippleMediaStatus* status) {

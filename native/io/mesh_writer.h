@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+#include "data/tri_mesh.h"
+
+namespace stipple {
+
+/// Writes positions and triangles, nothing else of the mesh, by the ending: .ply (binary, positions
+/// as they are) or .glb (Z up turned to Y up, so that readMeshFile gives the same positions back).
+/// Errors: kIo; kUnsupported for another ending and for 4 GiB and more; kInvalidArgument for a mesh
+/// that validate() refuses.
+void writeMeshFile(const TriMesh& mesh, const std::string& path);
+
+}  // namespace stipple
