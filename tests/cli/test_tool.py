@@ -183,3 +183,16 @@ def test_a_lying_header_is_refused_before_memory_is_taken(tmp_path):
         'rot_0', 'rot_1', 'rot_2', 'rot_3')) + 'end_header\n'
     (tmp_path / 'liar.ply').write_bytes(header.encode() + bytes(56))
     assert '1000000000000' in error('info', tmp_path / 'liar.ply')
+
+
+def test_mesh_is_closed_and_as_large_as_the_cube(scene):
+    made = figures('mesh', scene / 'cube.ply', scene / 'cube_mesh.glb', '--resolution', 40, '--largest')
+    assert made['open_edges'] == 0 and made['pieces'] == 1
+    # The surface lies up to two voxels outside the cube of side 1.
+    assert 1.0 < made['volume'] < (1 + 4 * made['voxel_size']) ** 3
+    assert figures('info', scene / 'cube_mesh.glb')['triangles'] == made['triangles']
+    run('voxelize', scene / 'cube.ply', scene / 'for_mesh.vdb', '--resolution', 40)
+    assert figures('mesh', scene / 'for_mesh.vdb', scene / 'cube_mesh.ply', '--largest')['triangles'] == made['triangles']
+    assert (scene / 'cube_mesh.ply').read_bytes().startswith(b'ply\n')
+    assert 'opacity is 1.5' in error('mesh', scene / 'for_mesh.vdb', scene / 'no.ply', '--threshold', 1.5)
+    assert '.ply and .glb' in error('mesh', scene / 'for_mesh.vdb', scene / 'no.obj')
