@@ -23,4 +23,9 @@ void stipple_media_volume_read(const char*, double*, double*, const StippleMedia
   reportLeftOut(status);
 }
 
+void stipple_media_volume_surface(const StippleMediaVolume*, double, double,
+                                  const StippleMediaSink*, StippleMediaStatus* status) {
+  reportLeftOut(status);
+}
+
 }  // namespace stipple::media
