@@ -3,6 +3,7 @@
 
 #include "cli/commands.h"
 #include "cli/report.h"
+#include "cli/voxels.h"
 
 namespace stipple::cli {
 
@@ -22,23 +23,9 @@ Volume volumeOf(const Context& context, const Arguments& arguments) {
   if (fileKind(arguments.in) == FileKind::kVolume) {
     return make<Volume>(stipple_volume_load, context.get(), arguments.in.c_str());
   }
-  if (arguments.resolution < 1 || arguments.resolution > 65536) {
-    throw Failure("--resolution is " + std::to_string(arguments.resolution) +
-                  "; 1 to 65536 is allowed");
-  }
-  StippleVoxelizeOptions options;
-  stipple_voxelize_options_init(&options);
-  options.voxel_size = arguments.voxel_size;
-  options.resolution = static_cast<uint32_t>(arguments.resolution);
+  const auto options = voxelizeOptions(arguments.voxel_size, arguments.resolution);
   const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
-  auto instance = sized<StippleInstance>();
-  instance.cloud = cloud.get();
-  for (int i = 0; i < 4; ++i) instance.matrix[i * 5] = 1.0;
-  const auto job = make<Job>(stipple_voxelize_start, context.get(),
-                             const_cast<const StippleInstance*>(&instance), uint64_t{1},
-                             const_cast<const StippleVoxelizeOptions*>(&options));
-  finish(job);
-  return make<Volume>(stipple_job_volume, job.get());
+  return voxelized(context, cloud, options);
 }
 
 void mesh(const Context& context, const Arguments& arguments) {

@@ -3,6 +3,7 @@
 
 #include "cli/commands.h"
 #include "cli/report.h"
+#include "cli/voxels.h"
 
 namespace stipple::cli {
 
@@ -18,24 +19,10 @@ void voxelize(const Context& context, const Arguments& arguments) {
   if (fileKind(arguments.out) != FileKind::kVolume) {
     throw Failure("'" + arguments.out + "' is not a volume; .vdb is expected");
   }
-  if (arguments.resolution < 1 || arguments.resolution > 65536) {
-    throw Failure("--resolution is " + std::to_string(arguments.resolution) +
-                  "; 1 to 65536 is allowed");
-  }
-  StippleVoxelizeOptions options;
-  stipple_voxelize_options_init(&options);
-  options.voxel_size = arguments.voxel_size;
-  options.resolution = static_cast<uint32_t>(arguments.resolution);
+  const auto options = voxelizeOptions(arguments.voxel_size, arguments.resolution);
   const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
-  auto instance = sized<StippleInstance>();
-  instance.cloud = cloud.get();
-  for (int i = 0; i < 4; ++i) instance.matrix[i * 5] = 1.0;
   const auto start = std::chrono::steady_clock::now();
-  const auto job = make<Job>(stipple_voxelize_start, context.get(),
-                             const_cast<const StippleInstance*>(&instance), uint64_t{1},
-                             const_cast<const StippleVoxelizeOptions*>(&options));
-  finish(job);
-  const auto volume = make<Volume>(stipple_job_volume, job.get());
+  const Volume volume = voxelized(context, cloud, options);
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   check(stipple_volume_save(volume.get(), arguments.out.c_str()));
