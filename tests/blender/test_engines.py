@@ -68,20 +68,6 @@ def camera():
     return scenes.camera((0, 0, 6), width=60, height=60, type='ORTHO', ortho_scale=3.0)
 
 
-@pytest.fixture
-def depths(stipple, monkeypatch):
-    """Depth pictures as the engines hand them to Blender, row 0 = bottom."""
-    found, fill = [], stipple.version.fill_pass
-
-    def note(render_pass, array):
-        if render_pass.name == 'Depth':
-            found.append(np.array(array))
-        fill(render_pass, array)
-
-    monkeypatch.setattr(stipple.version, 'fill_pass', note)
-    return found
-
-
 def mesh_between(stipple, opacity=0.98):
     """Splats at z = 1 on the left, an emitting quad of 1 x 1 metre at 0, splats at z = -1 on the whole."""
     splat_wall(stipple, 'behind', -1.0, opacity=opacity)

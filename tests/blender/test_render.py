@@ -70,20 +70,6 @@ def test_depth_is_planar_and_huge_where_nothing_is(square, tmp_path, depths):
     assert (depth[:5] == np.float32(1e10)).all()
 
 
-@pytest.fixture
-def depths(stipple, monkeypatch):
-    """Depth pictures as the engine hands them to Blender, row 0 = bottom."""
-    found, fill = [], stipple.version.fill_pass
-
-    def note(render_pass, array):
-        if render_pass.name == 'Depth':
-            found.append(np.array(array))
-        fill(render_pass, array)
-
-    monkeypatch.setattr(stipple.version, 'fill_pass', note)
-    return found
-
-
 def test_border_is_a_part_of_the_whole(square, tmp_path):
     scene = bpy.context.scene
     whole = scenes.render_pixels(tmp_path, 'whole')
