@@ -9,6 +9,7 @@
 #include "base/progress.h"
 #include "data/splat_cloud.h"
 #include "densify/splat_edit.h"
+#include "densify/statistic.h"
 #include "math/camera.h"
 #include "splat/render.h"
 #include "train/adam.h"
@@ -49,17 +50,6 @@ struct BackwardSummary {
   std::array<double, 6> camera{};
   std::array<double, 3> background{};
   uint64_t visible_count = 0;
-};
-
-enum class Statistic : uint32_t {
-  kContributions = 0,
-  kBlendingWeights = 1,
-  kEdgeWeights = 2,
-  kScreenGradients = 3,          ///< [N,2]
-  kAbsoluteScreenGradients = 4,  ///< [N,2]
-  kScreenGradientNorms = 5,
-  kErrors = 6,
-  kLargestErrors = 7,
 };
 
 /// Everything of a fit that a checkpoint has to keep.

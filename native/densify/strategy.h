@@ -1,0 +1,139 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "data/splat_cloud.h"
+#include "data/tensor_table.h"
+#include "densify/raw_splats.h"
+#include "densify/splat_edit.h"
+#include "densify/statistic.h"
+#include "math/camera.h"
+
+namespace stipple {
+
+/// Where a fit stands.
+struct FitMoment {
+  uint64_t iteration = 1;       ///< 1 for the first
+  uint64_t iterations = 30000;  ///< of the whole fit
+  double extent = 1;            ///< of the cameras: 1.1 times the largest distance from their mean
+  uint64_t seed = 0;            ///< of the fit; numbers are keyed by (seed, use, iteration, row)
+  uint64_t max_splats = 0;      ///< hard cap of the count; 0: none
+};
+
+/// An iteration of a published schedule of 30,000 in a fit of another length: every window,
+/// interval and event passes through here, and through nothing else. At least 1.
+uint64_t scaleSchedule(uint64_t published, uint64_t iterations);
+
+/// Numbers per splat that a strategy trains beside those of RawSplats.
+struct ExtraParameter {
+  std::string name;
+  size_t row_length = 1;
+  double learning_rate = 0;
+};
+
+/// How raw numbers and extra parameters become splats, where that is not exp, logistic and identity
+/// (raw_splats.h).
+class Parameterisation {
+ public:
+  virtual ~Parameterisation() = default;
+  /// In: extras, one array per parameter, [N, row length]. Out: cloud, of N splats, where the usual
+  /// activation has already written.
+  virtual void activate(const RawSplats& raw, std::span<const std::vector<float>> extras,
+                        SplatCloud& cloud) const = 0;
+  /// In: derivatives by the stored values of the cloud. Out: raw_gradient, where the usual
+  /// derivatives stand already, and one array per extra parameter.
+  virtual void adjoint(const RawSplats& raw, std::span<const std::vector<float>> extras,
+                       const SplatCloud& cloud_gradient, RawSplats& raw_gradient,
+                       std::span<std::vector<float>> extra_gradients) const = 0;
+};
+
+/// What one view told about the splats. Arrays live as long as the call.
+struct ViewStatistics {
+  size_t view = 0;
+  uint32_t width = 0;   ///< pixels
+  uint32_t height = 0;  ///< pixels
+  const Camera* camera = nullptr;
+  /// [N] 1 where the splat passed culling; what densification papers call visible.
+  std::span<const uint8_t> visible;
+  /// Of a statistic that was asked for; empty for the others.
+  std::span<const float> of(Statistic statistic) const {
+    return arrays[static_cast<size_t>(statistic)];
+  }
+  std::array<std::span<const float>, 8> arrays;
+};
+
+/// Draws views on demand, without a step.
+class ViewEvaluator {
+ public:
+  virtual ~ViewEvaluator() = default;
+  virtual size_t viewCount() const = 0;
+  virtual const Camera& camera(size_t view) const = 0;
+  /// [H,W,3] what the view should look like, over the background of evaluate().
+  virtual std::vector<float> target(size_t view) = 0;
+  /// [H,W,3] what it looks like now.
+  virtual std::vector<float> picture(size_t view) = 0;
+  /// Statistics of the current splats. Valid until the next call.
+  virtual const ViewStatistics& evaluate(size_t view, const StatisticRequest& request) = 0;
+};
+
+/// The splats as an edit may see them.
+struct SplatStore {
+  const RawSplats& splats;
+  const RawSplats& first_moments;
+  const RawSplats& second_moments;
+  std::span<const std::vector<float>> extras = {};
+};
+
+/// Controls which splats there are while they are trained. A strategy sees statistics and answers
+/// with edits; it draws nothing, steps nothing and knows nobody who does. Hooks are called in the
+/// order in which they stand here, once per iteration; those that are not overridden do nothing.
+/// Determinism: a strategy's answers depend on its calls and on FitMoment::seed alone.
+class Strategy {
+ public:
+  virtual ~Strategy() = default;
+
+  /// As users write it: "adaptive".
+  virtual const char* name() const = 0;
+
+  /// Once, before the first iteration; the splats start with these, and the parameterisation stays.
+  virtual std::vector<ExtraParameter> parameters() const { return {}; }
+  virtual std::vector<std::vector<float>> initialExtras(const RawSplats&) const { return {}; }
+  virtual const Parameterisation* parameterisation() const { return nullptr; }
+
+  /// What this iteration's backward pass shall gather for observe().
+  virtual StatisticRequest requests(const FitMoment&) const { return {}; }
+
+  /// Value of a regulariser of the stored values, and its derivative added to `gradient` (a cloud
+  /// of as many splats).
+  virtual double loss(const FitMoment&, const SplatCloud&, SplatCloud* /*gradient*/) { return 0; }
+
+  /// After the backward pass, with the statistics asked for.
+  virtual void observe(const FitMoment&, const ViewStatistics&) {}
+
+  /// Whether Adam takes its step in this iteration; derivatives add up where it does not.
+  virtual bool stepGate(const FitMoment&) const { return true; }
+
+  /// After the step: small changes of numbers (noise), as writes.
+  virtual std::optional<SplatEdit> afterStep(const FitMoment&, const SplatStore&) { return {}; }
+
+  /// Before an edit: looks at further views. Called where wantsSweep says so.
+  virtual bool wantsSweep(const FitMoment&) const { return false; }
+  virtual void sweep(const FitMoment&, ViewEvaluator&) {}
+
+  /// Which splats there shall be. The strategy's own arrays per splat follow its answer at once;
+  /// whoever called applies it.
+  virtual std::optional<SplatEdit> edit(const FitMoment&, const SplatStore&) { return {}; }
+
+  /// What a checkpoint keeps, and takes back. Errors: kFormat for a table of another strategy.
+  virtual TensorTable state() const { return {}; }
+  virtual void restore(const TensorTable&) {}
+};
+
+}  // namespace stipple

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "base/progress.h"
+#include "data/splat_cloud.h"
+#include "data/view_source.h"
+#include "train/fit_model.h"
+
+namespace stipple {
+
+struct ExplicitModelOptions {
+  std::string strategy = "adaptive";  ///< how splats are added and removed
+  uint64_t start_splats = 0;          ///< of the start; 0: as many as the prior has points
+  uint64_t max_splats = 0;            ///< hard cap; 0: none
+  int sh_degree = 3;                  ///< 0..4; 0 without view-dependent colour
+  Antialias antialias = Antialias::kClassic;
+  double ssim_share = 0.2;
+  uint64_t seed = 0;
+};
+
+/// Splats with parameters of their own, started from what the views know of surfaces: their points,
+/// else their depth, else the volume that the cameras share.
+/// In: training: the views that may be looked at. Source of constants: Kerbl, Kopanas, Leimkuehler,
+/// Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023.
+/// Errors: kInvalidArgument for no views, options out of range, an unknown strategy (says which
+/// there are).
+std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
+                                            std::span<const size_t> training,
+                                            const ExplicitModelOptions& options,
+                                            Progress* progress = nullptr);
+
+}  // namespace stipple
