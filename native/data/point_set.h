@@ -5,7 +5,8 @@
 
 namespace stipple {
 
-/// Oriented, coloured samples of a surface.
+/// Oriented, coloured samples of a surface. Points of a reconstruction have neither normals, areas
+/// nor weights: those arrays are empty.
 struct PointSet {
   std::vector<float> positions;  ///< [N,3] metres
   std::vector<float> normals;    ///< [N,3] unit

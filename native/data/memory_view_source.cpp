@@ -1,0 +1,30 @@
+#include "data/memory_view_source.h"
+
+#include <utility>
+
+#include "base/error.h"
+#include "data/view_check.h"
+
+namespace stipple {
+
+void MemoryViewSource::add(const Camera& camera, ViewPicture picture, std::string name) {
+  if (name.empty()) name = "view " + std::to_string(views_.size());
+  validateView(camera, picture, name);
+  views_.push_back({camera, std::move(picture), std::move(name)});
+}
+
+void MemoryViewSource::setPoints(PointSet points) {
+  validatePoints(points, "points");
+  points_ = std::move(points);
+}
+
+const MemoryViewSource::View& MemoryViewSource::at(size_t view) const {
+  if (view >= views_.size()) {
+    fail(ErrorCode::kInvalidArgument, "view " + std::to_string(view) +
+                                          " was asked for; there are " +
+                                          std::to_string(views_.size()) + " views, counted from 0");
+  }
+  return views_[view];
+}
+
+}  // namespace stipple

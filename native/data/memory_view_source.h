@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "data/view_source.h"
+
+namespace stipple {
+
+/// Views whose pictures are in memory: renders of a Blender scene, and whatever small.
+class MemoryViewSource final : public ViewSource {
+ public:
+  explicit MemoryViewSource(ColourSpace colour_space) : colour_space_(colour_space) {}
+
+  /// Errors: kInvalidArgument, as validateView(); nothing is added then. In: name, empty for
+  /// "view" and its number.
+  void add(const Camera& camera, ViewPicture picture, std::string name = {});
+  /// In: positions and colours [N,3] and opacities [N], the other arrays of N or empty.
+  /// Errors: kInvalidArgument for array sizes that disagree and values that are not finite.
+  void setPoints(PointSet points);
+
+  size_t count() const override { return views_.size(); }
+  const Camera& camera(size_t view) const override { return at(view).camera; }
+  std::string name(size_t view) const override { return at(view).name; }
+  ColourSpace colourSpace() const override { return colour_space_; }
+  ViewPicture load(size_t view) const override { return at(view).picture; }
+  const PointSet& points() const override { return points_; }
+
+  /// The picture without a copy; valid until the next add().
+  const ViewPicture& picture(size_t view) const { return at(view).picture; }
+
+ private:
+  struct View {
+    Camera camera;
+    ViewPicture picture;
+    std::string name;
+  };
+
+  const View& at(size_t view) const;
+
+  ColourSpace colour_space_;
+  std::vector<View> views_;
+  PointSet points_;
+};
+
+}  // namespace stipple
