@@ -5,20 +5,15 @@ Cycles is made to see another scene than the file's in the evaluated copies alon
 """
 
 import contextlib
-import inspect
 
 import bpy
 
 from . import version
 from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
+from .cycles_functions import CyclesRender, functions
 from .engine import NativeWork
 from .scene import cameras, facts, instances, layers, sources, splat_data
-
-try:
-    from cycles import CyclesRender
-except ImportError:  # a Blender that was built without Cycles
-    CyclesRender = None
 
 _VISIBILITY = ('visible_camera', 'visible_diffuse', 'visible_glossy', 'visible_transmission',
                'visible_volume_scatter', 'visible_shadow')
@@ -71,19 +66,9 @@ def _has_shadow_catchers():
 
 
 def _make_engine():
-    # Registering a subclass of a registered class takes the latter's Python away from Blender: Cycles itself would
-    # render no more. So this one has Cycles' functions without being derived from it.
-    functions = {name: value for name, value in vars(CyclesRender).items()
-                 if name.startswith('bl_use_') or name != '__init__' and inspect.isfunction(value)}
-    cycles_functions = type('CyclesFunctions', (), functions)
-
-    class STIPPLE_RE_cycles(NativeWork, cycles_functions, bpy.types.RenderEngine):
+    class STIPPLE_RE_cycles(NativeWork, functions(), bpy.types.RenderEngine):
         bl_idname = 'STIPPLE_CYCLES'
         bl_label = "Cycles + Stipple"
-
-        def __init__(self, *args, **kwargs):
-            super().__init__(*args, **kwargs)
-            self.session = None  # Cycles' own
 
         def update_render_passes(self, scene=None, srl=None):
             """Cycles' own passes, and those that the splats need."""
