@@ -22,6 +22,9 @@ from . import cameras, exr_layers, splat_data
 
 ENGINES = {'CYCLES': 'CYCLES', 'EEVEE': version.EEVEE_ENGINE, 'WORKBENCH': 'BLENDER_WORKBENCH'}
 _CAPTURE_ENGINE = 'STIPPLE_CAPTURE'
+_MULTI_LAYER = {'file_format': 'OPEN_EXR_MULTILAYER'}
+if version.VERSION >= (5, 0, 0):
+    _MULTI_LAYER = {'media_type': 'MULTI_LAYER_IMAGE', **_MULTI_LAYER}
 # Blender's engines mark emptiness by a depth of 65504 and more, or by the far end of the camera.
 _FARTHEST, _SHARE_OF_END = 6e4, 0.999
 # Depth and normals of pixels that something covers in part are mixtures: not used.
@@ -119,12 +122,8 @@ class Capture:
         if settings.engine != 'CYCLES':
             self._folder = tempfile.mkdtemp(prefix='stipple-views-')
             stack.callback(shutil.rmtree, self._folder, True)
-            image = render.image_settings
-            # In this order: what a field may be depends on the ones before it.
-            if version.VERSION >= (5, 0, 0):
-                kept.set(image, media_type='MULTI_LAYER_IMAGE')
-            kept.set(image, file_format='OPEN_EXR_MULTILAYER')
-            kept.set(image, color_depth='32', exr_codec='NONE')
+            stack.callback(_set_in_order, render.image_settings, _file_settings(render.image_settings))
+            _set_in_order(render.image_settings, {**_MULTI_LAYER, 'color_depth': '32', 'exr_codec': 'NONE'})
             kept.set(render, filepath=os.path.join(self._folder, 'view'), use_file_extension=True)
         kept.set(render, engine=engine)
         kept.set(render, resolution_x=render.resolution_x, resolution_y=render.resolution_y, resolution_percentage=100,
@@ -206,6 +205,17 @@ class Capture:
             known = is_known[..., None] & (length > 0.5)
             normals = np.where(known, self._passes['Normal'] / np.maximum(length, 1e-9), 0).astype(np.float32)
         return Captured(name, camera, linear, np.where(is_known, depth, 0).astype(np.float32), normals)
+
+
+def _file_settings(image):
+    """What of a scene's image settings a layered file changes."""
+    return {name: getattr(image, name) for name in (*_MULTI_LAYER, 'color_mode', 'color_depth', 'exr_codec')}
+
+
+def _set_in_order(owner, values):
+    """What one setting may be depends on those before it."""
+    for name, value in values.items():
+        setattr(owner, name, value)
 
 
 class _Kept:
