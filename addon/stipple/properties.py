@@ -117,6 +117,14 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         name="Meshes as Mattes", description="Meshes hide the splats behind them and leave a hole in the picture, for "
         "putting a render of the meshes there. Shadow catchers hide nothing", default=True, options=set(),
         override=_OVERRIDABLE)
+    max_splats: IntProperty(
+        name="Max Splats", description="Splats that the viewport shows at most, over all objects and their instances; 0 "
+        "for no limit. Objects share them in proportion to their own budgets", default=0, min=0, soft_max=10000000,
+        options=set(), override=_OVERRIDABLE, update=sync.on_limit_change)
+    max_splats_render: IntProperty(
+        name="Max Splats", description="Splats that a render shows at most, over all objects and their instances; 0 for "
+        "no limit. Objects share them in proportion to their own budgets", default=0, min=0, soft_max=100000000,
+        options=set(), override=_OVERRIDABLE)
 
 
 classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_scene)

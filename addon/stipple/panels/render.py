@@ -8,8 +8,8 @@ from ..scene import facts
 ENGINE = 'STIPPLE'
 CYCLES_ENGINE = 'STIPPLE_CYCLES'
 # Blender's panels that name BLENDER_RENDER but do nothing for this engine.
-_EXCLUDED = {'VIEWLAYER_PT_filter', 'VIEWLAYER_PT_layer_passes', 'RENDER_PT_freestyle', 'RENDER_PT_simplify',
-             'RENDER_PT_gpencil', 'RENDER_PT_stereoscopy'}
+_EXCLUDED = {'VIEWLAYER_PT_filter', 'VIEWLAYER_PT_layer_passes', 'RENDER_PT_freestyle',
+             'RENDER_PT_simplify_greasepencil', 'RENDER_PT_gpencil', 'RENDER_PT_stereoscopy'}
 
 
 class STIPPLE_PT_render_splats(bpy.types.Panel):
@@ -77,6 +77,35 @@ class STIPPLE_PT_view_layer_passes(bpy.types.Panel):
         column.prop(context.view_layer, 'use_pass_z')
 
 
+def _draw_max_splats(self, context):
+    _draw_limit(self.layout, context, 'max_splats')
+
+
+def _draw_max_splats_render(self, context):
+    _draw_limit(self.layout, context, 'max_splats_render')
+
+
+def _draw_limit(layout, context, name):
+    layout = layout.column()
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.active = context.scene.render.use_simplify
+    layout.prop(context.scene.stipple, name)
+
+
+# Cycles has panels of its own.
+_SIMPLIFY = (('RENDER_PT_simplify_viewport', _draw_max_splats), ('CYCLES_RENDER_PT_simplify_viewport', _draw_max_splats),
+             ('RENDER_PT_simplify_render', _draw_max_splats_render),
+             ('CYCLES_RENDER_PT_simplify_render', _draw_max_splats_render))
+
+
+def _simplify_panels():
+    for name, draw in _SIMPLIFY:
+        panel = getattr(bpy.types, name, None)
+        if panel is not None:
+            yield panel, draw
+
+
 def _panels(base=bpy.types.Panel):
     """Blender's panels that say which engines they are for."""
     for panel in base.__subclasses__():
@@ -91,9 +120,13 @@ def register():
             panel.COMPAT_ENGINES.add(ENGINE)
         if 'CYCLES' in panel.COMPAT_ENGINES:
             panel.COMPAT_ENGINES.add(CYCLES_ENGINE)
+    for panel, draw in _simplify_panels():
+        panel.append(draw)
 
 
 def unregister():
+    for panel, draw in _simplify_panels():
+        panel.remove(draw)
     for panel in _panels():
         panel.COMPAT_ENGINES.difference_update({ENGINE, CYCLES_ENGINE})
 

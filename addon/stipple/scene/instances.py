@@ -5,7 +5,7 @@ import bpy
 
 from .. import version
 from ..binding.errors import StippleError
-from . import grades, placement, sequences, sources, splat_data, sync, viewed
+from . import grades, limits, placement, sequences, shown, sources, splat_data, sync, viewed
 
 
 def gather(depsgraph, mode, warn=lambda message: None):
@@ -20,11 +20,12 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
     """[(owner, object, cloud, matrix)] with the original object, and the original one that it is selected and hidden
     with: itself or its instancer."""
     clouds, found = {}, []
+    share = limits.share(depsgraph, mode)
     for entry in depsgraph.object_instances:
         obj = entry.object
-        if not splat_data.is_splat_object(obj) or not (entry.show_self or entry.is_instance):
+        if not splat_data.is_splat_object(obj) or not shown.is_shown(entry):
             continue
-        if not getattr(obj, 'visible_camera', True):
+        if not shown.seen_by_camera(entry, depsgraph):
             continue
         if obj.is_holdout:
             warn(f"Splat object '{obj.name}' is a holdout, which splats do not support; it is left out.")
@@ -35,7 +36,7 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
             continue
         key = obj.data.as_pointer()
         if key not in clouds:
-            clouds[key] = _cloud_of(obj, mode, depsgraph.scene.frame_current)
+            clouds[key] = _cloud_of(obj, mode, depsgraph.scene.frame_current, share.most(obj.original.data))
         if clouds[key] is not None:
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
@@ -43,20 +44,19 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
     return found
 
 
-def _cloud_of(obj, mode, frame):
-    """Native splats of an evaluated object at a frame of the scene, or None for none."""
+def _cloud_of(obj, mode, frame, most):
+    """Native splats of an evaluated object at a frame of the scene, `most` at most, or None for none."""
     data, original = obj.data, obj.original.data
     stipple = data.stipple
     if mode == 'RENDER' and bpy.app.background and not stipple.edited:
         # Stored splats of a file that is gone or has changed: nobody would see the panel that says so.
         sources.check_unchanged(original)
-    from_source = (stipple.is_sequence or stipple.source_kind in sources.MODEL_KINDS) and not stipple.edited
-    if from_source and not _has_modifiers(obj) and not _is_edited(original, mode):
+    if limits.has_budget(stipple) and not _has_modifiers(obj) and not _is_edited(original, mode):
         try:
             if stipple.is_sequence:
-                cloud = sequences.frame_of(original, stipple, frame, mode).cloud()
+                cloud = sequences.frame_of(original, stipple, frame, mode, most).cloud()
             else:
-                cloud = sources.decode(original, sources.decode_settings(stipple, mode))
+                cloud = sources.decode(original, sources.at_most(sources.decode_settings(stipple, mode), most))
             return cloud and grades.apply(cloud, stipple)
         except StippleError as error:
             raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None

@@ -7,7 +7,7 @@ from .. import version
 from ..binding import mesh as native
 from ..binding.errors import StippleError
 from ..binding.renderer import EMPTY_DEPTH, Surface
-from . import cameras, geometry, meshes, placement, sources, splat_data
+from . import cameras, geometry, meshes, placement, shown, sources, splat_data
 
 # Samples of a pixel along each side, and of a picture that are held at a time (64 MB).
 SIDE = 4
@@ -26,11 +26,11 @@ def gather(depsgraph):
     for entry in depsgraph.object_instances:
         evaluated = entry.object
         owner = entry.parent.original if entry.is_instance else evaluated.original
-        if evaluated.type not in meshes.MESH_LIKE or not (entry.show_self or entry.is_instance):
+        if evaluated.type not in meshes.MESH_LIKE or not shown.is_shown(entry):
             continue
         if splat_data.is_splat_object(evaluated) or geometry.carries_splats(evaluated.data) or owner in made_from:
             continue
-        if not evaluated.visible_camera or evaluated.is_shadow_catcher:
+        if not shown.seen_by_camera(entry, depsgraph) or evaluated.is_shadow_catcher:
             continue
         matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
         if placement.is_flat(matrix):

@@ -72,12 +72,17 @@ class Frame:
         return self._cut(_filled(_Entry(), load(native, self.path)))
 
     def _cut(self, entry):
-        count = entry.count
-        if self.ratio is not None:
-            count = min(count, max(1, round(count * self.ratio)))
-        elif self.count is not None:
-            count = min(count, self.count)
+        count = self._budget(entry.count)
         return _cut(entry, count if self.most is None else min(count, self.most))
+
+    def _budget(self, available):
+        if self.ratio is not None:
+            return min(available, max(1, round(available * self.ratio)))
+        return available if self.count is None else min(available, self.count)
+
+    def shown_count(self):
+        """Splats that the budget leaves of the file, without `most`. Errors: StippleError."""
+        return self._budget(self.available())
 
     def available(self):
         """Splats in the file. Errors: StippleError."""

@@ -10,6 +10,7 @@ import os
 import re
 import zlib
 from collections import OrderedDict
+from dataclasses import replace
 
 import bpy
 
@@ -217,6 +218,13 @@ def decode_settings(stipple, mode='VIEWPORT'):
     if mode == 'RENDER' and stipple.anchors_render != 0:
         anchors = stipple.anchors_render
     return DecodeSettings(anchors, stipple.gaussians_per_anchor, AnchorOrder[stipple.order], stipple.seed)
+
+
+def at_most(settings, most):
+    """The settings for that many splats at most, at least one anchor; most: None for as they are."""
+    if most is None:
+        return settings
+    return replace(settings, anchors=min(settings.anchors, max(1, most // settings.gaussians_per_anchor)))
 
 
 def _tree_budget(stipple, mode):

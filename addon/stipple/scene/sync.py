@@ -8,13 +8,12 @@ property's update function is not called when the property is animated, undone o
 import logging
 import sys
 import time
-from dataclasses import replace
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..binding.errors import StippleError
-from . import grades, handlers, masks, meshes, sequences, sources, splat_data
+from . import grades, handlers, limits, masks, meshes, sequences, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -28,8 +27,9 @@ FEW = 1000           # fewer splats say nothing about the time that each takes
 log = logging.getLogger('stipple')
 # What is wrong with a datablock, by name, for the panel; empty while all is well.
 problems = {}
+# limited: whether Max Splats counted when the viewport was evaluated last.
 # seconds_per_splat: how long decoding and writing took last; the first value is a slow machine's.
-_state = {'paused': 0, 'rendering': False, 'seconds_per_splat': 1e-6}
+_state = {'paused': 0, 'rendering': False, 'seconds_per_splat': 1e-6, 'limited': False}
 
 
 class paused:
@@ -42,12 +42,12 @@ class paused:
         _state['paused'] -= 1
 
 
-def sync(obj, depsgraph, mode, most=None):
+def sync(obj, depsgraph, mode, most=None, share=None):
     """Writes the attributes that an object's data should have now. Returns True where it wrote.
 
     depsgraph: evaluated settings (animation, drivers) are read through it; None: the settings as they are.
-    mode: 'VIEWPORT' or 'RENDER'. most: splats that are written at most while a slider is dragged, None for all. Errors: StippleError,
-    with the splats as they were.
+    mode: 'VIEWPORT' or 'RENDER'. most: splats that are written at most while a slider is dragged, None for all.
+    share: of Max Splats, None to look it up. Errors: StippleError, with the splats as they were.
     """
     data = obj.data
     stipple = data.stipple
@@ -57,6 +57,8 @@ def sync(obj, depsgraph, mode, most=None):
     if mode == 'RENDER' and bpy.app.background:
         # Nobody sees a panel that says what is wrong, so old splats must not pass for the source's.
         sources.check_unchanged(data)
+    limit = (limits.share(depsgraph, mode) if share is None else share).most(data)
+    most = min((number for number in (most, limit) if number is not None), default=None)
     key, decode = _wanted(data, depsgraph, mode, most)
     if data.get(WRITTEN_KEY) == key:
         return regrade(data, grade)
@@ -79,9 +81,7 @@ def _wanted(data, depsgraph, mode, most):
         scene = bpy.context.scene if depsgraph is None else depsgraph.scene
         frame = sequences.frame_of(data, stipple, scene.frame_current, mode, most)
         return frame.key, frame.arrays
-    settings = sources.decode_settings(stipple, mode)
-    if most is not None:
-        settings = replace(settings, anchors=min(settings.anchors, max(1, most // settings.gaussians_per_anchor)))
+    settings = sources.at_most(sources.decode_settings(stipple, mode), most)
     return written_key(data, settings), lambda: _decoded(data, settings)
 
 
@@ -155,15 +155,32 @@ def on_property_change(stipple, _context):
     data = stipple.id_data
     users = [obj for obj in bpy.data.objects if obj.data == data]
     if users and bpy.app.background:
-        try_sync(users[0], None, 'VIEWPORT')
+        if limits.limit(bpy.context.scene, 'VIEWPORT') is None:
+            try_sync(users[0], None, 'VIEWPORT')
+        else:
+            sync_all()  # what one object shows, others cannot
     elif users:
         follow(users[0])
+
+
+def on_limit_change(_scene, _context):
+    """Update function of Max Splats."""
+    if _state['paused'] or _state['rendering']:
+        return
+    if bpy.app.background:
+        sync_all()
+    else:
+        _complete_later()
 
 
 def follow(obj):
     """Follows a slider: what cannot be written within MOVE_SECONDS is left out until the slider rests."""
     most = int(MOVE_SECONDS / _state['seconds_per_splat'])
     try_sync(obj, None, 'VIEWPORT', most)
+    _complete_later()
+
+
+def _complete_later():
     if bpy.app.timers.is_registered(complete):
         bpy.app.timers.unregister(complete)
     bpy.app.timers.register(complete, first_interval=REST_SECONDS)
@@ -175,7 +192,7 @@ def complete():
         sync_all()
 
 
-def try_sync(obj, depsgraph, mode, most=None):
+def try_sync(obj, depsgraph, mode, most=None, share=None):
     """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once.
 
     In background a render has no panel, and an engine of Blender's own draws what is stored: there the process ends
@@ -183,7 +200,7 @@ def try_sync(obj, depsgraph, mode, most=None):
     """
     name = obj.data.name
     try:
-        sync(obj, depsgraph, mode, most)
+        sync(obj, depsgraph, mode, most, share)
         problems.pop(name, None)
     except StippleError as error:
         if mode == 'RENDER' and bpy.app.background:
@@ -205,8 +222,10 @@ def splat_objects():
 def sync_all(depsgraph=None, mode='VIEWPORT'):
     if _state['paused']:
         return
-    for obj in list(splat_objects()):
-        try_sync(obj, depsgraph, mode)
+    objects = list(splat_objects())
+    share = limits.share(depsgraph, mode) if objects else None
+    for obj in objects:
+        try_sync(obj, depsgraph, mode, share=share)
 
 
 def _evaluated(data, depsgraph):
@@ -221,6 +240,7 @@ def _frame_change_post(scene, depsgraph):
     A render brings its own depsgraph, in stills too; after it the viewport's comes again.
     """
     if depsgraph.mode == 'VIEWPORT':
+        _follow_limit(scene, depsgraph)
         sync_all(depsgraph, 'VIEWPORT')
     elif scene.render.engine not in {ENGINE, CYCLES_ENGINE}:
         # Our engines decode and grade for themselves; every other one draws the stored attributes.
@@ -252,6 +272,7 @@ def _render_end(_scene, _=None):
 def _restored(*_):
     """After undo, redo and loading: splats that do not fit their settings are decoded again."""
     problems.clear()
+    limits.forget()
     _state['rendering'] = False
     _show_boxes(True)
     sync_all()
@@ -275,10 +296,23 @@ def _show_boxes(box):
                 splat_data.show_as_box(obj, box)
 
 
+def _follow_limit(scene, depsgraph):
+    """Notes what Max Splats is shared between. Returns whether it has to be shared anew."""
+    was_limited = _state['limited']
+    _state['limited'] = limits.limit(scene, 'VIEWPORT') is not None
+    if _state['limited']:
+        limits.note(depsgraph)
+    return _state['limited'] or was_limited
+
+
 @persistent
 def _depsgraph_update_post(scene, depsgraph):
-    """Notices when the mesh that splats were made from changes."""
-    if _state['rendering'] or not any(update.is_updated_geometry for update in depsgraph.updates):
+    """Notices when the mesh that splats were made from changes, and when others show under Max Splats."""
+    if _state['rendering'] or depsgraph.mode != 'VIEWPORT':
+        return
+    if _follow_limit(scene, depsgraph) and not bpy.app.timers.is_registered(complete):
+        sync_all(depsgraph)
+    if not any(update.is_updated_geometry for update in depsgraph.updates):
         return
     changed = {update.id.original for update in depsgraph.updates
                if update.is_updated_geometry and isinstance(update.id, bpy.types.Object)}
