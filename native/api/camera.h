@@ -17,4 +17,10 @@ std::string sizeText(const Camera& camera);
 /// The other way round; struct_size is left to the caller.
 StippleCamera cameraTo(const Camera& camera);
 
+/// "PINHOLE" or "ORTHOGRAPHIC".
+const char* modelName(const Camera& camera);
+
+/// Refuses the number of a view that is not there.
+void requireView(const StippleViews& views, uint64_t index);
+
 }  // namespace stipple::api

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "data/image.h"
+#include "data/memory_view_source.h"
 #include "data/sparse_volume.h"
 #include "data/splat_cloud.h"
 #include "data/tri_mesh.h"
@@ -48,6 +50,17 @@ struct ModelNotes {
 struct ModelParts {
   std::variant<SurfaceModel, std::shared_ptr<const HierarchyDecoder>> source;
   std::shared_ptr<const ModelNotes> notes = {};  ///< null where it was not loaded
+};
+
+/// What is known of a view beside its camera; texts are handed out as they lie here.
+struct ViewNote {
+  std::string name;
+  std::string image_path;
+  const char* camera_model = "";
+  StippleViewSplit split = STIPPLE_VIEW_SPLIT_NONE;
+  uint32_t source_width = 0;
+  uint32_t source_height = 0;
+  bool is_distorted = false;
 };
 
 /// What a renderer keeps from one picture to the next; its jobs hold a share.
@@ -93,9 +106,14 @@ struct StippleModel {
   stipple::api::ModelParts parts;
 };
 
+/// Cameras alone have no source. Pictures handed in are added until a job takes a share of the
+/// source; later additions go to a copy, which shares the pictures.
 struct StippleViews {
   stipple::api::Context context;
-  std::vector<stipple::CameraView> views;
+  std::vector<stipple::CameraView> cameras;           ///< where there is no source
+  std::shared_ptr<const stipple::ViewSource> source;  ///< null: cameras alone
+  std::shared_ptr<stipple::MemoryViewSource> memory;  ///< the source, where it can grow
+  std::deque<stipple::api::ViewNote> notes;           ///< one for each view
 };
 
 struct StippleRenderer {

@@ -40,6 +40,17 @@ StippleCamera cameraTo(const Camera& camera) {
   return out;
 }
 
+const char* modelName(const Camera& camera) {
+  return camera.model == CameraModel::kOrthographic ? "ORTHOGRAPHIC" : "PINHOLE";
+}
+
+void requireView(const StippleViews& views, uint64_t index) {
+  if (index < views.notes.size()) return;
+  fail(ErrorCode::kInvalidArgument, "view " + std::to_string(index) + " was asked for; there are " +
+                                        std::to_string(views.notes.size()) +
+                                        " views, counted from 0");
+}
+
 }  // namespace stipple::api
 
 using namespace stipple;
@@ -53,7 +64,18 @@ StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8,
     require(context, "context");
     require(views, "views");
     const std::string path = &require(path_utf8, "path_utf8");
-    *views = new StippleViews{context->state, readCameraFile(path)};
+    auto made = std::make_unique<StippleViews>();
+    made->context = context->state;
+    made->cameras = readCameraFile(path);
+    for (const CameraView& view : made->cameras) {
+      ViewNote note;
+      note.name = view.image_path;
+      note.camera_model = modelName(view.camera);
+      note.source_width = view.camera.width;
+      note.source_height = view.camera.height;
+      made->notes.push_back(std::move(note));
+    }
+    *views = made.release();
   });
 }
 
@@ -62,20 +84,16 @@ void stipple_views_free(StippleViews* views) {
 }
 
 StippleStatus stipple_views_count(const StippleViews* views, uint64_t* count) {
-  return guarded([&] { require(count, "count") = require(views, "views").views.size(); });
+  return guarded([&] { require(count, "count") = require(views, "views").notes.size(); });
 }
 
 StippleStatus stipple_views_camera(const StippleViews* views, uint64_t index,
                                    StippleCamera* camera) {
   return guarded([&] {
-    const auto& list = require(views, "views").views;
-    if (index >= list.size()) {
-      fail(ErrorCode::kInvalidArgument, "view " + std::to_string(index) +
-                                            " was asked for; the "
-                                            "file has " +
-                                            std::to_string(list.size()) + " views, counted from 0");
-    }
-    deliver(camera, cameraTo(list[index].camera), "camera");
+    requireView(require(views, "views"), index);
+    deliver(camera,
+            cameraTo(views->source ? views->source->camera(index) : views->cameras[index].camera),
+            "camera");
   });
 }
 

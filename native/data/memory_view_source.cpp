@@ -10,7 +10,7 @@ namespace stipple {
 void MemoryViewSource::add(const Camera& camera, ViewPicture picture, std::string name) {
   if (name.empty()) name = "view " + std::to_string(views_.size());
   validateView(camera, picture, name);
-  views_.push_back({camera, std::move(picture), std::move(name)});
+  views_.push_back(std::make_shared<const View>(View{camera, std::move(picture), std::move(name)}));
 }
 
 void MemoryViewSource::setPoints(PointSet points) {
@@ -24,7 +24,7 @@ const MemoryViewSource::View& MemoryViewSource::at(size_t view) const {
                                           " was asked for; there are " +
                                           std::to_string(views_.size()) + " views, counted from 0");
   }
-  return views_[view];
+  return *views_[view];
 }
 
 }  // namespace stipple

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -7,7 +8,8 @@
 
 namespace stipple {
 
-/// Views whose pictures are in memory: renders of a Blender scene, and whatever small.
+/// Views whose pictures are in memory: renders of a Blender scene, and whatever small. Copies share
+/// the pictures.
 class MemoryViewSource final : public ViewSource {
  public:
   explicit MemoryViewSource(ColourSpace colour_space) : colour_space_(colour_space) {}
@@ -26,7 +28,7 @@ class MemoryViewSource final : public ViewSource {
   ViewPicture load(size_t view) const override { return at(view).picture; }
   const PointSet& points() const override { return points_; }
 
-  /// The picture without a copy; valid until the next add().
+  /// The picture without a copy; valid as long as this source or a copy of it.
   const ViewPicture& picture(size_t view) const { return at(view).picture; }
 
  private:
@@ -39,7 +41,7 @@ class MemoryViewSource final : public ViewSource {
   const View& at(size_t view) const;
 
   ColourSpace colour_space_;
-  std::vector<View> views_;
+  std::vector<std::shared_ptr<const View>> views_;
   PointSet points_;
 };
 

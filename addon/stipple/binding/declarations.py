@@ -101,6 +101,14 @@ FUNCTIONS = {
     'stipple_views_count': (_status, [_handle, POINTER(c_uint64)]),
     'stipple_views_camera': (_status, [_handle, c_uint64, _to(s.StippleCamera)]),
     'stipple_camera_resize': (_status, [_to(s.StippleCamera), c_uint32, c_uint32]),
+    # views with pictures
+    'stipple_views_create': (_status, [_handle, c_uint32, _out_handle]),
+    'stipple_views_add': (_status, [_handle, _to(s.StippleCamera), _to(s.StippleViewPicture), c_char_p]),
+    'stipple_views_set_points': (_status, [_handle, _to(s.StippleViewPoints)]),
+    'stipple_views_info': (_status, [_handle, _to(s.StippleViewsInfo)]),
+    'stipple_views_view_info': (_status, [_handle, c_uint64, _to(s.StippleViewInfo)]),
+    'stipple_views_read': (_status, [_handle, c_uint64, _to(s.StippleViewBuffers)]),
+    'stipple_views_read_points': (_status, [_handle, c_uint64, _floats, _floats]),
     # rendering
     'stipple_render_options_init': (None, [_to(s.StippleRenderOptions)]),
     'stipple_renderer_create': (_status, [_handle, _out_handle]),

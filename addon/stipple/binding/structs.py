@@ -72,6 +72,13 @@ class MaterialColour(IntEnum):
     CORNER = 2
 
 
+class ViewSplit(IntEnum):
+    NONE = 0
+    TRAIN = 1
+    TEST = 2
+    VALIDATION = 3
+
+
 class AnchorOrder(IntEnum):
     SYSTEMATIC = 0
     PROGRESSIVE = 1
@@ -135,6 +142,7 @@ ENUMS = {
     'StippleMaterialColour': (MaterialColour, 'STIPPLE_MATERIAL_'),
     'StippleAnchorOrder': (AnchorOrder, 'STIPPLE_ORDER_'),
     'StippleViewRig': (ViewRig, 'STIPPLE_RIG_'),
+    'StippleViewSplit': (ViewSplit, 'STIPPLE_VIEW_SPLIT_'),
     'StippleModelKind': (ModelKind, 'STIPPLE_MODEL_'),
     'StippleCameraModel': (CameraModel, 'STIPPLE_CAMERA_'),
     'StippleLowPass': (LowPass, 'STIPPLE_LOW_PASS_'),
@@ -279,6 +287,32 @@ class StippleCamera(_Sized):
     _fields_ = [('struct_size', c_uint32), ('model', c_uint32), ('width', c_uint32), ('height', c_uint32),
                 ('fx', c_double), ('fy', c_double), ('cx', c_double), ('cy', c_double), ('world_to_camera', _matrix),
                 ('near_plane', c_double), ('far_plane', c_double)]
+
+
+class StippleViewPicture(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('transfer', c_uint32), ('rgba', _floats), ('weights', _floats),
+                ('depth', _floats), ('normals', _floats)]
+
+
+class StippleViewPoints(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('count', c_uint64), ('positions', _floats),
+                ('colours', _floats), ('normals', _floats), ('weights', _floats)]
+
+
+class StippleViewsInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('colour_space', c_uint32), ('view_count', c_uint64),
+                ('point_count', c_uint64), ('has_pictures', c_uint32), ('reserved', c_uint32)]
+
+
+class StippleViewInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('split', c_uint32), ('source_width', c_uint32),
+                ('source_height', c_uint32), ('is_distorted', c_uint32), ('reserved', c_uint32), ('name', c_char_p),
+                ('image_path', c_char_p), ('camera_model', c_char_p)]
+
+
+class StippleViewBuffers(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('capacity', c_uint64), ('rgba', _floats),
+                ('weights', _floats), ('depth', _floats), ('normals', _floats)]
 
 
 class StippleInstance(_Sized):

@@ -66,7 +66,7 @@ typedef struct StippleCloud StippleCloud;       /* splats */
 typedef struct StippleMesh StippleMesh;         /* triangles with colours, being put together */
 typedef struct StippleDensity StippleDensity;   /* a probability density over an octree */
 typedef struct StippleModel StippleModel;       /* density and decoder: a source of splats */
-typedef struct StippleViews StippleViews;       /* cameras */
+typedef struct StippleViews StippleViews;       /* cameras, and what they have seen */
 typedef struct StippleRenderer StippleRenderer;
 typedef struct StippleVolume StippleVolume;     /* sparse voxels */
 typedef struct StippleImage StippleImage;
@@ -572,6 +572,90 @@ StippleStatus stipple_views_camera(const StippleViews* views, uint64_t index, St
 /* The same view at another size: intrinsics scale with it. A camera of size 0 x 0 keeps its angle of view
  * over the width. */
 StippleStatus stipple_camera_resize(StippleCamera* camera, uint32_t width, uint32_t height);
+
+/* ---- views with pictures ------------------------------------------------------------------------ */
+
+/* What splats are fitted to: renders that are handed in. */
+
+/* One picture; arrays are read during the call. Row 0 = top; the size is that of the camera. */
+typedef struct StippleViewPicture {
+  uint32_t struct_size;
+  uint32_t transfer;     /* StippleTransfer of rgba; it is converted to the views' colour space */
+  const float* rgba;     /* [H,W,4] premultiplied, alpha 0..1 */
+  const float* weights;  /* [H,W] >= 0, what a pixel counts (a mask). NULL: 1 */
+  const float* depth;    /* [H,W] planar z, metres; 0, and 1e10 and more: unknown. NULL: unknown */
+  const float* normals;  /* [H,W,3] unit, world; 0: unknown. NULL: unknown */
+} StippleViewPicture;
+
+/* Where surfaces are known to be, in the world of the cameras. */
+typedef struct StippleViewPoints {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t count;          /* N >= 0 */
+  const float* positions;  /* [N,3] metres */
+  const float* colours;    /* [N,3] scene linear */
+  const float* normals;    /* [N,3] unit. NULL: unknown */
+  const float* weights;    /* [N] >= 0, what a point counts. NULL: alike */
+} StippleViewPoints;
+
+typedef struct StippleViewsInfo {
+  uint32_t struct_size;
+  uint32_t colour_space;  /* StippleColourSpace, in which the pictures are composited */
+  uint64_t view_count;
+  uint64_t point_count;
+  uint32_t has_pictures;  /* 0: cameras alone (stipple_views_load) */
+  uint32_t reserved;
+} StippleViewsInfo;
+
+/* What a data set says a view is for. */
+typedef enum StippleViewSplit {
+  STIPPLE_VIEW_SPLIT_NONE = 0, /* nothing is said */
+  STIPPLE_VIEW_SPLIT_TRAIN = 1,
+  STIPPLE_VIEW_SPLIT_TEST = 2,
+  STIPPLE_VIEW_SPLIT_VALIDATION = 3
+} StippleViewSplit;
+
+/* The texts live as long as the handle. */
+typedef struct StippleViewInfo {
+  uint32_t struct_size;
+  uint32_t split;             /* StippleViewSplit */
+  uint32_t source_width;      /* pixels of the file's picture; 0 where it was handed in */
+  uint32_t source_height;
+  uint32_t is_distorted;      /* 1: the file's picture is; the distortion is taken out when it is read */
+  uint32_t reserved;
+  const char* name;
+  const char* image_path;     /* of the picture's file; empty where there is none */
+  const char* camera_model;   /* as its source calls it: "OPENCV" */
+} StippleViewInfo;
+
+/* Any pointer may be NULL. capacity: pixels that each given buffer has room for. */
+typedef struct StippleViewBuffers {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t capacity;
+  float* rgba;     /* [H,W,4] premultiplied, in the views' colour space */
+  float* weights;  /* [H,W] 1 where no mask is */
+  float* depth;    /* [H,W] planar z, metres; 0 where unknown */
+  float* normals;  /* [H,W,3] world; 0 where unknown */
+} StippleViewBuffers;
+
+/* No views yet. In: colour_space, a StippleColourSpace: that of the splats to be. */
+StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_space, StippleViews** views);
+/* Copies the picture. name_utf8 may be NULL: "view" and its number. A job that uses the views does not see
+ * what is added after its start. Errors: INVALID_ARGUMENT, by name and pixel, for values that are not finite or
+ * out of range, and for views that were not made by stipple_views_create; MEMORY_LIMIT. */
+StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera,
+                                const StippleViewPicture* picture, const char* name_utf8);
+/* Takes the place of earlier points. Errors: as stipple_views_add. */
+StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoints* points);
+StippleStatus stipple_views_info(const StippleViews* views, StippleViewsInfo* info);
+StippleStatus stipple_views_view_info(const StippleViews* views, uint64_t index, StippleViewInfo* info);
+/* Reads the picture from its file where it has one. Its size is that of stipple_views_camera.
+ * Errors: BUFFER_TOO_SMALL; UNSUPPORTED for cameras alone; IO and FORMAT, by the file's name. */
+StippleStatus stipple_views_read(const StippleViews* views, uint64_t index, const StippleViewBuffers* buffers);
+/* Either pointer may be NULL. capacity: points that each has room for. Out: [N,3], as StippleViewPoints. */
+StippleStatus stipple_views_read_points(const StippleViews* views, uint64_t capacity, float* positions,
+                                        float* colours);
 
 /* ---- rendering --------------------------------------------------------------------------------- */
 

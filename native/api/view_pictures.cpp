@@ -1,0 +1,215 @@
+#include <algorithm>
+
+#include "api/camera.h"
+#include "api/guard.h"
+#include "api/handles.h"
+#include "data/view_check.h"
+#include "data/view_colour.h"
+#include "math/empty_depth.h"
+
+using namespace stipple;
+using namespace stipple::api;
+
+namespace {
+
+/// The views to change; a copy, which shares the pictures, where a job holds a share of them.
+MemoryViewSource& writable(StippleViews& views) {
+  if (!views.memory) {
+    fail(ErrorCode::kInvalidArgument,
+         "views come from a file; only those of stipple_views_create can be added to");
+  }
+  views.source.reset();
+  if (views.memory.use_count() > 1) {
+    views.memory = std::make_shared<MemoryViewSource>(*views.memory);
+  }
+  views.source = views.memory;
+  return *views.memory;
+}
+
+std::vector<float> copied(const float* values, size_t count) {
+  return values ? std::vector<float>(values, values + count) : std::vector<float>();
+}
+
+ViewPicture pictureFrom(const StippleViewPicture& given, const Camera& camera) {
+  ViewPicture picture;
+  picture.width = camera.width;
+  picture.height = camera.height;
+  const size_t pixels = size_t{camera.width} * camera.height;
+  const float* rgba = &require(given.rgba, "picture->rgba");
+  picture.colour.resize(pixels * 3);
+  picture.alpha.resize(pixels);
+  bool opaque = true;
+  for (size_t i = 0; i < pixels; ++i) {
+    std::copy(rgba + i * 4, rgba + i * 4 + 3, &picture.colour[i * 3]);
+    picture.alpha[i] = rgba[i * 4 + 3];
+    opaque = opaque && picture.alpha[i] == 1.0f;
+  }
+  if (opaque) picture.alpha.clear();
+  picture.weights = copied(given.weights, pixels);
+  picture.depth = copied(given.depth, pixels);
+  for (float& depth : picture.depth) {
+    if (depth >= kEmptyDepth) depth = 0.0f;
+  }
+  picture.normals = copied(given.normals, pixels * 3);
+  return picture;
+}
+
+void requireCapacity(uint64_t needed, uint64_t capacity, const char* what) {
+  if (capacity >= needed) return;
+  fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " " + what + "; " +
+                                       std::to_string(needed) + " are needed");
+}
+
+/// Values to a buffer of the caller, or `otherwise` where nothing is known.
+void give(const std::vector<float>& values, size_t count, float otherwise, float* out) {
+  if (!out) return;
+  if (values.empty()) {
+    std::fill_n(out, count, otherwise);
+  } else {
+    std::copy(values.begin(), values.end(), out);
+  }
+}
+
+}  // namespace
+
+extern "C" {
+
+StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_space,
+                                   StippleViews** views) {
+  return guarded([&] {
+    require(context, "context");
+    require(views, "views");
+    auto made = std::make_unique<StippleViews>();
+    made->context = context->state;
+    made->memory =
+        std::make_shared<MemoryViewSource>(enumValue<ColourSpace>(colour_space, 1, "colour_space"));
+    made->source = made->memory;
+    *views = made.release();
+  });
+}
+
+StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera,
+                                const StippleViewPicture* picture, const char* name_utf8) {
+  return guarded([&] {
+    require(views, "views");
+    const Camera seen_by = cameraFrom(camera);
+    const StippleViewPicture given = complete(picture, "picture");
+    const Transfer transfer = enumValue<Transfer>(given.transfer, 1, "picture->transfer");
+    MemoryViewSource& source = writable(*views);
+    const std::string name = name_utf8 ? name_utf8 : "view " + std::to_string(views->notes.size());
+    // Before the arrays are made: an absurd size is refused as such.
+    try {
+      validate(seen_by);
+    } catch (const Error& error) {
+      fail(error.code(), name + ": " + error.what());
+    }
+    constexpr uint64_t kBytesPerPixel = 9 * sizeof(float);
+    views->context->requireMemory(uint64_t{seen_by.width} * seen_by.height * kBytesPerPixel,
+                                  "the picture of a view");
+    ViewPicture made = pictureFrom(given, seen_by);
+    convertColours(made, transfer, source.colourSpace());
+    ViewNote note;
+    note.name = name;
+    note.camera_model = modelName(seen_by);
+    views->notes.push_back(std::move(note));
+    try {
+      source.add(seen_by, std::move(made), name);
+    } catch (...) {
+      views->notes.pop_back();
+      throw;
+    }
+  });
+}
+
+StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoints* points) {
+  return guarded([&] {
+    MemoryViewSource& source = writable(require(views, "views"));
+    const StippleViewPoints given = complete(points, "points");
+    if (given.count > 0) {
+      require(given.positions, "points->positions");
+      require(given.colours, "points->colours");
+    }
+    constexpr uint64_t kBytesPerPoint = 11 * sizeof(float);
+    views->context->requireMemory(
+        given.count > UINT64_MAX / kBytesPerPoint ? UINT64_MAX : given.count * kBytesPerPoint,
+        "the points of views");
+    const size_t count = given.count;
+    PointSet made;
+    made.positions = copied(given.positions, count * 3);
+    made.colours = copied(given.colours, count * 3);
+    made.normals = copied(given.normals, count * 3);
+    made.weights = copied(given.weights, count);
+    made.opacities.assign(count, 1.0f);
+    source.setPoints(std::move(made));
+  });
+}
+
+StippleStatus stipple_views_info(const StippleViews* views, StippleViewsInfo* info) {
+  return guarded([&] {
+    const StippleViews& given = require(views, "views");
+    StippleViewsInfo out = {};
+    out.view_count = given.notes.size();
+    if (given.source) {
+      out.colour_space = static_cast<uint32_t>(given.source->colourSpace());
+      out.point_count = given.source->points().size();
+      out.has_pictures = 1;
+    }
+    deliver(info, out, "info");
+  });
+}
+
+StippleStatus stipple_views_view_info(const StippleViews* views, uint64_t index,
+                                      StippleViewInfo* info) {
+  return guarded([&] {
+    requireView(require(views, "views"), index);
+    const ViewNote& note = views->notes[index];
+    StippleViewInfo out = {};
+    out.split = note.split;
+    out.source_width = note.source_width;
+    out.source_height = note.source_height;
+    out.is_distorted = note.is_distorted ? 1 : 0;
+    out.name = note.name.c_str();
+    out.image_path = note.image_path.c_str();
+    out.camera_model = note.camera_model;
+    deliver(info, out, "info");
+  });
+}
+
+StippleStatus stipple_views_read(const StippleViews* views, uint64_t index,
+                                 const StippleViewBuffers* buffers) {
+  return guarded([&] {
+    requireView(require(views, "views"), index);
+    const StippleViewBuffers out = complete(buffers, "buffers");
+    if (!views->source) {
+      fail(ErrorCode::kUnsupported,
+           "the views are cameras alone (stipple_views_load); they have no pictures");
+    }
+    const Camera& camera = views->source->camera(index);
+    const size_t pixels = size_t{camera.width} * camera.height;
+    requireCapacity(pixels, out.capacity, "pixels");
+    const ViewPicture picture = views->source->load(index);
+    if (out.rgba) {
+      for (size_t i = 0; i < pixels; ++i) {
+        std::copy_n(&picture.colour[i * 3], 3, out.rgba + i * 4);
+        out.rgba[i * 4 + 3] = picture.alpha.empty() ? 1.0f : picture.alpha[i];
+      }
+    }
+    give(picture.weights, pixels, 1.0f, out.weights);
+    give(picture.depth, pixels, 0.0f, out.depth);
+    give(picture.normals, pixels * 3, 0.0f, out.normals);
+  });
+}
+
+StippleStatus stipple_views_read_points(const StippleViews* views, uint64_t capacity,
+                                        float* positions, float* colours) {
+  return guarded([&] {
+    const StippleViews& given = require(views, "views");
+    if (!given.source) return;
+    const PointSet& points = given.source->points();
+    requireCapacity(points.size(), capacity, "points");
+    give(points.positions, points.size() * 3, 0.0f, positions);
+    give(points.colours, points.size() * 3, 0.0f, colours);
+  });
+}
+
+}  // extern "C"

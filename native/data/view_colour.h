@@ -1,0 +1,12 @@
+#pragma once
+
+#include "data/image.h"
+#include "data/view_source.h"
+
+namespace stipple {
+
+/// Brings colours that relate to light by `from` into the space in which they are composited. The
+/// curve belongs to the straight colour; where alpha is 0 it is applied to the value as it stands.
+void convertColours(ViewPicture& picture, Transfer from, ColourSpace to);
+
+}  // namespace stipple

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Views with pictures through the C header."""
+
+import numpy as np
+import pytest
+
+from stipple.binding.errors import StippleError
+from stipple.binding.structs import ColourSpace, StippleCamera, Transfer
+from stipple.binding.views import Views
+
+
+def camera(width, height):
+    made = StippleCamera(width=width, height=height, fx=width, fy=width, cx=width / 2, cy=height / 2, near_plane=0.01,
+                         far_plane=100.0)
+    for i in range(4):
+        made.world_to_camera[5 * i] = 1.0
+    return made
+
+
+def test_pictures_and_points_come_back(context):
+    rng = np.random.default_rng(3)
+    rgba = rng.random((3, 4, 4), np.float32)
+    depth = rng.random((3, 4), np.float32)
+    normals = np.tile(np.array((0, 0, 1), np.float32), (3, 4, 1))
+    with_space = Views.create(context, ColourSpace.LINEAR)
+    with_space.add(camera(4, 3), rgba, depth=depth, normals=normals, name='été.png')
+    with_space.add(camera(4, 3), rgba[:, ::-1])
+    assert len(with_space) == 2
+    assert with_space.view_info(0).name.decode() == 'été.png'
+    read = with_space.read(0)
+    np.testing.assert_array_equal(read[0], rgba)
+    np.testing.assert_array_equal(read[1], np.ones((3, 4)))
+    np.testing.assert_array_equal(read[2], depth)
+    np.testing.assert_array_equal(read[3], normals)
+    np.testing.assert_array_equal(with_space.read(1)[0], rgba[:, ::-1])
+
+    positions, colours = rng.random((5, 3), np.float32), rng.random((5, 3), np.float32)
+    with_space.set_points(positions, colours)
+    np.testing.assert_array_equal(with_space.points()[0], positions)
+    np.testing.assert_array_equal(with_space.points()[1], colours)
+    info = with_space.info()
+    assert (info.view_count, info.point_count, info.has_pictures) == (2, 5, 1)
+
+
+def test_wrong_shapes_are_one_clear_error(context):
+    views = Views.create(context)
+    with pytest.raises(StippleError, match=r'View array rgba has shape \(4, 3, 4\); allowed is \(3, 4, 4\)'):
+        views.add(camera(4, 3), np.zeros((4, 3, 4)))
+    with pytest.raises(StippleError, match='has colour nan'):
+        views.add(camera(4, 3), np.full((3, 4, 4), np.nan), Transfer.SRGB)
+    assert len(views) == 0
