@@ -27,6 +27,7 @@ enum class RandomUse : uint32_t {
   kViewRig = 10,
   kViewOrder = 11,
   kThinning = 12,
+  kBackground = 13,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and

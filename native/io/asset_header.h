@@ -10,6 +10,7 @@ namespace stipple {
 /// What every Stipple asset (`.stipple.safetensors`, version 1) says of itself.
 constexpr char kAssetSurface[] = "surface";
 constexpr char kAssetHierarchy[] = "hierarchy";
+constexpr char kAssetCheckpoint[] = "checkpoint";
 
 /// Text of the metadata. Errors: kFormat where it is missing.
 const std::string& requireText(const SafeTensorsReader& file, const char* key);

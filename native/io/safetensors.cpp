@@ -54,6 +54,15 @@ std::string shapeText(const std::vector<uint64_t>& shape) {
   return text + "]";
 }
 
+template <typename T>
+const char* dtypeName() {
+  if constexpr (std::is_same_v<T, float>) return "F32";
+  if constexpr (std::is_same_v<T, double>) return "F64";
+  if constexpr (std::is_same_v<T, uint8_t>) return "U8";
+  if constexpr (std::is_same_v<T, uint32_t>) return "U32";
+  if constexpr (std::is_same_v<T, uint64_t>) return "U64";
+}
+
 SafeTensor parseTensor(const std::string& path, const std::string& name, const Json& entry,
                        uint64_t data_start, uint64_t data_bytes) {
   const std::string what = path + ": tensor '" + name.substr(0, 80) + "' ";
@@ -169,6 +178,29 @@ std::vector<uint64_t> SafeTensorsReader::readUint64s(const std::string& name,
   return readValues<uint64_t>(require(name, "U64", width));
 }
 
+Tensor SafeTensorsReader::readTensor(const std::string& name) const {
+  const auto found = tensors_.find(name);
+  if (found == tensors_.end()) {
+    fail(ErrorCode::kFormat, path() + " has no tensor '" + name + "'");
+  }
+  Tensor tensor;
+  tensor.shape = found->second.shape;
+  const auto read = [&]<typename T>(std::vector<T>) {
+    if (found->second.dtype != dtypeName<T>()) return false;
+    tensor.values = readValues<T>(found->second);
+    return true;
+  };
+  if (!read(std::vector<float>()) && !read(std::vector<double>()) &&
+      !read(std::vector<uint8_t>()) && !read(std::vector<uint32_t>()) &&
+      !read(std::vector<uint64_t>())) {
+    fail(ErrorCode::kFormat, path() + ": tensor '" + name + "' is of the type " +
+                                 found->second.dtype.substr(0, 20) +
+                                 "; F32, F64, U8, U32 or U64 is needed");
+  }
+  read_.insert(name);
+  return tensor;
+}
+
 std::map<std::string, CarriedTensor> SafeTensorsReader::readOthers() const {
   std::map<std::string, CarriedTensor> others;
   for (const auto& [name, tensor] : tensors_) {
@@ -203,6 +235,21 @@ void SafeTensorsWriter::add(const std::string& name, const std::vector<uint32_t>
 void SafeTensorsWriter::add(const std::string& name, const std::vector<uint64_t>& values,
                             uint64_t width) {
   addEntry(name, "U64", width, values.data(), sizeof(uint64_t), values.size());
+}
+
+void SafeTensorsWriter::add(const std::string& name, const Tensor& tensor) {
+  std::visit(
+      [&](const auto& values) {
+        using T = typename std::decay_t<decltype(values)>::value_type;
+        const std::optional<uint64_t> count = product(tensor.shape, 1);
+        if (count != values.size()) {
+          fail(ErrorCode::kInvalidArgument, "tensor '" + name + "' has " +
+                                                std::to_string(values.size()) +
+                                                " values for the shape " + shapeText(tensor.shape));
+        }
+        entries_[name] = {dtypeName<T>(), tensor.shape, values.data(), values.size() * sizeof(T)};
+      },
+      tensor.values);
 }
 
 void SafeTensorsWriter::carry(const std::string& name, const CarriedTensor& tensor) {

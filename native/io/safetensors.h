@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "data/tensor_table.h"
 #include "io/input_file.h"
 
 namespace stipple {
@@ -41,6 +42,8 @@ class SafeTensorsReader {
   std::vector<float> readFloats(const std::string& name, uint64_t width) const;
   std::vector<uint32_t> readUint32s(const std::string& name, uint64_t width) const;
   std::vector<uint64_t> readUint64s(const std::string& name, uint64_t width) const;
+  /// A tensor of one of the types that Tensor has, whatever its shape. Errors: kFormat.
+  Tensor readTensor(const std::string& name) const;
   /// The tensors that nobody has read yet.
   std::map<std::string, CarriedTensor> readOthers() const;
 
@@ -63,6 +66,7 @@ class SafeTensorsWriter {
   void add(const std::string& name, const std::vector<float>& values, uint64_t width);
   void add(const std::string& name, const std::vector<uint32_t>& values, uint64_t width);
   void add(const std::string& name, const std::vector<uint64_t>& values, uint64_t width);
+  void add(const std::string& name, const Tensor& tensor);
   /// Writes a tensor as it is, where none of this name has been added.
   void carry(const std::string& name, const CarriedTensor& tensor);
   /// Writes metadata where the key has no value yet.

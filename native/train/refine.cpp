@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "base/error.h"
-#include "base/random.h"
 #include "data/cloud_extent.h"
 #include "splat/render_backward.h"
 #include "train/adam.h"
 #include "train/render_backend.h"
+#include "train/view_order.h"
 
 namespace stipple {
 
@@ -138,29 +138,6 @@ uint64_t lossBytes(uint64_t pixel_count) {
   return threads * (uint64_t{1} << 20) + pixel_count * sizeof(double);
 }
 
-/// All views once per round, each round in an order of its own.
-class ViewOrder {
- public:
-  ViewOrder(size_t count, uint64_t seed) : order_(count), seed_(seed) {
-    for (size_t i = 0; i < count; ++i) order_[i] = static_cast<uint32_t>(i);
-  }
-
-  uint32_t at(uint64_t iteration) {
-    const size_t place = iteration % order_.size();
-    if (place == 0) {
-      for (size_t i = order_.size(); i > 1; --i) {
-        const uint64_t bits = keyedBits(seed_, RandomUse::kViewOrder, iteration + i);
-        std::swap(order_[i - 1], order_[bits % i]);
-      }
-    }
-    return order_[place];
-  }
-
- private:
-  std::vector<uint32_t> order_;
-  uint64_t seed_;
-};
-
 }  // namespace
 
 uint64_t refineMemoryBound(const SplatCloud& start, const SplatCloud& full,
@@ -203,9 +180,9 @@ SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
   for (uint32_t i = 0; i < options.iterations; ++i) {
     const double done = static_cast<double>(i) / options.iterations;
     advance(progress, 0.2 + 0.8 * done, "Refining splats");
-    const uint32_t view = order.at(i);
+    const size_t view = order.at(i);
     backend->forward(views[view], renderOptions(view));
-    backend->loss(view, loss);
+    backend->loss(static_cast<uint32_t>(view), loss);
     backend->backward({});
     backend->step(stepOptions(size, share, done));
   }

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+#include "data/tensor_table.h"
+
+namespace stipple {
+
+/// A fit as it stood after one of its iterations.
+struct Checkpoint {
+  std::string settings_json = "{}";  ///< what the fit was started with, for comparing
+  TensorTable tensors;
+};
+
+/// `.stipple.safetensors`, version 1, kind "checkpoint". The file appears under its name when it is
+/// whole; until then, and where that fails, the one before it stays.
+/// Errors: kIo.
+void writeCheckpoint(const Checkpoint& checkpoint, const std::string& path);
+/// The same without a copy of the tensors.
+void writeCheckpoint(const std::string& settings_json, const TensorTable& tensors,
+                     const std::string& path);
+
+/// Errors: kIo, kFormat (truncated, or no checkpoint's tensors), kUnsupported (newer major version,
+/// other kind).
+Checkpoint readCheckpoint(const std::string& path);
+
+}  // namespace stipple
