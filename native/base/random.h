@@ -28,6 +28,11 @@ enum class RandomUse : uint32_t {
   kViewOrder = 11,
   kThinning = 12,
   kBackground = 13,
+  kNetworkStart = 30,
+  kFieldStart = 31,
+  kAnchorBudget = 32,
+  kAnchorSeed = 33,
+  kPriorSample = 34,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and
