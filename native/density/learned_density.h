@@ -1,0 +1,111 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "density/anchor_sampling.h"
+#include "density/density_model.h"
+#include "density/octree_density.h"
+
+namespace stipple {
+
+/// Share of a uniform choice in every choice: density can move to where there is none yet.
+constexpr double kUniformShare = 1e-3;
+/// Pseudo-count of each child in the shares of prior points: where few points fall, some of the
+/// density goes to the neighbours that were missed.
+constexpr double kPriorPseudoCount = 0.05;
+
+/// The active cells of one level, in Morton order.
+struct LearnedLevel {
+  std::vector<uint64_t> cells;
+  std::vector<float> logits;  ///< [cells, 8]
+  std::vector<float> prior;  ///< [cells, 8] share of all prior points, smoothed; sums to the cell's
+};
+
+/// Derivatives by the logits of some cells.
+struct DensityGradient {
+  struct Level {
+    std::vector<uint32_t> rows;  ///< into LearnedLevel::cells, ascending
+    std::vector<double> values;  ///< [rows, 8]
+  };
+  std::vector<Level> levels;
+};
+
+/// Density over an octree whose choices are learned. An active cell stores eight logits:
+/// q(k | cell) = (1 - eps) softmax(logits)_k + eps / 8; below an inactive cell the choices are
+/// even.
+class LearnedDensity final : public DensityModel {
+ public:
+  /// All even: every cell above `active_levels` is active.
+  LearnedDensity(const RootCube& root, int leaf_level, int active_levels = 1);
+
+  /// The density that fits the points best: active are the cells with points, and every choice is
+  /// the share of the points in each child, with kPriorPseudoCount. Points outside the root count
+  /// for nothing. In: positions [N,3] metres; weights [N] >= 0 or empty.
+  /// Errors: kInvalidArgument for a value that is negative or not finite; no point inside the root
+  /// with positive weight gives the even density.
+  static LearnedDensity fromPoints(std::span<const float> positions, std::span<const float> weights,
+                                   const RootCube& root, int leaf_level);
+
+  /// From stored levels. Errors: kFormat for arrays that do not fit together, cells that are not in
+  /// order or whose parent is inactive, numbers that are not finite.
+  LearnedDensity(const RootCube& root, std::vector<LearnedLevel> levels);
+
+  int leafLevel() const override { return static_cast<int>(levels_.size()); }
+  void childLogProbabilities(int level, std::span<const uint64_t> cells,
+                             std::span<float> out) const override;
+
+  const RootCube& root() const { return root_; }
+  const std::vector<LearnedLevel>& levels() const { return levels_; }
+  size_t activeCellCount() const;
+
+  /// New logits of some cells; values [rows, 8].
+  void setLogits(int level, std::span<const uint32_t> rows, std::span<const float> values);
+
+  /// Structural loss: divergence of the density from the prior points, sum over cells and children
+  /// of p log(p / q), nats; q conditional, p the share of all points. Not null: `gradient` gets its
+  /// derivatives times `weight` for every cell with points. Cost: O(active cells).
+  double structuralLoss(double weight, DensityGradient* gradient) const;
+  /// The same derivatives added for the cells that `gradient` has already. Cost: O(those cells).
+  void addStructuralGradient(double weight, DensityGradient& gradient) const;
+
+  /// Derivatives of sum_j g_j log q(x_j) for anchors of this density, through the even share.
+  /// In: g [anchors]. Cost: O(anchors * levels). Source: DeG (arXiv 2605.16355), score-function
+  /// gradient of the density; log-softmax of each level on the path of an anchor.
+  DensityGradient logDensityGradient(const AnchorSet& anchors, std::span<const double> g) const;
+
+  /// -sum q log q over the leaves, nats. Cost: O(active cells).
+  double entropy() const;
+
+  /// The inactive cells right below active ones that the anchors fall into, added to `draws` by
+  /// (level, cell).
+  using DrawCounts = std::map<std::pair<int, uint64_t>, uint64_t>;
+  void countDraws(const AnchorSet& anchors, DrawCounts& draws) const;
+  /// Makes those with at least `least_draws` active, with even choices: the density stays what it
+  /// is. Returns per level the rows where the new cells stand now, ascending.
+  std::vector<std::vector<uint32_t>> activate(const DrawCounts& draws, uint64_t least_draws);
+
+  /// As an octree with what sampling needs, for decoding: without the even share, without choices
+  /// below kUniformShare, and without cells that nothing was learned below. Its leaf level is that
+  /// of the deepest active cells.
+  OctreeDensity frozen() const;
+
+ private:
+  void refresh(int level, size_t row);
+  void refreshAll();
+  std::array<double, 8> logitGradient(int level, size_t row,
+                                      const std::array<double, 8>& log_gradient) const;
+
+  RootCube root_;
+  std::vector<LearnedLevel> levels_;
+  std::vector<std::vector<float>> log_probabilities_;  // [cells, 8] per level, of the mixture
+};
+
+/// Inserts rows of zeros: what belongs to the cells of a level follows LearnedDensity::activate.
+void insertZeroRows(std::vector<float>& values, size_t row_length, std::span<const uint32_t> rows);
+
+}  // namespace stipple
