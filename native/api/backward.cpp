@@ -97,9 +97,10 @@ BackwardInput inputFrom(const StippleBackwardInput* input, const Buffers& buffer
       given.errors, pixel_count, "errors", "errors");
   if (given.depth_gradient) made.depth_gradient = {given.depth_gradient, pixel_count};
   made.with_blending_weights = wanted(&StippleSplatGradients::blending_weights);
-  made.with_screen_gradients = wanted(&StippleSplatGradients::screen_gradients) ||
-                               wanted(&StippleSplatGradients::absolute_screen_gradients) ||
-                               wanted(&StippleSplatGradients::screen_gradient_norms);
+  made.with_screen_gradients = wanted(&StippleSplatGradients::screen_gradients);
+  made.with_absolute_screen_gradients =
+      wanted(&StippleSplatGradients::absolute_screen_gradients) ||
+      wanted(&StippleSplatGradients::screen_gradient_norms);
   return made;
 }
 

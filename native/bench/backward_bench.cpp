@@ -42,7 +42,8 @@ struct Loss {
     if (wants.depth) input.depth_gradient = std::span(residual).first(residual.size() / 3);
     if (wants.mode != BackwardMode::kGradients) input.residual = residual;
     if (wants.mode == BackwardMode::kStatistics) {
-      input.with_blending_weights = input.with_screen_gradients = true;
+      input.with_blending_weights = true;
+      input.with_screen_gradients = input.with_absolute_screen_gradients = true;
     }
     return input;
   }

@@ -6,7 +6,8 @@
 namespace stipple {
 
 void RawSplats::resize(size_t count) {
-  for (size_t i = 0; i < kRawArrayCount; ++i) {
+  extras.resize(extra_lengths.size());
+  for (size_t i = 0; i < arrayCount(*this); ++i) {
     const RawArray array = static_cast<RawArray>(i);
     arrayOf(*this, array).resize(count * rowLength(*this, array));
   }
@@ -23,9 +24,9 @@ const std::vector<float>& arrayOf(const RawSplats& splats, RawArray array) {
     case RawArray::kLogits:
       return splats.logits;
     case RawArray::kSh:
-      break;
+      return splats.sh;
   }
-  return splats.sh;
+  return splats.extras[static_cast<size_t>(array) - kRawArrayCount];
 }
 
 std::vector<float>& arrayOf(RawSplats& splats, RawArray array) {
@@ -34,7 +35,9 @@ std::vector<float>& arrayOf(RawSplats& splats, RawArray array) {
 
 size_t rowLength(const RawSplats& splats, RawArray array) {
   constexpr size_t kLengths[] = {3, 4, 3, 1};
-  return array == RawArray::kSh ? splats.shStride() : kLengths[static_cast<size_t>(array)];
+  if (array == RawArray::kSh) return splats.shStride();
+  const size_t index = static_cast<size_t>(array);
+  return index < kRawArrayCount ? kLengths[index] : splats.extra_lengths[index - kRawArrayCount];
 }
 
 RawSplats zerosLike(const RawSplats& splats) {
@@ -42,6 +45,7 @@ RawSplats zerosLike(const RawSplats& splats) {
   zeros.sh_degree = splats.sh_degree;
   zeros.colour_space = splats.colour_space;
   zeros.antialias = splats.antialias;
+  zeros.extra_lengths = splats.extra_lengths;
   zeros.resize(splats.size());
   return zeros;
 }

@@ -9,13 +9,17 @@
 namespace stipple {
 
 /// Splats as training moves them: any number is allowed. Linear scale = exp(log scale), opacity =
-/// 1 / (1 + exp(-logit)); quaternions need not be unit. The same struct holds moments.
+/// 1 / (1 + exp(-logit)); quaternions need not be unit. The same struct holds moments and
+/// derivatives.
 struct RawSplats {
   std::vector<float> positions;   ///< [N,3] metres
   std::vector<float> rotations;   ///< [N,4] w,x,y,z, not zero
   std::vector<float> log_scales;  ///< [N,3] natural logarithm of metres
   std::vector<float> logits;      ///< [N]
   std::vector<float> sh;          ///< [N,(degree+1)^2,3]
+  /// Numbers that a strategy trains beside them, one array per parameter: [N, extra_lengths[k]].
+  std::vector<std::vector<float>> extras;
+  std::vector<size_t> extra_lengths;
   int sh_degree = 0;
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kClassic;
@@ -25,7 +29,7 @@ struct RawSplats {
   void resize(size_t count);  ///< new numbers are 0
 };
 
-/// An array of RawSplats.
+/// An array of RawSplats; those of extras follow, see extraArray().
 enum class RawArray : uint32_t {
   kPositions = 0,
   kRotations = 1,
@@ -33,7 +37,14 @@ enum class RawArray : uint32_t {
   kLogits = 3,
   kSh = 4,
 };
-constexpr size_t kRawArrayCount = 5;
+constexpr size_t kRawArrayCount = 5;  ///< without extras
+
+constexpr RawArray extraArray(size_t extra) {
+  return static_cast<RawArray>(kRawArrayCount + extra);
+}
+inline size_t arrayCount(const RawSplats& splats) {
+  return kRawArrayCount + splats.extra_lengths.size();
+}
 
 std::vector<float>& arrayOf(RawSplats& splats, RawArray array);
 const std::vector<float>& arrayOf(const RawSplats& splats, RawArray array);

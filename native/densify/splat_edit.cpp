@@ -1,6 +1,7 @@
 #include "densify/splat_edit.h"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <string>
 
@@ -11,8 +12,13 @@ namespace stipple {
 
 namespace {
 
-constexpr size_t kRowGrain = 4096;
 constexpr const char* kArrayNames[] = {"positions", "rotations", "log_scales", "logits", "sh"};
+
+std::string nameOf(RawArray array) {
+  const size_t index = static_cast<size_t>(array);
+  return index < kRawArrayCount ? kArrayNames[index]
+                                : "extras[" + std::to_string(index - kRawArrayCount) + "]";
+}
 
 void requireCount(size_t seen, size_t needed, const std::string& what) {
   if (seen != needed) {
@@ -30,7 +36,13 @@ void requireRows(const std::vector<uint32_t>& rows, size_t count, const std::str
   }
 }
 
-void requireOnce(std::vector<uint32_t> rows, const std::string& what) {
+bool isRising(const std::vector<uint32_t>& rows) {
+  return std::adjacent_find(rows.begin(), rows.end(), std::greater_equal<>()) == rows.end();
+}
+
+void requireOnce(const std::vector<uint32_t>& given, const std::string& what) {
+  if (isRising(given)) return;
+  std::vector<uint32_t> rows = given;
   std::sort(rows.begin(), rows.end());
   const auto twice = std::adjacent_find(rows.begin(), rows.end());
   if (twice != rows.end()) {
@@ -45,24 +57,84 @@ void validateAppended(const RawSplats& append, const RawSplats& splats) {
                                           std::to_string(append.sh_degree) + "; the splats have " +
                                           std::to_string(splats.sh_degree));
   }
-  for (size_t i = 0; i < kRawArrayCount; ++i) {
+  if (append.size() > 0 && append.extra_lengths != splats.extra_lengths) {
+    fail(ErrorCode::kInvalidArgument, "append has " + std::to_string(append.extra_lengths.size()) +
+                                          " extra parameters; it must have the splats' " +
+                                          std::to_string(splats.extra_lengths.size()) +
+                                          ", of the same lengths");
+  }
+  requireCount(append.extras.size(), append.extra_lengths.size(), "append.extras");
+  for (size_t i = 0; i < arrayCount(append); ++i) {
     const RawArray array = static_cast<RawArray>(i);
-    const std::string name = std::string("append.") + kArrayNames[i];
+    const std::string name = "append." + nameOf(array);
     const size_t length = rowLength(append, array);
     requireCount(arrayOf(append, array).size(), append.size() * length, name);
     requireFinite(arrayOf(append, array).data(), append.size() * length, length, name.c_str());
   }
 }
 
-void gatherRows(const std::vector<uint32_t>& rows, size_t length, std::vector<float>& values) {
-  std::vector<float> kept(rows.size() * length);
-  parallelFor(rows.size(), kRowGrain, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      std::copy_n(values.data() + rows[i] * length, length, kept.data() + i * length);
+/// One array of one target.
+struct ArrayEdit {
+  const SplatEdit* edit;
+  EditTarget target;
+  RawArray array;
+  bool keep_is_rising;
+  std::vector<float> gathered;  ///< room for rows of a list that does not rise
+
+  auto& values() const { return arrayOf(*target.splats, array); }
+  size_t rowSize() const { return rowLength(*target.splats, array); }
+
+  /// Takes all memory that run() needs.
+  void reserve() {
+    const size_t needed = edit->countAfter(target.splats->size()) * rowSize();
+    if (needed > values().capacity()) values().reserve(needed + needed / 4);
+    if (edit->keep && !keep_is_rising) gathered.reserve(edit->keep->size() * rowSize());
+  }
+
+  void run() {
+    for (const RowWrite& write : edit->writes) {
+      if (write.array == array && (!target.is_moments || write.clear_moments)) writeRows(write);
     }
-  });
-  values.swap(kept);
-}
+    if (edit->keep) keepRows(*edit->keep);
+    const size_t added = edit->append.size() * rowSize();
+    if (target.is_moments) {
+      values().resize(values().size() + added, 0.0f);
+    } else if (added > 0) {
+      const auto& rows = arrayOf(edit->append, array);
+      values().insert(values().end(), rows.begin(), rows.end());
+    }
+  }
+
+ private:
+  void writeRows(const RowWrite& write) const {
+    const size_t length = rowSize();
+    for (size_t i = 0; i < write.rows.size(); ++i) {
+      float* row = values().data() + write.rows[i] * length;
+      if (target.is_moments) {
+        std::fill_n(row, length, 0.0f);
+      } else {
+        std::copy_n(&write.values[i * length], length, row);
+      }
+    }
+  }
+
+  void keepRows(const std::vector<uint32_t>& keep) {
+    const size_t length = rowSize();
+    float* all = values().data();
+    if (keep_is_rising) {
+      // Rows only move down, behind those that have moved: no other memory is needed.
+      for (size_t i = 0; i < keep.size(); ++i) {
+        if (keep[i] != i) std::copy_n(all + keep[i] * length, length, all + i * length);
+      }
+    } else {
+      for (const uint32_t row : keep) {
+        gathered.insert(gathered.end(), all + row * length, all + (row + 1) * length);
+      }
+      values().assign(gathered.begin(), gathered.end());
+    }
+    values().resize(keep.size() * length);
+  }
+};
 
 }  // namespace
 
@@ -70,10 +142,10 @@ void validate(const SplatEdit& edit, const RawSplats& splats) {
   for (size_t i = 0; i < edit.writes.size(); ++i) {
     const RowWrite& write = edit.writes[i];
     const std::string name = "write " + std::to_string(i);
-    if (static_cast<size_t>(write.array) >= kRawArrayCount) {
-      fail(ErrorCode::kInvalidArgument, name + " is of array " +
-                                            std::to_string(static_cast<uint32_t>(write.array)) +
-                                            "; 0 to 4 is allowed");
+    if (static_cast<size_t>(write.array) >= arrayCount(splats)) {
+      fail(ErrorCode::kInvalidArgument,
+           name + " is of array " + std::to_string(static_cast<uint32_t>(write.array)) + "; 0 to " +
+               std::to_string(arrayCount(splats) - 1) + " is allowed");
     }
     const size_t length = rowLength(splats, write.array);
     requireRows(write.rows, splats.size(), name);
@@ -83,39 +155,29 @@ void validate(const SplatEdit& edit, const RawSplats& splats) {
   }
   if (edit.keep) requireRows(*edit.keep, splats.size(), "keep");
   validateAppended(edit.append, splats);
-  const size_t count = (edit.keep ? edit.keep->size() : splats.size()) + edit.append.size();
+  const size_t count = edit.countAfter(splats.size());
   if (count > std::numeric_limits<uint32_t>::max()) {
     fail(ErrorCode::kUnsupported, "the edit makes " + std::to_string(count) +
                                       " splats; at most 4294967295 can be drawn together");
   }
 }
 
-void applyEdit(const SplatEdit& edit, bool moments, RawSplats& splats) {
-  for (const RowWrite& write : edit.writes) {
-    if (moments && !write.clear_moments) continue;
-    const size_t length = rowLength(splats, write.array);
-    float* values = arrayOf(splats, write.array).data();
-    for (size_t i = 0; i < write.rows.size(); ++i) {
-      float* row = values + write.rows[i] * length;
-      if (moments) {
-        std::fill_n(row, length, 0.0f);
-      } else {
-        std::copy_n(&write.values[i * length], length, row);
-      }
+void applyEdit(const SplatEdit& edit, std::span<const EditTarget> targets) {
+  std::vector<ArrayEdit> parts;
+  const bool keep_is_rising = edit.keep && isRising(*edit.keep);
+  for (const EditTarget& target : targets) {
+    for (size_t i = 0; i < arrayCount(*target.splats); ++i) {
+      parts.push_back({&edit, target, static_cast<RawArray>(i), keep_is_rising, {}});
     }
   }
-  for (size_t i = 0; i < kRawArrayCount; ++i) {
-    const RawArray array = static_cast<RawArray>(i);
-    std::vector<float>& values = arrayOf(splats, array);
-    const size_t length = rowLength(splats, array);
-    if (edit.keep) gatherRows(*edit.keep, length, values);
-    const std::vector<float>& added = arrayOf(edit.append, array);
-    if (moments) {
-      values.resize(values.size() + added.size(), 0.0f);
-    } else {
-      values.insert(values.end(), added.begin(), added.end());
-    }
-  }
+  for (ArrayEdit& part : parts) part.reserve();
+  // The largest arrays first, so that no thread begins one when the others are done.
+  std::stable_sort(parts.begin(), parts.end(), [](const ArrayEdit& a, const ArrayEdit& b) {
+    return a.rowSize() > b.rowSize();
+  });
+  parallelFor(parts.size(), 1, [&parts](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) parts[i].run();
+  });
 }
 
 }  // namespace stipple

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -18,14 +19,23 @@ enum class Statistic : uint32_t {
   kLargestErrors = 7,
 };
 
-/// Which of them a pass shall gather; each costs time only where it is asked for.
+constexpr size_t kStatisticCount = 8;
+
+/// Which of them a pass shall gather; each costs time only where it is asked for. Pictures have the
+/// size of the view.
 struct StatisticRequest {
   bool contributions = false;  ///< against the target of the view
   bool blending_weights = false;
-  bool screen_gradients = false;                 ///< all three of them
+  bool screen_gradients = false;           ///< signed ones: next to nothing beside the pass itself
+  bool absolute_screen_gradients = false;  ///< and lengths
   std::vector<float> contribution_weights = {};  ///< [H,W] >= 0; empty: 1
   std::vector<float> edge_weights = {};          ///< [H,W] not empty: edge weights are gathered
   std::vector<float> errors = {};                ///< [H,W] not empty: errors are gathered
+
+  bool any() const {
+    return contributions || blending_weights || screen_gradients || absolute_screen_gradients ||
+           !edge_weights.empty() || !errors.empty();
+  }
 };
 
 }  // namespace stipple

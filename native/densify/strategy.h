@@ -31,11 +31,20 @@ struct FitMoment {
 /// interval and event passes through here, and through nothing else. At least 1.
 uint64_t scaleSchedule(uint64_t published, uint64_t iterations);
 
-/// Numbers per splat that a strategy trains beside those of RawSplats.
+/// Numbers per splat that a strategy trains beside those of every fit: RawSplats::extras.
 struct ExtraParameter {
   std::string name;
   size_t row_length = 1;
   double learning_rate = 0;
+};
+
+/// Derivatives of splats by their stored values, shaped as SplatCloud is.
+struct CloudGradient {
+  std::span<float> positions;  ///< [N,3]
+  std::span<float> rotations;  ///< [N,4]
+  std::span<float> scales;     ///< [N,3]
+  std::span<float> opacities;  ///< [N]
+  std::span<float> sh;         ///< [N,(degree+1)^2,3]
 };
 
 /// How raw numbers and extra parameters become splats, where that is not exp, logistic and identity
@@ -43,15 +52,12 @@ struct ExtraParameter {
 class Parameterisation {
  public:
   virtual ~Parameterisation() = default;
-  /// In: extras, one array per parameter, [N, row length]. Out: cloud, of N splats, where the usual
-  /// activation has already written.
-  virtual void activate(const RawSplats& raw, std::span<const std::vector<float>> extras,
-                        SplatCloud& cloud) const = 0;
-  /// In: derivatives by the stored values of the cloud. Out: raw_gradient, where the usual
-  /// derivatives stand already, and one array per extra parameter.
-  virtual void adjoint(const RawSplats& raw, std::span<const std::vector<float>> extras,
-                       const SplatCloud& cloud_gradient, RawSplats& raw_gradient,
-                       std::span<std::vector<float>> extra_gradients) const = 0;
+  /// Out: cloud, of as many splats, where the usual activation has already written.
+  virtual void activate(const RawSplats& raw, SplatCloud& cloud) const = 0;
+  /// In: derivatives by the stored values of the cloud. Out: by_raw, where the usual derivatives
+  /// stand already and those of extras are 0.
+  virtual void adjoint(const RawSplats& raw, const SplatCloud& cloud, const CloudGradient& by_cloud,
+                       RawSplats& by_raw) const = 0;
 };
 
 /// What one view told about the splats. Arrays live as long as the call.
@@ -66,7 +72,7 @@ struct ViewStatistics {
   std::span<const float> of(Statistic statistic) const {
     return arrays[static_cast<size_t>(statistic)];
   }
-  std::array<std::span<const float>, 8> arrays;
+  std::array<std::span<const float>, kStatisticCount> arrays;
 };
 
 /// Draws views on demand, without a step.
@@ -77,7 +83,7 @@ class ViewEvaluator {
   virtual const Camera& camera(size_t view) const = 0;
   /// [H,W,3] what the view should look like, over the background of evaluate().
   virtual std::vector<float> target(size_t view) = 0;
-  /// [H,W,3] what it looks like now.
+  /// [H,W,3] what it looks like now, over the same.
   virtual std::vector<float> picture(size_t view) = 0;
   /// Statistics of the current splats. Valid until the next call.
   virtual const ViewStatistics& evaluate(size_t view, const StatisticRequest& request) = 0;
@@ -88,7 +94,6 @@ struct SplatStore {
   const RawSplats& splats;
   const RawSplats& first_moments;
   const RawSplats& second_moments;
-  std::span<const std::vector<float>> extras = {};
 };
 
 /// Controls which splats there are while they are trained. A strategy sees statistics and answers
@@ -104,15 +109,17 @@ class Strategy {
 
   /// Once, before the first iteration; the splats start with these, and the parameterisation stays.
   virtual std::vector<ExtraParameter> parameters() const { return {}; }
+  /// One array per parameter, [N, row length].
   virtual std::vector<std::vector<float>> initialExtras(const RawSplats&) const { return {}; }
   virtual const Parameterisation* parameterisation() const { return nullptr; }
 
   /// What this iteration's backward pass shall gather for observe().
   virtual StatisticRequest requests(const FitMoment&) const { return {}; }
 
-  /// Value of a regulariser of the stored values, and its derivative added to `gradient` (a cloud
-  /// of as many splats).
-  virtual double loss(const FitMoment&, const SplatCloud&, SplatCloud* /*gradient*/) { return 0; }
+  /// Value of a regulariser of the stored values; its derivative is added to `gradient`.
+  virtual double loss(const FitMoment&, const SplatCloud&, const CloudGradient& /*gradient*/) {
+    return 0;
+  }
 
   /// After the backward pass, with the statistics asked for.
   virtual void observe(const FitMoment&, const ViewStatistics&) {}

@@ -108,6 +108,10 @@ class RenderWorkspace {
   std::unique_ptr<Arrays> arrays_;
 };
 
+/// Which splats passed culling in the picture that was drawn last into a workspace: those in view
+/// that are not too faint or too near. Out: flags [splats of all clouds] 0 or 1.
+void visibleFlags(RenderWorkspace& drawn, std::vector<uint8_t>& flags);
+
 /// renderTiled into a result and a workspace that may have served before.
 void renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
                  const RenderOptions& options, RenderWorkspace& workspace, RenderResult& result,

@@ -29,7 +29,9 @@ struct BackwardInput {
   /// [H,W] >= 0. Not empty: error contributions are wanted.
   std::span<const float> errors;
   bool with_blending_weights = false;
-  bool with_screen_gradients = false;
+  bool with_screen_gradients = false;  ///< signed ones: they cost next to nothing
+  /// Absolute screen gradients and lengths, whose sums over pixels each pixel has to add to.
+  bool with_absolute_screen_gradients = false;
   /// [H,W] dL/d(expected depth), per metre, of RenderResult::depth. Empty: the loss does not depend
   /// on it. Where nothing covers a pixel it counts for nothing. The median depth is that of one
   /// splat, chosen by a threshold: a step function of everything else, so it has no derivative

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "splat/render_backward.h"
 #include "train/render_backend.h"
+#include "train/splat_activation.h"
 
 namespace stipple {
 
@@ -54,7 +55,7 @@ class CpuBackend final : public RenderBackend {
     validate(cloud, "splats");
     RawSplats raw = rawSplats(cloud);
     RawSplats zeros = zerosLike(raw);
-    hold({std::move(raw), zeros, std::move(zeros), 0});
+    hold({std::move(raw), zeros, std::move(zeros), {}, 0});
   }
 
   void restore(const TrainingState& state) override {
@@ -65,12 +66,44 @@ class CpuBackend final : public RenderBackend {
     requireLike(state.splats, state.splats, "splats");
     requireLike(state.splats, state.first_moments, "first moments");
     requireLike(state.splats, state.second_moments, "second moments");
+    if (state.kept_gradients.size() > 0) {
+      requireLike(state.splats, state.kept_gradients, "kept gradients");
+    }
     hold(state);
   }
 
+  void parameterise(const Parameterisation* how) override {
+    how_ = how;
+    by_raw_ = {};
+    changed();
+  }
+
   size_t splatCount() const override { return held_.splats.size(); }
-  SplatCloud download() const override { return activated(held_.splats); }
-  TrainingState state() const override { return held_; }
+  SplatCloud download() const override {
+    SplatCloud cloud = activated(held_.splats);
+    if (how_) how_->activate(held_.splats, cloud);
+    return cloud;
+  }
+  const TrainingState& state() const override { return held_; }
+
+  uint64_t memoryBytes() const override {
+    uint64_t floats = picture_.colour.capacity() + colour_gradient_.capacity() +
+                      residual_.capacity() + cloud_.scales.capacity() +
+                      cloud_.opacities.capacity() + visible_.capacity() / sizeof(float);
+    for (const RawSplats* splats : {&held_.splats, &held_.first_moments, &held_.second_moments,
+                                    &held_.kept_gradients, &by_raw_}) {
+      for (size_t i = 0; i < arrayCount(*splats); ++i) {
+        floats += arrayOf(*splats, static_cast<RawArray>(i)).capacity();
+      }
+    }
+    for (const SplatGradients& gradients : gradients_.instances) {
+      for (const GradientArray& array : kGradientArrays) {
+        floats += (gradients.*array.values).capacity();
+      }
+    }
+    for (const Target& target : targets_) floats += target.pixels.capacity();
+    return floats * sizeof(float) + workspace_.bytes() + image_loss_.workspaceBytes();
+  }
 
   uint32_t addTarget(uint32_t width, uint32_t height, std::span<const float> pixels) override {
     const size_t needed = static_cast<size_t>(width) * height * 3;
@@ -108,73 +141,93 @@ class CpuBackend final : public RenderBackend {
                std::to_string(wanted.height) + " pixels; the picture is " +
                std::to_string(picture_.width) + " x " + std::to_string(picture_.height));
     }
-    const size_t pixel_count = static_cast<size_t>(wanted.width) * wanted.height;
+    return loss(wanted.pixels, options, weights);
+  }
+
+  ImageLossValue loss(std::span<const float> target, const ImageLossOptions& options,
+                      std::span<const float> weights) override {
+    requireStage(Stage::kDrawn, "a loss needs a picture; call forward first");
+    const size_t pixel_count = static_cast<size_t>(picture_.width) * picture_.height;
+    requireCount(target.size(), pixel_count * 3, "the target");
     if (!weights.empty()) requireCount(weights.size(), pixel_count, "weights");
     stage_ = Stage::kDrawn;
     colour_gradient_.resize(pixel_count * 4);
     const ImageLossValue value = image_loss_.evaluate(
-        wanted.width, wanted.height, {picture_.colour.data(), PixelLayout::kRgba},
-        {wanted.pixels.data(), PixelLayout::kRgb}, weights.empty() ? nullptr : weights.data(),
+        picture_.width, picture_.height, {picture_.colour.data(), PixelLayout::kRgba},
+        {target.data(), PixelLayout::kRgb}, weights.empty() ? nullptr : weights.data(),
         {colour_gradient_.data(), PixelLayout::kRgba}, options);
     target_ = target;
     stage_ = Stage::kLoss;
     return value;
   }
 
-  BackwardSummary backward(const BackwardRequest& request, Progress* progress) override {
+  BackwardSummary backward(const StatisticRequest& request, Regulariser* regulariser,
+                           Progress* progress) override {
     requireStage(Stage::kLoss, "derivatives need a loss of the picture; call loss first");
     BackwardInput input;
     input.colour_gradient = colour_gradient_;
-    if (request.with_contributions) {
+    if (request.contributions) {
       subtractTarget();
       input.residual = residual_;
       input.residual_weights = request.contribution_weights;
     }
     input.edge_weights = request.edge_weights;
     input.errors = request.errors;
-    input.with_blending_weights = request.with_blending_weights;
-    input.with_screen_gradients = request.with_screen_gradients;
+    input.with_blending_weights = request.blending_weights;
+    input.with_screen_gradients = request.screen_gradients;
+    input.with_absolute_screen_gradients = request.absolute_screen_gradients;
     stage_ = Stage::kLoss;
     const Lent lent(*this);
     renderBackward(workspace_, picture_, input, backward_workspace_, gradients_, UINT64_MAX,
                    progress);
-    throughActivations();
+    SplatGradients& by = gradients_.instances[0];
+    double regularisation = 0;
+    if (regulariser) regularisation = regulariser->evaluate(cloud_, spansOf(by));
+    if (how_) {
+      throughActivations(held_.splats, cloud_, *how_, by, by_raw_);
+    } else {
+      throughActivations(cloud_, by);
+    }
     stage_ = Stage::kGradients;
-    return {gradients_.camera, gradients_.background, gradients_.visible_count};
+    are_kept_ = false;
+    return {gradients_.camera, gradients_.background, gradients_.visible_count, regularisation};
   }
 
   void step(const StepOptions& options) override {
     requireStage(Stage::kGradients, "a step needs derivatives; call backward first");
-    SplatGradients& by = gradients_.instances[0];
+    // Those that were kept count, these too.
+    if (held_.kept_gradients.size() > 0) addToKept();
     constexpr size_t kFirst = 3;  // numbers of the constant harmonic
-    std::vector<AdamGroup> groups;
-    const auto add = [&](ParameterGroup group, RawArray array, const std::vector<float>& gradients,
-                         size_t offset, size_t length) {
-      const double rate = options.learning_rates[static_cast<size_t>(group)];
-      if (rate == 0 || splatCount() == 0 || length == 0) return;
-      groups.push_back({arrayOf(held_.splats, array).data() + offset, gradients.data() + offset,
-                        arrayOf(held_.first_moments, array).data() + offset,
-                        arrayOf(held_.second_moments, array).data() + offset, splatCount(), length,
-                        rate, rowLength(held_.splats, array)});
-    };
-    add(ParameterGroup::kPositions, RawArray::kPositions, by.positions, 0, 3);
-    add(ParameterGroup::kRotations, RawArray::kRotations, by.rotations, 0, 4);
-    add(ParameterGroup::kLogScales, RawArray::kLogScales, by.scales, 0, 3);
-    add(ParameterGroup::kLogits, RawArray::kLogits, by.opacities, 0, 1);
-    add(ParameterGroup::kShFirst, RawArray::kSh, by.sh, 0, kFirst);
-    add(ParameterGroup::kShOthers, RawArray::kSh, by.sh, kFirst, held_.splats.shStride() - kFirst);
-    adamStep(groups, held_.step + 1, options.adam);
+    groups_.clear();
+    addGroup(options, ParameterGroup::kPositions, RawArray::kPositions, 0, 3);
+    addGroup(options, ParameterGroup::kRotations, RawArray::kRotations, 0, 4);
+    addGroup(options, ParameterGroup::kLogScales, RawArray::kLogScales, 0, 3);
+    addGroup(options, ParameterGroup::kLogits, RawArray::kLogits, 0, 1);
+    addGroup(options, ParameterGroup::kShFirst, RawArray::kSh, 0, kFirst);
+    addGroup(options, ParameterGroup::kShOthers, RawArray::kSh, kFirst,
+             held_.splats.shStride() - kFirst);
+    const size_t extra_count = how_ ? held_.splats.extra_lengths.size() : 0;
+    for (size_t k = 0; k < std::min(extra_count, options.extra_rates.size()); ++k) {
+      addGroup(options.extra_rates[k], extraArray(k), 0, held_.splats.extra_lengths[k]);
+    }
+    adamStep(groups_, held_.step + 1, options.adam);
     ++held_.step;
+    held_.kept_gradients = {};
     changed();
+  }
+
+  void keepGradients() override {
+    requireStage(Stage::kGradients, "there are no derivatives to keep; call backward first");
+    addToKept();
+    stage_ = Stage::kSplats;
   }
 
   void edit(const SplatEdit& edit) override {
     validate(edit, held_.splats);
-    TrainingState next = held_;  // so that a failure half-way changes nothing
-    applyEdit(edit, false, next.splats);
-    applyEdit(edit, true, next.first_moments);
-    applyEdit(edit, true, next.second_moments);
-    held_ = std::move(next);
+    std::vector<EditTarget> targets = {
+        {&held_.splats, false}, {&held_.first_moments, true}, {&held_.second_moments, true}};
+    if (held_.kept_gradients.size() > 0) targets.push_back({&held_.kept_gradients, true});
+    applyEdit(edit, targets);
     changed();
   }
 
@@ -185,6 +238,7 @@ class CpuBackend final : public RenderBackend {
 
   RawSplats gradients() const override {
     requireStage(Stage::kGradients, "there are no derivatives; call backward first");
+    if (how_) return by_raw_;
     const SplatGradients& by = gradients_.instances[0];
     RawSplats raw = zerosLike(held_.splats);
     raw.positions = by.positions;
@@ -206,13 +260,26 @@ class CpuBackend final : public RenderBackend {
     return seen;
   }
 
+  void lendStatistics(ViewStatistics& statistics) override {
+    requireStage(Stage::kGradients, "there are no statistics; call backward first");
+    visibleFlags(workspace_, visible_);
+    statistics.visible = visible_;
+    for (size_t i = 0; i < kStatisticCount; ++i) {
+      statistics.arrays[i] = gradients_.instances[0].*kStatistics[i].values;
+    }
+  }
+
  private:
   /// Positions, rotations and harmonics are the same numbers raw and stored: while splats are
-  /// drawn, the cloud has the arrays.
+  /// drawn, the cloud has the arrays. With a parameterisation it has arrays of its own.
   class Lent {
    public:
-    explicit Lent(CpuBackend& backend) : backend_(backend) { exchange(); }
-    ~Lent() { exchange(); }
+    explicit Lent(CpuBackend& backend) : backend_(backend) {
+      if (!backend_.how_) exchange();
+    }
+    ~Lent() {
+      if (!backend_.how_) exchange();
+    }
     Lent(const Lent&) = delete;
     Lent& operator=(const Lent&) = delete;
 
@@ -252,38 +319,60 @@ class CpuBackend final : public RenderBackend {
 
   void activate() {
     if (is_activated_) return;
-    const RawSplats& raw = held_.splats;
-    cloud_.scales.resize(raw.log_scales.size());
-    cloud_.opacities.resize(raw.logits.size());
-    parallelFor(raw.log_scales.size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) cloud_.scales[i] = activatedScale(raw.log_scales[i]);
-    });
-    parallelFor(raw.logits.size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) cloud_.opacities[i] = activatedOpacity(raw.logits[i]);
-    });
+    if (how_) {
+      activateAll(held_.splats, *how_, cloud_);
+    } else {
+      activateShapes(held_.splats, cloud_);
+    }
     is_activated_ = true;
   }
 
-  /// Derivatives by stored scales and opacities become those by raw ones.
-  void throughActivations() {
-    SplatGradients& by = gradients_.instances[0];
-    parallelFor(by.scales.size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) by.scales[i] *= cloud_.scales[i];
-    });
-    parallelFor(by.opacities.size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        by.opacities[i] *= cloud_.opacities[i] * (1.0f - cloud_.opacities[i]);
-      }
-    });
+  /// Derivatives by an array of the raw splats, of the last backward pass.
+  std::span<const float> lastGradient(RawArray array) const {
+    if (how_) return arrayOf(by_raw_, array);
+    const SplatGradients& by = gradients_.instances[0];
+    const std::vector<float>* const arrays[] = {&by.positions, &by.rotations, &by.scales,
+                                                &by.opacities, &by.sh};
+    return *arrays[static_cast<size_t>(array)];
+  }
+
+  void addGroup(const StepOptions& options, ParameterGroup group, RawArray array, size_t offset,
+                size_t length) {
+    addGroup(options.learning_rates[static_cast<size_t>(group)], array, offset, length);
+  }
+
+  void addGroup(double rate, RawArray array, size_t offset, size_t length) {
+    if (rate == 0 || splatCount() == 0 || length == 0) return;
+    const float* gradients = held_.kept_gradients.size() > 0
+                                 ? arrayOf(held_.kept_gradients, array).data()
+                                 : lastGradient(array).data();
+    groups_.push_back({arrayOf(held_.splats, array).data() + offset, gradients + offset,
+                       arrayOf(held_.first_moments, array).data() + offset,
+                       arrayOf(held_.second_moments, array).data() + offset, splatCount(), length,
+                       rate, rowLength(held_.splats, array)});
+  }
+
+  /// Adds the derivatives of the last backward pass to the kept ones, once.
+  void addToKept() {
+    if (are_kept_) return;
+    if (held_.kept_gradients.size() == 0) held_.kept_gradients = zerosLike(held_.splats);
+    for (size_t i = 0; i < (how_ ? arrayCount(held_.splats) : kRawArrayCount); ++i) {
+      const RawArray array = static_cast<RawArray>(i);
+      const std::span<const float> last = lastGradient(array);
+      float* sums = arrayOf(held_.kept_gradients, array).data();
+      parallelFor(last.size(), kGrain, [&](size_t begin, size_t end) {
+        for (size_t k = begin; k < end; ++k) sums[k] += last[k];
+      });
+    }
+    are_kept_ = true;
   }
 
   void subtractTarget() {
-    const std::vector<float>& target = targets_[target_].pixels;
-    residual_.resize(target.size());
-    parallelFor(target.size() / 3, kGrain, [&](size_t begin, size_t end) {
+    residual_.resize(target_.size());
+    parallelFor(target_.size() / 3, kGrain, [&](size_t begin, size_t end) {
       for (size_t pixel = begin; pixel < end; ++pixel) {
         for (size_t c = 0; c < 3; ++c) {
-          residual_[pixel * 3 + c] = picture_.colour[pixel * 4 + c] - target[pixel * 3 + c];
+          residual_[pixel * 3 + c] = picture_.colour[pixel * 4 + c] - target_[pixel * 3 + c];
         }
       }
     });
@@ -292,17 +381,22 @@ class CpuBackend final : public RenderBackend {
   TrainingState held_;
   SplatCloud cloud_;  ///< stored scales and opacities; the rest only while it is drawn
   bool is_activated_ = false;
+  const Parameterisation* how_ = nullptr;
   std::vector<Target> targets_;
 
   Stage stage_ = Stage::kSplats;
   RenderWorkspace workspace_;
   RenderResult picture_;
   ImageLoss image_loss_;
-  uint32_t target_ = 0;
+  std::span<const float> target_;       ///< of the last loss, [H,W,3]
   std::vector<float> colour_gradient_;  ///< [H,W,4]
   std::vector<float> residual_;         ///< [H,W,3]
   BackwardWorkspace backward_workspace_;
-  BackwardResult gradients_;  ///< by raw scales and opacities once a pass is done
+  BackwardResult gradients_;      ///< by raw scales and opacities once a pass is done without how_
+  RawSplats by_raw_;              ///< with how_
+  bool are_kept_ = false;         ///< whether the last derivatives are among the kept ones
+  std::vector<uint8_t> visible_;  ///< [N]
+  std::vector<AdamGroup> groups_;
 };
 
 }  // namespace

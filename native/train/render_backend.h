@@ -10,6 +10,7 @@
 #include "data/splat_cloud.h"
 #include "densify/splat_edit.h"
 #include "densify/statistic.h"
+#include "densify/strategy.h"
 #include "math/camera.h"
 #include "splat/render.h"
 #include "train/adam.h"
@@ -31,18 +32,16 @@ constexpr size_t kParameterGroupCount = 6;
 struct StepOptions {
   /// By ParameterGroup. A group of rate 0 takes no step: its moments stay as they are.
   std::array<double, kParameterGroupCount> learning_rates{};
+  std::vector<double> extra_rates;  ///< of RawSplats::extras; absent ones are 0
   AdamOptions adam;
 };
 
-/// Which statistics a backward pass gathers; each costs time only where it is asked for. Pictures
-/// have the size of the drawn one and are empty where not used.
-struct BackwardRequest {
-  bool with_contributions = false;  ///< of the drawn picture against its target
-  bool with_blending_weights = false;
-  bool with_screen_gradients = false;
-  std::span<const float> contribution_weights;  ///< [H,W] >= 0; empty: 1
-  std::span<const float> edge_weights;          ///< [H,W] not empty: edge weights are gathered
-  std::span<const float> errors;                ///< [H,W] not empty: errors are gathered
+/// A part of the loss that depends on the splats alone, not on a picture.
+class Regulariser {
+ public:
+  virtual ~Regulariser() = default;
+  /// Returns: its value. Its derivative is added to `gradient`.
+  virtual double evaluate(const SplatCloud& cloud, const CloudGradient& gradient) = 0;
 };
 
 /// Of one backward pass; what they are is said at SplatGradients and BackwardResult.
@@ -50,6 +49,7 @@ struct BackwardSummary {
   std::array<double, 6> camera{};
   std::array<double, 3> background{};
   uint64_t visible_count = 0;
+  double regularisation = 0;  ///< value of the regulariser
 };
 
 /// Everything of a fit that a checkpoint has to keep.
@@ -57,7 +57,8 @@ struct TrainingState {
   RawSplats splats;
   RawSplats first_moments;
   RawSplats second_moments;
-  uint64_t step = 0;  ///< taken so far
+  RawSplats kept_gradients;  ///< of keepGradients() since the last step; no splats: none
+  uint64_t step = 0;         ///< taken so far
 };
 
 /// Holds the splats of a fit and does its passes, each by one call: forward, loss, backward, step,
@@ -80,9 +81,15 @@ class RenderBackend {
   virtual void upload(const SplatCloud& cloud) = 0;
   virtual void restore(const TrainingState& state) = 0;
 
+  /// How raw numbers become splats, from now on; null: as raw_splats.h says. It must live as long
+  /// as the backend. Extras without it get no derivative.
+  virtual void parameterise(const Parameterisation* how) = 0;
+
   virtual size_t splatCount() const = 0;
   virtual SplatCloud download() const = 0;
-  virtual TrainingState state() const = 0;
+  /// Valid until the next call.
+  virtual const TrainingState& state() const = 0;
+  virtual uint64_t memoryBytes() const = 0;  ///< held now, about
 
   /// Keeps a target picture [H,W,3], in the space in which splats are composited. Returns its
   /// number: 0, 1, 2...
@@ -96,13 +103,21 @@ class RenderBackend {
   /// [H,W] >= 0, or empty: 1.
   virtual ImageLossValue loss(uint32_t target, const ImageLossOptions& options,
                               std::span<const float> weights = {}) = 0;
+  /// The same against a picture [H,W,3] that is not kept: the caller's, until backward() is done.
+  virtual ImageLossValue loss(std::span<const float> target, const ImageLossOptions& options,
+                              std::span<const float> weights = {}) = 0;
 
-  /// Derivatives of that loss by the raw parameters, and statistics.
-  virtual BackwardSummary backward(const BackwardRequest& request,
+  /// Derivatives of that loss by the raw parameters, and statistics. In: regulariser: what adds to
+  /// the loss, or null.
+  virtual BackwardSummary backward(const StatisticRequest& request,
+                                   Regulariser* regulariser = nullptr,
                                    Progress* progress = nullptr) = 0;
 
-  /// One step of Adam along them. May follow a backward pass once.
+  /// One step of Adam along them and those that were kept. May follow a backward pass once.
   virtual void step(const StepOptions& options) = 0;
+
+  /// Instead of a step: the derivatives add up until the next one, and move with edits.
+  virtual void keepGradients() = 0;
 
   /// Changes which splats there are. Drawn picture, derivatives and statistics are gone after it.
   virtual void edit(const SplatEdit& edit) = 0;
@@ -113,6 +128,9 @@ class RenderBackend {
   virtual RawSplats gradients() const = 0;
   /// [N] or as stated, of the last backward pass; refused where it was not asked for.
   virtual std::vector<float> statistic(Statistic statistic) const = 0;
+  /// All that were asked for, and which splats passed culling. Out: visible and arrays, valid until
+  /// the next call; the rest of `statistics` is left alone.
+  virtual void lendStatistics(ViewStatistics& statistics) = 0;
 };
 
 /// On this processor, with native/splat, train/image_loss and train/adam.

@@ -53,7 +53,7 @@ void expectSound(const SplatCloud& cloud, const Camera& camera, LowPass low_pass
   input.colour_gradient = gradient;
   input.residual = residual;
   input.with_blending_weights = true;
-  input.with_screen_gradients = true;
+  input.with_screen_gradients = input.with_absolute_screen_gradients = true;
   const std::vector<float> depth_gradient =
       with_depth ? randomWeights(pixelCount(camera), 3) : std::vector<float>();
   input.depth_gradient = depth_gradient;
@@ -226,7 +226,7 @@ TEST(BackwardStability, ExtremeQuaternionsAndColours) {
   for (float& value : cloud.sh) value *= 1e30f;
   BackwardInput input;
   input.colour_gradient = gradient;
-  input.with_screen_gradients = true;
+  input.with_screen_gradients = input.with_absolute_screen_gradients = true;
   const SplatInstance instance{&cloud};
   RenderOptions options;
   options.blend_space = BlendSpace::kSceneLinear;
@@ -278,8 +278,9 @@ TEST(BackwardStability, RefusesWhatIsNotFinite) {
   const std::vector<float> ones(n * 4, 1.0f);
   const auto inputOf = [&](const std::vector<float>& values) {
     const std::span<const float> all = values;
-    return BackwardInput{all,  all.first(n * 3), all.first(n), all.first(n), all.first(n), true,
-                         true, all.first(n)};
+    return BackwardInput{
+        all,  all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true,
+        true, all.first(n)};
   };
   const auto refused = [&](const SplatCloud& cloud, const BackwardInput& input) {
     const SplatInstance instance{&cloud};

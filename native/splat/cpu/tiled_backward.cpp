@@ -74,8 +74,8 @@ void requireRanges(const BackwardInput& input) {
 
 BackwardWants wantsOf(const BackwardInput& input) {
   const bool with_depth = !input.depth_gradient.empty();
-  if (input.with_blending_weights || input.with_screen_gradients || !input.edge_weights.empty() ||
-      !input.errors.empty()) {
+  if (input.with_blending_weights || input.with_absolute_screen_gradients ||
+      !input.edge_weights.empty() || !input.errors.empty()) {
     return {BackwardMode::kStatistics, with_depth};
   }
   return {input.residual.empty() ? BackwardMode::kGradients : BackwardMode::kContributions,
@@ -90,7 +90,8 @@ bool isWanted(const GradientArray& array, const BackwardInput& input) {
   if (isOneOf(&G::blending_weights)) return input.with_blending_weights;
   if (isOneOf(&G::edge_weights)) return !input.edge_weights.empty();
   if (isOneOf(&G::errors, &G::largest_errors)) return !input.errors.empty();
-  return input.with_screen_gradients;
+  if (isOneOf(&G::screen_gradients)) return input.with_screen_gradients;
+  return input.with_absolute_screen_gradients;
 }
 
 /// Calls use(array, values per splat) for every array of the result that is wanted.
@@ -176,6 +177,10 @@ void storeStatistics(const BackwardInput& input, const float* sums, const double
   if (input.with_screen_gradients) {
     for (size_t axis = 0; axis < 2; ++axis) {
       out.screen_gradients[index * 2 + axis] = static_cast<float>(mean[axis]);
+    }
+  }
+  if (input.with_absolute_screen_gradients) {
+    for (size_t axis = 0; axis < 2; ++axis) {
       out.absolute_screen_gradients[index * 2 + axis] = sums[kFieldAbsoluteX + axis];
     }
     out.screen_gradient_norms[index] = sums[kFieldNorm];

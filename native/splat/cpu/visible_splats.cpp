@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "base/parallel.h"
+#include "splat/cpu/tiled_render.h"
 
 namespace stipple {
 
@@ -67,6 +68,17 @@ VisibleSplats findVisibleSplats(const PlacedScene& scene, Progress* progress) {
   VisibleSplats visible;
   findVisibleSplats(chosenProjector(), scene, progress, visible);
   return visible;
+}
+
+void visibleFlags(RenderWorkspace& drawn, std::vector<uint8_t>& flags) {
+  const VisibleSplats& visible = drawn.arrays().visible;
+  flags.resize(drawn.arrays().scene.splat_count);
+  const auto write_range = [&](size_t begin, size_t end) {
+    std::fill(&flags[begin], &flags[begin] + (end - begin), uint8_t{0});
+    const size_t end_slot = begin + visible.slotCount(begin);
+    for (size_t slot = begin; slot < end_slot; ++slot) flags[visible.extras[slot].index] = 1;
+  };
+  parallelFor(flags.size(), kRangeSplats, std::cref(write_range));
 }
 
 uint64_t visibleSplatsMemoryBound(uint64_t splat_count) {

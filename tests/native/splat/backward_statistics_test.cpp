@@ -232,7 +232,7 @@ TEST(ScreenGradients, AgreeWithThePixelsOneByOne) {
   const SplatInstance instance{&cloud};
   BackwardInput input;
   input.colour_gradient = gradient;
-  input.with_screen_gradients = true;
+  input.with_screen_gradients = input.with_absolute_screen_gradients = true;
   const SplatGradients all = renderBackward({&instance, 1}, camera, {}, input).instances[0];
   std::vector<double> sum(cloud.size() * 2), absolute(cloud.size() * 2), norm(cloud.size());
   for (size_t pixel = 0; pixel < pixelCount(camera); ++pixel) {
@@ -294,7 +294,10 @@ TEST(Backward, ChangesNoGradientWhenStatisticsAreAskedFor) {
   EXPECT_TRUE(plain.screen_gradients.empty());
   input.residual = residual;
   const SplatGradients judged = renderBackward({&instance, 1}, camera, {}, input).instances[0];
-  input.with_screen_gradients = input.with_blending_weights = true;
+  input.with_screen_gradients = true;
+  const SplatGradients signed_only = renderBackward({&instance, 1}, camera, {}, input).instances[0];
+  EXPECT_TRUE(signed_only.screen_gradient_norms.empty());
+  input.with_absolute_screen_gradients = input.with_blending_weights = true;
   const SplatGradients full = renderBackward({&instance, 1}, camera, {}, input).instances[0];
   for (const SplatGradients* other : {&judged, &full}) {
     EXPECT_EQ(plain.positions, other->positions);
@@ -317,7 +320,7 @@ TEST(Backward, EveryTargetAgreesWithTheScalarOne) {
   BackwardInput input;
   input.colour_gradient = gradient;
   input.residual = residual;
-  input.with_screen_gradients = true;
+  input.with_screen_gradients = input.with_absolute_screen_gradients = true;
   input.with_blending_weights = true;
   const std::vector<BackwardKernel> kernels = backwardKernels();
   ASSERT_GE(kernels.size(), 2u);

@@ -41,7 +41,7 @@ struct Call {
 
   SplatInstance instance() const { return {&cloud, matrix}; }
   BackwardInput input() const {
-    return {colour_gradient, residual, residual_weights, edge_weights, errors, true, true,
+    return {colour_gradient, residual, residual_weights, edge_weights, errors, true, true, true,
             depth_gradient};
   }
 };
@@ -288,7 +288,8 @@ void expectNothingDrawn(const SplatCloud& cloud, const Camera& camera) {
   const std::span<const float> all = pictures;
   const size_t n = pixelCount(camera);
   const BackwardInput input = {
-      all, all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true, all.first(n)};
+      all,  all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true,
+      true, all.first(n)};
   const BackwardResult result = renderBackward({&instance, 1}, camera, options, input);
   double by_red = 0;
   for (size_t i = 0; i < n; ++i) by_red += static_cast<double>(pictures[i * 4]);

@@ -200,7 +200,8 @@ TEST(BackwardMemoryBound, IsNeverExceeded) {
         BackwardInput input;
         input.colour_gradient = gradient;
         if (everything) input.residual = residual;
-        input.with_blending_weights = input.with_screen_gradients = everything;
+        input.with_blending_weights = everything;
+        input.with_screen_gradients = input.with_absolute_screen_gradients = everything;
         const uint64_t bound = backwardMemoryBound({&instance, 1}, camera, {}, input);
         const uint64_t before = held.load();
         peak.store(before);
@@ -259,7 +260,7 @@ TEST(BackwardWorkspace, AllocatesNothingForASecondCallOfTheSameSizeAndGivesTheSa
   const std::vector<float> gradient(testing::pixelCount(camera) * 4, 0.5f);
   BackwardInput input;
   input.colour_gradient = gradient;
-  input.with_screen_gradients = true;
+  input.with_screen_gradients = input.with_absolute_screen_gradients = true;
   BackwardWorkspace workspace;
   BackwardResult result;
   // One thread: how many tiles are at work at once, and so want scratch, is then the same.

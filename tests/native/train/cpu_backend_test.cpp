@@ -48,7 +48,7 @@ StepOptions rates() {
 }
 
 /// One whole step of a fit.
-double fit(RenderBackend& backend, uint32_t picture, const BackwardRequest& request = {},
+double fit(RenderBackend& backend, uint32_t picture, const StatisticRequest& request = {},
            const StepOptions& options = rates()) {
   backend.forward(camera(), overGrey());
   const double loss = backend.loss(picture, {}).loss;
@@ -81,7 +81,7 @@ TEST(CpuBackend, GivesTheBitsOfTheSeparateCalls) {
   const uint32_t picture = backend->addTarget(camera().width, camera().height, wanted);
 
   RawSplats raw = rawSplats(start);
-  TrainingState expected{raw, zerosLike(raw), zerosLike(raw), 0};
+  TrainingState expected{raw, zerosLike(raw), zerosLike(raw), {}, 0};
   ImageLoss image_loss;
   for (uint64_t step = 1; step <= 3; ++step) {
     const SplatCloud cloud = activated(raw);
@@ -127,8 +127,8 @@ TEST(CpuBackend, GivesTheBitsOfTheSeparateCalls) {
     backend->forward(camera(), overGrey());
     EXPECT_EQ(backend->picture(), drawn.colour);
     EXPECT_EQ(backend->loss(picture, {}).loss, value.loss);
-    BackwardRequest request;
-    request.with_contributions = true;
+    StatisticRequest request;
+    request.contributions = true;
     const BackwardSummary summary = backend->backward(request);
     EXPECT_EQ(summary.camera, result.camera);
     EXPECT_EQ(summary.background, result.background);
@@ -331,7 +331,7 @@ TEST(CpuBackend, RefusesPassesOutOfOrderAndPicturesThatDoNotFit) {
               HasSubstr("target 0 is 6 x 4 pixels; the picture is 47 x 35"));
   EXPECT_THAT(messageOf([&] { backend->backward({}); }), HasSubstr("call loss first"));
   backend->loss(picture, {});
-  BackwardRequest request;
+  StatisticRequest request;
   const std::vector<float> few(3, 1.0f);
   request.errors = few;
   EXPECT_THAT(messageOf([&] { backend->backward(request); }), HasSubstr("errors holds 3 values"));
@@ -368,6 +368,195 @@ TEST(CpuBackend, GoesOnFromAStateAsIfNothingHadHappened) {
   expectEqual(first->state().splats, second->state().splats);
   expectEqual(first->state().first_moments, second->state().first_moments);
   EXPECT_EQ(second->state().step, 2u);
+}
+
+TEST(CpuBackend, AStepTakesTheDerivativesThatWereKept) {
+  const auto backend = makeCpuBackend();
+  backend->upload(smallCloud(30, 1, 690));
+  const std::vector<float> wanted = target(691);
+  const auto pass = [&](RenderBackend& fit) {
+    fit.forward(camera(), overGrey());
+    fit.loss(wanted, {});
+    fit.backward({});
+  };
+  pass(*backend);
+  const RawSplats once = backend->gradients();
+  backend->keepGradients();
+  EXPECT_THAT(messageOf([&] { backend->keepGradients(); }), HasSubstr("call backward first"));
+  // What was kept goes on with a checkpoint, and moves with the splats.
+  const auto other = makeCpuBackend();
+  other->restore(backend->state());
+  SplatEdit edit;
+  edit.keep = std::vector<uint32_t>{4, 9, 2};
+  edit.append = rawSplats(smallCloud(1, 1, 692));
+  other->edit(edit);
+  const RawSplats& moved = other->state().kept_gradients;
+  ASSERT_EQ(moved.size(), 4u);
+  EXPECT_EQ(moved.logits[1], once.logits[9]);
+  EXPECT_EQ(moved.positions[2 * 3], once.positions[2 * 3]);
+  EXPECT_EQ(moved.positions[3 * 3], 0.0f);
+
+  pass(*backend);
+  backend->step(rates());
+  EXPECT_EQ(backend->state().kept_gradients.size(), 0u);
+  EXPECT_EQ(backend->state().step, 1u);
+  // Adam's first moment is a tenth of the sum, which is twice one pass: nothing moved in between.
+  for (size_t i = 0; i < once.positions.size(); ++i) {
+    EXPECT_NEAR(backend->state().first_moments.positions[i], 0.2f * once.positions[i],
+                1e-6f * std::abs(once.positions[i]));
+  }
+}
+
+/// Half the sum of squares of the scales, and a sum of opacities.
+class SmallScales final : public Regulariser {
+ public:
+  double evaluate(const SplatCloud& cloud, const CloudGradient& gradient) override {
+    double sum = 0;
+    for (size_t i = 0; i < cloud.scales.size(); ++i) {
+      gradient.scales[i] += cloud.scales[i];
+      sum += 0.5 * static_cast<double>(cloud.scales[i] * cloud.scales[i]);
+    }
+    for (size_t i = 0; i < cloud.size(); ++i) {
+      gradient.opacities[i] += 1;
+      sum += static_cast<double>(cloud.opacities[i]);
+    }
+    EXPECT_EQ(cloud.positions.size(), 3 * cloud.size());
+    return sum;
+  }
+};
+
+TEST(CpuBackend, RegularisersActThroughTheActivations) {
+  const auto backend = makeCpuBackend();
+  backend->upload(smallCloud(30, 1, 700));
+  const std::vector<float> wanted = target(701);
+  backend->forward(camera(), overGrey());
+  backend->loss(wanted, {});
+  EXPECT_EQ(backend->backward({}).regularisation, 0);
+  const RawSplats without = backend->gradients();
+  SmallScales regulariser;
+  const double value = backend->backward({}, &regulariser).regularisation;
+  const RawSplats with = backend->gradients();
+  const SplatCloud cloud = backend->download();
+  double expected = 0;
+  for (size_t i = 0; i < cloud.scales.size(); ++i) {
+    const float s = cloud.scales[i];
+    expected += 0.5 * static_cast<double>(s * s);
+    EXPECT_NEAR(with.log_scales[i] - without.log_scales[i], s * s, 1e-5f * s * s + 1e-7f);
+  }
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    const float o = cloud.opacities[i];
+    expected += static_cast<double>(o);
+    EXPECT_NEAR(with.logits[i] - without.logits[i], o * (1 - o), 1e-6f);
+  }
+  EXPECT_NEAR(value, expected, 1e-6 * expected);
+  EXPECT_EQ(with.positions, without.positions);
+}
+
+/// Positions that are moved by three extra numbers per splat, doubled.
+class Moved final : public Parameterisation {
+ public:
+  void activate(const RawSplats& raw, SplatCloud& cloud) const override {
+    for (size_t i = 0; i < cloud.positions.size(); ++i) cloud.positions[i] += 2 * raw.extras[0][i];
+  }
+  void adjoint(const RawSplats&, const SplatCloud&, const CloudGradient& by_cloud,
+               RawSplats& by_raw) const override {
+    for (size_t i = 0; i < by_cloud.positions.size(); ++i) {
+      by_raw.extras[0][i] += 2 * by_cloud.positions[i];
+    }
+  }
+};
+
+TEST(CpuBackend, ExtraParametersAreTrainedThroughTheirParameterisation) {
+  const SplatCloud start = smallCloud(30, 1, 710);
+  const std::vector<float> wanted = target(711);
+  const auto plain = makeCpuBackend(), backend = makeCpuBackend();
+  SplatCloud moved_start = start;
+  TrainingState state;
+  {
+    plain->upload(start);
+    state = plain->state();
+  }
+  for (RawSplats* splats : {&state.splats, &state.first_moments, &state.second_moments}) {
+    splats->extra_lengths = {3};
+    splats->extras = {std::vector<float>(90, 0.0f)};
+  }
+  for (size_t i = 0; i < 90; ++i) {
+    state.splats.extras[0][i] = i % 2 ? 0.01f : -0.02f;
+    moved_start.positions[i] += 2 * state.splats.extras[0][i];
+  }
+  const Moved how;
+  backend->parameterise(&how);
+  backend->restore(state);
+  plain->upload(moved_start);
+  for (RenderBackend* fit : {plain.get(), backend.get()}) {
+    fit->forward(camera(), overGrey());
+    fit->loss(wanted, {});
+    fit->backward({});
+  }
+  EXPECT_EQ(backend->picture(), plain->picture());
+  EXPECT_EQ(backend->download().positions, moved_start.positions);
+  const RawSplats seen = backend->gradients();
+  const RawSplats expected = plain->gradients();
+  expectEqual(seen, expected);
+  for (size_t i = 0; i < 90; ++i) EXPECT_EQ(seen.extras[0][i], 2 * expected.positions[i]);
+  StepOptions options = rates();
+  options.extra_rates = {1e-3};
+  backend->step(options);
+  for (size_t i = 0; i < 90; ++i) {
+    // The first step of Adam has the size of the rate, against the sign of the derivative.
+    const float by = expected.positions[i];
+    const float step = by == 0 ? 0.0f : by > 0 ? -1e-3f : 1e-3f;
+    EXPECT_NEAR(backend->state().splats.extras[0][i], state.splats.extras[0][i] + step, 1e-6f);
+  }
+
+  SplatEdit edit;
+  edit.writes.push_back({extraArray(0), {1}, {7, 8, 9}, true});
+  edit.keep = std::vector<uint32_t>{0, 1, 5};
+  edit.append = rawSplats(smallCloud(1, 1, 712));
+  EXPECT_THAT(messageOf([&] { backend->edit(edit); }), HasSubstr("append has 0 extra parameters"));
+  edit.append.extra_lengths = {3};
+  edit.append.extras = {{4, 5, 6}};
+  const TrainingState before = backend->state();
+  backend->edit(edit);
+  const RawSplats& after = backend->state().splats;
+  EXPECT_THAT(std::vector<float>(after.extras[0].begin() + 3, after.extras[0].begin() + 6),
+              ElementsAre(7, 8, 9));
+  EXPECT_THAT(std::vector<float>(after.extras[0].begin() + 9, after.extras[0].end()),
+              ElementsAre(4, 5, 6));
+  EXPECT_EQ(after.extras[0][6], before.splats.extras[0][15]);
+  const RawSplats& moments = backend->state().first_moments;
+  EXPECT_EQ(moments.extras[0][3], 0.0f);
+  EXPECT_EQ(moments.extras[0][6], before.first_moments.extras[0][15]);
+  EXPECT_NE(moments.extras[0][6], 0.0f);
+  EXPECT_EQ(moments.extras[0].size(), 12u);
+}
+
+TEST(CpuBackend, LendsWhatAPassGathered) {
+  const auto backend = makeCpuBackend();
+  SplatCloud cloud = smallCloud(40, 0, 720);
+  cloud.positions[5 * 3] = 1e4f;  // out of view
+  cloud.opacities[7] = 1e-3f;     // below 1/255
+  backend->upload(cloud);
+  const std::vector<float> wanted = target(721);
+  ViewStatistics statistics;
+  EXPECT_THAT(messageOf([&] { backend->lendStatistics(statistics); }), HasSubstr("backward first"));
+  backend->forward(camera(), overGrey());
+  backend->loss(wanted, {});
+  StatisticRequest request;
+  request.screen_gradients = true;
+  const BackwardSummary summary = backend->backward(request);
+  backend->lendStatistics(statistics);
+  ASSERT_EQ(statistics.visible.size(), 40u);
+  EXPECT_EQ(statistics.visible[5], 0);
+  EXPECT_EQ(statistics.visible[7], 0);
+  uint64_t count = 0;
+  for (const uint8_t flag : statistics.visible) count += flag;
+  EXPECT_EQ(count, summary.visible_count);
+  const std::vector<float> expected = backend->statistic(Statistic::kScreenGradients);
+  const std::span<const float> seen = statistics.of(Statistic::kScreenGradients);
+  EXPECT_EQ(std::vector<float>(seen.begin(), seen.end()), expected);
+  EXPECT_TRUE(statistics.of(Statistic::kAbsoluteScreenGradients).empty());
+  EXPECT_TRUE(statistics.of(Statistic::kContributions).empty());
 }
 
 TEST(CpuBackend, AGroupWithoutARateStaysAsItIs) {
