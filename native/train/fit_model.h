@@ -37,7 +37,7 @@ struct StepReport {
 
 /// A view of the step: its picture is composited over the background already.
 struct StepView {
-  size_t index = 0;
+  size_t index = 0;  ///< among the views that are learned from, as ViewEvaluator counts them
   const Camera* camera = nullptr;
   const float* target = nullptr;   ///< [H,W,3] in the compositing space
   const float* weights = nullptr;  ///< [H,W] or null: 1

@@ -108,6 +108,10 @@ Trainer::Trainer(std::shared_ptr<const ViewSource> views, ViewSplit split,
     fail(ErrorCode::kInvalidArgument, "there are no views to learn from; at least one is needed");
   }
   extent_ = extentOfCameras(pictures_.views(), split_.training);
+  double background[3];
+  backgroundOf(0, background);
+  evaluator_ = std::make_unique<FitViewEvaluator>(*model_, pictures_, split_.training, background,
+                                                  options.ssim_share);
   history_.measured_on_held_out = !split_.held_out.empty();
   history_.training_view_count = split_.training.size();
 }
@@ -151,8 +155,9 @@ void Trainer::step(Pace& pace) {
   }
   view.target = target_.colour.data();
   view.weights = target_.weights.empty() ? nullptr : target_.weights.data();
+  evaluator_->forgetSplats();
   // A step is never left half-way: what was cancelled must go on bit for bit.
-  const StepReport report = model_->step(moment, view, nullptr, nullptr);
+  const StepReport report = model_->step(moment, view, evaluator_.get(), nullptr);
   stage_ = report.stage;
   ++iteration_;
   const double seconds = secondsSince(start);

@@ -15,6 +15,7 @@
 #include "train/fit_model.h"
 #include "train/held_out.h"
 #include "train/picture_store.h"
+#include "train/view_evaluator.h"
 #include "train/view_order.h"
 
 namespace stipple {
@@ -126,6 +127,7 @@ class Trainer {
   double extent_;
   ViewOrder order_;
   ViewMeasure measure_;
+  std::unique_ptr<FitViewEvaluator> evaluator_;
   TargetPicture target_;
   const char* stage_ = "";
 

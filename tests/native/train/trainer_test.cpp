@@ -362,6 +362,40 @@ TEST(PackedNumbers, KeepWhatTheyPromise) {
   EXPECT_TRUE(seen.empty());
 }
 
+TEST(FitViewEvaluator, DrawsAndJudgesTrainingViews) {
+  const auto views = colourViews(3, 0.25f, 0.5f, 0.75f, 0.5f);
+  PictureStore pictures(views, 1 << 20);
+  ColourModel model;
+  const double white[3] = {1, 1, 1};
+  const std::vector<size_t> training = {2, 0};
+  FitViewEvaluator evaluator(model, pictures, training, white, 0.2);
+  EXPECT_EQ(evaluator.viewCount(), 2u);
+  EXPECT_EQ(&evaluator.camera(0), &views->camera(2));
+  // Half of 0.27 and half of white; a grey splat that lets 0.01 of white through.
+  // Colour and alpha are kept in 16 bits.
+  EXPECT_NEAR(evaluator.target(0)[0], 0.635, 1.6e-5);
+  EXPECT_NEAR(evaluator.picture(0)[0], 0.505, 1e-5);
+  StatisticRequest request;
+  request.contributions = true;
+  request.screen_gradients = true;
+  request.absolute_screen_gradients = true;
+  request.blending_weights = true;
+  const ViewStatistics& seen = evaluator.evaluate(0, request);
+  EXPECT_EQ(seen.view, 0u);
+  EXPECT_EQ(seen.width, 20u);
+  ASSERT_EQ(seen.visible.size(), 1u);
+  EXPECT_EQ(seen.visible[0], 1);
+  ASSERT_EQ(seen.of(Statistic::kBlendingWeights).size(), 1u);
+  EXPECT_NEAR(seen.of(Statistic::kBlendingWeights)[0], 0.99f * 240, 0.01);
+  EXPECT_EQ(seen.of(Statistic::kScreenGradients).size(), 2u);
+  EXPECT_TRUE(seen.of(Statistic::kEdgeWeights).empty());
+  // By pixel |R| - |R without the splat|: targets 0.635, 0.76, 0.885; without it white is seen.
+  const double with = 0.13 + 0.255 + 0.38, without = 0.365 + 0.24 + 0.115;
+  EXPECT_NEAR(seen.of(Statistic::kContributions)[0], 240 * (with - without), 0.05);
+  EXPECT_NE(messageOf([&] { evaluator.camera(2); }).find("view 2 was asked for"),
+            std::string::npos);
+}
+
 TEST(CameraExtent, IsThePublishedOneAndNeverZero) {
   const auto views = colourViews(3, 0.5f, 0.5f, 0.5f);  // at x = 0, 0.1, 0.2
   const size_t all[3] = {0, 1, 2};

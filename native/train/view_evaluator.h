@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "densify/strategy.h"
+#include "splat/render_backward.h"
+#include "train/fit_model.h"
+#include "train/image_loss.h"
+#include "train/picture_store.h"
+
+namespace stipple {
+
+/// Draws the training views of a fit for strategies that look around between steps, with the splats
+/// that the model has when forgetSplats() was called last. Views are numbered as StepView::index.
+class FitViewEvaluator final : public ViewEvaluator {
+ public:
+  /// In: references outlive this; background [3] behind transparent views.
+  FitViewEvaluator(FitModel& model, PictureStore& pictures, const std::vector<size_t>& training,
+                   const double background[3], double ssim_share);
+
+  /// Call where the splats may have changed.
+  void forgetSplats() { cloud_.reset(); }
+
+  size_t viewCount() const override { return training_.size(); }
+  const Camera& camera(size_t view) const override;
+  std::vector<float> target(size_t view) override;
+  std::vector<float> picture(size_t view) override;
+  const ViewStatistics& evaluate(size_t view, const StatisticRequest& request) override;
+
+ private:
+  void load(size_t view);
+  void draw(size_t view);
+
+  FitModel& model_;
+  PictureStore& pictures_;
+  const std::vector<size_t>& training_;
+  double background_[3];
+  ImageLossOptions loss_options_;
+  std::optional<SplatCloud> cloud_;
+  RenderWorkspace workspace_;
+  RenderResult drawn_;
+  BackwardWorkspace backward_workspace_;
+  BackwardResult backward_;
+  ImageLoss loss_;
+  TargetPicture target_;
+  std::vector<float> colour_gradient_;  ///< [H,W,4]
+  std::vector<float> residual_;         ///< [H,W,3]
+  std::vector<uint8_t> visible_;
+  ViewStatistics statistics_;
+};
+
+}  // namespace stipple
