@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -27,6 +28,9 @@ enum class RandomUse : uint32_t {
   kViewRig = 10,
   kViewOrder = 11,
   kThinning = 12,
+  kSplitOffset = 20,
+  kStartChoice = 21,
+  kStartPoint = 22,
   kBackground = 13,
   kNetworkStart = 30,
   kFieldStart = 31,
@@ -42,9 +46,19 @@ inline uint64_t keyedBits(uint64_t seed, RandomUse use, uint64_t index) {
 }
 
 /// Uniform double in [0, 1) from the upper 53 bits.
-inline double unitDouble(uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1.0p-53; }
+inline double unitDouble(uint64_t bits) {
+  return static_cast<double>(bits >> 11) * 0x1.0p-53;
+}
+
+/// A number of the standard normal distribution from two uniform ones in [0, 1): Box, Muller, A
+/// Note on the Generation of Random Normal Deviates, Annals of Mathematical Statistics 1958.
+inline double normalOf(double u, double v) {
+  return std::sqrt(-2 * std::log1p(-u)) * std::cos(6.283185307179586 * v);
+}
 
 /// Uniform float in [0, 1) from 24 bits.
-inline float unitFloat(uint64_t bits) { return static_cast<float>(bits >> 40) * 0x1.0p-24f; }
+inline float unitFloat(uint64_t bits) {
+  return static_cast<float>(bits >> 40) * 0x1.0p-24f;
+}
 
 }  // namespace stipple

@@ -50,8 +50,27 @@ RawSplats zerosLike(const RawSplats& splats) {
   return zeros;
 }
 
+RawSplats rowsOf(const RawSplats& splats, const std::vector<uint32_t>& rows) {
+  RawSplats chosen;
+  chosen.sh_degree = splats.sh_degree;
+  chosen.colour_space = splats.colour_space;
+  chosen.antialias = splats.antialias;
+  chosen.extra_lengths = splats.extra_lengths;
+  chosen.resize(rows.size());
+  for (size_t i = 0; i < arrayCount(splats); ++i) {
+    const RawArray array = static_cast<RawArray>(i);
+    const size_t length = rowLength(splats, array);
+    const float* from = arrayOf(splats, array).data();
+    float* to = arrayOf(chosen, array).data();
+    for (size_t k = 0; k < rows.size(); ++k) {
+      std::copy_n(from + rows[k] * length, length, to + k * length);
+    }
+  }
+  return chosen;
+}
+
 float activatedScale(float log_scale) {
-  return std::exp(log_scale);
+  return std::exp(std::min(log_scale, kLargestLogScale));
 }
 
 float activatedOpacity(float logit) {

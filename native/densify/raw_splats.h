@@ -55,10 +55,14 @@ size_t rowLength(const RawSplats& splats, RawArray array);
 /// As many splats of the same kind, every number 0.
 RawSplats zerosLike(const RawSplats& splats);
 
+/// Splats of these rows, in this order.
+RawSplats rowsOf(const RawSplats& splats, const std::vector<uint32_t>& rows);
+
 /// Ends of what rawSplats() can take: a scale of 0 and an opacity of 0 or 1 have no finite raw
 /// number.
 constexpr float kLeastRawScale = 1e-30f;   ///< metres
 constexpr float kLeastRawOpacity = 1e-6f;  ///< and 1 minus it is the largest
+constexpr float kLargestLogScale = 88.0f;  ///< its exponential is finite; larger ones count as this
 float activatedScale(float log_scale);
 float activatedOpacity(float logit);
 float rawScale(float scale);

@@ -29,6 +29,7 @@ TEST(RawSplats, ActivationsNeverLeaveTheirRange) {
     EXPECT_GE(activatedOpacity(raw), 0);
     EXPECT_LE(activatedOpacity(raw), 1);
     EXPECT_GE(activatedScale(raw), 0);
+    EXPECT_TRUE(std::isfinite(activatedScale(raw)));
   }
   EXPECT_FLOAT_EQ(activatedOpacity(2) + activatedOpacity(-2), 1);
   EXPECT_EQ(activatedOpacity(0), 0.5f);

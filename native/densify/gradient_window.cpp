@@ -1,0 +1,78 @@
+#include "densify/gradient_window.h"
+
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "base/error.h"
+#include "base/parallel.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr size_t kGrain = 1 << 14;
+
+template <class T>
+std::vector<T> arrayOf(const TensorTable& table, const char* name) {
+  const auto found = table.find(name);
+  if (found == table.end() || !std::holds_alternative<std::vector<T>>(found->second.values)) {
+    fail(ErrorCode::kFormat, std::string("the strategy's state has no '") + name + "'");
+  }
+  return std::get<std::vector<T>>(found->second.values);
+}
+
+}  // namespace
+
+void GradientWindow::add(const ViewStatistics& view) {
+  const size_t count = view.visible.size();
+  if (sums_.empty()) reset(count);
+  if (sums_.size() != count) {
+    fail(ErrorCode::kInternal, "the strategy's statistics are of " + std::to_string(sums_.size()) +
+                                   " splats; the view is of " + std::to_string(count));
+  }
+  const std::span<const float> gradients = view.of(statistic_);
+  const float half_width = 0.5f * static_cast<float>(view.width);
+  const float half_height = 0.5f * static_cast<float>(view.height);
+  const auto add_range = [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      if (!view.visible[i]) continue;
+      const float x = gradients[i * 2] * half_width;
+      const float y = gradients[i * 2 + 1] * half_height;
+      sums_[i] += std::hypot(x, y);
+      ++counts_[i];
+    }
+  };
+  // By reference: a std::function of a large capture allocates.
+  parallelFor(count, kGrain, std::cref(add_range));
+}
+
+void GradientWindow::reset(size_t count) {
+  sums_.assign(count, 0.0f);
+  counts_.assign(count, 0);
+}
+
+void GradientWindow::put(TensorTable& table) const {
+  table["gradient_sums"] = {{sums_.size()}, sums_};
+  table["visible_counts"] = {{counts_.size()}, counts_};
+}
+
+void GradientWindow::take(const TensorTable& table) {
+  std::vector<float> sums = arrayOf<float>(table, "gradient_sums");
+  std::vector<uint32_t> counts = arrayOf<uint32_t>(table, "visible_counts");
+  if (sums.size() != counts.size()) {
+    fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(sums.size()) +
+                                 " gradient_sums and " + std::to_string(counts.size()) +
+                                 " visible_counts; as many are needed");
+  }
+  for (const float sum : sums) {
+    if (!(sum >= 0) || !std::isfinite(sum)) {
+      fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(sum) +
+                                   " among gradient_sums; 0 and more is allowed");
+    }
+  }
+  sums_ = std::move(sums);
+  counts_ = std::move(counts);
+}
+
+}  // namespace stipple

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "data/tensor_table.h"
+#include "densify/strategy.h"
+
+namespace stipple {
+
+/// Averages of how strongly views pull at each splat's place in the picture, over the views since
+/// the last edit that saw it. Unit: derivatives by normalised device coordinates, that is those per
+/// pixel times half the picture's sides, so that thresholds hold at any resolution.
+/// Source: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section
+/// 5.2.
+class GradientWindow {
+ public:
+  /// In: statistic: kScreenGradients or kAbsoluteScreenGradients, whose lengths are averaged.
+  explicit GradientWindow(Statistic statistic) : statistic_(statistic) {}
+
+  /// Errors: kInternal for another number of splats than before.
+  void add(const ViewStatistics& view);
+
+  /// Forgets everything, for this many splats from now on.
+  void reset(size_t count);
+
+  size_t size() const { return sums_.size(); }
+  /// 0 where no view has seen the splat.
+  float average(size_t splat) const {
+    return counts_[splat] == 0 ? 0.0f : sums_[splat] / static_cast<float>(counts_[splat]);
+  }
+
+  /// "gradient_sums" and "visible_counts". Errors of take: kFormat.
+  void put(TensorTable& table) const;
+  void take(const TensorTable& table);
+
+ private:
+  Statistic statistic_;
+  std::vector<float> sums_;       ///< [N]
+  std::vector<uint32_t> counts_;  ///< [N]
+};
+
+}  // namespace stipple

@@ -1,0 +1,373 @@
+#include "densify/adaptive.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "densify/strategies.h"
+
+namespace stipple {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+/// A fit of the published length whose cameras are spread over one metre.
+FitMoment at(uint64_t iteration, uint64_t max_splats = 0) {
+  FitMoment moment;
+  moment.iteration = iteration;
+  moment.iterations = 30000;
+  moment.extent = 1;
+  moment.seed = 7;
+  moment.max_splats = max_splats;
+  return moment;
+}
+
+struct Kind {
+  float scale;
+  float opacity;
+};
+
+RawSplats splatsOf(const std::vector<Kind>& kinds) {
+  SplatCloud cloud;
+  cloud.sh_degree = 1;
+  cloud.resize(kinds.size());
+  for (size_t i = 0; i < kinds.size(); ++i) {
+    cloud.positions[i * 3] = static_cast<float>(i);
+    cloud.rotations[i * 4] = 1;
+    std::fill_n(&cloud.scales[i * 3], 3, kinds[i].scale);
+    cloud.opacities[i] = kinds[i].opacity;
+    for (size_t k = 0; k < 12; ++k) cloud.sh[i * 12 + k] = static_cast<float>(100 * i + k);
+  }
+  return rawSplats(cloud);
+}
+
+/// What one view of 200 x 100 pixels says: gradients per pixel along x and y.
+struct Seen {
+  std::vector<float> gradients;
+  std::vector<uint8_t> visible;
+
+  /// In: gradients, of each splat, per half picture; along x.
+  explicit Seen(const std::vector<float>& along_x) {
+    for (const float value : along_x) {
+      gradients.insert(gradients.end(), {value / 100, 0.0f});
+      visible.push_back(1);
+    }
+  }
+
+  ViewStatistics statistics() const {
+    ViewStatistics view;
+    view.width = 200;
+    view.height = 100;
+    view.visible = visible;
+    view.arrays[static_cast<size_t>(Statistic::kScreenGradients)] = gradients;
+    return view;
+  }
+};
+
+std::optional<SplatEdit> editAt(Strategy& strategy, const FitMoment& moment,
+                                const RawSplats& splats) {
+  const RawSplats moments = zerosLike(splats);
+  return strategy.edit(moment, {splats, moments, moments});
+}
+
+RawSplats after(const SplatEdit& edit, RawSplats splats) {
+  validate(edit, splats);
+  const EditTarget target{&splats, false};
+  applyEdit(edit, {&target, 1});
+  return splats;
+}
+
+/// One view, then the edit of iteration 600.
+std::optional<SplatEdit> firstEdit(const std::vector<Kind>& kinds,
+                                   const std::vector<float>& gradients, uint64_t max_splats = 0) {
+  const auto strategy = makeAdaptive();
+  strategy->observe(at(1), Seen(gradients).statistics());
+  return editAt(*strategy, at(600, max_splats), splatsOf(kinds));
+}
+
+TEST(Adaptive, CopiesSmallSplatsThatArePulledAt) {
+  const auto edit = firstEdit({{0.005f, 0.5f}, {0.005f, 0.5f}}, {1.9e-4f, 2.1e-4f});
+  ASSERT_TRUE(edit);
+  EXPECT_FALSE(edit->keep);
+  const RawSplats before = splatsOf({{0.005f, 0.5f}, {0.005f, 0.5f}});
+  const RawSplats now = after(*edit, before);
+  ASSERT_EQ(now.size(), 3u);
+  EXPECT_EQ(now.positions[6], before.positions[3]);
+  EXPECT_EQ(now.log_scales[6], before.log_scales[3]);
+  EXPECT_EQ(now.logits[2], before.logits[1]);
+  EXPECT_EQ(now.sh[24 + 5], before.sh[12 + 5]);
+}
+
+TEST(Adaptive, SplitsLargeSplatsIntoTwoOfTheirDistribution) {
+  const auto edit = firstEdit({{0.05f, 0.5f}, {0.005f, 0.5f}}, {1e-3f, 0});
+  ASSERT_TRUE(edit);
+  ASSERT_TRUE(edit->keep);
+  EXPECT_THAT(*edit->keep, ElementsAre(1));
+  const RawSplats now = after(*edit, splatsOf({{0.05f, 0.5f}, {0.005f, 0.5f}}));
+  ASSERT_EQ(now.size(), 3u);
+  for (const size_t child : {1u, 2u}) {
+    // ln(0.05) - ln(1.6), rounded to float32 twice.
+    EXPECT_NEAR(now.log_scales[child * 3], -2.9957323f - 0.4700036f, 5e-7f);
+    EXPECT_NEAR(now.logits[child], 0, 1e-6f);
+    EXPECT_EQ(now.sh[child * 12 + 3], 3.0f);
+    EXPECT_LT(std::abs(now.positions[child * 3]), 0.05f * 6);
+  }
+  EXPECT_NE(now.positions[3], now.positions[6]);
+}
+
+TEST(Adaptive, ChildrenAreSpreadAsTheirParentsAre) {
+  // Turned by 90 degrees about z: the parent's long first axis points along y.
+  SplatCloud cloud;
+  cloud.resize(1);
+  const float half = std::sqrt(0.5f);
+  const float values[] = {half, 0, 0, half};
+  std::copy_n(values, 4, cloud.rotations.begin());
+  cloud.scales = {0.09f, 0.03f, 0.01f};
+  cloud.opacities = {0.5f};
+  RawSplats parents = rowsOf(rawSplats(cloud), std::vector<uint32_t>(4000, 0));
+  const auto strategy = makeAdaptive();
+  strategy->observe(at(1), Seen(std::vector<float>(4000, 1)).statistics());
+  const RawSplats children = after(*editAt(*strategy, at(600), parents), parents);
+  ASSERT_EQ(children.size(), 8000u);
+  const double expected[] = {0.03, 0.09, 0.01};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    double sum = 0, squares = 0;
+    for (size_t i = 0; i < 8000; ++i) {
+      const double x = static_cast<double>(children.positions[i * 3 + axis]);
+      sum += x;
+      squares += x * x;
+    }
+    // Four standard errors of 8000 samples: 4/sqrt(8000) and 4/sqrt(16000).
+    EXPECT_NEAR(sum / 8000, 0, 0.045 * expected[axis]);
+    EXPECT_NEAR(std::sqrt(squares / 8000), expected[axis], 0.032 * expected[axis]);
+  }
+}
+
+TEST(Adaptive, AveragesOverTheViewsThatSeeASplat) {
+  const auto strategy = makeAdaptive();
+  Seen seen({3e-4f, 3e-4f});
+  strategy->observe(at(1), seen.statistics());
+  Seen other({0, 0});
+  other.visible[1] = 0;
+  strategy->observe(at(2), other.statistics());
+  const RawSplats splats = splatsOf({{0.005f, 0.5f}, {0.005f, 0.5f}});
+  // (3e-4 + 0) / 2 is too little, 3e-4 / 1 is enough.
+  const auto edit = editAt(*strategy, at(600), splats);
+  ASSERT_TRUE(edit);
+  ASSERT_EQ(edit->append.size(), 1u);
+  EXPECT_EQ(edit->append.positions[0], 1.0f);
+  // And forgets them.
+  EXPECT_EQ(editAt(*strategy, at(700), after(*edit, splats))->append.size(), 0u);
+}
+
+TEST(Adaptive, GradientsCountPerHalfPictureAlongBothSides) {
+  const auto strategy = makeAdaptive();
+  Seen seen({0, 0});
+  // 100 and 50 pixels are half the sides: 1.2e-4 and 1.7e-4 make 2.08e-4, 1e-4 and 1.7e-4 1.97e-4.
+  seen.gradients = {1.2e-6f, 3.4e-6f, 1e-6f, 3.4e-6f};
+  strategy->observe(at(1), seen.statistics());
+  const auto edit = editAt(*strategy, at(600), splatsOf({{0.005f, 0.5f}, {0.005f, 0.5f}}));
+  ASSERT_EQ(edit->append.size(), 1u);
+  EXPECT_EQ(edit->append.positions[0], 0.0f);
+}
+
+TEST(Adaptive, RemovesFaintSplatsAndLaterHugeOnes) {
+  const std::vector<Kind> kinds = {
+      {0.005f, 0.0049f}, {0.2f, 0.5f}, {0.005f, 0.0051f}, {0.005f, 0.5f}};
+  const auto strategy = makeAdaptive();
+  EXPECT_THAT(*editAt(*strategy, at(600), splatsOf(kinds))->keep, ElementsAre(1, 2, 3));
+  const auto later = makeAdaptive();
+  EXPECT_THAT(*editAt(*later, at(3100), splatsOf(kinds))->keep, ElementsAre(2, 3));
+}
+
+TEST(Adaptive, AHugeSplatLivesOnInChildrenThatAreNot) {
+  const std::vector<Kind> kinds = {{0.15f, 0.5f}, {0.17f, 0.5f}, {0.005f, 0.5f}};
+  const auto strategy = makeAdaptive();
+  strategy->observe(at(3001), Seen({1, 1, 0}).statistics());
+  // 0.15 / 1.6 is below 0.1, 0.17 / 1.6 is not.
+  const auto edit = editAt(*strategy, at(3100), splatsOf(kinds));
+  EXPECT_THAT(*edit->keep, ElementsAre(2));
+  EXPECT_EQ(edit->append.size(), 2u);
+}
+
+TEST(Adaptive, TheStrongestPullsWinWhereThereIsNoRoom) {
+  const std::vector<Kind> kinds(5, {0.005f, 0.5f});
+  auto edit = firstEdit(kinds, {3e-4f, 9e-4f, 5e-4f, 7e-4f, 4e-4f}, 7);
+  ASSERT_EQ(edit->append.size(), 2u);
+  const std::set<float> places = {edit->append.positions[0], edit->append.positions[3]};
+  EXPECT_THAT(places, ElementsAre(1.0f, 3.0f));
+  // Tied: the first ones.
+  edit = firstEdit(kinds, {5e-4f, 5e-4f, 5e-4f, 5e-4f, 5e-4f}, 8);
+  ASSERT_EQ(edit->append.size(), 3u);
+  EXPECT_EQ(edit->append.positions[0] + edit->append.positions[3] + edit->append.positions[6], 3);
+  // Full already.
+  edit = firstEdit(kinds, {1, 1, 1, 1, 1}, 3);
+  EXPECT_EQ(edit->countAfter(5), 5u);
+  EXPECT_FALSE(edit->keep);
+}
+
+TEST(Adaptive, WhatIsRemovedMakesRoom) {
+  const std::vector<Kind> kinds = {{0.005f, 0.001f}, {0.005f, 0.001f}, {0.05f, 0.5f}};
+  const auto edit = firstEdit(kinds, {1, 1, 1}, 2);
+  EXPECT_TRUE(edit->keep->empty());
+  EXPECT_EQ(edit->append.size(), 2u);
+}
+
+TEST(Adaptive, LeavesSplatsAloneThatNothingPullsAt) {
+  const auto edit = firstEdit({{0.005f, 0.5f}, {0.05f, 0.5f}}, {0, 0});
+  ASSERT_TRUE(edit);
+  EXPECT_FALSE(edit->keep);
+  EXPECT_EQ(edit->append.size(), 0u);
+  // Of a splat that no view has seen, the average is 0, not 0 / 0.
+  const auto strategy = makeAdaptive();
+  EXPECT_EQ(editAt(*strategy, at(600), splatsOf({{0.05f, 0.5f}}))->append.size(), 0u);
+}
+
+TEST(Adaptive, TheLastSplatStays) {
+  const auto edit = firstEdit({{0.005f, 0.001f}, {0.005f, 0.004f}, {0.005f, 0.002f}}, {1, 1, 1});
+  EXPECT_THAT(*edit->keep, ElementsAre(1));
+  EXPECT_EQ(edit->append.size(), 0u);
+  const auto strategy = makeAdaptive();
+  EXPECT_FALSE(editAt(*strategy, at(600), RawSplats()));
+}
+
+TEST(Adaptive, WithoutAnExtentNothingIsLarge) {
+  const auto strategy = makeAdaptive();
+  strategy->observe(at(1), Seen({1, 1}).statistics());
+  FitMoment moment = at(3100);
+  moment.extent = 0;
+  const auto edit = editAt(*strategy, moment, splatsOf({{50, 0.5f}, {0.005f, 0.5f}}));
+  EXPECT_FALSE(edit->keep);
+  EXPECT_EQ(edit->append.size(), 2u);
+}
+
+TEST(Adaptive, KeepsThePublishedSchedule) {
+  const auto strategy = makeAdaptive();
+  std::vector<uint64_t> edits, resets;
+  const RawSplats splats = splatsOf({{0.005f, 0.5f}});
+  for (uint64_t iteration = 1; iteration <= 30000; ++iteration) {
+    const auto edit = editAt(*strategy, at(iteration), splats);
+    if (!edit) continue;
+    edits.push_back(iteration);
+    if (!edit->writes.empty()) resets.push_back(iteration);
+    EXPECT_EQ(strategy->requests(at(iteration)).any(), iteration < 15000);
+  }
+  EXPECT_EQ(edits.size(), 144u);
+  EXPECT_EQ(edits.front(), 600u);
+  EXPECT_EQ(edits.back(), 14900u);
+  EXPECT_THAT(resets, ElementsAre(3000, 6000, 9000, 12000));
+}
+
+TEST(Adaptive, ShortFitsScaleTheScheduleAndLeaveResetsOut) {
+  const RawSplats splats = splatsOf({{0.005f, 0.5f}});
+  const auto count = [&](uint64_t iterations) {
+    const auto strategy = makeAdaptive();
+    std::pair<int, int> edits_and_resets;
+    for (uint64_t iteration = 1; iteration <= iterations; ++iteration) {
+      FitMoment moment = at(iteration);
+      moment.iterations = iterations;
+      const auto edit = editAt(*strategy, moment, splats);
+      edits_and_resets.first += edit.has_value();
+      edits_and_resets.second += edit && !edit->writes.empty();
+    }
+    return edits_and_resets;
+  };
+  EXPECT_EQ(count(3000), std::make_pair(144, 4));
+  EXPECT_EQ(count(1500), std::make_pair(144, 0));
+  EXPECT_EQ(scaleSchedule(500, 30), 1u);
+  EXPECT_EQ(scaleSchedule(100, 1), 1u);
+  EXPECT_EQ(scaleSchedule(15000, 60000), 30000u);
+}
+
+TEST(Adaptive, AResetLowersOpacitiesAndForgetsTheirMoments) {
+  const auto strategy = makeAdaptive();
+  strategy->observe(at(2990), Seen({1, 0}).statistics());
+  RawSplats splats = splatsOf({{0.005f, 0.9f}, {0.005f, 0.006f}});
+  const auto edit = editAt(*strategy, at(3000), splats);
+  ASSERT_TRUE(edit);
+  ASSERT_EQ(edit->writes.size(), 1u);
+  EXPECT_TRUE(edit->writes[0].clear_moments);
+  const RawSplats now = after(*edit, splats);
+  ASSERT_EQ(now.size(), 3u);
+  EXPECT_NEAR(now.logits[0], -4.595120f, 1e-5f);
+  EXPECT_EQ(now.logits[1], splats.logits[1]);
+  EXPECT_NEAR(now.logits[2], -4.595120f, 1e-5f);  // the new one, too
+}
+
+TEST(Adaptive, GoesOnFromItsStateBitForBit) {
+  const std::vector<Kind> kinds(200, {0.03f, 0.5f});
+  std::vector<float> pulls(200);
+  for (size_t i = 0; i < 200; ++i) pulls[i] = 2e-6f * static_cast<float>(i);
+  const auto first = makeAdaptive(), second = makeAdaptive();
+  first->observe(at(501), Seen(pulls).statistics());
+  second->restore(first->state());
+  for (Strategy* strategy : {first.get(), second.get()}) {
+    strategy->observe(at(502), Seen(std::vector<float>(200, 2.1e-4f)).statistics());
+  }
+  const auto a = editAt(*first, at(600), splatsOf(kinds));
+  const auto b = editAt(*second, at(600), splatsOf(kinds));
+  EXPECT_EQ(*a->keep, *b->keep);
+  EXPECT_EQ(a->append.positions, b->append.positions);
+  EXPECT_GT(a->append.size(), 100u);
+}
+
+TEST(Adaptive, DiceDependOnSeedAndIterationAlone) {
+  const std::vector<Kind> kinds(3000, {0.03f, 0.5f});
+  const auto placesOf = [&](uint64_t iteration, uint64_t seed, unsigned threads) {
+    const auto strategy = makeAdaptive();
+    std::vector<float> places;
+    withThreads(threads, [&] {
+      strategy->observe(at(1), Seen(std::vector<float>(3000, 1)).statistics());
+      FitMoment moment = at(iteration);
+      moment.seed = seed;
+      const auto edit = editAt(*strategy, moment, splatsOf(kinds));
+      places.assign(edit->append.positions.begin(), edit->append.positions.end());
+    });
+    return places;
+  };
+  const std::vector<float> places = placesOf(600, 1, 1);
+  EXPECT_EQ(places, placesOf(600, 1, 2));
+  EXPECT_NE(places, placesOf(700, 1, 2));
+  EXPECT_NE(places, placesOf(600, 2, 2));
+}
+
+TEST(Adaptive, RefusesTheStateOfAnother) {
+  const auto strategy = makeAdaptive();
+  const auto messageOf = [&](const std::function<void()>& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing thrown");
+  };
+  EXPECT_THAT(messageOf([&] { strategy->restore({}); }), HasSubstr("no 'gradient_sums'"));
+  TensorTable table = strategy->state();
+  table["visible_counts"] = {{1}, std::vector<uint32_t>{1}};
+  EXPECT_THAT(messageOf([&] { strategy->restore(table); }),
+              HasSubstr("0 gradient_sums and 1 visible_counts"));
+  table["gradient_sums"] = {{1}, std::vector<float>{-1}};
+  EXPECT_THAT(messageOf([&] { strategy->restore(table); }), HasSubstr("0 and more is allowed"));
+}
+
+TEST(Strategies, AreMadeByName) {
+  EXPECT_THAT(strategyNames(), ::testing::Contains("adaptive"));
+  for (const std::string& name : strategyNames()) EXPECT_EQ(makeStrategy(name)->name(), name);
+  try {
+    makeStrategy("adaptve");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(error.what(), HasSubstr("strategy is 'adaptve'; there is adaptive"));
+  }
+}
+
+}  // namespace
+}  // namespace stipple
