@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "density/anchor_sampling.h"
+
+namespace stipple {
+
+/// How far apart anchors stand, unit cube: the root of the area that an anchor has to itself, were
+/// they strewn on a plane: from the squared distances of the nearest six, whose means are i / pi
+/// areas for the i-th. At most half a cube, which a single anchor has; at least a quarter of a
+/// leaf, or less where more than 16 share a leaf (anchors without jitter stand on each other).
+/// Threads and determinism: parallel; same result for any number of threads. Cost: O(P log P).
+std::vector<float> anchorSpacing(const AnchorSet& anchors);
+
+}  // namespace stipple

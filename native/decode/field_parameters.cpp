@@ -1,0 +1,139 @@
+#include "decode/field_parameters.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string>
+
+#include "base/error.h"
+#include "density/anchor_sampling.h"
+
+namespace stipple {
+
+namespace {
+
+/// Levels of features, the finest that of the leaves; and of colours, the finest one above it.
+constexpr int kFeatureLevels = 6;
+constexpr int kColourLevels = 3;
+constexpr size_t kFeatureChannels = 8;
+constexpr size_t kColourChannels = 3;
+constexpr size_t kHidden = 64;
+/// Numbers of the input beside features: place in the leaf 3, budget, spacing.
+constexpr size_t kOtherInputs = 5;
+/// Vectors of 16 floats are the widest there are.
+constexpr size_t kVector = 16;
+
+constexpr uint32_t kLeastRows = 1 << 12;
+constexpr uint32_t kMostRows = 1 << 19;
+constexpr float kFeatureAmplitude = 1e-2f;
+/// Outputs start near 0, which is the lattice, and yet pass derivatives on.
+constexpr float kLastLayerScale = 0.1f;
+/// At the start Gaussians of an anchor close a plane between them: 0.6 of their own spacing.
+constexpr double kStartingScale = 0.6;
+constexpr double kStartingOpacity = 0.3;
+
+size_t wholeVectors(size_t width) {
+  return (width + kVector - 1) / kVector * kVector;
+}
+
+/// What softplus takes to give y.
+double inverseSoftplus(double y) {
+  return std::log(std::expm1(y));
+}
+
+void requireShape(int leaf_level, const SplatLayout& layout, uint64_t least, uint64_t most,
+                  ErrorCode code) {
+  const auto require = [code](bool good, const char* what, uint64_t seen, const char* allowed) {
+    if (good) return;
+    fail(code, std::string(what) + " of the field is " + std::to_string(seen) + "; " + allowed +
+                   " is allowed");
+  };
+  require(leaf_level >= 1 && leaf_level <= kMaxLeafLevel, "leaf level",
+          static_cast<uint64_t>(std::max(leaf_level, 0)), "1 to 10");
+  require(layout.gaussians >= 4 && layout.gaussians <= 32, "count of Gaussians per anchor",
+          layout.gaussians, "4 to 32");
+  require(layout.sh_degree >= 0 && layout.sh_degree <= kMaxShDegree, "harmonic degree",
+          static_cast<uint64_t>(std::max(layout.sh_degree, 0)), "0 to 4");
+  require(least >= 1 && least <= most, "least budget", least, "1 to the largest budget");
+  require(most <= kMaxAnchorCount, "largest budget", most, "at most 2^28");
+}
+
+/// Levels that end with `finest`, none below 1; with as many rows as surface cells need there.
+FeatureGrid gridOf(size_t channels, int finest, int level_count, const FieldShape& shape,
+                   float amplitude, uint64_t seed) {
+  std::vector<int> levels;
+  std::vector<uint32_t> rows;
+  for (int level = std::max(1, finest - level_count + 1); level <= finest; ++level) {
+    // A surface has a quarter of its cells one level above; corners are about twice the cells.
+    const double cells =
+        2.0 * static_cast<double>(shape.surface_cells) * std::pow(4.0, level - shape.leaf_level);
+    const uint64_t needed = std::bit_ceil(static_cast<uint64_t>(std::min(cells, 1e9)) + 1);
+    levels.push_back(level);
+    rows.push_back(static_cast<uint32_t>(std::clamp<uint64_t>(needed, kLeastRows, kMostRows)));
+  }
+  return FeatureGrid(channels, levels, rows, amplitude, seed);
+}
+
+}  // namespace
+
+uint64_t FieldParameters::bytes() const {
+  uint64_t bytes = features.bytes() + colours.bytes();
+  for (const LinearLayer& layer : network.layers()) {
+    bytes += (layer.weights.size() + layer.biases.size()) * sizeof(float);
+  }
+  return bytes;
+}
+
+size_t fieldInputWidth(const FieldParameters& field) {
+  const size_t levels = field.features.levels().size();
+  return wholeVectors(levels * field.features.channels() + kOtherInputs + levels);
+}
+
+size_t fieldOutputWidth(const SplatLayout& layout) {
+  return wholeVectors(layout.outputs());
+}
+
+FieldParameters makeFieldParameters(const FieldShape& shape) {
+  requireShape(shape.leaf_level, shape.layout, shape.least_anchors, shape.most_anchors,
+               ErrorCode::kInvalidArgument);
+  FieldParameters field;
+  field.root = shape.root;
+  field.leaf_level = shape.leaf_level;
+  field.layout = shape.layout;
+  field.least_anchors = shape.least_anchors;
+  field.most_anchors = shape.most_anchors;
+  field.colour_space = shape.colour_space;
+  field.antialias = shape.antialias;
+  field.features = gridOf(kFeatureChannels, shape.leaf_level, kFeatureLevels, shape,
+                          kFeatureAmplitude, shape.seed);
+  field.colours =
+      gridOf(kColourChannels, shape.leaf_level + 1, kColourLevels, shape, 0.0f, shape.seed);
+  const size_t widths[] = {fieldInputWidth(field), kHidden, kHidden,
+                           fieldOutputWidth(shape.layout)};
+  field.network = Mlp(widths, shape.seed, kLastLayerScale);
+  std::vector<float>& biases = field.network.layers().back().biases;
+  const double scale = kLatticeSide * kStartingScale / std::sqrt(shape.layout.gaussians);
+  for (size_t k = 0; k < shape.layout.gaussians; ++k) {
+    std::fill_n(&biases[shape.layout.scale(k)], 3,
+                static_cast<float>(inverseSoftplus(scale) - inverseSoftplus(kLatticeScale)));
+    biases[shape.layout.opacity(k)] =
+        static_cast<float>(std::log(kStartingOpacity / (1 - kStartingOpacity)) - std::log(1 / 9.0));
+  }
+  return field;
+}
+
+void validate(const FieldParameters& field) {
+  requireShape(field.leaf_level, field.layout, field.least_anchors, field.most_anchors,
+               ErrorCode::kFormat);
+  const auto require = [](const char* what, size_t seen, size_t needed) {
+    if (seen == needed) return;
+    fail(ErrorCode::kFormat, std::string(what) + " of the field is " + std::to_string(seen) + "; " +
+                                 std::to_string(needed) + " is needed");
+  };
+  require("width of the network's input", field.network.inputWidth(), fieldInputWidth(field));
+  require("width of the network's output", field.network.outputWidth(),
+          fieldOutputWidth(field.layout));
+  require("count of colour channels", field.colours.channels(), kColourChannels);
+}
+
+}  // namespace stipple
