@@ -6,8 +6,10 @@
 #include <Eigen/SVD>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "io/colmap_cameras.h"
@@ -17,6 +19,7 @@ namespace stipple {
 
 namespace {
 
+namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 // A thousand frames take about a megabyte.
@@ -27,15 +30,22 @@ constexpr double kRotationTolerance = 5e-3;
 /// One frame and the file around it, and how both are called in messages.
 class FrameReader {
  public:
-  FrameReader(const std::string& path, const Json& file, const Json& frame, size_t index)
-      : path_(path), file_(file), frame_(frame), name_("frame " + std::to_string(index)) {
+  FrameReader(const std::string& path, const Json& file, const Json& frame, size_t index,
+              Distorted distorted)
+      : path_(path),
+        file_(file),
+        frame_(frame),
+        name_("frame " + std::to_string(index)),
+        distorted_(distorted) {
     if (!frame.is_object()) failHere("is not a JSON object");
   }
 
   CameraView read() const {
     CameraView view;
     view.image_path = text("file_path").value_or("");
-    readModel(view.camera);
+    view.mask_path = text("mask_path").value_or("");
+    view.depth_path = text("depth_file_path").value_or("");
+    readModel(view);
     readIntrinsics(view.camera);
     readPose(view.camera);
     return view;
@@ -80,29 +90,56 @@ class FrameReader {
     return static_cast<uint32_t>(*value);
   }
 
-  void readModel(Camera& camera) const {
-    const std::string model = text("camera_model").value_or("PINHOLE");
+  void readModel(CameraView& view) const {
+    view.camera_model = text("camera_model").value_or("PINHOLE");
+    const std::string& model = view.camera_model;
+    bool fisheye = model == "OPENCV_FISHEYE";
     if (model == "ORTHOGRAPHIC") {
-      camera.model = CameraModel::kOrthographic;
-    } else if (model != "PINHOLE" && model != "SIMPLE_PINHOLE" && model != "PERSPECTIVE" &&
-               model != "OPENCV" && model != "SIMPLE_RADIAL" && model != "RADIAL") {
+      view.camera.model = CameraModel::kOrthographic;
+    } else if (!fisheye && model != "PINHOLE" && model != "SIMPLE_PINHOLE" &&
+               model != "PERSPECTIVE" && model != "OPENCV" && model != "FULL_OPENCV" &&
+               model != "SIMPLE_RADIAL" && model != "RADIAL") {
       failHere("has the camera model '" + model.substr(0, 60) +
-                   "'; pinhole and orthographic cameras are supported",
+                   "'; PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE and "
+                   "ORTHOGRAPHIC are supported",
                ErrorCode::kUnsupported);
     }
-    const Json* fisheye = find("is_fisheye");
-    if (fisheye != nullptr && fisheye->is_boolean() && fisheye->get<bool>()) {
-      failHere("is a fisheye camera; pinhole and orthographic cameras are supported",
+    const Json* flag = find("is_fisheye");
+    if (flag != nullptr && flag->is_boolean() && flag->get<bool>()) fisheye = true;
+    view.lens.fisheye = fisheye;
+    if (fisheye && distorted_ == Distorted::kRefuse) {
+      failHere("is a fisheye camera (" + model +
+                   "); pinhole and orthographic cameras are supported here",
                ErrorCode::kUnsupported);
     }
-    for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
-      const double value = number(key).value_or(0.0);
-      if (value != 0.0) {
-        failHere(std::string("is distorted (") + key + " = " + std::to_string(value) +
-                     "); undistort the images first, then all of k1..k6, p1, p2 are 0",
-                 ErrorCode::kUnsupported);
-      }
+    readDistortion(model == "FULL_OPENCV", view.lens);
+    if (view.lens.isDistorted() && view.camera.model == CameraModel::kOrthographic) {
+      failHere("is orthographic and distorted; one of both is supported", ErrorCode::kUnsupported);
     }
+  }
+
+  /// k1..k4 are of r^2 to r^8; with k5 or k6, k4..k6 are OpenCV's divisor.
+  void readDistortion(bool rational, Lens& lens) const {
+    double k[6] = {};
+    const char* names[6] = {"k1", "k2", "k3", "k4", "k5", "k6"};
+    for (size_t i = 0; i < 6; ++i) k[i] = distortion(names[i]);
+    lens.tangential = {distortion("p1"), distortion("p2")};
+    lens.radial = {k[0], k[1], k[2]};
+    if (!lens.fisheye && (rational || k[4] != 0.0 || k[5] != 0.0)) {
+      lens.divisor = {k[3], k[4], k[5]};
+    } else {
+      lens.radial[3] = k[3];
+    }
+  }
+
+  double distortion(const char* key) const {
+    const double value = number(key).value_or(0.0);
+    if (value != 0.0 && distorted_ == Distorted::kRefuse) {
+      failHere(std::string("is distorted (") + key + " = " + std::to_string(value) +
+                   "); undistort the images first, then all of k1..k6, p1, p2 are 0",
+               ErrorCode::kUnsupported);
+    }
+    return value;
   }
 
   double positive(const char* key, double value) const {
@@ -203,25 +240,58 @@ class FrameReader {
   const Json& file_;
   const Json& frame_;
   std::string name_;
+  Distorted distorted_;
 };
 
-std::vector<CameraView> readTransforms(const std::string& path) {
+Json readJson(const std::string& path) {
   const std::string text = readTextFile(path, kMaxFileBytes);
-  Json file;
   try {
-    file = Json::parse(text);
+    return Json::parse(text);
   } catch (const Json::exception& error) {
     fail(ErrorCode::kFormat, path + " is not valid JSON: " + error.what());
   }
+}
+
+/// What the name of a transforms_*.json says of its views.
+ViewSplit splitOfName(const std::string& path) {
+  const std::string name = fs::path(path).filename().string();
+  if (name == "transforms_train.json") return ViewSplit::kTrain;
+  if (name == "transforms_test.json") return ViewSplit::kTest;
+  if (name == "transforms_val.json") return ViewSplit::kValidation;
+  return ViewSplit::kNone;
+}
+
+/// Lists of file names that nerfstudio writes beside the frames.
+std::map<std::string, ViewSplit> namedSplits(const Json& file) {
+  std::map<std::string, ViewSplit> splits;
+  const std::pair<const char*, ViewSplit> lists[] = {{"train_filenames", ViewSplit::kTrain},
+                                                     {"test_filenames", ViewSplit::kTest},
+                                                     {"val_filenames", ViewSplit::kValidation}};
+  for (const auto& [key, split] : lists) {
+    const auto found = file.find(key);
+    if (found == file.end() || !found->is_array()) continue;
+    for (const Json& name : *found) {
+      // A view in two lists is one to train on: what is left out is what must not be seen.
+      if (name.is_string()) splits.emplace(name.get<std::string>(), split);
+    }
+  }
+  return splits;
+}
+
+std::vector<CameraView> readTransforms(const std::string& path, Distorted distorted) {
+  const Json file = readJson(path);
   if (!file.is_object() || !file.contains("frames") || !file["frames"].is_array() ||
       file["frames"].empty()) {
     fail(ErrorCode::kFormat,
          path + " is not a transforms.json: a list 'frames' with at least one camera is needed");
   }
+  const std::map<std::string, ViewSplit> splits = namedSplits(file);
   std::vector<CameraView> views;
   const Json& frames = file["frames"];
   for (size_t i = 0; i < frames.size(); ++i) {
-    views.push_back(FrameReader(path, file, frames[i], i).read());
+    views.push_back(FrameReader(path, file, frames[i], i, distorted).read());
+    const auto named = splits.find(views.back().image_path);
+    views.back().split = named != splits.end() ? named->second : splitOfName(path);
   }
   return views;
 }
@@ -240,30 +310,59 @@ void requireUsable(const std::vector<CameraView>& views, const std::string& path
   }
 }
 
-std::vector<CameraView> readViews(const std::string& path) {
-  namespace fs = std::filesystem;
-  std::error_code ignored;
-  if (fs::is_directory(path, ignored)) {
-    const fs::path transforms = fs::path(path) / "transforms.json";
-    if (fs::exists(transforms, ignored)) return readTransforms(transforms.string());
-  }
-  if (const std::optional<std::string> model = findColmapModel(path)) {
-    return readColmapCameras(*model);
-  }
-  if (fs::is_directory(path, ignored)) {
-    fail(ErrorCode::kFormat, path +
-                                 " holds no cameras: transforms.json, or images.bin or images.txt "
-                                 "of COLMAP (there or in sparse/0) is needed");
-  }
-  return readTransforms(path);
-}
-
 }  // namespace
 
-std::vector<CameraView> readCameraFile(const std::string& path) {
-  std::vector<CameraView> views = readViews(path);
+CameraFiles findCameraFiles(const std::string& path) {
+  std::error_code ignored;
+  const bool is_folder = fs::is_directory(path, ignored);
+  CameraFiles files;
+  if (is_folder) {
+    const auto take = [&](const char* name) {
+      const fs::path file = fs::path(path) / name;
+      if (fs::exists(file, ignored)) files.transforms.push_back(file.string());
+      return !files.transforms.empty();
+    };
+    if (take("transforms.json")) return files;
+    if (take("transforms_train.json")) {
+      take("transforms_test.json");
+      take("transforms_val.json");
+      return files;
+    }
+  }
+  if (const std::optional<std::string> model = findColmapModel(path)) {
+    files.colmap = *model;
+  } else if (is_folder) {
+    fail(ErrorCode::kFormat, path +
+                                 " holds no cameras: transforms.json, transforms_train.json, or "
+                                 "images.bin or images.txt of COLMAP (there or in sparse/0) is "
+                                 "needed");
+  } else {
+    files.transforms.push_back(path);
+  }
+  return files;
+}
+
+std::vector<CameraView> readCameraFile(const std::string& path, Distorted distorted) {
+  const CameraFiles files = findCameraFiles(path);
+  std::vector<CameraView> views;
+  if (!files.colmap.empty()) views = readColmapCameras(files.colmap, distorted);
+  for (const std::string& file : files.transforms) {
+    const std::vector<CameraView> more = readTransforms(file, distorted);
+    views.insert(views.end(), more.begin(), more.end());
+  }
   requireUsable(views, path);
   return views;
+}
+
+std::string readPointsPath(const std::string& transforms) {
+  const Json file = readJson(transforms);
+  if (!file.is_object()) return {};
+  const auto found = file.find("ply_file_path");
+  if (found == file.end() || found->is_null()) return {};
+  if (!found->is_string()) {
+    fail(ErrorCode::kFormat, transforms + " has a 'ply_file_path' that is not a text");
+  }
+  return found->get<std::string>();
 }
 
 }  // namespace stipple

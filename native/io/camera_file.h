@@ -1,20 +1,34 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "math/camera.h"
+#include "math/lens.h"
 
 namespace stipple {
 
+/// What a data set says a view is for.
+enum class ViewSplit : uint32_t { kNone = 0, kTrain = 1, kTest = 2, kValidation = 3 };
+
 struct CameraView {
-  Camera camera;
-  std::string image_path;  ///< as in the file, relative to it; may be empty
+  Camera camera;               ///< without the lens
+  std::string image_path;      ///< as in the file, relative to it; may be empty
+  Lens lens = {};              ///< what the picture was taken through
+  std::string camera_model{};  ///< as the file calls it
+  std::string mask_path{};     ///< as image_path
+  std::string depth_path{};    ///< as image_path
+  ViewSplit split = ViewSplit::kNone;
 };
 
+/// Cameras whose lens is not a pinhole's.
+enum class Distorted { kRefuse, kKeep };
+
 /// Reads cameras of a transforms.json (nerfstudio, NeRF-synthetic; OpenGL frames become OpenCV) or
-/// of a COLMAP model (binary or text; pinhole cameras). In: path, the file, or a folder: its
-/// transforms.json where there is one, else the COLMAP model in it or in its sparse/0.
+/// of a COLMAP model (binary or text). In: path, the file, or a folder: its
+/// transforms.json where there is one, else transforms_train.json with _test and _val, else the
+/// COLMAP model in it or in its sparse/0.
 ///
 /// In a transforms.json keys of a frame win over those of the file. Besides perspective cameras it
 /// knows ours: `"camera_model": "ORTHOGRAPHIC"` with `"ortho_scale"`, the metres across the
@@ -24,7 +38,23 @@ struct CameraView {
 /// intrinsics are in units of the picture: fx = fy = 0.5 / tan(angle / 2), the focal length in
 /// widths (orthographic: 1 / ortho_scale, widths per metre), cx = cy = 0.5 of width and height.
 /// For a picture of w x h pixels: fx, fy and cx times w, cy times h.
-/// Errors: kIo, kFormat (missing or wrong fields, with the frame), kUnsupported (distorted models).
-std::vector<CameraView> readCameraFile(const std::string& path);
+/// Errors: kIo, kFormat (missing or wrong fields, with the frame), kUnsupported (models that are
+/// not known; distorted ones where they are refused).
+std::vector<CameraView> readCameraFile(const std::string& path,
+                                       Distorted distorted = Distorted::kRefuse);
+
+/// Where the pictures and points of a data set are listed.
+struct CameraFiles {
+  std::vector<std::string> transforms;  ///< transforms*.json
+  std::string colmap;                   ///< or the folder of a COLMAP model
+};
+
+/// What readCameraFile() reads for a path. A folder with transforms_train.json, and without
+/// transforms.json, gives that and its _test and _val (NeRF-synthetic), whose views are told apart
+/// by CameraView::split. Errors: kFormat for a folder without any.
+CameraFiles findCameraFiles(const std::string& path);
+
+/// `ply_file_path` of a transforms.json, the points of its scene; empty where it names none.
+std::string readPointsPath(const std::string& transforms);
 
 }  // namespace stipple

@@ -4,15 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <map>
-#include <string_view>
 
 #include "base/error.h"
-#include "io/input_file.h"
+#include "io/colmap_models.h"
+#include "io/colmap_reading.h"
 #include "math/quaternion.h"
 
 namespace stipple {
@@ -21,38 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Text files list every point of every picture; ten thousand pictures take a few hundred megabytes.
-constexpr uint64_t kMaxTextBytes = uint64_t{1} << 32;
 constexpr size_t kMaxNameBytes = 4096;
 constexpr double kMaxSide = 65536;
 
-/// What each model's parameters are: focal lengths, the principal point, then distortion. A model
-/// whose distortion is 0 everywhere is a pinhole camera, unless its projection is another one.
-struct ModelKind {
-  const char* name;
-  size_t parameter_count;
-  size_t focal_count;
-  bool pinhole;
-};
-
-// The order is COLMAP's numbering.
-constexpr ModelKind kModels[] = {
-    {"SIMPLE_PINHOLE", 3, 1, true},
-    {"PINHOLE", 4, 2, true},
-    {"SIMPLE_RADIAL", 4, 1, true},
-    {"RADIAL", 5, 1, true},
-    {"OPENCV", 8, 2, true},
-    {"OPENCV_FISHEYE", 8, 2, false},
-    {"FULL_OPENCV", 12, 2, true},
-    {"FOV", 5, 2, false},
-    {"SIMPLE_RADIAL_FISHEYE", 4, 1, false},
-    {"RADIAL_FISHEYE", 5, 1, false},
-    {"THIN_PRISM_FISHEYE", 12, 2, false},
-    {"RAD_TAN_THIN_PRISM_FISHEYE", 16, 2, false},
-};
-
 struct ColmapCamera {
-  const ModelKind* kind = nullptr;
+  const ColmapModel* model = nullptr;
   double width = 0;
   double height = 0;
   std::vector<double> parameters;
@@ -67,126 +38,22 @@ struct ColmapImage {
 
 using Cameras = std::map<uint32_t, ColmapCamera>;
 
-/// Bytes of a file one after the other, through a buffer; every read says what it is for.
-class BinaryReader {
- public:
-  explicit BinaryReader(const std::string& path) : file_(path) {}
-
-  const std::string& path() const { return file_.path(); }
-  uint64_t offset() const { return offset_; }
-  uint64_t left() const { return file_.size() - offset_; }
-
-  template <typename T>
-  T take(const char* what) {
-    T value;
-    require(sizeof(T), what);
-    if (offset_ < buffer_start_ || offset_ + sizeof(T) > buffer_start_ + buffer_.size()) refill();
-    std::memcpy(&value, buffer_.data() + (offset_ - buffer_start_), sizeof(T));
-    offset_ += sizeof(T);
-    return value;
-  }
-
-  void skip(uint64_t bytes, const char* what) {
-    require(bytes, what);
-    offset_ += bytes;
-  }
-
-  void require(uint64_t bytes, const char* what) const {
-    if (bytes > left()) {
-      fail(ErrorCode::kFormat, path() + " ends at byte " + std::to_string(file_.size()) + ": " +
-                                   what + " from byte " + std::to_string(offset_) + " needs " +
-                                   std::to_string(bytes) + " bytes");
-    }
-  }
-
- private:
-  void refill() {
-    buffer_.resize(static_cast<size_t>(std::min<uint64_t>(left(), 1 << 16)));
-    buffer_start_ = offset_;
-    file_.readAt(offset_, buffer_.data(), buffer_.size());
-  }
-
-  InputFile file_;
-  uint64_t offset_ = 0;
-  uint64_t buffer_start_ = 0;
-  std::vector<char> buffer_;
-};
-
-/// Lines of a text file, and the words of the current one.
-class TextReader {
- public:
-  explicit TextReader(const std::string& path)
-      : path_(path), text_(readTextFile(path, kMaxTextBytes)) {}
-
-  /// Goes to the next line; with `content`, past comments and empty ones. False at the end.
-  bool next(bool content) {
-    while (position_ < text_.size()) {
-      const size_t end = std::min(text_.find('\n', position_), text_.size());
-      line_ = std::string_view(text_).substr(position_, end - position_);
-      position_ = end + 1;
-      ++number_;
-      while (!line_.empty() && (line_.back() == '\r' || line_.back() == ' '))
-        line_.remove_suffix(1);
-      skipSpaces();
-      if (!content || (!line_.empty() && line_.front() != '#')) return true;
-    }
-    return false;
-  }
-
-  bool atEnd() const { return line_.empty(); }
-  std::string_view rest() const { return line_; }
-
-  std::string_view word() {
-    const size_t end = std::min(line_.find_first_of(" \t"), line_.size());
-    const std::string_view word = line_.substr(0, end);
-    line_.remove_prefix(end);
-    skipSpaces();
-    return word;
-  }
-
-  template <typename T>
-  T number(const char* what) {
-    const std::string_view text = word();
-    T value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) {
-      failHere(std::string("has '") + std::string(text.substr(0, 40)) + "' as " + what +
-               "; a number is needed");
-    }
-    return value;
-  }
-
-  [[noreturn]] void failHere(const std::string& what) const {
-    fail(ErrorCode::kFormat, path_ + ": line " + std::to_string(number_) + " " + what);
-  }
-
- private:
-  void skipSpaces() { line_.remove_prefix(std::min(line_.find_first_not_of(" \t"), line_.size())); }
-
-  std::string path_;
-  std::string text_;
-  size_t position_ = 0;
-  size_t number_ = 0;
-  std::string_view line_;
-};
-
 Cameras readBinaryCameras(const std::string& path) {
-  BinaryReader file(path);
+  ColmapBytes file(path);
   Cameras cameras;
   const auto count = file.take<uint64_t>("the number of cameras");
   for (uint64_t i = 0; i < count; ++i) {
     const auto id = file.take<uint32_t>("a camera's number");
     const auto model = file.take<int32_t>("a camera's model");
-    if (model < 0 || static_cast<size_t>(model) >= std::size(kModels)) {
-      fail(ErrorCode::kUnsupported, path + ": camera " + std::to_string(id) + " has model " +
-                                        std::to_string(model) +
-                                        "; pinhole cameras (models 0 and 1) are supported");
-    }
     ColmapCamera camera;
-    camera.kind = &kModels[model];
+    camera.model = colmapModel(model);
+    if (camera.model == nullptr) {
+      fail(ErrorCode::kUnsupported, path + ": camera " + std::to_string(id) + " has model " +
+                                        std::to_string(model) + "; models 0 to 11 are supported");
+    }
     camera.width = static_cast<double>(file.take<uint64_t>("a camera's width"));
     camera.height = static_cast<double>(file.take<uint64_t>("a camera's height"));
-    for (size_t p = 0; p < camera.kind->parameter_count; ++p) {
+    for (size_t p = 0; p < camera.model->parameter_count; ++p) {
       camera.parameters.push_back(file.take<double>("a camera's parameters"));
     }
     cameras[id] = std::move(camera);
@@ -195,7 +62,7 @@ Cameras readBinaryCameras(const std::string& path) {
 }
 
 std::vector<ColmapImage> readBinaryImages(const std::string& path) {
-  BinaryReader file(path);
+  ColmapBytes file(path);
   std::vector<ColmapImage> images;
   const auto count = file.take<uint64_t>("the number of pictures");
   for (uint64_t i = 0; i < count; ++i) {
@@ -228,24 +95,21 @@ std::vector<ColmapImage> readBinaryImages(const std::string& path) {
 }
 
 Cameras readTextCameras(const std::string& path) {
-  TextReader file(path);
+  ColmapLines file(path);
   Cameras cameras;
   while (file.next(true)) {
     const auto id = file.number<uint32_t>("the camera's number");
     const std::string name(file.word());
     ColmapCamera camera;
-    for (const ModelKind& kind : kModels) {
-      if (name == kind.name) camera.kind = &kind;
-    }
-    if (camera.kind == nullptr) {
+    camera.model = colmapModel(name);
+    if (camera.model == nullptr) {
       fail(ErrorCode::kUnsupported, path + ": camera " + std::to_string(id) + " has the model '" +
-                                        name.substr(0, 60) +
-                                        "'; pinhole cameras (SIMPLE_PINHOLE, PINHOLE) are "
-                                        "supported");
+                                        name.substr(0, 60) + "'; " + colmapModelNames() +
+                                        " are supported");
     }
     camera.width = file.number<double>("the camera's width");
     camera.height = file.number<double>("the camera's height");
-    for (size_t p = 0; p < camera.kind->parameter_count; ++p) {
+    for (size_t p = 0; p < camera.model->parameter_count; ++p) {
       camera.parameters.push_back(file.number<double>("a camera's parameter"));
     }
     cameras[id] = std::move(camera);
@@ -254,7 +118,7 @@ Cameras readTextCameras(const std::string& path) {
 }
 
 std::vector<ColmapImage> readTextImages(const std::string& path) {
-  TextReader file(path);
+  ColmapLines file(path);
   std::vector<ColmapImage> images;
   while (file.next(true)) {
     ColmapImage image;
@@ -276,21 +140,22 @@ std::vector<ColmapImage> readTextImages(const std::string& path) {
 /// Turns one picture with its camera into ours, or says why that cannot be.
 class ViewMaker {
  public:
-  ViewMaker(std::string cameras_path, std::string images_path, Cameras cameras)
+  ViewMaker(std::string cameras_path, std::string images_path, Cameras cameras, Distorted distorted)
       : cameras_path_(std::move(cameras_path)),
         images_path_(std::move(images_path)),
-        cameras_(std::move(cameras)) {}
+        cameras_(std::move(cameras)),
+        distorted_(distorted) {}
 
   CameraView make(const ColmapImage& image) const {
     CameraView view;
     view.image_path = image.name;
-    intrinsics(image, view.camera);
+    intrinsics(image, view);
     pose(image, view.camera);
     return view;
   }
 
  private:
-  void intrinsics(const ColmapImage& image, Camera& camera) const {
+  void intrinsics(const ColmapImage& image, CameraView& view) const {
     const auto found = cameras_.find(image.camera);
     if (found == cameras_.end()) {
       fail(ErrorCode::kFormat, images_path_ + ": picture '" + image.name + "' uses camera " +
@@ -310,22 +175,17 @@ class ViewMaker {
         fail(ErrorCode::kFormat, name + "has a parameter that is not a finite number");
       }
     }
-    const size_t focal_count = from.kind->focal_count;
-    bool distorted = !from.kind->pinhole;
-    for (size_t p = focal_count + 2; p < from.parameters.size(); ++p) {
-      distorted = distorted || from.parameters[p] != 0.0;
-    }
-    if (distorted) {
+    view.lens = colmapLens(*from.model, from.parameters);
+    view.camera_model = from.model->name;
+    if (distorted_ == Distorted::kRefuse && view.lens.isDistorted()) {
       fail(ErrorCode::kUnsupported,
-           name + "is distorted (model " + from.kind->name +
+           name + "is distorted (model " + from.model->name +
                "); undistort the pictures first (colmap image_undistorter makes PINHOLE cameras)");
     }
+    Camera& camera = view.camera;
     camera.width = static_cast<uint32_t>(from.width);
     camera.height = static_cast<uint32_t>(from.height);
-    camera.fx = from.parameters[0];
-    camera.fy = from.parameters[focal_count - 1];
-    camera.cx = from.parameters[focal_count];
-    camera.cy = from.parameters[focal_count + 1];
+    setColmapIntrinsics(*from.model, from.parameters, camera);
     if (!(camera.fx > 0) || !(camera.fy > 0)) {
       fail(ErrorCode::kFormat, name + "has focal lengths " + std::to_string(camera.fx) + " and " +
                                    std::to_string(camera.fy) + "; positive numbers are needed");
@@ -355,6 +215,7 @@ class ViewMaker {
   std::string cameras_path_;
   std::string images_path_;
   Cameras cameras_;
+  Distorted distorted_;
 };
 
 bool holdsModel(const fs::path& folder) {
@@ -383,14 +244,15 @@ std::optional<std::string> findColmapModel(const std::string& path) {
   return std::nullopt;
 }
 
-std::vector<CameraView> readColmapCameras(const std::string& folder) {
+std::vector<CameraView> readColmapCameras(const std::string& folder, Distorted distorted) {
   std::error_code ignored;
   const bool binary = fs::exists(fs::path(folder) / "images.bin", ignored);
   const std::string ending = binary ? ".bin" : ".txt";
   const std::string cameras_path = (fs::path(folder) / ("cameras" + ending)).string();
   const std::string images_path = (fs::path(folder) / ("images" + ending)).string();
   const ViewMaker maker(cameras_path, images_path,
-                        binary ? readBinaryCameras(cameras_path) : readTextCameras(cameras_path));
+                        binary ? readBinaryCameras(cameras_path) : readTextCameras(cameras_path),
+                        distorted);
   const std::vector<ColmapImage> images =
       binary ? readBinaryImages(images_path) : readTextImages(images_path);
   if (images.empty()) {

@@ -44,6 +44,41 @@ StippleMediaImage infoOf(const Image& image) {
   return info;
 }
 
+/// Refuses a JPEG file without its end marker: its decoder fills what is missing with grey and says
+/// nothing.
+void requireWholeJpeg(const InputFile& file) {
+  const uint64_t size = file.size();
+  uint8_t ends[4] = {};
+  if (size < 4) return;
+  file.readAt(0, ends, 2);
+  file.readAt(size - 2, ends + 2, 2);
+  if (ends[0] != 0xff || ends[1] != 0xd8) return;
+  if (ends[2] == 0xff && ends[3] == 0xd9) return;
+  // Some programs append to the picture. Its end comes after the first scan; in a scan every byte
+  // 255 that is data is followed by 0. Before it, a preview may have an end of its own.
+  std::vector<uint8_t> bytes(static_cast<size_t>(size));
+  file.readAt(0, bytes.data(), bytes.size());
+  size_t at = 2;
+  while (at + 4 <= bytes.size() && bytes[at] == 0xff && bytes[at + 1] != 0xda) {
+    at += bytes[at + 1] == 0xff ? 1 : size_t{2} + (size_t{bytes[at + 2]} << 8) + bytes[at + 3];
+  }
+  for (; at + 1 < bytes.size(); ++at) {
+    if (bytes[at] == 0xff && bytes[at + 1] == 0xd9) return;
+  }
+  fail(ErrorCode::kFormat, file.path() + " is cut off: it is " + std::to_string(size) +
+                               " bytes long and has no end marker, as JPEG files do");
+}
+
+ImageHeader headerOf(const StippleMediaImage& info) {
+  ImageHeader header;
+  header.width = info.width;
+  header.height = info.height;
+  header.channels = info.channels;
+  header.bits = info.bits;
+  header.transfer = info.is_display != 0 ? Transfer::kSrgb : Transfer::kLinear;
+  return header;
+}
+
 /// Straight display colour 0..1, clamped: what 8 bits can hold.
 uint8_t toByte(float value) {
   // Not a number becomes 0.
@@ -109,9 +144,17 @@ void writeExr(const Image& image, const std::string& path, bool keep_values) {
 
 }  // namespace
 
-Image readImageFile(const std::string& path) {
-  // Names a missing or unreadable file in the words of every reader.
+ImageHeader readImageHeader(const std::string& path) {
   { const InputFile file(path); }
+  StippleMediaImage info{};
+  const StippleMediaTable& media = mediaTable();
+  callMedia([&](StippleMediaStatus* status) { media.image_header(path.c_str(), &info, status); });
+  return headerOf(info);
+}
+
+Image readImageFile(const std::string& path, ImageHeader* header) {
+  // Names a missing or unreadable file in the words of every reader.
+  requireWholeJpeg(InputFile(path));
   Image image;
   const MediaSink sink([&image](uint32_t array, uint64_t bytes) -> void* {
     if (array != kMediaPixels) return nullptr;
@@ -123,10 +166,12 @@ Image readImageFile(const std::string& path) {
   callMedia([&](StippleMediaStatus* status) {
     media.image_read(path.c_str(), &info, sink.get(), status);
   });
-  image.width = info.width;
-  image.height = info.height;
-  image.channels = info.channels;
-  image.transfer = info.is_display != 0 ? Transfer::kSrgb : Transfer::kLinear;
+  const ImageHeader read = headerOf(info);
+  image.width = read.width;
+  image.height = read.height;
+  image.channels = read.channels;
+  image.transfer = read.transfer;
+  if (header) *header = read;
   if (image.channels == 4 && info.alpha_is_associated == 0) {
     parallelFor(image.pixelCount(), kPixelsPerTask, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {

@@ -9,7 +9,7 @@
 
 namespace stipple {
 
-constexpr uint32_t kMediaTableVersion = 4;
+constexpr uint32_t kMediaTableVersion = 5;
 
 extern "C" {
 
@@ -33,6 +33,7 @@ struct StippleMediaImage {
   uint32_t channels;             ///< 1, 3 or 4
   uint32_t is_display;           ///< 1: 8- or 16-bit display sRGB; 0: float, scene linear
   uint32_t alpha_is_associated;  ///< 1: colours are multiplied by alpha
+  uint32_t bits;                 ///< of a value in the file: 8, 16, 32...
 };
 
 enum StippleMediaImageArray : uint32_t {
@@ -125,6 +126,8 @@ struct StippleMediaTable {
   uint32_t version;
   void (*image_read)(const char* path, StippleMediaImage* image, const StippleMediaSink* sink,
                      StippleMediaStatus* status);
+  /// Only what the file's header says: no pixels are decoded.
+  void (*image_header)(const char* path, StippleMediaImage* image, StippleMediaStatus* status);
   /// 8-bit PNG. In: pixels [height, width, channels] display sRGB 0..255, straight alpha.
   void (*png_write)(const char* path, const StippleMediaImage* image, const uint8_t* pixels,
                     StippleMediaStatus* status);

@@ -44,8 +44,8 @@ std::vector<int> chooseChannels(const OIIO::ImageSpec& spec) {
   return chosen;
 }
 
-DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
-  const OIIO::ImageSpec spec = input.spec();
+/// What the header says, where that is a picture that can be read.
+StippleMediaImage describe(const OIIO::ImageSpec& spec, const std::string& name) {
   const int64_t window[2] = {spec.full_width > 0 ? spec.full_width : spec.width,
                              spec.full_height > 0 ? spec.full_height : spec.height};
   for (const int64_t side : {window[0], window[1], int64_t{spec.width}, int64_t{spec.height}}) {
@@ -62,6 +62,22 @@ DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
                                  std::to_string(window[1]) + " pixels; at most " +
                                  std::to_string(kMaxPixels) + " flat pixels can be read");
   }
+  StippleMediaImage info{};
+  info.width = static_cast<uint32_t>(window[0]);
+  info.height = static_cast<uint32_t>(window[1]);
+  info.channels = static_cast<uint32_t>(chooseChannels(spec).size());
+  info.is_display = spec.format.is_floating_point() ? 0 : 1;
+  // Readers that kept straight alpha, as told, say so; others (WebP in version 2.4) multiply.
+  info.alpha_is_associated = spec.get_int_attribute("oiio:UnassociatedAlpha", 0) != 0 ? 0 : 1;
+  info.bits = static_cast<uint32_t>(spec.format.size() * 8);
+  return info;
+}
+
+DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
+  const OIIO::ImageSpec spec = input.spec();
+  DecodedImage image;
+  image.info = describe(spec, name);
+  const int64_t window[2] = {image.info.width, image.info.height};
 
   const std::vector<int> channels = chooseChannels(spec);
   const int first = *std::min_element(channels.begin(), channels.end());
@@ -74,13 +90,6 @@ DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
     fail(ErrorCode::kFormat, name + " cannot be decoded: " + input.geterror());
   }
 
-  DecodedImage image;
-  image.info.width = static_cast<uint32_t>(window[0]);
-  image.info.height = static_cast<uint32_t>(window[1]);
-  image.info.channels = static_cast<uint32_t>(channels.size());
-  image.info.is_display = spec.format.is_floating_point() ? 0 : 1;
-  // Readers that kept straight alpha, as told, say so; others (WebP in version 2.4) multiply.
-  image.info.alpha_is_associated = spec.get_int_attribute("oiio:UnassociatedAlpha", 0) != 0 ? 0 : 1;
   image.pixels.assign(static_cast<size_t>(window[0] * window[1]) * channels.size(), 0.0f);
   // The data window may be smaller or larger than the picture.
   for (size_t y = 0; y < height; ++y) {
@@ -101,6 +110,15 @@ OIIO::ImageSpec keepAlpha() {
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   return config;
+}
+
+std::unique_ptr<OIIO::ImageInput> openImage(const std::string& path) {
+  const OIIO::ImageSpec config = keepAlpha();
+  auto input = OIIO::ImageInput::open(path, &config);
+  if (!input) {
+    fail(ErrorCode::kFormat, path + " is not a picture that can be read: " + OIIO::geterror());
+  }
+  return input;
 }
 
 /// The name under which OpenImageIO finds the reader of these bytes.
@@ -143,12 +161,7 @@ OIIO::ImageSpec specFor(const StippleMediaImage& image, OIIO::TypeDesc type) {
 }  // namespace
 
 DecodedImage decodeImageFile(const std::string& path) {
-  const OIIO::ImageSpec config = keepAlpha();
-  const auto input = OIIO::ImageInput::open(path, &config);
-  if (!input) {
-    fail(ErrorCode::kFormat, path + " is not a picture that can be read: " + OIIO::geterror());
-  }
-  return decode(*input, path);
+  return decode(*openImage(path), path);
 }
 
 DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std::string& name) {
@@ -173,6 +186,11 @@ void stipple_media_image_read(const char* path, StippleMediaImage* image,
     *image = decoded.info;
     give(*sink, kMediaPixels, decoded.pixels);
   });
+}
+
+void stipple_media_image_header(const char* path, StippleMediaImage* image,
+                                StippleMediaStatus* status) {
+  guard(path, status, [&] { *image = describe(openImage(path)->spec(), path); });
 }
 
 void stipple_media_png_write(const char* path, const StippleMediaImage* image,

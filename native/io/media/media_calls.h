@@ -14,6 +14,8 @@ namespace stipple::media {
 extern "C" {
 void stipple_media_image_read(const char* path, StippleMediaImage* image,
                               const StippleMediaSink* sink, StippleMediaStatus* status);
+void stipple_media_image_header(const char* path, StippleMediaImage* image,
+                                StippleMediaStatus* status);
 void stipple_media_png_write(const char* path, const StippleMediaImage* image,
                              const uint8_t* pixels, StippleMediaStatus* status);
 void stipple_media_exr_write(const char* path, const StippleMediaImage* image, const float* pixels,

@@ -145,7 +145,7 @@ TEST_F(Colmap, RefusesDistortedAndUnknownModelsByName) {
   refused("3 SIMPLE_RADIAL 100 50 80 51 24 0.01", {"cameras.txt: camera 3", "SIMPLE_RADIAL"});
   refused("3 OPENCV 100 50 80 90 51 24 0 0 0 -0.1", {"camera 3", "OPENCV", "undistort"});
   refused("3 OPENCV_FISHEYE 100 50 80 90 51 24 0 0 0 0", {"camera 3", "OPENCV_FISHEYE"});
-  refused("3 FOV 100 50 80 90 51 24 0", {"camera 3", "FOV"});
+  refused("3 FOV 100 50 80 90 51 24 0.5", {"camera 3", "FOV"});
   refused("3 EQUIRECTANGULAR 100 50", {"camera 3", "EQUIRECTANGULAR", "PINHOLE"});
   storeBinary();
   std::string bytes = cameras();
