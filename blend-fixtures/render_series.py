@@ -66,7 +66,7 @@ def main():
     out = pathlib.Path(sys.argv[sys.argv.index('--') + 1]).resolve()
     files = out / 'files'
     files.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)  # add-ons stay, in every version
     for frame in range(1, FRAMES + 1):
         ring(frame).save(str(files / f'ring_{frame:04d}.ply'), frame=binding().binding.structs.Frame.RFU)
     load(files, 'Ring', -1.55)
