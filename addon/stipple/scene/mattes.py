@@ -57,9 +57,18 @@ def surface(placed, camera, wait):
         task = native.start_depth(sources.context(), placed, cameras.finer_rows(camera, first, count, side))
         wait(task.job)
         samples = task.depth.reshape(count, side, width, side)
-        depth[first:first + count] = samples.min(axis=(1, 3))
-        opacity[first:first + count] = (samples < EMPTY_DEPTH).mean(axis=(1, 3))
+        depth[first:first + count] = _along_last(np.minimum, samples.min(axis=1))
+        hits = _along_last(np.add, (samples < EMPTY_DEPTH).sum(axis=1, dtype=np.uint8))
+        opacity[first:first + count] = hits / np.float32(side * side)
     return Surface(depth, opacity=opacity)
+
+
+def _along_last(function, samples):
+    """function of all values along the last, short axis: ten times as quick as numpy's reduce, which takes them one by one."""
+    result = samples[..., 0]
+    for i in range(1, samples.shape[-1]):
+        result = function(result, samples[..., i])
+    return result
 
 
 def _sources_of_splats(depsgraph):
