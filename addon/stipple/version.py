@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every difference between Blender versions (3.4 to 5.x), in one place."""
 
+import ctypes
 import os
 
 import bpy
@@ -83,6 +84,18 @@ def _get(collection, field, count, width):
     array = np.empty(count * width, np.float32)
     collection.foreach_get(field, array)
     return array.reshape(count, width)
+
+
+def attribute_values(elements, field, count, width):
+    """[count*width] float32 of an attribute or of positions: Blender's own memory where they lie there one after the
+    other, to be read before anything is written; a copy otherwise."""
+    if 0 < count == len(elements):
+        first, last = elements[0].as_pointer(), elements[count - 1].as_pointer()
+        if last - first == 4 * width * (count - 1):
+            return np.frombuffer((ctypes.c_float * (count * width)).from_address(first), np.float32)
+    values = np.empty(count * width, np.float32)
+    elements.foreach_get(field, values)
+    return values
 
 
 def fill_pass(render_pass, array):

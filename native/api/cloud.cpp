@@ -1,11 +1,15 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <utility>
 
 #include "api/bounds.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
 #include "base/parallel.h"
+#include "data/cloud_columns.h"
 #include "data/cloud_comparison.h"
 #include "data/cloud_transform.h"
 #include "io/splat_file.h"
@@ -13,28 +17,50 @@
 using namespace stipple;
 using namespace stipple::api;
 
+static_assert(std::size(StippleCloudColumns{}.rest) == kMaxShColumns);
+
 namespace {
 
 void normaliseRotations(SplatCloud& cloud) {
-  for (size_t i = 0; i < cloud.size(); ++i) {
-    float* q = &cloud.rotations[i * 4];
-    double squares = 0;
-    for (int k = 0; k < 4; ++k) squares += static_cast<double>(q[k]) * static_cast<double>(q[k]);
-    const double length = std::sqrt(squares);
-    for (int k = 0; k < 4; ++k) q[k] = static_cast<float>(static_cast<double>(q[k]) / length);
+  parallelFor(cloud.size(), 16384, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      float* q = &cloud.rotations[i * 4];
+      double squares = 0;
+      for (int k = 0; k < 4; ++k) squares += static_cast<double>(q[k]) * static_cast<double>(q[k]);
+      const double length = std::sqrt(squares);
+      for (int k = 0; k < 4; ++k) q[k] = static_cast<float>(static_cast<double>(q[k]) / length);
+    }
+  });
+}
+
+/// A cloud as a handle holds it: its values are in range, its quaternions of length one.
+std::shared_ptr<const SplatCloud> checked(SplatCloud cloud) {
+  validate(cloud, "splats");
+  normaliseRotations(cloud);
+  return std::make_shared<const SplatCloud>(std::move(cloud));
+}
+
+/// What arrays and columns have in common. In: the name of the argument in the header.
+template <class Given>
+void describe(const Given& given, const std::string& name, SplatCloud& cloud) {
+  cloud.colour_space =
+      enumValue<ColourSpace>(given.colour_space, 1, (name + "->colour_space").c_str());
+  cloud.antialias = enumValue<Antialias>(given.antialias, 1, (name + "->antialias").c_str());
+  cloud.frame = enumValue<Frame>(given.frame, kLastFrame, (name + "->frame").c_str());
+}
+
+int degreeOf(uint32_t given, const char* name) {
+  if (given > static_cast<uint32_t>(kMaxShDegree)) {
+    fail(ErrorCode::kInvalidArgument,
+         std::string(name) + "->sh_degree is " + std::to_string(given) + "; 0 to 4 is allowed");
   }
+  return static_cast<int>(given);
 }
 
 SplatCloud fromArrays(const StippleCloudArrays& arrays) {
-  if (arrays.sh_degree > static_cast<uint32_t>(kMaxShDegree)) {
-    fail(ErrorCode::kInvalidArgument,
-         "arrays->sh_degree is " + std::to_string(arrays.sh_degree) + "; 0 to 4 is allowed");
-  }
   SplatCloud cloud;
-  cloud.sh_degree = static_cast<int>(arrays.sh_degree);
-  cloud.colour_space = enumValue<ColourSpace>(arrays.colour_space, 1, "arrays->colour_space");
-  cloud.antialias = enumValue<Antialias>(arrays.antialias, 1, "arrays->antialias");
-  cloud.frame = enumValue<Frame>(arrays.frame, kLastFrame, "arrays->frame");
+  cloud.sh_degree = degreeOf(arrays.sh_degree, "arrays");
+  describe(arrays, "arrays", cloud);
   const size_t count = arrays.count;
   if (count > 0) {
     cloud.positions.assign(&require(arrays.positions, "arrays->positions"),
@@ -46,9 +72,32 @@ SplatCloud fromArrays(const StippleCloudArrays& arrays) {
                            arrays.opacities + count);
     cloud.sh.assign(&require(arrays.sh, "arrays->sh"), arrays.sh + count * cloud.shStride());
   }
-  validate(cloud, "splats");
-  normaliseRotations(cloud);
   return cloud;
+}
+
+SplatCloud fromColumns(const StippleCloudColumns& given) {
+  const int degree = degreeOf(given.sh_degree, "columns");
+  CloudColumns<const float> columns;
+  if (given.count > 0) {
+    columns.positions = &require(given.positions, "columns->positions");
+    columns.rotations = &require(given.rotations, "columns->rotations");
+    columns.scales = &require(given.scales, "columns->scales");
+    columns.base = &require(given.base, "columns->base");
+    for (size_t k = 0; k + 1 < shCoefficientCount(degree); ++k) {
+      const std::string name = "columns->rest[" + std::to_string(k) + "]";
+      columns.rest[k] = &require(given.rest[k], name.c_str());
+    }
+  }
+  SplatCloud cloud = cloudFromColumns(columns, given.count, degree);
+  describe(given, "columns", cloud);
+  return cloud;
+}
+
+void requireCapacity(uint64_t capacity, size_t count) {
+  if (capacity < count) {
+    fail(ErrorCode::kBufferTooSmall, "buffers->capacity is " + std::to_string(capacity) +
+                                         " splats; " + std::to_string(count) + " are needed");
+  }
 }
 
 void copyTo(const std::vector<float>& values, float* out) {
@@ -87,8 +136,22 @@ StippleStatus stipple_cloud_create(StippleContext* context, const StippleCloudAr
     require(cloud, "cloud");
     const StippleCloudArrays given =
         completeUpTo(arrays, offsetof(StippleCloudArrays, frame), "arrays");
-    *cloud =
-        new StippleCloud{context->state, std::make_shared<const SplatCloud>(fromArrays(given))};
+    withThreads(context->state->thread_count, [&] {
+      *cloud = new StippleCloud{context->state, checked(fromArrays(given))};
+    });
+  });
+}
+
+StippleStatus stipple_cloud_create_from_columns(StippleContext* context,
+                                                const StippleCloudColumns* columns,
+                                                StippleCloud** cloud) {
+  return guarded([&] {
+    require(context, "context");
+    require(cloud, "cloud");
+    const StippleCloudColumns given = complete(columns, "columns");
+    withThreads(context->state->thread_count, [&] {
+      *cloud = new StippleCloud{context->state, checked(fromColumns(given))};
+    });
   });
 }
 
@@ -114,16 +177,24 @@ StippleStatus stipple_cloud_read(const StippleCloud* cloud, const StippleCloudBu
   return guarded([&] {
     const SplatCloud& splats = *require(cloud, "cloud").cloud;
     const StippleCloudBuffers out = complete(buffers, "buffers");
-    if (out.capacity < splats.size()) {
-      fail(ErrorCode::kBufferTooSmall, "buffers->capacity is " + std::to_string(out.capacity) +
-                                           " splats; " + std::to_string(splats.size()) +
-                                           " are needed");
-    }
+    requireCapacity(out.capacity, splats.size());
     copyTo(splats.positions, out.positions);
     copyTo(splats.rotations, out.rotations);
     copyTo(splats.scales, out.scales);
     copyTo(splats.opacities, out.opacities);
     copyTo(splats.sh, out.sh);
+  });
+}
+
+StippleStatus stipple_cloud_read_columns(const StippleCloud* cloud,
+                                         const StippleCloudColumnBuffers* buffers) {
+  return guarded([&] {
+    const SplatCloud& splats = *require(cloud, "cloud").cloud;
+    const StippleCloudColumnBuffers out = complete(buffers, "buffers");
+    requireCapacity(out.capacity, splats.size());
+    CloudColumns<float> columns{out.positions, out.rotations, out.scales, out.base, {}};
+    std::copy(std::begin(out.rest), std::end(out.rest), columns.rest.begin());
+    withThreads(cloud->context->thread_count, [&] { readColumns(splats, columns); });
   });
 }
 

@@ -10,6 +10,7 @@
 #include "bench/comparison.h"
 #include "bench/plain_file.h"
 #include "bench/splat_scene.h"
+#include "data/cloud_columns.h"
 #include "data/cloud_selection.h"
 #include "data/cloud_transform.h"
 #include "mesh/floaters.h"
@@ -72,6 +73,19 @@ void merge(benchmark::State& state) {
   edit(state, [&] { return merged(instances, cloud.frame); });
 }
 
+/// What a cloud is made of in Blender, and back.
+void columns(benchmark::State& state) {
+  const SplatCloud& cloud = cloudOf(k300k);
+  std::vector<std::vector<float>> room(19, std::vector<float>(cloud.size() * 4));
+  CloudColumns<float> out{room[0].data(), room[1].data(), room[2].data(), room[3].data(), {}};
+  CloudColumns<const float> in{out.positions, out.rotations, out.scales, out.base, {}};
+  for (size_t k = 0; k < 15; ++k) in.rest[k] = out.rest[k] = room[4 + k].data();
+  edit(state, [&] {
+    readColumns(cloud, out);
+    return cloudFromColumns(in, cloud.size(), cloud.sh_degree);
+  });
+}
+
 BENCHMARK(transform)
     ->Name("edit.transform.300k")
     ->UseManualTime()
@@ -79,6 +93,11 @@ BENCHMARK(transform)
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(cropBox)
     ->Name("edit.crop_box.300k")
+    ->UseManualTime()
+    ->Iterations(5)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(columns)
+    ->Name("edit.columns.300k")
     ->UseManualTime()
     ->Iterations(5)
     ->Unit(benchmark::kMillisecond);

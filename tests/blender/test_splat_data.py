@@ -32,6 +32,46 @@ def test_splats_come_back_bit_for_bit(stipple, degree):
     assert_equal(splat_data.read(data), arrays)
 
 
+@pytest.mark.parametrize('degree', [0, 3])
+def test_native_clouds_are_those_of_the_arrays(stipple, degree):
+    """Attributes go into a cloud and out of it without arrays between them, evaluated ones too."""
+    splat_data, native = stipple.scene.splat_data, stipple.scene.sources.context()
+    arrays = make_arrays(stipple, degree=degree)
+    data = splat_data.new_data('splats')
+    splat_data.write(data, arrays)
+    obj = splat_data.new_object('splats', data)
+    bpy.context.scene.collection.objects.link(obj)
+    expected = arrays.to_cloud(native).read()
+    assert_equal(splat_data.cloud(native, data).read(), expected)
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    cloud = splat_data.cloud(native, evaluated, data)
+    assert_equal(cloud.read(), expected)
+    again = splat_data.new_data('again')
+    splat_data.write(again, cloud.columns())
+    assert_equal(splat_data.read(again), expected)
+
+
+@pytest.mark.parametrize('count', [0, 1, 7])
+def test_attribute_values_are_blenders(stipple, count):
+    data = stipple.scene.splat_data.new_data('splats')
+    stipple.scene.splat_data.write(data, make_arrays(stipple, count=count, degree=0))
+    for name, width in (('scale', 3), ('rotation', 4)):
+        elements = data.attributes[name].data
+        field = stipple.version.ATTRIBUTE_FIELDS[data.attributes[name].data_type]
+        expected = np.empty(count * width, np.float32)
+        elements.foreach_get(field, expected)
+        np.testing.assert_array_equal(stipple.version.attribute_values(elements, field, count, width), expected)
+
+
+def test_an_attribute_of_another_kind_is_refused(stipple):
+    data = stipple.scene.splat_data.new_data('splats')
+    stipple.scene.splat_data.write(data, make_arrays(stipple, degree=0))
+    data.attributes.remove(data.attributes['scale'])
+    data.attributes.new('scale', 'FLOAT', 'POINT')
+    with pytest.raises((stipple.binding.errors.StippleError, RuntimeError, TypeError)):
+        stipple.scene.splat_data.cloud(stipple.scene.sources.context(), data)
+
+
 def test_attributes_have_the_names_and_types_of_the_contract(stipple):
     data = stipple.scene.splat_data.new_data('splats')
     stipple.scene.splat_data.write(data, make_arrays(stipple, degree=1))

@@ -9,8 +9,13 @@ import numpy as np
 from .errors import invalid
 from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
 from .job import Job
-from .structs import (Antialias, ColourSpace, Frame, StippleCloudArrays, StippleCloudBuffers,
-                      StippleCloudComparison, StippleCloudInfo, StippleCloudSaveOptions)
+from .structs import (Antialias, ColourSpace, Frame, StippleCloudArrays, StippleCloudBuffers, StippleCloudColumnBuffers,
+                      StippleCloudColumns, StippleCloudComparison, StippleCloudInfo, StippleCloudSaveOptions)
+
+# Floats of a splat in each attribute that Blender stores. 'base' is the harmonics of degree 0 and the opacity; those above
+# are columns of their own, named by number from 0 on.
+COLUMN_WIDTHS = {'positions': 3, 'rotations': 4, 'scales': 3, 'base': 4}
+_REST_WIDTH = 3
 
 SAVE_OPTIONS = ('ascii', 'sh_degree_limit', 'format_version', 'frame')
 
@@ -35,6 +40,39 @@ class SplatArrays:
     @property
     def sh_degree(self):
         return sh_degree_of(self.sh.shape[1])
+
+    def column(self, name):
+        """[N,3] or [N,4] of an attribute as Blender stores it (COLUMN_WIDTHS)."""
+        if isinstance(name, int):
+            return self.sh[:, name + 1]
+        if name != 'base':
+            return getattr(self, name)
+        return np.concatenate([self.sh[:, 0], self.opacities[:, None]], axis=1)
+
+    def to_cloud(self, context):
+        return Cloud.create(context, self)
+
+
+class CloudColumns:
+    """The splats of a native cloud, read an attribute at a time: what a SplatArrays tells, in a fraction of its memory."""
+
+    def __init__(self, cloud):
+        self._cloud = cloud
+        info = cloud.info()
+        self.count, self.sh_degree = info.count, info.sh_degree
+        self.colour_space, self.antialias = ColourSpace(info.colour_space), Antialias(info.antialias)
+        self.frame = Frame(info.frame)
+        self._room = np.empty(4 * info.count, np.float32)
+
+    def column(self, name):
+        """As SplatArrays.column. The next column is read over it."""
+        width = COLUMN_WIDTHS.get(name, _REST_WIDTH)
+        values = self._room[:width * self.count].reshape(self.count, width)
+        self._cloud.read_column(name, values)
+        return values
+
+    def to_cloud(self, _context):
+        return self._cloud
 
 
 def sh_degree_of(coefficient_count):
@@ -64,6 +102,25 @@ class Cloud(Handle):
         return cls(context.library, new_handle(context.library, 'stipple_cloud_create', context.pointer, byref(given)))
 
     @classmethod
+    def from_columns(cls, context, columns, rest, colour_space, antialias, frame):
+        """The cloud of attributes as Blender stores them; columns: those of COLUMN_WIDTHS, rest: [[N,3]] in order. Arrays are
+        flat or not, and are copied."""
+        arrays = {name: contiguous(columns[name]) for name in COLUMN_WIDTHS}
+        count = arrays['positions'].size // 3
+        rest = [contiguous(values) for values in rest]
+        for name, values in (*arrays.items(), *enumerate(rest)):
+            if values.size != count * COLUMN_WIDTHS.get(name, _REST_WIDTH):
+                raise invalid(f'Splat column {name} has {values.size} values; {count} splats have '
+                              f'{count * COLUMN_WIDTHS.get(name, _REST_WIDTH)}.')
+        given = StippleCloudColumns(sh_degree=sh_degree_of(len(rest) + 1), colour_space=int(colour_space),
+                                    antialias=int(antialias), frame=int(frame), count=count,
+                                    **{name: pointer_to(values) for name, values in arrays.items()})
+        for i, values in enumerate(rest):
+            given.rest[i] = pointer_to(values)
+        return cls(context.library, new_handle(context.library, 'stipple_cloud_create_from_columns', context.pointer,
+                                               byref(given)))
+
+    @classmethod
     def load(cls, context, path):
         return cls(context.library,
                    new_handle(context.library, 'stipple_cloud_load', context.pointer, path_bytes(path)))
@@ -91,6 +148,18 @@ class Cloud(Handle):
                                       opacities=pointer_to(arrays.opacities), sh=pointer_to(arrays.sh))
         self._check(self.library.stipple_cloud_read(self.pointer, byref(buffers)))
         return arrays
+
+    def columns(self):
+        return CloudColumns(self)
+
+    def read_column(self, name, values):
+        """Fills a contiguous array with an attribute as Blender stores it (COLUMN_WIDTHS)."""
+        buffers = StippleCloudColumnBuffers(capacity=len(values))
+        if isinstance(name, int):
+            buffers.rest[name] = pointer_to(values)
+        else:
+            setattr(buffers, name, pointer_to(values))
+        self._check(self.library.stipple_cloud_read_columns(self.pointer, byref(buffers)))
 
     def positions(self):
         """[N,3] as a new array."""

@@ -43,6 +43,8 @@ FUNCTIONS = {
     'stipple_cloud_free': (None, [_handle]),
     'stipple_cloud_info': (_status, [_handle, _to(s.StippleCloudInfo)]),
     'stipple_cloud_read': (_status, [_handle, _to(s.StippleCloudBuffers)]),
+    'stipple_cloud_create_from_columns': (_status, [_handle, _to(s.StippleCloudColumns), _out_handle]),
+    'stipple_cloud_read_columns': (_status, [_handle, _to(s.StippleCloudColumnBuffers)]),
     'stipple_cloud_load': (_status, [_handle, _path, _out_handle]),
     'stipple_cloud_load_start': (_status, [_handle, _path, _out_handle]),
     'stipple_cloud_save_options_init': (None, [_to(s.StippleCloudSaveOptions)]),

@@ -57,6 +57,9 @@ class GradedCloud:
     def read(self):
         return self.baked().read()
 
+    def columns(self):
+        return self.baked().columns()
+
     def save(self, path, **options_given):
         self.baked().save(path, **options_given)
 

@@ -10,6 +10,7 @@ NO_INDEX = 0xFFFFFFFF
 DRAW_GEOMETRY_FLOATS = 12
 DRAW_ROW_FLOATS = 4
 MAX_DRAW_ROWS = 1 << 24
+MAX_SH_COLUMNS = 24
 
 _floats = POINTER(c_float)
 _matrix = c_double * 16
@@ -185,6 +186,18 @@ class StippleCloudInfo(_Sized):
 class StippleCloudBuffers(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('capacity', c_uint64), ('positions', _floats),
                 ('rotations', _floats), ('scales', _floats), ('opacities', _floats), ('sh', _floats)]
+
+
+class StippleCloudColumns(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('sh_degree', c_uint32), ('colour_space', c_uint32),
+                ('antialias', c_uint32), ('count', c_uint64), ('positions', _floats), ('rotations', _floats),
+                ('scales', _floats), ('base', _floats), ('rest', _floats * MAX_SH_COLUMNS), ('frame', c_uint32),
+                ('reserved', c_uint32)]
+
+
+class StippleCloudColumnBuffers(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('capacity', c_uint64), ('positions', _floats),
+                ('rotations', _floats), ('scales', _floats), ('base', _floats), ('rest', _floats * MAX_SH_COLUMNS)]
 
 
 class StippleCloudSaveOptions(_Sized):

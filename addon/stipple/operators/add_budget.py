@@ -53,7 +53,7 @@ class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
             visible = sources.visible_count(data.stipple)
             data.stipple.ratio = min(1.0, FIRST_COUNT / visible)
         settings = sources.decode_settings(data.stipple)
-        sync.write_decoded(data, sources.decode_data(data, settings).read())
+        sync.write_decoded(data, sources.decode_data(data, settings).columns())
         self.report({'INFO'}, f"'{obj.name}' shows {settings.anchors:,} of {visible:,} splats")
 
     def _new_object(self, context):

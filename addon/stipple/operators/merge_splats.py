@@ -51,7 +51,7 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
         data = splat_data.new_data(active.data.name)
         with sync.paused():
             sources.attach_cloud(data, path)
-        splats = job.result.read()
+        splats = job.result.columns()
         sync.write(data, splats, masks.key(data))
         active.data = data
         for obj in self._objects[1:]:

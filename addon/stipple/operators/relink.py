@@ -101,7 +101,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
             masks.clear(data)
         splats = sources.masked(made, data) if stipple.source_kind == 'CLOUD' else sources.decode_data(
             data, sources.decode_settings(stipple))
-        sync.write_decoded(data, splats.read())
+        sync.write_decoded(data, splats.columns())
 
 
 def _count_before(data):

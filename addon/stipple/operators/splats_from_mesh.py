@@ -57,7 +57,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         path = sources.save_model(model, sources.model_path_for(name, self.source_path), bool(self.source_path))
         sources.remember_model(path, model)
         decoding.wait()
-        splats = decoding.cloud().read()
+        splats = decoding.cloud().columns()
         obj = splat_data.new_object(name, splat_data.new_data(name))
         stipple = obj.data.stipple
         with sync.paused():

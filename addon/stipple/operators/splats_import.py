@@ -56,7 +56,7 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
             for i, (path, frame_count) in enumerate(chosen):
                 task.advance(i / len(chosen), f'Reading {os.path.basename(path)}')
                 try:
-                    loaded.append((path, frame_count, Cloud.load(native, path).read()))
+                    loaded.append((path, frame_count, Cloud.load(native, path).columns()))
                 except StippleError as error:
                     failed.append(error)
             if not loaded:

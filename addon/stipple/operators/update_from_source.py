@@ -39,7 +39,7 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
 
     def finish(self, _context, job):
         model, data = job.model(), self._object.data
-        splats = model.decode(self._settings).read()
+        splats = model.decode(self._settings).columns()
         # Never over the old file: undo goes back to it.
         path = sources.save_model(model, sources.model_path_for(self._object.name))
         sources.remember_model(path, model)

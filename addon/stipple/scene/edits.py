@@ -91,7 +91,7 @@ def show(data, cloud=None):
         splats = sources.masked(cloud, data)
     else:
         splats = sources.decode_data(data, settings)
-    sync.write(data, splats.read(), sync.written_key(data, settings))
+    sync.write(data, splats.columns(), sync.written_key(data, settings))
 
 
 def refuse_sequence(obj):

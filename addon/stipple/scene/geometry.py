@@ -5,7 +5,6 @@ import numpy as np
 
 from .. import version
 from ..binding import cloud_edit
-from ..binding.cloud import Cloud
 from ..binding.errors import invalid
 from . import placement, sources, splat_data
 
@@ -39,7 +38,7 @@ def splats_of(obj, depsgraph):
         data = obj.data
         if splat_data.is_splats(data) and data.stipple.source_kind == 'CLOUD' and not data.stipple.edited:
             return sources.whole_cloud(data)
-        return Cloud.create(sources.context(), splat_data.read_ungraded(data))
+        return splat_data.ungraded_cloud(sources.context(), data)
     inverse, found = np.linalg.inv(placement.matrix_of(obj)), []
     # Points that modifiers make come as instances of the object.
     for entry in depsgraph.object_instances:
@@ -50,7 +49,7 @@ def splats_of(obj, depsgraph):
         matrix = inverse @ version.copy_of_evaluated_matrix(entry.matrix_world)
         if np.abs(matrix - np.eye(4)).max() < 1e-6:
             matrix = np.eye(4)  # its bits stay
-        found.append((Cloud.create(sources.context(), splat_data.read_ungraded(data, obj.data)), matrix))
+        found.append((splat_data.ungraded_cloud(sources.context(), data, obj.data), matrix))
     if not found:
         raise invalid(f"'{obj.name}' shows no splats; geometry with the attributes position, {', '.join(_NAMES)} is "
                       'needed.')

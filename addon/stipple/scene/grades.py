@@ -31,12 +31,12 @@ def is_shown(data, settings):
     return data.get(GRADE_KEY, '') == _text(settings)
 
 
-def write(data, arrays, settings):
+def write(data, splats, settings):
     """Stores splats that are not graded, graded. Errors: StippleError, with the splats as they were."""
-    shown = arrays
+    shown = splats
     if not settings.is_neutral:
-        shown = graded(Cloud.create(sources.context(), arrays), settings).read()
-    splat_data.write(data, shown, None if settings.is_neutral else arrays)
+        shown = graded(splats.to_cloud(sources.context()), settings).columns()
+    splat_data.write(data, shown, None if settings.is_neutral else splats)
     if settings.is_neutral:
         data.pop(GRADE_KEY, None)
     else:

@@ -88,11 +88,11 @@ class Frame:
         """Splats in the file. Errors: StippleError."""
         return _read(self.path, self.stamp, self.kind).count if self.path else 0
 
-    def arrays(self):
-        """cloud() as arrays; none of a series that shows nothing are empty."""
+    def splats(self):
+        """cloud() as what is stored; that of a series that shows nothing is empty."""
         cloud = self.cloud()
         if cloud is not None:
-            return cloud.read()
+            return cloud.columns()
         return SplatArrays(*(np.empty(shape, np.float32) for shape in ((0, 3), (0, 4), (0, 3), (0,), (0, 1, 3))))
 
 

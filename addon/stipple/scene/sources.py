@@ -191,7 +191,7 @@ def full_cloud(data):
     what is stored where there is no source. Not graded."""
     stipple = data.stipple
     if stipple.source_kind == 'NONE' or stipple.edited:
-        return Cloud.create(context(), splat_data.read_ungraded(data))
+        return splat_data.ungraded_cloud(context(), data)
     return decode_data(data, decode_settings(stipple, 'FULL' if stipple.source_kind == 'TREE' else 'RENDER'))
 
 
@@ -246,12 +246,12 @@ def visible_count(stipple):
 
 def cloud_from_object(obj):
     """The cloud of an object's attributes as they are, evaluated where the object is: graded."""
-    return Cloud.create(context(), splat_data.read(obj.data, obj.original.data))
+    return splat_data.cloud(context(), obj.data, obj.original.data)
 
 
 def ungraded_cloud(obj):
     """The same without the grade of the attributes."""
-    return Cloud.create(context(), splat_data.read_ungraded(obj.data, obj.original.data))
+    return splat_data.ungraded_cloud(context(), obj.data, obj.original.data)
 
 
 def model_path_for(name, given=''):

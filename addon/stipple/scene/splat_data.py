@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from .. import version
-from ..binding.cloud import SplatArrays, sh_degree_of
+from ..binding.cloud import Cloud, SplatArrays, sh_degree_of
 from ..binding.errors import StippleError
 from ..binding.structs import Antialias, ColourSpace, Frame, Status
 
@@ -78,37 +78,35 @@ def degree(data):
     return sh_degree_of(1 + sum(a.name.startswith('radiance:sh_') for a in data.attributes))
 
 
-def write(data, arrays, ungraded=None):
-    """Replaces the splats of a datablock. ungraded: the same splats before their grade, to be kept beside them."""
+def write(data, splats, ungraded=None):
+    """Replaces the splats of a datablock (SplatArrays or CloudColumns). ungraded: the same splats before their grade, to
+    be kept beside them."""
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         raise StippleError(f"'{data.name}' is in Edit Mode; leave it before its splats are written.",
                            Status.ERROR_INVALID_ARGUMENT)
     if isinstance(data, bpy.types.Mesh) and not _is_editable(data):
-        _write_linked(data, arrays, ungraded)
+        _write_linked(data, splats, ungraded)
         return
-    _resize(data, arrays.count)
+    _resize(data, splats.count)
     if isinstance(data, bpy.types.Mesh):
-        data.vertices.foreach_set('co', _flat(arrays.positions))
+        data.vertices.foreach_set('co', _flat(splats.column('positions')))
     else:
-        _set(data, 'position', 'FLOAT_VECTOR', arrays.positions)
-    _set(data, 'scale', 'FLOAT_VECTOR', np.maximum(arrays.scales, np.float32(MIN_SCALE)))
-    _set(data, 'rotation', version.ROTATION_TYPE, arrays.rotations)
-    _write_colours(data, 'radiance', arrays)
+        _set(data, 'position', 'FLOAT_VECTOR', splats.column('positions'))
+    _set(data, 'scale', 'FLOAT_VECTOR', np.maximum(splats.column('scales'), np.float32(MIN_SCALE)))
+    _set(data, 'rotation', version.ROTATION_TYPE, splats.column('rotations'))
+    _write_colours(data, 'radiance', splats)
     _write_colours(data, 'ungraded', ungraded)
-    _mark(data, arrays)
+    _mark(data, splats)
 
 
-def _write_colours(data, prefix, arrays):
+def _write_colours(data, prefix, splats):
     """Colours and opacities under names with this prefix; None removes them."""
     rest = -1
-    if arrays is not None:
-        base = np.empty((arrays.count, 4), np.float32)
-        base[:, :3] = arrays.sh[:, 0]
-        base[:, 3] = arrays.opacities
-        _set(data, f'{prefix}:base', version.BASE_TYPE, base)
-        rest = arrays.sh.shape[1] - 1
+    if splats is not None:
+        _set(data, f'{prefix}:base', version.BASE_TYPE, splats.column('base'))
+        rest = (splats.sh_degree + 1) ** 2 - 1
         for i in range(rest):
-            _set(data, f'{prefix}:sh_{i}', 'FLOAT_VECTOR', arrays.sh[:, i + 1])
+            _set(data, f'{prefix}:sh_{i}', 'FLOAT_VECTOR', splats.column(i))
     elif f'{prefix}:base' in data.attributes:
         data.attributes.remove(data.attributes[f'{prefix}:base'])
     for name in [a.name for a in data.attributes if a.name.startswith(f'{prefix}:sh_')]:
@@ -121,25 +119,25 @@ def _is_editable(data):
     return data.library is None and data.override_library is None
 
 
-def _write_linked(mesh, arrays, ungraded):
+def _write_linked(mesh, splats, ungraded):
     """BMesh writes data that foreach_set does not."""
     own = bpy.data.meshes.new(mesh.name)
     try:
-        write(own, arrays, ungraded)
+        write(own, splats, ungraded)
         carrier = bmesh.new()
         carrier.from_mesh(own)
         carrier.to_mesh(mesh)
         carrier.free()
     finally:
         bpy.data.meshes.remove(own)
-    _mark(mesh, arrays)
+    _mark(mesh, splats)
 
 
-def _mark(data, arrays):
+def _mark(data, splats):
     data[LAYOUT_KEY] = LAYOUT
-    data[COLOUR_SPACE_KEY] = _COLOUR_SPACES[ColourSpace(arrays.colour_space)]
-    data[ANTIALIAS_KEY] = _ANTIALIAS[Antialias(arrays.antialias)]
-    data[FRAME_KEY] = Frame(arrays.frame).name
+    data[COLOUR_SPACE_KEY] = _COLOUR_SPACES[ColourSpace(splats.colour_space)]
+    data[ANTIALIAS_KEY] = _ANTIALIAS[Antialias(splats.antialias)]
+    data[FRAME_KEY] = Frame(splats.frame).name
     if isinstance(data, bpy.types.Mesh):
         data.update()
     data.update_tag()
@@ -156,34 +154,64 @@ def read(data, original=None):
 
 def read_ungraded(data, original=None):
     """The same before the grade that the attributes carry."""
-    return _read(data, original, 'ungraded' if data.attributes.get('ungraded:base') is not None else 'radiance')
+    return _read(data, original, _ungraded(data))
+
+
+def cloud(native, data, original=None):
+    """A native cloud of read(), made without arrays between it and the attributes."""
+    return _cloud(native, data, original, 'radiance')
+
+
+def ungraded_cloud(native, data, original=None):
+    """A native cloud of read_ungraded()."""
+    return _cloud(native, data, original, _ungraded(data))
+
+
+def _ungraded(data):
+    return 'ungraded' if data.attributes.get('ungraded:base') is not None else 'radiance'
 
 
 def _read(data, original, prefix):
-    marked = data if original is None else original
-    n = count(data)
-    positions = _positions(data, n)
-    scales, rotations, base = _get(data, 'scale', n, 3), _get(data, 'rotation', n, 4), _get(data, f'{prefix}:base', n, 4)
-    base = base.reshape(n, 4)
-    rest = 0
+    n, columns, rest = _columns(data, prefix)
+    sh = np.empty((n, len(rest) + 1, 3), np.float32)
+    base = columns['base'].reshape(n, 4)
+    sh[:, 0] = base[:, :3]
+    for i, values in enumerate(rest):
+        sh[:, i + 1] = values.reshape(n, 3)
+    return SplatArrays(columns['positions'].reshape(n, 3).copy(), columns['rotations'].reshape(n, 4).copy(),
+                       columns['scales'].reshape(n, 3).copy(), base[:, 3].copy(), sh,
+                       *_marks(data if original is None else original))
+
+
+def _cloud(native, data, original, prefix):
+    _, columns, rest = _columns(data, prefix)
+    return Cloud.from_columns(native, columns, rest, *_marks(data if original is None else original))
+
+
+def _columns(data, prefix):
+    """(number of splats, values by COLUMN_WIDTHS' names, those of the harmonics above degree 0), flat, to be used before
+    anything is written."""
+    n, rest = count(data), 0
     while data.attributes.get(f'{prefix}:sh_{rest}') is not None:
         rest += 1
     sh_degree_of(rest + 1)
-    sh = np.empty((n, rest + 1, 3), np.float32)
-    sh[:, 0] = base[:, :3]
-    for i in range(rest):
-        sh[:, i + 1] = _get(data, f'{prefix}:sh_{i}', n, 3).reshape(n, 3)
-    return SplatArrays(positions.reshape(n, 3), rotations.reshape(n, 4), scales.reshape(n, 3), base[:, 3].copy(), sh,
-                       _key_of(_COLOUR_SPACES, marked.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
-                       _key_of(_ANTIALIAS, marked.get(ANTIALIAS_KEY), Antialias.CLASSIC),
-                       Frame.__members__.get(marked.get(FRAME_KEY), Frame.UNKNOWN))
+    columns = {'positions': _positions(data, n), 'rotations': _get(data, 'rotation', n, 4),
+               'scales': _get(data, 'scale', n, 3), 'base': _get(data, f'{prefix}:base', n, 4)}
+    return n, columns, [_get(data, f'{prefix}:sh_{i}', n, 3) for i in range(rest)]
+
+
+def _marks(data):
+    """What SplatArrays has beside its arrays."""
+    return (_key_of(_COLOUR_SPACES, data.get(COLOUR_SPACE_KEY), ColourSpace.DISPLAY),
+            _key_of(_ANTIALIAS, data.get(ANTIALIAS_KEY), Antialias.CLASSIC),
+            Frame.__members__.get(data.get(FRAME_KEY), Frame.UNKNOWN))
 
 
 def read_points(data, step=1):
     """Positions [n,3] and DC harmonics [n,3] of every step-th splat. Errors: StippleError for missing attributes."""
     n = count(data)
     positions, base = _positions(data, n).reshape(n, 3), _get(data, 'radiance:base', n, 4).reshape(n, 4)
-    return np.ascontiguousarray(positions[::step]), np.ascontiguousarray(base[::step, :3])
+    return positions[::step].copy(), base[::step, :3].copy()
 
 
 def fingerprint(data):
@@ -191,9 +219,7 @@ def fingerprint(data):
     n = count(data)
     value = zlib.crc32(str(n).encode())
     if isinstance(data, bpy.types.Mesh):
-        positions = np.empty(n * 3, np.float32)
-        data.vertices.foreach_get('co', positions)
-        value = zlib.crc32(positions, value)
+        value = zlib.crc32(_positions(data, n), value)
     for attribute in data.attributes:
         field = version.ATTRIBUTE_FIELDS.get(attribute.data_type)
         if attribute.domain != 'POINT' or field is None or not (
@@ -202,9 +228,7 @@ def fingerprint(data):
         if attribute.name == 'position' and isinstance(data, bpy.types.Mesh):
             continue
         width = {'FLOAT': 1, 'FLOAT_VECTOR': 3}.get(attribute.data_type, 4)
-        values = np.empty(n * width, np.float32)
-        attribute.data.foreach_get(field, values)
-        value = zlib.crc32(values, value)
+        value = zlib.crc32(version.attribute_values(attribute.data, field, n, width), value)
     return f'{value:08x}'
 
 
@@ -240,9 +264,7 @@ def _set(data, name, kind, values):
 
 def _positions(data, n):
     if isinstance(data, bpy.types.Mesh):
-        positions = np.empty(n * 3, np.float32)
-        data.vertices.foreach_get('co', positions)
-        return positions
+        return version.attribute_values(data.vertices, 'co', n, 3)
     return _get(data, 'position', n, 3)
 
 
@@ -251,9 +273,7 @@ def _get(data, name, n, width):
     if attribute is None:
         raise StippleError(f"'{data.name}' has no attribute '{name}'; a splat object needs position, scale, rotation "
                            'and radiance:base.', Status.ERROR_INVALID_ARGUMENT)
-    values = np.empty(n * width, np.float32)
-    attribute.data.foreach_get(version.ATTRIBUTE_FIELDS[attribute.data_type], values)
-    return values
+    return version.attribute_values(attribute.data, version.ATTRIBUTE_FIELDS[attribute.data_type], n, width)
 
 
 def _flat(values):

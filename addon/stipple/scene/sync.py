@@ -80,7 +80,7 @@ def _wanted(data, depsgraph, mode, most):
     if stipple.is_sequence:
         scene = bpy.context.scene if depsgraph is None else depsgraph.scene
         frame = sequences.frame_of(data, stipple, scene.frame_current, mode, most)
-        return frame.key, frame.arrays
+        return frame.key, frame.splats
     settings = sources.at_most(sources.decode_settings(stipple, mode), most)
     return written_key(data, settings), lambda: _decoded(data, settings)
 
@@ -88,7 +88,7 @@ def _wanted(data, depsgraph, mode, most):
 def _decoded(data, settings):
     settings.check()
     sources.check_unchanged(data)
-    return sources.decode_data(data, settings).read()
+    return sources.decode_data(data, settings).columns()
 
 
 def regrade(data, grade):
@@ -102,22 +102,22 @@ def regrade(data, grade):
     return True
 
 
-def write(data, arrays, key, grade=None):
-    """Stores splats, which are not graded, together with what they were made from. grade: None for the present one."""
-    grades.write(data, arrays, grades.settings_of(data.stipple) if grade is None else grade)
+def write(data, splats, key, grade=None):
+    """Stores splats (SplatArrays or CloudColumns), which are not graded, together with what they were made from. grade: None for the present one."""
+    grades.write(data, splats, grades.settings_of(data.stipple) if grade is None else grade)
     data[FINGERPRINT_KEY] = splat_data.fingerprint(data)
     data[WRITTEN_KEY] = key
 
 
-def write_decoded(data, arrays):
+def write_decoded(data, splats):
     """Stores splats that were decoded with the present settings."""
-    write(data, arrays, written_key(data, sources.decode_settings(data.stipple)))
+    write(data, splats, written_key(data, sources.decode_settings(data.stipple)))
 
 
 def write_shown(data):
     """Stores what a series shows at the present frame of the scene. Errors: StippleError for its file."""
     frame = sequences.frame_of(data, data.stipple, bpy.context.scene.frame_current, 'VIEWPORT')
-    write(data, frame.arrays(), frame.key)
+    write(data, frame.splats(), frame.key)
 
 
 def written_key(data, settings):

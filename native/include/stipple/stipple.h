@@ -197,6 +197,41 @@ void stipple_cloud_free(StippleCloud* cloud);
 StippleStatus stipple_cloud_info(const StippleCloud* cloud, StippleCloudInfo* info);
 /* Errors: BUFFER_TOO_SMALL when capacity < count. */
 StippleStatus stipple_cloud_read(const StippleCloud* cloud, const StippleCloudBuffers* buffers);
+/* Splats as Blender keeps them, each attribute in an array of its own. Harmonics above degree 0, in the order of
+ * StippleCloudArrays: as many as the degree has, (degree+1)^2 - 1. */
+typedef struct StippleCloudColumns {
+  uint32_t struct_size;
+  uint32_t sh_degree;      /* 0..4 */
+  uint32_t colour_space;   /* StippleColourSpace */
+  uint32_t antialias;      /* StippleAntialias */
+  uint64_t count;          /* N >= 0 */
+  const float* positions;  /* [N,3] metres */
+  const float* rotations;  /* [N,4] w,x,y,z; not zero (normalised on entry) */
+  const float* scales;     /* [N,3] linear standard deviations, metres, >= 0 */
+  const float* base;       /* [N,4] harmonics of degree 0, and the opacity, 0..1 */
+  const float* rest[24]; /* [N,3] each */
+  uint32_t frame;          /* StippleFrame */
+  uint32_t reserved;
+} StippleCloudColumns;
+
+/* Any pointer may be NULL (not wanted). capacity: splats that every given buffer has room for. Harmonics that the
+ * cloud does not have are filled with zeros. */
+typedef struct StippleCloudColumnBuffers {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t capacity;
+  float* positions;
+  float* rotations;
+  float* scales;
+  float* base;
+  float* rest[24];
+} StippleCloudColumnBuffers;
+
+/* As stipple_cloud_create and stipple_cloud_read, with the same errors. The cloud is the same from columns as from
+ * arrays. Threads: all. Cost: O(N); one pass over memory. */
+StippleStatus stipple_cloud_create_from_columns(StippleContext* context, const StippleCloudColumns* columns,
+                                                StippleCloud** cloud);
+StippleStatus stipple_cloud_read_columns(const StippleCloud* cloud, const StippleCloudColumnBuffers* buffers);
 /* Reads a splat file of any format that stipple_format_info lists. The format is told by its content. */
 StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8, StippleCloud** cloud);
 /* The same as a job (stipple_job_cloud), for reading ahead: a file that is missing or broken is an error of the

@@ -108,6 +108,43 @@ TEST_F(BadInput, PlacementsAndBackgroundsThatAreNotNumbersAreRefused) {
   stipple_job_free(job);
 }
 
+TEST_F(BadInput, ColumnsAreHeldToTheSameRangesAndAllThere) {
+  float position[3] = {0, 0, 0}, rotation[4] = {0, 2, 0, 0}, scale[3] = {1, 1, 1};
+  float base[4] = {0, 0, 0, 0.5f}, rest[3] = {1, 2, 3};
+  auto columns = sized<StippleCloudColumns>();
+  columns.count = 1;
+  columns.sh_degree = 1;
+  columns.positions = position;
+  columns.rotations = rotation;
+  columns.scales = scale;
+  columns.base = base;
+  columns.rest[0] = columns.rest[1] = rest;
+  StippleCloud* cloud = nullptr;
+  expectInvalid(stipple_cloud_create_from_columns(context_, &columns, &cloud),
+                "columns->rest[2] is NULL");
+  columns.rest[2] = rest;
+  base[3] = 1.5f;
+  expectInvalid(stipple_cloud_create_from_columns(context_, &columns, &cloud), "0 to 1 is allowed");
+  base[3] = 0.5f;
+  columns.sh_degree = 5;
+  expectInvalid(stipple_cloud_create_from_columns(context_, &columns, &cloud),
+                "columns->sh_degree is 5; 0 to 4 is allowed");
+  columns.sh_degree = 1;
+  columns.frame = 99;
+  expectInvalid(stipple_cloud_create_from_columns(context_, &columns, &cloud),
+                "columns->frame is 99");
+  columns.frame = STIPPLE_FRAME_RFU;
+  EXPECT_EQ(cloud, nullptr);
+  STIPPLE_ASSERT_OK(stipple_cloud_create_from_columns(context_, &columns, &cloud));
+  auto buffers = sized<StippleCloudColumnBuffers>();
+  buffers.rotations = rotation;
+  EXPECT_EQ(stipple_cloud_read_columns(cloud, &buffers), STIPPLE_ERROR_BUFFER_TOO_SMALL);
+  buffers.capacity = 1;
+  STIPPLE_EXPECT_OK(stipple_cloud_read_columns(cloud, &buffers));
+  EXPECT_EQ(rotation[1], 1.0f);  // normalised on entry
+  stipple_cloud_free(cloud);
+}
+
 TEST_F(BadInput, EveryArrayOfACloudIsHeldToItsRange) {
   const float nan = static_cast<float>(kNan), infinity = static_cast<float>(kInfinity);
   const struct {
