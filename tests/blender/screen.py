@@ -15,14 +15,14 @@ HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT = 1280, 800
 
 
-def run_steps(steps_file, folder, blender, timeout=300):
-    """Runs the steps of a file (window.py) and returns {name: picture [H,W,3] uint8}."""
+def run_steps(steps_file, folder, blender, timeout=300, size=(WIDTH, HEIGHT), arguments=()):
+    """Runs the steps of a file (window.py) and returns {name: picture [H,W,3] uint8} and what Blender has written."""
     if shutil.which('Xvfb') is None:
         pytest.skip('Xvfb is not installed: nothing can be shown in a window')
-    with Screen(folder) as screen:
+    with Screen(folder, size) as screen:
         environment = dict(os.environ, DISPLAY=screen.display, LIBGL_ALWAYS_SOFTWARE='1')
-        command = [blender, '--factory-startup', '--window-geometry', '0', '0', str(WIDTH), str(HEIGHT), '--python',
-                   str(HERE / 'window.py'), '--', str(steps_file), str(folder), str(screen.file)]
+        command = [blender, '--factory-startup', '--window-geometry', '0', '0', *map(str, size), '--python',
+                   str(HERE / 'window.py'), '--', str(steps_file), str(folder), str(screen.file), *arguments]
         with open(folder / 'log.txt', 'w') as log:
             process = subprocess.Popen(command, env=environment, cwd=folder, stdout=log, stderr=subprocess.STDOUT)
             try:
@@ -40,14 +40,15 @@ def run_steps(steps_file, folder, blender, timeout=300):
 class Screen:
     """An X server that keeps its picture in a file."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, size):
         self._folder = folder / 'screen'
+        self._size = 'x'.join(map(str, size))
         self.file = self._folder / 'Xvfb_screen0'
 
     def __enter__(self):
         self._folder.mkdir()
         reading, writing = os.pipe()
-        self._process = subprocess.Popen(['Xvfb', '-displayfd', str(writing), '-screen', '0', f'{WIDTH}x{HEIGHT}x24',
+        self._process = subprocess.Popen(['Xvfb', '-displayfd', str(writing), '-screen', '0', f'{self._size}x24',
                                           '-fbdir', str(self._folder), '-nolisten', 'tcp'], pass_fds=[writing],
                                          stderr=subprocess.DEVNULL)
         os.close(writing)

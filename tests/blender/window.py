@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs steps in a Blender with a window and takes pictures of its screen.
 
-    blender --factory-startup --python window.py -- STEPS.py FOLDER SCREEN
+    blender --factory-startup --python window.py -- STEPS.py FOLDER SCREEN [arguments of the steps...]
 
 STEPS.py defines `steps`: a list of functions of a Window, called one after the other with a pause for
 Blender to draw. A step that returns a name gets its picture, FOLDER/name.xwd, a copy of SCREEN: the frame
@@ -98,7 +98,7 @@ def main():
             return None
         return STEP_SECONDS
 
-    bpy.app.timers.register(advance, first_interval=1.0)
+    bpy.app.timers.register(advance, first_interval=1.0, persistent=True)
 
 
 main()
