@@ -3,14 +3,27 @@
 #include "api/camera.h"
 #include "api/guard.h"
 #include "api/handles.h"
+#include "base/parallel.h"
 #include "data/view_check.h"
 #include "data/view_colour.h"
+#include "io/dataset.h"
 #include "math/empty_depth.h"
 
 using namespace stipple;
 using namespace stipple::api;
 
 namespace {
+
+// Decoded, without distortion, and made smaller: three times four channels of float32.
+constexpr uint64_t kBytesPerPixelRead = 48;
+
+StippleViewsOpenOptions openDefaults() {
+  StippleViewsOpenOptions options = {};
+  options.struct_size = sizeof(options);
+  options.downscale = DatasetOptions().downscale;
+  options.cache_bytes = DatasetOptions().cache_bytes;
+  return options;
+}
 
 /// The views to change; a copy, which shares the pictures, where a job holds a share of them.
 MemoryViewSource& writable(StippleViews& views) {
@@ -73,6 +86,45 @@ void give(const std::vector<float>& values, size_t count, float otherwise, float
 }  // namespace
 
 extern "C" {
+
+void stipple_views_open_options_init(StippleViewsOpenOptions* options) {
+  if (options) *options = openDefaults();
+}
+
+StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
+                                 const StippleViewsOpenOptions* options, StippleViews** views) {
+  return guarded([&] {
+    require(context, "context");
+    require(views, "views");
+    const std::string path = &require(path_utf8, "path_utf8");
+    const StippleViewsOpenOptions given = completed(options, openDefaults(), "options");
+    const ContextState& state = *context->state;
+    DatasetOptions asked;
+    asked.downscale = given.downscale;
+    asked.cache_bytes = std::min(given.cache_bytes, state.memory_limit_bytes / 4);
+    std::shared_ptr<const Dataset> dataset;
+    withThreads(state.thread_count, [&] { dataset = openDataset(path, asked); });
+    auto made = std::make_unique<StippleViews>();
+    made->context = context->state;
+    for (size_t i = 0; i < dataset->count(); ++i) {
+      const DatasetView& source = dataset->source(i);
+      const Camera& seen_by = source.view.camera;
+      state.requireMemory(uint64_t{seen_by.width} * seen_by.height * kBytesPerPixelRead,
+                          ("reading " + source.image_path).c_str());
+      ViewNote note;
+      note.name = dataset->name(i);
+      note.image_path = source.image_path;
+      note.camera_model = source.view.camera_model.c_str();
+      note.split = static_cast<StippleViewSplit>(source.view.split);
+      note.source_width = seen_by.width;
+      note.source_height = seen_by.height;
+      note.is_distorted = source.view.lens.isDistorted();
+      made->notes.push_back(std::move(note));
+    }
+    made->source = std::move(dataset);
+    *views = made.release();
+  });
+}
 
 StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_space,
                                    StippleViews** views) {
@@ -187,7 +239,8 @@ StippleStatus stipple_views_read(const StippleViews* views, uint64_t index,
     const Camera& camera = views->source->camera(index);
     const size_t pixels = size_t{camera.width} * camera.height;
     requireCapacity(pixels, out.capacity, "pixels");
-    const ViewPicture picture = views->source->load(index);
+    ViewPicture picture;
+    withThreads(views->context->thread_count, [&] { picture = views->source->load(index); });
     if (out.rgba) {
       for (size_t i = 0; i < pixels; ++i) {
         std::copy_n(&picture.colour[i * 3], 3, out.rgba + i * 4);

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
+#include <system_error>
 
 #include "cli/commands.h"
 #include "cli/formats.h"
@@ -16,6 +18,12 @@ std::string endingOf(const std::string& path) {
   return ending;
 }
 
+bool isColmapFile(const std::string& path) {
+  const std::string name = std::filesystem::path(path).filename().string();
+  return name == "cameras.bin" || name == "cameras.txt" || name == "images.bin" ||
+         name == "images.txt";
+}
+
 }  // namespace
 
 bool hasModelEnding(const std::string& path) {
@@ -23,6 +31,8 @@ bool hasModelEnding(const std::string& path) {
 }
 
 FileKind fileKind(const std::string& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return FileKind::kViews;
   const std::string ending = endingOf(path);
   // A glTF file holds meshes, splats or both; splats go first, because fewer programs show them.
   if (ending == ".glb" || ending == ".gltf") {
@@ -34,7 +44,7 @@ FileKind fileKind(const std::string& path) {
   }
   if (hasSplatEnding(path)) return FileKind::kSplats;
   if (hasModelEnding(path)) return FileKind::kModel;
-  if (ending == ".json") return FileKind::kViews;
+  if (ending == ".json" || isColmapFile(path)) return FileKind::kViews;
   if (ending == ".vdb") return FileKind::kVolume;
   for (const char* image : {".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}) {
     if (ending == image) return FileKind::kImage;

@@ -1,4 +1,8 @@
+#include <algorithm>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "cli/commands.h"
 #include "cli/formats.h"
@@ -63,8 +67,86 @@ Report describeModel(const Context& context, const std::string& path) {
   return report;
 }
 
+/// What most of a data set's views share, in the order in which it is first met: "800 x 600: 20".
+class Tally {
+ public:
+  void count(const std::string& what) {
+    for (auto& [name, number] : counts_) {
+      if (name == what) {
+        ++number;
+        return;
+      }
+    }
+    counts_.emplace_back(what, 1);
+  }
+  std::string text() const {
+    // A data set of phones may have a size for every picture.
+    constexpr size_t kMostNames = 8;
+    std::string text;
+    for (size_t i = 0; i < std::min(counts_.size(), kMostNames); ++i) {
+      text += (i > 0 ? ", " : "") + counts_[i].first;
+      if (counts_.size() > 1) text += " (" + std::to_string(counts_[i].second) + ")";
+    }
+    if (counts_.size() > kMostNames) {
+      text += " and " + std::to_string(counts_.size() - kMostNames) + " more";
+    }
+    return text;
+  }
+
+ private:
+  std::vector<std::pair<std::string, size_t>> counts_;
+};
+
+std::string sizeText(uint32_t width, uint32_t height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+Report describeDataset(const Views& views) {
+  auto info = sized<StippleViewsInfo>();
+  check(stipple_views_info(views.get(), &info));
+  Tally models, file_sizes, sizes;
+  uint64_t distorted = 0, splits[4] = {};
+  for (uint64_t i = 0; i < info.view_count; ++i) {
+    auto view = sized<StippleViewInfo>();
+    auto camera = sized<StippleCamera>();
+    check(stipple_views_view_info(views.get(), i, &view));
+    check(stipple_views_camera(views.get(), i, &camera));
+    models.count(view.camera_model);
+    file_sizes.count(sizeText(view.source_width, view.source_height));
+    sizes.count(sizeText(camera.width, camera.height));
+    distorted += view.is_distorted;
+    if (view.split < 4) ++splits[view.split];
+  }
+  Report report;
+  report.add("kind", "data set");
+  report.add("count", info.view_count);
+  report.add("camera_models", models.text());
+  report.add("sizes", file_sizes.text());
+  if (distorted > 0) {
+    report.add("distorted", distorted);
+    report.add("sizes_without_distortion", sizes.text());
+  }
+  if (splits[STIPPLE_VIEW_SPLIT_NONE] < info.view_count) {
+    report.add("train", splits[STIPPLE_VIEW_SPLIT_TRAIN]);
+    report.add("test", splits[STIPPLE_VIEW_SPLIT_TEST]);
+    report.add("validation", splits[STIPPLE_VIEW_SPLIT_VALIDATION]);
+  }
+  report.add("points", info.point_count);
+  report.add("colour_space", info.colour_space == STIPPLE_COLOUR_DISPLAY ? "srgb_rec709_display"
+                                                                         : "lin_rec709_display");
+  return report;
+}
+
+/// Cameras with pictures are a data set; where pictures are missing, the cameras and why.
 Report describeViews(const Context& context, const std::string& path) {
-  const auto views = make<Views>(stipple_views_load, context.get(), path.c_str());
+  StippleViews* opened = nullptr;
+  const StippleStatus status = stipple_views_open(context.get(), path.c_str(), nullptr, &opened);
+  if (status == STIPPLE_OK) return describeDataset(Views(opened));
+  const std::string reason = stipple_last_error_message();
+  StippleViews* loaded = nullptr;
+  // Of two faults the first is told: without pictures it does not matter that lenses are distorted.
+  if (stipple_views_load(context.get(), path.c_str(), &loaded) != STIPPLE_OK) throw Failure(reason);
+  const Views views(loaded);
   uint64_t count = 0;
   check(stipple_views_count(views.get(), &count));
   Report report;
@@ -78,6 +160,7 @@ Report describeViews(const Context& context, const std::string& path) {
     report.add("width", uint64_t{camera.width});
     report.add("height", uint64_t{camera.height});
   }
+  report.add("pictures", "none: " + reason);
   return report;
 }
 
@@ -135,7 +218,9 @@ void addInfo(CLI::App& app, const Context& context) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("info", "What a file holds");
-  command->add_option("file", arguments->path, "Splats, mesh, model, cameras, volume or picture")
+  command
+      ->add_option("file", arguments->path,
+                   "Splats, mesh, model, cameras, a data set's folder, volume or picture")
       ->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback(

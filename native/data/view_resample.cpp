@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -127,7 +128,7 @@ Camera undistortedCamera(const Camera& seen_by, const Lens& lens) {
   const double top = extent(seen_by, lens, {0, -1}, limit);
   const double bottom = extent(seen_by, lens, {0, 1}, limit);
   const double width = (left + right) * seen_by.fx, height = (top + bottom) * seen_by.fy;
-  if (!(width > 0) || !(height > 0)) {
+  if (!(width > 0) || !(height > 0) || !std::isfinite(width * height)) {
     fail(ErrorCode::kUnsupported,
          "the camera's distortion cannot be taken out: its model folds the picture over at its "
          "principal point, or that point lies outside of the picture");
@@ -143,6 +144,13 @@ Camera undistortedCamera(const Camera& seen_by, const Lens& lens) {
   camera.fy = camera.height / (top + bottom);
   camera.cx = camera.fx * left;
   camera.cy = camera.fy * top;
+  try {
+    validate(camera);
+  } catch (const Error& error) {
+    fail(
+        ErrorCode::kUnsupported,
+        std::string("the camera's distortion cannot be taken out: without it the ") + error.what());
+  }
   return camera;
 }
 

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Views with pictures through the C header."""
 
+import json
+import os
+
 import numpy as np
 import pytest
 
 from stipple.binding.errors import StippleError
-from stipple.binding.structs import ColourSpace, StippleCamera, Transfer
+from stipple.binding.image import Image
+from stipple.binding.structs import ColourSpace, StippleCamera, Transfer, ViewSplit
 from stipple.binding.views import Views
 
 
@@ -40,6 +44,25 @@ def test_pictures_and_points_come_back(context):
     np.testing.assert_array_equal(with_space.points()[1], colours)
     info = with_space.info()
     assert (info.view_count, info.point_count, info.has_pictures) == (2, 5, 1)
+
+
+def test_a_data_set_is_read_from_its_folder(context, tmp_path):
+    pixels = np.full((6, 8, 3), 51 / 255, np.float32)
+    Image.create(context, pixels, Transfer.SRGB).save(tmp_path / 'a.png')
+    matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]
+    (tmp_path / 'transforms_train.json').write_text(json.dumps(
+        {'camera_angle_x': 1.0, 'frames': [{'file_path': './a', 'transform_matrix': matrix}]}))
+    views = Views.open(context, tmp_path, downscale=2)
+    assert len(views) == 1
+    info = views.view_info(0)
+    assert ViewSplit(info.split) == ViewSplit.TRAIN
+    assert (info.source_width, info.source_height) == (8, 6)
+    assert os.path.samefile(info.image_path.decode(), tmp_path / 'a.png')
+    assert (views.camera(0).width, views.camera(0).height) == (4, 3)
+    rgba, weights, _, _ = views.read(0)
+    # Kept in 16 bits.
+    np.testing.assert_allclose(rgba[..., :3], 51 / 255, atol=1 / 131070)
+    assert (weights == 1).all()
 
 
 def test_wrong_shapes_are_one_clear_error(context):

@@ -72,12 +72,31 @@ def scene(tmp_path_factory):
     return folder
 
 
+def test_info_describes_a_data_set(tmp_path, scene):
+    (tmp_path / 'images').mkdir()
+    run('render', scene / 'cube.ply', '--camera', scene / 'transforms.json', '-o', tmp_path / 'images' / 'a.png')
+    sparse = tmp_path / 'sparse' / '0'
+    sparse.mkdir(parents=True)
+    (sparse / 'cameras.txt').write_text('1 OPENCV 96 64 90 90 48 32 -0.1 0.02 0 0\n2 PINHOLE 96 64 90 90 48 32\n')
+    (sparse / 'images.txt').write_text('1 1 0 0 0 0 0 3 1 a.png\n\n2 1 0 0 0 0 0 3 2 a.png\n\n')
+    (sparse / 'points3D.txt').write_text('1 0 0 0 255 0 0 0.5 1 0\n')
+    for path in (tmp_path, sparse, sparse / 'images.txt'):
+        info = figures('info', path)
+        assert (info['kind'], info['count'], info['points'], info['distorted']) == ('data set', 2, 1, 1)
+        assert info['camera_models'] == 'OPENCV (1), PINHOLE (1)'
+        assert info['sizes'] == '96 x 64'
+    (tmp_path / 'images' / 'a.png').unlink()
+    assert "'a.png' is missing" in error('info', tmp_path)
+
+
 def test_info_describes_each_kind(scene):
     assert figures('info', scene / 'cube.glb')['triangles'] == 12
     splats = figures('info', scene / 'cube.ply')
     assert splats['count'] == 5000 and splats['colour_space'] == 'srgb_rec709_display'
     assert all(abs(value + 0.5) < 0.01 for value in splats['bounds_min'])
-    assert figures('info', scene / 'transforms.json')['count'] == 1
+    cameras = figures('info', scene / 'transforms.json')
+    assert (cameras['kind'], cameras['count']) == ('cameras', 1)
+    assert 'a.png' in cameras['pictures']
 
 
 def test_decode_gives_the_budget_times_k(scene):

@@ -104,6 +104,8 @@ FUNCTIONS = {
     'stipple_views_camera': (_status, [_handle, c_uint64, _to(s.StippleCamera)]),
     'stipple_camera_resize': (_status, [_to(s.StippleCamera), c_uint32, c_uint32]),
     # views with pictures
+    'stipple_views_open_options_init': (None, [_to(s.StippleViewsOpenOptions)]),
+    'stipple_views_open': (_status, [_handle, _path, _to(s.StippleViewsOpenOptions), _out_handle]),
     'stipple_views_create': (_status, [_handle, c_uint32, _out_handle]),
     'stipple_views_add': (_status, [_handle, _to(s.StippleCamera), _to(s.StippleViewPicture), c_char_p]),
     'stipple_views_set_points': (_status, [_handle, _to(s.StippleViewPoints)]),

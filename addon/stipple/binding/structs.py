@@ -302,6 +302,10 @@ class StippleCamera(_Sized):
                 ('near_plane', c_double), ('far_plane', c_double)]
 
 
+class StippleViewsOpenOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('downscale', c_uint32), ('cache_bytes', c_uint64)]
+
+
 class StippleViewPicture(_Sized):
     _fields_ = [('struct_size', c_uint32), ('transfer', c_uint32), ('rgba', _floats), ('weights', _floats),
                 ('depth', _floats), ('normals', _floats)]

@@ -8,7 +8,7 @@ import numpy as np
 from .errors import check, invalid
 from .handle import Handle, contiguous, new_handle, path_bytes, pointer_to
 from .structs import (ColourSpace, StippleCamera, StippleViewBuffers, StippleViewInfo, StippleViewPicture,
-                      StippleViewPoints, StippleViewsInfo, Transfer)
+                      StippleViewPoints, StippleViewsInfo, StippleViewsOpenOptions, Transfer)
 
 
 class Views(Handle):
@@ -19,6 +19,15 @@ class Views(Handle):
         """Cameras alone."""
         return cls(context.library,
                    new_handle(context.library, 'stipple_views_load', context.pointer, path_bytes(path)))
+
+    @classmethod
+    def open(cls, context, path, downscale=1):
+        """A photo data set with its pictures."""
+        options = StippleViewsOpenOptions()
+        context.library.stipple_views_open_options_init(byref(options))
+        options.downscale = downscale
+        return cls(context.library, new_handle(context.library, 'stipple_views_open', context.pointer,
+                                               path_bytes(path), byref(options)))
 
     @classmethod
     def create(cls, context, colour_space=ColourSpace.DISPLAY):

@@ -55,6 +55,11 @@ def _draw_convert(self, _context):
 
 def _draw_import(self, _context):
     self.layout.operator('stipple.splats_import', text="Gaussian Splats")
+    self.layout.operator('stipple.cameras_import', text="Cameras of Photos (COLMAP, transforms.json)")
+
+
+def _draw_background_images(self, _context):
+    self.layout.operator('stipple.cameras_import', icon='FILE_FOLDER')
 
 
 def _draw_export(self, _context):
@@ -62,7 +67,8 @@ def _draw_export(self, _context):
 
 
 _MENUS = (('VIEW3D_MT_add', _draw_add), ('VIEW3D_MT_object_convert', _draw_convert),
-          ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import), ('TOPBAR_MT_file_export', _draw_export))
+          ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import), ('TOPBAR_MT_file_export', _draw_export),
+          ('DATA_PT_camera_background_image', _draw_background_images))
 
 
 def register():

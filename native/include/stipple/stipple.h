@@ -596,9 +596,9 @@ typedef struct StippleCamera {
   double far_plane;
 } StippleCamera;
 
-/* Reads transforms.json (nerfstudio, NeRF-synthetic) or a COLMAP model. path_utf8: a file, or a folder
- * with transforms.json, else with images.bin or images.txt in it or in sparse/0. Distorted cameras are
- * STIPPLE_ERROR_UNSUPPORTED. */
+/* Reads the cameras of transforms.json (nerfstudio, NeRF-synthetic) or a COLMAP model. path_utf8: a file, or a
+ * folder with transforms.json, else with transforms_train.json (and _test, _val), else with images.bin or images.txt
+ * in it or in sparse/0. Distorted cameras are STIPPLE_ERROR_UNSUPPORTED: stipple_views_open gives pinholes. */
 StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8, StippleViews** views);
 void stipple_views_free(StippleViews* views);
 StippleStatus stipple_views_count(const StippleViews* views, uint64_t* count);
@@ -610,7 +610,7 @@ StippleStatus stipple_camera_resize(StippleCamera* camera, uint32_t width, uint3
 
 /* ---- views with pictures ------------------------------------------------------------------------ */
 
-/* What splats are fitted to: renders that are handed in. */
+/* What splats are fitted to: photographs from files, or renders that are handed in. */
 
 /* One picture; arrays are read during the call. Row 0 = top; the size is that of the camera. */
 typedef struct StippleViewPicture {
@@ -674,6 +674,23 @@ typedef struct StippleViewBuffers {
   float* normals;  /* [H,W,3] world; 0 where unknown */
 } StippleViewBuffers;
 
+typedef struct StippleViewsOpenOptions {
+  uint32_t struct_size;
+  uint32_t downscale;    /* 1..64, default 1: pixels of the file along each side of a pixel, averaged by area */
+  uint64_t cache_bytes;  /* decoded pictures that stay in memory, default 1 GiB; at most a quarter of the
+                            context's limit. The others are read again when they are wanted */
+} StippleViewsOpenOptions;
+void stipple_views_open_options_init(StippleViewsOpenOptions* options);
+
+/* Opens a photo data set: a COLMAP model with its pictures, transforms.json of nerfstudio, or a NeRF-synthetic
+ * folder (path_utf8 as in stipple_views_load); options may be NULL. Lens distortion is taken out of pictures as
+ * they are read: cameras are pinholes. The colour space is that of the first picture: display of 8 and 16 bits,
+ * scene linear of float. Masks give the weights. docs/formats.md, Data sets.
+ * Errors: IO where pictures are missing, with the first of them; FORMAT; UNSUPPORTED for camera models that are not
+ * known; MEMORY_LIMIT where the largest picture cannot be read within it. No picture is decoded.
+ * Cost: a look at every file's header where the cameras say no size. */
+StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
+                                 const StippleViewsOpenOptions* options, StippleViews** views);
 /* No views yet. In: colour_space, a StippleColourSpace: that of the splats to be. */
 StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_space, StippleViews** views);
 /* Copies the picture. name_utf8 may be NULL: "view" and its number. A job that uses the views does not see

@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <stdlib.h>
+
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <string>
 #include <vector>
@@ -151,6 +155,106 @@ TEST_F(ViewsTest, KeepsPoints) {
             STIPPLE_ERROR_BUFFER_TOO_SMALL);
   points.count = UINT64_MAX;
   EXPECT_NE(stipple_views_set_points(views_, &points), STIPPLE_OK);
+}
+
+/// A folder with one distorted picture of 8 x 6 pixels, whose value is 0.5, and its camera.
+class DatasetFolder : public ViewsTest {
+ protected:
+  void SetUp() override {
+    ViewsTest::SetUp();
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "stipple_views_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    const std::vector<float> pixels(8 * 6 * 3, 128.0f / 255.0f);
+    StippleImage* image = nullptr;
+    STIPPLE_ASSERT_OK(
+        stipple_image_create(context_, 8, 6, 3, STIPPLE_TRANSFER_SRGB, pixels.data(), &image));
+    STIPPLE_ASSERT_OK(stipple_image_save(image, (folder_ / "a.png").c_str(), 0));
+    stipple_image_free(image);
+    std::ofstream(folder_ / "transforms.json")
+        << "{\"camera_model\": \"OPENCV\", \"fl_x\": 8, \"w\": 8, \"h\": 6, \"k1\": -0.1, "
+           "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": "
+           "[[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}";
+  }
+  void TearDown() override {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+    ViewsTest::TearDown();
+  }
+  std::filesystem::path folder_;
+};
+
+TEST_F(DatasetFolder, OpensWithItsPictures) {
+  StippleViews* views = nullptr;
+  STIPPLE_ASSERT_OK(stipple_views_open(context_, folder_.c_str(), nullptr, &views));
+  auto info = sized<StippleViewsInfo>();
+  STIPPLE_ASSERT_OK(stipple_views_info(views, &info));
+  EXPECT_EQ(info.view_count, 1u);
+  EXPECT_EQ(info.has_pictures, 1u);
+  auto view = sized<StippleViewInfo>();
+  STIPPLE_ASSERT_OK(stipple_views_view_info(views, 0, &view));
+  EXPECT_STREQ(view.name, "a.png");
+  EXPECT_EQ(view.image_path, (folder_ / "a.png").string());
+  EXPECT_STREQ(view.camera_model, "OPENCV");
+  EXPECT_EQ(view.is_distorted, 1u);
+  EXPECT_EQ(view.source_width, 8u);
+  auto camera = sized<StippleCamera>();
+  STIPPLE_ASSERT_OK(stipple_views_camera(views, 0, &camera));
+  std::vector<float> rgba(size_t{camera.width} * camera.height * 4);
+  auto buffers = sized<StippleViewBuffers>();
+  buffers.capacity = uint64_t{camera.width} * camera.height;
+  buffers.rgba = rgba.data();
+  STIPPLE_ASSERT_OK(stipple_views_read(views, 0, &buffers));
+  const size_t middle = (size_t{camera.height} / 2 * camera.width + camera.width / 2) * 4;
+  EXPECT_EQ(rgba[middle], 128.0f / 255.0f);
+  EXPECT_EQ(rgba[middle + 3], 1.0f);
+  // Views of files do not grow.
+  const StippleViewPicture given = picture(rgba_);
+  EXPECT_EQ(stipple_views_add(views, &camera_, &given, nullptr), STIPPLE_ERROR_INVALID_ARGUMENT);
+  stipple_views_free(views);
+}
+
+TEST_F(DatasetFolder, ObeysItsOptionsAndTheMemoryLimit) {
+  StippleViewsOpenOptions options;
+  stipple_views_open_options_init(&options);
+  EXPECT_EQ(options.downscale, 1u);
+  options.downscale = 2;
+  StippleViews* views = nullptr;
+  STIPPLE_ASSERT_OK(stipple_views_open(context_, folder_.c_str(), &options, &views));
+  auto camera = sized<StippleCamera>();
+  STIPPLE_ASSERT_OK(stipple_views_camera(views, 0, &camera));
+  EXPECT_NEAR(camera.width, 4, 1);
+  stipple_views_free(views);
+  options.downscale = 65;
+  EXPECT_EQ(stipple_views_open(context_, folder_.c_str(), &options, &views),
+            STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(stipple_last_error_message(), "downscale is 65; 1 to 64 is allowed");
+
+  StippleContextOptions small;
+  stipple_context_options_init(&small);
+  small.memory_limit_bytes = 1000;
+  StippleContext* context = nullptr;
+  STIPPLE_ASSERT_OK(stipple_context_create(&small, &context));
+  EXPECT_EQ(stipple_views_open(context, folder_.c_str(), nullptr, &views),
+            STIPPLE_ERROR_MEMORY_LIMIT);
+  stipple_context_free(context);
+}
+
+TEST_F(DatasetFolder, CamerasAloneHaveNoPictures) {
+  StippleViews* views = nullptr;
+  EXPECT_EQ(stipple_views_load(context_, folder_.c_str(), &views), STIPPLE_ERROR_UNSUPPORTED);
+  std::ofstream(folder_ / "transforms.json")
+      << "{\"fl_x\": 8, \"w\": 8, \"h\": 6, \"frames\": [{\"file_path\": \"none.png\", "
+         "\"transform_matrix\": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}";
+  EXPECT_EQ(stipple_views_open(context_, folder_.c_str(), nullptr, &views), STIPPLE_ERROR_IO);
+  STIPPLE_ASSERT_OK(stipple_views_load(context_, folder_.c_str(), &views));
+  auto info = sized<StippleViewsInfo>();
+  STIPPLE_ASSERT_OK(stipple_views_info(views, &info));
+  EXPECT_EQ(info.has_pictures, 0u);
+  auto buffers = sized<StippleViewBuffers>();
+  EXPECT_EQ(stipple_views_read(views, 0, &buffers), STIPPLE_ERROR_UNSUPPORTED);
+  stipple_views_free(views);
 }
 
 }  // namespace
