@@ -51,9 +51,11 @@ class Adaptive final : public Strategy {
 
   std::optional<SplatEdit> edit(const FitMoment& moment, const SplatStore& store) override {
     if (!isLearning(moment) || store.splats.size() == 0) return {};
+    const uint64_t interval =
+        std::max(options_.least_interval, scaleSchedule(options_.interval, moment.iterations));
     const bool multiplies =
         moment.iteration > scaleSchedule(options_.first, moment.iterations) &&
-        moment.iteration % scaleSchedule(options_.interval, moment.iterations) == 0;
+        moment.iteration % interval == 0;
     const bool resets = resetIsDue(moment);
     if (!multiplies && !resets) return {};
     SplatEdit edit;

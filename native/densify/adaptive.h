@@ -12,6 +12,10 @@ struct AdaptiveOptions {
   uint64_t first = 500;     ///< splats are added and removed after this iteration
   uint64_t last = 15000;    ///< and before this one
   uint64_t interval = 100;  ///< iterations from one edit to the next
+  /// Steps from one edit to the next at least, however short the fit: new splats must have taken
+  /// their places, and views been seen, before the pulls say where more are needed; else the count
+  /// doubles with every edit.
+  uint64_t least_interval = 50;
   /// Mean length of the screen gradient, per half picture, from which on a splat is too few for
   /// what it covers. Raising it makes fewer splats.
   double gradient_threshold = 2e-4;

@@ -9,6 +9,7 @@
 #include "base/progress.h"
 #include "data/splat_cloud.h"
 #include "data/view_source.h"
+#include "densify/strategy.h"
 #include "train/fit_model.h"
 
 namespace stipple {
@@ -24,7 +25,7 @@ struct ExplicitModelOptions {
 };
 
 /// Splats with parameters of their own, started from what the views know of surfaces: their points,
-/// else their depth, else the volume that the cameras share.
+/// else their depth, else the volume that the cameras share (start_splats.h).
 /// In: training: the views that may be looked at. Source of constants: Kerbl, Kopanas, Leimkuehler,
 /// Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023.
 /// Errors: kInvalidArgument for no views, options out of range, an unknown strategy (says which
@@ -33,5 +34,11 @@ std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
                                             std::span<const size_t> training,
                                             const ExplicitModelOptions& options,
                                             Progress* progress = nullptr);
+
+/// The same from splats that are there, with a strategy of the caller's; of options, seed and
+/// start_splats count for nothing.
+std::unique_ptr<FitModel> makeExplicitModel(const SplatCloud& start,
+                                            std::unique_ptr<Strategy> strategy,
+                                            const ExplicitModelOptions& options);
 
 }  // namespace stipple

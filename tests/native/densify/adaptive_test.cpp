@@ -265,22 +265,39 @@ TEST(Adaptive, KeepsThePublishedSchedule) {
   EXPECT_THAT(resets, ElementsAre(3000, 6000, 9000, 12000));
 }
 
-TEST(Adaptive, ShortFitsScaleTheScheduleAndLeaveResetsOut) {
+TEST(Adaptive, ShortFitsScaleTheScheduleWithinReason) {
   const RawSplats splats = splatsOf({{0.005f, 0.5f}});
-  const auto count = [&](uint64_t iterations) {
+  struct Edits {
+    uint64_t first = 0, last = 0;
+    int count = 0, resets = 0;
+  };
+  const auto editsOf = [&](uint64_t iterations) {
     const auto strategy = makeAdaptive();
-    std::pair<int, int> edits_and_resets;
+    Edits edits;
     for (uint64_t iteration = 1; iteration <= iterations; ++iteration) {
       FitMoment moment = at(iteration);
       moment.iterations = iterations;
       const auto edit = editAt(*strategy, moment, splats);
-      edits_and_resets.first += edit.has_value();
-      edits_and_resets.second += edit && !edit->writes.empty();
+      if (!edit) continue;
+      if (edits.count++ == 0) edits.first = iteration;
+      edits.last = iteration;
+      edits.resets += !edit->writes.empty();
     }
-    return edits_and_resets;
+    return edits;
   };
-  EXPECT_EQ(count(3000), std::make_pair(144, 4));
-  EXPECT_EQ(count(1500), std::make_pair(144, 0));
+  // Half the length, half the interval.
+  const Edits half = editsOf(15000);
+  EXPECT_EQ(half.count, 144);
+  EXPECT_EQ(half.resets, 4);
+  EXPECT_EQ(half.first, 300u);
+  EXPECT_EQ(half.last, 7450u);
+  // Edits need 50 steps between them, resets 300.
+  const Edits tenth = editsOf(3000);
+  EXPECT_EQ(tenth.count, 28);  // 100, 150, ..., 1450
+  EXPECT_EQ(tenth.resets, 4);
+  const Edits short_one = editsOf(500);
+  EXPECT_EQ(short_one.count, 4);  // 50, 100, 150, 200
+  EXPECT_EQ(short_one.resets, 0);
   EXPECT_EQ(scaleSchedule(500, 30), 1u);
   EXPECT_EQ(scaleSchedule(100, 1), 1u);
   EXPECT_EQ(scaleSchedule(15000, 60000), 30000u);

@@ -1,0 +1,206 @@
+#include "train/start_splats.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "base/parallel.h"
+#include "math/colour.h"
+#include "train/fit_scene.h"
+
+namespace stipple {
+namespace {
+
+using namespace stipple::testing;
+
+std::shared_ptr<MemoryViewSource> emptyViews(const std::vector<Camera>& cameras) {
+  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  for (const Camera& camera : cameras) {
+    ViewPicture picture;
+    picture.width = camera.width;
+    picture.height = camera.height;
+    picture.colour.assign(size_t{camera.width} * camera.height * 3, 0.25f);
+    views->add(camera, std::move(picture));
+  }
+  return views;
+}
+
+SplatCloud startOf(const MemoryViewSource& views, const StartOptions& options = {}) {
+  return startSplats(views, allViews(views), options);
+}
+
+TEST(StartSplats, StandAtThePointsAsLargeAsTheirNeighboursAreFar) {
+  const auto views = emptyViews(camerasAround(4, 16));
+  PointSet points;
+  // A unit cube's corners: three neighbours at 1 each; and two far apart.
+  for (int corner = 0; corner < 8; ++corner) {
+    for (int axis = 0; axis < 3; ++axis) {
+      points.positions.push_back(static_cast<float>(corner >> axis & 1));
+    }
+    points.colours.insert(points.colours.end(), {0.2f, 0.5f, 1.0f});
+    points.opacities.push_back(1);
+  }
+  views->setPoints(points);
+  const SplatCloud cloud = startOf(*views);
+  ASSERT_EQ(cloud.size(), 8u);
+  EXPECT_EQ(cloud.sh_degree, 3);
+  for (size_t i = 0; i < 8; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(cloud.scales[i * 3 + k], 1, 1e-6f);
+      EXPECT_EQ(cloud.positions[i * 3 + k], points.positions[i * 3 + k]);
+      const float colour = kShC0 * cloud.sh[i * 48 + k] + 0.5f;
+      EXPECT_NEAR(colour, linearToSrgb(points.colours[k]), 1e-6f);
+    }
+    EXPECT_EQ(cloud.opacities[i], 0.1f);
+    EXPECT_EQ(cloud.rotations[i * 4], 1.0f);
+    EXPECT_EQ(cloud.sh[i * 48 + 20], 0.0f);
+  }
+}
+
+TEST(StartSplats, PointsAtOnePlaceAndAPointAloneHaveASize) {
+  const auto views = emptyViews(camerasAround(4, 16));
+  PointSet points;
+  points.positions.assign(30, 0.5f);
+  points.colours.assign(30, 0.5f);
+  points.opacities.assign(10, 1.0f);
+  views->setPoints(points);
+  // sqrt(1e-7).
+  for (const float scale : startOf(*views).scales) EXPECT_NEAR(scale, 3.162e-4f, 1e-6f);
+  points.positions.resize(3);
+  points.colours.resize(3);
+  points.opacities.resize(1);
+  views->setPoints(points);
+  const SplatCloud one = startOf(*views);
+  ASSERT_EQ(one.size(), 1u);
+  EXPECT_GT(one.scales[0], 0.02f);  // a hundredth of the distance of the nearest camera
+  EXPECT_LT(one.scales[0], 0.05f);
+}
+
+TEST(StartSplats, FewerThanThePointsAreDrawnByWeight) {
+  const auto views = emptyViews(camerasAround(2, 16));
+  PointSet points = pointsOf(ballOfSplats(4000, 3), 0, 1);
+  points.weights.assign(4000, 1.0f);
+  for (size_t i = 0; i < 1000; ++i) points.weights[i] = 9.0f;
+  for (size_t i = 1000; i < 2000; ++i) points.weights[i] = 0.0f;
+  views->setPoints(points);
+  std::map<float, size_t> row_of;
+  for (size_t i = 0; i < 4000; ++i) row_of[points.positions[i * 3]] = i;
+  StartOptions options;
+  options.count = 500;
+  const SplatCloud cloud = startOf(*views, options);
+  ASSERT_EQ(cloud.size(), 500u);
+  size_t heavy = 0;
+  for (size_t i = 0; i < 500; ++i) {
+    const size_t row = row_of.at(cloud.positions[i * 3]);
+    EXPECT_FALSE(row >= 1000 && row < 2000);
+    heavy += row < 1000;
+  }
+  // 9000 of 11000 of the weight, less as heavy ones run out: about 395, +-5 standard deviations.
+  EXPECT_NEAR(static_cast<double>(heavy), 395, 45);
+  EXPECT_EQ(startOf(*views, options).positions, cloud.positions);
+  options.seed = 1;
+  EXPECT_NE(startOf(*views, options).positions, cloud.positions);
+  options.max_count = 100;
+  EXPECT_EQ(startOf(*views, options).size(), 100u);
+  options.count = 0;
+  EXPECT_EQ(startOf(*views, options).size(), 100u);
+}
+
+TEST(StartSplats, WithoutPointsTheyStandOnWhatDepthShows) {
+  // A wall at z = 5 before a camera at the origin, half of it transparent.
+  Camera camera;
+  camera.width = 40;
+  camera.height = 30;
+  camera.fx = camera.fy = 30;
+  camera.cx = 20;
+  camera.cy = 15;
+  ViewPicture picture;
+  picture.width = 40;
+  picture.height = 30;
+  picture.colour.assign(1200 * 3, 0.5f);
+  picture.depth.assign(1200, 5.0f);
+  picture.alpha.assign(1200, 1.0f);
+  for (size_t i = 0; i < 1200; ++i) {
+    if (i % 40 >= 20) picture.alpha[i] = 0;
+    if (i / 40 < 5) picture.depth[i] = 0;
+  }
+  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  views->add(camera, picture);
+  StartOptions options;
+  options.count = 200;
+  const SplatCloud cloud = startOf(*views, options);
+  ASSERT_EQ(cloud.size(), 200u);
+  for (size_t i = 0; i < 200; ++i) {
+    EXPECT_NEAR(cloud.positions[i * 3 + 2], 5, 1e-5f);
+    EXPECT_LT(cloud.positions[i * 3], 0);                    // left of the middle
+    EXPECT_GT(cloud.positions[i * 3 + 1], -10.0f / 30 * 5);  // below the fifth row
+    EXPECT_NEAR(kShC0 * cloud.sh[i * 48] + 0.5f, 0.5f, 1e-6f);
+  }
+  // As many as there are pixels, once each.
+  options.count = 100000;
+  EXPECT_EQ(startOf(*views, options).size(), 500u);
+}
+
+TEST(StartSplats, WithoutDepthTheyFillWhatTheCamerasShare) {
+  const auto views = emptyViews(camerasAround(10, 32));
+  StartOptions options;
+  options.count = 2000;
+  const SplatCloud cloud = startOf(*views, options);
+  ASSERT_EQ(cloud.size(), 2000u);
+  // Cameras at 3.5 see sin(atan(0.5/1.1)) of that: a ball of radius 1.448.
+  double largest = 0;
+  Vec3d mean = Vec3d::Zero();
+  for (size_t i = 0; i < 2000; ++i) {
+    const Vec3d place(static_cast<double>(cloud.positions[i * 3]),
+                      static_cast<double>(cloud.positions[i * 3 + 1]),
+                      static_cast<double>(cloud.positions[i * 3 + 2]));
+    largest = std::max(largest, place.norm());
+    mean += place / 2000;
+  }
+  EXPECT_LT(largest, 1.46);
+  EXPECT_GT(largest, 1.38);
+  EXPECT_LT(mean.norm(), 0.1);
+  SplatCloud others[2];
+  for (const unsigned threads : {1u, 2u}) {
+    withThreads(threads, [&] { others[threads - 1] = startOf(*views, options); });
+  }
+  EXPECT_EQ(others[0].positions, cloud.positions);
+  EXPECT_EQ(others[1].scales, cloud.scales);
+}
+
+TEST(StartSplats, AnyCamerasGiveAStart) {
+  // One camera; cameras that look away from each other; all at one place; parallel ones.
+  std::vector<Camera> outward = camerasAround(6, 16, 0.1);
+  for (Camera& camera : outward) {
+    camera.world_to_camera.row(0) *= -1;  // turned about y
+    camera.world_to_camera.row(2) *= -1;
+  }
+  std::vector<Camera> same(3, camerasAround(1, 16)[0]);
+  std::vector<Camera> parallel = same;
+  for (size_t i = 0; i < 3; ++i) parallel[i].world_to_camera(0, 3) += static_cast<double>(i);
+  std::vector<Camera> flat = camerasAround(5, 16);
+  for (Camera& camera : flat) {
+    camera.model = CameraModel::kOrthographic;
+    camera.fx = camera.fy = 8;
+  }
+  for (const std::vector<Camera>& cameras : {camerasAround(1, 16), outward, same, parallel, flat}) {
+    const auto views = emptyViews(cameras);
+    StartOptions options;
+    options.count = 300;
+    const SplatCloud cloud = startOf(*views, options);
+    EXPECT_GE(cloud.size(), 250u);
+    validate(cloud, "start");
+    // Somebody sees most of them.
+    size_t seen = 0;
+    for (const Camera& camera : cameras) {
+      const SplatInstance instance{&cloud};
+      seen += renderTiled({&instance, 1}, camera, {}).visible_count;
+    }
+    EXPECT_GT(seen, cloud.size() / 2);
+  }
+}
+
+}  // namespace
+}  // namespace stipple

@@ -1,0 +1,126 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "train/explicit_model.h"
+#include "train/fit_scene.h"
+
+// Fits of views that say little, wrong things or nothing, with traps on: every number stays finite.
+
+namespace stipple {
+namespace {
+
+using namespace stipple::testing;
+
+void expectFinite(const TensorTable& table) {
+  for (const auto& [name, tensor] : table) {
+    const auto* values = std::get_if<std::vector<float>>(&tensor.values);
+    if (!values) continue;
+    for (const float value : *values) ASSERT_TRUE(std::isfinite(value)) << name;
+  }
+}
+
+/// A fit of `iterations`, of the schedule of 3000, so that edits and resets come.
+std::unique_ptr<FitModel> fitted(const MemoryViewSource& views, uint64_t iterations,
+                                 const ExplicitModelOptions& options = {}, double extent = 3.85) {
+  auto model = makeExplicitModel(views, allViews(views), options);
+  Fit fit(views, *model, 3000);
+  fit.moment().extent = extent;
+  for (uint64_t done = 100; done <= iterations; done += 100) {
+    EXPECT_TRUE(std::isfinite(fit.run(done).loss));
+    expectFinite(model->state());
+  }
+  validate(model->splats(0), "fitted");
+  return model;
+}
+
+std::shared_ptr<MemoryViewSource> constantViews(float colour, float alpha, size_t count) {
+  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  for (const Camera& camera : camerasAround(count, 24)) {
+    ViewPicture picture;
+    picture.width = picture.height = 24;
+    picture.colour.assign(24 * 24 * 3, colour * alpha);
+    picture.alpha.assign(24 * 24, alpha);
+    views->add(camera, std::move(picture));
+  }
+  views->setPoints(pointsOf(ballOfSplats(50, 3), 0, 1));
+  return views;
+}
+
+ExplicitModelOptions small() {
+  ExplicitModelOptions options;
+  options.sh_degree = 1;
+  options.max_splats = 300;
+  return options;
+}
+
+TEST(FittingStability, OneCameraAndNoExtent) {
+  const SplatCloud truth = ballOfSplats(40, 1);
+  const auto views = viewsOf(truth, camerasAround(1, 32));
+  views->setPoints(pointsOf(truth, 0.02f, 2));
+  const auto model = fitted(*views, 700, small(), 0.0);
+  EXPECT_GT(model->splats(0).size(), 0u);
+}
+
+TEST(FittingStability, ViewsThatAreBlackOrTransparentEverywhere) {
+  for (const float alpha : {1.0f, 0.0f}) {
+    const auto model = fitted(*constantViews(0, alpha, 4), 700, small());
+    EXPECT_GT(model->splats(0).size(), 0u);
+  }
+}
+
+TEST(FittingStability, ViewsOfColoursFarAboveWhite) {
+  fitted(*constantViews(1e3f, 1, 4), 400, small());
+}
+
+TEST(FittingStability, SplatsBehindEveryCamera) {
+  const auto views = constantViews(0.5f, 1, 1);
+  PointSet points = pointsOf(ballOfSplats(50, 3), 0, 1);
+  const Vec3d behind = 3 * cameraCentre(views->camera(0));
+  for (size_t i = 0; i < points.positions.size(); ++i) {
+    points.positions[i] += static_cast<float>(behind[static_cast<Eigen::Index>(i % 3)]);
+  }
+  views->setPoints(points);
+  const auto model = fitted(*views, 200, small());  // size is not judged yet
+  EXPECT_EQ(model->splats(0).size(), 50u);
+  EXPECT_EQ(model->splats(0).positions, points.positions);
+}
+
+TEST(FittingStability, PointsFarFromTheOriginAndFarFromEachOther) {
+  const SplatCloud truth = ballOfSplats(40, 1);
+  std::vector<Camera> cameras = camerasAround(4, 24);
+  SplatCloud far = truth;
+  for (float& value : far.positions) value += 1e5f;
+  for (Camera& camera : cameras) {
+    camera.world_to_camera.topRightCorner<3, 1>() -=
+        camera.world_to_camera.topLeftCorner<3, 3>() * Vec3d(1e5, 1e5, 1e5);
+  }
+  const auto views = viewsOf(far, cameras);
+  PointSet points = pointsOf(far, 0.02f, 2);
+  points.positions[0] = 1e12f;
+  points.positions[4] = -1e15f;
+  views->setPoints(points);
+  fitted(*views, 400, small());
+}
+
+TEST(FittingStability, EveryPointAtOnePlace) {
+  const auto views = constantViews(0.5f, 1, 3);
+  PointSet points = pointsOf(ballOfSplats(50, 3), 0, 1);
+  std::fill(points.positions.begin(), points.positions.end(), 0.25f);
+  views->setPoints(points);
+  fitted(*views, 400, small());
+}
+
+TEST(FittingStability, PicturesOfOnePixel) {
+  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  for (const Camera& camera : camerasAround(3, 1)) {
+    ViewPicture picture;
+    picture.width = picture.height = 1;
+    picture.colour = {0.9f, 0.1f, 0.4f};
+    views->add(camera, std::move(picture));
+  }
+  fitted(*views, 300, small());
+}
+
+}  // namespace
+}  // namespace stipple
