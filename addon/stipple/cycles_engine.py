@@ -13,7 +13,7 @@ from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
 from .cycles_functions import CyclesRender, functions
 from .engine import NativeWork
-from .scene import cameras, facts, instances, layers, sources, splat_data
+from .scene import cameras, facts, instances, layers, mattes, sources, splat_data
 
 _VISIBILITY = ('visible_camera', 'visible_diffuse', 'visible_glossy', 'visible_transmission',
                'visible_volume_scatter', 'visible_shadow')
@@ -82,7 +82,7 @@ def _make_engine():
 
         def update(self, data=None, depsgraph=None):
             """Decodes the splats of the view layer, then hands the rest to Cycles."""
-            self._instances, self._failed = [], False
+            self._instances, self._holdouts, self._failed = [], [], False
             if self.is_preview:
                 super().update(data, depsgraph)
                 return
@@ -90,6 +90,8 @@ def _make_engine():
                 self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
                 if self._instances:
                     self._camera(depsgraph, None)
+                    # Cycles' passes tell nothing of what it holds out.
+                    self._holdouts = mattes.gather(depsgraph, only_holdouts=True)
             except StippleError as error:
                 self._failed = True
                 self._fail(error)
@@ -129,22 +131,25 @@ def _make_engine():
             result = self.get_result()
             layer = next(layer for layer in result.layers if layer.name == layer_name)
             passes = {render_pass.name: render_pass for render_pass in layer.passes}
-            cycles = self._layers_of(passes, picture, world)
+            matte = mattes.surface(self._holdouts, camera, self._wait) if self._holdouts else None
+            cycles = self._layers_of(passes, picture, world, matte)
             renderer = Renderer(sources.context())
             task = renderer.start(self._instances, camera, renderer.options(blend_space=picture.blend_space),
-                                  surface=cycles.surface())
+                                  surface=cycles.surface(), with_transmittance=True)
             self._wait(task.job)
             combined, depth = cycles.picture(task)
             version.fill_pass(passes['Combined'], combined)
             version.fill_pass(passes['Depth'], depth)
 
-        def _layers_of(self, passes, picture, world):
-            """What Cycles has drawn."""
+        def _layers_of(self, passes, picture, world, matte):
+            """What Cycles has drawn. matte: of its holdouts, or None."""
             def read(name):
                 found = passes.get(name)
                 return None if found is None else version.read_pass(found, picture.border.width, picture.border.height)
 
             cycles = layers.CyclesLayers(read('Combined'), read('Depth')[..., 0], read(_SHADOW_PASS))
+            if matte is not None:
+                cycles.hold_out(matte)
             if picture.background is not None:
                 cycles.take_world(read(version.ENVIRONMENT_PASS), world)
             return cycles

@@ -89,16 +89,16 @@ class ViewPicture:
         self._task = _Making(task, self._key, border, coarse)
 
     def _placed(self, entries, planes):
-        """[(cloud, matrix)] of what the clipping planes leave."""
+        """Instances for the renderer: what the clipping planes leave."""
         if not len(planes):
             self._clipped.clear()
-            return [(cloud, matrix) for _, _, cloud, matrix in entries]
+            return [placed for _, _, placed in entries]
         placed, used = [], {}
-        for _, _, cloud, matrix in entries:
+        for _, _, (cloud, matrix, is_holdout) in entries:
             local = planes @ matrix
             key = (id(cloud), local.tobytes())
             used[key] = self._clipped.get(key) or (cloud, _clipped(cloud, local))
-            placed.append((used[key][1], matrix))
+            placed.append((used[key][1], matrix, is_holdout))
         self._clipped = used
         return placed
 

@@ -105,7 +105,7 @@ BackwardInput inputFrom(const StippleBackwardInput* input, const Buffers& buffer
 }
 
 /// Refuses what is drawn but has no derivative here.
-void requireDerivative(const RenderSettings& settings) {
+void requireDerivative(const RenderSettings& settings, const Instances& placed) {
   if (settings.method != STIPPLE_RENDER_TILED) {
     fail(ErrorCode::kInvalidArgument, "options->method is " + std::to_string(settings.method) +
                                           "; derivatives have 0 (tiled) only");
@@ -113,6 +113,11 @@ void requireDerivative(const RenderSettings& settings) {
   if (settings.options.surface.depth || settings.splat_light) {
     fail(ErrorCode::kInvalidArgument,
          "options has a surface or a splat_light; derivatives are those of splats alone");
+  }
+  for (size_t i = 0; i < placed.list.size(); ++i) {
+    if (!placed.list[i].holdout) continue;
+    fail(ErrorCode::kInvalidArgument,
+         "instances[" + std::to_string(i) + "].holdout is 1; instances with derivatives have 0");
   }
   if (settings.linearise) {
     fail(ErrorCode::kInvalidArgument,
@@ -180,7 +185,7 @@ StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer,
     require(job, "job");
     Instances placed = instancesFrom(instances, count);
     const RenderSettings settings = renderSettings(options, placed);
-    requireDerivative(settings);
+    requireDerivative(settings, placed);
     const Camera view = cameraFrom(camera);
     validate(view);
     Buffers buffers = buffersFrom(gradients, placed);

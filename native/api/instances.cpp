@@ -55,6 +55,7 @@ Instances instancesFrom(const StippleInstance* instances, uint64_t count) {
     for (const double value : given.matrix) requireFinite(value, (name + ".matrix").c_str());
     SplatInstance placed;
     placed.cloud = cloud.cloud.get();
+    placed.holdout = enumValue<uint32_t>(given.holdout, 1, (name + ".holdout").c_str()) == 1;
     placed.values_are_checked = isChecked(cloud);
     placed.object_to_world = Eigen::Map<const Mat4d>(given.matrix);
     if (given.grade) placed.grade = gradeFrom(*given.grade, (name + ".grade").c_str());

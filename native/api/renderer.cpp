@@ -1,3 +1,4 @@
+#include <cstddef>
 #include <utility>
 
 #include "api/camera.h"
@@ -56,6 +57,7 @@ void deliverPicture(const Result& picture, const RenderSettings& settings,
   copyTo(picture.depth, buffers.depth);
   copyTo(picture.median_depth, buffers.median_depth);
   copyTo(picture.counts, buffers.counts);
+  copyTo(picture.transmittance, buffers.transmittance);
   if (!buffers.colour) return;
   const size_t pixel_count = static_cast<size_t>(picture.width) * picture.height;
   if (settings.linearise) lineariseColour(buffers.colour, pixel_count);
@@ -113,10 +115,12 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     const Camera view = cameraFrom(camera);
     validate(view);
     validateLayers(settings, view);
-    const StippleRenderBuffers out = complete(buffers, "buffers");
+    const StippleRenderBuffers out =
+        completeUpTo(buffers, offsetof(StippleRenderBuffers, transmittance), "buffers");
     settings.options.with_depth = out.depth != nullptr;
     settings.options.with_median_depth = out.median_depth != nullptr;
     settings.options.with_counts = out.counts != nullptr;
+    settings.options.with_transmittance = out.transmittance != nullptr;
     const RenderMemory memory = renderMemory(placed.list, view, settings.options);
     renderer->context->requirePictureMemory(memory.sum(), "this picture of " + sizeText(view),
                                             memory.pair_bytes);

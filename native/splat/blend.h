@@ -16,8 +16,10 @@
 // the others, as if it were one more splat, except that it is never left out:
 //   w = T,   T <- T (1 - a),
 // and the pixel is what the splats summed up to, plus w S; T below 1e-4 ends it. Without a colour
-// the surface is a matte: a = 1, and nothing is added. Depths compare as the numbers of single
-// precision by which splats are sorted; a splat at exactly z comes first. Based on: Zwicker,
+// the surface is a matte: a = 1, and nothing is added. It may also hide more than a, up to 1, of
+// what is behind it, and a splat may be a holdout: both take their share of T and add nothing, so
+// colour and alpha are those of the rest, sum of w and not 1 - T. Depths compare as the numbers of
+// single precision by which splats are sorted; a splat at exactly z comes first. Based on: Zwicker,
 // Pfister, van Baar and Gross, EWA Volume Splatting, Visualization 2001; Kerbl, Kopanas,
 // Leimkuehler and Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section 6.
 

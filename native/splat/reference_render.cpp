@@ -15,6 +15,14 @@ struct ReferenceSplat {
   Projected<double> projected;
   double colour[3];
   uint32_t key;
+  bool is_holdout;
+};
+
+/// What shows and what only hides, of splats at one pixel: sums of w, and of w z.
+struct Shares {
+  double shown = 0;
+  double shown_depth = 0;
+  double hidden = 0;
 };
 
 std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene) {
@@ -25,6 +33,8 @@ std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene) {
       if (!projectSplat(scene, placed, i, splat.projected)) continue;
       splatColour(scene, placed, i, splat.colour);
       splat.key = depthKey(splat.projected.depth);
+      splat.is_holdout = placed.is_holdout;
+      if (splat.is_holdout) std::fill(splat.colour, splat.colour + 3, 0.0);
       splats.push_back(splat);
     }
   }
@@ -49,6 +59,7 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
   if (options.with_depth) result.depth.resize(pixel_count);
   if (options.with_median_depth) result.median_depth.resize(pixel_count);
   if (options.with_counts) result.counts.resize(pixel_count);
+  if (options.with_transmittance) result.transmittance.resize(pixel_count);
   const bool with_surface = hasSurface(options);
   result.surface_weight.resize(with_surface ? pixel_count : 0);
 
@@ -67,6 +78,7 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
       const double px = x + 0.5;
       const size_t i = static_cast<size_t>(y) * camera.width + x;
       PixelBlend<double> pixel;
+      Shares shares;
       SurfaceAtPixel<double> surface{};
       if (with_surface) surface = surfaceAt<double>(options.surface, i);
       for (const ReferenceSplat* splat : row) {
@@ -80,36 +92,45 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
           pixel.addSurface(surface);
           if (pixel.finished) break;
         }
+        const double weight = pixel.transmittance * alpha;
         pixel.add(alpha, splat->colour, p.depth);
         if (pixel.finished) break;
+        (splat->is_holdout ? shares.hidden : shares.shown) += weight;
+        if (!splat->is_holdout) shares.shown_depth += weight * p.depth;
       }
       if (with_surface && pixel.surface_weight < 0) pixel.addSurface(surface);
-      const double coverage =
-          with_surface ? pixel.splatCoverage(surface) : 1.0 - pixel.transmittance;
+      // Sum of w: 1 - T where all shows.
+      double coverage = with_surface ? pixel.splatCoverage(surface) : 1.0 - pixel.transmittance;
+      double weighted_depth = pixel.weighted_depth;
+      if (shares.hidden > 0) {
+        coverage = shares.shown;
+        weighted_depth = shares.shown_depth;
+      }
       for (size_t c = 0; c < 3; ++c) {
         result.colour[i * 4 + c] =
             pixel.colour[c] +
             (options.with_background ? pixel.transmittance * options.background[c] : 0.0);
       }
-      result.colour[i * 4 + 3] = options.with_background ? 1.0 : coverage;
+      result.colour[i * 4 + 3] = options.with_background ? 1.0 - shares.hidden : coverage;
       if (with_surface) {
         result.surface_weight[i] = pixel.surface_weight;
         result.colour[i * 4 + 3] =
-            alphaApart(surface, pixel.surface_weight, coverage, options.with_background);
+            alphaApart(surface, pixel.surface_weight, coverage, options.with_background) -
+            (options.with_background ? shares.hidden : 0.0);
       }
       const double empty = static_cast<double>(kEmptyDepth);
       if (options.with_depth) {
-        // Sum of w = 1 - T.
-        result.depth[i] = pixel.count > 0 ? pixel.weighted_depth / coverage : empty;
+        result.depth[i] = coverage > 0 ? weighted_depth / coverage : empty;
         if (with_surface) {
-          result.depth[i] = depthWithSurface(pixel.weighted_depth, coverage, surface,
-                                             pixel.surface_weight, empty);
+          result.depth[i] =
+              depthWithSurface(weighted_depth, coverage, surface, pixel.surface_weight, empty);
         }
       }
       if (options.with_median_depth) {
         result.median_depth[i] = pixel.has_median ? pixel.median_depth : empty;
       }
       if (options.with_counts) result.counts[i] = pixel.count;
+      if (options.with_transmittance) result.transmittance[i] = pixel.transmittance;
     }
   }
   if (with_surface && options.surface.colour && !options.splats_apart) {

@@ -22,6 +22,7 @@ struct SplatInstance {
   /// renderer then does not read its values a second time to check them.
   bool values_are_checked = false;
   ColourGrade grade = {};  ///< of what the cloud stores; neutral costs nothing
+  bool holdout = false;  ///< hides what is behind it and shows nothing, in colour, alpha and depth
 };
 
 enum class LowPass : uint32_t {
@@ -47,7 +48,8 @@ struct SurfaceLayer {
   /// [H,W,4] premultiplied, alpha 0..1, in the blending space (see RenderOptions::splats_apart).
   /// Null: a matte, which hides what is behind it and leaves a hole.
   const float* colour = nullptr;
-  /// [H,W] 0..1, of a matte where it covers pixels in part; null: 1.
+  /// [H,W] 0..1, of a matte where it covers pixels in part; null: 1. With a colour: how much of
+  /// what is behind it the layer hides, no less than its alpha; null: its alpha.
   const float* matte_opacity = nullptr;
 };
 
@@ -61,6 +63,7 @@ struct RenderOptions {
   bool with_depth = true;
   bool with_median_depth = false;
   bool with_counts = false;  ///< also the number of splats blended per pixel
+  bool with_transmittance = false;
   SurfaceLayer surface = {};
   /// True: the colour is left without the surface's, and surface_weight tells what that counts for:
   /// for who changes the splats' colours before addSurface. Depth has the surface all the same.
@@ -76,6 +79,7 @@ struct RenderResult {
   std::vector<float> median_depth;    ///< [H,W] planar z where transmittance passes 1/2, metres
   std::vector<uint32_t> counts;       ///< [H,W]
   std::vector<float> surface_weight;  ///< [H,W] transmittance before the surface; if splats_apart
+  std::vector<float> transmittance;   ///< [H,W] of all, holdouts and surface too
   uint64_t visible_count = 0;         ///< splats that passed culling
   uint64_t number = 0;                ///< of this drawing, another for every call; 0: none
 };
@@ -148,6 +152,7 @@ struct ReferenceResult {
   std::vector<double> median_depth;    ///< [H,W]
   std::vector<uint32_t> counts;        ///< [H,W]
   std::vector<double> surface_weight;  ///< [H,W]
+  std::vector<double> transmittance;   ///< [H,W]
 };
 ReferenceResult renderReference(std::span<const SplatInstance> instances, const Camera& camera,
                                 const RenderOptions& options, Progress* progress = nullptr);

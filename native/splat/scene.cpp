@@ -58,6 +58,7 @@ PlacedCloud place(const SplatInstance& instance, const Camera& camera,
   placed.sh_degree = std::min(cloud.sh_degree, options.sh_degree_limit);
   placed.grades_colour = instance.grade.changesColour();
   placed.grade = instance.grade;
+  placed.is_holdout = instance.holdout;
   placed.linearise = options.blend_space == BlendSpace::kSceneLinear &&
                      cloud.colour_space == ColourSpace::kDisplay;
   return placed;
@@ -77,6 +78,7 @@ void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& ca
   scene.view = makeView<double>(camera);
   scene.clouds.clear();
   scene.splat_count = 0;
+  scene.has_holdouts = false;
   for (size_t i = 0; i < instances.size(); ++i) {
     const SplatInstance& instance = instances[i];
     const std::string name = nameOf(i);
@@ -98,6 +100,7 @@ void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& ca
     placed.instance = i;
     placed.first_index = scene.splat_count;
     scene.splat_count += instance.cloud->size();
+    scene.has_holdouts |= instance.holdout;
     scene.clouds.push_back(placed);
   }
   if (scene.splat_count > std::numeric_limits<uint32_t>::max()) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 #include <vector>
@@ -25,6 +26,7 @@ struct PlacedCloud {
   int sh_degree;
   bool linearise;      ///< colours are stored for display and composited scene linear
   bool grades_colour;  ///< grade has more than an opacity
+  bool is_holdout;     ///< its splats have the colour kHoldoutColour
   ColourGrade grade;
 
   /// Opacity of a splat as it is drawn.
@@ -40,7 +42,11 @@ struct PlacedScene {
   View<double> view;
   std::vector<PlacedCloud> clouds;
   uint64_t splat_count = 0;
+  bool has_holdouts = false;
 };
+
+/// All three numbers of the colour of a splat that shows nothing: no colour is below 0.
+constexpr double kHoldoutColour = -1;
 
 /// Checks everything that enters (camera, clouds, matrices, options) and places the instances.
 /// Errors: kInvalidArgument; kUnsupported for clouds of different colour spaces under
@@ -69,9 +75,14 @@ inline bool projectSplat(const PlacedScene& scene, const PlacedCloud& placed, si
                  placed.low_pass, out);
 }
 
-/// From the sums of the harmonics + 0.5 to the colour that is blended. In and out: colour [3].
+/// From the sums of the harmonics + 0.5 to the colour that is blended, or kHoldoutColour. In and
+/// out: colour [3].
 template <typename T>
 void finishColour(const PlacedCloud& placed, T* colour) {
+  if (placed.is_holdout) {
+    std::fill(colour, colour + 3, T(kHoldoutColour));
+    return;
+  }
   if (placed.grades_colour) {
     // So that no product of a harmonic sum and the matrix leaves float32.
     for (size_t c = 0; c < 3; ++c) colour[c] = std::clamp(colour[c], T(-1e12), T(1e12));

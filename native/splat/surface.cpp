@@ -39,10 +39,6 @@ void validateSurface(const SurfaceLayer& surface, const Camera& camera) {
     }
     return;
   }
-  if (surface.colour && surface.matte_opacity) {
-    fail(ErrorCode::kInvalidArgument,
-         "the surface has a colour and the opacity of a matte; it can have one of them");
-  }
   if (surface.width != camera.width || surface.height != camera.height) {
     fail(ErrorCode::kInvalidArgument,
          "the surface is " + std::to_string(surface.width) + " x " +
@@ -65,7 +61,13 @@ void validateSurface(const SurfaceLayer& surface, const Camera& camera) {
   if (!surface.colour) return;
   requireFinite(surface.colour, count * 4, 4, "the surface's colour at pixel");
   for (size_t i = 0; i < count; ++i) {
-    requireOpacity("alpha", surface, i, surface.colour[i * 4 + 3]);
+    const float alpha = surface.colour[i * 4 + 3];
+    requireOpacity("alpha", surface, i, alpha);
+    if (surface.matte_opacity && surface.matte_opacity[i] < alpha) {
+      fail(ErrorCode::kInvalidArgument,
+           nameOf("matte opacity", surface, i) + std::to_string(surface.matte_opacity[i]) +
+               "; no less than its alpha, " + std::to_string(alpha) + ", is allowed");
+    }
   }
 }
 

@@ -10,7 +10,8 @@
 namespace stipple {
 
 /// Refuses a layer of another size than the camera's picture, NaN and minus infinity among its
-/// depths, colours that are not finite and opacities outside 0..1. Errors: kInvalidArgument.
+/// depths, colours that are not finite, opacities outside 0..1 or below the colour's alpha. Errors:
+/// kInvalidArgument.
 void validateSurface(const SurfaceLayer& surface, const Camera& camera);
 
 inline bool hasSurface(const RenderOptions& options) {
@@ -30,7 +31,8 @@ SurfaceAtPixel<T> surfaceAt(const SurfaceLayer& layer, size_t index) {
   } else if (is_there) {
     surface.opacity = layer.matte_opacity ? T(layer.matte_opacity[index]) : T(1);
   }
-  surface.transmittance = T(1) - surface.opacity;
+  const bool hides_more = surface.shows && layer.matte_opacity;
+  surface.transmittance = T(1) - (hides_more ? T(layer.matte_opacity[index]) : surface.opacity);
   return surface;
 }
 

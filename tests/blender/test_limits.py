@@ -36,7 +36,7 @@ def simplify(most=0, most_render=0, on=True):
 def drawn(stipple, mode):
     """Splats of each instance that an engine draws."""
     gathered = stipple.scene.instances.gather(bpy.context.evaluated_depsgraph_get(), mode)
-    return sorted(cloud.info().count for cloud, _ in gathered)
+    return sorted(placed[0].info().count for placed in gathered)
 
 
 def test_the_viewport_shares_the_limit_by_budget(stipple, pair):

@@ -15,19 +15,21 @@ EMPTY_DEPTH = 1e10  # metres; what Blender also writes where nothing is
 
 
 def instance_array(instances):
-    """[(cloud, 4x4 object to world)] as the header's array; a GradedCloud brings its grade, which it must outlive."""
+    """[(cloud, 4x4 object to world)], or with a third value, whether it is a holdout, as the header's array; a
+    GradedCloud brings its grade, which it must outlive."""
     array = (StippleInstance * max(len(instances), 1))()
-    for entry, (cloud, matrix) in zip(array, instances):
+    for entry, (cloud, matrix, *holdout) in zip(array, instances):
         grade = getattr(cloud, 'grade', None)
-        entry.__init__(cloud=cloud.pointer, matrix=matrix16(matrix), grade=pointer(grade) if grade is not None else None)
+        entry.__init__(cloud=cloud.pointer, matrix=matrix16(matrix), grade=pointer(grade) if grade is not None else None,
+                       holdout=any(holdout))
     return array
 
 
 class Surface:
     """Something else between the splats, a mesh: arrays as in StippleRenderOptions, row 0 = top.
 
-    depth [H,W] metres; colour [H,W,4] premultiplied, or None for a matte, of opacity [H,W]; light [H,W,3] factors of the
-    splats, or None.
+    depth [H,W] metres; colour [H,W,4] premultiplied, or None for a matte, of opacity [H,W]; with a colour, opacity is what
+    it hides, its alpha and what it holds out, or None for its alpha. light [H,W,3] factors of the splats, or None.
     """
 
     def __init__(self, depth, colour=None, light=None, opacity=None):
@@ -58,10 +60,11 @@ def _layer(name, array, shape):
 class RenderTask:
     """A picture that is being made: poll, cancel or wait through `job`, then read the arrays."""
 
-    def __init__(self, job, colour, depth):
+    def __init__(self, job, colour, depth, transmittance=None):
         self.job = job
         self.colour = colour  # [H,W,4] premultiplied, row 0 = top
         self.depth = depth    # [H,W] metres, or None
+        self.transmittance = transmittance  # [H,W] of the light behind everything, or None
 
 
 class Renderer(Handle):
@@ -82,8 +85,9 @@ class Renderer(Handle):
             options.background = (c_double * 3)(*background)
         return options
 
-    def start(self, instances, camera, options, with_depth=True, median_depth=False, surface=None):
-        """Starts the picture of instances [(cloud, matrix)]; clouds must outlive the start only.
+    def start(self, instances, camera, options, with_depth=True, median_depth=False, surface=None,
+              with_transmittance=False):
+        """Starts the picture of instances, as of instance_array; clouds must outlive the start only.
 
         median_depth: where light is half gone, instead of the mean depth of what is seen. surface: a Surface that stands
         between the splats.
@@ -92,13 +96,14 @@ class Renderer(Handle):
         options = surface.put_into(options) if surface is not None else options
         colour = np.empty(shape + (4,), np.float32)
         depth = np.empty(shape, np.float32) if with_depth else None
-        buffers = StippleRenderBuffers(colour=pointer_to(colour))
+        transmittance = np.empty(shape, np.float32) if with_transmittance else None
+        buffers = StippleRenderBuffers(colour=pointer_to(colour), transmittance=pointer_to(transmittance))
         setattr(buffers, 'median_depth' if median_depth else 'depth', pointer_to(depth))
         array = instance_array(instances)
         job = Job(self.library, new_handle(self.library, 'stipple_renderer_render_start', self.pointer, array,
                                            len(instances), byref(camera), byref(options), byref(buffers)),
-                  keep=(colour, depth, buffers, array, surface, [cloud for cloud, _ in instances]))
-        return RenderTask(job, colour, depth)
+                  keep=(colour, depth, transmittance, buffers, array, surface, [placed[0] for placed in instances]))
+        return RenderTask(job, colour, depth, transmittance)
 
     def memory_bound(self, instances, camera):
         size = c_uint64()

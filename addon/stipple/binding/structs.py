@@ -333,7 +333,7 @@ class StippleViewBuffers(_Sized):
 
 
 class StippleInstance(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('cloud', c_void_p), ('matrix', _matrix),
+    _fields_ = [('struct_size', c_uint32), ('holdout', c_uint32), ('cloud', c_void_p), ('matrix', _matrix),
                 ('grade', POINTER(StippleGrade))]
 
 
@@ -351,7 +351,7 @@ class StippleMeshInstance(_Sized):
 
 class StippleRenderBuffers(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour', _floats), ('depth', _floats),
-                ('median_depth', _floats), ('counts', POINTER(c_uint32))]
+                ('median_depth', _floats), ('counts', POINTER(c_uint32)), ('transmittance', _floats)]
 
 
 class StippleDrawOrderBuffers(_Sized):

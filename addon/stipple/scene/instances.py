@@ -9,16 +9,16 @@ from . import grades, limits, placement, sequences, shown, sources, splat_data, 
 
 
 def gather(depsgraph, mode, warn=lambda message: None):
-    """[(cloud, 4x4 object to world)]. Decodes from evaluated settings; writes no datablock.
+    """[(cloud, 4x4 object to world, is a holdout)]. Decodes from evaluated settings; writes no datablock.
 
     mode: 'VIEWPORT' or 'RENDER', which budget. warn: called with a sentence per object that is left out.
     """
-    return [(cloud, matrix) for _, _, cloud, matrix in gather_owned(depsgraph, mode, warn)]
+    return [placed for _, _, placed in gather_owned(depsgraph, mode, warn)]
 
 
 def gather_owned(depsgraph, mode, warn=lambda message: None):
-    """[(owner, object, cloud, matrix)] with the original object, and the original one that it is selected and hidden
-    with: itself or its instancer."""
+    """[(owner, object, placed)], placed as gather has it, with the original object, and the original one that it is
+    selected and hidden with: itself or its instancer."""
     clouds, found = {}, []
     share = limits.share(depsgraph, mode)
     for entry in depsgraph.object_instances:
@@ -26,9 +26,6 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
         if not splat_data.is_splat_object(obj) or not shown.is_shown(entry):
             continue
         if not shown.seen_by_camera(entry, depsgraph):
-            continue
-        if obj.is_holdout:
-            warn(f"Splat object '{obj.name}' is a holdout, which splats do not support; it is left out.")
             continue
         matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
         if placement.is_flat(matrix):
@@ -40,7 +37,7 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
         if clouds[key] is not None:
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
-            found.append((owner, original, clouds[key], matrix))
+            found.append((owner, original, (clouds[key], matrix, shown.holds_out(entry, depsgraph))))
     return found
 
 

@@ -19,6 +19,7 @@ class CyclesLayers:
         # What is not finite shows as black in every picture: it must not stop this one.
         self.colour = np.nan_to_num(combined, nan=0.0, posinf=0.0, neginf=0.0)  # alpha of meshes alone
         self.colour[..., 3] = np.clip(self.colour[..., 3], 0.0, 1.0)
+        self._held = None  # (depth [H,W], opacity [H,W]) of holdouts
         self.world = None  # [H,W,3] light that the camera sees of the world, or None where the film stays transparent
         self.light = self._passed = None
         if shadow is not None:
@@ -37,31 +38,47 @@ class CyclesLayers:
         nothing = self.depth >= EMPTY_DEPTH
         meshes = self.colour[..., 3]
         behind = plain if plain is not None else _spread(self.world, no_catcher & nothing & (meshes == 0))
-        gaps = (1.0 - meshes)[..., None]
+        gaps = (1.0 - self._hidden())[..., None]
         known = (no_catcher & (nothing | (meshes > 0)))[..., None]
         self.world = np.where(known, self.world, gaps * np.asarray(behind, np.float32))
+
+    def hold_out(self, matte):
+        """Before take_world. matte: a Surface of the holdouts, of which Cycles' passes show nothing but what they leave of the rest."""
+        self._held = matte.depth[::-1], matte.opacity[::-1]
 
     def surface(self):
         """The meshes, to stand between the splats."""
         depth = _depth_at_edges(self.depth, self.colour[..., 3])
-        return Surface(depth[::-1], self.colour[::-1], None if self.light is None else self.light[::-1])
+        opacity = None
+        if self._held is not None:
+            # Where both share a pixel, one depth stands for both.
+            depth = np.minimum(depth, self._held[0])
+            opacity = self._hidden()[::-1]
+        return Surface(depth[::-1], self.colour[::-1], None if self.light is None else self.light[::-1], opacity)
+
+    def _hidden(self):
+        """[H,W] how much meshes and holdouts hide: Cycles' alpha is that of what holdouts leave of meshes."""
+        alpha = self.colour[..., 3]
+        return alpha if self._held is None else np.minimum(alpha + self._held[1], np.float32(1.0))
 
     def picture(self, task):
         """(combined [H,W,4], depth [H,W]) of meshes, splats and world, from the splats' finished task."""
         colour, depth = task.colour[::-1].copy(), task.depth[::-1].copy()
         untouched = (colour == self.colour).all(axis=2)
         depth[untouched] = self.depth[untouched]
-        through = np.clip(1.0 - colour[..., 3], 0.0, 1.0)
+        through = task.transmittance[::-1]
         passed = np.float32(1.0) if self._passed is None else self._passed
         if self.world is None:
             # Shadows on nothing are black with an alpha, as Cycles has them.
             colour[..., 3] += through * (1 - passed)
             return colour, depth
         # Of the world's light that the meshes let pass, splats take their share.
-        gaps = 1.0 - self.colour[..., 3]
+        gaps = 1.0 - self._hidden()
         share = np.divide(through, gaps, out=np.zeros_like(through), where=gaps > 0)
         colour[..., :3] += (np.minimum(share, 1) * passed)[..., None] * self.world
-        colour[..., 3] = 1.0
+        # What neither shows nor passes is held out; less than a rounding of the two is nothing.
+        held = 1.0 - colour[..., 3] - through
+        colour[..., 3] = np.where(held > 1e-5, 1.0 - held, 1.0)
         return colour, depth
 
 

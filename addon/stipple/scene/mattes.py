@@ -15,11 +15,11 @@ MOST_SAMPLES = 16_000_000
 LONGEST_SIDE = 65536  # of a native picture, pixels
 
 
-def gather(depsgraph):
+def gather(depsgraph, only_holdouts=False):
     """[(native mesh, 4x4 object to world)] of all that has faces and that the camera sees.
 
-    Each mesh is read once, however many instances it has. Left out: shadow catchers, which stand where splats are, and
-    what the splats that show were made from. Errors: StippleError that names the object.
+    Each mesh is read once, however many instances it has. Left out, unless they are holdouts: shadow catchers, which
+    stand where splats are, and what the splats that show were made from. Errors: StippleError that names the object.
     """
     made_from = _sources_of_splats(depsgraph)
     read, placed = {}, []
@@ -28,9 +28,11 @@ def gather(depsgraph):
         owner = entry.parent.original if entry.is_instance else evaluated.original
         if evaluated.type not in meshes.MESH_LIKE or not shown.is_shown(entry):
             continue
-        if splat_data.is_splat_object(evaluated) or geometry.carries_splats(evaluated.data) or owner in made_from:
+        if splat_data.is_splat_object(evaluated) or geometry.carries_splats(evaluated.data):
             continue
-        if not shown.seen_by_camera(entry, depsgraph) or evaluated.is_shadow_catcher:
+        is_holdout = shown.holds_out(entry, depsgraph)
+        hides = is_holdout or not (only_holdouts or evaluated.is_shadow_catcher or owner in made_from)
+        if not hides or not shown.seen_by_camera(entry, depsgraph):
             continue
         matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
         if placement.is_flat(matrix):

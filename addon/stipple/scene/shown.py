@@ -13,6 +13,11 @@ def seen_by_camera(entry, depsgraph):
         view_layer=depsgraph.view_layer_eval)
 
 
+def holds_out(entry, depsgraph):
+    """Whether an entry is a holdout: by itself or by its collections. Cycles does not ask the object that is instanced."""
+    return _owner(entry).holdout_get(view_layer=depsgraph.view_layer_eval)
+
+
 def _owner(entry):
     """The evaluated object whose collections count, as in Cycles: instances are where their instancer is."""
     return entry.parent if entry.is_instance else entry.object

@@ -713,7 +713,8 @@ StippleStatus stipple_views_read_points(const StippleViews* views, uint64_t capa
 
 typedef struct StippleInstance {
   uint32_t struct_size;
-  uint32_t reserved;
+  uint32_t holdout; /* 1: in pictures it hides what is behind it and leaves a hole in colour, alpha and depth;
+                       not for backward passes */
   const StippleCloud* cloud;
   double matrix[16]; /* object to world; invertible */
   const StippleGrade* grade; /* read during the call; NULL: none. Costs nothing where it changes nothing */
@@ -761,7 +762,8 @@ typedef struct StippleRenderOptions {
   /* [H,W,4] premultiplied, alpha 0..1, in output_colour's space: it is added to the splats as those come out.
    * NULL: a matte, which hides what is behind it, the background too, and shows nothing itself. */
   const float* surface_colour;
-  /* [H,W] 0..1, of a matte whose edges cover pixels in part. NULL: 1. */
+  /* [H,W] 0..1, of a matte whose edges cover pixels in part. NULL: 1. With a colour: how much of what is behind it
+   * the surface hides, no less than its alpha; what is hidden beyond that is a hole. NULL: its alpha. */
   const float* matte_opacity;
   /* [H,W,3] >= 0, factors of all that is not the surface, in output_colour's space: shadows that fall on
    * splats. NULL: 1. */
@@ -777,6 +779,7 @@ typedef struct StippleRenderBuffers {
   float* depth;         /* [H,W] expected planar z, metres, of splats and surface; 1e10 where nothing is */
   float* median_depth;  /* [H,W] planar z where transmittance passes 1/2; 1e10 where it does not */
   uint32_t* counts;     /* [H,W] splats blended */
+  float* transmittance; /* [H,W] share of the light from behind everything that passes, through holes too */
 } StippleRenderBuffers;
 
 StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer);

@@ -58,8 +58,8 @@ void endWithSurface(const SurfaceLayer& surface, const Tile& tile, bool with_ext
   });
 }
 
-void writeWithSurface(const Tile& tile, const TilePixels& pixels, const RenderOptions& options,
-                      RenderResult& result) {
+void writeWithSurface(const Tile& tile, const TilePixels& pixels, const TilePixels* shares,
+                      const RenderOptions& options, RenderResult& result) {
   const float background[3] = {static_cast<float>(options.background[0]),
                                static_cast<float>(options.background[1]),
                                static_cast<float>(options.background[2])};
@@ -68,16 +68,25 @@ void writeWithSurface(const Tile& tile, const TilePixels& pixels, const RenderOp
     PixelBlend<float> pixel;
     pixel.transmittance = pixels.transmittance[i];
     pixel.surface_weight = pixels.before[i];
-    const float coverage = pixel.splatCoverage(surface);
+    float coverage = pixel.splatCoverage(surface);
+    float weighted_depth = pixels.weighted_depth[i];
+    float hidden = 0.0f;
+    if (shares && sharesOf(*shares, i).hidden > 0.0f) {
+      const PixelShares share = sharesOf(*shares, i);
+      coverage = share.shown;
+      weighted_depth = share.shown_depth;
+      if (options.with_background) hidden = share.hidden;
+    }
     const float behind = options.with_background ? pixel.transmittance : 0.0f;
     float* colour = &result.colour[at * 4];
     colour[0] = pixels.red[i] + behind * background[0];
     colour[1] = pixels.green[i] + behind * background[1];
     colour[2] = pixels.blue[i] + behind * background[2];
-    colour[3] = alphaApart(surface, pixel.surface_weight, coverage, options.with_background);
+    colour[3] =
+        alphaApart(surface, pixel.surface_weight, coverage, options.with_background) - hidden;
     if (options.with_depth) {
-      result.depth[at] = depthWithSurface(pixels.weighted_depth[i], coverage, surface,
-                                          pixel.surface_weight, kEmptyDepth);
+      result.depth[at] =
+          depthWithSurface(weighted_depth, coverage, surface, pixel.surface_weight, kEmptyDepth);
     }
     if (options.splats_apart) {
       result.surface_weight[at] = pixel.surface_weight;

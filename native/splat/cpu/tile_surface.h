@@ -1,6 +1,7 @@
 #pragma once
 
 #include "splat/cpu/tile.h"
+#include "splat/cpu/tile_holdouts.h"
 #include "splat/render.h"
 
 namespace stipple {
@@ -16,8 +17,9 @@ void endWithSurface(const SurfaceLayer& surface, const Tile& tile, bool with_ext
                     TilePixels& pixels);
 
 /// The tile's colour, depth and surface weight over what was written without a surface; the median
-/// depth and the counts are right as they were.
-void writeWithSurface(const Tile& tile, const TilePixels& pixels, const RenderOptions& options,
-                      RenderResult& result);
+/// depth, counts and transmittance are right as they were. In: shares, of holdouts, or null for
+/// none.
+void writeWithSurface(const Tile& tile, const TilePixels& pixels, const TilePixels* shares,
+                      const RenderOptions& options, RenderResult& result);
 
 }  // namespace stipple

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/cpu/tile.h"
+#include "splat/cpu/tile_holdouts.h"
 #include "splat/cpu/tile_lists.h"
 #include "splat/cpu/tile_surface.h"
 #include "splat/cpu/visible_splats.h"
@@ -36,7 +37,8 @@ struct DoubtfulPixel {
 
 /// Goes over the tile's splats once for all of them.
 template <bool kSurface>
-void blendInDouble(const SplatSlots& slots, const Tile& tile, DoubtfulPixel* pixels, size_t count) {
+void blendInDouble(const SplatSlots& slots, const Tile& tile, Paint paint, DoubtfulPixel* pixels,
+                   size_t count) {
   constexpr size_t kAhead = 8;
   for (size_t i = 0; i < tile.splats.size() && count > 0; ++i) {
     const size_t ahead = std::min(i + kAhead, tile.splats.size() - 1);
@@ -44,6 +46,8 @@ void blendInDouble(const SplatSlots& slots, const Tile& tile, DoubtfulPixel* pix
     __builtin_prefetch(&slots.extras[tile.splats[ahead]]);
     const uint32_t slot = tile.splats[i];
     const VisibleSplat& splat = slots.splats[slot];
+    float colour[3] = {splat.colour[0], splat.colour[1], splat.colour[2]};
+    paintSplat(paint, splat.depth, colour);
     for (size_t k = 0; k < count; ++k) {
       double distance;
       if (!mayShow(splat, tile, pixels[k].x, pixels[k].y, distance)) continue;
@@ -56,7 +60,7 @@ void blendInDouble(const SplatSlots& slots, const Tile& tile, DoubtfulPixel* pix
           continue;
         }
       }
-      pixels[k].blend.add(alpha, splat.colour, static_cast<double>(splat.depth));
+      pixels[k].blend.add(alpha, colour, static_cast<double>(splat.depth));
       // A pixel that has ended changes places with the last that has not.
       if (pixels[k].blend.finished) std::swap(pixels[k--], pixels[--count]);
     }
@@ -64,7 +68,7 @@ void blendInDouble(const SplatSlots& slots, const Tile& tile, DoubtfulPixel* pix
 }
 
 void replaceDoubtful(const SplatSlots& slots, const Tile& tile, const RenderOptions& options,
-                     TilePixels& pixels) {
+                     Paint paint, TilePixels& pixels) {
   uint32_t any = 0;
   for (const float doubt : pixels.doubt) any |= std::bit_cast<uint32_t>(doubt);
   if (any == 0) return;
@@ -82,9 +86,9 @@ void replaceDoubtful(const SplatSlots& slots, const Tile& tile, const RenderOpti
         const size_t row = static_cast<size_t>(tile.y0 + doubtful[k].y) * options.surface.width;
         doubtful[k].surface = surfaceAt<double>(options.surface, row + tile.x0 + doubtful[k].x);
       }
-      blendInDouble<true>(slots, tile, doubtful, count);
+      blendInDouble<true>(slots, tile, paint, doubtful, count);
     } else {
-      blendInDouble<false>(slots, tile, doubtful, count);
+      blendInDouble<false>(slots, tile, paint, doubtful, count);
     }
     for (size_t k = 0; k < count; ++k) {
       const size_t i = static_cast<size_t>(doubtful[k].y) * kTileSide + doubtful[k].x;
@@ -157,15 +161,33 @@ void writeRow(const TilePixels& pixels, size_t first, size_t count, const Render
       result.counts[out + x] = static_cast<uint32_t>(pixels.count[first + x]);
     }
   }
+  if (options.with_transmittance) {
+    std::copy_n(transmittance, count, result.transmittance.begin() + static_cast<ptrdiff_t>(out));
+  }
 }
 
-void writePixels(const Tile& tile, const TilePixels& pixels, const RenderOptions& options,
-                 RenderResult& result) {
+/// Alpha and depth of the pixels of a row, written as writeRow does, that holdouts touch.
+void leaveOutHoldouts(const TilePixels& shares, size_t first, size_t count,
+                      const RenderOptions& options, RenderResult& result, size_t out) {
+  for (size_t x = 0; x < count; ++x) {
+    const PixelShares share = sharesOf(shares, first + x);
+    if (share.hidden == 0.0f) continue;
+    result.colour[(out + x) * 4 + 3] = options.with_background ? 1.0f - share.hidden : share.shown;
+    if (!options.with_depth) continue;
+    result.depth[out + x] = share.shown > 0.0f ? share.shown_depth / share.shown : kEmptyDepth;
+  }
+}
+
+/// In: shares, of holdouts, or null for none.
+void writePixels(const Tile& tile, const TilePixels& pixels, const TilePixels* shares,
+                 const RenderOptions& options, RenderResult& result) {
   for (uint32_t y = 0; y < tile.height; ++y) {
     const size_t out = static_cast<size_t>(tile.y0 + y) * result.width + tile.x0;
-    writeRow(pixels, static_cast<size_t>(y) * kTileSide, tile.width, options, result, out);
+    const size_t first = static_cast<size_t>(y) * kTileSide;
+    writeRow(pixels, first, tile.width, options, result, out);
+    if (shares) leaveOutHoldouts(*shares, first, tile.width, options, result, out);
   }
-  if (hasSurface(options)) writeWithSurface(tile, pixels, options, result);
+  if (hasSurface(options)) writeWithSurface(tile, pixels, shares, options, result);
 }
 
 /// The batch that the kernel works on, for judgeAlpha.
@@ -197,18 +219,14 @@ void keepTile(size_t index, const TilePixels& pixels, KeptPicture& kept) {
   }
 }
 
-/// Out: result and kept, where not null.
-void renderTile(const SplatSlots& slots, Tile tile, size_t index, TileKernel kernel,
-                const RenderOptions& options, RenderResult* result, KeptPicture* kept) {
+/// In: which sums are wanted. Out: pixels.
+void blendTile(const SplatSlots& slots, Tile tile, TileKernel kernel, const RenderOptions& options,
+               TileKernelOptions kernel_options, Paint paint, TilePixels& pixels) {
   // Scratch of this thread: 10 KiB of pixels and 8 KiB of splats, in the first-level cache.
-  TilePixels pixels;
   TileSplat batch[kBatchSize];
   clearPixels(tile, pixels);
   if (hasSurface(options)) takeSurface(options.surface, slots.splats, tile, pixels);
   Judged judged{&slots, &tile, 0};
-  TileKernelOptions kernel_options = {options.with_depth,
-                                      options.with_median_depth || options.with_counts};
-  kernel_options.with_coverage = kept != nullptr;
   kernel_options.with_surface = hasSurface(options);
   kernel_options.surface_shows = options.surface.colour != nullptr;
   kernel_options.judge = judgeAlpha;
@@ -217,6 +235,7 @@ void renderTile(const SplatSlots& slots, Tile tile, size_t index, TileKernel ker
   for (size_t begin = 0; begin < tile.splats.size() && pixels.unfinished > 0; begin += kBatchSize) {
     const size_t count = std::min(kBatchSize, tile.splats.size() - begin);
     makeTileSplats(slots.splats, tile, begin, count, largest, batch);
+    paintSplats(paint, count, batch);
     judged.begin = begin;
     kernel_options.first = static_cast<int32_t>(begin);
     const size_t behind = tile.splats.size() - begin - count + tile.listed_behind;
@@ -226,8 +245,25 @@ void renderTile(const SplatSlots& slots, Tile tile, size_t index, TileKernel ker
   if (hasSurface(options)) {
     endWithSurface(options.surface, tile, kernel_options.with_extras, pixels);
   }
-  replaceDoubtful(slots, tile, options, pixels);
-  if (result) writePixels(tile, pixels, options, *result);
+  replaceDoubtful(slots, tile, options, paint, pixels);
+}
+
+/// Out: result and kept, where not null.
+void renderTile(const SplatSlots& slots, const Tile& tile, size_t index, TileKernel kernel,
+                const RenderOptions& options, bool has_holdouts, RenderResult* result,
+                KeptPicture* kept) {
+  TileKernelOptions wanted = {options.with_depth, options.with_median_depth || options.with_counts};
+  wanted.with_coverage = kept != nullptr;
+  TilePixels pixels;
+  blendTile(slots, tile, kernel, options, wanted, has_holdouts ? Paint::kColours : Paint::kStored,
+            pixels);
+  if (result && has_holdouts) {
+    TilePixels shares;
+    blendTile(slots, tile, kernel, options, {false, false}, Paint::kShares, shares);
+    writePixels(tile, pixels, &shares, options, *result);
+  } else if (result) {
+    writePixels(tile, pixels, nullptr, options, *result);
+  }
   if (kept) keepTile(index, pixels, *kept);
 }
 
@@ -239,6 +275,7 @@ void prepareResult(const Camera& camera, const RenderOptions& options, RenderRes
   result.depth.resize(options.with_depth ? pixel_count : 0);
   result.median_depth.resize(options.with_median_depth ? pixel_count : 0);
   result.counts.resize(options.with_counts ? pixel_count : 0);
+  result.transmittance.resize(options.with_transmittance ? pixel_count : 0);
   result.surface_weight.resize(hasSurface(options) && options.splats_apart ? pixel_count : 0);
 }
 
@@ -246,6 +283,7 @@ uint64_t resultBytes(const Camera& camera, const RenderOptions& options) {
   const uint64_t pixel_count = static_cast<uint64_t>(camera.width) * camera.height;
   const uint64_t planes = 4u + (options.with_depth ? 1u : 0u) +
                           (options.with_median_depth ? 1u : 0u) + (options.with_counts ? 1u : 0u) +
+                          (options.with_transmittance ? 1u : 0u) +
                           (hasSurface(options) && options.splats_apart ? 1u : 0u);
   return pixel_count * planes * sizeof(float);
 }
@@ -369,6 +407,10 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
   auto& [scene, visible, lists, last] = workspace.arrays();
   last.number = 0;  // also where this fails on the way
   placeSceneUnread(instances, camera, options, scene);
+  if (kept && scene.has_holdouts) {
+    fail(ErrorCode::kUnsupported,
+         "an instance is a holdout; pictures that a backward pass goes on from can have none");
+  }
   advance(progress, 0.0, "Projecting splats");
   findVisibleSplats(projector, scene, progress, visible);
   if (kept) prepareKept(instances, camera, options, workspace.arrays());
@@ -385,7 +427,7 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
         if (progress) progress->throwIfCancelled();
         Tile tile = tileOf(grid, index, group.tile(index));
         tile.listed_behind = group.listedBehind(index);
-        renderTile(visible.slots(), tile, index, kernel, options, result, kept);
+        renderTile(visible.slots(), tile, index, kernel, options, scene.has_holdouts, result, kept);
         const size_t finished = finished_tiles.fetch_add(1, std::memory_order_relaxed) + 1;
         if (finished % grid.columns == 0) {
           advance(progress, static_cast<double>(finished) / static_cast<double>(grid.tileCount()),

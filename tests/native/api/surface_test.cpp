@@ -75,6 +75,51 @@ TEST_F(SurfaceApi, IsAddedToSplatsThatAreLightAlready) {
   }
 }
 
+TEST_F(SurfaceApi, HoldoutsAreHolesInSceneLinearPictures) {
+  // Of splats at one depth the first comes first: it holds the second out. Composited as display
+  // values.
+  StippleCloud* behind = oneSplat(0.2f, 0.7f, 0.4f, 0.5f);
+  StippleInstance instances[] = {placed(cloud_), placed(behind)};
+  instances[0].holdout = 1;
+  StippleRenderer* renderer = nullptr;
+  STIPPLE_ASSERT_OK(stipple_renderer_create(context_, &renderer));
+  std::vector<float> colour(kPixels * 4), depth(kPixels), transmittance(kPixels);
+  auto buffers = sized<StippleRenderBuffers>();
+  buffers.colour = colour.data();
+  buffers.depth = depth.data();
+  buffers.transmittance = transmittance.data();
+  for (const uint32_t method : {STIPPLE_RENDER_TILED, STIPPLE_RENDER_REFERENCE}) {
+    StippleRenderOptions plain;
+    stipple_render_options_init(&plain);
+    plain.method = method;
+    const std::vector<float> own = render(context_, behind, plain, camera_);
+    StippleJob* job = nullptr;
+    STIPPLE_ASSERT_OK(
+        stipple_renderer_render_start(renderer, instances, 2, &camera_, &plain, &buffers, &job));
+    STIPPLE_ASSERT_OK(stipple_job_wait(job));
+    stipple_job_free(job);
+    size_t seen = 0;
+    for (size_t i = 0; i < kPixels; ++i) {
+      if (colour[i * 4 + 3] < 0.02f) continue;
+      ++seen;
+      // What shows has the splat's own colour, whatever its alpha.
+      for (size_t c = 0; c < 3; ++c) {
+        EXPECT_NEAR(colour[i * 4 + c] / colour[i * 4 + 3], own[i * 4 + c] / own[i * 4 + 3], 1e-4);
+      }
+      EXPECT_LT(colour[i * 4 + 3] + transmittance[i], 1.0f);
+    }
+    EXPECT_GT(seen, 20u);
+  }
+  instances[1].holdout = 2;
+  StippleJob* job = nullptr;
+  EXPECT_EQ(
+      stipple_renderer_render_start(renderer, instances, 2, &camera_, nullptr, &buffers, &job),
+      STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(stipple_last_error_message(), "instances[1].holdout is 2; 0 to 1 is allowed");
+  stipple_renderer_free(renderer);
+  stipple_cloud_free(behind);
+}
+
 TEST_F(SurfaceApi, LetsABackgroundThroughWhereItIsTransparent) {
   for (float& z : depth_) z = 1.0f;  // before the splat
   options_.with_background = 1;

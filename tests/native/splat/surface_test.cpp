@@ -319,8 +319,11 @@ TEST(Surface, RefusesOtherSizesAndNumbersThatAreNone) {
   SurfaceLayer matte = surface.matte();
   std::vector<float> opacity(81, 0.5f);
   matte.matte_opacity = opacity.data();
+  surface.colour[23] = 0.75f;
   matte.colour = surface.colour.data();
-  EXPECT_THAT(messageOf(matte), HasSubstr("can have one of them"));
+  EXPECT_THAT(messageOf(matte),
+              HasSubstr("matte opacity at pixel (5, 0) is 0.500000; no less than its "
+                        "alpha, 0.750000, is allowed"));
   matte.colour = nullptr;
   for (const float bad : {kNan, -0.5f, 1.25f, kInfinity}) {
     opacity[10] = bad;

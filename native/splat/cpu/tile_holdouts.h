@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+
+#include "splat/cpu/tile_kernel.h"
+
+namespace stipple {
+
+/// What is blended in place of the splats' colours. A tile with holdouts is blended twice: once for
+/// the picture, once for the shares of what shows and what only hides.
+enum class Paint : uint32_t {
+  kStored,   ///< the colours as they are: there are no holdouts
+  kColours,  ///< holdouts black
+  kShares,   ///< red 1 and green the depth where a splat shows, blue 1 where it only hides
+};
+
+/// In and out: colour [3], kHoldoutColour where the splat is a holdout.
+void paintSplat(Paint paint, float depth, float* colour);
+
+/// A batch of a tile.
+void paintSplats(Paint paint, size_t count, TileSplat* splats);
+
+/// Sums of w of one pixel that was blended as Paint::kShares.
+struct PixelShares {
+  float shown;
+  float shown_depth;  ///< of w z
+  float hidden;
+};
+
+inline PixelShares sharesOf(const TilePixels& blended, size_t pixel) {
+  return {blended.red[pixel], blended.green[pixel], blended.blue[pixel]};
+}
+
+}  // namespace stipple
