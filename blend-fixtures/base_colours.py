@@ -64,3 +64,9 @@ def render_base_colours(scene, path):
     prepare_cycles(scene)
     scene.cycles.max_bounces = 0
     render_picture(scene, path)
+
+
+def use_nodes(material):
+    """Gives a new material its node tree; those of Blender 5 always have one."""
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True

@@ -34,7 +34,7 @@ def _without_splats(depsgraph, is_kept=True):
     for entry in depsgraph.object_instances:
         # Instances take their visibility from the object that is instanced.
         obj = entry.instance_object if entry.is_instance else entry.object
-        if splat_data.is_splat_object(obj):
+        if splat_data.is_splat_object(obj) or _is_cloud_of_nodes(entry):
             originals.add(obj.original)
 
     def owners():
@@ -54,6 +54,16 @@ def _without_splats(depsgraph, is_kept=True):
     finally:
         for (owner, _), values in zip(owners() if is_kept else (), kept):
             _set(owner, values)
+
+
+def _is_cloud_of_nodes(entry):
+    """Whether nodes instance splats that Cycles would draw as points, without their object, where nothing else hangs on
+    the visibility of the object that has the nodes."""
+    obj = entry.object
+    if not entry.is_instance or obj.type != 'POINTCLOUD' or not splat_data.is_splats(obj.data):
+        return False
+    own = entry.parent.data
+    return not getattr(own, 'polygons', ())
 
 
 def _set(owner, values):

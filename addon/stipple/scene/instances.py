@@ -20,10 +20,10 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
     """[(owner, object, placed)], placed as gather has it, with the original object, and the original one that it is
     selected and hidden with: itself or its instancer."""
     clouds, found = {}, []
-    share = limits.share(depsgraph, mode)
+    share, splats = limits.share(depsgraph, mode), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
-        obj = entry.object
-        if not splat_data.is_splat_object(obj) or not shown.is_shown(entry):
+        obj = splats.of(entry)
+        if obj is None or not shown.is_shown(entry):
             continue
         if not shown.seen_by_camera(entry, depsgraph):
             continue

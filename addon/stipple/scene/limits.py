@@ -65,10 +65,11 @@ def share(depsgraph, mode):
 
 def shown_counts(depsgraph):
     """Counter of how many instances of each splat datablock an engine shows, by name."""
-    counts = Counter()
+    counts, splats = Counter(), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
-        if splat_data.is_splat_object(entry.object) and shown.is_shown(entry) and shown.seen_by_camera(entry, depsgraph):
-            counts[entry.object.original.data.name_full] += 1
+        obj = splats.of(entry)
+        if obj is not None and shown.is_shown(entry) and shown.seen_by_camera(entry, depsgraph):
+            counts[obj.original.data.name_full] += 1
     return counts
 
 

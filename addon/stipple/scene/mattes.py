@@ -74,10 +74,11 @@ def _along_last(function, samples):
 
 
 def _sources_of_splats(depsgraph):
-    found = set()
+    found, splats = set(), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
-        if splat_data.is_splat_object(entry.object):
-            data = entry.object.original.data
+        obj = splats.of(entry)
+        if obj is not None:
+            data = obj.original.data
             found.update(source.object for source in data.stipple.source_objects if source.object is not None)
     return found
 

@@ -8,7 +8,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from .. import version
-from . import grades, handlers, sources, splat_data, sync
+from . import grades, handlers, shown as shown_by_layer, sources, splat_data, sync
 
 # Objects behind or before which splats can be, apart from splats themselves.
 SOLID_TYPES = {'MESH', 'CURVE', 'SURFACE', 'META', 'FONT', 'CURVES', 'POINTCLOUD', 'VOLUME', 'GPENCIL', 'GREASEPENCIL'}
@@ -56,15 +56,15 @@ class ViewedScene:
 
 def gather(depsgraph):
     """Everything that the view layer shows."""
-    found, others = [], set()
+    found, others, splats = [], set(), shown_by_layer.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
-        obj = entry.object
-        if not (entry.show_self or entry.is_instance):
+        if not shown_by_layer.is_shown(entry):
             continue
-        original = obj.original
+        obj = splats.of(entry)
+        original = (obj or entry.object).original
         owner = entry.parent.original if entry.is_instance else original
-        if not splat_data.is_splat_object(obj):
-            if obj.type in SOLID_TYPES:
+        if obj is None:
+            if original.type in SOLID_TYPES:
                 others.add(owner)
             continue
         count = splat_data.count(obj.data)
