@@ -1,6 +1,7 @@
-// Splat files against what the disk cache gives: the same bytes through fread and fwrite alone, and
-// through the packing library where the format packs. Beside it a second ratio, without a target:
-// the same and one copy of the cloud's arrays, which a reader has to fill and a writer to read.
+// Splat files against what the disk cache gives: the same bytes through fread and fwrite alone,
+// through the packing library where the format packs streams, and through plain loops between bits
+// and float32 where it packs numbers (plain_unpack.h). Beside it ratios without a target: fread and
+// fwrite alone, or the same and one copy of the cloud's arrays.
 // Files lie in memory (/dev/shm), so that a slow disk does not hide the work of the reader.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
@@ -12,6 +13,7 @@
 #include "base/random.h"
 #include "bench/comparison.h"
 #include "bench/plain_file.h"
+#include "bench/plain_unpack.h"
 #include "io/compression.h"
 #include "io/little_endian.h"
 #include "io/splat_file.h"
@@ -103,12 +105,20 @@ void packAll(const std::vector<ByteVector>& plain, const std::vector<Stream>& st
   });
 }
 
+/// What lies between a file's bytes and arrays of float32.
+enum class Packing {
+  kNone,
+  kStreams,        ///< of gzip or zstd
+  kCompressedPly,  ///< bits of numbers
+  kRecords,        ///< the same
+};
+
 struct Case {
   const char* name;
   const char* ending;
   SplatWriteOptions options;
-  bool packed;  ///< the floor unpacks (or packs) the file's streams too
-  int degree;   ///< of the cloud that is written
+  Packing packing;
+  int degree;  ///< of the cloud that is written
 };
 
 /// Reading against fread, and unpacking where the format packs.
@@ -116,59 +126,107 @@ void readCase(benchmark::State& state, const Case& which) {
   const std::string path = scratchPath(which.ending);
   writeSplatFile(cloudOf(which.degree), path, which.options);
   const SplatCloud decoded = readSplatFile(path);
-  size_t bytes = 0;
-  const auto plain = [&] {
-    const PlainBytes file = readPlainly(path);
-    bytes = file.size();
-    if (which.packed) benchmark::DoNotOptimize(unpackAll(file, streamsOf(file)));
-  };
-  const std::string name = which.packed ? "fread+unpack" : "fread";
-  compareWithAll(state, [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
-                 {{name, 0.6, plain}, {name + "+arrays", 0.0, [&] {
+  const size_t bytes = readPlainly(path).size();
+  const auto fread = [&] { benchmark::DoNotOptimize(readPlainly(path).data()); };
+  std::vector<Reference> references;
+  const auto withCopy = [&](const std::string& name, const std::function<void()>& plain) {
+    references = {{name, 0.6, plain}, {name + "+arrays", 0.0, [&decoded, plain] {
                                          plain();
                                          copyArrays(decoded);
-                                       }}});
+                                       }}};
+  };
+  switch (which.packing) {
+    case Packing::kNone:
+      withCopy("fread", fread);
+      break;
+    case Packing::kStreams:
+      withCopy("fread+unpack", [&] {
+        const PlainBytes file = readPlainly(path);
+        benchmark::DoNotOptimize(unpackAll(file, streamsOf(file)));
+      });
+      break;
+    case Packing::kCompressedPly:
+      references = {{"fread+unpack", 0.6,
+                     [&] {
+                       const PlainArrays arrays =
+                           unpackCompressedPly(readPlainly(path), kSplats, which.degree);
+                       benchmark::DoNotOptimize(arrays.sh.data());
+                     }},
+                    {"fread", 0.0, fread}};
+      break;
+    case Packing::kRecords:
+      references = {{"fread+unpack", 0.6,
+                     [&] {
+                       const PlainArrays arrays = unpackSplat32(readPlainly(path));
+                       benchmark::DoNotOptimize(arrays.sh.data());
+                     }},
+                    {"fread", 0.0, fread}};
+      break;
+  }
+  compareWithAll(
+      state, [&] { benchmark::DoNotOptimize(readSplatFile(path)); }, references);
   ::unlink(path.c_str());
   finish(state, bytes);
 }
 
-/// Writing against fwrite, and packing the same bytes where the format packs.
+/// Writing against fwrite, and packing the same where the format packs.
 void writeCase(benchmark::State& state, const Case& which) {
   const SplatCloud& cloud = cloudOf(which.degree);
   const std::string path = scratchPath(which.ending);
   writeSplatFile(cloud, path, which.options);
   const PlainBytes bytes = readPlainly(path);
   std::vector<Stream> streams;
-  if (which.packed) streams = streamsOf(bytes);
+  if (which.packing == Packing::kStreams) streams = streamsOf(bytes);
   const std::vector<ByteVector> plain = unpackAll(bytes, streams);
   const std::string floor_path = path + ".floor";
-  const auto write = [&] {
-    packAll(plain, streams);
-    writePlainly(floor_path, bytes);
-  };
-  const std::string name = which.packed ? "pack+fwrite" : "fwrite";
-  compareWithAll(state, [&] { writeSplatFile(cloud, path, which.options); },
-                 {{name, 0.6, write}, {name + "+arrays", 0.0, [&] {
+  const auto fwrite = [&] { writePlainly(floor_path, bytes); };
+  std::vector<Reference> references;
+  const auto withCopy = [&](const std::string& name, const std::function<void()>& write) {
+    references = {{name, 0.6, write}, {name + "+arrays", 0.0, [&cloud, write] {
                                          copyArrays(cloud);
                                          write();
-                                       }}});
+                                       }}};
+  };
+  switch (which.packing) {
+    case Packing::kNone:
+      withCopy("fwrite", fwrite);
+      break;
+    case Packing::kStreams:
+      withCopy("pack+fwrite", [&] {
+        packAll(plain, streams);
+        fwrite();
+      });
+      break;
+    case Packing::kCompressedPly:
+      references = {{"pack+fwrite", 0.6,
+                     [&] { writePlainly(floor_path, packCompressedPly(cloud, bytes.size())); }},
+                    {"fwrite", 0.0, fwrite}};
+      break;
+    case Packing::kRecords:
+      references = {{"pack+fwrite", 0.6, [&] { writePlainly(floor_path, packSplat32(cloud)); }},
+                    {"fwrite", 0.0, fwrite}};
+      break;
+  }
+  compareWithAll(
+      state, [&] { writeSplatFile(cloud, path, which.options); }, references);
   ::unlink(floor_path.c_str());
   ::unlink(path.c_str());
   finish(state, bytes.size());
 }
 
-const Case kCases[] = {{"ply", ".ply", {}, false, kDegree},
-                       {"compressed_ply", ".compressed.ply", {}, false, kDegree},
-                       {"compressed_ply_degree0", ".compressed.ply", {}, false, 0},
-                       {"splat", ".splat", {}, false, kDegree},
-                       {"splat_degree0", ".splat", {}, false, 0},
-                       {"spz3", ".spz", {.version = 3}, true, kDegree},
-                       {"spz4", ".spz", {.version = 4}, true, kDegree}};
+const Case kCases[] = {
+    {"ply", ".ply", {}, Packing::kNone, kDegree},
+    {"compressed_ply", ".compressed.ply", {}, Packing::kCompressedPly, kDegree},
+    {"compressed_ply_degree0", ".compressed.ply", {}, Packing::kCompressedPly, 0},
+    {"splat", ".splat", {}, Packing::kRecords, kDegree},
+    {"splat_degree0", ".splat", {}, Packing::kRecords, 0},
+    {"spz3", ".spz", {.version = 3}, Packing::kStreams, kDegree},
+    {"spz4", ".spz", {.version = 4}, Packing::kStreams, kDegree}};
 
 const bool kRegistered = [] {
   for (const Case& which : kCases) {
     // Packing a million splats takes seconds: fewer rounds there.
-    const int rounds = which.packed ? 2 : 8;
+    const int rounds = which.packing == Packing::kStreams ? 2 : 8;
     benchmark::RegisterBenchmark((std::string("io.") + which.name + "_read.1M").c_str(), readCase,
                                  which)
         ->UseManualTime()

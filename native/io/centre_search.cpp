@@ -128,6 +128,8 @@ HWY_AFTER_NAMESPACE();
 #include <cstdlib>
 #include <limits>
 
+#include "io/every_target.h"
+
 namespace stipple {
 
 HWY_EXPORT(namedSearch);
@@ -183,15 +185,7 @@ NamedCentreSearch dispatched() {
 }  // namespace
 
 std::vector<NamedCentreSearch> centreSearches() {
-  std::vector<NamedCentreSearch> list = {{"scalar", searchCentresPlainly}};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    list.push_back(dispatched());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return list;
+  return onEveryTarget(NamedCentreSearch{"scalar", searchCentresPlainly}, dispatched);
 }
 
 CentreSearch chosenCentreSearch() {

@@ -14,6 +14,7 @@
 #include "io/little_endian.h"
 #include "io/ply_comments.h"
 #include "io/ply_compressed.h"
+#include "io/ply_compressed_kernel.h"
 #include "io/ply_file.h"
 #include "io/ply_header.h"
 #include "io/ply_rows.h"
@@ -29,24 +30,57 @@ struct Rows {
   size_t stride = 0;
 };
 
-/// 0..1 in even steps.
-template <size_t kCount>
-std::array<double, kCount> sharesOf() {
-  std::array<double, kCount> shares;
-  for (size_t i = 0; i < kCount; ++i) {
-    shares[i] = static_cast<double>(i) / static_cast<double>(kCount - 1);
+// Chunks of one task: 250 KB of the file at degree 3.
+constexpr size_t kTaskChunks = 16;
+// A colour's harmonic of band 0 is 3.5 times as large and has to be a float32, too.
+constexpr float kLargestColour = 9.599e37f;
+
+/// exp(low + (high - low) * steps / last) for whole steps: the exponential of a sum is a product,
+/// and a chunk has fewer factors than splats.
+class ScaleTable {
+ public:
+  ScaleTable(float low, float high, uint32_t last) : low_(static_cast<double>(low)) {
+    step_ = (static_cast<double>(high) - low_) / last;
+    most_ = std::max(low_, static_cast<double>(high));
+    // Beyond these, factors of a product that has a value may have none.
+    is_tame_ = std::abs(low_) < kMost && std::abs(static_cast<double>(high)) < kMost;
+    if (!is_tame_) return;
+    // Each is the one before times the same: relative errors grow to 64 roundings of a double.
+    fillPowers(1.0, std::exp(step_), fine_);
+    fillPowers(std::exp(low_), std::exp(step_ * kFine), coarse_);
   }
-  return shares;
-}
+
+  float operator()(uint32_t steps) const {
+    // Not beyond the ends, which rounding of wide ranges leaves otherwise.
+    if (!is_tame_) return static_cast<float>(std::exp(std::min(low_ + steps * step_, most_)));
+    return static_cast<float>(coarse_[steps / kFine] * fine_[steps % kFine]);
+  }
+
+ private:
+  static constexpr size_t kFine = 32;
+  static constexpr double kMost = 300.0;
+
+  template <size_t kCount>
+  static void fillPowers(double first, double factor, std::array<double, kCount>& powers) {
+    for (double& power : powers) {
+      power = first;
+      first *= factor;
+    }
+  }
+
+  double low_, step_, most_;
+  bool is_tame_;
+  std::array<double, kFine> fine_;
+  std::array<double, 2048 / kFine> coarse_;
+};
 
 class Reader {
  public:
   Reader(const std::string& path, Progress* progress)
-      : file_(path), progress_(progress), header_(readPlyHeader(file_)) {
-    for (size_t byte = 0; byte < 256; ++byte) {
-      harmonic_of_[byte] = static_cast<float>(plyHarmonicOf(static_cast<uint8_t>(byte)));
-    }
-  }
+      : file_(path),
+        progress_(progress),
+        header_(readPlyHeader(file_)),
+        kernel_(plyChunkKernel()) {}
 
   SplatCloud read() {
     if (header_.encoding != PlyEncoding::kLittleEndian) {
@@ -62,11 +96,12 @@ class Reader {
     for (size_t k = 0; k < 4; ++k) {
       columns[k] = column(vertices_, kPackedProperties[k], PlyType::kUint32);
     }
-    const std::vector<size_t> harmonics = harmonicColumns();
+    const PlyHarmonicRows harmonics = harmonicRows();
     std::atomic<size_t> done{0};
-    parallelFor(cloud_.size(), kPlyChunkSplats * 16, [&](size_t begin, size_t end) {
+    parallelFor(cloud_.size(), kPlyChunkSplats * kTaskChunks, [&](size_t begin, size_t end) {
+      // Of each row, band 0 lies in front of the rest and is written behind it.
+      if (harmonics.row_bytes > 0) decodeHarmonics(harmonics, begin, end);
       decodeRows(columns, begin, end);
-      if (!harmonics.empty()) decodeHarmonics(harmonics, begin, end);
       const size_t rows = done.fetch_add(end - begin) + (end - begin);
       advance(progress_, static_cast<double>(rows) / static_cast<double>(cloud_.size()),
               "Reading splats");
@@ -149,104 +184,89 @@ class Reader {
         ranges_[i][k] = k < numbers ? loadFloat(&rows[i * chunks_.stride + columns[k]])
                                     : (k < kPlyChunkNumbers - 3 ? 0.0f : 1.0f);
         const bool is_scale = k >= 6 && k < 12;
-        if (std::isfinite(ranges_[i][k]) && !(is_scale && ranges_[i][k] > kPlyLargestLogScale)) {
+        const bool is_colour = k >= 12;
+        if (std::isfinite(ranges_[i][k]) && !(is_scale && ranges_[i][k] > kPlyLargestLogScale) &&
+            !(is_colour && std::abs(ranges_[i][k]) > kLargestColour)) {
           continue;
         }
         failHere(std::string(kChunkProperties[k]) + " of chunk " + std::to_string(i) + " is " +
                  std::to_string(ranges_[i][k]) +
-                 "; a finite number, and a logarithm up "
-                 "to 88.7 for scales, is expected");
+                 "; a finite number, for scales a logarithm up to 88.7, for colours one of size "
+                 "9.599e37 "
+                 "at most, is expected");
       }
     }
   }
 
-  /// Rows [begin, end) of an element.
-  ByteVector bytesOf(const Rows& rows, size_t begin, size_t end) const {
-    ByteVector block((end - begin) * rows.stride);
-    file_.readAt(rows.offset + begin * uint64_t{rows.stride}, block.data(), block.size());
+  /// Rows [begin, end) of an element, and room behind them.
+  ByteVector bytesOf(const Rows& rows, size_t begin, size_t end, size_t room) const {
+    const size_t bytes = (end - begin) * rows.stride;
+    ByteVector block(bytes + room);
+    file_.readAt(rows.offset + begin * uint64_t{rows.stride}, block.data(), bytes);
     return block;
   }
 
   void decodeRows(const std::array<size_t, 4>& columns, size_t begin, size_t end) {
-    const ByteVector block = bytesOf(vertices_, begin, end);
-    for (size_t i = begin; i < end; ++i) {
-      const uint8_t* row = &block[(i - begin) * vertices_.stride];
-      std::array<uint32_t, 4> packed;
-      for (size_t k = 0; k < 4; ++k) packed[k] = loadLittleEndian<uint32_t>(row + columns[k]);
-      decode(packed, i);
+    const ByteVector block = bytesOf(vertices_, begin, end, 0);
+    PlyChunkBits bits{};
+    for (size_t from = begin; from < end; from += kPlyChunkSplats) {
+      const size_t count = std::min(kPlyChunkSplats, end - from);
+      for (size_t i = 0; i < count; ++i) {
+        const uint8_t* row = &block[(from - begin + i) * vertices_.stride];
+        for (size_t k = 0; k < 4; ++k) bits[k][i] = loadLittleEndian<uint32_t>(row + columns[k]);
+      }
+      decodeChunk(bits, from, count);
     }
   }
 
-  /// The three numbers of 11, 10 and 11 bits, between the ranges that start at `first`.
-  std::array<double, 3> unpack(uint32_t packed, const PlyChunkRange& range, size_t first) const {
-    const std::array<double, 3> shares = {shares_of_11_[packed >> 21],
-                                          shares_of_10_[packed >> 11 & 1023],
-                                          shares_of_11_[packed & 2047]};
-    std::array<double, 3> values;
-    for (size_t k = 0; k < 3; ++k) values[k] = between(range, first + k, shares[k]);
-    return values;
-  }
-
-  static double between(const PlyChunkRange& range, size_t lowest, double share) {
-    const double low = static_cast<double>(range[lowest]);
-    return low + (static_cast<double>(range[lowest + 3]) - low) * share;
-  }
-
-  void decode(const std::array<uint32_t, 4>& packed, size_t i) {
-    const PlyChunkRange& range = ranges_[i / kPlyChunkSplats];
-    const std::array<double, 3> position = unpack(packed[0], range, 0);
-    const std::array<double, 3> logarithm = unpack(packed[2], range, 6);
-    float* sh = &cloud_.sh[i * cloud_.shStride()];
-    for (size_t k = 0; k < 3; ++k) {
-      cloud_.positions[i * 3 + k] = static_cast<float>(position[k]);
-      cloud_.scales[i * 3 + k] = static_cast<float>(std::exp(logarithm[k]));
-      const double colour = between(range, 12 + k, shares_of_8_[packed[3] >> (24 - 8 * k) & 255]);
-      sh[k] = static_cast<float>((colour - 0.5) / kPlyChunkC0);
+  void decodeChunk(const PlyChunkBits& bits, size_t from, size_t count) {
+    const PlyChunkRange& range = ranges_[from / kPlyChunkSplats];
+    std::array<std::array<float, kPlyChunkSplats>, 3> colours;
+    if (count == kPlyChunkSplats) {
+      kernel_.decode(bits, range,
+                     {&cloud_.positions[from * 3], &cloud_.rotations[from * 4],
+                      &cloud_.opacities[from], &colours});
+    } else {
+      std::array<float, kPlyChunkSplats * 3> positions;
+      std::array<float, kPlyChunkSplats * 4> rotations;
+      std::array<float, kPlyChunkSplats> opacities;
+      kernel_.decode(bits, range, {positions.data(), rotations.data(), opacities.data(), &colours});
+      std::copy_n(positions.data(), count * 3, &cloud_.positions[from * 3]);
+      std::copy_n(rotations.data(), count * 4, &cloud_.rotations[from * 4]);
+      std::copy_n(opacities.data(), count, &cloud_.opacities[from]);
     }
-    cloud_.opacities[i] = static_cast<float>(shares_of_8_[packed[3] & 255]);
-    decodeRotation(packed[1], &cloud_.rotations[i * 4]);
-  }
-
-  /// Index of the largest of w, x, y, z in 2 bits, then the others in 10 bits each, between
-  /// -sqrt(1/2) and sqrt(1/2).
-  void decodeRotation(uint32_t packed, float* q) const {
-    const size_t largest = packed >> 30;
-    double squares = 0;
-    for (size_t k = 4; k-- > 0;) {
-      if (k == largest) continue;
-      const double value = (shares_of_10_[packed & 1023] - 0.5) * std::sqrt(2.0);
-      packed >>= 10;
-      squares += value * value;
-      q[k] = static_cast<float>(value);
-    }
-    q[largest] = static_cast<float>(std::sqrt(std::max(0.0, 1.0 - squares)));
-    if (squares <= 1.0) return;
-    for (size_t k = 0; k < 4; ++k) {
-      q[k] = static_cast<float>(static_cast<double>(q[k]) / std::sqrt(squares));
+    const ScaleTable x(range[6], range[9], 2047);
+    const ScaleTable y(range[7], range[10], 1023);
+    const ScaleTable z(range[8], range[11], 2047);
+    const size_t stride = cloud_.shStride();
+    for (size_t i = 0; i < count; ++i) {
+      const uint32_t packed = bits[2][i];
+      float* scale = &cloud_.scales[(from + i) * 3];
+      scale[0] = x(packed >> 21);
+      scale[1] = y(packed >> 11 & 1023);
+      scale[2] = z(packed & 2047);
+      float* sh = &cloud_.sh[(from + i) * stride];
+      for (size_t k = 0; k < 3; ++k) sh[k] = colours[k][i];
     }
   }
 
   /// Where in a row the harmonics lie: all of red, then all of green, then all of blue.
-  std::vector<size_t> harmonicColumns() const {
-    std::vector<size_t> columns;
-    for (size_t k = 0; k < cloud_.shStride() - 3; ++k) {
-      columns.push_back(column(harmonics_, "f_rest_" + std::to_string(k), PlyType::kUint8));
+  PlyHarmonicRows harmonicRows() const {
+    PlyHarmonicRows rows{};
+    rows.row_bytes = cloud_.shStride() - 3;
+    const size_t rest = rows.row_bytes / 3;
+    for (size_t k = 0; k < rows.row_bytes; ++k) {
+      const std::string name = "f_rest_" + std::to_string(k % 3 * rest + k / 3);
+      rows.from[k] = static_cast<uint8_t>(column(harmonics_, name, PlyType::kUint8));
     }
-    return columns;
+    return rows;
   }
 
-  void decodeHarmonics(const std::vector<size_t>& columns, size_t begin, size_t end) {
-    const ByteVector block = bytesOf(harmonics_, begin, end);
-    const size_t stride = cloud_.shStride();
-    const size_t rest = columns.size() / 3;
-    // In the order of the cloud, so that it is written from front to back.
-    std::array<size_t, 45> from;
-    for (size_t k = 0; k < columns.size(); ++k) from[k] = columns[k % 3 * rest + k / 3];
-    for (size_t i = begin; i < end; ++i) {
-      const uint8_t* row = &block[(i - begin) * harmonics_.stride];
-      float* sh = &cloud_.sh[i * stride + 3];
-      for (size_t k = 0; k < columns.size(); ++k) sh[k] = harmonic_of_[row[from[k]]];
-    }
+  void decodeHarmonics(PlyHarmonicRows rows, size_t begin, size_t end) {
+    const ByteVector block = bytesOf(harmonics_, begin, end, PlyHarmonicRows::kReadable);
+    rows.bytes = block.data();
+    rows.count = end - begin;
+    kernel_.decodeHarmonics(rows, &cloud_.sh[begin * cloud_.shStride()]);
   }
 
   InputFile file_;
@@ -255,11 +275,7 @@ class Reader {
   Rows chunks_, vertices_, harmonics_;
   std::vector<PlyChunkRange> ranges_;
   SplatCloud cloud_;
-  // Divisions take longer than these look-ups.
-  const std::array<double, 2048> shares_of_11_ = sharesOf<2048>();
-  const std::array<double, 1024> shares_of_10_ = sharesOf<1024>();
-  const std::array<double, 256> shares_of_8_ = sharesOf<256>();
-  std::array<float, 256> harmonic_of_;
+  const PlyChunkKernel& kernel_;
 };
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "byte_text.h"
+#include "io/ply_compressed.h"
 #include "io/splat_file.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
@@ -134,12 +135,62 @@ TEST_F(CompressedPly, RefusesCountsAndRangesThatLie) {
   raw.range[9] = 89;
   expectRefused(raw, {"max_scale_x of chunk 0", "88.7"});
   raw = RawChunks();
+  raw.range[12] = -1e38f;  // -3.5e38 as a harmonic, which no float32 is
+  expectRefused(raw, {"min_r of chunk 0", "9.599e37"});
+  raw = RawChunks();
   std::string bytes = raw.bytes();
   bytes.replace(bytes.find("packed_scale"), 12, "packed_size_");
   expectError(ErrorCode::kFormat, {"packed_scale"}, [&] { readSplatFile(store("b.ply", bytes)); });
   bytes = raw.bytes();
   bytes.replace(bytes.find("little"), 6, "big");
   expectError(ErrorCode::kUnsupported, {"little"}, [&] { readSplatFile(store("b.ply", bytes)); });
+}
+
+TEST_F(CompressedPly, ReadsScalesBetweenEndsOfAnySize) {
+  RawChunks raw;
+  constexpr float kMost = std::numeric_limits<float>::max();
+  // x of the second splat lies at the lowest end, z of the first at the highest.
+  raw.range[6] = raw.range[7] = raw.range[8] = -kMost;
+  raw.range[9] = raw.range[10] = raw.range[11] = 88.7f;
+  const SplatCloud cloud = read(raw);
+  // The sum of -3.4e38 and as much more is known to 4e22 only, and must not end beyond the range.
+  EXPECT_LE(cloud.scales[2], float(std::exp(double(88.7f))));
+  EXPECT_GE(cloud.scales[2], 0.0f);
+  EXPECT_EQ(cloud.scales[3], 0.0f);
+  // Ends that stand the wrong way round count as they stand.
+  raw.range[6] = 2;
+  raw.range[9] = -2;
+  EXPECT_FLOAT_EQ(read(raw).scales[0], float(std::exp(2.0)));
+}
+
+TEST_F(CompressedPly, ReadsEveryStepOfAScaleAsItsExponential) {
+  // 2048 splats in chunks of one range: x takes all its steps, y its steps of 1023 twice.
+  for (const auto& [low, high] : {std::pair{-9.0f, 3.0f}, std::pair{-299.0f, 80.0f}}) {
+    ByteText file;
+    file.text("ply\nformat binary_little_endian 1.0\nelement chunk 8\n");
+    for (const char* name : kChunkProperties) {
+      file.text(std::string("property float ") + name + "\n");
+    }
+    file.text("element vertex 2048\n");
+    for (const char* name : kPackedProperties) {
+      file.text(std::string("property uint ") + name + "\n");
+    }
+    file.text("end_header\n");
+    for (size_t i = 0; i < 8 * kPlyChunkNumbers; ++i) {
+      const size_t k = i % kPlyChunkNumbers;
+      file.f32(k < 6 || k >= 12 ? 0.0f : k < 9 ? low : high);
+    }
+    for (uint32_t i = 0; i < 2048; ++i) file.u32(0).u32(0).u32(i << 21 | (i / 2) << 11).u32(0);
+    const SplatCloud cloud = readSplatFile(store("steps.compressed.ply", file.bytes));
+    ASSERT_EQ(cloud.size(), 2048u);
+    for (size_t i = 0; i < 2048; ++i) {
+      const double extent = double(high) - double(low);
+      EXPECT_FLOAT_EQ(cloud.scales[i * 3],
+                      float(std::exp(double(low) + extent * double(i) / 2047)));
+      EXPECT_FLOAT_EQ(cloud.scales[i * 3 + 1],
+                      float(std::exp(double(low) + extent * double(i / 2) / 1023)));
+    }
+  }
 }
 
 /// Which splat of `cloud` each splat of `back` is: writing changes the order.

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "io/ply_compressed.h"
+
+namespace stipple {
+
+/// The packed numbers of a chunk, property by property (kPackedProperties). Behind the last splat
+/// of a short chunk any bits do.
+using PlyChunkBits = std::array<std::array<uint32_t, kPlyChunkSplats>, kPackedProperties.size()>;
+
+/// What the bits of a chunk stand for, except for scales. Rows behind the last splat are written,
+/// too.
+struct PlyChunkTarget {
+  float* positions;                                              ///< [256,3]
+  float* rotations;                                              ///< [256,4] w,x,y,z
+  float* opacities;                                              ///< [256]
+  std::array<std::array<float, kPlyChunkSplats>, 3>* harmonics;  ///< [3,256] of band 0
+};
+
+/// Rows of bytes that stand for harmonics of bands 1 and up.
+struct PlyHarmonicRows {
+  static constexpr size_t kMostBytes = 45;
+  static constexpr size_t kReadable = 48;  ///< bytes from the start of the last row on
+  const uint8_t* bytes;                    ///< [count, row_bytes]
+  size_t row_bytes;
+  size_t count;
+  std::array<uint8_t, kMostBytes> from;  ///< where in a row the numbers lie, in the cloud's order
+};
+
+/// Loops over chunks and rows for one instruction set; all give the same numbers.
+struct PlyChunkKernel {
+  const char* target;
+  void (*decode)(const PlyChunkBits& bits, const PlyChunkRange& range, const PlyChunkTarget& out);
+  /// In: sh [count, 3 + row_bytes], of which the first three of each row are left undefined.
+  void (*decodeHarmonics)(const PlyHarmonicRows& rows, float* sh);
+};
+
+PlyChunkKernel plainPlyChunkKernel();
+
+/// The kernels that this machine can run, plain code ("scalar") first.
+std::vector<PlyChunkKernel> plyChunkKernels();
+
+/// The best, or the one that STIPPLE_FORCE_TARGET names.
+const PlyChunkKernel& plyChunkKernel();
+
+}  // namespace stipple
