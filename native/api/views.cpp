@@ -1,6 +1,7 @@
 #include "api/camera.h"
 #include "api/guard.h"
 #include "api/handles.h"
+#include "data/view_resample.h"
 #include "io/camera_file.h"
 
 namespace stipple::api {
@@ -99,29 +100,13 @@ StippleStatus stipple_views_camera(const StippleViews* views, uint64_t index,
 
 StippleStatus stipple_camera_resize(StippleCamera* camera, uint32_t width, uint32_t height) {
   return guarded([&] {
-    StippleCamera resized = complete(camera, "camera");
+    require(camera, "camera");
     if (width < 1 || height < 1) {
       fail(ErrorCode::kInvalidArgument, "the new size is " + std::to_string(width) + " x " +
                                             std::to_string(height) +
                                             "; each side must be at least 1");
     }
-    if (resized.width == 0 || resized.height == 0) {
-      // The camera of a file without sizes: lengths in widths of the picture, axis in its middle.
-      resized.fx *= width;
-      resized.fy *= width;
-      resized.cx = 0.5 * width;
-      resized.cy = 0.5 * height;
-    } else {
-      const double scale_x = static_cast<double>(width) / resized.width;
-      const double scale_y = static_cast<double>(height) / resized.height;
-      resized.fx *= scale_x;
-      resized.cx *= scale_x;
-      resized.fy *= scale_y;
-      resized.cy *= scale_y;
-    }
-    resized.width = width;
-    resized.height = height;
-    deliver(camera, resized, "camera");
+    deliver(camera, cameraTo(resized(cameraFrom(camera), width, height)), "camera");
   });
 }
 

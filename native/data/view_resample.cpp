@@ -180,10 +180,17 @@ Image undistort(const Image& image, const Camera& seen_by, const Lens& lens, con
 
 Camera resized(const Camera& camera, uint32_t width, uint32_t height) {
   Camera made = camera;
-  const double x = static_cast<double>(width) / camera.width;
-  const double y = static_cast<double>(height) / camera.height;
   made.width = width;
   made.height = height;
+  if (camera.width == 0 || camera.height == 0) {
+    made.fx *= width;
+    made.fy *= width;
+    made.cx = 0.5 * width;
+    made.cy = 0.5 * height;
+    return made;
+  }
+  const double x = static_cast<double>(width) / camera.width;
+  const double y = static_cast<double>(height) / camera.height;
   made.fx *= x;
   made.cx *= x;
   made.fy *= y;

@@ -24,7 +24,8 @@ enum class Sampling { kBilinear, kNearest };
 Image undistort(const Image& image, const Camera& seen_by, const Lens& lens, const Camera& target,
                 Sampling sampling, std::vector<float>* covered);
 
-/// A camera for the same picture at another size.
+/// A camera for the same picture at another size. One of size 0 x 0 is in units of the picture
+/// (io/camera_file.h): its focal lengths are in widths, its axis is in the middle.
 Camera resized(const Camera& camera, uint32_t width, uint32_t height);
 
 /// The picture at a smaller or equal size: every pixel is the mean over the exact area that it

@@ -31,12 +31,7 @@ void takeSizeOfPicture(DatasetView& view) {
   Camera& camera = view.view.camera;
   if (camera.width != 0) return;
   const ImageHeader header = readImageHeader(view.image_path);
-  camera.fx *= header.width;
-  camera.fy *= header.width;
-  camera.cx *= header.width;
-  camera.cy *= header.height;
-  camera.width = header.width;
-  camera.height = header.height;
+  camera = resized(camera, header.width, header.height);
 }
 
 uint32_t reduced(uint32_t side, uint32_t downscale) {
@@ -171,25 +166,29 @@ std::vector<float> readDepth(const DatasetView& view, const Camera& full, const 
 }
 
 /// RGB apart from alpha, which is left out where it is 1 everywhere.
-ViewPicture separated(const Image& image, std::vector<float> weights) {
+ViewPicture separated(Image image, std::vector<float> weights) {
   ViewPicture picture;
   picture.width = image.width;
   picture.height = image.height;
   const size_t pixels = image.pixelCount(), channels = image.channels;
-  picture.colour.resize(pixels * 3);
-  if (channels == 4) picture.alpha.resize(pixels);
-  bool opaque = true;
-  for (size_t i = 0; i < pixels; ++i) {
-    const float* from = &image.pixels[i * channels];
-    for (size_t c = 0; c < 3; ++c) picture.colour[i * 3 + c] = from[channels == 1 ? 0 : c];
-    if (channels != 4) continue;
-    picture.alpha[i] = std::clamp(from[3], 0.0f, 1.0f);
-    opaque = opaque && picture.alpha[i] == 1.0f;
+  if (channels == 3) {
+    picture.colour = std::move(image.pixels);
+  } else {
+    picture.colour.resize(pixels * 3);
+    if (channels == 4) picture.alpha.resize(pixels);
+    parallelFor(pixels, kPixelsPerTask, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const float* from = &image.pixels[i * channels];
+        for (size_t c = 0; c < 3; ++c) picture.colour[i * 3 + c] = from[channels == 1 ? 0 : c];
+        if (channels == 4) picture.alpha[i] = std::clamp(from[3], 0.0f, 1.0f);
+      }
+    });
   }
-  if (opaque) picture.alpha.clear();
-  const bool all_count =
-      std::all_of(weights.begin(), weights.end(), [](float weight) { return weight == 1.0f; });
-  if (!all_count) picture.weights = std::move(weights);
+  const auto all_one = [](const std::vector<float>& values) {
+    return std::all_of(values.begin(), values.end(), [](float value) { return value == 1.0f; });
+  };
+  if (all_one(picture.alpha)) picture.alpha.clear();
+  if (!all_one(weights)) picture.weights = std::move(weights);
   return picture;
 }
 
@@ -268,7 +267,7 @@ ViewPicture Dataset::read(size_t view) const {
     image = weights.empty() ? areaAverage(image, given.width, given.height)
                             : weightedAverage(std::move(image), weights, given.width, given.height);
   }
-  ViewPicture picture = separated(image, std::move(weights));
+  ViewPicture picture = separated(std::move(image), std::move(weights));
   if (!files.depth_path.empty()) picture.depth = readDepth(files, full, given);
   return picture;
 }

@@ -1,37 +1,46 @@
 #include "io/packed_picture.h"
 
-#include <cmath>
+#include <algorithm>
+#include <atomic>
 #include <utility>
+
+#include "base/parallel.h"
 
 namespace stipple {
 
 namespace {
 
 constexpr float kFull = 65535.0f;
+constexpr size_t kValuesPerTask = size_t{1} << 18;
 
 }  // namespace
 
 PackedPicture::Values PackedPicture::pack(const std::vector<float>& values) {
-  bool shares = true;
-  for (const float value : values) shares = shares && value >= 0.0f && value <= 1.0f;
   Values packed;
-  if (!shares) {
-    packed.floats = values;
-    return packed;
-  }
   packed.shares.resize(values.size());
-  for (size_t i = 0; i < values.size(); ++i) {
-    packed.shares[i] = static_cast<uint16_t>(values[i] * kFull + 0.5f);
-  }
+  std::atomic<bool> all_shares{true};
+  parallelFor(values.size(), kValuesPerTask, [&](size_t begin, size_t end) {
+    // No early end, so that the compiler makes vector code.
+    bool shares = true;
+    for (size_t i = begin; i < end; ++i) {
+      shares = shares & (values[i] >= 0.0f) & (values[i] <= 1.0f);
+      const float inside = std::min(1.0f, std::max(0.0f, values[i]));
+      packed.shares[i] = static_cast<uint16_t>(static_cast<int32_t>(inside * kFull + 0.5f));
+    }
+    if (!shares) all_shares = false;
+  });
+  if (!all_shares) packed = {{}, values};
   return packed;
 }
 
 std::vector<float> PackedPicture::unpack(const Values& values) {
   if (values.shares.empty()) return values.floats;
   std::vector<float> unpacked(values.shares.size());
-  for (size_t i = 0; i < unpacked.size(); ++i) {
-    unpacked[i] = static_cast<float>(values.shares[i]) / kFull;
-  }
+  parallelFor(unpacked.size(), kValuesPerTask, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      unpacked[i] = static_cast<float>(int32_t{values.shares[i]}) / kFull;
+    }
+  });
   return unpacked;
 }
 

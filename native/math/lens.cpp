@@ -62,10 +62,13 @@ bool Lens::isDistorted() const {
 
 Vec2d distort(const Lens& lens, const Vec2d& point) {
   Vec2d at = point;
-  const double radius = point.norm();
-  if (radius > 0) at *= radiusFactor(lens, radius);
+  if (lens.fisheye || lens.field_of_view != 0 || lens.division != 0) {
+    const double radius = point.norm();
+    if (radius > 0) at *= radiusFactor(lens, radius);
+  }
   double square = at.squaredNorm();
-  const double factor = polynomial(lens.radial, square) / polynomial(lens.divisor, square);
+  double factor = polynomial(lens.radial, square);
+  if (anyOf(lens.divisor)) factor /= polynomial(lens.divisor, square);
   const Vec2d radial = at * factor;
   if (lens.tangential_after_radial) {
     at = radial;

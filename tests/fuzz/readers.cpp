@@ -7,15 +7,19 @@
 #include <memory>
 
 #include "base/error.h"
+#include "data/view_check.h"
+#include "data/view_resample.h"
 #include "decode/hierarchy_decoder.h"
 #include "decode/surface_model.h"
 #include "density/octree_density.h"
 #include "io/camera_file.h"
+#include "io/colmap_points.h"
 #include "io/glb_builder.h"
 #include "io/hierarchy_asset.h"
 #include "io/image_file.h"
 #include "io/ksplat_builder.h"
 #include "io/mesh_file.h"
+#include "io/ply_points.h"
 #include "io/random_cloud.h"
 #include "io/sog_levels.h"
 #include "io/sog_scene.h"
@@ -255,8 +259,23 @@ std::vector<std::string> hierarchySeeds(const fs::path& folder) {
 
 // ---- Cameras ------------------------------------------------------------------------------------
 
+/// The camera without distortion of a lens, as a data set gives it.
+void undistorts(const CameraView& view) {
+  Camera camera = view.camera;
+  if (camera.width == 0)
+    camera = resized({.width = 1, .height = 1, .fx = camera.fx, .fy = camera.fy}, 9, 7);
+  try {
+    camera = undistortedCamera(camera, view.lens);
+  } catch (const Error&) {
+    return;
+  }
+  keepsPromises([&] { validate(camera); });
+}
+
 void readCameras(const fs::path& path) {
-  const std::vector<CameraView> views = readCameraFile(path.string());
+  const std::vector<CameraView> views = readCameraFile(path.string(), Distorted::kKeep);
+  // One lens takes a millisecond: what a fuzzer looks for is in the first.
+  if (!views.empty() && views.front().lens.isDistorted()) undistorts(views.front());
   keepsPromises([&] {
     for (CameraView view : views) {
       // Files without a size of the pictures give cameras in units of the picture.
@@ -313,6 +332,35 @@ std::vector<std::string> colmapTextSeeds(const fs::path&) {
            "# Images\n11 1 1 0 0 1 2 3 3 b c.png\n1.5 2.5 -1\n12 1 0 0 0 0 0 4 7 a.png\n\n")};
 }
 
+void readPoints(const PointSet& points) {
+  keepsPromises([&] { validatePoints(points, "points"); });
+}
+
+std::vector<std::string> colmapPointSeeds(const fs::path&) {
+  ByteText bytes;
+  bytes.u64(2);
+  for (const uint64_t id : {5u, 9u}) {
+    bytes.u64(id);
+    for (const double value : {1.0, -2.0, 3.5}) bytes.u64(std::bit_cast<uint64_t>(value));
+    bytes.u8(255).u8(0).u8(128).u64(std::bit_cast<uint64_t>(0.25)).u64(1).u32(1).u32(7);
+  }
+  return {bytes.bytes};
+}
+
+std::vector<std::string> colmapPointTextSeeds(const fs::path&) {
+  return {"# 3D points\n5 1 -2 3.5 255 0 128 0.25 1 7\n9 0 0 2 0 0 0 1e-3\r\n"};
+}
+
+std::vector<std::string> plyPointSeeds(const fs::path&) {
+  const std::string properties =
+      "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty uchar "
+      "red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+  return {"ply\nformat ascii 1.0\n" + properties + "1 2 3 4 5 6\n",
+          "ply\nformat binary_little_endian 1.0\n" + properties + std::string(15, '\x01'),
+          "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\n"
+          "property double z\nend_header\n1 2 3\n4 5 6\n"};
+}
+
 std::vector<std::string> transformsSeeds(const fs::path&) {
   const std::string frames =
       "\"frames\":[{\"file_path\":\"a.png\",\"transform_matrix\":"
@@ -323,6 +371,11 @@ std::vector<std::string> transformsSeeds(const fs::path&) {
       "\"camera_model\":\"OPENCV\"," +
           frames,
       "{\"camera_angle_x\":1.2," + frames,
+      "{\"fl_x\":50,\"w\":64,\"h\":48,\"camera_model\":\"OPENCV\",\"k1\":-0.1,\"k3\":0.01,\"k5\":0."
+      "1,\"p2\":"
+      "0.001,\"ply_file_path\":\"p.ply\",\"test_filenames\":[\"b\"]," +
+          frames,
+      "{\"fl_x\":50,\"w\":64,\"h\":48,\"is_fisheye\":true,\"k1\":0.1,\"k4\":0.2," + frames,
       "{\"camera_model\":\"ORTHOGRAPHIC\",\"ortho_scale\":3,\"w\":8,\"h\":8," + frames};
 }
 
@@ -347,6 +400,16 @@ std::vector<Reader> makeReaders() {
                  transformsSeeds});
   all.push_back({"colmap", nullptr, storePair("cameras.bin", "images.bin"),
                  [](const fs::path& folder) { readCameras(folder); }, colmapSeeds});
+  all.push_back({"colmap-points", nullptr, storeAs("points3D.bin"),
+                 [](const fs::path& folder) { readPoints(readColmapPoints(folder.string())); },
+                 colmapPointSeeds});
+  all.push_back({"colmap-points-text", nullptr, storeAs("points3D.txt"),
+                 [](const fs::path& folder) { readPoints(readColmapPoints(folder.string())); },
+                 colmapPointTextSeeds});
+  all.push_back(
+      {"ply-points", nullptr, storeAs("points.ply"),
+       [](const fs::path& folder) { readPoints(readPlyPoints((folder / "points.ply").string())); },
+       plyPointSeeds});
   all.push_back({"colmap-text", nullptr, storePair("cameras.txt", "images.txt"),
                  [](const fs::path& folder) { readCameras(folder); }, colmapTextSeeds});
   return all;

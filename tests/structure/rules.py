@@ -28,9 +28,9 @@ THIRD_PARTY = {
     'CLI11': r'CLI/',
     'Google Benchmark': r'benchmark/',
 }
-# A format's library is known to the files of that format only (benchmarks may measure against OpenVDB).
+# A format's library is known to the files of that format only (benchmarks may measure against some).
 FORMAT_FILES = {'OpenVDB': r'native/(io/media/volume_|bench/)', 'tinygltf': r'native/io/media/gltf_',
-                'OpenImageIO': r'native/io/media/image_', 'zlib': r'native/io/media/zlib_', 'zstd': r'native/io/media/zstd_',
+                'OpenImageIO': r'native/(io/media/image_|bench/)', 'zlib': r'native/io/media/zlib_', 'zstd': r'native/io/media/zstd_',
                 'libwebp': r'native/io/media/webp_'}
 
 # Headers of ours whose purpose is to hand a package's types to every folder.

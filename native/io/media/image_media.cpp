@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -73,24 +74,43 @@ StippleMediaImage describe(const OIIO::ImageSpec& spec, const std::string& name)
   return info;
 }
 
-DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
-  const OIIO::ImageSpec spec = input.spec();
-  DecodedImage image;
-  image.info = describe(spec, name);
-  const int64_t window[2] = {image.info.width, image.info.height};
+/// Room for this many floats.
+using Allocate = std::function<float*(size_t count)>;
 
+/// Decodes the pixels [height, width, channels] to where `allocate` says.
+StippleMediaImage decodeInto(OIIO::ImageInput& input, const std::string& name,
+                             const Allocate& allocate) {
+  const OIIO::ImageSpec spec = input.spec();
+  const StippleMediaImage info = describe(spec, name);
+  const int64_t window[2] = {info.width, info.height};
   const std::vector<int> channels = chooseChannels(spec);
   const int first = *std::min_element(channels.begin(), channels.end());
   const int last = *std::max_element(channels.begin(), channels.end());
+  const auto read = [&](float* pixels) {
+    if (!input.read_image(0, 0, first, last + 1, OIIO::TypeDesc::FLOAT, pixels)) {
+      fail(ErrorCode::kFormat, name + " cannot be decoded: " + input.geterror());
+    }
+  };
+  const size_t count = static_cast<size_t>(window[0] * window[1]) * channels.size();
+  // Most pictures lie in their files as they are wanted; a copy takes as long as a tenth of
+  // decoding.
+  bool as_wanted = spec.x == spec.full_x && spec.y == spec.full_y && spec.width == window[0] &&
+                   spec.height == window[1];
+  for (size_t c = 0; c < channels.size(); ++c) {
+    as_wanted = as_wanted && channels[c] == first + static_cast<int>(c);
+  }
+  if (as_wanted) {
+    read(allocate(count));
+    return info;
+  }
+
   const size_t read_channels = static_cast<size_t>(last - first + 1);
   const size_t width = static_cast<size_t>(spec.width);
   const size_t height = static_cast<size_t>(spec.height);
   std::vector<float> pixels(width * height * read_channels);
-  if (!input.read_image(0, 0, first, last + 1, OIIO::TypeDesc::FLOAT, pixels.data())) {
-    fail(ErrorCode::kFormat, name + " cannot be decoded: " + input.geterror());
-  }
-
-  image.pixels.assign(static_cast<size_t>(window[0] * window[1]) * channels.size(), 0.0f);
+  read(pixels.data());
+  float* out = allocate(count);
+  std::fill_n(out, count, 0.0f);
   // The data window may be smaller or larger than the picture.
   for (size_t y = 0; y < height; ++y) {
     const int64_t row = spec.y - spec.full_y + static_cast<int64_t>(y);
@@ -99,10 +119,19 @@ DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
       const int64_t column = spec.x - spec.full_x + static_cast<int64_t>(x);
       if (column < 0 || column >= window[0]) continue;
       const float* from = &pixels[(y * width + x) * read_channels];
-      float* to = &image.pixels[static_cast<size_t>(row * window[0] + column) * channels.size()];
+      float* to = out + static_cast<size_t>(row * window[0] + column) * channels.size();
       for (size_t c = 0; c < channels.size(); ++c) to[c] = from[channels[c] - first];
     }
   }
+  return info;
+}
+
+DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
+  DecodedImage image;
+  image.info = decodeInto(input, name, [&image](size_t count) {
+    image.pixels.resize(count);
+    return image.pixels.data();
+  });
   return image;
 }
 
@@ -182,9 +211,10 @@ DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std
 void stipple_media_image_read(const char* path, StippleMediaImage* image,
                               const StippleMediaSink* sink, StippleMediaStatus* status) {
   guard(path, status, [&] {
-    const DecodedImage decoded = decodeImageFile(path);
-    *image = decoded.info;
-    give(*sink, kMediaPixels, decoded.pixels);
+    *image = decodeInto(*openImage(path), path, [sink](size_t count) {
+      return static_cast<float*>(
+          stipple::media::allocate(*sink, kMediaPixels, count * sizeof(float)));
+    });
   });
 }
 
