@@ -11,7 +11,6 @@ namespace stipple {
 
 namespace {
 
-constexpr size_t kNeighbours = 6;
 constexpr size_t kGrain = 4096;
 constexpr double kWidest = 0.5;
 
@@ -31,18 +30,23 @@ std::vector<uint32_t> sharers(const AnchorSet& anchors) {
 }  // namespace
 
 std::vector<float> anchorSpacing(const AnchorSet& anchors) {
+  std::vector<uint32_t> neighbours;
+  return anchorSpacing(anchors, neighbours);
+}
+
+std::vector<float> anchorSpacing(const AnchorSet& anchors, std::vector<uint32_t>& neighbours) {
   const size_t count = anchors.size();
   const double leaf = std::ldexp(1.0, -anchors.leaf_level);
   const std::vector<double> places(anchors.positions.begin(), anchors.positions.end());
-  const std::vector<uint32_t> neighbours = nearestNeighbours(places, kNeighbours);
+  neighbours = nearestNeighbours(places, kSpacingNeighbours);
   const std::vector<uint32_t> in_leaf = sharers(anchors);
   std::vector<float> spacing(count);
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       double squared = 0;
       double areas = 0;
-      for (size_t k = 0; k < kNeighbours; ++k) {
-        const uint32_t other = neighbours[i * kNeighbours + k];
+      for (size_t k = 0; k < kSpacingNeighbours; ++k) {
+        const uint32_t other = neighbours[i * kSpacingNeighbours + k];
         if (other == kNoPlace) break;
         for (size_t axis = 0; axis < 3; ++axis) {
           const double d = places[i * 3 + axis] - places[other * size_t{3} + axis];

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <span>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "density/anchor_sampling.h"
@@ -13,5 +14,10 @@ namespace stipple {
 /// leaf, or less where more than 16 share a leaf (anchors without jitter stand on each other).
 /// Threads and determinism: parallel; same result for any number of threads. Cost: O(P log P).
 std::vector<float> anchorSpacing(const AnchorSet& anchors);
+
+/// The same, with the neighbours that it found. Out: neighbours [P, kSpacingNeighbours] nearest
+/// anchors, kNoPlace (decode/merge_neighbours.h) where there are fewer.
+constexpr size_t kSpacingNeighbours = 6;
+std::vector<float> anchorSpacing(const AnchorSet& anchors, std::vector<uint32_t>& neighbours);
 
 }  // namespace stipple

@@ -31,6 +31,13 @@ uint32_t hashOf(uint32_t x, uint32_t y, uint32_t z) {
   return x ^ (y * 2654435761u) ^ (z * 805459861u);
 }
 
+/// Blocks of 2x2x2 corners are hashed as one and stand together, so that the corners of a cell lie
+/// in few cache lines.
+uint32_t hashedRow(const FeatureLevel& level, uint32_t x, uint32_t y, uint32_t z) {
+  const uint32_t block = hashOf(x >> 1, y >> 1, z >> 1) & (level.row_count / 8 - 1);
+  return block * 8 + (x & 1) + 2 * (y & 1) + 4 * (z & 1);
+}
+
 /// Eight corners of the cell around a place, with the weights of trilinear interpolation; corner
 /// dx + 2 dy + 4 dz.
 struct Corners {
@@ -59,8 +66,7 @@ Corners cornersOf(const FeatureLevel& level, bool hashed, const float* position)
     }
     corners.weights[c] = weight;
     const uint32_t x = low[0] + d[0], y = low[1] + d[1], z = low[2] + d[2];
-    corners.rows[c] =
-        hashed ? hashOf(x, y, z) & (level.row_count - 1) : x + (side + 1) * (y + (side + 1) * z);
+    corners.rows[c] = hashed ? hashedRow(level, x, y, z) : x + (side + 1) * (y + (side + 1) * z);
   }
   return corners;
 }
@@ -107,7 +113,7 @@ FeatureGrid::FeatureGrid(size_t channels, std::vector<FeatureLevel> levels)
     const bool is_power = (level.row_count & (level.row_count - 1)) == 0;
     if (!in_range || level.row_count == 0 ||
         (level.row_count != cornerCount(level.level) &&
-         (!is_power || level.row_count > cornerCount(level.level))) ||
+         (!is_power || level.row_count < 8 || level.row_count > cornerCount(level.level))) ||
         level.values.size() != level.row_count * channels_) {
       fail(ErrorCode::kFormat,
            name + " have " + std::to_string(level.row_count) + " rows and " +

@@ -11,7 +11,7 @@ namespace stipple {
 /// of its own where all fit, else the row that a hash of its coordinates gives.
 struct FeatureLevel {
   int level = 0;              ///< 2^level cells a side
-  uint32_t row_count = 0;     ///< a power of two where hashed
+  uint32_t row_count = 0;     ///< a power of two, at least 8, where hashed
   std::vector<float> values;  ///< [rows, channels]
 };
 

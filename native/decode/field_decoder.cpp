@@ -74,7 +74,7 @@ void FieldDecoder::forward(const AnchorSet& anchors, FieldTape& tape, SplatCloud
   const size_t count = anchors.size();
   const size_t width = fieldInputWidth(field);
   const size_t gaussians = field.layout.gaussians;
-  tape.spacing = anchorSpacing(anchors);
+  tape.spacing = anchorSpacing(anchors, tape.neighbours);
   tape.units.resize(count);
   tape.footprints.resize(count * gaussians);
   tape.inputs.assign(count * width, 0.0f);

@@ -11,9 +11,10 @@ namespace stipple {
 
 /// What a forward pass leaves for the backward pass. Memory is used again by the next.
 struct FieldTape {
-  std::vector<float> spacing;  ///< [P] unit cube
-  std::vector<float> units;    ///< [P] of the layout
-  std::vector<float> inputs;   ///< [P, input width]
+  std::vector<float> spacing;        ///< [P] unit cube
+  std::vector<uint32_t> neighbours;  ///< [P, kSpacingNeighbours] of the anchors
+  std::vector<float> units;          ///< [P] of the layout
+  std::vector<float> inputs;         ///< [P, input width]
   MlpTape network;
   std::vector<float> centres;     ///< [N,3] of the Gaussians, unit cube
   std::vector<float> footprints;  ///< [N] of the Gaussians, unit cube

@@ -12,9 +12,9 @@ namespace stipple {
 
 namespace {
 
-/// Levels of features, the finest that of the leaves; and of colours, the finest one above it.
+/// Levels of features and of colours; the finest are those of the leaves.
 constexpr int kFeatureLevels = 6;
-constexpr int kColourLevels = 3;
+constexpr int kColourLevels = 2;
 constexpr size_t kFeatureChannels = 8;
 constexpr size_t kColourChannels = 3;
 constexpr size_t kHidden = 64;
@@ -107,7 +107,7 @@ FieldParameters makeFieldParameters(const FieldShape& shape) {
   field.features = gridOf(kFeatureChannels, shape.leaf_level, kFeatureLevels, shape,
                           kFeatureAmplitude, shape.seed);
   field.colours =
-      gridOf(kColourChannels, shape.leaf_level + 1, kColourLevels, shape, 0.0f, shape.seed);
+      gridOf(kColourChannels, shape.leaf_level, kColourLevels, shape, 0.0f, shape.seed);
   const size_t widths[] = {fieldInputWidth(field), kHidden, kHidden,
                            fieldOutputWidth(shape.layout)};
   field.network = Mlp(widths, shape.seed, kLastLayerScale);

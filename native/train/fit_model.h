@@ -58,7 +58,8 @@ class FitModel {
   virtual StepReport step(const FitMoment& moment, const StepView& view, ViewEvaluator* views,
                           Progress* progress) = 0;
 
-  /// The splats at a budget; 0: all that there are, or the largest budget that was trained. A model
+  /// The splats at a budget (of a field: its anchors); 0: all that there are, or the largest budget
+  /// that was trained. A model
   /// of one size gives that, whatever is asked.
   virtual SplatCloud splats(uint64_t budget) = 0;
   /// Budgets at which held-out views are worth measuring, ascending; one for a model of one size.

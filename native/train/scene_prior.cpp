@@ -1,0 +1,188 @@
+#include "train/scene_prior.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "base/random.h"
+#include "math/vec.h"
+
+namespace stipple {
+
+namespace {
+
+/// A surface is known where this much of a pixel is covered.
+constexpr float kCovered = 0.5f;
+constexpr double kOutliers = 0.01;
+/// Points that reach this much farther than all but the outliers are no outliers.
+constexpr double kCompact = 1.3;
+constexpr double kMargin = 0.1;
+/// Cameras that are asked whether they see a point.
+constexpr size_t kWitnesses = 100;
+
+bool sees(const Camera& camera, const Vec3d& point) {
+  const Vec3d p = (camera.world_to_camera * point.homogeneous()).head<3>();
+  if (p.z() < camera.near_plane || p.z() > camera.far_plane) return false;
+  const double depth = camera.model == CameraModel::kPerspective ? p.z() : 1.0;
+  const double x = camera.fx * p.x() / depth + camera.cx;
+  const double y = camera.fy * p.y() / depth + camera.cy;
+  return x >= 0 && y >= 0 && x < camera.width && y < camera.height;
+}
+
+/// World place of a pixel's middle at a depth.
+Vec3d unprojected(const Camera& camera, const Mat4d& camera_to_world, size_t x, size_t y,
+                  double depth) {
+  const double along = camera.model == CameraModel::kPerspective ? depth : 1.0;
+  const Vec3d p((static_cast<double>(x) + 0.5 - camera.cx) / camera.fx * along,
+                (static_cast<double>(y) + 0.5 - camera.cy) / camera.fy * along, depth);
+  return (camera_to_world * p.homogeneous()).head<3>();
+}
+
+void addPoint(ScenePrior& prior, const Vec3d& place, float weight) {
+  for (int axis = 0; axis < 3; ++axis) prior.positions.push_back(static_cast<float>(place[axis]));
+  prior.weights.push_back(weight);
+}
+
+/// Points of the source, weighted as it says, with a mean of 1.
+void addPoints(const PointSet& points, ScenePrior& prior) {
+  double sum = 0;
+  for (const float weight : points.weights) sum += static_cast<double>(weight);
+  const size_t count = points.positions.size() / 3;
+  const double scale = sum > 0 ? static_cast<double>(count) / sum : 0;
+  for (size_t i = 0; i < count; ++i) {
+    const float* p = &points.positions[i * 3];
+    const float weight =
+        scale > 0 ? static_cast<float>(scale * static_cast<double>(points.weights[i])) : 1.0f;
+    if (weight > 0) addPoint(prior, Vec3d(p[0], p[1], p[2]), weight);
+  }
+}
+
+void addDepth(const ViewSource& views, std::span<const size_t> training,
+              const ScenePriorOptions& options, ScenePrior& prior, Progress* progress) {
+  const size_t view_count = std::min(training.size(), options.depth_views);
+  const size_t per_view = options.depth_points / view_count;
+  for (size_t v = 0; v < view_count; ++v) {
+    advance(progress, static_cast<double>(v) / static_cast<double>(view_count),
+            "Looking for surfaces");
+    const size_t view = training[v * training.size() / view_count];
+    const ViewPicture picture = views.load(view);
+    if (picture.depth.empty()) return;  // the others have none either
+    const Camera& camera = views.camera(view);
+    const Mat4d to_world = camera.world_to_camera.inverse();
+    const size_t pixels = size_t{picture.width} * picture.height;
+    const auto known = [&](size_t i) {
+      return picture.depth[i] > 0 && static_cast<double>(picture.depth[i]) < camera.far_plane &&
+             (picture.alpha.empty() || picture.alpha[i] > kCovered);
+    };
+    size_t known_count = 0;
+    for (size_t i = 0; i < pixels; ++i) known_count += known(i) ? 1 : 0;
+    // Every pixel has the same chance, by its own number.
+    const double chance = std::min(
+        1.0, static_cast<double>(per_view) / std::max(1.0, static_cast<double>(known_count)));
+    for (size_t i = 0; i < pixels; ++i) {
+      if (!known(i)) continue;
+      const uint64_t key = static_cast<uint64_t>(view) << 32 | i;
+      if (unitDouble(keyedBits(options.seed, RandomUse::kPriorSample, key)) >= chance) continue;
+      addPoint(prior,
+               unprojected(camera, to_world, i % picture.width, i / picture.width,
+                           static_cast<double>(picture.depth[i])),
+               1.0f);
+    }
+  }
+}
+
+/// Keeps points that at least two of the cameras see; all where none is.
+void dropUnseen(const ViewSource& views, std::span<const size_t> training, ScenePrior& prior) {
+  const size_t witnesses = std::min(training.size(), kWitnesses);
+  const size_t needed = std::min<size_t>(2, witnesses);
+  ScenePrior kept;
+  for (size_t i = 0; i < prior.weights.size(); ++i) {
+    const float* p = &prior.positions[i * 3];
+    const Vec3d place(p[0], p[1], p[2]);
+    size_t seen = 0;
+    for (size_t w = 0; w < witnesses && seen < needed; ++w) {
+      seen += sees(views.camera(training[w * training.size() / witnesses]), place) ? 1 : 0;
+    }
+    if (seen >= needed) addPoint(kept, place, prior.weights[i]);
+  }
+  if (kept.weights.empty()) return;
+  prior.positions = std::move(kept.positions);
+  prior.weights = std::move(kept.weights);
+}
+
+RootCube cubeAround(const Vec3d& low, const Vec3d& high, double margin) {
+  const Vec3d middle = 0.5 * (low + high);
+  const double least = 1e-3 + 1e-6 * middle.cwiseAbs().maxCoeff();
+  const double side = std::max((high - low).maxCoeff() * (1 + margin), least);
+  RootCube root;
+  for (int axis = 0; axis < 3; ++axis) {
+    root.origin[static_cast<size_t>(axis)] = middle[axis] - 0.5 * side;
+  }
+  root.side = side;
+  return root;
+}
+
+RootCube cubeOfPoints(const std::vector<float>& positions) {
+  const size_t count = positions.size() / 3;
+  const size_t cut = static_cast<size_t>(kOutliers * static_cast<double>(count));
+  Vec3d low, high;
+  std::vector<double> places(count);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < count; ++i) places[i] = static_cast<double>(positions[i * 3 + axis]);
+    std::sort(places.begin(), places.end());
+    low[static_cast<int>(axis)] = places[cut];
+    high[static_cast<int>(axis)] = places[count - 1 - cut];
+    const double inner = places[count - 1 - cut] - places[cut];
+    if (places[count - 1] - places[0] > kCompact * inner) continue;
+    low[static_cast<int>(axis)] = places[0];
+    high[static_cast<int>(axis)] = places[count - 1];
+  }
+  return cubeAround(low, high, kMargin);
+}
+
+/// The ball that all cameras see, about: around the place nearest to all optical axes, out to the
+/// nearest side of a picture; where cameras look away from each other, around them.
+RootCube cubeOfCameras(const ViewSource& views, std::span<const size_t> training) {
+  Mat3d sum = Mat3d::Identity() * 1e-6;
+  Vec3d target = Vec3d::Zero();
+  Vec3d centre = Vec3d::Zero();
+  for (const size_t view : training) {
+    const Camera& camera = views.camera(view);
+    const Vec3d axis = camera.world_to_camera.block<1, 3>(2, 0).transpose();
+    const Mat3d across = Mat3d::Identity() - axis * axis.transpose();
+    sum += across;
+    target += across * cameraCentre(camera);
+    centre += cameraCentre(camera) / static_cast<double>(training.size());
+  }
+  target += 1e-6 * centre;
+  const Vec3d middle = sum.ldlt().solve(target);
+  double radius = 1e30;
+  double extent = 0;
+  for (const size_t view : training) {
+    const Camera& camera = views.camera(view);
+    extent = std::max(extent, (cameraCentre(camera) - centre).norm());
+    const Vec3d p = (camera.world_to_camera * middle.homogeneous()).head<3>();
+    const double half = 0.5 * std::min(camera.width / camera.fx, camera.height / camera.fy);
+    const bool flat = camera.model == CameraModel::kOrthographic;
+    if (!flat && p.z() <= camera.near_plane) continue;  // looks away
+    radius = std::min(radius, flat ? half : p.z() * half / std::sqrt(1 + half * half));
+  }
+  const double least = 0.05 * extent;
+  if (radius > 1e29 || radius < least) radius = std::max(2 * extent, 1.0);
+  return cubeAround(middle - Vec3d::Constant(radius), middle + Vec3d::Constant(radius), kMargin);
+}
+
+}  // namespace
+
+ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
+                      const ScenePriorOptions& options, Progress* progress) {
+  ScenePrior prior;
+  addPoints(views.points(), prior);
+  addDepth(views, training, options, prior, progress);
+  dropUnseen(views, training, prior);
+  prior.root =
+      prior.weights.empty() ? cubeOfCameras(views, training) : cubeOfPoints(prior.positions);
+  return prior;
+}
+
+}  // namespace stipple

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "data/view_source.h"
+#include "density/octree_density.h"
+
+namespace stipple {
+
+/// What is known of a scene before it is fitted: where it is and where its surfaces are.
+struct ScenePrior {
+  RootCube root;
+  std::vector<float> positions;  ///< [N,3] metres, on surfaces; may be empty
+  std::vector<float> weights;    ///< [N] >= 0, mean 1
+};
+
+struct ScenePriorOptions {
+  size_t depth_points = 300000;  ///< at most, from the depth of views where they have it
+  size_t depth_views = 64;       ///< at most, that are loaded for it
+  uint64_t seed = 0;
+};
+
+/// Points of the source, and places that the views' depth shows. The root cube holds the points
+/// that at least two cameras see, without the farthest 1 % on either side of each axis where those
+/// reach far out, and a tenth more; without points, the ball that the cameras have in common. In:
+/// training: views of the source, at least one. Errors: those of ViewSource::load; kCancelled.
+ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
+                      const ScenePriorOptions& options, Progress* progress = nullptr);
+
+}  // namespace stipple

@@ -1,0 +1,293 @@
+#include "train/field_model.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "train/toy_views.h"
+
+namespace stipple {
+namespace {
+
+constexpr size_t kViews = 24;
+constexpr uint32_t kSize = 64;
+
+FieldModelOptions smallOptions() {
+  FieldModelOptions options;
+  options.least_anchors = 64;
+  options.most_anchors = 1024;
+  options.gaussians_per_anchor = 4;
+  options.leaf_level = 6;
+  options.seed = 1;
+  return options;
+}
+
+/// Every sixth view is kept apart.
+std::vector<size_t> trainingViews() {
+  std::vector<size_t> views;
+  for (size_t v = 0; v < kViews; ++v) {
+    if (v % 6 != 0) views.push_back(v);
+  }
+  return views;
+}
+
+std::vector<float> targetOf(const MemoryViewSource& views, size_t v, const double* background) {
+  const ViewPicture& picture = views.picture(v);
+  std::vector<float> target = picture.colour;
+  for (size_t i = 0; i < target.size(); ++i) {
+    target[i] += (1.0f - picture.alpha[i / 3]) * static_cast<float>(background[i % 3]);
+  }
+  return target;
+}
+
+/// Steps `begin` to `end` of `iterations`.
+std::vector<StepReport> train(FitModel& model, const MemoryViewSource& views, uint64_t begin,
+                              uint64_t end, uint64_t iterations) {
+  const std::vector<size_t> training = trainingViews();
+  std::vector<StepReport> reports;
+  for (uint64_t i = begin; i <= end; ++i) {
+    FitMoment moment;
+    moment.iteration = i;
+    moment.iterations = iterations;
+    StepView view;
+    view.index = training[(i * 7) % training.size()];
+    view.camera = &views.camera(view.index);
+    std::fill_n(view.background, 3, i % 2 == 0 ? 0.0 : 1.0);
+    const std::vector<float> target = targetOf(views, view.index, view.background);
+    view.target = target.data();
+    reports.push_back(model.step(moment, view, nullptr, nullptr));
+  }
+  return reports;
+}
+
+double heldOutPsnr(FitModel& model, const MemoryViewSource& views, uint64_t budget) {
+  const SplatCloud cloud = model.splats(budget);
+  const SplatInstance instance{&cloud};
+  double sum = 0;
+  size_t count = 0;
+  for (size_t v = 0; v < kViews; v += 6) {
+    const RenderResult drawn = renderTiled({&instance, 1}, views.camera(v), {});
+    double squares = 0;
+    for (size_t i = 0; i < drawn.colour.size(); i += 4) {
+      for (size_t c = 0; c < 3; ++c) {
+        const double d = static_cast<double>(drawn.colour[i + c]) -
+                         static_cast<double>(views.picture(v).colour[i / 4 * 3 + c]);
+        squares += d * d;
+      }
+    }
+    sum += -10 * std::log10(squares / (3.0 * kSize * kSize));
+    ++count;
+  }
+  return sum / static_cast<double>(count);
+}
+
+TEST(FieldModel, LearnsABallThatDecodesAtAnyBudget) {
+  const auto views = toyViews(toyBall(6000), kViews, kSize);
+  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const double before = heldOutPsnr(*model, *views, 1024);
+  train(*model, *views, 1, 250, 250);
+  std::vector<double> psnr;
+  EXPECT_EQ(model->budgets(), (std::vector<uint64_t>{64, 128, 256, 512, 1024}));
+  for (const uint64_t budget : model->budgets()) {
+    psnr.push_back(heldOutPsnr(*model, *views, budget));
+    EXPECT_EQ(model->splats(budget).size(), budget * 4);
+  }
+  for (size_t i = 1; i < psnr.size(); ++i) EXPECT_GE(psnr[i], psnr[i - 1] - 0.05) << i;
+  EXPECT_GT(psnr.back(), before + 5);
+  EXPECT_GT(psnr.back(), 21);
+  EXPECT_EQ(model->splats(0).size(), 4096u);
+}
+
+TEST(FieldModel, GoesThroughItsStages) {
+  const auto views = toyViews(toyBall(2000), kViews, 32);
+  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const std::vector<StepReport> reports = train(*model, *views, 1, 200, 200);
+  EXPECT_STREQ(reports[0].stage, "Density");
+  EXPECT_EQ(reports[0].splat_count, 0u);
+  EXPECT_STREQ(reports[2].stage, "Attributes");
+  EXPECT_STREQ(reports[199].stage, "Joint");
+  uint64_t least = UINT64_MAX, most = 0;
+  for (size_t i = 2; i < reports.size(); ++i) {
+    EXPECT_GT(reports[i].seconds.render, 0);
+    EXPECT_GT(reports[i].seconds.field, 0);
+    least = std::min(least, reports[i].splat_count);
+    most = std::max(most, reports[i].splat_count);
+  }
+  // Budgets are drawn between 64 and 1024 anchors.
+  EXPECT_GE(least, 256u);
+  EXPECT_LT(least, 350u);
+  EXPECT_LE(most, 4096u);
+  EXPECT_GT(most, 3000u);
+}
+
+TEST(FieldModel, TheDensityMovesOnlyWhereItsGradientIsOn) {
+  const auto views = toyViews(toyBall(2000), kViews, 32);
+  FieldModelOptions options = smallOptions();
+  const auto entropyAfter = [&](bool gradient) {
+    options.density_gradient = gradient;
+    const auto model = makeFieldModel(*views, trainingViews(), options);
+    train(*model, *views, 1, 30, 100);  // the first two stages
+    const double before = *model->densityEntropy();
+    train(*model, *views, 31, 100, 100);
+    return std::make_pair(before, *model->densityEntropy());
+  };
+  const auto off = entropyAfter(false);
+  const auto on = entropyAfter(true);
+  EXPECT_EQ(off.first, off.second);
+  EXPECT_EQ(on.first, off.first);
+  EXPECT_NE(on.second, on.first);
+}
+
+/// Half of the prior stands where nothing is: views show that it does not help.
+TEST(FieldModel, TheDensityLeavesPlacesThatDoNotHelp) {
+  const SplatCloud ball = toyBall(4000);
+  const auto views = toyViews(ball, kViews, 48, false);
+  SplatCloud points = ball;
+  for (size_t i = 0; i < points.size(); i += 2) {
+    for (size_t a = 0; a < 3; ++a) points.positions[i * 3 + a] *= 0.5f;  // hidden inside
+  }
+  views->setPoints(toyPoints(points));
+  const auto outsideShare = [&](bool gradient) {
+    FieldModelOptions options = smallOptions();
+    options.density_gradient = gradient;
+    const auto model = makeFieldModel(*views, trainingViews(), options);
+    train(*model, *views, 1, 150, 150);
+    const SplatCloud cloud = model->splats(1024);
+    size_t outside = 0;
+    for (size_t n = 0; n < cloud.size(); ++n) {
+      const float* p = &cloud.positions[n * 3];
+      outside += p[0] * p[0] + p[1] * p[1] + p[2] * p[2] > 0.6f ? 1 : 0;
+    }
+    return static_cast<double>(outside) / static_cast<double>(cloud.size());
+  };
+  EXPECT_GT(outsideShare(true), outsideShare(false) + 0.02);
+}
+
+TEST(FieldModel, GoesOnBitForBitFromItsState) {
+  const auto views = toyViews(toyBall(2000), kViews, 32);
+  const auto whole = makeFieldModel(*views, trainingViews(), smallOptions());
+  train(*whole, *views, 1, 60, 120);
+  const TensorTable saved = whole->state();
+  train(*whole, *views, 61, 120, 120);
+  const auto resumed = makeFieldModel(*views, trainingViews(), smallOptions());
+  resumed->restore(saved);
+  train(*resumed, *views, 61, 120, 120);
+  const TensorTable one = whole->state(), other = resumed->state();
+  ASSERT_EQ(one.size(), other.size());
+  for (const auto& [name, tensor] : one) {
+    EXPECT_EQ(tensor.values, other.at(name).values) << name;
+    EXPECT_EQ(tensor.shape, other.at(name).shape) << name;
+  }
+  EXPECT_EQ(whole->splats(300).sh, resumed->splats(300).sh);
+}
+
+TEST(FieldModel, HasTheSameBitsForAnyNumberOfThreads) {
+  const auto views = toyViews(toyBall(2000), kViews, 32);
+  std::vector<float> first;
+  for (const unsigned threads : {1u, 3u}) {
+    std::vector<float> positions;
+    withThreads(threads, [&] {
+      const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+      train(*model, *views, 1, 40, 60);
+      positions = model->splats(200).positions;
+    });
+    if (first.empty()) first = positions;
+    EXPECT_EQ(positions, first) << threads;
+  }
+}
+
+TEST(FieldModel, RefusesStatesThatAreNotItsOwn) {
+  const auto views = toyViews(toyBall(500), kViews, 32);
+  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const TensorTable good = model->state();
+  const auto messageOf = [&](const TensorTable& table) -> std::string {
+    try {
+      model->restore(table);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code() == ErrorCode::kFormat || error.code() == ErrorCode::kInvalidArgument,
+                true);
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(messageOf(good), "");
+  TensorTable table = good;
+  table.erase("field.steps");
+  EXPECT_THAT(messageOf(table), ::testing::HasSubstr("no tensor field.steps"));
+  table = good;
+  std::get<std::vector<float>>(table["field.network.layer0.weights"].values).pop_back();
+  EXPECT_THAT(messageOf(table), ::testing::HasSubstr("field.network.layer0.weights"));
+  table = good;
+  table["octree.level0.cells"].values = std::vector<float>{0.0f};
+  EXPECT_THAT(messageOf(table), ::testing::HasSubstr("another type"));
+  table = good;
+  std::get<std::vector<float>>(table["field.features.level6"].values)[3] = std::nanf("");
+  EXPECT_THAT(messageOf(table), ::testing::HasSubstr("field.features.level6"));
+}
+
+TEST(FieldModel, RefusesOptionsOutOfRange) {
+  const auto views = toyViews(toyBall(100), kViews, 16);
+  const auto messageOf = [&](const FieldModelOptions& options) -> std::string {
+    try {
+      makeFieldModel(*views, trainingViews(), options);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+      return error.what();
+    }
+    return "";
+  };
+  FieldModelOptions options = smallOptions();
+  options.gaussians_per_anchor = 3;
+  EXPECT_THAT(messageOf(options), ::testing::HasSubstr("per anchor of the field is 3"));
+  options = smallOptions();
+  options.leaf_level = 11;
+  EXPECT_THAT(messageOf(options), ::testing::HasSubstr("leaf level of the field is 11"));
+  options = smallOptions();
+  options.least_anchors = 5000;
+  EXPECT_THAT(messageOf(options), ::testing::HasSubstr("least budget of the field is 5000"));
+  options = smallOptions();
+  options.ssim_share = 2;
+  EXPECT_THAT(messageOf(options), ::testing::HasSubstr("ssim_share is 2"));
+  EXPECT_THROW(makeFieldModel(*views, {}, smallOptions()), Error);
+}
+
+TEST(FieldModel, TakesScenesThatHaveAlmostNothing) {
+  FieldModelOptions options = smallOptions();
+  options.least_anchors = 1;
+  options.most_anchors = 40;
+  const double black[3] = {0, 0, 0};
+  // Empty views without points; a single point; one view.
+  for (const size_t points : {0u, 1u}) {
+    auto views = toyViews(SplatCloud(), 3, 16, false);
+    if (points == 1) views->setPoints(toyPoints(toyBall(1)));
+    const std::vector<size_t> training = {0, 1, 2};
+    const auto model =
+        makeFieldModel(*views, std::span(training).first(points == 1 ? 1 : 3), options);
+    for (uint64_t i = 1; i <= 30; ++i) {
+      FitMoment moment;
+      moment.iteration = i;
+      moment.iterations = 30;
+      StepView view;
+      view.camera = &views->camera(0);
+      const std::vector<float> target = targetOf(*views, 0, black);
+      view.target = target.data();
+      const StepReport report = model->step(moment, view, nullptr, nullptr);
+      EXPECT_TRUE(std::isfinite(report.loss));
+    }
+    for (const uint64_t budget : {uint64_t{1}, uint64_t{5000}}) {
+      const SplatCloud cloud = model->splats(budget);
+      EXPECT_EQ(cloud.size(), budget * 4);
+      EXPECT_NO_THROW(validate(cloud, "cloud"));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stipple

@@ -1,0 +1,190 @@
+// What a fit of a field is put together from: sparse steps, regularisers, the prior.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "base/random.h"
+#include "decode/anchor_spacing.h"
+#include "train/field_regularisers.h"
+#include "train/scene_prior.h"
+#include "train/sparse_adam.h"
+#include "train/toy_views.h"
+
+namespace stipple {
+namespace {
+
+float number(uint64_t index) {
+  return unitFloat(keyedBits(3, RandomUse::kFieldStart, index)) - 0.5f;
+}
+
+TEST(SparseAdam, StepsTheListedRowsAsAdamDoesAndNoOthers) {
+  for (const size_t length : {3u, 8u, 5u}) {
+    constexpr size_t kRows = 40;
+    std::vector<float> values(kRows * length), gradients(kRows * length);
+    for (size_t i = 0; i < values.size(); ++i) {
+      values[i] = number(i);
+      gradients[i] = number(1000 + i);
+    }
+    std::vector<float> first(values.size(), 0.1f), second(values.size(), 0.2f);
+    const std::vector<uint32_t> rows = {7, 3, 39, 0};
+    std::vector<float> expected = values, expected_first = first, expected_second = second;
+    for (const uint32_t row : rows) {
+      const AdamGroup group = {&expected[row * length],
+                               &gradients[row * length],
+                               &expected_first[row * length],
+                               &expected_second[row * length],
+                               1,
+                               length,
+                               0.01};
+      adamStep({&group, 1}, 4);
+    }
+    SparseAdamScratch scratch;
+    const SparseRows table = {rows,          length,           values.data(), first.data(),
+                              second.data(), gradients.data(), 0.01};
+    sparseAdamStep({&table, 1}, 4, {}, scratch);
+    EXPECT_EQ(values, expected);
+    EXPECT_EQ(first, expected_first);
+    EXPECT_EQ(second, expected_second);
+  }
+}
+
+struct DecodedField {
+  FieldParameters field;
+  AnchorSet anchors;
+  FieldTape tape;
+  SplatCloud cloud;
+};
+
+/// Anchors so near to each other that every regulariser counts.
+DecodedField decodedField() {
+  FieldShape shape;
+  shape.root = {{1, 2, 3}, 2.0};
+  shape.leaf_level = 4;
+  shape.layout = {4, 0};
+  DecodedField decoded;
+  decoded.field = makeFieldParameters(shape);
+  for (float& bias : decoded.field.network.layers().back().biases) bias += 3.0f * number(7);
+  for (float& weight : decoded.field.network.layers().back().weights) weight *= 30.0f;
+  decoded.anchors.leaf_level = 4;
+  for (uint64_t i = 0; i < 12; ++i) {
+    for (uint64_t a = 0; a < 3; ++a) {
+      decoded.anchors.positions.push_back(0.5f + 0.2f * number(3 * i + a));
+    }
+    decoded.anchors.log_q.push_back(0);
+    decoded.anchors.leaves.push_back(i);
+  }
+  const auto view =
+      std::shared_ptr<const FieldParameters>(&decoded.field, [](const FieldParameters*) {});
+  FieldDecoder(view).forward(decoded.anchors, decoded.tape, decoded.cloud);
+  return decoded;
+}
+
+TEST(FieldRegularisers, GradientsAreThoseOfDifferences) {
+  for (const FieldRegularisers weights :
+       {FieldRegularisers{1e3, 0, 0}, FieldRegularisers{0, 1, 0}, FieldRegularisers{0, 0, 100}}) {
+    DecodedField d = decodedField();
+    SplatCloud gradient = d.cloud;
+    for (auto* values : {&gradient.positions, &gradient.scales, &gradient.opacities}) {
+      std::fill(values->begin(), values->end(), 0.0f);
+    }
+    EXPECT_GT(regularise(weights, d.field, d.anchors, d.tape, d.cloud, gradient), 0);
+    double largest = 0;
+    const auto compare = [&](std::vector<float>& values, double step, float by, size_t at,
+                             double to_value) {
+      const float kept = values[at];
+      SplatCloud unused = gradient;
+      values[at] = kept + static_cast<float>(step);
+      const double above = static_cast<double>(values[at]);
+      const double high = regularise(weights, d.field, d.anchors, d.tape, d.cloud, unused);
+      values[at] = kept - static_cast<float>(step);
+      const double below = static_cast<double>(values[at]);
+      const double low = regularise(weights, d.field, d.anchors, d.tape, d.cloud, unused);
+      values[at] = kept;
+      const double difference = (high - low) / ((above - below) * to_value);
+      // Sums in double of float32 values; truncation of steps of 1e-3 of the values' size.
+      EXPECT_NEAR(static_cast<double>(by), difference, 1e-3 * std::abs(difference) + 1e-5);
+      largest = std::max(largest, std::abs(difference));
+    };
+    for (size_t i = 0; i < d.cloud.scales.size(); i += 5) {
+      // Centres are kept in the unit cube; the derivative is by the world, twice as large.
+      compare(d.tape.centres, 1e-4, gradient.positions[i], i, 2.0);
+      compare(d.cloud.scales, 1e-3 * static_cast<double>(d.cloud.scales[i]), gradient.scales[i], i,
+              1.0);
+    }
+    for (size_t i = 0; i < d.cloud.size(); i += 3) {
+      compare(d.cloud.opacities, 1e-3, gradient.opacities[i], i, 1.0);
+    }
+    EXPECT_GT(largest, 1e-4);
+  }
+}
+
+std::vector<size_t> all(const ViewSource& views) {
+  std::vector<size_t> list;
+  for (size_t v = 0; v < views.count(); ++v) list.push_back(v);
+  return list;
+}
+
+TEST(ScenePrior, HoldsThePointsAndATenthMore) {
+  const auto views = toyViews(toyBall(1000), 8, 16);
+  const ScenePrior prior = scenePrior(*views, all(*views), {});
+  EXPECT_EQ(prior.weights.size(), 1000u);
+  // The extents are those of the ball's outermost splats, 1.998 and less.
+  EXPECT_NEAR(prior.root.side, 2.2, 0.01);
+  for (const double origin : prior.root.origin) EXPECT_NEAR(origin, -1.1, 0.01);
+}
+
+TEST(ScenePrior, LeavesOutFarPointsAndUnseenOnes) {
+  SplatCloud cloud = toyBall(1000);
+  const auto views = toyViews(cloud, 8, 16, false);
+  cloud.positions[0] = 500.0f;  // behind and beside every camera but some
+  cloud.positions[4] = 40000.0f;
+  for (size_t i = 10; i < 15; ++i) cloud.positions[i * 3] = 1.6f;  // seen, yet far out
+  views->setPoints(toyPoints(cloud));
+  const ScenePrior prior = scenePrior(*views, all(*views), {});
+  EXPECT_LE(prior.weights.size(), 1000u);
+  EXPECT_LT(prior.root.side, 3.0);
+  EXPECT_GT(prior.root.side, 2.1);
+}
+
+TEST(ScenePrior, TakesPointsFromDepth) {
+  auto with_depth = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  for (size_t v = 0; v < 6; ++v) {
+    const Camera camera = toyCamera(v, 6, 32);
+    ViewPicture picture;
+    picture.width = picture.height = 32;
+    picture.colour.assign(32 * 32 * 3, 0.5f);
+    // A wall across the origin; in the left half nothing is known.
+    picture.depth.assign(32 * 32, 3.5f);
+    for (size_t i = 0; i < 32 * 32; ++i) {
+      if (i % 32 < 16) picture.depth[i] = 0.0f;
+    }
+    with_depth->add(camera, std::move(picture));
+  }
+  ScenePriorOptions options;
+  options.depth_points = 600;
+  const ScenePrior prior = scenePrior(*with_depth, all(*with_depth), options);
+  EXPECT_GT(prior.weights.size(), 300u);
+  EXPECT_LT(prior.weights.size(), 700u);
+  for (size_t i = 0; i < prior.weights.size(); ++i) {
+    const float* p = &prior.positions[i * 3];
+    // Half a picture is 3.5 * 16 / (1.4 * 32) = 1.25 wide.
+    EXPECT_LT(std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), 1.25f * 1.42f);
+  }
+}
+
+TEST(ScenePrior, WithoutPointsTakesWhatTheCamerasShare) {
+  const auto views = toyViews(toyBall(100), 12, 16, false);
+  const ScenePrior prior = scenePrior(*views, all(*views), {});
+  EXPECT_TRUE(prior.weights.empty());
+  // Around the origin; half an angle of view of atan(1 / 2.8): radius 3.5 sin of it, 1.18.
+  const double side = 2 * 3.5 * std::sin(std::atan(1 / 2.8)) * 1.1;
+  EXPECT_NEAR(prior.root.side, side, 0.01);
+  for (const double origin : prior.root.origin) EXPECT_NEAR(origin, -0.5 * side, 0.01);
+  const std::vector<size_t> one = {0};
+  EXPECT_GT(scenePrior(*views, one, {}).root.side, 0.01);
+}
+
+}  // namespace
+}  // namespace stipple
