@@ -32,12 +32,38 @@ struct PlyHarmonicRows {
   std::array<uint8_t, kMostBytes> from;  ///< where in a row the numbers lie, in the cloud's order
 };
 
+/// Logarithms of scales beyond this are moved here: 2 nm and 485,165 km.
+constexpr double kPlyLogLimit = 20.0;
+
+/// Numbers of a chunk's splats as a cloud has them, attribute by attribute. Behind the last splat
+/// of a short chunk one of its own stands again.
+struct PlyChunkValues {
+  using Values = std::array<float, kPlyChunkSplats>;
+  std::array<Values, 9> ranged;  ///< position, scale, harmonics of band 0
+  Values opacity;
+  std::array<Values, 4> rotation;  ///< w,x,y,z
+};
+
+/// Harmonics of splats that lie anywhere.
+struct PlyHarmonicSources {
+  const float* const* rows;  ///< [count], each [3 + numbers], of which the first three are band 0
+  size_t count;
+  size_t numbers;
+  std::array<uint8_t, PlyHarmonicRows::kMostBytes> to;  ///< where in a row of bytes each goes
+};
+
 /// Loops over chunks and rows for one instruction set; all give the same numbers.
 struct PlyChunkKernel {
   const char* target;
   void (*decode)(const PlyChunkBits& bits, const PlyChunkRange& range, const PlyChunkTarget& out);
   /// In: sh [count, 3 + row_bytes], of which the first three of each row are left undefined.
   void (*decodeHarmonics)(const PlyHarmonicRows& rows, float* sh);
+  /// The range of a chunk's numbers and the nearest of the even numbers in it. Returns false, and
+  /// any bits, where a value is none that validate() lets through.
+  bool (*encode)(const PlyChunkValues& values, PlyChunkRange& range, PlyChunkBits& bits);
+  /// Out: bytes [count, numbers] and room for 16 more. Returns false, and any bytes, where a
+  /// value is not finite.
+  bool (*encodeHarmonics)(const PlyHarmonicSources& sources, uint8_t* bytes);
 };
 
 PlyChunkKernel plainPlyChunkKernel();

@@ -4,20 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
-#include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "io/compression.h"
 #include "io/little_endian.h"
 #include "io/output_file.h"
 #include "io/ply_comments.h"
 #include "io/ply_compressed.h"
+#include "io/ply_compressed_kernel.h"
 #include "io/ply_file.h"
-#include "io/quantize.h"
 #include "io/radix_order.h"
 #include "io/splat_check.h"
 #include "math/morton.h"
@@ -27,94 +25,65 @@ namespace stipple {
 namespace {
 
 constexpr size_t kGrain = 8192;
-// Logarithms of scales beyond this are moved here: 2 nm and 485,165 km.
-constexpr double kLogLimit = 20.0;
 constexpr double kMortonCells = 2097151.0;
 constexpr size_t kVertexBytes = 16;
-// Chunks of one task: 250 KB of the file at degree 3.
-constexpr size_t kTaskChunks = 16;
+// Chunks of one task: 125 KB of the file at degree 3.
+constexpr size_t kTaskChunks = 8;
+constexpr size_t kTaskSplats = kTaskChunks * kPlyChunkSplats;
 
-/// Where along the Morton curve each splat comes, ties by index.
-DefaultInitVector<uint32_t> mortonPlaces(const SplatCloud& cloud) {
-  const size_t count = cloud.size();
-  std::array<double, 3> low, to_cells;
-  for (size_t k = 0; k < 3; ++k) {
-    float least = count > 0 ? cloud.positions[k] : 0.0f;
-    float most = least;
-    for (size_t i = 0; i < count; ++i) {
-      least = std::min(least, cloud.positions[i * 3 + k]);
-      most = std::max(most, cloud.positions[i * 3 + k]);
+using Corner = std::array<float, 3>;
+
+/// Lowest and highest position.
+std::pair<Corner, Corner> boundsOf(const SplatCloud& cloud) {
+  std::vector<std::pair<Corner, Corner>> bounds(rangeCount(cloud.size(), kGrain));
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    Corner low = {cloud.positions[begin * 3], cloud.positions[begin * 3 + 1],
+                  cloud.positions[begin * 3 + 2]};
+    Corner high = low;
+    for (size_t i = begin; i < end; ++i) {
+      for (size_t k = 0; k < 3; ++k) {
+        low[k] = std::min(low[k], cloud.positions[i * 3 + k]);
+        high[k] = std::max(high[k], cloud.positions[i * 3 + k]);
+      }
     }
-    low[k] = static_cast<double>(least);
-    const double extent = static_cast<double>(most) - low[k];
+    bounds[begin / kGrain] = {low, high};
+  });
+  if (bounds.empty()) return {};
+  std::pair<Corner, Corner> all = bounds.front();
+  for (const auto& [low, high] : bounds) {
+    for (size_t k = 0; k < 3; ++k) {
+      all.first[k] = std::min(all.first[k], low[k]);
+      all.second[k] = std::max(all.second[k], high[k]);
+    }
+  }
+  return all;
+}
+
+/// The splats along the Morton curve, ties by index. In: finite positions.
+KeyedIndices mortonOrder(const SplatCloud& cloud) {
+  const auto [low, high] = boundsOf(cloud);
+  std::array<double, 3> from, to_cells;
+  for (size_t k = 0; k < 3; ++k) {
+    from[k] = static_cast<double>(low[k]);
+    const double extent = static_cast<double>(high[k]) - from[k];
     to_cells[k] = extent > 0 ? kMortonCells / extent : 0.0;
   }
-  KeyedIndices keys(count);
-  parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+  KeyedIndices keys(cloud.size());
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       std::array<uint32_t, 3> cell;
       for (size_t k = 0; k < 3; ++k) {
-        const double at = (static_cast<double>(cloud.positions[i * 3 + k]) - low[k]) * to_cells[k];
-        cell[k] = static_cast<uint32_t>(std::min(at, kMortonCells));
+        const double at = (static_cast<double>(cloud.positions[i * 3 + k]) - from[k]) * to_cells[k];
+        cell[k] = static_cast<uint32_t>(static_cast<int32_t>(std::min(at, kMortonCells)));
       }
       keys[i] = {mortonEncode(cell[0], cell[1], cell[2]), static_cast<uint32_t>(i)};
     }
   });
   sortByKey(keys);
-  DefaultInitVector<uint32_t> places(count);
-  parallelFor(count, kGrain, [&](size_t begin, size_t end) {
-    for (size_t k = begin; k < end; ++k) places[keys[k].index] = static_cast<uint32_t>(k);
-  });
-  return places;
+  return keys;
 }
 
-uint32_t packRotation(const float* q) {
-  size_t largest = 0;
-  double squares = 0;
-  for (size_t k = 0; k < 4; ++k) {
-    squares += static_cast<double>(q[k]) * static_cast<double>(q[k]);
-    if (std::abs(q[k]) > std::abs(q[largest])) largest = k;
-  }
-  const double factor = std::sqrt(0.5) / std::sqrt(squares) * (q[largest] < 0 ? -1.0 : 1.0);
-  uint32_t packed = static_cast<uint32_t>(largest);
-  for (size_t k = 0; k < 4; ++k) {
-    if (k == largest) continue;
-    packed = packed << 10 | nearestStep((static_cast<double>(q[k]) * factor + 0.5) * 1023.0, 1023);
-  }
-  return packed;
-}
-
-/// Numbers whose middles or ends (plyHarmonicOf) are nearest to the values. 32 v + 128 counts in
-/// parts; taken apart, so that float32 has room for it.
-void packHarmonics(const float* values, size_t count, uint8_t* bytes) {
-  // Below this a value does not move the sum of a double: it counts as 0.
-  constexpr float kNothing = 0x1p-47f;
-  for (size_t k = 0; k < count; ++k) {
-    const float parts = std::clamp(values[k] * 32.0f, -128.0f, 128.0f);
-    const auto whole = static_cast<int32_t>(parts);  // towards 0
-    const int32_t below = whole - (parts < static_cast<float>(whole) && parts < -kNothing ? 1 : 0);
-    const int32_t middle = std::clamp(below + 128, 1, 254);
-    // The bytes at the ends stand for the ends and not for the middle of their part.
-    bytes[k] = static_cast<uint8_t>(parts <= -127.25f ? 0 : parts >= 127.25f ? 255 : middle);
-  }
-}
-
-/// What a chunk needs of a splat before its ranges are known.
-struct Part {
-  std::array<float, 3> position, scale, colour;  ///< colour: coefficient 0
-  uint32_t opacity, rotation;                    ///< packed
-};
-
-/// Position, logarithm of the scale, and colour of a chunk's splats, and the same in steps:
-/// attribute by attribute, so that the loops over them become vector code.
-struct Chunk {
-  std::array<std::array<double, kPlyChunkSplats>, 9> values;
-  std::array<std::array<uint32_t, kPlyChunkSplats>, 9> steps;
-};
-
-/// Two passes: splats in the order of the cloud to their places along the curve, where chunks are
-/// made of neighbours. Rows of the cloud take four times the bytes of what goes to the places, so
-/// that memory is read from front to back, and only the small writes jump.
+/// Chunks of neighbours along the curve, each from splats that are fetched from where they lie.
 class Writer {
  public:
   Writer(const SplatCloud& cloud, OutputFile& file, Progress* progress)
@@ -123,24 +92,32 @@ class Writer {
         progress_(progress),
         harmonic_bytes_(cloud.shStride() - 3),
         chunk_count_((cloud.size() + kPlyChunkSplats - 1) / kPlyChunkSplats),
-        parts_(cloud.size()),
-        harmonics_(cloud.size() * harmonic_bytes_) {}
+        kernel_(plyChunkKernel()) {
+    // The file holds all of red, then all of green, then all of blue.
+    for (size_t k = 0; k < harmonic_bytes_; ++k) {
+      places_[k] = static_cast<uint8_t>(k % 3 * (harmonic_bytes_ / 3) + k / 3);
+    }
+  }
 
+  /// Errors: values that are not valid.
   void write() {
     const std::string head = header();
     chunks_at_ = head.size();
     vertices_at_ = chunks_at_ + chunk_count_ * kChunkBytes;
     harmonics_at_ = vertices_at_ + cloud_.size() * uint64_t{kVertexBytes};
     file_.writeAt(0, head.data(), head.size());
-    takeApart();
+    RowCheck check(cloud_, "cloud");
+    order_ = mortonOrder(cloud_);
+    advance(progress_, 0.25, "Writing splats");
     std::atomic<size_t> done{0};
     parallelFor(chunk_count_, kTaskChunks, [&](size_t begin, size_t end) {
-      packChunks(begin, end);
+      if (!packChunks(begin, end)) check.doubt();
       const size_t chunks = done.fetch_add(end - begin) + (end - begin);
       advance(progress_,
-              0.5 + 0.5 * static_cast<double>(chunks) / static_cast<double>(chunk_count_),
+              0.25 + 0.75 * static_cast<double>(chunks) / static_cast<double>(chunk_count_),
               "Writing splats");
     });
+    check.require();
   }
 
  private:
@@ -160,110 +137,65 @@ class Writer {
     return text + "end_header\n";
   }
 
-  /// Every splat to its place. Errors: values that are not valid.
-  void takeApart() {
-    RowCheck check(cloud_, "cloud");
-    const DefaultInitVector<uint32_t> places = mortonPlaces(cloud_);
-    parallelFor(cloud_.size(), kGrain, [&](size_t begin, size_t end) {
-      if (!check.look(begin, end)) return;
-      for (size_t i = begin; i < end; ++i) {
-        const size_t place = places[i];
-        const float* sh = &cloud_.sh[i * cloud_.shStride()];
-        Part& part = parts_[place];
-        std::copy_n(&cloud_.positions[i * 3], 3, part.position.begin());
-        std::copy_n(&cloud_.scales[i * 3], 3, part.scale.begin());
-        std::copy_n(sh, 3, part.colour.begin());
-        part.opacity = nearestByte(static_cast<double>(cloud_.opacities[i]) * 255.0);
-        part.rotation = packRotation(&cloud_.rotations[i * 4]);
-        if (harmonic_bytes_ > 0) packRest(sh + 3, &harmonics_[place * harmonic_bytes_]);
-      }
-    });
-    check.require();
-    advance(progress_, 0.5, "Writing splats");
-  }
-
-  /// The file holds all of red, then all of green, then all of blue.
-  void packRest(const float* values, uint8_t* out) const {
-    std::array<uint8_t, 48> bytes;
-    packHarmonics(values, harmonic_bytes_, bytes.data());
-    const size_t rest = harmonic_bytes_ / 3;
-    for (size_t channel = 0; channel < 3; ++channel) {
-      for (size_t k = 0; k < rest; ++k) *out++ = bytes[k * 3 + channel];
-    }
-  }
-
-  /// Chunks [begin, end) to their three places in the file.
-  void packChunks(size_t begin, size_t end) const {
+  /// Chunks [begin, end) to their three places in the file; false where values are not valid.
+  bool packChunks(size_t begin, size_t end) const {
     const size_t first = begin * kPlyChunkSplats;
     const size_t last = std::min(cloud_.size(), end * kPlyChunkSplats);
     std::array<uint8_t, kTaskChunks * kChunkBytes> chunks;
-    std::array<uint8_t, kTaskChunks * kPlyChunkSplats * kVertexBytes> vertices;
-    Chunk chunk;
-    for (size_t c = begin; c < end; ++c) {
-      const size_t from = c * kPlyChunkSplats;
-      const size_t to = std::min(cloud_.size(), from + kPlyChunkSplats);
-      fill(from, to, chunk);
-      quantise(to - from, chunk, &chunks[(c - begin) * kChunkBytes]);
-      for (size_t i = from; i < to; ++i) {
-        packVertex(parts_[i], chunk, i - from, &vertices[(i - first) * kVertexBytes]);
+    std::array<uint8_t, kTaskSplats * kVertexBytes> vertices;
+    std::array<uint8_t, kTaskSplats * PlyHarmonicRows::kMostBytes + 16> harmonics;
+    PlyChunkValues values;
+    PlyChunkRange range;
+    PlyChunkBits bits;
+    for (size_t from = first; from < last; from += kPlyChunkSplats) {
+      const size_t count = std::min(kPlyChunkSplats, last - from);
+      std::array<const float*, kPlyChunkSplats> rows;
+      fetch(from, count, values, rows);
+      if (!kernel_.encode(values, range, bits)) return false;
+      uint8_t* stored = &chunks[(from - first) / kPlyChunkSplats * kChunkBytes];
+      for (size_t k = 0; k < kPlyChunkNumbers; ++k) storeFloat(range[k], stored + k * 4);
+      uint8_t* vertex = &vertices[(from - first) * kVertexBytes];
+      for (size_t i = 0; i < count; ++i) {
+        for (size_t k = 0; k < 4; ++k) storeLittleEndian(bits[k][i], vertex + i * 16 + k * 4);
+      }
+      if (harmonic_bytes_ == 0) continue;
+      if (!kernel_.encodeHarmonics({rows.data(), count, harmonic_bytes_, places_},
+                                   &harmonics[(from - first) * harmonic_bytes_])) {
+        return false;
       }
     }
     file_.writeAt(chunks_at_ + begin * uint64_t{kChunkBytes}, chunks.data(),
                   (end - begin) * kChunkBytes);
     file_.writeAt(vertices_at_ + first * uint64_t{kVertexBytes}, vertices.data(),
                   (last - first) * kVertexBytes);
-    file_.writeAt(harmonics_at_ + first * uint64_t{harmonic_bytes_},
-                  harmonics_.data() + first * harmonic_bytes_, (last - first) * harmonic_bytes_);
+    file_.writeAt(harmonics_at_ + first * uint64_t{harmonic_bytes_}, harmonics.data(),
+                  (last - first) * harmonic_bytes_);
+    return true;
   }
 
-  void fill(size_t from, size_t to, Chunk& chunk) const {
-    for (size_t i = from; i < to; ++i) {
-      const Part& part = parts_[i];
+  /// Values of a chunk's splats, and where the harmonics of each begin.
+  void fetch(size_t from, size_t count, PlyChunkValues& values,
+             std::array<const float*, kPlyChunkSplats>& rows) const {
+    constexpr size_t kAhead = 16;
+    const size_t stride = cloud_.shStride();
+    for (size_t i = 0; i < kPlyChunkSplats; ++i) {
+      // Splats lie anywhere in memory: those to come are asked for early.
+      const size_t ahead = order_[std::min(from + i + kAhead, order_.size() - 1)].index;
+      __builtin_prefetch(&cloud_.positions[ahead * 3]);
+      __builtin_prefetch(&cloud_.scales[ahead * 3]);
+      __builtin_prefetch(&cloud_.rotations[ahead * 4]);
+      __builtin_prefetch(&cloud_.opacities[ahead]);
+      __builtin_prefetch(&cloud_.sh[ahead * stride]);
+      const size_t splat = order_[from + std::min(i, count - 1)].index;
+      rows[i] = &cloud_.sh[splat * stride];
       for (size_t k = 0; k < 3; ++k) {
-        chunk.values[k][i - from] = static_cast<double>(part.position[k]);
-        const double scale = static_cast<double>(part.scale[k]);
-        chunk.values[3 + k][i - from] =
-            scale > 0 ? std::clamp(std::log(scale), -kLogLimit, kLogLimit) : -kLogLimit;
-        chunk.values[6 + k][i - from] = static_cast<double>(part.colour[k]) * kPlyChunkC0 + 0.5;
+        values.ranged[k][i] = cloud_.positions[splat * 3 + k];
+        values.ranged[3 + k][i] = cloud_.scales[splat * 3 + k];
+        values.ranged[6 + k][i] = rows[i][k];
       }
+      values.opacity[i] = cloud_.opacities[splat];
+      for (size_t k = 0; k < 4; ++k) values.rotation[k][i] = cloud_.rotations[splat * 4 + k];
     }
-  }
-
-  /// Ranges of a chunk of `count` splats, stored too, and the nearest of the even numbers between
-  /// their ends.
-  static void quantise(size_t count, Chunk& chunk, uint8_t* stored) {
-    constexpr std::array<uint32_t, 3> kSteps = {2047, 1023, 2047};
-    for (size_t k = 0; k < 9; ++k) {
-      const double* values = chunk.values[k].data();
-      uint32_t* steps = chunk.steps[k].data();
-      float low = std::numeric_limits<float>::max();
-      float high = std::numeric_limits<float>::lowest();
-      for (size_t i = 0; i < count; ++i) {
-        low = std::min(low, static_cast<float>(values[i]));
-        high = std::max(high, static_cast<float>(values[i]));
-      }
-      const size_t place = k / 3 * 6 + k % 3;
-      storeFloat(low, stored + place * sizeof(float));
-      storeFloat(high, stored + (place + 3) * sizeof(float));
-      const uint32_t last = k < 6 ? kSteps[k % 3] : 255;
-      const double from = static_cast<double>(low);
-      const double extent = static_cast<double>(high) - from;
-      if (!(extent > 0)) {
-        std::fill_n(steps, count, 0u);
-        continue;
-      }
-      for (size_t i = 0; i < count; ++i) {
-        steps[i] = nearestStep((values[i] - from) / extent * last, last);
-      }
-    }
-  }
-
-  static void packVertex(const Part& part, const Chunk& chunk, size_t at, uint8_t* row) {
-    const auto step = [&](size_t k) { return chunk.steps[k][at]; };
-    storeLittleEndian(step(0) << 21 | step(1) << 11 | step(2), row);
-    storeLittleEndian(part.rotation, row + 4);
-    storeLittleEndian(step(3) << 21 | step(4) << 11 | step(5), row + 8);
-    storeLittleEndian(step(6) << 24 | step(7) << 16 | step(8) << 8 | part.opacity, row + 12);
   }
 
   const SplatCloud& cloud_;
@@ -271,11 +203,12 @@ class Writer {
   Progress* progress_;
   size_t harmonic_bytes_;
   size_t chunk_count_;
+  const PlyChunkKernel& kernel_;
+  std::array<uint8_t, PlyHarmonicRows::kMostBytes> places_{};  ///< in a row of the file
   uint64_t chunks_at_ = 0;
   uint64_t vertices_at_ = 0;
   uint64_t harmonics_at_ = 0;
-  DefaultInitVector<Part> parts_;  ///< along the curve
-  ByteVector harmonics_;           ///< the same
+  KeyedIndices order_;
 };
 
 }  // namespace

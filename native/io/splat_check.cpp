@@ -10,12 +10,14 @@ RowCheck::RowCheck(const SplatCloud& cloud, const char* what) : cloud_(cloud), w
 
 bool RowCheck::look(size_t begin, size_t end) {
   if (rowsAreValid(cloud_, begin, end)) return true;
-  valid_.store(false, std::memory_order_relaxed);
+  doubt();
   return false;
 }
 
 void RowCheck::require() const {
-  if (!valid_.load(std::memory_order_relaxed)) validate(cloud_, what_);
+  if (valid_.load(std::memory_order_relaxed)) return;
+  validate(cloud_, what_);
+  fail(ErrorCode::kInternal, std::string(what_) + " was doubted without a reason");
 }
 
 void requireValidSplats(const SplatCloud& cloud, const std::string& path) {

@@ -16,6 +16,8 @@ class RowCheck {
   /// Notes and tells whether rows [begin, end) are valid; from any thread. Others are not to be
   /// encoded: conversions of NaN to whole numbers are undefined.
   bool look(size_t begin, size_t end);
+  /// Notes that some row is not valid, where look() has not been asked; from any thread.
+  void doubt() { valid_.store(false, std::memory_order_relaxed); }
   /// Refuses the cloud as validate() does if one of the rows was not valid.
   void require() const;
 

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -116,6 +118,150 @@ TEST(PlyChunkKernel, PutsHarmonicsInTheCloudsOrderOnEveryInstructionSet) {
         }
       }
       for (size_t k = kRows * stride; k < sh.size(); ++k) ASSERT_EQ(sh[k], -7.0f);
+    }
+  }
+}
+
+PlyChunkValues randomValues(unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal(0.0f, 1.0f);
+  std::uniform_real_distribution<float> unit(0.0f, 1.0f);
+  PlyChunkValues values;
+  for (size_t i = 0; i < kPlyChunkSplats; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      values.ranged[k][i] = 10.0f * normal(random);
+      values.ranged[3 + k][i] = std::pow(10.0f, -12.0f + 22.0f * unit(random));
+      values.ranged[6 + k][i] = normal(random);
+    }
+    values.opacity[i] = unit(random);
+    for (auto& part : values.rotation) part[i] = normal(random);
+  }
+  values.ranged[1].fill(2.5f);  // no extent
+  values.ranged[4].fill(0.0f);
+  values.opacity[0] = 0.0f;
+  values.opacity[1] = 1.0f;
+  for (auto& part : values.rotation) part[2] = -0.5f;  // of equals, the first is the largest
+  return values;
+}
+
+TEST(PlyChunkKernel, PacksTheNearestStepsOnEveryInstructionSet) {
+  const auto steps = [](const PlyChunkBits& bits, size_t k, size_t i) {
+    constexpr unsigned kShifts[] = {21, 11, 0, 21, 11, 0, 24, 16, 8};
+    constexpr uint32_t kLast[] = {2047, 1023, 2047};
+    const uint32_t word = bits[k < 3 ? 0 : k < 6 ? 2 : 3][i];
+    return word >> kShifts[k] & (k < 6 ? kLast[k % 3] : 255);
+  };
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    const PlyChunkValues values = randomValues(seed);
+    PlyChunkRange expected_range;
+    PlyChunkBits expected;
+    ASSERT_TRUE(plainPlyChunkKernel().encode(values, expected_range, expected));
+    for (const PlyChunkKernel& kernel : plyChunkKernels()) {
+      SCOPED_TRACE(kernel.target);
+      PlyChunkRange range;
+      PlyChunkBits bits;
+      ASSERT_TRUE(kernel.encode(values, range, bits));
+      EXPECT_EQ(bits[1], expected[1]);
+      for (size_t k = 0; k < kPlyChunkNumbers; ++k) {
+        // Logarithms of two libraries, off by some of the last bits of a double: of 20 at most.
+        const float allowed = k >= 6 && k < 12 ? 2e-6f : 0.0f;
+        ASSERT_NEAR(range[k], expected_range[k], allowed) << k;
+      }
+      for (size_t i = 0; i < kPlyChunkSplats; ++i) {
+        EXPECT_EQ(bits[3][i] & 255, expected[3][i] & 255);
+        for (size_t k = 0; k < 9; ++k) {
+          const size_t place = k / 3 * 6 + k % 3;
+          const double low = double(range[place]);
+          const double extent = double(range[place + 3]) - low;
+          const double last = k >= 6 ? 255 : k % 3 == 1 ? 1023 : 2047;
+          const double value = double(values.ranged[k][i]);
+          const double mapped =
+              k < 3   ? value
+              : k < 6 ? std::clamp(std::log(std::max(value, 1e-30)), -kPlyLogLimit, kPlyLogLimit)
+                      : value * kPlyChunkC0 + 0.5;
+          const double place_of = extent > 0 ? (mapped - low) / extent * last : 0.0;
+          // Half a step, and as much as ends of the range are rounded by.
+          EXPECT_NEAR(steps(bits, k, i), place_of, 0.5 + 1e-4) << k << ", " << i;
+        }
+      }
+    }
+  }
+}
+
+TEST(PlyChunkKernel, RefusesWhatNoSplatHasWhereverItStands) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const PlyChunkKernel& kernel : plyChunkKernels()) {
+    SCOPED_TRACE(kernel.target);
+    PlyChunkRange range;
+    PlyChunkBits bits;
+    const auto refuses = [&](PlyChunkValues values, auto&& damage) {
+      damage(values);
+      return !kernel.encode(values, range, bits);
+    };
+    const PlyChunkValues good = randomValues(7);
+    EXPECT_FALSE(refuses(good, [](PlyChunkValues&) {}));
+    for (const size_t at : {size_t{0}, size_t{101}, kPlyChunkSplats - 1}) {
+      for (const float bad : {infinity, -infinity, nan}) {
+        for (size_t k = 0; k < 9; ++k) {
+          EXPECT_TRUE(refuses(good, [&](PlyChunkValues& v) { v.ranged[k][at] = bad; })) << k;
+        }
+        EXPECT_TRUE(refuses(good, [&](PlyChunkValues& v) { v.opacity[at] = bad; }));
+        EXPECT_TRUE(refuses(good, [&](PlyChunkValues& v) { v.rotation[2][at] = bad; }));
+      }
+      EXPECT_TRUE(refuses(good, [&](PlyChunkValues& v) { v.ranged[4][at] = -1e-30f; }));
+      EXPECT_TRUE(refuses(good, [&](PlyChunkValues& v) { v.opacity[at] = 1.0001f; }));
+      EXPECT_TRUE(refuses(good, [&](PlyChunkValues& v) { v.opacity[at] = -1e-30f; }));
+      EXPECT_TRUE(refuses(good, [&](PlyChunkValues& v) {
+        for (auto& part : v.rotation) part[at] = -0.0f;
+      }));
+    }
+  }
+}
+
+TEST(PlyChunkKernel, PacksHarmonicsInTheFilesOrderOnEveryInstructionSet) {
+  std::mt19937 random(5);
+  std::normal_distribution<float> normal(0.0f, 2.0f);
+  for (const size_t numbers : {size_t{9}, size_t{24}, size_t{45}}) {
+    constexpr size_t kRows = 50;
+    const size_t stride = 3 + numbers;
+    // Nothing readable behind the last row.
+    std::vector<float> sh(kRows * stride);
+    for (float& value : sh) value = normal(random);
+    const float ends[] = {-4.0f,  -3.98f, -3.97f, 3.97f,   3.98f,  4.0f,      1e30f,
+                          -1e30f, 0.0f,   -0.0f,  -1e-20f, 1e-20f, -0.03125f, 0.03125f};
+    for (size_t k = 0; k < std::size(ends); ++k) sh[stride * (k + 1) + 3 + k % numbers] = ends[k];
+    PlyHarmonicSources sources{nullptr, kRows, numbers, {}};
+    std::vector<const float*> rows;
+    for (size_t i = 0; i < kRows; ++i) rows.push_back(&sh[(kRows - 1 - i) * stride]);
+    sources.rows = rows.data();
+    for (size_t k = 0; k < numbers; ++k) {
+      sources.to[k] = static_cast<uint8_t>(k % 3 * (numbers / 3) + k / 3);
+    }
+    for (const PlyChunkKernel& kernel : plyChunkKernels()) {
+      SCOPED_TRACE(kernel.target);
+      std::vector<uint8_t> bytes(kRows * numbers + 16);
+      ASSERT_TRUE(kernel.encodeHarmonics(sources, bytes.data()));
+      for (size_t i = 0; i < kRows; ++i) {
+        for (size_t k = 0; k < numbers; ++k) {
+          const double value = double(rows[i][3 + k]);
+          const uint8_t byte = bytes[i * numbers + sources.to[k]];
+          double least = 1e300;
+          for (unsigned other = 0; other < 256; ++other) {
+            least = std::min(least, std::abs(plyHarmonicOf(static_cast<uint8_t>(other)) - value));
+          }
+          // Between two that are equally near, either.
+          ASSERT_LE(std::abs(plyHarmonicOf(byte) - value), least + 1e-6 * (1 + std::abs(value)))
+              << numbers << " numbers, value " << value;
+        }
+      }
+      for (const size_t at : {size_t{0}, size_t{2}, stride - 1}) {
+        float& value = sh[17 * stride + at];
+        const float before = value;
+        value = std::numeric_limits<float>::quiet_NaN();
+        EXPECT_FALSE(kernel.encodeHarmonics(sources, bytes.data())) << at;
+        value = before;
+      }
     }
   }
 }
