@@ -88,6 +88,9 @@ HWY_INLINE void fillNode(const Load& load, MergeValues<CostLanes>& node) {
   node.contrast = load(field++);
   node.weight = load(field++);
   node.depth = load(field++);
+  node.inflation = load(field++);
+  node.leaf_area = load(field++);
+  for (CostLanes& x : node.around) x = load(field++);
 }
 
 HWY_FLATTEN void costsOfLanes(const MergeNode* nodes, uint32_t slot, const uint32_t* others,

@@ -112,7 +112,9 @@ MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,
     node.colour[axis] =
         std::max(0.0, 0.5 + static_cast<double>(kShC0) * static_cast<double>(sh[axis]));
   }
-  measure<double>(node, scale.footprint);
+  measureArea<double>(node, scale.footprint);
+  measurePlanes<double>(node, scale.footprint);
+  node.leaf_area = node.area;
   node.opacity = std::min(static_cast<double>(cloud.opacities[index]), kMergeMaxOpacity);
   node.depth = opticalDepth(node.opacity) * node.area;
   node.visibility = visibility;
@@ -127,6 +129,19 @@ MergeNode mergedNode(const MergeNode& a, const MergeNode& b, const MergeScale& s
   return node;
 }
 
+void Surrounding::add(const MergeNode& neighbour) {
+  const double weight = neighbour.opacity * neighbour.area;
+  for (size_t c = 0; c < 3; ++c) colour_[c] += weight * neighbour.colour[c];
+  opacity_ += weight * neighbour.opacity;
+  weight_ += weight;
+}
+
+std::array<double, 3> Surrounding::mean() const {
+  if (!(weight_ > 0)) return {};
+  const double share = kSurroundingShare + kOpaqueSurroundingShare * opacity_ / weight_;
+  return {share * colour_[0] / weight_, share * colour_[1] / weight_, share * colour_[2] / weight_};
+}
+
 double mergeError(const MergeNode& a, const MergeNode& b, const MergeNode& merged,
                   const MergeScale& scale) {
   return errorOfMerge<double>(a, b, merged, scale.footprint);
@@ -136,6 +151,7 @@ void writeNode(const MergeNode& node, const MergeScale& scale, SplatCloud& cloud
   const auto& c = node.covariance;
   Mat3d covariance;
   covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+  covariance *= node.inflation;
   // Of a symmetric matrix without negative eigenvalues, lengths are the eigenvalues.
   const PrincipalAxes principal = principalAxes(covariance);
   const Vec4d quaternion = quaternionFromRotation(principal.axes);

@@ -17,7 +17,7 @@ struct MergeValues {
   std::array<T, 3> mean = {};
   std::array<T, 6> covariance = {};  ///< xx xy xz yy yz zz
   std::array<T, 3> colour = {};      ///< mean over directions, clamped at 0
-  /// Per coordinate plane xy, xz, yz: sqrt of the determinant of the projected covariance, through
+  /// Per coordinate plane xy, xz, yz: sqrt of the determinant of what is drawn, projected, through
   /// the low-pass.
   std::array<T, 3> plane_size = {};
   T opacity = T(0.0);
@@ -25,8 +25,14 @@ struct MergeValues {
   /// Root of the visibility: squared errors add over the views that see the splat.
   T contrast = T(1.0);
   T weight = T(0.0);  ///< of the moments: visible mass, the sum over the leaves below
-  T depth = T(0.0);   ///< integral of the optical depth over the area, over 2 pi
-  T area = T(0.0);    ///< projected, averaged over directions, over 2 pi
+  T depth = T(0.0);   ///< integral of the optical depth over the picture, over 2 pi
+  /// What is drawn has this many times the covariance: mergeMoments.
+  T inflation = T(1.0);
+  T leaf_area = T(0.0);  ///< mean area of the leaves below
+  /// Mean colour of the neighbours, by how far it is likely to stand behind this node: what errors
+  /// of shape show against. Filled in by who knows the neighbours (Surrounding).
+  std::array<T, 3> around = {};
+  T area = T(0.0);  ///< of the covariance, projected, averaged over directions, over 2 pi
 };
 
 /// Whole cache lines of doubles: costs of many are taken at once (merge_cost.h).
@@ -61,12 +67,14 @@ struct OpacityTable {
 };
 const OpacityTable& opacityTable();
 
-/// Coverage counts beside colour, as what stands behind is not known; measured best on scans of
-/// people and things (0.1 to 1 are alike within 0.3 dB).
-constexpr double kCoverageShare = 0.3;
-/// Errors of shape show against a surrounding that is likely to be alike: this share of the merged
-/// colour is taken off.
-constexpr double kLikeSurrounding = 0.3;
+/// Coverage counts beside colour, as what stands behind is not known.
+constexpr double kCoverageShare = 0.07;
+/// Errors of shape show against the neighbours' mean colour by this share, and by the second one
+/// as far as the neighbours are opaque: what stands behind faint ones is not known.
+constexpr double kSurroundingShare = 0.45;
+constexpr double kOpaqueSurroundingShare = 0.45;
+/// From this visibility on a node that lies open is drawn as large as its gaps ask for.
+constexpr double kFullInflationVisibility = 0.2;
 /// Variances below this of a degenerate splat, in units of the tree, cannot be told apart from 0.
 constexpr double kSmallestDeterminant = 1e-60;
 /// Below this an exponential is far below the errors of moments: 0.
@@ -81,10 +89,27 @@ MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,
 
 /// Moment match: mean, covariance and colour are those of the mixture with the nodes' weights; the
 /// optical depth of both, a hidden one counted as far as it is seen, is spread over the new area.
+/// Where that asks for more than an opacity of 1 and the leaves lie apart, the node is drawn larger
+/// than its moments, at most twice as large in area: Gaussians with the moments of their share of a
+/// surface leave gaps between each other. What is hidden is not, it would show around what hides
+/// it.
 MergeNode mergedNode(const MergeNode& a, const MergeNode& b, const MergeScale& scale);
 
+/// The sum over neighbours that `around` is the mean of.
+class Surrounding {
+ public:
+  void add(const MergeNode& neighbour);
+  std::array<double, 3> mean() const;
+
+ private:
+  std::array<double, 3> colour_ = {};
+  double opacity_ = 0;
+  double weight_ = 0;
+};
+
 /// What merging does to pictures: the integral of the squared change of colour and coverage over
-/// the three coordinate planes, seen through the low-pass, weighted by contrast.
+/// the three coordinate planes, before what is around both, seen through the low-pass, weighted by
+/// contrast.
 double mergeError(const MergeNode& a, const MergeNode& b, const MergeNode& merged,
                   const MergeScale& scale);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
+#include <initializer_list>
 #include <limits>
 
 #include "base/parallel.h"
@@ -151,6 +152,9 @@ class MergeRounds {
     parallelFor(count, kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) keepEntries(active_[i], ~uint32_t{one_sided[i]});
     });
+    parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) lookAround(active_[i], {active_[i]});
+    });
     // An edge costs the same from both ends: the lower slot finds out.
     parallelFor(count, kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
@@ -232,6 +236,11 @@ class MergeRounds {
 
   void updateLists() {
     parallelFor(pairs_.size(), kGrain / 4, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        lookAround(pairs_[i].first, {pairs_[i].first, pairs_[i].second});
+      }
+    });
+    parallelFor(pairs_.size(), kGrain / 4, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) takeOver(pairs_[i].first, pairs_[i].second);
     });
     std::vector<uint32_t> merged(pairs_.size());
@@ -276,6 +285,21 @@ class MergeRounds {
     parallelFor(slots.size(), kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) keepEntries(slots[i], kept[i]);
     });
+  }
+
+  /// What is around a node: itself and the partners of those whose lists are its own. Who is near
+  /// to both children counts twice.
+  void lookAround(uint32_t slot, std::initializer_list<uint32_t> sources) {
+    Surrounding surrounding;
+    surrounding.add(nodes_[slot]);
+    for (const uint32_t source : sources) {
+      const Entry* list = &entries_[source * kListCapacity];
+      for (size_t k = 0; k < sizes_[source]; ++k) {
+        const uint32_t other = alias_[list[k].slot];
+        if (other != slot) surrounding.add(nodes_[other]);
+      }
+    }
+    nodes_[slot].around = surrounding.mean();
   }
 
   /// The list of a merged node: the partners of both children, the cheapest kept.

@@ -44,20 +44,32 @@ T opacityByTable(T depth) {
   return min(opacity, T(kMergeMaxOpacity));
 }
 
-/// Fills what follows from the covariance.
+/// The same of a node's covariance times a factor.
 template <class T>
-void measure(MergeValues<T>& node, T footprint) {
+T planeDeterminant(const MergeValues<T>& node, size_t plane, T factor, T blur) {
+  const size_t* entries = kPlaneEntries[plane];
+  return blurredDeterminant(factor * node.covariance[entries[0]],
+                            factor * node.covariance[entries[1]],
+                            factor * node.covariance[entries[2]], blur);
+}
+
+/// Fills the area, which follows from the covariance.
+template <class T>
+void measureArea(MergeValues<T>& node, T footprint) {
   T squares = T(0.0);
   for (size_t plane = 0; plane < 3; ++plane) {
-    const size_t* entries = kPlaneEntries[plane];
-    const T determinant =
-        blurredDeterminant(node.covariance[entries[0]], node.covariance[entries[1]],
-                           node.covariance[entries[2]], footprint);
-    squares = squares + determinant;
-    node.plane_size[plane] = sqrt(determinant);
+    squares = squares + planeDeterminant(node, plane, T(1.0), footprint);
   }
   // The sum of the squared areas over three orthogonal directions is the same for all of them.
   node.area = sqrt(squares * T(1.0 / 3));
+}
+
+/// Fills the plane sizes, which follow from the covariance and the inflation.
+template <class T>
+void measurePlanes(MergeValues<T>& node, T footprint) {
+  for (size_t plane = 0; plane < 3; ++plane) {
+    node.plane_size[plane] = sqrt(planeDeterminant(node, plane, node.inflation, footprint));
+  }
 }
 
 /// mergedNode. Both nodes count alike: exchanging them changes no bit.
@@ -82,16 +94,22 @@ void mergeMoments(const MergeValues<T>& a, const MergeValues<T>& b, T footprint,
     node.covariance[i] = share_a * a.covariance[i] + share_b * b.covariance[i] +
                          spread * (apart[row] * apart[column]);
   }
-  measure(node, footprint);
+  measureArea(node, footprint);
+  node.leaf_area = share_a * a.leaf_area + share_b * b.leaf_area;
   node.visibility = share_a * a.visibility + share_b * b.visibility;
   node.contrast = share_a * a.contrast + share_b * b.contrast;
   // What stands behind the others adds to the coverage only as far as it is seen beside them.
   const T inverse_seen = T(1.0) / pick(node.visibility > T(0.0), node.visibility, T(1.0));
   const T seen_a = pick(node.visibility > a.visibility, a.visibility * inverse_seen, T(1.0));
   const T seen_b = pick(node.visibility > b.visibility, b.visibility * inverse_seen, T(1.0));
-  const T depth = seen_a * a.depth + seen_b * b.depth;
-  node.opacity = opacityByTable(depth / node.area);
-  node.depth = min(depth, T(kLargestDepth) * node.area);
+  node.depth = seen_a * a.depth + seen_b * b.depth;
+  // 0 where all leaves lie in one place, near 1 where the area is that between them.
+  const T spacing = max(T(1.0) - node.leaf_area / node.area, T(0.0));
+  const T open = min(node.visibility * T(1 / kFullInflationVisibility), T(1.0));
+  const T surplus = max(node.depth / (T(kLargestDepth) * node.area), T(1.0));
+  node.inflation = T(1.0) + open * (min(T(1.0) + spacing * spacing, surplus) - T(1.0));
+  node.opacity = opacityByTable(node.depth / (node.area * node.inflation));
+  measurePlanes(node, footprint);
 }
 
 template <class T>
@@ -108,9 +126,12 @@ T dotColours(const MergeValues<T>& a, const MergeValues<T>& b, const T* behind) 
 template <class T>
 T planeProduct(const MergeValues<T>& a, const MergeValues<T>& b, size_t plane, T footprint) {
   const size_t* entries = kPlaneEntries[plane];
-  const T xx = a.covariance[entries[0]] + b.covariance[entries[0]];
-  const T xy = a.covariance[entries[1]] + b.covariance[entries[1]];
-  const T yy = a.covariance[entries[2]] + b.covariance[entries[2]];
+  const auto sum = [&](size_t entry) {
+    return a.inflation * a.covariance[entry] + b.inflation * b.covariance[entry];
+  };
+  const T xx = sum(entries[0]);
+  const T xy = sum(entries[1]);
+  const T yy = sum(entries[2]);
   const T blur = footprint + footprint;
   const T inverse_root = T(1.0) / sqrt(blurredDeterminant(xx, xy, yy, blur));
   const T dx = a.mean[kPlaneAxes[plane][0]] - b.mean[kPlaneAxes[plane][0]];
@@ -126,7 +147,7 @@ template <class T>
 T errorOfMerge(const MergeValues<T>& a, const MergeValues<T>& b, const MergeValues<T>& merged,
                T footprint) {
   T behind[3];
-  for (size_t c = 0; c < 3; ++c) behind[c] = T(kLikeSurrounding) * merged.colour[c];
+  for (size_t c = 0; c < 3; ++c) behind[c] = T(0.5) * (a.around[c] + b.around[c]);
   const T aa = dotColours(a, a, behind);
   const T bb = dotColours(b, b, behind);
   const T mm = dotColours(merged, merged, behind);

@@ -78,10 +78,18 @@ TEST(MergeNode, ErrorIsTheSquaredChangeOfThreeProjections) {
   for (float& x : cloud.positions) x *= 0.05f;
   MergeScale scale;
   scale.footprint = 1e-4;
-  const MergeNode a = leafNode(cloud, 0, 0.5, scale);
-  const MergeNode b = leafNode(cloud, 1, 1.0, scale);
-  const MergeNode m = mergedNode(a, b, scale);
-  // Colour less a third of the merged one, and coverage, on a grid of each coordinate plane.
+  MergeNode a = leafNode(cloud, 0, 0.5, scale);
+  MergeNode b = leafNode(cloud, 1, 1.0, scale);
+  a.around = {0.2, 0.4, 0.6};
+  b.around = {0.3, 0.1, 0.5};
+  MergeNode m = mergedNode(a, b, scale);
+  m.inflation = 1.5;  // plane sizes with it: those of 1.5 times the covariance
+  for (size_t plane = 0; plane < 3; ++plane) {
+    const auto entry = [&](size_t k) { return 1.5 * m.covariance[kPlaneEntries[plane][k]]; };
+    const double f = scale.footprint;
+    m.plane_size[plane] = std::sqrt((entry(0) + f) * (entry(2) + f) - entry(1) * entry(1));
+  }
+  // Colour less what is around both, and coverage, on a grid of each coordinate plane.
   double sum = 0;
   const int axes[3][2] = {{0, 1}, {0, 2}, {1, 2}};
   const size_t entries[3][3] = {{0, 1, 3}, {0, 2, 5}, {3, 4, 5}};
@@ -89,9 +97,9 @@ TEST(MergeNode, ErrorIsTheSquaredChangeOfThreeProjections) {
   constexpr double kStep = 0.25 / kHalf;
   for (int plane = 0; plane < 3; ++plane) {
     const auto profile = [&](const MergeNode& node, double x, double y) {
-      const double xx = node.covariance[entries[plane][0]] + scale.footprint;
-      const double xy = node.covariance[entries[plane][1]];
-      const double yy = node.covariance[entries[plane][2]] + scale.footprint;
+      const double xx = node.inflation * node.covariance[entries[plane][0]] + scale.footprint;
+      const double xy = node.inflation * node.covariance[entries[plane][1]];
+      const double yy = node.inflation * node.covariance[entries[plane][2]] + scale.footprint;
       const double det = xx * yy - xy * xy;
       const double dx = x - node.mean[static_cast<size_t>(axes[plane][0])];
       const double dy = y - node.mean[static_cast<size_t>(axes[plane][1])];
@@ -105,9 +113,9 @@ TEST(MergeNode, ErrorIsTheSquaredChangeOfThreeProjections) {
         const double pa = profile(a, x, y);
         const double pb = profile(b, x, y);
         const double pm = profile(m, x, y);
-        double squared = 0.3 * (pa + pb - pm) * (pa + pb - pm);
+        double squared = kCoverageShare * (pa + pb - pm) * (pa + pb - pm);
         for (size_t c = 0; c < 3; ++c) {
-          const double behind = 0.3 * m.colour[c];
+          const double behind = 0.5 * (a.around[c] + b.around[c]);
           const double change = pa * (a.colour[c] - behind) + pb * (b.colour[c] - behind) -
                                 pm * (m.colour[c] - behind);
           squared += change * change;
@@ -118,6 +126,61 @@ TEST(MergeNode, ErrorIsTheSquaredChangeOfThreeProjections) {
   }
   // The grid ends at eight standard deviations and its sums of Gaussians are exact to 1e-8.
   EXPECT_NEAR(mergeError(a, b, m, scale) / sum, 1.0, 1e-6);
+}
+
+/// Two round splats of an opacity, this many standard deviations apart.
+MergeNode mergedPair(double apart, float opacity, double visibility) {
+  SplatCloud cloud = randomCloud(2, 1, 0);
+  for (size_t k = 0; k < 6; ++k) {
+    cloud.positions[k] = 0.0f;
+    cloud.scales[k] = 0.1f;
+  }
+  cloud.positions[3] = static_cast<float>(0.1 * apart);
+  cloud.opacities = {opacity, opacity};
+  MergeScale scale;
+  scale.footprint = 1e-12;
+  return mergedNode(leafNode(cloud, 0, visibility, scale), leafNode(cloud, 1, visibility, scale),
+                    scale);
+}
+
+TEST(MergeNode, IsDrawnLargerOnlyWhereOpaqueLeavesLieApartInTheOpen) {
+  // Two standard deviations apart: the covariance doubles along one axis, so the three areas are
+  // 1, sqrt 2 and sqrt 2 of a leaf's, their root mean square sqrt(5/3), and of the area 1 - 0.77 is
+  // between the leaves.
+  const double area = std::sqrt(5.0 / 3.0);
+  const double spacing = 1 - 1 / area;
+  const MergeNode seen = mergedPair(2, 0.9999f, 1);
+  EXPECT_NEAR(seen.inflation, 1 + spacing * spacing, 1e-6);
+  // Its moments stay exact: the parent's are those of all leaves.
+  EXPECT_NEAR(seen.covariance[0], 0.02, 1e-8);
+  EXPECT_NEAR(seen.covariance[3], 0.01, 1e-8);
+  // Half as visible as it must be for the whole of it.
+  const MergeNode half = mergedPair(2, 0.9999f, 0.5 * kFullInflationVisibility);
+  EXPECT_NEAR(half.inflation, 1 + 0.5 * spacing * spacing, 1e-6);
+  EXPECT_EQ(mergedPair(2, 0.9999f, 0).inflation, 1);
+  EXPECT_NEAR(mergedPair(0, 0.9999f, 1).inflation, 1, 1e-12);
+  // Depths of 0.43 each fit into an opacity of 1.
+  EXPECT_EQ(mergedPair(2, 0.4f, 1).inflation, 1);
+  EXPECT_LE(mergedPair(1000, 0.9999f, 1).inflation, 2);
+}
+
+TEST(MergeNode, SurroundingIsTheMeanColourByHowFarItHides) {
+  MergeNode red, green;
+  red.colour = {1, 0, 0};
+  red.opacity = 0.8;
+  red.area = 1;
+  green.colour = {0, 1, 0};
+  green.opacity = 0.2;
+  green.area = 2;
+  Surrounding surrounding;
+  EXPECT_EQ(surrounding.mean(), (std::array<double, 3>{0, 0, 0}));
+  surrounding.add(red);
+  surrounding.add(green);
+  // Weights 0.8 and 0.4: mean opacity 0.6.
+  const double share = kSurroundingShare + kOpaqueSurroundingShare * 0.6;
+  EXPECT_NEAR(surrounding.mean()[0], share * 2 / 3, 1e-15);
+  EXPECT_NEAR(surrounding.mean()[1], share / 3, 1e-15);
+  EXPECT_EQ(surrounding.mean()[2], 0);
 }
 
 TEST(MergeNode, CostsAreTheSameBitsByEveryKernelAndFromBothEnds) {
@@ -136,6 +199,10 @@ TEST(MergeNode, CostsAreTheSameBitsByEveryKernelAndFromBothEnds) {
   std::vector<MergeNode> nodes;
   for (size_t i = 0; i < 60; ++i) {
     nodes.push_back(leafNode(cloud, i, i % 7 == 0 ? 0.003 : 0.1 + 0.01 * double(i), scale));
+    nodes.back().around = {0.1, 0.01 * double(i), 0.7};
+    if (i % 5 == 0) nodes.back().depth *= 4;  // of many leaves in one place
+    if (i % 10 == 0) nodes.back().leaf_area *= 0.2;
+    if (i % 15 == 0) nodes.back().inflation = 1.7;
   }
   std::vector<uint32_t> others;
   for (uint32_t i = 0; i < 60; ++i) others.push_back(i * 7 % 60);
@@ -214,6 +281,75 @@ TEST(MergeTree, PairKeepsItsOpticalDepth) {
       areaOf(covariance<double>(tree.nodes.rotations.data(), tree.nodes.scales.data()));
   EXPECT_NEAR(opticalDepth(static_cast<double>(tree.nodes.opacities[0])) * area, depth,
               1e-6 * depth);
+}
+
+/// A wall of overlapping, nearly opaque flat splats in x and y, one colour per unit square.
+SplatCloud checkeredWall(size_t side) {
+  SplatCloud cloud = randomCloud(side * side, 6, 0);
+  constexpr double kSquares = 4;
+  const float step = static_cast<float>(kSquares / static_cast<double>(side));
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    float* p = &cloud.positions[i * 3];
+    // The random places of the cloud jitter it.
+    p[0] = (static_cast<float>(i % side) + 0.3f * p[0]) * step;
+    p[1] = (static_cast<float>(i / side) + 0.3f * p[1]) * step;
+    p[2] = 0.0f;
+    const bool is_light = (static_cast<int>(p[0]) + static_cast<int>(p[1])) % 2 == 0;
+    for (size_t k = 0; k < 3; ++k) {
+      cloud.scales[i * 3 + k] = k == 2 ? 1e-4f : step;
+      cloud.sh[i * 3 + k] = is_light ? 1.5f : -1.0f;
+    }
+    cloud.rotations[i * 4] = 1.0f;
+    std::fill_n(&cloud.rotations[i * 4 + 1], 3, 0.0f);
+    cloud.opacities[i] = 0.99f;
+  }
+  return cloud;
+}
+
+/// What passes through at a place of the plane z = 0, along z.
+double transmittanceAt(const SplatCloud& cloud, double x, double y) {
+  double left = 1;
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    const Mat3d c = covariance<double>(&cloud.rotations[i * 4], &cloud.scales[i * 3]);
+    const double dx = x - static_cast<double>(cloud.positions[i * 3]);
+    const double dy = y - static_cast<double>(cloud.positions[i * 3 + 1]);
+    const double det = c(0, 0) * c(1, 1) - c(0, 1) * c(0, 1);
+    const double squared = (c(1, 1) * dx * dx - 2 * c(0, 1) * dx * dy + c(0, 0) * dy * dy) / det;
+    left *= 1 - static_cast<double>(cloud.opacities[i]) * std::exp(-0.5 * squared);
+  }
+  return left;
+}
+
+TEST(MergeTree, WallsStayClosed) {
+  const SplatCloud wall = checkeredWall(64);
+  const SplatCloud cut = cutOf(decoderOf(wall), wall.size() / 20);
+  double sum = 0;
+  int count = 0;
+  for (double x = 0.5; x < 3.5; x += 0.05) {
+    for (double y = 0.5; y < 3.5; y += 0.05) {
+      sum += transmittanceAt(cut, x, y);
+      ++count;
+    }
+  }
+  // Gaussians with the moments of their share of the wall alone let 0.18 through.
+  EXPECT_LT(sum / count, 0.03);
+}
+
+TEST(MergeTree, SplatsGoWhereColoursChange) {
+  const SplatCloud wall = checkeredWall(64);
+  const SplatCloud cut = cutOf(decoderOf(wall), wall.size() / 4);
+  size_t near = 0;
+  for (size_t i = 0; i < cut.size(); ++i) {
+    for (size_t axis = 0; axis < 2; ++axis) {
+      const double x = static_cast<double>(cut.positions[i * 3 + axis]);
+      if (x > 0.5 && x < 3.5 && std::abs(x - std::round(x)) < 0.125) {
+        ++near;
+        break;
+      }
+    }
+  }
+  // Bands of a quarter around the three borders each way are 0.34 of the wall.
+  EXPECT_GT(static_cast<double>(near) / static_cast<double>(cut.size()), 0.5);
 }
 
 TEST(MergeTree, EveryBudgetIsExactAndRefinesOneSplat) {
