@@ -73,7 +73,7 @@ Hierarchy build(const std::shared_ptr<const SplatCloud>& cloud, const HierarchyS
                 Progress& progress) {
   std::vector<float> visibility;
   if (settings.view_count > 0) {
-    const std::vector<Camera> views = viewsOfCloud(*cloud, settings.rig);
+    const std::vector<Camera> views = viewsForVisibility(*cloud, settings.rig);
     visibility = splatVisibility(*cloud, views, &progress);
   }
   auto tree = std::make_shared<const MergeTree>(

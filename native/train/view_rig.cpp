@@ -31,6 +31,10 @@ constexpr size_t kSplatsToAsk = 8192;
 constexpr size_t kMayBeNearer = 256;
 /// Nothing within this many radii is cut off behind.
 constexpr double kFarRadii = 1e3;
+/// Views from around, and places inside, of a hollow cloud: of ten views.
+constexpr uint32_t kHollowShare = 4;
+/// Faces of the cube around a place have this many of a view's 25 pixels.
+constexpr uint32_t kFacePixels = 16;
 constexpr uint32_t kProbeSize = 48;
 constexpr double kProbeDepthShare = 0.3;
 
@@ -104,6 +108,31 @@ Vec3d insidePlace(const SplatCloud& cloud, const CloudExtent& extent, uint64_t s
   return best;
 }
 
+void validate(const SplatCloud& cloud, const ViewRigOptions& options) {
+  if (cloud.size() == 0) {
+    fail(ErrorCode::kInvalidArgument, "the cloud has 0 splats; views need at least 1");
+  }
+  if (options.count < 1 || options.count > 4096 || options.size < 1 || options.size > 65536) {
+    fail(ErrorCode::kInvalidArgument,
+         "the view rig has " + std::to_string(options.count) + " views of " +
+             std::to_string(options.size) +
+             " pixels; 1 to 4096 views of 1 to 65536 pixels are allowed");
+  }
+}
+
+/// Looks along axis face / 2, backwards where the face is odd.
+Camera cubeFace(const Vec3d& eye, int face, uint32_t size, double radius) {
+  Vec3d forward = Vec3d::Zero();
+  forward[face / 2] = face % 2 == 0 ? 1 : -1;
+  return lookingAlong(eye, forward, 0.5 * std::numbers::pi, size, radius);
+}
+
+Camera viewFromAround(const CloudExtent& extent, const Vec3d& outward, uint32_t size) {
+  const double distance = extent.radius / std::sin(0.5 * kAngleAround);
+  return lookingAlong(centreOf(extent) + distance * outward, -outward, kAngleAround, size,
+                      extent.radius);
+}
+
 }  // namespace
 
 ViewRig chooseRig(const SplatCloud& cloud) {
@@ -116,10 +145,7 @@ ViewRig chooseRig(const SplatCloud& cloud) {
   uint64_t far_count = 0;
   uint64_t pixel_count = 0;
   for (int face = 0; face < 6; ++face) {
-    Vec3d forward = Vec3d::Zero();
-    forward[face / 2] = face % 2 == 0 ? 1 : -1;
-    const Camera camera =
-        lookingAlong(centreOf(extent), forward, 0.5 * std::numbers::pi, kProbeSize, extent.radius);
+    const Camera camera = cubeFace(centreOf(extent), face, kProbeSize, extent.radius);
     renderTiled({&instance, 1}, camera, options, workspace, result);
     for (size_t i = 0; i < result.depth.size(); ++i) {
       const bool covered = result.colour[i * 4 + 3] > 0.5f;
@@ -132,15 +158,7 @@ ViewRig chooseRig(const SplatCloud& cloud) {
 }
 
 std::vector<Camera> viewsOfCloud(const SplatCloud& cloud, const ViewRigOptions& options) {
-  if (cloud.size() == 0) {
-    fail(ErrorCode::kInvalidArgument, "the cloud has 0 splats; views need at least 1");
-  }
-  if (options.count < 1 || options.count > 4096 || options.size < 1 || options.size > 65536) {
-    fail(ErrorCode::kInvalidArgument,
-         "the view rig has " + std::to_string(options.count) + " views of " +
-             std::to_string(options.size) +
-             " pixels; 1 to 4096 views of 1 to 65536 pixels are allowed");
-  }
+  validate(cloud, options);
   // A hollow thing, as a mesh becomes, and a room are alike from their middle: seen both ways.
   const bool is_automatic = options.rig == ViewRig::kAutomatic;
   const bool is_hollow = is_automatic && chooseRig(cloud) == ViewRig::kInside;
@@ -153,12 +171,36 @@ std::vector<Camera> viewsOfCloud(const SplatCloud& cloud, const ViewRigOptions& 
     const ViewRig automatic = is_hollow && i / 2 % 2 == 1 ? ViewRig::kInside : ViewRig::kAround;
     const ViewRig rig = is_automatic ? automatic : options.rig;
     if (rig == ViewRig::kAround) {
-      const double distance = extent.radius / std::sin(0.5 * kAngleAround);
-      cameras.push_back(lookingAlong(centreOf(extent) + distance * outward, -outward, kAngleAround,
-                                     options.size, extent.radius));
+      cameras.push_back(viewFromAround(extent, outward, options.size));
     } else {
       const Vec3d eye = insidePlace(cloud, extent, options.seed, i);
       cameras.push_back(lookingAlong(eye, outward, kAngleInside, options.size, extent.radius));
+    }
+  }
+  return cameras;
+}
+
+std::vector<Camera> viewsForVisibility(const SplatCloud& cloud, const ViewRigOptions& options) {
+  validate(cloud, options);
+  ViewRig rig = options.rig;
+  const bool is_hollow = rig == ViewRig::kAutomatic && chooseRig(cloud) == ViewRig::kInside;
+  if (rig == ViewRig::kAutomatic && !is_hollow) rig = ViewRig::kAround;
+  const CloudExtent extent = cloudExtent(cloud);
+  const uint32_t share = (options.count * kHollowShare + 9) / 10;
+  const uint32_t around_count = rig == ViewRig::kAround   ? options.count
+                                : rig == ViewRig::kInside ? 0
+                                                          : share;
+  const uint32_t place_count = rig == ViewRig::kAround ? 0 : share;
+  const Mat3d turn = turnOf(options.seed);
+  std::vector<Camera> cameras;
+  for (uint32_t i = 0; i < around_count; ++i) {
+    cameras.push_back(viewFromAround(extent, direction(turn, i, around_count), options.size));
+  }
+  const uint32_t face_size = (options.size * kFacePixels + 24) / 25;
+  for (uint32_t i = 0; i < place_count; ++i) {
+    const Vec3d eye = insidePlace(cloud, extent, options.seed, i);
+    for (int face = 0; face < 6; ++face) {
+      cameras.push_back(cubeFace(eye, face, face_size, extent.radius));
     }
   }
   return cameras;

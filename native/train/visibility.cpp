@@ -14,12 +14,35 @@ namespace stipple {
 namespace {
 
 constexpr size_t kGrain = 2048;
+/// A splat shows nothing beyond sqrt(2 ln 255) = 3.33 standard deviations of its longest axis, in
+/// the picture magnified by at most 1 + |slope|, slopes held to 1.3 of those at the borders.
+constexpr double kReach = 3.4;
+constexpr double kLowPassPixels = 3;  ///< more than the reach of the low-pass
 
 /// Sum of alpha over the pixels of a view with nothing in front, by the area of the projected
 /// Gaussian in the middle of its pixels, clamps left out; the picture's borders cut nothing off.
 double unhiddenWeight(const Projected<double>& splat) {
   const Footprint<double>& f = splat.footprint;
   return 2 * std::numbers::pi * f.opacity / (f.l00 * f.l11);
+}
+
+/// A cheap bound: false only for splats that show nothing in a picture.
+bool mayShow(const View<double>& view, const Vec3d& centre, const float* scales) {
+  if (!(centre[2] >= view.near_plane && centre[2] <= view.far_plane)) return false;
+  if (!view.perspective) return true;
+  const double longest = static_cast<double>(std::max({scales[0], scales[1], scales[2]}));
+  const double focal[2] = {view.fx, view.fy};
+  const double middle[2] = {view.cx, view.cy};
+  const double size[2] = {view.width, view.height};
+  for (size_t axis = 0; axis < 2; ++axis) {
+    const double steepest =
+        std::max(std::abs(view.slope_min[axis]), std::abs(view.slope_max[axis]));
+    const double magnified = focal[axis] * (1 + steepest) * longest / centre[2];
+    const double reach = kReach * magnified + kLowPassPixels;
+    const double place = focal[axis] * centre[static_cast<int>(axis)] / centre[2] + middle[axis];
+    if (place + reach < 0 || place - reach > size[axis]) return false;
+  }
+  return true;
 }
 
 /// The same splats in a medium grey, seen alike from everywhere.
@@ -67,6 +90,9 @@ std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Came
     const LowPass low_pass = cloud.antialias == Antialias::kMip ? LowPass::kMip : LowPass::kClassic;
     parallelFor(count, kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
+        const float* p = &cloud.positions[i * 3];
+        const Vec3d centre = linear * Vec3d(p[0], p[1], p[2]) + translation;
+        if (!mayShow(view, centre, &cloud.scales[i * 3])) continue;
         Projected<double> projected;
         if (!project(view, linear, translation, &cloud.positions[i * 3], &cloud.rotations[i * 4],
                      &cloud.scales[i * 3], static_cast<double>(cloud.opacities[i]), low_pass,

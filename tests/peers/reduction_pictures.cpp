@@ -121,7 +121,7 @@ void compare(int argc, char** argv) {
   const double plain = secondsOf([&] { buildMergeTree(*full, {}, {}); });
   std::vector<float> visibility;
   const double looking = secondsOf(
-      [&] { visibility = splatVisibility(*full, viewsOfCloud(*full, ViewRigOptions())); });
+      [&] { visibility = splatVisibility(*full, viewsForVisibility(*full, ViewRigOptions())); });
   const double building = secondsOf([&] { tree = buildMergeTree(*full, visibility, {}); });
   std::printf("tree without pictures %.3f s; pictures %.3f s, tree %.3f s\n", plain, looking,
               building);

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "data/cloud_extent.h"
+#include "splat/projection.h"
 #include "splat/render.h"
 #include "splat/render_backward.h"
 #include "train/allocation_count.h"
@@ -131,6 +132,108 @@ TEST(ViewRig, LooksOutFromPlacesWithRoomAround) {
   // away on average; the farthest of sixteen is mostly in the last fifth.
   const double reach = 0.25 * cloudExtent(cloud).radius;
   EXPECT_GT(sum / 16, 0.75 * reach);
+}
+
+TEST(ViewRig, LooksEveryWayFromPlacesInsideForVisibility) {
+  const SplatCloud room = sphere(3000, 1.0, 1);
+  const double radius = cloudExtent(room).radius;
+  std::vector<Camera> inside;
+  size_t around_count = 0;
+  for (const Camera& camera : viewsForVisibility(room, {})) {
+    EXPECT_NO_THROW(validate(camera));
+    if (cameraCentre(camera).norm() > radius) {
+      ++around_count;
+    } else {
+      inside.push_back(camera);
+    }
+  }
+  EXPECT_EQ(around_count, 4u);
+  ASSERT_EQ(inside.size(), 4u * 6);
+  // Each place sees each splat: the faces of a cube close.
+  for (size_t place = 0; place < 4; ++place) {
+    for (size_t i = 0; i < room.size(); ++i) {
+      size_t seen_count = 0;
+      for (size_t face = 0; face < 6; ++face) {
+        const Camera& camera = inside[place * 6 + face];
+        EXPECT_EQ(cameraCentre(camera), cameraCentre(inside[place * 6]));
+        Eigen::Vector4d point(0, 0, 0, 1);
+        for (int k = 0; k < 3; ++k) {
+          point[k] = static_cast<double>(room.positions[i * 3 + static_cast<size_t>(k)]);
+        }
+        const Eigen::Vector4d view = camera.world_to_camera * point;
+        const double x = camera.fx * view[0] / view[2] + camera.cx;
+        const double y = camera.fy * view[1] / view[2] + camera.cy;
+        const bool is_seen = view[2] > 0 && x >= -1e-6 && x <= camera.width + 1e-6 && y >= -1e-6 &&
+                             y <= camera.height + 1e-6;
+        seen_count += is_seen ? 1 : 0;
+      }
+      ASSERT_GE(seen_count, 1u);
+    }
+  }
+  // A thing is looked at as it always is.
+  SplatCloud thing = sphere(3000, 1.0, 1);
+  append(thing, sphere(1000, 0.2, 2));
+  const std::vector<Camera> seen = viewsForVisibility(thing, {});
+  const std::vector<Camera> usual = viewsOfCloud(thing, {});
+  ASSERT_EQ(seen.size(), usual.size());
+  for (size_t i = 0; i < seen.size(); ++i) {
+    EXPECT_EQ(seen[i].world_to_camera, usual[i].world_to_camera);
+    EXPECT_EQ(seen[i].width, usual[i].width);
+  }
+  ViewRigOptions options;
+  options.rig = ViewRig::kInside;
+  for (const Camera& camera : viewsForVisibility(thing, options)) {
+    EXPECT_LT(cameraCentre(camera).norm(), radius);
+  }
+  options.count = 0;
+  EXPECT_THROW(viewsForVisibility(thing, options), Error);
+  EXPECT_THROW(viewsForVisibility({}, {}), Error);
+}
+
+TEST(Visibility, CountsEverySplatThatReachesIntoAPicture) {
+  // From inside, of splats that are larger than the distance to them, too.
+  SplatCloud cloud = sphere(400, 1.0, 1);
+  for (size_t i = 0; i < cloud.scales.size(); ++i) {
+    cloud.scales[i] =
+        0.02f + 0.6f * static_cast<float>(i % 7 == 0) * 0.1f * static_cast<float>(i % 11);
+  }
+  ViewRigOptions options;
+  options.rig = ViewRig::kInside;
+  options.count = 3;
+  options.size = 96;
+  const std::vector<Camera> views = viewsOfCloud(cloud, options);
+  std::vector<double> seen(cloud.size(), 0.0), whole(cloud.size(), 0.0);
+  RenderOptions plain;
+  plain.with_depth = false;
+  const SplatInstance instance{&cloud};
+  for (const Camera& camera : views) {
+    const std::vector<float> zeros(size_t{4} * 96 * 96, 0.0f);
+    BackwardInput input;
+    input.colour_gradient = zeros;
+    input.with_blending_weights = true;
+    const BackwardResult result = renderBackward({&instance, 1}, camera, plain, input);
+    const View<double> view = makeView<double>(camera);
+    const Mat3d linear = camera.world_to_camera.topLeftCorner<3, 3>();
+    const Vec3d translation = camera.world_to_camera.topRightCorner<3, 1>();
+    for (size_t i = 0; i < cloud.size(); ++i) {
+      Projected<double> projected;
+      if (!project(view, linear, translation, &cloud.positions[i * 3], &cloud.rotations[i * 4],
+                   &cloud.scales[i * 3], static_cast<double>(cloud.opacities[i]), LowPass::kClassic,
+                   projected)) {
+        continue;
+      }
+      const Footprint<double>& f = projected.footprint;
+      const double area = projected.depth * projected.depth;
+      seen[i] += static_cast<double>(result.instances[0].blending_weights[i]) * area;
+      whole[i] += 2 * 3.141592653589793 * f.opacity / (f.l00 * f.l11) * area;
+    }
+  }
+  const std::vector<float> visibility = splatVisibility(cloud, views);
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    const double expected = whole[i] > 0 ? std::min(seen[i] / whole[i], 1.0) : 1.0;
+    // Sums of float32 blending weights.
+    EXPECT_NEAR(static_cast<double>(visibility[i]), expected, 1e-4);
+  }
 }
 
 TEST(Visibility, IsNearOneInFrontAndNearZeroBehind) {
