@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <memory>
 
+#include "base/default_init_vector.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "io/input_file.h"
@@ -35,6 +37,10 @@ constexpr uint64_t kCodes = 65536;
 // is made to exhaust memory. Small scenes of equal splats are let through.
 constexpr uint64_t kMaxSplatsPerByte = 64;
 constexpr uint64_t kAlwaysAllowed = 65536;
+
+// Of a cloud's bytes over those of its pictures, real scenes have 7 to 15.
+constexpr uint64_t kMostEarly = 32;
+constexpr size_t kPaletteAhead = 8;
 
 /// The files of a scene: entries of a zip, or files of a folder.
 class Files {
@@ -89,23 +95,25 @@ class Files {
 class Reader {
  public:
   Reader(const std::string& path, Progress* progress)
-      : files_(path), progress_(progress), meta_(readMeta()) {}
+      : files_(path), progress_(progress), meta_(readMeta()) {
+    for (size_t byte = 0; byte < 256; ++byte) {
+      components_[byte] = (static_cast<double>(byte) / 255.0 * 2.0 - 1.0) * M_SQRT1_2;
+    }
+  }
 
   SplatCloud read() {
-    checkCount();
-    decodePictures();
+    decodePictures(checkCount());
     advance(progress_, 0.5, "Reading splats");
     cloud_.antialias = meta_.antialias;
     cloud_.colour_space = meta_.colour_space;
     cloud_.frame = meta_.frame;
-    cloud_.sh_degree = meta_.bands;
-    cloud_.resize(static_cast<size_t>(meta_.count));
-    fillPositionTables();
+    allocate(meta_.bands);
     fillPalette();
     bad_.assign(rangeCount(cloud_.size(), kGrain), std::string());
     parallelFor(cloud_.size(), kGrain, [this](size_t begin, size_t end) {
-      for (size_t i = begin; i < end && bad_[begin / kGrain].empty(); ++i) {
-        fillSplat(i, &bad_[begin / kGrain]);
+      for (size_t i = begin; i < end; ++i) {
+        prefetchPalette(std::min(i + kPaletteAhead, end - 1));
+        if (!fillSplat(i, &bad_[begin / kGrain])) return;
       }
     });
     for (const std::string& what : bad_) {
@@ -133,7 +141,8 @@ class Reader {
     return names;
   }
 
-  void checkCount() const {
+  /// Returns the bytes of all pictures as they are stored.
+  uint64_t checkCount() const {
     uint64_t bytes = 0;
     for (const std::string& name : pictureNames()) bytes += files_.storedBytes(name);
     const uint64_t most = kAlwaysAllowed + bytes * kMaxSplatsPerByte;
@@ -143,15 +152,34 @@ class Reader {
                                    std::to_string(bytes) + " bytes can hold at most " +
                                    std::to_string(most));
     }
+    return bytes;
   }
 
-  void decodePictures() {
+  void allocate(int degree) {
+    cloud_.sh_degree = degree;
+    cloud_.resize(static_cast<size_t>(meta_.count));
+  }
+
+  void decodePictures(uint64_t stored_bytes) {
     const std::vector<std::string> names = pictureNames();
     // Writers pad the sides to multiples of 4.
     const uint64_t splat_pixels = std::max<uint64_t>(meta_.count * 4, 4096);
     const uint64_t palette_pixels = kMaxPalette * (shCoefficientCount(3) - 1);
     pictures_.resize(names.size());
-    parallelFor(names.size(), 1, [&](size_t begin, size_t) {
+    // Touching fresh memory takes a third as long as decoding: done beside it, where the count
+    // does not claim far more than the pictures can hold.
+    const int degree = meta_.bands;  // version 1 tells it only by a picture
+    const uint64_t floats = 11 + shCoefficientCount(degree) * 3;
+    const bool allocates = meta_.count * floats * sizeof(float) <= stored_bytes * kMostEarly;
+    parallelFor(names.size() + 2, 1, [&](size_t begin, size_t) {
+      if (begin == names.size()) {
+        if (allocates) allocate(degree);
+        return;
+      }
+      if (begin > names.size()) {
+        fillPositionTables();
+        return;
+      }
       const uint64_t most = begin == kCentroids ? palette_pixels : splat_pixels;
       const std::vector<uint8_t> bytes = files_.read(names[begin], most * 4 + (1 << 16));
       RgbaBytes& picture = pictures_[begin];
@@ -219,7 +247,23 @@ class Reader {
     });
   }
 
-  void fillSplat(size_t i, std::string* bad) {
+  size_t labelOf(size_t i) const {
+    const uint8_t* bytes = &pictures_[kLabels].bytes[i * 4];
+    return bytes[0] | static_cast<size_t>(bytes[1]) << 8;
+  }
+
+  /// Vectors of a palette of several megabytes come in any order.
+  void prefetchPalette(size_t i) const {
+    if (!meta_.hasHarmonics()) return;
+    const size_t label = labelOf(i);
+    if (label >= palette_count_) return;
+    const size_t rest = cloud_.shStride() - 3;
+    const float* vector = &palette_[label * rest];
+    for (size_t k = 0; k < rest; k += 16) __builtin_prefetch(vector + k);
+  }
+
+  /// Returns false, and what is wrong, where there is something.
+  bool fillSplat(size_t i, std::string* bad) {
     const uint8_t* low = &pictures_[kMeansLow].bytes[i * 4];
     const uint8_t* high = &pictures_[kMeansHigh].bytes[i * 4];
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -242,37 +286,40 @@ class Reader {
       *bad = files_.name(meta_.rotations_file) + " has " + std::to_string(rotation[3]) +
              " in the alpha of splat " + std::to_string(i) +
              "; 252 to 255 name the largest component of a rotation";
-      return;
+      return false;
     }
-    if (!meta_.hasHarmonics()) return;
-    const uint8_t* bytes = &pictures_[kLabels].bytes[i * 4];
-    const size_t label = bytes[0] | static_cast<size_t>(bytes[1]) << 8;
+    if (!meta_.hasHarmonics()) return true;
+    const size_t label = labelOf(i);
     if (label >= palette_count_) {
       *bad = files_.name(meta_.labels_file) + " names vector " + std::to_string(label) +
              " of the palette for splat " + std::to_string(i) + "; it holds " +
              std::to_string(palette_count_);
-      return;
+      return false;
     }
+    constexpr size_t kRestOf3 = 45;
     const size_t rest = cloud_.shStride() - 3;
-    std::copy_n(&palette_[label * rest], rest, sh + 3);
+    const float* vector = &palette_[label * rest];
+    if (rest == kRestOf3) {
+      std::memcpy(sh + 3, vector, kRestOf3 * sizeof(float));  // a known length needs no call
+    } else {
+      std::copy_n(vector, rest, sh + 3);
+    }
+    return true;
   }
 
   /// Three components in bytes; the largest follows from the length, and is positive.
-  static bool fillRotation(const uint8_t* bytes, float* wxyz) {
+  bool fillRotation(const uint8_t* bytes, float* wxyz) const {
     if (bytes[3] < 252) return false;
     const size_t largest = bytes[3] - size_t{252};
-    std::array<double, 4> q{};
-    double squares = 0;
-    size_t next = 0;
-    for (size_t k = 0; k < 4; ++k) {
-      if (k == largest) continue;
-      q[k] = (bytes[next++] / 255.0 * 2.0 - 1.0) * M_SQRT1_2;
-      squares += q[k] * q[k];
-    }
-    q[largest] = std::sqrt(std::max(0.0, 1.0 - squares));
+    std::array<double, 3> parts;
+    for (size_t k = 0; k < 3; ++k) parts[k] = components_[bytes[k]];
+    const double squares = parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2];
     // Damaged bytes may be longer than 1 together.
-    const double length = std::sqrt(squares + q[largest] * q[largest]);
-    for (size_t k = 0; k < 4; ++k) wxyz[k] = static_cast<float>(q[k] / length);
+    if (squares > 1.0) {
+      for (double& part : parts) part /= std::sqrt(squares);
+    }
+    for (size_t k = 0; k < 3; ++k) wxyz[k + (k < largest ? 0 : 1)] = static_cast<float>(parts[k]);
+    wxyz[largest] = static_cast<float>(std::sqrt(std::max(0.0, 1.0 - squares)));
     return true;
   }
 
@@ -281,10 +328,11 @@ class Reader {
   SogMeta meta_;
   std::vector<RgbaBytes> pictures_;
   std::array<std::vector<float>, 3> positions_;
-  std::vector<float> palette_;  ///< [palette_count, (bands+1)^2 - 1, 3]
+  DefaultInitVector<float> palette_;  ///< [palette_count, (bands+1)^2 - 1, 3]
   uint64_t palette_count_ = 0;
   SplatCloud cloud_;
   std::vector<std::string> bad_;
+  std::array<double, 256> components_;  ///< of rotations, by byte
 };
 
 }  // namespace
