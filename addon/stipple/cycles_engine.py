@@ -12,6 +12,7 @@ from . import version
 from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
 from .cycles_functions import CyclesRender, functions
+from .binding.structs import OutputColour
 from .engine import NativeWork
 from .scene import cameras, facts, instances, layers, mattes, sources, splat_data
 
@@ -92,7 +93,7 @@ def _make_engine():
 
         def update(self, data=None, depsgraph=None):
             """Decodes the splats of the view layer, then hands the rest to Cycles."""
-            self._instances, self._holdouts, self._failed = [], [], False
+            self._instances, self._holdouts, self._catchers, self._failed = [], [], [], False
             if self.is_preview:
                 super().update(data, depsgraph)
                 return
@@ -100,8 +101,9 @@ def _make_engine():
                 self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
                 if self._instances:
                     self._camera(depsgraph, None)
-                    # Cycles' passes tell nothing of what it holds out.
-                    self._holdouts = mattes.gather(depsgraph, only_holdouts=True)
+                    # Cycles' passes tell nothing of what it holds out, and of shadow catchers only what falls on them.
+                    self._holdouts = mattes.gather(depsgraph, 'HOLDOUTS')
+                    self._catchers = mattes.gather(depsgraph, 'CATCHERS')
             except StippleError as error:
                 self._failed = True
                 self._fail(error)
@@ -127,7 +129,7 @@ def _make_engine():
             if self._cancelled():
                 return
             try:
-                self._insert_splats(layer_name, picture, camera, world)
+                self._insert_splats(layer_name, picture, camera, world, scene.stipple.shadow_margin)
             except CancelledError:
                 return
             except StippleError as error:
@@ -137,19 +139,35 @@ def _make_engine():
             scene = depsgraph.scene
             return cameras.camera_of(self.camera_override or scene.camera, scene.render, border)
 
-        def _insert_splats(self, layer_name, picture, camera, world):
+        def _insert_splats(self, layer_name, picture, camera, world, shadow_margin):
             result = self.get_result()
             layer = next(layer for layer in result.layers if layer.name == layer_name)
             passes = {render_pass.name: render_pass for render_pass in layer.passes}
             matte = mattes.surface(self._holdouts, camera, self._wait) if self._holdouts else None
             cycles = self._layers_of(passes, picture, world, matte)
             renderer = Renderer(sources.context())
+            if self._catchers and cycles.has_shadows():
+                self._light_what_is_before_catchers(cycles, renderer, picture, camera, shadow_margin)
             task = renderer.start(self._instances, camera, renderer.options(blend_space=picture.blend_space),
                                   surface=cycles.surface(), with_transmittance=True)
             self._wait(task.job)
             combined, depth = cycles.picture(task)
             version.fill_pass(passes['Combined'], combined)
             version.fill_pass(passes['Depth'], depth)
+
+        def _light_what_is_before_catchers(self, cycles, renderer, picture, camera, margin):
+            """Takes the shadows off splats that are nearer than a catcher by more than the margin."""
+            options = renderer.options(blend_space=picture.blend_space, output_colour=OutputColour.COMPOSITED)
+
+            def drawn(surface):
+                task = renderer.start(self._instances, camera, options, with_depth=False, surface=surface)
+                self._wait(task.job)
+                return task.colour[::-1]
+
+            catchers = mattes.surface(self._catchers, camera, self._wait)
+            before = drawn(cycles.matte_of(catchers, margin))
+            if before[..., 3].any():
+                cycles.light_before_catchers(before, drawn(cycles.matte()))
 
         def _layers_of(self, passes, picture, world, matte):
             """What Cycles has drawn. matte: of its holdouts, or None."""

@@ -63,7 +63,8 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
         """Decodes what the view layer shows, from the evaluated settings."""
         self._instances = None
         try:
-            self._mattes = mattes.gather(depsgraph, only_holdouts=not depsgraph.scene.stipple.meshes_as_mattes)
+            wanted = 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS'
+            self._mattes = mattes.gather(depsgraph, wanted)
             self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
         except StippleError as error:
             self._fail(error)

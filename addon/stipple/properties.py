@@ -117,6 +117,10 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         name="Meshes as Mattes", description="Meshes hide the splats behind them and leave a hole in the picture, for "
         "putting a render of the meshes there. Shadow catchers hide nothing", default=True, options=set(),
         override=_OVERRIDABLE)
+    shadow_margin: FloatProperty(
+        name="Shadow Margin", description="Splats that are nearer to the camera than a shadow catcher by more than this get "
+        "none of its shadows", default=0.5, min=0.0, soft_max=10.0, subtype='DISTANCE', options=set(),
+        override=_OVERRIDABLE)
     max_splats: IntProperty(
         name="Max Splats", description="Splats that the viewport shows at most, over all objects and their instances; 0 "
         "for no limit. Objects share them in proportion to their own budgets", default=0, min=0, soft_max=10000000,

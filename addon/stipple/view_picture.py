@@ -13,7 +13,7 @@ from .binding import cloud_edit
 from .binding.grade import GradedCloud
 from .binding.renderer import Renderer
 from .binding.structs import JobState
-from .scene import cameras, facts, instances, sources, viewed
+from .scene import cameras, facts, instances, mattes, sources, viewed
 
 # Coarse pictures have one pixel for this many of the region's along each side: the least, the first and the most.
 # Beyond the most, ordering the splats takes the time and not their pixels.
@@ -22,8 +22,32 @@ COARSE = (2, 4, 8)
 COARSE_SECONDS = 0.04
 # Seconds that a redraw waits for a coarse picture before it shows the last one instead.
 PATIENCE = 0.02
+# Samples of meshes' edges along each side of a pixel of a fine picture; a coarse one has one.
+MATTE_SIDE = 2
 # Seconds without a change after which a view rests.
 REST_SECONDS = 0.15
+
+
+class ViewMattes:
+    """Meshes that hide splats in a view; each is read again only when it has changed."""
+
+    def __init__(self):
+        self.placed = []  # as of mattes.gather_owned
+        self._read = {}
+
+    def update(self, depsgraph):
+        used, wanted = {}, 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS'
+
+        def mesh_of(evaluated):
+            # Geometry that nodes instance without its object has the name of its own data.
+            key = evaluated.original.name_full, evaluated.data.name_full
+            made = viewed.geometry_version(evaluated.original)
+            known = self._read.get(key)
+            used[key] = known if known is not None and known[0] == made else (made, mattes.read(evaluated))
+            return used[key][1]
+
+        self.placed = mattes.gather_owned(depsgraph, wanted, mesh_of)
+        self._read = used
 
 
 class ViewPicture:
@@ -31,6 +55,7 @@ class ViewPicture:
 
     def __init__(self):
         self._instances = []
+        self._mattes = ViewMattes()
         self._version = 0
         self._coarse = COARSE[1]
         self._renderer = None
@@ -44,6 +69,7 @@ class ViewPicture:
         """Takes what the view shows now. Errors: StippleError."""
         viewed.note_changes(depsgraph)
         self._instances = instances.gather_owned(depsgraph, 'VIEWPORT', warn)
+        self._mattes.update(depsgraph)
         self._version += 1
 
     def draw(self, engine, context, depsgraph):
@@ -53,7 +79,8 @@ class ViewPicture:
         border = cameras.view_border(context, region)
         planes = viewed.clip_planes(context.region_data)
         entries = [entry for entry in self._instances if viewed.shows(space, depsgraph, *entry[:2])]
-        key = (self._version, tuple(id(entry) for entry in entries), bytes(camera), border, planes.tobytes(),
+        hiding = [entry for entry in self._mattes.placed if viewed.shows(space, depsgraph, *entry[:2])] if entries else []
+        key = (self._version, tuple(id(entry) for entry in entries + hiding), bytes(camera), border, planes.tobytes(),
                facts.blend_space(scene), scene.render.film_transparent)
         now = time.perf_counter()
         if key != self._key:
@@ -63,11 +90,11 @@ class ViewPicture:
             self._task.close()
             self._task = None
         if self._task is None and (self._shown is None or self._shown.key != key):
-            self._start(scene, camera, border, entries, planes, self._coarse)
+            self._start(scene, camera, border, entries, hiding, planes, self._coarse)
             self._take(PATIENCE)
         if (self._task is None and self._shown is not None and self._shown.key == key and not self._shown.is_fine
                 and now - self._changed >= REST_SECONDS):
-            self._start(scene, camera, border, entries, planes, 1)
+            self._start(scene, camera, border, entries, hiding, planes, 1)
         if self._task is not None or self._shown is None or not self._shown.is_fine or self._shown.key != key:
             engine.tag_redraw()
         if self._shown is not None:
@@ -78,15 +105,20 @@ class ViewPicture:
             self._task.close()
             self._task = None
 
-    def _start(self, scene, camera, border, entries, planes, coarse):
+    def _start(self, scene, camera, border, entries, hiding, planes, coarse):
         """Starts the picture of the border's pixels with one pixel for coarse x coarse of them."""
         if self._renderer is None:
             self._renderer = Renderer(sources.context())
         background = None if scene.render.film_transparent else facts.world_colour(scene.world)
         options = self._renderer.options(blend_space=facts.blend_space(scene), background=background)
-        task = self._renderer.start(self._placed(entries, planes), cameras.part_of(camera, border, coarse), options,
-                                    with_depth=False)
-        self._task = _Making(task, self._key, border, coarse)
+        placed, part = self._placed(entries, planes), cameras.part_of(camera, border, coarse)
+
+        def begin(surface):
+            return self._renderer.start(placed, part, options, with_depth=False, surface=surface)
+
+        side = MATTE_SIDE if coarse == 1 else 1
+        samples = mattes.start_samples([matte for _, _, matte in hiding], part, side) if hiding else None
+        self._task = _Making(begin, samples, side, self._key, border, coarse)
 
     def _placed(self, entries, planes):
         """Instances for the renderer: what the clipping planes leave."""
@@ -127,10 +159,12 @@ class ViewPicture:
 
 
 class _Making:
-    """A picture that a job makes."""
+    """A picture that a job makes, after another has drawn the depth of meshes where there are any."""
 
-    def __init__(self, task, key, border, coarse):
-        self._task = task
+    def __init__(self, begin, samples, side, key, border, coarse):
+        """begin: starts the picture's job behind a Surface, or None. samples: of mattes.start_samples, or None."""
+        self._begin, self._samples, self._side = begin, samples, side
+        self._task = begin(None) if samples is None else None
         self.key, self.border = key, border
         self.is_fine = coarse == 1
         self.begun = time.perf_counter()
@@ -140,13 +174,18 @@ class _Making:
         return self._task.colour
 
     def is_running(self):
+        if self._task is None:
+            if self._samples.job.poll()[0] == JobState.RUNNING:
+                return True
+            self._samples.job.wait()
+            self._task = self._begin(mattes.surface_of(self._samples, self._side))
         return self._task.job.poll()[0] == JobState.RUNNING
 
     def wait(self):
         self._task.job.wait()
 
     def close(self):
-        self._task.job.close()
+        (self._samples if self._task is None else self._task).job.close()
 
 
 class _Shown:

@@ -135,6 +135,40 @@ def test_characters_cast_shadows_on_splats(stipple, camera, tmp_path):
     np.testing.assert_allclose(scenes.render_pixels(tmp_path, 'without')[30, shadow_x, :3], 0.5, atol=0.03)
 
 
+def test_shadows_do_not_fall_on_splats_before_the_catcher(stipple, camera, tmp_path):
+    """A pane of splats over the shadow, as bright as without the ball; half transparent, the floor's shadow shows."""
+    floor, _, ball = shadow_scene(stipple)
+    scene = prepare('STIPPLE_CYCLES', samples=16)
+    shadow = np.s_[28:32, 11:15]
+    without = scenes.render_pixels(tmp_path, 'without')
+    dark = without[shadow][..., :3].mean()
+    pane = splat_wall(stipple, 'pane', 1.5, side=0.8, colour=(0.6, 0.6, 0.6))
+    pane.location.x = -0.85
+    seen = scenes.render_pixels(tmp_path, 'pane')
+    np.testing.assert_allclose(seen[shadow][..., :3], 0.6, atol=0.03)
+    # Away from the pane, which ends at column 24, nothing changes: not the ball's edges before the catcher either.
+    np.testing.assert_allclose(seen[:, 26:], without[:, 26:], atol=1e-5)
+    scene.stipple.shadow_margin = 2.0  # farther than the pane: it counts as the floor
+    assert scenes.render_pixels(tmp_path, 'margin')[shadow][..., :3].max() < 0.1
+    scene.stipple.shadow_margin = 0.5
+    bpy.data.objects.remove(pane)
+    thin = splat_wall(stipple, 'thin', 1.5, side=0.8, colour=(0.6, 0.6, 0.6), count=10, opacity=0.2)
+    thin.location.x = -0.85
+    for blending in ('AS_TRAINED', 'SCENE_LINEAR'):
+        scene.stipple.splat_color = blending
+        half = scenes.render_pixels(tmp_path, 'half')[shadow][..., :3]
+        ball.hide_render = True
+        lit = scenes.render_pixels(tmp_path, 'lit')[shadow][..., :3]
+        ball.hide_render = False
+        assert dark + 0.05 < half.min() and half.mean() < lit.mean() - 0.02
+    # As light it is the thin pane over the dark floor.
+    floor.hide_render, scene.render.engine = True, 'STIPPLE'
+    scene.stipple.meshes_as_mattes = False
+    alone = scenes.render_pixels(tmp_path, 'alone')[shadow]
+    assert 0.3 < alone[..., 3].min()
+    np.testing.assert_allclose(half, alone[..., :3] + (1 - alone[..., 3:]) * dark, atol=0.02)
+
+
 @pytest.mark.parametrize('transparent', [True, False])
 def test_a_shadow_catcher_without_splats_is_cycles_own(stipple, camera, tmp_path, transparent):
     floor, _, _ = shadow_scene(stipple)
@@ -419,8 +453,8 @@ def test_each_mesh_is_read_once(stipple, camera, tmp_path, monkeypatch):
     for i in range(20):
         copy = scenes.link(bpy.data.objects.new('copy', quad.data))
         copy.location.x = -1 + 0.1 * i
-    read, reader = [], stipple.scene.mattes._read
-    monkeypatch.setattr(stipple.scene.mattes, '_read', lambda obj: read.append(obj.name) or reader(obj))
+    read, reader = [], stipple.scene.mattes.read
+    monkeypatch.setattr(stipple.scene.mattes, 'read', lambda obj: read.append(obj.name) or reader(obj))
     prepare('STIPPLE')
     scenes.render_pixels(tmp_path)
     assert len(read) == 1

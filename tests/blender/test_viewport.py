@@ -143,3 +143,77 @@ def test_clipping_planes_leave_what_lies_below(stipple, square):
     np.testing.assert_array_equal(kept.positions(), expected)
     assert cloud_edit.clipped(cloud, [(0.0, 0.0, 1.0, -5.0)]) is cloud
     assert cloud_edit.clipped(cloud, [(0.0, 0.0, 0.0, 1.0)]).info().count == 0
+
+
+def made_pictures(view_picture, viewed, borders):
+    """What a rendered view's jobs make of the scene, coarse and fine, without a window: [H,W,4], top row first."""
+    picture = view_picture.ViewPicture()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    picture.update(depsgraph, print)
+    camera = importlib.import_module(view_picture.__name__.replace('view_picture', 'scene.cameras')).camera_of(
+        bpy.context.scene.camera, bpy.context.scene.render, None)
+    found = []
+    for coarse in (2, 1):
+        picture._key = coarse
+        picture._start(bpy.context.scene, camera, borders, picture._instances, picture._mattes.placed, np.zeros((0, 4)),
+                       coarse)
+        while picture._task.is_running():
+            pass
+        picture._task.wait()
+        found.append(picture._task.colour)
+    return found
+
+
+def test_meshes_and_holdouts_hide_splats_in_rendered_views(stipple, viewed, square):
+    """A quad before the left half of splats; then holdouts alone; then nothing."""
+    view_picture = importlib.import_module(f'{stipple.__name__}.view_picture')
+    facts = importlib.import_module(f'{stipple.__name__}.scene.facts')
+    scene = bpy.context.scene
+    scenes.camera((0, 0, 6), width=60, height=60, type='ORTHO', ortho_scale=3.0)
+    quad = scenes.quad('before', offset=(-1.0, 0.0, 1.0))
+    scene.render.film_transparent = True
+    whole = facts.Border(0, 0, 60, 60)
+
+    def alphas():
+        bpy.context.view_layer.update()
+        coarse, fine = made_pictures(view_picture, viewed, whole)
+        assert coarse.shape == (30, 30, 4) and fine.shape == (60, 60, 4)
+        np.testing.assert_allclose(coarse[15, [10, 20], 3], fine[30, [20, 40], 3], atol=0.05)
+        return fine[30, 20, 3], fine[30, 40, 3]
+
+    hidden, seen = alphas()
+    assert hidden == 0.0 and seen > 0.9
+    scene.stipple.meshes_as_mattes = False
+    assert min(alphas()) > 0.9
+    quad.is_holdout = True
+    hidden, seen = alphas()
+    assert hidden == 0.0 and seen > 0.9
+    square.is_holdout = True
+    assert max(alphas()) == 0.0
+
+
+def test_rendered_views_read_a_mesh_again_only_when_it_changes(stipple, viewed, square, monkeypatch):
+    view_picture = importlib.import_module(f'{stipple.__name__}.view_picture')
+    quad = scenes.quad('before')
+    read, reader = [], stipple.scene.mattes.read
+    monkeypatch.setattr(stipple.scene.mattes, 'read', lambda obj: read.append(obj.name) or reader(obj))
+    kept = view_picture.ViewMattes()
+
+    def update():
+        bpy.context.view_layer.update()
+        kept.update(bpy.context.evaluated_depsgraph_get())
+        return len(read)
+
+    assert update() == 1 and update() == 1
+    quad.location.x = 1.0
+    assert update() == 1
+    np.testing.assert_allclose(kept.placed[0][2][1][:3, 3], (1, 0, 0), atol=1e-6)
+    quad.data.vertices[0].co.x = -3.0
+    quad.data.update()
+    assert update() == 2
+    quad.modifiers.new('array', 'ARRAY')
+    assert update() == 3
+    quad.hide_set(True)
+    assert update() == 3 and kept.placed == []
+    quad.hide_set(False)
+    assert update() == 4

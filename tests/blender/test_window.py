@@ -50,6 +50,11 @@ def test_meshes_hide_splats_behind_them(shots):
     assert np.ptp(value) < 10 and value.mean() > 80  # the grey of the cube
 
 
+def test_meshes_hide_splats_in_the_engines_own_view(shots):
+    value = pixel(shots, 'native', 'behind_cube')
+    assert np.ptp(value) < 10  # a hole, in which the editor's grey shows
+
+
 def test_selected_splats_have_an_outline(shots):
     # Blender draws the box of what is selected too; the outline lies on the splats' rim, next to it.
     changed = (shots[0]['outlined'] != shots[0]['solid']).any(-1)

@@ -30,6 +30,7 @@ class STIPPLE_PT_render_splats(bpy.types.Panel):
         scene = context.scene
         if context.engine == CYCLES_ENGINE:
             layout.prop(scene.cycles, 'device')
+            layout.prop(scene.stipple, 'shadow_margin')
             layout.label(text="Splats do not appear in reflections", icon='INFO')
         else:
             layout.prop(scene.stipple, 'meshes_as_mattes')

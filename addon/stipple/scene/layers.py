@@ -56,6 +56,32 @@ class CyclesLayers:
             opacity = self._hidden()[::-1]
         return Surface(depth[::-1], self.colour[::-1], None if self.light is None else self.light[::-1], opacity)
 
+    def has_shadows(self):
+        return self.light is not None and bool((self.light != 1.0).any())
+
+    def matte(self):
+        """The meshes as a matte: what is left of a picture is the splats' part of it."""
+        surface = self.surface()
+        return Surface(surface.depth, opacity=self._hidden()[::-1])
+
+    def matte_of(self, catchers, margin):
+        """The same with shadow catchers, each a margin nearer than it is. catchers: a Surface of their depth.
+
+        Nothing behind a catcher is left, nor, where a mesh before it covers a pixel in part, what is between the two.
+        """
+        meshes = self.matte()
+        return Surface(np.minimum(catchers.depth - np.float32(margin), meshes.depth),
+                       opacity=np.where(catchers.depth < EMPTY_DEPTH, np.float32(1.0), meshes.opacity))
+
+    def light_before_catchers(self, before, whole):
+        """Leaves shadows to the splats at and behind catchers. before, whole [H,W,4]: composited colours of the splats
+        before the catchers, and of all; each pixel's light is shared as these are."""
+        # A pixel without splats has no share of either.
+        share = np.divide(before[..., :3], whole[..., :3], out=np.zeros_like(before[..., :3]),
+                          where=whole[..., :3] > 0)
+        share = np.clip(share, 0.0, 1.0)
+        self.light = share + (1.0 - share) * self.light
+
     def _hidden(self):
         """[H,W] how much meshes and holdouts hide: Cycles' alpha is that of what holdouts leave of meshes."""
         alpha = self.colour[..., 3]

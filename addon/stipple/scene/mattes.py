@@ -15,14 +15,22 @@ MOST_SAMPLES = 16_000_000
 LONGEST_SIDE = 65536  # of a native picture, pixels
 
 
-def gather(depsgraph, only_holdouts=False):
+def gather(depsgraph, wanted='ALL'):
     """[(native mesh, 4x4 object to world)] of all that has faces and that the camera sees.
 
     Each mesh is read once, however many instances it has. Left out, unless they are holdouts: shadow catchers, which
-    stand where splats are, and what the splats that show were made from. Errors: StippleError that names the object.
+    stand where splats are, and what the splats that show were made from. wanted: 'ALL'; 'HOLDOUTS', or the shadow
+    'CATCHERS', alone. Errors: StippleError that names the object.
     """
+    return [placed for _, _, placed in gather_owned(depsgraph, wanted)]
+
+
+def gather_owned(depsgraph, wanted='ALL', read_mesh=None):
+    """[(owner, object, placed)], placed as gather has it, with the original object, and the original one that it is
+    hidden with: itself or its instancer. read_mesh: gives the native mesh of an evaluated object, or None."""
     made_from = _sources_of_splats(depsgraph)
-    read, placed = {}, []
+    read_mesh = read_mesh or read
+    meshes_read, found = {}, []
     for entry in depsgraph.object_instances:
         evaluated = entry.object
         owner = entry.parent.original if entry.is_instance else evaluated.original
@@ -30,19 +38,25 @@ def gather(depsgraph, only_holdouts=False):
             continue
         if splat_data.is_splat_object(evaluated) or geometry.carries_splats(evaluated.data):
             continue
-        is_holdout = shown.holds_out(entry, depsgraph)
-        hides = is_holdout or not (only_holdouts or evaluated.is_shadow_catcher or owner in made_from)
-        if not hides or not shown.seen_by_camera(entry, depsgraph):
+        kind = 'OTHER'
+        if shown.holds_out(entry, depsgraph):
+            kind = 'HOLDOUTS'
+        elif evaluated.is_shadow_catcher or owner.is_shadow_catcher:
+            kind = 'CATCHERS'
+        elif owner in made_from:
+            continue
+        is_wanted = kind != 'CATCHERS' if wanted == 'ALL' else kind == wanted
+        if not is_wanted or not shown.seen_by_camera(entry, depsgraph):
             continue
         matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
         if placement.is_flat(matrix):
             continue
         key = evaluated.data.as_pointer()
-        if key not in read:
-            read[key] = _read(evaluated)
-        if read[key] is not None:
-            placed.append((read[key], matrix))
-    return placed
+        if key not in meshes_read:
+            meshes_read[key] = read_mesh(evaluated)
+        if meshes_read[key] is not None:
+            found.append((owner, evaluated.original, (meshes_read[key], matrix)))
+    return found
 
 
 def surface(placed, camera, wait):
@@ -58,11 +72,28 @@ def surface(placed, camera, wait):
         count = min(rows, height - first)
         task = native.start_depth(sources.context(), placed, cameras.finer_rows(camera, first, count, side))
         wait(task.job)
-        samples = task.depth.reshape(count, side, width, side)
-        depth[first:first + count] = _along_last(np.minimum, samples.min(axis=1))
-        hits = _along_last(np.add, (samples < EMPTY_DEPTH).sum(axis=1, dtype=np.uint8))
-        opacity[first:first + count] = hits / np.float32(side * side)
+        depth[first:first + count], opacity[first:first + count] = _folded(task.depth, side)
     return Surface(depth, opacity=opacity)
+
+
+def start_samples(placed, camera, side):
+    """Starts the samples, side x side of each pixel, of a small picture."""
+    return native.start_depth(sources.context(), placed, cameras.finer_rows(camera, 0, camera.height, side))
+
+
+def surface_of(samples, side):
+    """The Surface of finished samples."""
+    depth, opacity = _folded(samples.depth, side)
+    return Surface(depth, opacity=opacity)
+
+
+def _folded(samples, side):
+    """(nearest depth, share that is hit) of each pixel's side x side samples."""
+    height, width = samples.shape
+    samples = samples.reshape(height // side, side, width // side, side)
+    depth = _along_last(np.minimum, samples.min(axis=1))
+    hits = _along_last(np.add, (samples < EMPTY_DEPTH).sum(axis=1, dtype=np.uint8))
+    return depth, hits / np.float32(side * side)
 
 
 def _along_last(function, samples):
@@ -83,8 +114,8 @@ def _sources_of_splats(depsgraph):
     return found
 
 
-def _read(evaluated):
-    """The faces of an evaluated object, or None for none."""
+def read(evaluated):
+    """The native mesh of the faces of an evaluated object, or None for none."""
     temporary = evaluated.to_mesh()
     try:
         if temporary is None:

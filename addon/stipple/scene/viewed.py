@@ -164,6 +164,11 @@ def note_changes(depsgraph):
             _geometry_versions[name] = _geometry_versions.get(name, 0) + 1
 
 
+def geometry_version(original):
+    """A number that grows whenever the geometry of an object changes."""
+    return _geometry_versions.get(original.name_full, 0)
+
+
 @persistent
 def _changed(_scene, depsgraph=None):
     _state['version'] += 1
