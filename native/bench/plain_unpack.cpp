@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "base/parallel.h"
+#include "math/morton.h"
 
 namespace stipple::bench {
 
@@ -165,6 +166,20 @@ PlainBytes packCompressedPly(const SplatCloud& cloud, size_t file_bytes) {
     }
   });
   return file;
+}
+
+std::vector<std::pair<uint64_t, uint32_t>> sortPlainly(const SplatCloud& cloud) {
+  const auto [low, high] = std::minmax_element(cloud.positions.begin(), cloud.positions.end());
+  const float to_cells = 2097151.0f / std::max(*high - *low, 1e-30f);
+  std::vector<std::pair<uint64_t, uint32_t>> keys(cloud.size());
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    const auto cell = [&](size_t k) {
+      return static_cast<uint32_t>((cloud.positions[i * 3 + k] - *low) * to_cells);
+    };
+    keys[i] = {mortonEncode(cell(0), cell(1), cell(2)), static_cast<uint32_t>(i)};
+  }
+  std::sort(keys.begin(), keys.end());
+  return keys;
 }
 
 PlainArrays unpackSplat32(const PlainBytes& file) {

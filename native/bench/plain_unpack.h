@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "bench/plain_file.h"
 #include "data/splat_cloud.h"
@@ -22,6 +24,10 @@ struct PlainArrays {
 /// A compressed PLY of `count` splats as our writer lays it out, to arrays; and back.
 PlainArrays unpackCompressedPly(const PlainBytes& file, size_t count, int degree);
 PlainBytes packCompressedPly(const SplatCloud& cloud, size_t file_bytes);
+
+/// The splats along a curve through space, by std::sort on one thread: what the format's chunks
+/// want of a writer beside packing, as a chunk of splats from everywhere spans everything.
+std::vector<std::pair<uint64_t, uint32_t>> sortPlainly(const SplatCloud& cloud);
 
 /// Records of 32 bytes, to arrays; and back.
 PlainArrays unpackSplat32(const PlainBytes& file);

@@ -45,6 +45,11 @@ struct Delivery {
       return packed[part].data();
     }
     SplatCloud& cloud = clouds[part];
+    if (cloud.size() == 0) {
+      // All at once, on pages that all threads touch.
+      cloud.sh_degree = static_cast<int>(infos[part].sh_degree);
+      cloud.resize(static_cast<size_t>(infos[part].count));
+    }
     std::vector<float>* const arrays[] = {&cloud.positions, &cloud.rotations, &cloud.scales,
                                           &cloud.opacities, &cloud.sh};
     std::vector<float>& values = *arrays[(array - kMediaSplatPositions) % 5];
