@@ -32,9 +32,10 @@ void run(StippleJob& job, JobWork work) {
 
 }  // namespace
 
-StippleJob* startJob(Context context, JobWork work) {
+StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit) {
   auto job = std::make_unique<StippleJob>();
   job->context = std::move(context);
+  job->fit = std::move(fit);
   StippleJob* address = job.get();
   job->thread =
       std::thread([address, work = std::move(work)]() mutable { run(*address, std::move(work)); });

@@ -25,7 +25,10 @@ using JobResult = std::variant<std::monostate, ModelParts, std::shared_ptr<const
 /// all that it uses, apart from the caller's buffers.
 using JobWork = std::function<JobResult(Progress&)>;
 
-StippleJob* startJob(Context context, JobWork work);
+class FitSession;
+
+/// In: fit, for a job of fitting: what can be asked while it runs and after any end of it.
+StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit = nullptr);
 
 }  // namespace stipple::api
 
@@ -34,6 +37,7 @@ struct StippleJob {
 
   stipple::api::Context context;
   stipple::Progress progress;
+  std::shared_ptr<stipple::api::FitSession> fit;  ///< null of other jobs
   std::thread thread;
 
   mutable std::mutex mutex;  ///< of what follows

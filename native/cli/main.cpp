@@ -33,6 +33,7 @@ int run(int argc, char** argv) {
   addRender(app, context);
   addVoxelize(app, context);
   addMesh(app, context);
+  addFit(app, context);
   addCompare(app, context);
   try {
     app.parse(argc, argv);

@@ -65,14 +65,14 @@ double meanDistance(const PointSet& points, const Vec3d& place) {
 
 }  // namespace
 
-ViewSplit splitViews(const ViewSource& views, uint64_t every) {
+FitViews splitViews(const ViewSource& views, uint64_t every) {
   std::vector<std::string> names(views.count());
   for (size_t i = 0; i < names.size(); ++i) names[i] = views.name(i);
   std::vector<size_t> order(names.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return names[a] < names[b]; });
-  ViewSplit split;
+  FitViews split;
   const bool holds_out = every > 1 && order.size() >= every;
   for (size_t i = 0; i < order.size(); ++i) {
     (holds_out && i % every == 0 ? split.held_out : split.training).push_back(order[i]);

@@ -14,14 +14,14 @@
 namespace stipple {
 
 /// Which views a fit learns from, and which it is measured on.
-struct ViewSplit {
+struct FitViews {
   std::vector<size_t> training;  ///< ascending names
   std::vector<size_t> held_out;  ///< the same
 };
 
 /// Every `every`-th view by name is held out, the first one too, as published results do it.
 /// In: every: 0: none. Where there are fewer than `every` views, none is held out.
-ViewSplit splitViews(const ViewSource& views, uint64_t every);
+FitViews splitViews(const ViewSource& views, uint64_t every);
 
 /// 1.1 times the largest distance of a camera from the mean of all, metres: the unit of published
 /// learning rates of positions. Cameras of one place: their mean distance to the known points, and

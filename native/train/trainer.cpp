@@ -41,7 +41,7 @@ std::vector<size_t> someOf(const std::vector<size_t>& views, size_t count) {
   return some;
 }
 
-const std::vector<size_t>& viewsToMeasure(const ViewSplit& split) {
+const std::vector<size_t>& viewsToMeasure(const FitViews& split) {
   return split.held_out.empty() ? split.training : split.held_out;
 }
 
@@ -94,7 +94,7 @@ struct Trainer::Pace {
   }
 };
 
-Trainer::Trainer(std::shared_ptr<const ViewSource> views, ViewSplit split,
+Trainer::Trainer(std::shared_ptr<const ViewSource> views, FitViews split,
                  std::unique_ptr<FitModel> model, const TrainerOptions& options)
     : options_(options),
       pictures_(std::move(views), options.picture_bytes),

@@ -83,7 +83,7 @@ class Trainer {
  public:
   /// In: split: disjoint, of `views`; training: at least one view.
   /// Errors: kInvalidArgument for options out of range or no views.
-  Trainer(std::shared_ptr<const ViewSource> views, ViewSplit split, std::unique_ptr<FitModel> model,
+  Trainer(std::shared_ptr<const ViewSource> views, FitViews split, std::unique_ptr<FitModel> model,
           const TrainerOptions& options);
   ~Trainer();
 
@@ -121,7 +121,7 @@ class Trainer {
 
   TrainerOptions options_;
   PictureStore pictures_;
-  ViewSplit split_;
+  FitViews split_;
   std::vector<size_t> measured_;  ///< views, while it runs
   std::unique_ptr<FitModel> model_;
   double extent_;

@@ -154,6 +154,16 @@ FUNCTIONS = {
     'stipple_image_loss_options_init': (None, [_to(s.StippleImageLossOptions)]),
     'stipple_image_loss': (_status, [_handle, c_uint32, c_uint32, _floats, _floats, _floats,
                                      _to(s.StippleImageLossOptions), _to(s.StippleImageLoss), _floats]),
+    # fitting splats to views
+    'stipple_fit_options_init': (None, [_to(s.StippleFitOptions)]),
+    'stipple_fit_options_preset': (_status, [_to(s.StippleFitOptions), c_uint32, c_uint32]),
+    'stipple_fit_start': (_status, [_handle, _handle, _to(s.StippleFitOptions), _out_handle]),
+    'stipple_fit_memory_bound': (_status, [_handle, _to(s.StippleFitOptions), POINTER(c_uint64)]),
+    'stipple_fit_figures': (_status, [_handle, _to(s.StippleFitFigures)]),
+    'stipple_fit_note': (_status, [_handle, c_uint64, POINTER(c_char_p)]),
+    'stipple_fit_preview': (_status, [_handle, _out_handle]),
+    'stipple_fit_cloud': (_status, [_handle, c_uint64, _out_handle]),
+    'stipple_fit_report_save': (_status, [_handle, _path]),
     # volumes
     'stipple_voxelize_options_init': (None, [_to(s.StippleVoxelizeOptions)]),
     'stipple_voxelize_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleVoxelizeOptions),

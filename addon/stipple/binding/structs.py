@@ -134,6 +134,23 @@ class Transfer(IntEnum):
 
 
 # Each enumeration: the C type and what its values' names start with.
+class FitModel(IntEnum):
+    EXPLICIT = 0
+    FIELD = 1
+
+
+class FitQuality(IntEnum):
+    FAST = 0
+    BALANCED = 1
+    FINE_DETAIL = 2
+
+
+class FitBackground(IntEnum):
+    BLACK = 0
+    WHITE = 1
+    RANDOM = 2
+
+
 ENUMS = {
     'StippleStatus': (Status, 'STIPPLE_'),
     'StippleJobState': (JobState, 'STIPPLE_JOB_'),
@@ -152,6 +169,9 @@ ENUMS = {
     'StippleRenderMethod': (RenderMethod, 'STIPPLE_RENDER_'),
     'StippleSide': (Side, 'STIPPLE_SIDE_'),
     'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
+    'StippleFitModel': (FitModel, 'STIPPLE_FIT_'),
+    'StippleFitQuality': (FitQuality, 'STIPPLE_FIT_'),
+    'StippleFitBackground': (FitBackground, 'STIPPLE_FIT_BACKGROUND_'),
 }
 
 
@@ -408,6 +428,24 @@ class StippleImageLossOptions(_Sized):
 class StippleImageLoss(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('loss', c_double), ('l1', c_double),
                 ('ssim', c_double)]
+
+
+class StippleFitOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('model', c_uint32), ('strategy_utf8', c_char_p), ('iterations', c_uint64),
+                ('max_splats', c_uint64), ('start_splats', c_uint64), ('least_anchors', c_uint64),
+                ('most_anchors', c_uint64), ('gaussians_per_anchor', c_uint32), ('sh_degree', c_uint32),
+                ('antialias', c_uint32), ('background', c_uint32), ('density_gradient', c_uint32), ('jitter', c_uint32),
+                ('holdout', c_uint32), ('resume', c_uint32), ('seed', c_uint64), ('ssim_share', c_double),
+                ('picture_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
+                ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double)]
+
+
+class StippleFitFigures(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('measured_on_training', c_uint32), ('iteration', c_uint64),
+                ('iterations', c_uint64), ('splat_count', c_uint64), ('best_iteration', c_uint64), ('loss', c_double),
+                ('psnr', c_double), ('best_psnr', c_double), ('seconds', c_double), ('seconds_left', c_double),
+                ('estimated_seconds', c_double), ('estimated_bytes', c_uint64), ('note_count', c_uint64),
+                ('preview_iteration', c_uint64), ('stage', c_char * 64)]
 
 
 class StippleVoxelizeOptions(_Sized):

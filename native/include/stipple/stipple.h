@@ -1065,6 +1065,110 @@ StippleStatus stipple_image_loss(StippleContext* context, uint32_t width, uint32
                                  const StippleImageLossOptions* options, StippleImageLoss* value,
                                  float* gradient);
 
+/* ---- fitting splats to views --------------------------------------------------------------------- */
+
+typedef enum StippleFitModel {
+  STIPPLE_FIT_EXPLICIT = 0, /* splats with parameters of their own; a strategy adds and removes them */
+  STIPPLE_FIT_FIELD = 1     /* a learned density and a field of attributes: decodes at any budget */
+} StippleFitModel;
+
+typedef enum StippleFitQuality {
+  STIPPLE_FIT_FAST = 0,
+  STIPPLE_FIT_BALANCED = 1,
+  STIPPLE_FIT_FINE_DETAIL = 2
+} StippleFitQuality;
+
+/* What stands behind views with alpha. Views without stand before black, or white where that is chosen. */
+typedef enum StippleFitBackground {
+  STIPPLE_FIT_BACKGROUND_BLACK = 0,
+  STIPPLE_FIT_BACKGROUND_WHITE = 1,
+  STIPPLE_FIT_BACKGROUND_RANDOM = 2 /* another colour in every step: coverage shows whatever the colours */
+} StippleFitBackground;
+
+typedef struct StippleFitOptions {
+  uint32_t struct_size;
+  uint32_t model;              /* StippleFitModel, default explicit */
+  const char* strategy_utf8;   /* explicit: how splats are added and removed; NULL: "adaptive" */
+  uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
+  uint64_t max_splats;         /* explicit: hard cap, 1..2^28 */
+  uint64_t start_splats;       /* explicit; 0, the default: as many as points are known */
+  uint64_t least_anchors;      /* field: budgets of training, 1..STIPPLE_MAX_ANCHORS */
+  uint64_t most_anchors;
+  uint32_t gaussians_per_anchor; /* field: 4..32 */
+  uint32_t sh_degree;          /* 0..4; 0: colour does not depend on the view */
+  uint32_t antialias;          /* StippleAntialias that the splats are made for */
+  uint32_t background;         /* StippleFitBackground, default random */
+  uint32_t density_gradient;   /* field: 1, the default: anchors are learned by what they do to the loss */
+  uint32_t jitter;             /* field: 1, the default: anchors anywhere in their cell; 0: at its centre */
+  uint32_t holdout;            /* every so many-th view by name is measured and not learned from, default 8; 0:
+                                  none. Where views are fewer, none is. A split that the data set names wins */
+  uint32_t resume;             /* 1: goes on from checkpoint_path_utf8, which must be of the same views and
+                                  options */
+  uint64_t seed;
+  double ssim_share;           /* 0..1 of the loss beside L1, default 0.2 */
+  uint64_t picture_bytes;      /* of pictures kept in memory, default 1 GiB; others are loaded when wanted */
+  uint64_t measure_interval;   /* iterations between looks at held-out views; 0, the default: a twentieth of
+                                  the fit, at least 100 */
+  const char* checkpoint_path_utf8; /* NULL, the default: none are written */
+  uint64_t checkpoint_interval; /* iterations; 0, the default: by time alone */
+  double checkpoint_seconds;   /* default 60; 0: by iterations alone */
+} StippleFitOptions;
+void stipple_fit_options_init(StippleFitOptions* options);
+/* Sets model, iterations, counts, degree and antialias as a user's choice of quality asks for; the others stay.
+ * In: options->struct_size set. docs/methods/fitting.md has what each costs. */
+StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t model, uint32_t quality);
+
+typedef struct StippleFitFigures {
+  uint32_t struct_size;
+  uint32_t measured_on_training; /* 1: too few views to hold any out */
+  uint64_t iteration;          /* that is done */
+  uint64_t iterations;
+  uint64_t splat_count;        /* drawn in the last step */
+  uint64_t best_iteration;     /* of the result if the fit ended now; 0: not measured yet */
+  double loss;                 /* mean of the last 50 iterations */
+  double psnr;                 /* dB on measured views, last; NaN: not measured yet */
+  double best_psnr;
+  double seconds;              /* since the first step of this job */
+  double seconds_left;         /* at the pace of the last 50 iterations */
+  double estimated_seconds;    /* of the whole job, from its first 20 steps; 0 before */
+  uint64_t estimated_bytes;    /* the same, of memory */
+  uint64_t note_count;         /* of stipple_fit_note */
+  uint64_t preview_iteration;  /* of the newest preview; 0: none yet */
+  char stage[64];
+} StippleFitFigures;
+
+/* Fits splats to views, as a job. It reads the pictures of views as they are at the start.
+ * A cancel, and an error of a step or a picture, end the fit with the best that it had measured: the result can be
+ * read either way (stipple_fit_cloud). Checkpoints appear under their name when they are whole; a job that ends
+ * early leaves one. Where one cannot be written, that is a note and the fit goes on.
+ * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without pictures;
+ * MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
+ * transparent or masked out, cameras that see none of the points); those of reading pictures; with resume IO, FORMAT,
+ * UNSUPPORTED, and INVALID_ARGUMENT for a checkpoint of other options or views (says which).
+ * Threads and determinism: the same bits for any number of threads, any picture_bytes, and wherever it was
+ * stopped and resumed in between. docs/methods/fitting.md. */
+StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* views, const StippleFitOptions* options,
+                                StippleJob** job);
+/* Bytes that it allocates, about: pictures up to picture_bytes, the model at its largest, its best state and a
+ * checkpoint. */
+StippleStatus stipple_fit_memory_bound(const StippleViews* views, const StippleFitOptions* options,
+                                       uint64_t* bytes);
+/* Never waits. In: figures->struct_size set. */
+StippleStatus stipple_fit_figures(const StippleJob* job, StippleFitFigures* figures);
+/* One sentence on something that the user should know (a view that shows nothing, a checkpoint that could not be
+ * written). The text lives as long as the job. */
+StippleStatus stipple_fit_note(const StippleJob* job, uint64_t index, const char** text);
+/* The splats as they are now, for looking at while the job runs. Never waits: gives the newest copy, and asks the
+ * job for another after the step that it is at. Out: cloud, NULL where there is none yet. */
+StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud);
+/* The result of a job that has ended, however it ended: the state that did best on held-out views, decoded at a
+ * budget (anchors of a field; 0: the largest; explicit splats have one size). INVALID_ARGUMENT where no step was
+ * taken. */
+StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud);
+/* The story of a job that has ended: JSON at path_utf8, and its curves as SVG beside it, under the same name with
+ * the ending .svg. Errors: IO; INVALID_ARGUMENT where no step was taken. */
+StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_utf8);
+
 /* ---- volumes ----------------------------------------------------------------------------------- */
 
 typedef struct StippleVoxelizeOptions {

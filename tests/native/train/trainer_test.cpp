@@ -75,19 +75,19 @@ std::string messageOf(const std::function<void()>& call) {
   return "no error";
 }
 
-TEST(ViewSplit, HoldsOutEveryEighthByName) {
+TEST(FitViews, HoldsOutEveryEighthByName) {
   auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
   const auto source = colourViews(17, 0.5f, 0.5f, 0.5f);
   for (size_t v = 17; v-- > 0;) views->add(source->camera(v), source->load(v), source->name(v));
-  const ViewSplit split = splitViews(*views, 8);
+  const FitViews split = splitViews(*views, 8);
   // Added in falling order of names: view 16 has the first name.
   EXPECT_EQ(split.held_out, (std::vector<size_t>{16, 8, 0}));
   EXPECT_EQ(split.training.size(), 14u);
   EXPECT_EQ(split.training.front(), 15u);
 }
 
-TEST(ViewSplit, HoldsNothingOutOfFewViews) {
-  const ViewSplit split = splitViews(*colourViews(7, 0.5f, 0.5f, 0.5f), 8);
+TEST(FitViews, HoldsNothingOutOfFewViews) {
+  const FitViews split = splitViews(*colourViews(7, 0.5f, 0.5f, 0.5f), 8);
   EXPECT_TRUE(split.held_out.empty());
   EXPECT_EQ(split.training.size(), 7u);
   EXPECT_TRUE(splitViews(*colourViews(20, 0.5f, 0.5f, 0.5f), 0).held_out.empty());

@@ -1,0 +1,183 @@
+#include "api/fit.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "api/guard.h"
+#include "api/job.h"
+#include "base/parallel.h"
+#include "io/fit_report.h"
+
+using namespace stipple;
+using namespace stipple::api;
+
+namespace {
+
+/// What a user's choice of quality means.
+struct Preset {
+  uint64_t iterations;
+  uint64_t max_splats;
+  uint64_t most_anchors;
+};
+constexpr Preset kPresets[] = {
+    {500, 50000, 4096},     // fast
+    {2000, 150000, 8192},   // balanced
+    {7000, 500000, 16384},  // fine detail
+};
+constexpr int kDegreeOfExplicit = 3;
+
+StippleFitOptions completedOptions(const StippleFitOptions* options) {
+  StippleFitOptions defaults;
+  stipple_fit_options_init(&defaults);
+  return completed(options, defaults, "options");
+}
+
+std::shared_ptr<const ViewSource> sourceOf(const StippleViews& views) {
+  if (!views.source) {
+    fail(ErrorCode::kInvalidArgument,
+         "the views are cameras without pictures; fitting needs pictures");
+  }
+  return views.source;
+}
+
+/// What the data set says of its views; where it says nothing, every so many-th is held out.
+FitViews splitOf(const StippleViews& views, const ViewSource& source, uint64_t holdout) {
+  FitViews split;
+  for (size_t v = 0; v < views.notes.size(); ++v) {
+    const StippleViewSplit said = views.notes[v].split;
+    if (said == STIPPLE_VIEW_SPLIT_TEST) {
+      split.held_out.push_back(v);
+    } else if (said != STIPPLE_VIEW_SPLIT_VALIDATION) {
+      split.training.push_back(v);
+    }
+  }
+  const bool is_said = !split.held_out.empty() && !split.training.empty();
+  if (holdout == 0 || !is_said) return splitViews(source, holdout);
+  return split;
+}
+
+FitSession& sessionOf(const StippleJob* job) {
+  const StippleJob& given = require(job, "job");
+  if (!given.fit) fail(ErrorCode::kInvalidArgument, "this job does not fit splats to views");
+  return *given.fit;
+}
+
+std::string plotPathOf(const std::string& path) {
+  return std::filesystem::path(path).replace_extension(".svg").string();
+}
+
+}  // namespace
+
+extern "C" {
+
+void stipple_fit_options_init(StippleFitOptions* options) {
+  if (!options) return;
+  const TrainerOptions trainer;
+  const FieldModelOptions field;
+  *options = {};
+  options->struct_size = sizeof(StippleFitOptions);
+  options->background = STIPPLE_FIT_BACKGROUND_RANDOM;
+  options->density_gradient = field.density_gradient;
+  options->jitter = field.jitter;
+  options->holdout = 8;
+  options->ssim_share = trainer.ssim_share;
+  options->picture_bytes = trainer.picture_bytes;
+  options->checkpoint_seconds = 60;
+  stipple_fit_options_preset(options, STIPPLE_FIT_EXPLICIT, STIPPLE_FIT_BALANCED);
+}
+
+StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t model,
+                                         uint32_t quality) {
+  return guarded([&] {
+    const bool is_field = enumValue<StippleFitModel>(model, 1, "model") == STIPPLE_FIT_FIELD;
+    const Preset& preset =
+        kPresets[static_cast<uint32_t>(enumValue<StippleFitQuality>(quality, 2, "quality"))];
+    StippleFitOptions chosen = complete(options, "options");
+    const FieldModelOptions field;
+    chosen.model = model;
+    chosen.iterations = preset.iterations;
+    chosen.max_splats = preset.max_splats;
+    chosen.least_anchors = field.least_anchors;
+    chosen.most_anchors = preset.most_anchors;
+    chosen.gaussians_per_anchor = field.gaussians_per_anchor;
+    chosen.sh_degree = static_cast<uint32_t>(is_field ? field.sh_degree : kDegreeOfExplicit);
+    chosen.antialias = static_cast<uint32_t>(is_field ? field.antialias : Antialias::kClassic);
+    deliver(options, chosen, "options");
+  });
+}
+
+StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* views,
+                                const StippleFitOptions* options, StippleJob** job) {
+  return guarded([&] {
+    require(context, "context");
+    require(views, "views");
+    require(job, "job");
+    FitSettings settings = fitSettings(completedOptions(options));
+    const std::shared_ptr<const ViewSource> source = sourceOf(*views);
+    context->state->requireMemory(fitMemoryBound(settings, *source), "this fit");
+    FitViews split = splitOf(*views, *source, settings.holdout);
+    auto session = std::make_shared<FitSession>(source, std::move(split), std::move(settings));
+    *job = startJob(
+        context->state,
+        [session](Progress& progress) -> JobResult {
+          session->run(progress);
+          return {};
+        },
+        session);
+  });
+}
+
+StippleStatus stipple_fit_memory_bound(const StippleViews* views, const StippleFitOptions* options,
+                                       uint64_t* bytes) {
+  return guarded([&] {
+    require(views, "views");
+    require(bytes, "bytes") =
+        fitMemoryBound(fitSettings(completedOptions(options)), *sourceOf(*views));
+  });
+}
+
+StippleStatus stipple_fit_figures(const StippleJob* job, StippleFitFigures* figures) {
+  return guarded([&] { deliver(figures, sessionOf(job).figuresNow(), "figures"); });
+}
+
+StippleStatus stipple_fit_note(const StippleJob* job, uint64_t index, const char** text) {
+  return guarded([&] {
+    require(text, "text");
+    *text = sessionOf(job).noteAt(index);
+  });
+}
+
+StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud) {
+  return guarded([&] {
+    require(cloud, "cloud");
+    std::shared_ptr<const SplatCloud> newest = sessionOf(job).takePreview();
+    *cloud = newest ? new StippleCloud{job->context, std::move(newest)} : nullptr;
+  });
+}
+
+StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud) {
+  return guarded([&] {
+    require(cloud, "cloud");
+    Trainer& trainer = sessionOf(job).ended();
+    std::shared_ptr<const SplatCloud> made;
+    withThreads(job->context->thread_count,
+                [&] { made = std::make_shared<const SplatCloud>(trainer.model().splats(budget)); });
+    *cloud = new StippleCloud{job->context, std::move(made)};
+  });
+}
+
+StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_utf8) {
+  return guarded([&] {
+    const FitSession& session = sessionOf(job);
+    const std::string path = &require(path_utf8, "path_utf8");
+    const FitHistory& history = session.ended().history();
+    FitReportHead head;
+    head.model = session.ended().model().name();
+    if (!session.settings().is_field) head.strategy = session.settings().explicit_model.strategy;
+    head.settings_json = session.settingsJson();
+    writeFitReport(head, history, path);
+    writeFitPlots(history, plotPathOf(path));
+  });
+}
+
+}  // extern "C"

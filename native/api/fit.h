@@ -1,0 +1,88 @@
+#pragma once
+
+#include <stipple/stipple.h>
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "api/handles.h"
+#include "train/explicit_model.h"
+#include "train/field_model.h"
+#include "train/trainer.h"
+
+namespace stipple::api {
+
+/// StippleFitOptions as the library has them.
+struct FitSettings {
+  bool is_field = false;
+  ExplicitModelOptions explicit_model;
+  FieldModelOptions field_model;
+  TrainerOptions trainer;
+  uint64_t holdout = 8;
+  std::string checkpoint_path;  ///< empty: none
+  bool resumes = false;
+};
+
+/// Errors: kInvalidArgument, with the name of the option.
+FitSettings fitSettings(const StippleFitOptions& options);
+
+/// What a checkpoint must agree with: everything that the steps depend on.
+std::string settingsText(const FitSettings& settings, const ViewSource& views);
+/// Refuses texts that differ. In: path, of the checkpoint.
+void requireSameSettings(const std::string& stored, const std::string& wanted,
+                         const std::string& path);
+
+/// About what a fit allocates, bytes.
+uint64_t fitMemoryBound(const FitSettings& settings, const ViewSource& views);
+
+/// One fit: what its job works on, and what others ask of it meanwhile.
+class FitSession final : public FitObserver {
+ public:
+  FitSession(std::shared_ptr<const ViewSource> views, FitViews split, FitSettings settings);
+
+  /// The whole work, on the job's thread.
+  void run(Progress& progress);
+
+  StippleFitFigures figuresNow() const;
+  const char* noteAt(uint64_t index) const;
+  /// The newest preview, and a request for another.
+  std::shared_ptr<const SplatCloud> takePreview();
+
+  /// The trainer of a fit that has ended with something to show. Errors: kInvalidArgument.
+  Trainer& ended() const;
+  /// Of such a fit. May be called by several threads.
+  SplatCloud decode(uint64_t budget) const;
+  const FitSettings& settings() const { return settings_; }
+  const std::string& settingsJson() const { return settings_json_; }
+
+  void figures(const FitFigures& figures) override;
+  void note(const std::string& text) override;
+  bool wantsPreview() override;
+  void preview(SplatCloud cloud) override;
+  void save(const TensorTable& table) override;
+
+ private:
+  std::shared_ptr<const ViewSource> views_;
+  FitViews split_;
+  FitSettings settings_;
+  std::string settings_json_;
+  std::unique_ptr<Trainer> trainer_;
+
+  mutable std::mutex decode_mutex_;  ///< models decode one budget at a time
+  mutable std::mutex mutex_;         ///< of what follows
+  bool has_ended_ = false;
+  FitFigures figures_;
+  std::string stage_ = "Checking views";
+  std::deque<std::string> notes_;  ///< texts stay where they are
+  std::shared_ptr<const SplatCloud> preview_;
+  uint64_t preview_iteration_ = 0;
+  std::atomic<bool> preview_is_wanted_{false};
+};
+
+}  // namespace stipple::api

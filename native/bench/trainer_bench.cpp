@@ -1,0 +1,140 @@
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/parallel.h"
+#include "bench/comparison.h"
+#include "bench/splat_scene.h"
+#include "data/memory_view_source.h"
+#include "train/explicit_model.h"
+#include "train/trainer.h"
+
+namespace stipple::bench {
+namespace {
+
+constexpr SplatCase kCases[] = {
+    {"15k_256x464", 15000, 256, 464, 0, 1.0},
+    {"150k_800x800", 150000, 800, 800, 0, 1.0},
+};
+constexpr size_t kViews = 8;
+constexpr uint64_t kSteps = 24;
+constexpr int kRounds = 4;
+
+/// Pictures of the scene, with alpha, whose points are its splats.
+std::shared_ptr<const ViewSource> viewsOf(const SplatCase& c) {
+  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  const SplatCloud& cloud = cloudOf(c);
+  const SplatInstance instance{&cloud};
+  for (size_t v = 0; v < kViews; ++v) {
+    Camera camera = cameraOf(c);
+    camera.world_to_camera(0, 3) += 0.01 * static_cast<double>(v);
+    const RenderResult drawn = renderTiled({&instance, 1}, camera, {});
+    ViewPicture picture;
+    picture.width = c.width;
+    picture.height = c.height;
+    for (size_t i = 0; i < drawn.colour.size(); i += 4) {
+      for (size_t k = 0; k < 3; ++k) {
+        picture.colour.push_back(std::clamp(drawn.colour[i + k], 0.0f, 1.0f));
+      }
+      picture.alpha.push_back(drawn.colour[i + 3]);
+    }
+    views->add(camera, std::move(picture));
+  }
+  PointSet points;
+  points.positions = cloud.positions;
+  points.colours.assign(cloud.size() * 3, 0.5f);
+  points.opacities.assign(cloud.size(), 1.0f);
+  views->setPoints(std::move(points));
+  return views;
+}
+
+std::unique_ptr<FitModel> modelOf(const ViewSource& views, const FitViews& split) {
+  ExplicitModelOptions options;
+  options.sh_degree = 0;
+  return makeExplicitModel(views, split.training, options);
+}
+
+/// Ends a fit after kSteps.
+class Stop final : public FitObserver {
+ public:
+  explicit Stop(Progress& progress) : progress_(progress) {}
+  void figures(const FitFigures& figures) override {
+    if (figures.iteration >= kSteps) progress_.cancel();
+  }
+
+ private:
+  Progress& progress_;
+};
+
+/// Seconds of kSteps steps of a trainer, pictures and books included.
+double trainerSeconds(const std::shared_ptr<const ViewSource>& views) {
+  const FitViews split = splitViews(*views, 0);
+  TrainerOptions options;
+  options.iterations = 30000;
+  Trainer trainer(views, split, modelOf(*views, split), options);
+  Progress progress;
+  Stop stop(progress);
+  trainer.run(stop, &progress);
+  double sum = 0;
+  for (const FitRecord& r : trainer.history().records) {
+    sum += static_cast<double>(r.render_seconds + r.backward_seconds + r.field_seconds +
+                               r.optimiser_seconds + r.edit_seconds + r.other_seconds);
+  }
+  return sum;
+}
+
+/// The same steps by hand, with targets that are ready.
+double bareSeconds(const std::shared_ptr<const ViewSource>& views) {
+  const FitViews split = splitViews(*views, 0);
+  const auto model = modelOf(*views, split);
+  PictureStore pictures(views, UINT64_MAX);
+  std::vector<TargetPicture> targets(kViews);
+  const double black[3] = {0, 0, 0};
+  for (size_t v = 0; v < kViews; ++v) pictures.load(v, black, targets[v]);
+  FitMoment moment;
+  ViewOrder order(kViews, 0);
+  double sum = 0;
+  for (uint64_t i = 0; i < kSteps; ++i) {
+    moment.iteration = i + 1;
+    StepView view;
+    view.index = order.at(i);
+    view.camera = &views->camera(view.index);
+    view.target = targets[view.index].colour.data();
+    sum += secondsOf([&] { model->step(moment, view, nullptr, nullptr); });
+  }
+  return sum;
+}
+
+void steps(benchmark::State& state, const SplatCase& c) {
+  const auto views = viewsOf(c);
+  double ours = 1e300, bare = 1e300;
+  for (auto round : state) {
+    (void)round;
+    withThreads(2, [&] {
+      bare = std::min(bare, bareSeconds(views));
+      const double seconds = trainerSeconds(views);
+      ours = std::min(ours, seconds);
+      state.SetIterationTime(seconds);
+    });
+  }
+  state.counters["step_ms"] = 1e3 * ours / kSteps;
+  state.counters["reference_ms"] = 1e3 * bare / kSteps;
+  state.counters["ratio_bare_steps"] = bare / ours;
+  state.counters["target_bare_steps"] = 0.9;
+}
+
+const bool registered = [] {
+  for (const SplatCase& c : kCases) {
+    benchmark::RegisterBenchmark((std::string("trainer.step.") + c.name).c_str(), steps, c)
+        ->UseManualTime()
+        ->Iterations(kRounds)
+        ->Unit(benchmark::kMillisecond);
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace stipple::bench

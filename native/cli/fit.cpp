@@ -1,0 +1,322 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/formats.h"
+#include "cli/hierarchy.h"
+#include "cli/report.h"
+
+namespace stipple::cli {
+
+namespace {
+
+constexpr int kBarWidth = 24;
+constexpr auto kPollInterval = std::chrono::milliseconds(50);
+constexpr int64_t kMost = int64_t{1} << 40;
+
+struct Arguments {
+  std::string dataset, out, model = "explicit", quality = "balanced", background = "random", report;
+  std::string strategy;
+  std::optional<int64_t> gaussians, anchors, iterations, gaussians_per_anchor, sh_degree, budget;
+  int64_t downscale = 1;
+  int64_t holdout = 8;
+  int64_t checkpoint_every = 0;
+  uint64_t seed = 0;
+  double picture_mib = 1024;
+  bool resume = false, no_jitter = false, no_density_gradient = false;
+};
+
+/// Of one name in a list, its place.
+uint32_t placeOf(const std::string& name, std::initializer_list<const char*> names) {
+  uint32_t place = 0;
+  for (const char* each : names) {
+    if (name == each) return place;
+    ++place;
+  }
+  throw Failure("'" + name + "' is not known");  // CLI11 has checked it
+}
+
+/// Negative numbers must reach the message as they were typed.
+uint64_t counted(int64_t value, const char* name, int64_t first = 1) {
+  if (value < first || value > kMost) {
+    throw Failure(std::string(name) + " is " + std::to_string(value) + "; " +
+                  std::to_string(first) + " or more is allowed");
+  }
+  return static_cast<uint64_t>(value);
+}
+
+StippleFitOptions optionsOf(const Arguments& arguments, const std::string& checkpoint) {
+  StippleFitOptions options;
+  stipple_fit_options_init(&options);
+  const uint32_t model = placeOf(arguments.model, {"explicit", "field"});
+  check(stipple_fit_options_preset(&options, model,
+                                   placeOf(arguments.quality, {"fast", "balanced", "fine"})));
+  if (model == STIPPLE_FIT_EXPLICIT && (arguments.anchors || arguments.gaussians_per_anchor)) {
+    throw Failure(
+        "--anchors and --gaussians-per-anchor belong to --model field; explicit splats take "
+        "--gaussians");
+  }
+  if (model == STIPPLE_FIT_FIELD && (arguments.gaussians || !arguments.strategy.empty())) {
+    throw Failure("--gaussians and --strategy belong to --model explicit; a field takes --anchors");
+  }
+  if (arguments.gaussians) options.max_splats = counted(*arguments.gaussians, "--gaussians");
+  if (arguments.anchors) {
+    options.most_anchors = counted(*arguments.anchors, "--anchors");
+    options.least_anchors = std::min(options.least_anchors, options.most_anchors);
+  }
+  if (arguments.gaussians_per_anchor) {
+    options.gaussians_per_anchor = static_cast<uint32_t>(std::min<uint64_t>(
+        counted(*arguments.gaussians_per_anchor, "--gaussians-per-anchor"), UINT32_MAX));
+  }
+  if (arguments.iterations) options.iterations = counted(*arguments.iterations, "--iterations");
+  if (arguments.sh_degree) {
+    options.sh_degree = static_cast<uint32_t>(
+        std::min<uint64_t>(counted(*arguments.sh_degree, "--sh-degree", 0), UINT32_MAX));
+  }
+  if (!arguments.strategy.empty()) options.strategy_utf8 = arguments.strategy.c_str();
+  options.background = placeOf(arguments.background, {"black", "white", "random"});
+  options.holdout = static_cast<uint32_t>(
+      std::min<uint64_t>(counted(arguments.holdout, "--holdout", 0), UINT32_MAX));
+  options.jitter = !arguments.no_jitter;
+  options.density_gradient = !arguments.no_density_gradient;
+  options.seed = arguments.seed;
+  options.picture_bytes = static_cast<uint64_t>(std::max(0.0, arguments.picture_mib) * 0x1p20);
+  options.checkpoint_path_utf8 = checkpoint.c_str();
+  options.checkpoint_interval = counted(arguments.checkpoint_every, "--checkpoint-every", 0);
+  options.resume = arguments.resume;
+  return options;
+}
+
+Views openViews(const Context& context, const Arguments& arguments) {
+  StippleViewsOpenOptions options;
+  stipple_views_open_options_init(&options);
+  options.downscale = static_cast<uint32_t>(
+      std::min<uint64_t>(counted(arguments.downscale, "--downscale"), UINT32_MAX));
+  options.cache_bytes = 0;  // the fit keeps them
+  return make<Views>(stipple_views_open, context.get(), arguments.dataset.c_str(),
+                     const_cast<const StippleViewsOpenOptions*>(&options));
+}
+
+volatile std::sig_atomic_t g_interrupted = 0;
+
+void interrupt(int) {
+  g_interrupted = 1;
+}
+
+std::string timeText(double seconds) {
+  const auto whole = static_cast<long>(std::max(0.0, seconds) + 0.5);
+  char text[48];
+  if (whole >= 3600) {
+    std::snprintf(text, sizeof(text), "%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
+  } else {
+    std::snprintf(text, sizeof(text), "%ld:%02ld", whole / 60, whole % 60);
+  }
+  return text;
+}
+
+/// "Joint  1200 / 2000  loss 0.0312  PSNR 23.41 dB  14700 splats  1:23 left"
+std::string lineOf(const StippleFitFigures& figures) {
+  char text[200];
+  std::string line = figures.stage;
+  if (figures.iteration == 0) return line;
+  std::snprintf(text, sizeof(text), "  %llu / %llu  loss %.4f",
+                static_cast<unsigned long long>(figures.iteration),
+                static_cast<unsigned long long>(figures.iterations), figures.loss);
+  line += text;
+  if (std::isfinite(figures.psnr)) {
+    std::snprintf(text, sizeof(text), "  PSNR %.2f dB", figures.psnr);
+    line += text;
+  }
+  line += "  " + std::to_string(figures.splat_count) + " splats  " +
+          timeText(figures.seconds_left) + " left";
+  return line;
+}
+
+/// What the user sees of a fit that runs: a bar on a terminal, else now and then a line.
+class Watch {
+ public:
+  void show(const StippleFitFigures& figures) {
+    const double done = figures.iterations == 0 ? 0
+                                                : static_cast<double>(figures.iteration) /
+                                                      static_cast<double>(figures.iterations);
+    if (is_terminal_) {
+      const auto full = static_cast<size_t>(done * kBarWidth);
+      std::fprintf(stderr, "\r[%s%s] %s\033[K", std::string(full, '#').c_str(),
+                   std::string(kBarWidth - full, ' ').c_str(), lineOf(figures).c_str());
+      std::fflush(stderr);
+      is_drawn_ = true;
+      return;
+    }
+    const int tenth = static_cast<int>(done * 10);
+    if (tenth == tenth_ && stage_ == figures.stage) return;
+    tenth_ = tenth;
+    stage_ = figures.stage;
+    std::fprintf(stderr, "%s\n", lineOf(figures).c_str());
+  }
+  void clear() {
+    if (is_drawn_) std::fprintf(stderr, "\r\033[K");
+    is_drawn_ = false;
+  }
+
+ private:
+  bool is_terminal_ = isatty(STDERR_FILENO) != 0;
+  bool is_drawn_ = false;
+  int tenth_ = -1;
+  std::string stage_;
+};
+
+void printNotes(const Job& job, uint64_t& printed, uint64_t count) {
+  for (; printed < count; ++printed) {
+    const char* text = nullptr;
+    check(stipple_fit_note(job.get(), printed, &text));
+    std::fprintf(stderr, "stipple: note: %s\n", text);
+  }
+}
+
+/// Waits for the end. Ctrl-C ends the fit with its best. Returns: whether all steps were taken.
+bool watch(const Job& job) {
+  Watch watch;
+  auto progress = sized<StippleJobProgress>();
+  auto figures = sized<StippleFitFigures>();
+  uint64_t printed = 0;
+  const auto previous = std::signal(SIGINT, interrupt);
+  for (;;) {
+    check(stipple_job_poll(job.get(), &progress));
+    check(stipple_fit_figures(job.get(), &figures));
+    if (figures.note_count > printed) watch.clear();
+    printNotes(job, printed, figures.note_count);
+    if (progress.state != STIPPLE_JOB_RUNNING) break;
+    if (g_interrupted) check(stipple_job_cancel(job.get()));
+    watch.show(figures);
+    std::this_thread::sleep_for(kPollInterval);
+  }
+  std::signal(SIGINT, previous);
+  watch.clear();
+  const StippleStatus status = stipple_job_wait(job.get());
+  if (status == STIPPLE_ERROR_CANCELLED && figures.iteration > 0) return false;
+  check(status);
+  return true;
+}
+
+void save(const Context& context, const Job& job, const Arguments& arguments, uint32_t model) {
+  const uint64_t budget = arguments.budget ? counted(*arguments.budget, "--budget") : 0;
+  auto cloud = make<Cloud>(stipple_fit_cloud, job.get(), budget);
+  auto info = sized<StippleCloudInfo>();
+  check(stipple_cloud_info(cloud.get(), &info));
+  const bool is_asset = !hasSplatEnding(arguments.out);
+  if (model == STIPPLE_FIT_EXPLICIT && (is_asset || (budget > 0 && budget < info.count))) {
+    const Model tree = hierarchyOf(context, cloud, arguments.seed);
+    if (is_asset) {
+      check(stipple_model_save(tree.get(), arguments.out.c_str()));
+      return;
+    }
+    cloud = cutOf(tree, budget);
+  }
+  check(stipple_cloud_save(cloud.get(), arguments.out.c_str(), nullptr));
+}
+
+void fit(const Context& context, const Arguments& arguments) {
+  const bool is_asset = !hasSplatEnding(arguments.out);
+  if (is_asset && fileKind(arguments.out) != FileKind::kModel) {
+    throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
+                  " or .stipple.safetensors is expected");
+  }
+  const std::string checkpoint = arguments.out + ".checkpoint.safetensors";
+  const bool is_left = std::filesystem::exists(checkpoint);
+  if (is_left && !arguments.resume) {
+    throw Failure("'" + checkpoint +
+                  "' is left from a fit that was stopped; go on with --resume, or remove it");
+  }
+  if (!is_left && arguments.resume) {
+    throw Failure("--resume needs '" + checkpoint + "', which is not there");
+  }
+  const StippleFitOptions options = optionsOf(arguments, checkpoint);
+  const Views views = openViews(context, arguments);
+  const auto job =
+      make<Job>(stipple_fit_start, context.get(), const_cast<const StippleViews*>(views.get()),
+                const_cast<const StippleFitOptions*>(&options));
+  const bool is_whole = watch(job);
+  save(context, job, arguments, options.model);
+  if (!arguments.report.empty()) {
+    check(stipple_fit_report_save(job.get(), arguments.report.c_str()));
+  }
+  if (is_whole) std::filesystem::remove(checkpoint);
+  if (!is_whole) {
+    std::fprintf(stderr, "stipple: stopped; the best so far is in '%s', --resume goes on\n",
+                 arguments.out.c_str());
+  }
+  auto figures = sized<StippleFitFigures>();
+  check(stipple_fit_figures(job.get(), &figures));
+  Report report;
+  report.add("iterations", figures.iteration);
+  report.add("best_iteration", figures.best_iteration);
+  report.add(figures.measured_on_training ? "training_psnr" : "held_out_psnr", figures.best_psnr);
+  report.add("gaussians", figures.splat_count);
+  report.add("seconds", figures.seconds);
+  report.print(false);
+}
+
+}  // namespace
+
+void addFit(CLI::App& app, const Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  Arguments& to = *arguments;
+  CLI::App* command = app.add_subcommand("fit", "Splats from pictures with cameras");
+  command
+      ->add_option("dataset", to.dataset,
+                   "COLMAP folder, or transforms.json or its folder, with the pictures")
+      ->required();
+  command->add_option("out", to.out, "Splats (.ply and others), or a model (.stipple.safetensors)")
+      ->required();
+  command->add_option("--model", to.model, "explicit, or field (a learned density)")
+      ->check(CLI::IsMember({"explicit", "field"}))
+      ->capture_default_str();
+  command->add_option("--strategy", to.strategy, "Explicit: how splats are added and removed");
+  command->add_option("--quality", to.quality, "Sets iterations and counts")
+      ->check(CLI::IsMember({"fast", "balanced", "fine"}))
+      ->capture_default_str();
+  auto* gaussians =
+      command->add_option("--gaussians", to.gaussians, "Explicit: the most splats there may be");
+  command->add_option("--anchors", to.anchors, "Field: the largest budget that is trained")
+      ->excludes(gaussians);
+  command->add_option("--gaussians-per-anchor", to.gaussians_per_anchor, "Field: 4 to 32");
+  command->add_option("--iterations", to.iterations, "Steps, one view each");
+  command->add_option("--sh-degree", to.sh_degree, "0 (colour without view) to 4");
+  command->add_option("--downscale", to.downscale, "Pictures are made smaller by this factor")
+      ->capture_default_str();
+  command
+      ->add_option("--holdout", to.holdout,
+                   "Every so many-th picture is measured and not learned from; 0: none")
+      ->capture_default_str();
+  command->add_option("--background", to.background, "Behind transparent pictures")
+      ->check(CLI::IsMember({"black", "white", "random"}))
+      ->capture_default_str();
+  command->add_option("--budget", to.budget, "Splats (field: anchors) that go into a splat file");
+  command
+      ->add_option("--picture-memory", to.picture_mib,
+                   "MiB of pictures kept; others are read again whenever they are wanted")
+      ->capture_default_str();
+  command->add_option("--report", to.report,
+                      "JSON of the whole fit; curves go beside it with the ending .svg");
+  command
+      ->add_option("--checkpoint-every", to.checkpoint_every,
+                   "Saves what --resume needs after so many steps, beside once a minute")
+      ->capture_default_str();
+  command->add_flag("--resume", to.resume, "Goes on from where the same command was stopped");
+  command->add_flag("--no-jitter", to.no_jitter, "Field: anchors at the centres of their cells");
+  command->add_flag("--no-density-gradient", to.no_density_gradient,
+                    "Field: the density is not learned from the pictures");
+  command->add_option("--seed", to.seed)->capture_default_str();
+  command->callback([arguments, &context] { fit(context, *arguments); });
+}
+
+}  // namespace stipple::cli

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fitting through the binding: figures, a preview, the result, a report, a resumed fit."""
+
+import json
+import math
+import time
+
+import numpy as np
+import pytest
+
+from stipple.binding.errors import CancelledError, StippleError
+from stipple.binding.fit import Fit, fit_memory_bound, fit_options
+from stipple.binding.structs import ColourSpace, FitModel, FitQuality, StippleCamera, Transfer
+from stipple.binding.views import Views
+
+
+def camera(angle):
+    made = StippleCamera(width=32, height=24, fx=30, fy=30, cx=16, cy=12, near_plane=0.01, far_plane=100.0)
+    c, s = math.cos(angle), math.sin(angle)
+    matrix = (c, 0, s, 0, 0, -1, 0, 0, s, 0, -c, 3, 0, 0, 0, 1)
+    for i, value in enumerate(matrix):
+        made.world_to_camera[i] = value
+    return made
+
+
+@pytest.fixture
+def views(context):
+    """A red ball of radius 0.5 from ten sides."""
+    y, x = np.mgrid[0:24, 0:32] + 0.5
+    inside = ((x - 16) ** 2 + (y - 12) ** 2 < 5.0 ** 2).astype(np.float32)
+    rgba = np.stack((0.8 * inside, 0.1 * inside, 0.1 * inside, inside), axis=-1)
+    made = Views.create(context, ColourSpace.DISPLAY)
+    for i in range(10):
+        made.add(camera(2 * math.pi * i / 10), rgba, transfer=Transfer.SRGB, name=f'v{i}')
+    rng = np.random.default_rng(1)
+    points = rng.normal(size=(50, 3))
+    points *= 0.5 / np.linalg.norm(points, axis=1, keepdims=True)
+    made.set_points(points, np.full((50, 3), 0.5))
+    return made
+
+
+def options(context, **fields):
+    values = dict(iterations=60, max_splats=200, sh_degree=0, measure_interval=10)
+    return fit_options(context.library, **{**values, **fields})
+
+
+def test_fits_and_reports(context, views, tmp_path):
+    fit = Fit.start(context, views, options(context))
+    fit.wait()
+    figures = fit.figures()
+    assert figures.iteration == 60
+    assert figures.best_psnr > 15
+    cloud = fit.result()
+    assert 0 < cloud.info().count <= 200
+    fit.save_report(tmp_path / 'r.json')
+    report = json.loads((tmp_path / 'r.json').read_text())
+    assert len(report['by_iteration']['loss']) == 60
+    assert report['measured_views'] == 2
+    assert (tmp_path / 'r.svg').read_text().startswith('<svg ')
+    assert fit.notes() == []
+
+
+def test_a_cancel_keeps_the_best(context, views):
+    fit = Fit.start(context, views, options(context, iterations=1000000))
+    deadline = time.monotonic() + 60
+    preview = None
+    while preview is None and time.monotonic() < deadline:
+        preview = fit.preview()
+        time.sleep(0.002)
+    assert preview.info().count > 0
+    fit.cancel()
+    with pytest.raises(CancelledError):
+        fit.wait()
+    assert fit.result().info().count > 0
+
+
+def test_resumes_only_the_same_fit(context, views, tmp_path):
+    path = tmp_path / 'ä.checkpoint.safetensors'
+    Fit.start(context, views, options(context, checkpoint_path=path, checkpoint_interval=30)).wait()
+    assert path.is_file()
+    other = Fit.start(context, views, options(context, checkpoint_path=path, resume=1, iterations=61))
+    with pytest.raises(StippleError, match='iterations was 60; now it is 61'):
+        other.wait()
+
+
+def test_presets_grow_with_quality(context):
+    chosen = [fit_options(context.library, model, quality) for model in FitModel for quality in FitQuality]
+    assert [o.iterations for o in chosen[:3]] == sorted({o.iterations for o in chosen[:3]})
+    assert chosen[0].max_splats < chosen[2].max_splats
+    assert chosen[3].model == FitModel.FIELD
+    assert chosen[3].most_anchors < chosen[5].most_anchors
+
+
+def test_unknown_names_are_errors(context, views):
+    with pytest.raises(TypeError, match="no option 'iteration'"):
+        fit_options(context.library, iteration=3)
+    with pytest.raises(StippleError, match='adaptive'):
+        Fit.start(context, views, options(context, strategy='best')).wait()
+
+
+def test_memory_grows_with_the_cap(context, views):
+    small, large = (fit_memory_bound(views, options(context, max_splats=n)) for n in (1000, 100000))
+    assert large - small > 99000 * 4 * 14

@@ -1,0 +1,139 @@
+"""`stipple fit`: from pictures to splats and models, stopped, killed and resumed."""
+import json
+import math
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import conversion_table as conversions
+import pytest
+
+TOOL = Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
+FEW = ('--iterations', 60, '--gaussians', 300, '--sh-degree', 0)
+
+
+def run(*arguments, status=0):
+    result = subprocess.run([TOOL, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    assert result.returncode == status, (arguments, result.stdout, result.stderr)
+    return result
+
+
+def error(*arguments):
+    lines = run(*arguments, status=1).stderr.strip().splitlines()
+    assert lines[-1].startswith('stipple: '), lines
+    return lines[-1]
+
+
+def figures(text):
+    return dict(line.split(None, 1) for line in text.strip().splitlines())
+
+
+@pytest.fixture(scope='module')
+def dataset(tmp_path_factory):
+    """Twelve pictures of a cloud from a ring around it, as NeRF-synthetic has them."""
+    folder = tmp_path_factory.mktemp('dataset')
+    conversions.write_ply(folder / 'truth.ply', conversions.make_cloud(5), conversions.DEGREE)
+    low, high = (json.loads(run('info', folder / 'truth.ply', '--json').stdout)[f'bounds_{end}'] for end in ('min', 'max'))
+    middle = [(a + b) / 2 for a, b in zip(low, high)]
+    distance = 2 * max(b - a for a, b in zip(low, high))
+    frames = []
+    for i in range(12):
+        c, s = math.cos(math.tau * i / 12), math.sin(math.tau * i / 12)
+        eye = (middle[0] + distance * s, middle[1], middle[2] + distance * c)
+        frames.append({'file_path': f'images/{i:02}.png',
+                       'transform_matrix': [[c, 0, s, eye[0]], [0, 1, 0, eye[1]], [-s, 0, c, eye[2]], [0, 0, 0, 1]]})
+    (folder / 'images').mkdir()
+    (folder / 'transforms.json').write_text(json.dumps(
+        {'camera_angle_x': 0.7, 'w': 48, 'h': 36, 'fl_x': 66, 'fl_y': 66, 'cx': 24, 'cy': 18, 'frames': frames}))
+    for i in range(12):
+        run('render', folder / 'truth.ply', '--camera', folder / 'transforms.json', '--view', i, '--colour', 'display',
+            '-o', folder / 'images' / f'{i:02}.png')
+    return folder
+
+
+def test_fits_splats_and_reports(dataset, tmp_path):
+    result = run('fit', dataset, tmp_path / 'out.ply', *FEW, '--report', tmp_path / 'r.json')
+    seen = figures(result.stdout)
+    assert seen['iterations'] == '60'
+    assert float(seen['held_out_psnr']) > 12  # 3 dB above pictures of nothing
+    assert 0 < json.loads(run('info', tmp_path / 'out.ply', '--json').stdout)['count'] <= 300
+    report = json.loads((tmp_path / 'r.json').read_text())
+    assert report['settings']['max_splats'] == 300
+    assert len(report['by_iteration']['loss']) == 60
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['out.ply', 'r.json', 'r.svg']
+
+
+def test_a_model_decodes_at_any_budget(dataset, tmp_path):
+    model = tmp_path / 'm.stipple.safetensors'
+    run('fit', dataset, model, *FEW)
+    run('decode', model, tmp_path / 'few.ply', '--anchors', 20)
+    assert json.loads(run('info', tmp_path / 'few.ply', '--json').stdout)['count'] == 20
+    run('fit', dataset, tmp_path / 'cut.ply', *FEW, '--budget', 30)
+    assert json.loads(run('info', tmp_path / 'cut.ply', '--json').stdout)['count'] == 30
+
+
+def start(*arguments):
+    return subprocess.Popen([TOOL, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(path):
+    deadline = time.monotonic() + 60
+    while not path.exists() and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert path.exists()
+
+
+def test_a_killed_fit_resumes_bit_for_bit(dataset, tmp_path):
+    steps = ('--iterations', 300, '--gaussians', 300, '--sh-degree', 0)
+    run('fit', dataset, tmp_path / 'whole.ply', *steps)
+    out = tmp_path / 'out.ply'
+    checkpoint = tmp_path / 'out.ply.checkpoint.safetensors'
+    process = start('fit', dataset, out, *steps, '--checkpoint-every', 5)
+    wait_for(checkpoint)
+    process.kill()
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGKILL
+    assert not out.exists()
+    run('fit', dataset, out, *steps, '--resume')
+    assert out.read_bytes() == (tmp_path / 'whole.ply').read_bytes()
+    assert not checkpoint.exists()
+
+
+def test_ctrl_c_keeps_the_best(dataset, tmp_path):
+    out = tmp_path / 'out.ply'
+    checkpoint = tmp_path / 'out.ply.checkpoint.safetensors'
+    steps = ('--iterations', 100000, '--gaussians', 300, '--sh-degree', 0)
+    process = start('fit', dataset, out, *steps, '--checkpoint-every', 5)
+    wait_for(checkpoint)
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=60)
+    assert process.returncode == 0, stderr
+    assert '--resume goes on' in stderr
+    assert 5 <= int(figures(stdout)['iterations']) < 100000
+    assert json.loads(run('info', out, '--json').stdout)['count'] > 0
+    assert checkpoint.exists()
+    before = checkpoint.read_bytes()
+    assert 'go on with --resume' in error('fit', dataset, out, *steps)
+    assert 'iterations was 100000; now it is 50' in error('fit', dataset, out, '--iterations', 50, '--gaussians', 300,
+                                                          '--sh-degree', 0, '--resume')
+    assert checkpoint.read_bytes() == before
+
+
+@pytest.mark.parametrize('arguments, text', [
+    (('missing', 'out.ply'), 'missing'),
+    (('{dataset}', 'out.txt'), 'out.txt'),
+    (('{dataset}', 'out.ply', '--resume'), 'out.ply.checkpoint.safetensors'),
+    (('{dataset}', 'out.ply', '--strategy', 'best'), 'adaptive'),
+    (('{dataset}', 'out.ply', '--anchors', 100), '--model field'),
+    (('{dataset}', 'out.ply', '--model', 'field', '--gaussians', 100), '--model explicit'),
+    (('{dataset}', 'out.ply', '--iterations', 0), '--iterations is 0'),
+    (('{dataset}', 'out.ply', '--sh-degree', 5), 'sh_degree is 5'),
+    (('{dataset}', 'out.ply', '--downscale', 0), 'downscale'),
+])
+def test_one_line_says_what_is_wrong(dataset, tmp_path, arguments, text):
+    given = [str(a).replace('{dataset}', str(dataset)) for a in arguments]
+    given[1] = str(tmp_path / given[1])
+    assert text in error('fit', *given)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,335 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "fixtures.h"
+
+namespace stipple::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kViewCount = 12;
+
+/// Pictures of three splats from a ring of cameras, and where those splats are.
+class FitTest : public ApiTest {
+ protected:
+  void SetUp() override {
+    ApiTest::SetUp();
+    std::string pattern = (fs::temp_directory_path() / "stipple_fit_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    STIPPLE_ASSERT_OK(stipple_views_create(context_, STIPPLE_COLOUR_DISPLAY, &views_));
+    addViews(views_, 1.0f);
+    stipple_fit_options_init(&options_);
+    options_.iterations = 60;
+    options_.max_splats = 200;
+    options_.sh_degree = 0;
+    options_.measure_interval = 10;
+  }
+  void TearDown() override {
+    stipple_views_free(views_);
+    fs::remove_all(folder_);
+    ApiTest::TearDown();
+  }
+
+  StippleCloud* scene() {
+    const float positions[9] = {-0.3f, 0, 0, 0.3f, 0.1f, 0, 0, -0.2f, 0.3f};
+    const float rotations[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+    const float scales[9] = {0.15f, 0.15f, 0.15f, 0.2f, 0.1f, 0.1f, 0.1f, 0.1f, 0.2f};
+    const float opacities[3] = {0.9f, 0.8f, 0.95f};
+    const float sh[9] = {1.2f, -1, -1, -1, 1.2f, -1, -1, -1, 1.5f};
+    auto arrays = sized<StippleCloudArrays>();
+    arrays.count = 3;
+    arrays.positions = positions;
+    arrays.rotations = rotations;
+    arrays.scales = scales;
+    arrays.opacities = opacities;
+    arrays.sh = sh;
+    StippleCloud* cloud = nullptr;
+    STIPPLE_EXPECT_OK(stipple_cloud_create(context_, &arrays, &cloud));
+    return cloud;
+  }
+
+  /// In: brightness, a factor of all colours; 0 makes black pictures.
+  void addViews(StippleViews* views, float brightness) {
+    StippleCloud* cloud = scene();
+    StippleRenderOptions render_options;
+    stipple_render_options_init(&render_options);
+    render_options.output_colour = STIPPLE_OUTPUT_COMPOSITED;
+    for (int v = 0; v < kViewCount; ++v) {
+      const double angle = 2 * 3.141592653589793 * v / kViewCount;
+      StippleCamera camera = frontCamera();
+      const double c = std::cos(angle), s = std::sin(angle);
+      // The front camera, with the world turned about y.
+      const double matrix[16] = {c, 0, s, 0, 0, -1, 0, 0, s, 0, -c, 3, 0, 0, 0, 1};
+      std::copy(matrix, matrix + 16, camera.world_to_camera);
+      std::vector<float> rgba = render(context_, cloud, render_options, camera);
+      for (size_t i = 0; i < rgba.size(); ++i) {
+        if (brightness == 0) rgba[i] = i % 4 == 3 ? 1.0f : 0.0f;
+      }
+      auto picture = sized<StippleViewPicture>();
+      picture.transfer = STIPPLE_TRANSFER_SRGB;
+      picture.rgba = rgba.data();
+      const std::string name = std::to_string(100 + v);
+      STIPPLE_ASSERT_OK(stipple_views_add(views, &camera, &picture, name.c_str()));
+    }
+    stipple_cloud_free(cloud);
+    const float positions[9] = {-0.3f, 0, 0, 0.3f, 0.1f, 0, 0, -0.2f, 0.3f};
+    const float colours[9] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
+    auto points = sized<StippleViewPoints>();
+    points.count = 3;
+    points.positions = positions;
+    points.colours = colours;
+    STIPPLE_ASSERT_OK(stipple_views_set_points(views, &points));
+  }
+
+  std::string path(const char* name) const { return (folder_ / name).string(); }
+
+  StippleJob* start() {
+    StippleJob* job = nullptr;
+    STIPPLE_EXPECT_OK(stipple_fit_start(context_, views_, &options_, &job));
+    return job;
+  }
+
+  static StippleFitFigures figuresOf(const StippleJob* job) {
+    auto figures = sized<StippleFitFigures>();
+    STIPPLE_EXPECT_OK(stipple_fit_figures(job, &figures));
+    return figures;
+  }
+
+  /// Every number of the result.
+  std::vector<float> result(const StippleJob* job) {
+    StippleCloud* cloud = nullptr;
+    STIPPLE_EXPECT_OK(stipple_fit_cloud(job, 0, &cloud));
+    auto info = sized<StippleCloudInfo>();
+    STIPPLE_EXPECT_OK(stipple_cloud_info(cloud, &info));
+    const uint64_t n = info.count;
+    std::vector<float> all(n * (3 + 4 + 3 + 1 + 3));
+    auto buffers = sized<StippleCloudBuffers>();
+    buffers.capacity = n;
+    buffers.positions = all.data();
+    buffers.rotations = buffers.positions + 3 * n;
+    buffers.scales = buffers.rotations + 4 * n;
+    buffers.opacities = buffers.scales + 3 * n;
+    buffers.sh = buffers.opacities + n;
+    STIPPLE_EXPECT_OK(stipple_cloud_read(cloud, &buffers));
+    stipple_cloud_free(cloud);
+    return all;
+  }
+
+  static void waitForIteration(const StippleJob* job, uint64_t iteration) {
+    for (int i = 0; i < 20000 && figuresOf(job).iteration < iteration; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+
+  static void expectRefused(StippleStatus seen, StippleStatus wanted, const char* text) {
+    EXPECT_EQ(seen, wanted);
+    EXPECT_NE(std::string(stipple_last_error_message()).find(text), std::string::npos)
+        << stipple_last_error_message();
+  }
+
+  fs::path folder_;
+  StippleViews* views_ = nullptr;
+  StippleFitOptions options_;
+};
+
+TEST_F(FitTest, FitsPicturesAndReports) {
+  StippleJob* job = start();
+  STIPPLE_ASSERT_OK(stipple_job_wait(job));
+  const StippleFitFigures figures = figuresOf(job);
+  EXPECT_EQ(figures.iteration, 60u);
+  EXPECT_EQ(figures.measured_on_training, 0u);
+  EXPECT_GT(figures.best_psnr, 15);
+  EXPECT_GT(figures.best_iteration, 0u);
+  EXPECT_GT(figures.estimated_seconds, 0);
+  EXPECT_GT(figures.estimated_bytes, 0u);
+  EXPECT_FALSE(result(job).empty());
+  STIPPLE_ASSERT_OK(stipple_fit_report_save(job, path("r.json").c_str()));
+  std::ifstream json(path("r.json")), svg(path("r.svg"));
+  const std::string text((std::istreambuf_iterator<char>(json)), {});
+  EXPECT_NE(text.find("\"strategy\": \"adaptive\""), std::string::npos);
+  EXPECT_NE(text.find("\"iterations\": 60"), std::string::npos);
+  EXPECT_TRUE(svg.good());
+  StippleModel* model = nullptr;
+  EXPECT_EQ(stipple_job_model(job, &model), STIPPLE_ERROR_INVALID_ARGUMENT);
+  stipple_job_free(job);
+}
+
+TEST_F(FitTest, ACancelKeepsTheBestAndAPreviewIsThere) {
+  options_.iterations = 1000000;
+  StippleJob* job = start();
+  StippleCloud* preview = nullptr;
+  for (int i = 0; i < 20000 && !preview; ++i) {
+    STIPPLE_ASSERT_OK(stipple_fit_preview(job, &preview));
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ASSERT_NE(preview, nullptr);
+  EXPECT_GT(figuresOf(job).preview_iteration, 0u);
+  stipple_cloud_free(preview);
+  waitForIteration(job, 15);
+  STIPPLE_ASSERT_OK(stipple_job_cancel(job));
+  EXPECT_EQ(stipple_job_wait(job), STIPPLE_ERROR_CANCELLED);
+  EXPECT_GT(figuresOf(job).best_psnr, 5);
+  EXPECT_FALSE(result(job).empty());
+  STIPPLE_EXPECT_OK(stipple_fit_report_save(job, path("r.json").c_str()));
+  stipple_job_free(job);
+}
+
+TEST_F(FitTest, ResumesBitForBit) {
+  options_.iterations = 40;
+  StippleJob* whole = start();
+  STIPPLE_ASSERT_OK(stipple_job_wait(whole));
+  const std::vector<float> wanted = result(whole);
+  stipple_job_free(whole);
+
+  const std::string checkpoint = path("a.checkpoint.safetensors");
+  options_.checkpoint_path_utf8 = checkpoint.c_str();
+  options_.checkpoint_interval = 20;
+  StippleJob* first = start();
+  waitForIteration(first, 20);
+  stipple_job_free(first);  // cancels, and saves where it stood
+  ASSERT_TRUE(fs::exists(checkpoint));
+  options_.resume = 1;
+  StippleJob* second = start();
+  STIPPLE_ASSERT_OK(stipple_job_wait(second));
+  EXPECT_EQ(result(second), wanted);
+  stipple_job_free(second);
+
+  options_.seed = 5;
+  StippleJob* other = start();
+  expectRefused(stipple_job_wait(other), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "a fit whose seed was 0; now it is 5");
+  stipple_job_free(other);
+  options_.seed = 0;
+  fs::resize_file(checkpoint, fs::file_size(checkpoint) / 2);
+  other = start();
+  expectRefused(stipple_job_wait(other), STIPPLE_ERROR_FORMAT, "a.checkpoint.safetensors");
+  stipple_job_free(other);
+  fs::remove(checkpoint);
+  other = start();
+  expectRefused(stipple_job_wait(other), STIPPLE_ERROR_IO, "a.checkpoint.safetensors");
+  StippleCloud* cloud = nullptr;
+  expectRefused(stipple_fit_cloud(other, 0, &cloud), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "the fit has no result");
+  stipple_job_free(other);
+}
+
+TEST_F(FitTest, ACheckpointThatCannotBeWrittenIsANote) {
+  const std::string checkpoint = path("missing/a.checkpoint.safetensors");
+  options_.iterations = 20;
+  options_.checkpoint_path_utf8 = checkpoint.c_str();
+  options_.checkpoint_interval = 5;
+  StippleJob* job = start();
+  STIPPLE_ASSERT_OK(stipple_job_wait(job));
+  ASSERT_EQ(figuresOf(job).note_count, 1u);
+  const char* text = nullptr;
+  STIPPLE_ASSERT_OK(stipple_fit_note(job, 0, &text));
+  EXPECT_NE(std::strstr(text, "the checkpoint is not saved: "), nullptr) << text;
+  expectRefused(stipple_fit_note(job, 1, &text), STIPPLE_ERROR_INVALID_ARGUMENT, "there are 1");
+  EXPECT_FALSE(result(job).empty());
+  stipple_job_free(job);
+}
+
+TEST_F(FitTest, GivesTheSameBitsForAnyThreads) {
+  options_.iterations = 20;
+  std::vector<float> results[2];
+  for (uint32_t threads = 1; threads <= 2; ++threads) {
+    StippleContext* context = withThreadCount(threads);
+    StippleJob* job = nullptr;
+    STIPPLE_ASSERT_OK(stipple_fit_start(context, views_, &options_, &job));
+    STIPPLE_ASSERT_OK(stipple_job_wait(job));
+    results[threads - 1] = result(job);
+    stipple_job_free(job);
+    stipple_context_free(context);
+  }
+  EXPECT_EQ(results[0], results[1]);
+}
+
+TEST_F(FitTest, RefusesViewsThatNothingCanBeLearnedFrom) {
+  StippleViews* none = nullptr;
+  STIPPLE_ASSERT_OK(stipple_views_create(context_, STIPPLE_COLOUR_DISPLAY, &none));
+  StippleJob* job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_fit_start(context_, none, &options_, &job));
+  expectRefused(stipple_job_wait(job), STIPPLE_ERROR_INVALID_ARGUMENT, "there are no views");
+  stipple_job_free(job);
+  stipple_views_free(none);
+
+  StippleViews* black = nullptr;
+  STIPPLE_ASSERT_OK(stipple_views_create(context_, STIPPLE_COLOUR_DISPLAY, &black));
+  addViews(black, 0);
+  STIPPLE_ASSERT_OK(stipple_fit_start(context_, black, &options_, &job));
+  expectRefused(stipple_job_wait(job), STIPPLE_ERROR_INVALID_ARGUMENT, "black everywhere");
+  stipple_job_free(job);
+  stipple_views_free(black);
+}
+
+TEST_F(FitTest, RefusesOptionsOutOfRange) {
+  const auto refused = [&](const char* text) {
+    StippleJob* job = nullptr;
+    expectRefused(stipple_fit_start(context_, views_, &options_, &job),
+                  STIPPLE_ERROR_INVALID_ARGUMENT, text);
+    EXPECT_EQ(job, nullptr);
+    stipple_fit_options_init(&options_);
+  };
+  options_.iterations = 0;
+  refused("options->iterations is 0; 1 to 10000000 is allowed");
+  options_.model = 2;
+  refused("options->model is 2");
+  options_.max_splats = 0;
+  refused("options->max_splats is 0");
+  options_.sh_degree = 5;
+  refused("options->sh_degree is 5");
+  options_.ssim_share = std::nan("");
+  refused("options->ssim_share is");
+  options_.background = 3;
+  refused("options->background is 3");
+  options_.checkpoint_seconds = -1;
+  refused("options->checkpoint_seconds is -1");
+  options_.resume = 1;
+  refused("checkpoint_path_utf8 is NULL");
+  options_.model = STIPPLE_FIT_FIELD;
+  options_.least_anchors = 9000;
+  refused("options->most_anchors is");
+  options_.model = STIPPLE_FIT_FIELD;
+  options_.gaussians_per_anchor = 3;
+  refused("options->gaussians_per_anchor is 3; 4 to 32 is allowed");
+  expectRefused(stipple_fit_options_preset(&options_, 0, 3), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "quality is 3");
+}
+
+TEST_F(FitTest, RefusesMoreMemoryThanItsLimit) {
+  uint64_t bytes = 0;
+  STIPPLE_ASSERT_OK(stipple_fit_memory_bound(views_, &options_, &bytes));
+  EXPECT_GT(bytes, 12u * 64 * 48 * 4);
+  StippleContextOptions limited;
+  stipple_context_options_init(&limited);
+  limited.memory_limit_bytes = bytes - 1;
+  StippleContext* context = nullptr;
+  STIPPLE_ASSERT_OK(stipple_context_create(&limited, &context));
+  StippleJob* job = nullptr;
+  expectRefused(stipple_fit_start(context, views_, &options_, &job), STIPPLE_ERROR_MEMORY_LIMIT,
+                "this fit would need up to");
+  stipple_context_free(context);
+}
+
+TEST_F(FitTest, OtherJobsHaveNoFigures) {
+  StippleJob* job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_cloud_load_start(context_, path("none.ply").c_str(), &job));
+  auto figures = sized<StippleFitFigures>();
+  expectRefused(stipple_fit_figures(job, &figures), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "this job does not fit splats to views");
+  stipple_job_free(job);
+}
+
+}  // namespace
+}  // namespace stipple::test
