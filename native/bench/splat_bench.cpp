@@ -28,8 +28,9 @@ constexpr SplatCase kCases[] = {
 constexpr int kRepeats = 5;
 
 void draw(const SplatCase& c, TileKernel kernel, unsigned threads,
-          const RenderOptions& options = {}) {
+          const RenderOptions& options = {}, bool holdout = false) {
   SplatInstance instance{&cloudOf(c)};
+  instance.holdout = holdout;
   instance.values_are_checked = true;  // as every cloud handle is drawn, once it has been read
   withThreads(threads, [&] {
     // As a renderer keeps them from one picture to the next.
@@ -158,6 +159,16 @@ void withSurface(benchmark::State& state, const SplatCase& c) {
   state.counters["matte_ms"] = 1e3 * matte_seconds;
 }
 
+/// The splats as a holdout against the same splats as they are: tiles are blended twice, nothing
+/// else is done again.
+void asHoldout(benchmark::State& state, const SplatCase& c) {
+  const TileKernel kernel = chosenTileKernel();
+  draw(c, kernel, 2);
+  compare(
+      state, "holdout_to_shown", 0.5, [&] { draw(c, kernel, 2, {}, true); },
+      [&] { draw(c, kernel, 2); });
+}
+
 void add(const std::string& name, void (*run)(benchmark::State&, const SplatCase&),
          const SplatCase& c, int iterations) {
   benchmark::RegisterBenchmark(name.c_str(), run, c)
@@ -173,6 +184,7 @@ const bool registered = [] {
     add(std::string("splat.forward_avx2_") + c.name, againstNarrow, c, 2);
     add(std::string("splat.forward_scalar_") + c.name, againstScalar, c, 2);
     add(std::string("splat.surface_") + c.name, withSurface, c, kRepeats);
+    add(std::string("splat.holdout_") + c.name, asHoldout, c, kRepeats);
   }
   return true;
 }();
