@@ -16,6 +16,9 @@ namespace {
 
 constexpr size_t kGrain = 256;
 constexpr int kMaxGridLevel = 12;
+/// A level whose cells are as large as a footprint counts two thirds, one of a quarter of that a
+/// fifth.
+constexpr float kFade = 1.25f;
 
 uint64_t cornerCount(int level) {
   const uint64_t side = (uint64_t{1} << level) + 1;
@@ -74,7 +77,7 @@ Corners cornersOf(const FeatureLevel& level, bool hashed, const float* position)
 /// How much a level counts at a place.
 float levelWeight(const FeatureLevel& level, float footprint) {
   const float cell = 1.0f / static_cast<float>(uint32_t{1} << level.level);
-  return std::erf(cell / (1.41421356f * footprint));
+  return cell / std::sqrt(cell * cell + kFade * footprint * footprint);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ struct FeatureGradient {
 struct FeaturePlaces {
   std::span<const float> positions;  ///< [N,3] in the unit cube; held to it
   /// [N] > 0, side of what a place stands for, unit cube: levels that are finer than that count
-  /// less, by erf(cell / (sqrt 2 footprint)), as they would only add noise.
+  /// less, by 1 / sqrt(1 + 1.25 (footprint / cell)^2), as they would only add noise.
   std::span<const float> footprints;
 
   size_t size() const { return footprints.size(); }

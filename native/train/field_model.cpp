@@ -35,8 +35,8 @@ constexpr double kStructureEnd = 0.01;
 constexpr double kAttributesEnd = 0.3;
 constexpr uint64_t kMostStructureSteps = 20;
 
-constexpr double kNetworkRate = 5e-3;
-constexpr double kGridRate = 1e-2;
+constexpr double kNetworkRate = 8e-3;
+constexpr double kGridRate = 1.5e-2;
 constexpr double kLogitRate = 1e-2;
 constexpr double kStructureRate = 2e-2;
 constexpr double kLastRate = 0.02;

@@ -1,0 +1,147 @@
+// Whole iterations of a fit of a field, with the density gradient, split by what they do: against
+// the passes of as many explicit splats, and against a field over a far larger octree.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/random.h"
+#include "bench/comparison.h"
+#include "data/memory_view_source.h"
+#include "splat/render.h"
+#include "train/field_model.h"
+#include "train/render_backend.h"
+
+namespace stipple::bench {
+namespace {
+
+struct FieldCase {
+  const char* name;
+  uint64_t anchors;
+  uint32_t size;  ///< pixels a side
+};
+constexpr FieldCase kCases[] = {{"2k_256x256", 2048, 256}, {"8k_512x512", 8192, 512}};
+constexpr uint32_t kGaussians = 8;
+constexpr int kSteps = 10;
+
+/// Points of a ball, as many as make an octree of some size, and one picture of another colour.
+class BallViews {
+ public:
+  BallViews(size_t points, uint32_t size) : views_(ColourSpace::kDisplay) {
+    PointSet set;
+    for (size_t i = 0; i < points; ++i) {
+      double p[3];
+      double length = 0;
+      for (size_t a = 0; a < 3; ++a) {
+        p[a] = unitDouble(keyedBits(1, RandomUse::kFieldStart, 3 * i + a)) - 0.5;
+        length += p[a] * p[a];
+      }
+      for (const double value : p) {
+        set.positions.push_back(static_cast<float>(value / std::sqrt(length)));
+      }
+      set.opacities.push_back(1.0f);
+      set.colours.insert(set.colours.end(), 3, 0.5f);
+    }
+    views_.setPoints(set);
+    Camera camera;
+    camera.width = camera.height = size;
+    camera.fx = camera.fy = size;
+    camera.cx = camera.cy = 0.5 * size;
+    camera.world_to_camera(2, 3) = 3.0;
+    ViewPicture picture;
+    picture.width = picture.height = size;
+    picture.colour.assign(size_t{3} * size * size, 0.3f);
+    views_.add(camera, picture);
+  }
+
+  std::unique_ptr<FitModel> model(const FieldCase& c, int leaf_level) const {
+    FieldModelOptions options;
+    options.least_anchors = options.most_anchors = c.anchors;
+    options.gaussians_per_anchor = kGaussians;
+    options.leaf_level = leaf_level;
+    const std::vector<size_t> training = {0};
+    return makeFieldModel(views_, training, options);
+  }
+
+  StepReport step(FitModel& model, uint64_t iteration) const {
+    FitMoment moment;
+    moment.iteration = iteration;
+    moment.iterations = 2 * iteration;  // so always in the stage that does most
+    StepView view;
+    view.camera = &views_.camera(0);
+    view.target = views_.picture(0).colour.data();
+    return model.step(moment, view, nullptr, nullptr);
+  }
+
+  const MemoryViewSource& views() const { return views_; }
+
+ private:
+  MemoryViewSource views_;
+};
+
+void steps(benchmark::State& state, const FieldCase& c) {
+  const BallViews few(20000, c.size), many(600000, c.size);
+  const auto small = few.model(c, 7), large = many.model(c, 9);
+  // The passes of explicit splats that look the same.
+  const auto backend = makeCpuBackend();
+  backend->upload(small->splats(c.anchors));
+  RenderOptions options;
+  options.with_depth = false;
+  const auto passes = [&] {
+    backend->forward(few.views().camera(0), options);
+    backend->loss(few.views().picture(0).colour, {});
+    StatisticRequest request;
+    request.contributions = true;
+    backend->backward(request);
+    StepOptions step;
+    step.learning_rates.fill(1e-9);
+    backend->step(step);
+  };
+  uint64_t iteration = 1000;
+  StepSeconds least;
+  double best = 1e300, best_large = 1e300, best_passes = 1e300;
+  few.step(*small, iteration);
+  many.step(*large, iteration);
+  passes();
+  for (auto step : state) {
+    (void)step;
+    ++iteration;
+    StepReport report;
+    const double seconds = secondsOf([&] { report = few.step(*small, iteration); });
+    state.SetIterationTime(seconds);
+    if (seconds < best) least = report.seconds;
+    best = std::min(best, seconds);
+    best_large = std::min(best_large, secondsOf([&] { many.step(*large, iteration); }));
+    best_passes = std::min(best_passes, secondsOf(passes));
+  }
+  state.counters["step_ms"] = 1e3 * best;
+  state.counters["render_ms"] = 1e3 * least.render;
+  state.counters["backward_ms"] = 1e3 * least.backward;
+  state.counters["field_ms"] = 1e3 * least.field;
+  state.counters["optimiser_ms"] = 1e3 * least.optimiser;
+  state.counters["edit_ms"] = 1e3 * least.edit;
+  state.counters["large_octree_ms"] = 1e3 * best_large;
+  state.counters["passes_ms"] = 1e3 * best_passes;
+  // Thirty times as many points in cells of a quarter of the side: colder memory and two levels
+  // more, but not thirty times the work.
+  state.counters["ratio_large_octree"] = best / best_large;
+  state.counters["target_large_octree"] = 0.5;
+  state.counters["ratio_explicit_passes"] = best_passes / best;
+  state.counters["target_explicit_passes"] = 0.25;
+}
+
+const bool registered = [] {
+  for (const FieldCase& c : kCases) {
+    benchmark::RegisterBenchmark((std::string("train.step.field.") + c.name).c_str(), steps, c)
+        ->UseManualTime()
+        ->Iterations(kSteps)
+        ->Unit(benchmark::kMillisecond);
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace stipple::bench
