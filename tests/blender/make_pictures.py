@@ -7,20 +7,28 @@
 Not a test of the suite: its name keeps it out.
 """
 
+import json
 from pathlib import Path
 
 import bpy
 import numpy as np
+import pytest
 
 import picture_steps
 import screen
+import tour_steps
 
 IMAGES = Path(__file__).resolve().parent.parent.parent / 'docs' / 'images'
 
 
-def test_pictures_of_windows(tmp_path):
-    shots, _ = screen.run_steps(Path(picture_steps.__file__), tmp_path, bpy.app.binary_path)
+@pytest.mark.parametrize('steps,size', ((picture_steps, (screen.WIDTH, screen.HEIGHT)), (tour_steps, (1600, 1300))))
+def test_pictures_of_windows(tmp_path, steps, size):
+    shots, _ = screen.run_steps(Path(steps.__file__), tmp_path, bpy.app.binary_path, size=size)
     for name, shot in shots.items():
+        part = tmp_path / f'{name}.json'
+        if part.exists():
+            x, y, width, height = json.loads(part.read_text())
+            shot = shot[len(shot) - y - height:len(shot) - y, x:x + width]
         height, width = shot.shape[:2]
         pixels = np.ones((height, width, 4), np.float32)
         pixels[..., :3] = shot[::-1] / 255
