@@ -93,7 +93,8 @@ TrainingState takeTrainingState(const TensorTable& table, const RawSplats& like)
   requireCount(state.first_moments, "first moments");
   requireCount(state.second_moments, "second moments");
   if (state.kept_gradients.size() > 0) requireCount(state.kept_gradients, "kept gradients");
-  const std::vector<uint64_t>& step = valuesOf<uint64_t>(table, "adam.step");
+  const std::string name = "adam.step";  // GCC 14 warns of a reference made with a temporary
+  const std::vector<uint64_t>& step = valuesOf<uint64_t>(table, name);
   if (step.size() != 1) {
     fail(ErrorCode::kFormat, "'adam.step' of the checkpoint holds " + std::to_string(step.size()) +
                                  " values; 1 is needed");
