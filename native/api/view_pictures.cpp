@@ -115,7 +115,7 @@ StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
       note.name = dataset->name(i);
       note.image_path = source.image_path;
       note.camera_model = source.view.camera_model.c_str();
-      note.split = static_cast<StippleViewSplit>(source.view.split);
+      note.split = static_cast<StippleViewSplit>(dataset->role(i));
       note.source_width = seen_by.width;
       note.source_height = seen_by.height;
       note.is_distorted = source.view.lens.isDistorted();

@@ -25,6 +25,9 @@ struct ViewPicture {
   std::vector<float> normals;  ///< [H,W,3] unit, world; 0 where unknown
 };
 
+/// What a data set says a view is for.
+enum class ViewRole : uint32_t { kNone = 0, kTrain = 1, kTest = 2, kValidation = 3 };
+
 /// Views of one scene: photographs, or renders of a Blender scene. Pictures are loaded when they
 /// are wanted, as ten thousand of them fit into no memory.
 class ViewSource {
@@ -38,6 +41,8 @@ class ViewSource {
   /// Of the picture, for messages and for choosing held-out views by name.
   virtual std::string name(size_t view) const = 0;
   virtual ColourSpace colourSpace() const = 0;
+  /// kNone where nothing is said.
+  virtual ViewRole role(size_t) const { return ViewRole::kNone; }
 
   /// May be called by several threads at once. Errors: kIo, kFormat (names the picture), and
   /// kInvalidArgument for numbers that are not finite.

@@ -253,20 +253,20 @@ Json readJson(const std::string& path) {
 }
 
 /// What the name of a transforms_*.json says of its views.
-ViewSplit splitOfName(const std::string& path) {
+ViewRole splitOfName(const std::string& path) {
   const std::string name = fs::path(path).filename().string();
-  if (name == "transforms_train.json") return ViewSplit::kTrain;
-  if (name == "transforms_test.json") return ViewSplit::kTest;
-  if (name == "transforms_val.json") return ViewSplit::kValidation;
-  return ViewSplit::kNone;
+  if (name == "transforms_train.json") return ViewRole::kTrain;
+  if (name == "transforms_test.json") return ViewRole::kTest;
+  if (name == "transforms_val.json") return ViewRole::kValidation;
+  return ViewRole::kNone;
 }
 
 /// Lists of file names that nerfstudio writes beside the frames.
-std::map<std::string, ViewSplit> namedSplits(const Json& file) {
-  std::map<std::string, ViewSplit> splits;
-  const std::pair<const char*, ViewSplit> lists[] = {{"train_filenames", ViewSplit::kTrain},
-                                                     {"test_filenames", ViewSplit::kTest},
-                                                     {"val_filenames", ViewSplit::kValidation}};
+std::map<std::string, ViewRole> namedSplits(const Json& file) {
+  std::map<std::string, ViewRole> splits;
+  const std::pair<const char*, ViewRole> lists[] = {{"train_filenames", ViewRole::kTrain},
+                                                     {"test_filenames", ViewRole::kTest},
+                                                     {"val_filenames", ViewRole::kValidation}};
   for (const auto& [key, split] : lists) {
     const auto found = file.find(key);
     if (found == file.end() || !found->is_array()) continue;
@@ -285,13 +285,13 @@ std::vector<CameraView> readTransforms(const std::string& path, Distorted distor
     fail(ErrorCode::kFormat,
          path + " is not a transforms.json: a list 'frames' with at least one camera is needed");
   }
-  const std::map<std::string, ViewSplit> splits = namedSplits(file);
+  const std::map<std::string, ViewRole> splits = namedSplits(file);
   std::vector<CameraView> views;
   const Json& frames = file["frames"];
   for (size_t i = 0; i < frames.size(); ++i) {
     views.push_back(FrameReader(path, file, frames[i], i, distorted).read());
     const auto named = splits.find(views.back().image_path);
-    views.back().split = named != splits.end() ? named->second : splitOfName(path);
+    views.back().role = named != splits.end() ? named->second : splitOfName(path);
   }
   return views;
 }

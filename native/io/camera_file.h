@@ -4,13 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "data/view_source.h"
 #include "math/camera.h"
 #include "math/lens.h"
 
 namespace stipple {
-
-/// What a data set says a view is for.
-enum class ViewSplit : uint32_t { kNone = 0, kTrain = 1, kTest = 2, kValidation = 3 };
 
 struct CameraView {
   Camera camera;               ///< without the lens
@@ -19,7 +17,7 @@ struct CameraView {
   std::string camera_model{};  ///< as the file calls it
   std::string mask_path{};     ///< as image_path
   std::string depth_path{};    ///< as image_path
-  ViewSplit split = ViewSplit::kNone;
+  ViewRole role = ViewRole::kNone;
 };
 
 /// Cameras whose lens is not a pinhole's.
@@ -51,7 +49,7 @@ struct CameraFiles {
 
 /// What readCameraFile() reads for a path. A folder with transforms_train.json, and without
 /// transforms.json, gives that and its _test and _val (NeRF-synthetic), whose views are told apart
-/// by CameraView::split. Errors: kFormat for a folder without any.
+/// by CameraView::role. Errors: kFormat for a folder without any.
 CameraFiles findCameraFiles(const std::string& path);
 
 /// `ply_file_path` of a transforms.json, the points of its scene; empty where it names none.

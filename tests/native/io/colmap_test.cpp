@@ -111,6 +111,18 @@ TEST_F(Colmap, ReadsBinaryAndTextAlike) {
   expectBoth(readCameraFile(folder()));
 }
 
+TEST_F(Colmap, ReadsLinesThatAreLongerThanItsBuffer) {
+  // Three million bytes of points of the first picture, and no line end after the last.
+  std::string points;
+  while (points.size() < 3000000) points += "1.5 2.5 -1 ";
+  storeText(kTextCameras,
+            "11 1 1 0 0 1 2 3 3 second view.png\n" + points + "\n12 1 0 0 0 0 0 4 7 first.png");
+  expectBoth(readCameraFile(folder()));
+  storeText(kTextCameras,
+            "11 1 1 0 0 1 2 3 3 second view.png\n" + points + "\n12 1 0 0 0 0 0 4 x first.png");
+  expectError(ErrorCode::kFormat, {"images.txt: line 3", "'x'"}, [&] { readCameraFile(folder()); });
+}
+
 TEST_F(Colmap, FindsTheModelInTheUsualPlaces) {
   storeBinary("scene/sparse/0");
   for (const char* name : {"scene", "scene/sparse/0", "scene/sparse/0/images.bin"}) {

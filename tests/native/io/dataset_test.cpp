@@ -98,9 +98,9 @@ TEST_F(DatasetTest, ReadsNeRFSyntheticWithItsSplits) {
   }
   const auto dataset = openDataset(folder());
   ASSERT_EQ(dataset->count(), 3u);
-  EXPECT_EQ(dataset->source(0).view.split, ViewSplit::kTrain);
-  EXPECT_EQ(dataset->source(1).view.split, ViewSplit::kTest);
-  EXPECT_EQ(dataset->source(2).view.split, ViewSplit::kValidation);
+  EXPECT_EQ(dataset->role(0), ViewRole::kTrain);
+  EXPECT_EQ(dataset->role(1), ViewRole::kTest);
+  EXPECT_EQ(dataset->role(2), ViewRole::kValidation);
   const Camera& camera = dataset->camera(0);
   EXPECT_EQ(camera.width, 6u);
   EXPECT_EQ(camera.height, 4u);
@@ -140,7 +140,7 @@ TEST_F(DatasetTest, ReadsTransformsWithMasksDepthsAndPoints) {
   // Two roundings, of the share of 65535 and of the product.
   for (size_t i = 0; i < 8; ++i) EXPECT_NEAR(picture.depth[i], expected[i], 3e-7f);
   EXPECT_TRUE(dataset->load(1).weights.empty());
-  EXPECT_EQ(dataset->source(1).view.split, ViewSplit::kTest);
+  EXPECT_EQ(dataset->role(1), ViewRole::kTest);
   EXPECT_EQ(dataset->points().positions, (std::vector<float>{1, 2, 3}));
   EXPECT_EQ(dataset->points().colours, (std::vector<float>{1, 1, 0}));
 }
