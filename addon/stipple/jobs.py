@@ -82,6 +82,7 @@ class JobOperator:
 
     _timer = None
     _job = None
+    escape_text = 'Esc cancels'  # what the status bar says
 
     def __init_subclass__(cls, **options):
         """Without the library none of these operators can do anything: their menu entries are grey and say why."""
@@ -129,7 +130,7 @@ class JobOperator:
         state, fraction, stage = self._job.poll()
         if state == JobState.RUNNING:
             context.window_manager.progress_update(int(100 * fraction))
-            context.workspace.status_text_set(f'{self.bl_label}: {stage} {fraction:.0%} (Esc cancels)')
+            context.workspace.status_text_set(f'{self.bl_label}: {stage} {fraction:.0%} ({self.escape_text})')
             return {'PASS_THROUGH'}
         self._leave_window(context)
         return self._finish_in_window(context)

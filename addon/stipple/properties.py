@@ -107,6 +107,60 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     edited: BoolProperty(name="Edited", description="The splats were edited by hand", options={'HIDDEN'})
 
 
+class STIPPLE_PG_fit(bpy.types.PropertyGroup):
+    """How splats are fitted to views of the scene."""
+
+    views_from: EnumProperty(name="Views", description="What the splats are to look like",
+                             items=(('RIG', "Camera Rig", "Renders of the selected meshes, else of all, from cameras "
+                                     "that are made for it"),
+                                    ('CAMERAS', "Scene Cameras", "Renders through the cameras of the scene"),
+                                    ('DATASET', "Photos", "A folder of photographs with their cameras: COLMAP, "
+                                     "transforms.json")), options=set())
+    rig: EnumProperty(name="Rig", description="Where the cameras stand",
+                      items=(('AUTO', "Automatic", "In a room where the scene's camera stands between walls, else "
+                              "around"),
+                             ('AROUND', "Around", "On a sphere around everything, looking in"),
+                             ('INSIDE', "Inside", "Between the walls of a room, looking everywhere")), options=set())
+    view_count: IntProperty(name="Count", description="Number of views that are rendered", default=60, min=1,
+                            soft_max=500, max=10000, options=set())
+    view_size: IntProperty(name="Resolution", description="Pixels of the longer side of a view", default=256, min=16,
+                           soft_max=1024, max=8192, options=set())
+    engine: EnumProperty(name="Render With", description="Engine that renders the views",
+                         items=(('CYCLES', "Cycles", "Light as in the final picture"),
+                                ('EEVEE', "EEVEE", "Light as EEVEE shows it"),
+                                ('WORKBENCH', "Workbench", "Plain colors without light, quickest")), options=set())
+    samples: IntProperty(name="Samples", description="Samples per pixel of a view", default=64, min=1, soft_max=1024,
+                         options=set())
+    transparent: BoolProperty(name="Transparent Film", description="Fit the objects alone; off: also the world behind "
+                              "them", default=True, options=set())
+    dataset: StringProperty(name="Folder", description="Folder with photographs and their cameras",
+                            subtype='DIR_PATH', options=version.RELATIVE_PATH)
+    downscale: IntProperty(name="Downscale", description="Pixels of a photograph along each side for one that is "
+                           "learned from", default=1, min=1, soft_max=8, max=64, options=set())
+    max_splats: IntProperty(name="Splats", description="The fit never has more splats than this", default=50000, min=100,
+                            soft_max=1000000, max=100000000, options=set())
+    quality: EnumProperty(name="Quality", description="How long the fit may learn",
+                          items=(('FAST', "Fast", "For a first look"), ('BALANCED', "Balanced", "For most shots"),
+                                 ('FINE_DETAIL', "Fine Detail", "For close views of fine texture")), default='BALANCED',
+                          options=set())
+    view_dependent: BoolProperty(name="View-Dependent Color", description="Colors change with the direction they are seen "
+                                 "from, as those of shiny things do; more numbers per splat", default=False,
+                                 options=set())
+    model: EnumProperty(name="Model", description="What is learned",
+                        items=(('EXPLICIT', "Splats", "Splats, each with numbers of its own"),
+                               ('FIELD', "Density Field", "A density of anchors, which decodes at any budget")),
+                        options=set())
+    strategy: EnumProperty(name="Strategy", description="How splats are added and removed while they are fitted",
+                           items=(('adaptive', "Adaptive", "Clones small and splits large splats where the picture "
+                                   "still moves them (Kerbl and others, 2023)"),), options=set())
+    density_gradient: BoolProperty(name="Learn Density", description="Move anchors to where they help the picture "
+                                   "most", default=True, options=set())
+    seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,
+                      options=set())
+    report: StringProperty(name="Report", description="File for the fit's figures (.json, and curves as .svg beside "
+                           "it); empty for none", subtype='FILE_PATH', options=version.RELATIVE_PATH)
+
+
 class STIPPLE_PG_scene(bpy.types.PropertyGroup):
     splat_color: EnumProperty(
         name="Splat Color", description="Space in which splats are blended over each other",
@@ -121,6 +175,7 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         name="Shadow Margin", description="Splats that are nearer to the camera than a shadow catcher by more than this get "
         "none of its shadows", default=0.5, min=0.0, soft_max=10.0, subtype='DISTANCE', options=set(),
         override=_OVERRIDABLE)
+    fit: PointerProperty(type=STIPPLE_PG_fit)
     max_splats: IntProperty(
         name="Max Splats", description="Splats that the viewport shows at most, over all objects and their instances; 0 "
         "for no limit. Objects share them in proportion to their own budgets", default=0, min=0, soft_max=10000000,
@@ -131,7 +186,7 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         options=set(), override=_OVERRIDABLE)
 
 
-classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_scene)
+classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_fit, STIPPLE_PG_scene)
 
 
 def register():

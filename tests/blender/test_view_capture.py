@@ -133,6 +133,9 @@ def test_picture_depth_and_normals_of_a_ball(rigs, capture, engine):
     radius = view.camera.fx * math.tan(math.asin(1 / distance))
     covered = float((view.linear[..., 3] > 0.5).sum())
     assert abs(covered - math.pi * radius ** 2) < 2 * math.pi * radius
+    if engine == 'WORKBENCH':  # no light that turns with the camera
+        shown = view.linear[view.linear[..., 3] > 0.99]
+        assert np.ptp(shown, axis=0).max() < 0.02
     assert abs(view.depth[32, 32] - (distance - 1)) < 0.02
     assert view.depth[0, 0] == 0
     known = view.depth > 0
@@ -152,8 +155,6 @@ def test_picture_depth_and_normals_of_a_ball(rigs, capture, engine):
         rows = middle[known]
         agreement = (view.normals[known][rows] * world[rows] / lengths[rows, None]).sum(axis=1)
         assert np.median(agreement) > 0.99
-    display = view.display()
-    assert display[..., :3].max() <= 1 and np.array_equal(display[..., 3], view.linear[..., 3])
 
 
 def test_views_leave_the_scene_as_it_was(rigs, capture):
@@ -162,7 +163,7 @@ def test_views_leave_the_scene_as_it_was(rigs, capture):
     scene = bpy.context.scene
     scene.render.resolution_percentage, scene.render.use_border = 50, True
     scene.render.image_settings.file_format = 'JPEG'
-    owners = [scene.render, scene.render.image_settings, scene.cycles, scene.eevee, scene, bpy.context.view_layer, walls,
+    owners = [scene.render, scene.render.image_settings, scene.cycles, scene.eevee, scene.display.shading, scene, bpy.context.view_layer, walls,
               ball]
     bounds = rigs.bounds_of([ball], depsgraph())
     pose = rigs.around(scene, depsgraph(), bounds, 3, angle=math.radians(60))[0]

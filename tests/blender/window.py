@@ -4,7 +4,8 @@
     blender --factory-startup --python window.py -- STEPS.py FOLDER SCREEN [arguments of the steps...]
 
 STEPS.py defines `steps`: a list of functions of a Window, called one after the other with a pause for
-Blender to draw. A step that returns a name gets its picture, FOLDER/name.xwd, a copy of SCREEN: the frame
+Blender to draw. A step that returns False is called again: it waits for something. One that returns a
+name gets its picture, FOLDER/name.xwd, a copy of SCREEN: the frame
 buffer file of `Xvfb -fbdir`, since Blender's own screenshots are black there from 4.0 on. `done` is
 written at the end, `failed` with the traceback where a step raises.
 """
@@ -89,8 +90,10 @@ def main():
                 finish('done')
                 return None
             step = state['steps'][state['step']]
-            state['step'] += 1
-            state['shot'] = step(window)
+            shot = step(window)
+            if shot is not False:
+                state['step'] += 1
+                state['shot'] = shot
             state['until'] = window.redraws + REDRAWS
             window.redraw()
         except Exception:

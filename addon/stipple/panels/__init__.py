@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing only."""
 
-from . import data, menus, render, sequence
+from . import data, fit, menus, render, sequence
 
-classes = data.classes + sequence.classes + render.classes + menus.classes
+classes = data.classes + sequence.classes + render.classes + fit.classes + menus.classes
 
 
 def register():

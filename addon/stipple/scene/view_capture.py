@@ -41,14 +41,6 @@ class Captured:
     depth: np.ndarray     # [H,W] planar z, metres; 0 where unknown
     normals: np.ndarray   # [H,W,3] world, unit; 0 where unknown; None where the engine has none
 
-    def display(self):
-        """[H,W,4] premultiplied, colours in sRGB as a Standard view shows them: what trained splats add up to."""
-        alpha = self.linear[..., 3:]
-        straight = np.divide(self.linear[..., :3], alpha, out=np.zeros_like(self.linear[..., :3]), where=alpha > 1e-6)
-        straight = np.clip(straight, 0, 1)
-        encoded = np.where(straight <= 0.0031308, 12.92 * straight, 1.055 * straight ** (1 / 2.4) - 0.055)
-        return np.concatenate([encoded * alpha, alpha], axis=2).astype(np.float32)
-
 
 @dataclass(frozen=True)
 class CaptureSettings:
@@ -118,6 +110,9 @@ class Capture:
             kept.set(scene.cycles, samples=settings.samples, use_denoising=False, use_adaptive_sampling=False)
         elif settings.engine == 'EEVEE':
             kept.set(scene.eevee, taa_render_samples=settings.samples)
+        else:
+            # Its lights turn with the camera: no two views would agree.
+            kept.set(scene.display.shading, light='FLAT', color_type='TEXTURE')
         self._folder = None
         if settings.engine != 'CYCLES':
             self._folder = tempfile.mkdtemp(prefix='stipple-views-')

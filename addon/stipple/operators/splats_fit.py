@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splats are fitted to views of the scene, or to photographs."""
+
+import time
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from .. import version
+from ..jobs import JobOperator
+from ..scene import fitting, sources, splat_data, sync
+
+PROPOSED_KEY = 'stipple_fit_proposed'
+_PREVIEW_SECONDS = 1.5
+
+
+class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
+    """Make splats that look like renders of the selected objects, or like the photographs of a data set. Esc keeps the
+    best so far"""
+
+    bl_idname = 'stipple.splats_fit'
+    bl_label = "Fit Splats"
+    bl_options = {'UNDO'}
+
+    source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
+                                "beside the .blend file", subtype='FILE_PATH', options={'SKIP_SAVE'} | version.RELATIVE_PATH)
+
+    _preview = ''
+    _shown_at = 0.0
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT' and not fitting.state.is_running
+
+    def invoke(self, context, _event):
+        return self.run_in_window(context)
+
+    def start(self, context):
+        settings = context.scene.stipple.fit
+        objects = [] if settings.views_from == 'DATASET' else fitting.seen_objects(context)
+        return fitting.FitTask(context, objects, settings, self.source_path and sources.absolute_path(self.source_path))
+
+    @property
+    def escape_text(self):
+        return 'Esc cancels' if self._job.holds_scene else 'Esc keeps the best so far'
+
+    def modal(self, context, event):
+        result = super().modal(context, event)
+        if self._job is None:
+            return result
+        if event.type == 'TIMER':
+            self._show(context)
+            _redraw(context)
+        # Nothing may change while views are rendered.
+        return {'RUNNING_MODAL'} if self._job.holds_scene else result
+
+    def cancel(self, context):
+        super().cancel(context)
+        self._remove_preview()
+
+    def finish(self, context, job):
+        result = job.result
+        obj = bpy.data.objects.get(self._preview) if self._preview else None
+        if obj is None:
+            obj = splat_data.new_object(result.name, splat_data.new_data(result.name))
+            context.collection.objects.link(obj)
+        with sync.paused():
+            sources.attach_tree(obj.data, result.path, result.count)
+            obj.data.stipple.ratio = obj.data.stipple.ratio_render = 1.0
+        sync.write_decoded(obj.data, result.splats)
+        if not bpy.app.background:
+            obj[PROPOSED_KEY] = True
+        for note in fitting.state.notes:
+            self.report({'WARNING'}, note)
+        figures = fitting.state.figures
+        quality = f', {figures.best_psnr:.1f} dB on held-out views' if figures.best_psnr == figures.best_psnr else ''
+        self.report({'INFO'}, f"{result.count:,} splats in '{obj.name}'{quality}")
+        _redraw(context)
+
+    def _show(self, context):
+        """Brings the preview up to date, now and then."""
+        if time.monotonic() - self._shown_at < _PREVIEW_SECONDS:
+            return
+        self._shown_at = time.monotonic()
+        splats = self._job.preview()
+        if splats is None:
+            return
+        obj = bpy.data.objects.get(self._preview) if self._preview else None
+        if obj is None:
+            if self._preview:
+                return  # removed by hand: it is not wanted
+            obj = splat_data.new_object(fitting.state.name, splat_data.new_data(fitting.state.name))
+            context.collection.objects.link(obj)
+            self._preview = obj.name
+        sync.write(obj.data, splats, '')
+
+    def _failed(self, error):
+        self._remove_preview()
+        return super()._failed(error)
+
+    def _remove_preview(self):
+        obj = bpy.data.objects.get(self._preview) if self._preview else None
+        if obj is not None:
+            _remove(obj)
+        self._preview = ''
+
+
+class STIPPLE_OT_fit_accept(bpy.types.Operator):
+    """Keep the fitted splats and hide what they were fitted to"""
+
+    bl_idname = 'stipple.fit_accept'
+    bl_label = "Accept"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    hide_source: BoolProperty(name="Hide Source", description="Hide the selected meshes in the viewport and in renders",
+                              default=True)
+
+    @classmethod
+    def poll(cls, context):
+        return proposed(context) is not None
+
+    def execute(self, context):
+        obj = proposed(context)
+        del obj[PROPOSED_KEY]
+        if self.hide_source:
+            for source in fitting.meshes.source_objects(context.selected_objects):
+                source.select_set(False)
+                source.hide_set(True)
+                source.hide_render = True
+        obj.select_set(True)
+        context.view_layer.objects.active = obj
+        return {'FINISHED'}
+
+
+class STIPPLE_OT_fit_discard(bpy.types.Operator):
+    """Remove the fitted splats; their file stays"""
+
+    bl_idname = 'stipple.fit_discard'
+    bl_label = "Discard"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return proposed(context) is not None
+
+    def execute(self, context):
+        _remove(proposed(context))
+        return {'FINISHED'}
+
+
+def proposed(context):
+    """The object of a fit that waits for a decision."""
+    return next((obj for obj in context.view_layer.objects if obj is not None and PROPOSED_KEY in obj), None)
+
+
+def _remove(obj):
+    data = obj.data
+    (bpy.data.pointclouds if isinstance(data, bpy.types.PointCloud) else bpy.data.meshes).remove(data)
+
+
+def _redraw(context):
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'VIEW_3D':
+                area.tag_redraw()
+
+
+classes = (STIPPLE_OT_splats_fit, STIPPLE_OT_fit_accept, STIPPLE_OT_fit_discard)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splats fitted to views of a scene: from the operator to an object with a budget."""
+
+import importlib
+import json
+
+import bpy
+import numpy as np
+import pytest
+
+import scenes
+
+
+@pytest.fixture
+def fitting(stipple):
+    return importlib.import_module('.scene.fitting', stipple.__name__)
+
+
+@pytest.fixture
+def ball(tmp_path):
+    """A ball with two colours, lit by the world alone, in a saved file."""
+    obj = scenes.sphere(segments=24, rings=12)
+    scenes.image_material('Halves', scenes.half_image(), obj)
+    bpy.context.scene.world = bpy.data.worlds.new('Sky')
+    bpy.context.scene.world.color = (0.5, 0.5, 0.5)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
+    scenes.select(obj)
+    return obj
+
+
+def settings(**values):
+    """Few small views without light: seconds."""
+    chosen = bpy.context.scene.stipple.fit
+    for name, value in {'view_count': 10, 'view_size': 48, 'engine': 'WORKBENCH', 'max_splats': 2000,
+                        'quality': 'FAST', **values}.items():
+        setattr(chosen, name, value)
+    return chosen
+
+
+def fitted():
+    assert bpy.ops.stipple.splats_fit() == {'FINISHED'}
+    return next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
+
+
+def test_a_ball_is_fitted_and_gets_a_budget(stipple, ball, fitting, tmp_path):
+    settings(report=str(tmp_path / 'report.json'))
+    obj = fitted()
+    count = obj.data.stipple.source_count
+    assert obj.name == 'Sphere Fit' and 100 <= count <= 2000
+    assert obj.data.stipple.source_kind == 'TREE' and obj.data.stipple.source.startswith('//')
+    assert not ball.hide_render  # nothing is replaced
+    splats = stipple.scene.splat_data.read(obj.data)
+    # Nine of ten splats lie about the surface, by their opacity.
+    distance = np.abs(np.linalg.norm(splats.positions, axis=1) - 1)
+    weight = splats.opacities / splats.opacities.sum()
+    assert weight[distance < 0.15].sum() > 0.9
+    # Far above what an empty picture would have: 8 dB.
+    assert fitting.state.figures.best_psnr > 20
+    assert not fitting.state.is_running
+    report = json.loads((tmp_path / 'report.json').read_text())
+    assert report and (tmp_path / 'report.svg').exists()
+    with_budget = obj.data.stipple
+    with_budget.ratio = 0.25
+    assert stipple.scene.splat_data.count(obj.data) == round(0.25 * count)
+
+
+def test_the_same_fit_twice_gives_the_same_splats(stipple, ball, tmp_path):
+    settings(view_count=4, view_size=32)
+    first = stipple.scene.splat_data.read(fitted().data)
+    for obj in [o for o in bpy.data.objects if o.name.endswith(' Fit')]:
+        bpy.data.objects.remove(obj)
+    scenes.select(ball)
+    again = stipple.scene.splat_data.read(fitted().data)
+    assert np.array_equal(first.positions, again.positions) and np.array_equal(first.sh, again.sh)
+
+
+def test_scene_cameras_serve_as_views(stipple, ball):
+    for i in range(5):
+        angle = i * 1.2566
+        scenes.camera(location=(4 * np.sin(angle), -4 * np.cos(angle), 0), rotation=(np.pi / 2, 0, angle))
+    settings(views_from='CAMERAS', view_size=32)
+    assert stipple.scene.splat_data.count(fitted().data) > 0
+
+
+def test_a_cancel_while_views_are_rendered_leaves_nothing(ball, fitting, stipple):
+    task = fitting.FitTask(bpy.context, [ball], settings(), '')
+    while 'Rendering view 2' not in task.poll()[2]:
+        pass
+    objects_before = {'Sphere', 'Stipple View'}
+    assert set(bpy.data.objects.keys()) == objects_before
+    task.cancel()
+    with pytest.raises(stipple.binding.errors.CancelledError):
+        task.wait()
+    assert task.result is None and set(bpy.data.objects.keys()) == {'Sphere'}
+    assert bpy.context.scene.render.engine != 'BLENDER_WORKBENCH'
+
+
+def test_a_cancel_while_it_fits_keeps_the_best(ball, fitting):
+    task = fitting.FitTask(bpy.context, [ball], settings(quality='FINE_DETAIL'), '')
+    while fitting.state.figures is None or fitting.state.figures.iteration < 30:
+        task.poll()
+    task.cancel()
+    task.wait()
+    assert task.result.count > 0 and fitting.state.figures.iteration < fitting.state.figures.iterations
+
+
+def test_ending_at_once_puts_the_scene_back(ball, fitting):
+    scene = bpy.context.scene
+    before = scene.render.engine, scene.render.resolution_x, scene.render.filepath
+    task = fitting.FitTask(bpy.context, [ball], settings(), '')
+    while 'Rendering view 2' not in task.poll()[2]:
+        pass
+    task.close()
+    assert (scene.render.engine, scene.render.resolution_x, scene.render.filepath) == before
+    assert not fitting.state.is_running
+
+
+def test_messages(ball, stipple):
+    refuses = scenes.refuses
+    settings(views_from='CAMERAS')
+    refuses(bpy.ops.stipple.splats_fit, 'no perspective or orthographic camera')
+    settings(views_from='DATASET')
+    refuses(bpy.ops.stipple.splats_fit, 'No data set is chosen')
+    settings(views_from='DATASET', dataset='//nowhere')
+    refuses(bpy.ops.stipple.splats_fit, 'nowhere')
+    bpy.data.objects.remove(ball)
+    settings(views_from='RIG', dataset='')
+    refuses(bpy.ops.stipple.splats_fit, 'no mesh')
+    assert not bpy.data.objects
