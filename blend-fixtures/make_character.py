@@ -14,20 +14,9 @@ import numpy as np
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 import base_colours  # noqa: E402 (found beside this file)
+from make_shots import DC, add_on, disc_rotations  # noqa: E402
 
 WIDTH, HEIGHT = 320, 240
-DC = 0.28209479177387814
-
-
-def add_on():
-    return sys.modules[next(name for name in sys.modules if name.rpartition('.')[2] == 'stipple')]
-
-
-def disc_rotations(normals):
-    """w,x,y,z that turn z to each normal."""
-    w = 1.0 + normals[:, 2]
-    quaternions = np.stack([w, -normals[:, 1], normals[:, 0], np.zeros_like(w)], axis=1)
-    return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
 
 
 def floor():
