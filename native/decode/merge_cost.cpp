@@ -62,6 +62,12 @@ HWY_INLINE CostLanes powerOfTwo(CostLanes n) {
   return CostLanes(hn::BitCast(Tag(), hn::ShiftLeft<52>(exponent)));
 }
 
+HWY_INLINE CostLanes rootGuess(CostLanes x) {
+  const hn::RebindToUnsigned<Tag> du;
+  const auto bits = hn::BitCast(du, x.v);
+  return CostLanes(hn::BitCast(Tag(), hn::Sub(hn::Set(du, kRootGuess), hn::ShiftRight<1>(bits))));
+}
+
 HWY_INLINE void opacityEnds(CostLanes piece, CostLanes* ends) {
   const Tag d;
   const IndexTag di;

@@ -54,6 +54,9 @@ double wholePart(double value) {
 double powerOfTwo(double n) {
   return std::bit_cast<double>(static_cast<uint64_t>(static_cast<int64_t>(n) + 1023) << 52);
 }
+double rootGuess(double x) {
+  return std::bit_cast<double>(kRootGuess - (std::bit_cast<uint64_t>(x) >> 1));
+}
 void opacityEnds(double piece, double* ends) {
   std::copy_n(&opacityTable().ends[2 * static_cast<size_t>(piece)], 4, ends);
 }

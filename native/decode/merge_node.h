@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 
 #include "data/cloud_extent.h"
@@ -77,6 +78,8 @@ constexpr double kOpaqueSurroundingShare = 0.45;
 constexpr double kFullInflationVisibility = 0.2;
 /// Variances below this of a degenerate splat, in units of the tree, cannot be told apart from 0.
 constexpr double kSmallestDeterminant = 1e-60;
+/// Less half of a number's bits: the bits of about 1 / sqrt of it (within 3.5 %).
+constexpr uint64_t kRootGuess = 0x5fe6eb50c7b537a9;
 /// Below this an exponential is far below the errors of moments: 0.
 constexpr double kLeastExponent = -40;
 

@@ -1,7 +1,7 @@
 // The moments and the error of one merge. T is double, or a vector of doubles that looks like one,
 // with every operation rounded by itself: all instances give the same bits. Included inside the
 // namespace of the instance, which has beforehand: sqrt, min, max, pick(condition, yes, no),
-// wholePart (floor), powerOfTwo (of a whole number, -64..0) and opacityEnds, all for T.
+// wholePart (floor), powerOfTwo (of a whole number, -64..0), rootGuess and opacityEnds, all for T.
 
 /// Variance of a coordinate plane after the low-pass, times the other axis', less the covariance
 /// squared. Of a needle, rounding would leave anything of xx yy - xy^2: below 0 it is 0, what the
@@ -9,6 +9,17 @@
 template <class T>
 T blurredDeterminant(T xx, T xy, T yy, T blur) {
   return max(max(xx * yy - xy * xy, T(0.0)) + blur * (xx + yy + blur), T(kSmallestDeterminant));
+}
+
+/// 1 / sqrt(x) of a normal number above 0, by Newton's steps from rootGuess: a relative error of
+/// 2e-3 after the first, 5e-6, 3e-11 after the third. A root and a division take five times as
+/// long.
+template <class T>
+T inverseRoot(T x) {
+  const T half = T(0.5) * x;
+  T y = rootGuess(x);
+  for (int step = 0; step < 3; ++step) y = y * (T(1.5) - half * y * y);
+  return y;
 }
 
 /// exp(x) for x <= 0, 0 below kLeastExponent. The reduced argument is within ln 2 / 2 of 0; the
@@ -68,7 +79,8 @@ void measureArea(MergeValues<T>& node, T footprint) {
 template <class T>
 void measurePlanes(MergeValues<T>& node, T footprint) {
   for (size_t plane = 0; plane < 3; ++plane) {
-    node.plane_size[plane] = sqrt(planeDeterminant(node, plane, node.inflation, footprint));
+    const T determinant = planeDeterminant(node, plane, node.inflation, footprint);
+    node.plane_size[plane] = determinant * inverseRoot(determinant);
   }
 }
 
@@ -133,7 +145,7 @@ T planeProduct(const MergeValues<T>& a, const MergeValues<T>& b, size_t plane, T
   const T xy = sum(entries[1]);
   const T yy = sum(entries[2]);
   const T blur = footprint + footprint;
-  const T inverse_root = T(1.0) / sqrt(blurredDeterminant(xx, xy, yy, blur));
+  const T inverse_root = inverseRoot(blurredDeterminant(xx, xy, yy, blur));
   const T dx = a.mean[kPlaneAxes[plane][0]] - b.mean[kPlaneAxes[plane][0]];
   const T dy = a.mean[kPlaneAxes[plane][1]] - b.mean[kPlaneAxes[plane][1]];
   const T squared = ((yy + blur) * dx * dx - T(2.0) * xy * dx * dy + (xx + blur) * dy * dy) *
