@@ -86,10 +86,11 @@ HWY_INLINE void fillNode(const Load& load, MergeValues<CostLanes>& node) {
   // The fields of MergeValues in order.
   size_t field = 0;
   for (CostLanes& x : node.mean) x = load(field++);
-  for (CostLanes& x : node.covariance) x = load(field++);
   for (CostLanes& x : node.colour) x = load(field++);
-  for (CostLanes& x : node.plane_size) x = load(field++);
   node.opacity = load(field++);
+  ++field;  // no cost needs the area
+  for (CostLanes& x : node.covariance) x = load(field++);
+  for (CostLanes& x : node.plane_size) x = load(field++);
   node.visibility = load(field++);
   node.contrast = load(field++);
   node.weight = load(field++);

@@ -15,13 +15,16 @@ namespace stipple {
 /// several at once.
 template <class T>
 struct MergeValues {
+  // What a neighbour is asked for when others look around: one cache line of doubles.
   std::array<T, 3> mean = {};
+  std::array<T, 3> colour = {};  ///< mean over directions, clamped at 0
+  T opacity = T(0.0);
+  T area = T(0.0);  ///< of the covariance, projected, averaged over directions, over 2 pi
+
   std::array<T, 6> covariance = {};  ///< xx xy xz yy yz zz
-  std::array<T, 3> colour = {};      ///< mean over directions, clamped at 0
   /// Per coordinate plane xy, xz, yz: sqrt of the determinant of what is drawn, projected, through
   /// the low-pass.
   std::array<T, 3> plane_size = {};
-  T opacity = T(0.0);
   T visibility = T(1.0);  ///< 0..1: share that is seen, averaged over the views
   /// Root of the visibility: squared errors add over the views that see the splat.
   T contrast = T(1.0);
@@ -33,7 +36,6 @@ struct MergeValues {
   /// Mean colour of the neighbours, by how far it is likely to stand behind this node: what errors
   /// of shape show against. Filled in by who knows the neighbours (Surrounding).
   std::array<T, 3> around = {};
-  T area = T(0.0);  ///< of the covariance, projected, averaged over directions, over 2 pi
 };
 
 /// Whole cache lines of doubles: costs of many are taken at once (merge_cost.h).

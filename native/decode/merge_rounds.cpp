@@ -82,6 +82,13 @@ class MergeRounds {
   }
 
  private:
+  /// Nodes lie all over the memory; the costs of a list wait for them less where they are asked for
+  /// as soon as they are known.
+  static void fetchAhead(const MergeNode& node) {
+    const char* bytes = reinterpret_cast<const char*>(&node);
+    for (size_t line = 0; line < sizeof(MergeNode); line += 64) __builtin_prefetch(bytes + line);
+  }
+
   /// Costs of a node with the others of entries[0..count).
   void fillCosts(uint32_t slot, Entry* entries, size_t count) const {
     uint32_t others[2 * kListCapacity] = {};
@@ -315,7 +322,9 @@ class MergeRounds {
         if (slot == a) continue;
         bool known = false;
         for (size_t j = 0; j < count; ++j) known |= candidates[j].slot == slot;
-        if (!known) candidates[count++] = {0.0f, slot};
+        if (known) continue;
+        candidates[count++] = {0.0f, slot};
+        fetchAhead(nodes_[slot]);
       }
     }
     fillCosts(a, candidates, count);
