@@ -42,6 +42,16 @@ const std::string& requireText(const SafeTensorsReader& file, const char* key) {
   return found->second;
 }
 
+bool isFirstText(const SafeTensorsReader& file, const char* key, const std::string& first,
+                 const std::string& second) {
+  const std::string& text = requireText(file, key);
+  if (text != first && text != second) {
+    fail(ErrorCode::kFormat, file.path() + " has the " + key + " '" + text.substr(0, 40) + "'; '" +
+                                 first + "' or '" + second + "' is needed");
+  }
+  return text == first;
+}
+
 const std::string& assetKind(const SafeTensorsReader& file) {
   const int version = majorVersion(file);
   if (version != kMajorVersion) {

@@ -10,10 +10,15 @@ namespace stipple {
 /// What every Stipple asset (`.stipple.safetensors`, version 1) says of itself.
 constexpr char kAssetSurface[] = "surface";
 constexpr char kAssetHierarchy[] = "hierarchy";
+constexpr char kAssetField[] = "field";
 constexpr char kAssetCheckpoint[] = "checkpoint";
 
 /// Text of the metadata. Errors: kFormat where it is missing.
 const std::string& requireText(const SafeTensorsReader& file, const char* key);
+
+/// Whether a text of the metadata is the first of the two that it may be. Errors: kFormat.
+bool isFirstText(const SafeTensorsReader& file, const char* key, const std::string& first,
+                 const std::string& second);
 
 /// The kind of an asset of a version that is supported. Errors: kFormat; kUnsupported for a newer
 /// major version.

@@ -34,24 +34,13 @@ SplatCloud readCloud(const SafeTensorsReader& file, const std::string& stem,
   return cloud;
 }
 
-/// One of two texts. Errors: kFormat.
-bool isFirst(const SafeTensorsReader& file, const char* key, const char* first,
-             const char* second) {
-  const std::string& text = requireText(file, key);
-  if (text != first && text != second) {
-    fail(ErrorCode::kFormat, file.path() + " has the " + key + " '" + text.substr(0, 40) + "'; '" +
-                                 first + "' or '" + second + "' is needed");
-  }
-  return text == first;
-}
-
 SplatCloud readFlags(const SafeTensorsReader& file) {
   SplatCloud flags;
-  flags.colour_space = isFirst(file, "colour_space", kColourSpaceDisplay, kColourSpaceLinear)
+  flags.colour_space = isFirstText(file, "colour_space", kColourSpaceDisplay, kColourSpaceLinear)
                            ? ColourSpace::kDisplay
                            : ColourSpace::kLinear;
   flags.antialias =
-      isFirst(file, "antialias", kMip, kClassic) ? Antialias::kMip : Antialias::kClassic;
+      isFirstText(file, "antialias", kMip, kClassic) ? Antialias::kMip : Antialias::kClassic;
   const std::string& frame = requireText(file, "frame");
   const auto known = frameFromName(frame);
   if (!known) {

@@ -141,12 +141,15 @@ class FieldModel final : public FitModel {
     AnchorSamplingOptions sampling;
     sampling.count = budget == 0 ? options_.most_anchors : std::min(budget, kMaxAnchorCount);
     sampling.seed = options_.seed;
-    AnchorSet anchors = sampleAnchors(frozen(), sampling);
-    if (!options_.jitter) moveToCentres(anchors);
+    const AnchorSet anchors = fieldAnchors(frozen(), sampling, options_.jitter);
     DecodeRequest request;
     request.anchors = &anchors;
     request.gaussians_per_anchor = options_.gaussians_per_anchor;
     return FieldDecoder(state_.field).decode(request);
+  }
+
+  FieldResult result() {
+    return {frozen(), std::make_shared<const FieldParameters>(*state_.field), options_.jitter};
   }
 
   std::vector<uint64_t> budgets() const override {
@@ -424,6 +427,19 @@ std::unique_ptr<FitModel> makeFieldModel(const ViewSource& views, std::span<cons
   prior_options.seed = options.seed;
   const ScenePrior prior = scenePrior(views, training, prior_options, progress);
   return std::make_unique<FieldModel>(startOf(prior, options, views.colourSpace()), options);
+}
+
+std::optional<FieldResult> fieldResult(FitModel& model) {
+  auto* field = dynamic_cast<FieldModel*>(&model);
+  if (field == nullptr) return {};
+  return field->result();
+}
+
+AnchorSet fieldAnchors(const OctreeDensity& density, const AnchorSamplingOptions& options,
+                       bool jitter) {
+  AnchorSet anchors = sampleAnchors(density, options);
+  if (!jitter) moveToCentres(anchors);
+  return anchors;
 }
 
 }  // namespace stipple

@@ -3,11 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "base/progress.h"
 #include "data/splat_cloud.h"
 #include "data/view_source.h"
+#include "decode/field_parameters.h"
+#include "density/anchor_sampling.h"
+#include "density/octree_density.h"
 #include "train/fit_model.h"
 
 namespace stipple {
@@ -35,5 +39,19 @@ struct FieldModelOptions {
 std::unique_ptr<FitModel> makeFieldModel(const ViewSource& views, std::span<const size_t> training,
                                          const FieldModelOptions& options,
                                          Progress* progress = nullptr);
+
+/// What a fit of a field has learned: all that decoding and an asset file need.
+struct FieldResult {
+  OctreeDensity density;
+  std::shared_ptr<const FieldParameters> field;  ///< a copy; the fit may go on
+  bool jitter = true;                            ///< FieldModelOptions::jitter
+};
+
+/// Of a model of makeFieldModel; empty for any other.
+std::optional<FieldResult> fieldResult(FitModel& model);
+
+/// Anchors of a field at a budget, as FitModel::splats draws them.
+AnchorSet fieldAnchors(const OctreeDensity& density, const AnchorSamplingOptions& options,
+                       bool jitter);
 
 }  // namespace stipple
