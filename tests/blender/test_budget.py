@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The slider on splats that are there already: imported, foreign, out of geometry nodes."""
 
+import time
+
 import bpy
 import numpy as np
 import pytest
@@ -249,6 +251,25 @@ def test_a_dragged_slider_writes_what_fits_and_completes_at_rest(stipple, budget
         assert count(stipple, budgeted) == 40
     finally:
         sync._state.update(slow)
+        bpy.app.timers.unregister(sync.complete)
+
+
+def test_a_slider_does_not_wait_for_its_tree_to_be_read(stipple, budgeted, monkeypatch):
+    """After a file is opened: the first move leaves the reading to the library's thread, and what it asked for follows."""
+    sync, sources = stipple.scene.sync, stipple.scene.sources
+    sources.forget()
+    monkeypatch.setattr(sources.Model, 'load', None)  # reading on Blender's own thread
+    with sync.paused():
+        budgeted.data.stipple.ratio = 0.75
+    try:
+        sync.follow(budgeted)
+        until = time.monotonic() + 60
+        while sync.complete() is not None:
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        assert count(stipple, budgeted) == 300
+        assert not sources.is_reading() and sources.is_at_hand(budgeted.data, 0.0)
+    finally:
         bpy.app.timers.unregister(sync.complete)
 
 

@@ -8,6 +8,7 @@ Blender data.
 import filecmp
 import os
 import re
+import time
 import zlib
 from collections import OrderedDict
 from dataclasses import replace
@@ -20,7 +21,7 @@ from ..binding.cloud import Cloud
 from ..binding.context import Context
 from ..binding.errors import StippleError
 from ..binding.model import DecodeSettings, Model
-from ..binding.structs import AnchorOrder, Status
+from ..binding.structs import AnchorOrder, JobState, Status
 from . import masks, meshes, splat_data
 
 # Kinds of sources that give splats at any budget.
@@ -37,6 +38,7 @@ _MAX_SAMPLES = 32
 _contexts = {}
 _stamps = {}
 _models = OrderedDict()
+_reading = {}  # jobs of models that were asked for, by the same keys
 _clouds = OrderedDict()
 
 
@@ -65,6 +67,9 @@ def context():
 
 def forget():
     """Gives all native memory back."""
+    for job in _reading.values():
+        job.close()
+    _reading.clear()
     _clouds.clear()
     _models.clear()
     _contexts.clear()
@@ -126,10 +131,47 @@ def model(path):
     key = _file_key(path)
     known = _models.get(key)
     if known is None:
-        known = Model.load(context(), path)
+        job = _reading.pop(key, None)
+        if job is None:
+            known = Model.load(context(), path)
+        else:
+            job.wait()
+            known = job.model()
         remember_model(path, known)
     _models.move_to_end(key)
     return known
+
+
+def is_at_hand(data, patience):
+    """Whether decoding a datablock's source would not have to read its file first. Where it would, reading begins in the
+    library's own thread, for the next call; patience: seconds that are waited for it."""
+    stipple = data.stipple
+    if stipple.source_kind not in MODEL_KINDS or stipple.is_sequence:
+        return True
+    try:
+        path = absolute_path(stipple.source, data)
+        key = _file_key(path)
+        if key in _models:
+            return True
+        if key not in _reading:
+            _reading[key] = Model.load_start(context(), path)
+    except StippleError:
+        return True  # decoding says what is wrong
+    until = time.perf_counter() + patience
+    while _is_running(_reading[key]):
+        if time.perf_counter() >= until:
+            return False
+        time.sleep(0.001)
+    return True
+
+
+def is_reading():
+    """Whether a file is being read that is_at_hand() has asked for."""
+    return any(_is_running(job) for job in _reading.values())
+
+
+def _is_running(job):
+    return job.poll()[0] == JobState.RUNNING
 
 
 def remember_model(path, loaded):

@@ -176,7 +176,9 @@ def on_limit_change(_scene, _context):
 def follow(obj):
     """Follows a slider: what cannot be written within MOVE_SECONDS is left out until the slider rests."""
     most = int(MOVE_SECONDS / _state['seconds_per_splat'])
-    try_sync(obj, None, 'VIEWPORT', most)
+    # The first move after a file is opened does not wait for a tree of gigabytes either.
+    if sources.is_at_hand(obj.data, MOVE_SECONDS):
+        try_sync(obj, None, 'VIEWPORT', most)
     _complete_later()
 
 
@@ -187,7 +189,9 @@ def _complete_later():
 
 
 def complete():
-    """The slider rests: all splats of the budget. A timer's function: it returns None to end."""
+    """The slider rests: all splats of the budget. A timer's function: it returns when to be called again, None to end."""
+    if sources.is_reading():
+        return REST_SECONDS
     if not _state['rendering']:
         sync_all()
 
