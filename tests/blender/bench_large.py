@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures scans of 3 M and 6 M splats of degree 3, each step in a Blender of its own, and prints a table.
 
-    STIPPLE_BENCH_FOLDER=/somewhere python3 tests/blender/run.py tests/blender/bench_large.py -s [-k '3 and not 6']
+    STIPPLE_BENCH_FOLDER=/somewhere python3 tests/blender/run.py tests/blender/bench_large.py -s [-k 3]
 
-Not a test of the suite: its name keeps it out. It takes about 10 GiB on disk, 12 GiB of main memory and a quarter of an
-hour. Files that are in the folder already are used again; without a folder they go with the end of the run.
+Not a test of the suite: its name keeps it out. It takes 8 GiB on disk and 9 GiB of main memory. Clouds and results that are in
+the folder already are used again, so remove the folder for new ones; without a folder all go with the end of the run.
 """
 
 import json
 import os
 import re
+import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -85,39 +86,38 @@ def _facing(random, normals):
     return np.stack([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s], -1)
 
 
-def run(folder, name, step, again=(), **arguments):
-    """Runs a step of large_steps.py unless what it makes is there; returns its results, with the process's own peak."""
+def run(folder, name, step, makes=(), **arguments):
+    """Runs a step of large_steps.py, unless its results and what it makes are there already."""
     result, given = folder / f'{name}.json', folder / f'{name}_arguments.json'
-    if result.exists() and all(Path(path).exists() for path in again):
-        return json.loads(result.read_text())
+    if result.exists() and all(Path(path).exists() for path in makes):
+        return
     given.write_text(json.dumps(arguments))
     if step == 'window':
         screen_folder = folder / f'{name}_screen'
+        shutil.rmtree(screen_folder, ignore_errors=True)
         screen_folder.mkdir()
         screen.run_steps(Path(large_steps.__file__), screen_folder, bpy.app.binary_path, TIMEOUT, large_steps.SIZE,
                          [str(result), str(given)])
     else:
         wait([bpy.app.binary_path, '--background', '--factory-startup', '--python-exit-code', '70', '--python',
               str(HERE / 'large_steps.py'), '--', step, str(result), str(given)])
-    print(f'{name}: {json.loads(result.read_text())}', flush=True)
-    return json.loads(result.read_text())
+    print(f'{name}: {result.read_text()}', flush=True)
 
 
 def animate(folder, name, blend, engine):
     """What `blender -b FILE -E ENGINE -a` takes, start and reading included, and each frame."""
     result = folder / f'{name}.json'
     if result.exists():
-        return json.loads(result.read_text())
+        return
     begin = time.perf_counter()
     text, work, peak = wait([bpy.app.binary_path, '--background', '--factory-startup', '--addons', 'stipple', blend, '-E', engine,
                        '-o', str(folder / f'{name}_####'), '-s', '1', '-e', str(large_steps.FRAMES), '-a'])
     seconds = time.perf_counter() - begin
     times = [60 * float(m) + float(s) for m, s in re.findall(r'^ ?Time: (\d+):([\d.]+) \(Saving', text, re.MULTILINE)]
     assert len(times) == large_steps.FRAMES, text
-    values = {': all frames': (seconds, work, peak), 'frames': times}
+    values = {'all': (seconds, work, peak), 'frames': times}
     result.write_text(json.dumps(values))
     print(f'{name}: {values}', flush=True)
-    return json.loads(result.read_text())
 
 
 def wait(command):
@@ -138,30 +138,48 @@ def test_scan(stipple, tmp_path, millions):
     if not Path(cloud).exists():
         stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), scan(stipple, millions * 1_000_000)).save(cloud)
     load = os.getloadavg()[0]
-    imported = run(folder, 'import', 'import', (blend,), cloud=cloud, blend=blend)
-    tree = run(folder, 'budget', 'budget', (reduced,), blend=blend, reduced=reduced)
-    views = {name: run(folder, f'view_{name}', 'window', blend=file, all_ellipses=every)
-             for name, file, every in (('points', blend, False), ('ellipses', blend, True), ('budget', reduced, False))}
-    renders = {name: run(folder, f'render_{name}', 'render', blend=file, engine=engine, with_splats=name != 'cycles')
-               for name, file, engine in (('stipple', blend, 'STIPPLE'), ('budget', reduced, 'STIPPLE'),
-                                          ('both', blend, 'STIPPLE_CYCLES'), ('cycles', blend, 'CYCLES'))}
-    series = {engine: animate(folder, f'series_{engine}', blend, engine) for engine in ('STIPPLE', 'STIPPLE_CYCLES')}
+    run(folder, 'import', 'import', (blend,), cloud=cloud, blend=blend)
+    run(folder, 'budget', 'budget', (reduced,), blend=blend, reduced=reduced)
+    for name, file, every in (('points', blend, False), ('ellipses', blend, True), ('budget', reduced, False)):
+        run(folder, f'view_{name}', 'window', blend=file, all_ellipses=every)
+    for name, file, engine in (('stipple', blend, 'STIPPLE'), ('budget', reduced, 'STIPPLE'),
+                               ('both', blend, 'STIPPLE_CYCLES'), ('cycles', blend, 'CYCLES')):
+        run(folder, f'render_{name}', 'render', blend=file, engine=engine, with_splats=name != 'cycles')
+    for engine in ('STIPPLE', 'STIPPLE_CYCLES'):
+        animate(folder, f'series_{engine}', blend, engine)
     print(f'\n{millions} M, load {load:.1f} before and {os.getloadavg()[0]:.1f} after', flush=True)
-    print(table(Path(cloud).stat().st_size, imported, tree, views, renders, series))
+    print(table(sorted(folder.parent.glob('*m'))))
 
 
-def table(size, imported, tree, views, renders, series):
-    """Markdown, one line a measurement."""
-    lines = ['| | seconds | of the processors | main memory at most | of the file |', '|---|---:|---:|---:|---:|']
+# What the table shows: words, file of results, name in it.
+ROWS = (
+    ('import', 'import', 'import'), ('save', 'import', 'save'), ('Add Budget', 'budget', 'tree'),
+    ('open the file in a window', 'view_points', 'open'), ('first view, points', 'view_points', 'first view'),
+    ('first view, ellipses', 'view_ellipses', 'first view'), ('turned view, ellipses', 'view_ellipses', 'turned view'),
+    ('first view of 500,000 by budget, ellipses', 'view_budget', 'first view'),
+    ('slider, first move', 'view_budget', 'slider begins'), ('slider, each further move', 'view_budget', 'slider'),
+    ('redraw of a move', 'view_budget', 'slider drawn'), ('slider rests', 'view_budget', 'slider rests'),
+    ('Rendered shading by Stipple, first coarse picture', 'view_points', 'rendered view'),
+    ('the fine one after it', 'view_points', 'fine view'), ('F12, Stipple', 'render_stipple', 'first'),
+    ('F12, Stipple, all splats by budget', 'render_budget', 'first'), ('F12, Cycles + Stipple', 'render_both', 'first'),
+    ('F12, Cycles without the splats', 'render_cycles', 'first'), ('ten frames of `-b -a`, Stipple', 'series_STIPPLE', 'all'),
+    ('ten frames of `-b -a`, Cycles + Stipple', 'series_STIPPLE_CYCLES', 'all'))
 
-    def add(what, seconds, work, peak):
-        lines.append(f'| {what} | {seconds:.2f} | {work:.2f} | {peak / 1024:.1f} GiB | {peak * 2**20 / size:.1f} |')
 
-    for where, values in (('', imported), ('', tree), *((f'{name}: ', view) for name, view in views.items()),
-                          *((f'F12 {name}: ', render) for name, render in renders.items()), *series.items()):
-        for name, value in values.items():
-            if isinstance(value, list) and len(value) == 3:
-                add(where + name, *value)
-    lines.append(f'| splat file, .blend with all, .blend with the budget, MiB | {size / 2**20:.0f} '
-                 f'| {imported["file"] / 2**20:.0f} | {tree["file"] / 2**20:.0f} | |')
+def table(folders):
+    """Markdown: seconds, processor seconds of all threads, GiB of main memory at most; two columns for each folder."""
+    found = [{path.stem: json.loads(path.read_text()) for path in folder.glob('*.json')} for folder in folders]
+    lines = ['| | ' + ' | '.join(f'{folder.name}: s (of processors) | GiB' for folder in folders) + ' |',
+             '|---|' + '---:|---:|' * len(folders)]
+    for words, file, name in ROWS:
+        cells = []
+        for results in found:
+            seconds, work, peak = results.get(file, {}).get(name, (None, None, None))
+            cells.append('| ' if seconds is None else f'{seconds:.2f} ({work:.2f}) | {peak / 1024:.1f}')
+        lines.append(f'| {words} | ' + ' | '.join(cells) + ' |')
+    for words, path in (('splat file', 'scan.ply'), ('.blend with all splats', 'scan.blend'),
+                        ('.blend with a budget of 500,000', 'budget.blend')):
+        sizes = [folder / path for folder in folders]
+        lines.append(f'| {words} | ' + ' | '.join(
+            f'{size.stat().st_size / 2**20:,.0f} MiB | ' if size.exists() else '| ' for size in sizes) + ' |')
     return '\n'.join(lines)

@@ -132,7 +132,7 @@ def measure_views(window):
 
 
 def move_slider(window):
-    """Moves around BUDGET; the median, as the first ones do not know yet how long a splat takes. Then a rest."""
+    """Moves around BUDGET: the first, which does not know yet how long a splat takes, the median, and the rest after."""
     settings, sync = the_splats().data.stipple, sys.modules['stipple'].scene.sync
     moves = {'slider': [], 'slider drawn': []}
     for move in range(1, MOVES + 1):
@@ -142,6 +142,7 @@ def move_slider(window):
             draw(window)
         for name, values in moves.items():
             values.append(results[name])
+    results['slider begins'] = moves['slider'][0]
     results.update({name: sorted(values)[MOVES // 2] for name, values in moves.items()})
     with measured('slider rests'):
         sync.complete()
