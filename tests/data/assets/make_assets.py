@@ -78,6 +78,22 @@ def hierarchy():
            'frame': 'RUB', 'sh_degree': str(degree), 'settings': '{"views": 16}', 'provenance': 'written by hand'}, tensors)
 
 
+def field():
+    tensors = {'field.features.level3': f32(numbers(8, 8, 1)), 'field.colours.level7': f32(numbers(16, 3, 2)),
+               'field.network.layer0.weights': f32(numbers(16, 64, 3)),
+               'field.network.layer0.biases': f32(numbers(64, 1, 4)[:, 0]),
+               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+    for level, (cells, rows) in enumerate(LEVELS):
+        tensors[f'octree.cells.{level}'] = u64(cells)
+        tensors[f'octree.log_p.{level}'] = f32(logarithms(rows))
+    write('field_1.0.stipple.safetensors',
+          {'stipple_version': '1.0', 'kind': 'field', 'colour_space': 'srgb_rec709_display', 'antialias': 'classic',
+           'frame': 'right-handed, z up, metres', 'root_cube': '[-1.5, 0.25, 2.0, 4.0]', 'levels': '2', 'field_level': '7',
+           'K': '16', 'sh_degree': '2', 'least_anchors': '100', 'most_anchors': '5000', 'jitter': 'none',
+           'settings': '{"iterations": 700}', 'provenance': 'written by hand'}, tensors)
+
+
 if __name__ == '__main__':
     surface()
     hierarchy()
+    field()

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "io/field_asset.h"
 #include "io/hierarchy_asset.h"
 #include "io/surface_asset.h"
 #include "scratch_folder.h"
@@ -52,7 +53,7 @@ void expectExtras(const AssetExtras& extras) {
   EXPECT_EQ(labels.bytes, (std::vector<uint8_t>{1, 0, 0xfe, 0xff, 0x2c, 1, 4, 0}));
 }
 
-void expectSurface(const SurfaceAsset& asset) {
+void expectOctree(const OctreeTensors& asset) {
   EXPECT_EQ(asset.root_origin, (std::array<double, 3>{-1.5, 0.25, 2.0}));
   EXPECT_EQ(asset.root_side, 4.0);
   EXPECT_EQ(asset.cells, (std::vector<std::vector<uint64_t>>{{0}, {0, 5, 7}}));
@@ -61,6 +62,34 @@ void expectSurface(const SurfaceAsset& asset) {
   const double e = 0.125;
   expectLogarithms(asset.log_probabilities[1],
                    {e, e, e, e, e, e, e, e, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.5, 0.5, 0, 0, 0});
+}
+
+void expectField(const FieldAsset& asset) {
+  expectOctree(asset);
+  EXPECT_EQ(asset.field_level, 7);
+  EXPECT_EQ(asset.gaussians, 16u);
+  EXPECT_EQ(asset.sh_degree, 2);
+  EXPECT_EQ(asset.least_anchors, 100u);
+  EXPECT_EQ(asset.most_anchors, 5000u);
+  EXPECT_FALSE(asset.jitter);
+  EXPECT_EQ(asset.colour_space, ColourSpace::kDisplay);
+  EXPECT_EQ(asset.antialias, Antialias::kClassic);
+  const auto expectTensor = [&](const char* name, std::vector<uint64_t> shape,
+                                const std::vector<float>& values) {
+    EXPECT_EQ(asset.tensors.at(name).shape, shape);
+    EXPECT_EQ(std::get<std::vector<float>>(asset.tensors.at(name).values), values);
+  };
+  EXPECT_EQ(asset.tensors.size(), 4u);
+  expectTensor("field.features.level3", {8, 8}, numbers(8, 8, 1));
+  expectTensor("field.colours.level7", {16, 3}, numbers(16, 3, 2));
+  expectTensor("field.network.layer0.weights", {16, 64}, numbers(16, 64, 3));
+  expectTensor("field.network.layer0.biases", {64}, numbers(64, 1, 4));
+  EXPECT_EQ(asset.settings_json, "{\"iterations\": 700}");
+  expectExtras(asset.extras);
+}
+
+void expectSurface(const SurfaceAsset& asset) {
+  expectOctree(asset);
   EXPECT_EQ(asset.surface.positions, numbers(5, 3, 1));
   EXPECT_EQ(asset.surface.normals,
             (std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}));
@@ -106,6 +135,13 @@ TEST_F(GoldenAssets, ReadsAHierarchyOfVersion1AndKeepsAllOfIt) {
   expectHierarchy(asset);
   writeHierarchyAsset(asset, path("again"));
   expectHierarchy(readHierarchyAsset(path("again")));
+}
+
+TEST_F(GoldenAssets, ReadsAFieldOfVersion1AndKeepsAllOfIt) {
+  const FieldAsset asset = readFieldAsset(golden("field_1.0"));
+  expectField(asset);
+  writeFieldAsset(asset, path("again"));
+  expectField(readFieldAsset(path("again")));
 }
 
 TEST_F(GoldenAssets, KeepsTheVersionOfANewerFileAndRefusesTheNextMajorOne) {
