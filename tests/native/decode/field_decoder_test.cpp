@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "decode/anchor_spacing.h"
+#include "decode/cloud_loss.h"
 
 namespace stipple {
 namespace {
@@ -145,28 +146,11 @@ TEST(FieldDecoder, GradientsAreThoseOfDifferences) {
   FieldParameters field = livelyField(4, 1);
   const auto view = std::shared_ptr<const FieldParameters>(&field, [](const FieldParameters*) {});
   const FieldDecoder decoder(view);
-  const auto lossOf = [&](const SplatCloud& cloud, SplatCloud* gradient) {
-    double sum = 0;
-    uint64_t number = 0;
-    const auto add = [&](const std::vector<float>& values, std::vector<float>* by) {
-      for (size_t i = 0; i < values.size(); ++i) {
-        const double factor = unitDouble(keyedBits(7, RandomUse::kFieldStart, number++)) - 0.5;
-        sum += factor * static_cast<double>(values[i]);
-        if (by != nullptr) (*by)[i] = static_cast<float>(factor);
-      }
-    };
-    add(cloud.positions, gradient ? &gradient->positions : nullptr);
-    add(cloud.scales, gradient ? &gradient->scales : nullptr);
-    add(cloud.rotations, gradient ? &gradient->rotations : nullptr);
-    add(cloud.opacities, gradient ? &gradient->opacities : nullptr);
-    add(cloud.sh, gradient ? &gradient->sh : nullptr);
-    return sum;
-  };
   FieldTape tape;
   SplatCloud cloud;
   decoder.forward(anchors, tape, cloud);
   SplatCloud cloud_gradient = cloud;
-  lossOf(cloud, &cloud_gradient);
+  cloudLoss(cloud, &cloud_gradient);
   FieldGradients gradients;
   decoder.backward(anchors, tape, cloud, cloud_gradient, gradients);
   size_t compared = 0;
@@ -179,10 +163,10 @@ TEST(FieldDecoder, GradientsAreThoseOfDifferences) {
     SplatCloud other;
     value = kept + eps;
     decoder.forward(anchors, other_tape, other);
-    const double high = lossOf(other, nullptr);
+    const double high = cloudLoss(other, nullptr);
     value = kept - eps;
     decoder.forward(anchors, other_tape, other);
-    const double low = lossOf(other, nullptr);
+    const double low = cloudLoss(other, nullptr);
     value = kept;
     const double difference = (high - low) / (2 * static_cast<double>(eps));
     EXPECT_NEAR(static_cast<double>(gradient), difference, 2e-3 + 0.01 * std::abs(difference))

@@ -4,10 +4,10 @@
 
 #include <array>
 #include <cmath>
-#include <functional>
 #include <vector>
 
 #include "base/random.h"
+#include "decode/cloud_loss.h"
 
 namespace stipple {
 namespace {
@@ -73,26 +73,6 @@ TEST(SplatLayout, LengthsAreInTheUnitOfTheAnchor) {
   }
 }
 
-/// Sum of random factors times every value of the cloud; quaternions are unit, so their derivative
-/// has no part along them.
-double loss(const SplatCloud& cloud, SplatCloud* gradient) {
-  double sum = 0;
-  uint64_t number = 0;
-  const auto add = [&](const std::vector<float>& values, std::vector<float>* by) {
-    for (size_t i = 0; i < values.size(); ++i) {
-      const double factor = unitDouble(keyedBits(7, RandomUse::kFieldStart, number++)) - 0.5;
-      sum += factor * static_cast<double>(values[i]);
-      if (by != nullptr) (*by)[i] = static_cast<float>(factor);
-    }
-  };
-  add(cloud.positions, gradient ? &gradient->positions : nullptr);
-  add(cloud.rotations, gradient ? &gradient->rotations : nullptr);
-  add(cloud.scales, gradient ? &gradient->scales : nullptr);
-  add(cloud.opacities, gradient ? &gradient->opacities : nullptr);
-  add(cloud.sh, gradient ? &gradient->sh : nullptr);
-  return sum;
-}
-
 TEST(SplatLayout, GradientsAreThoseOfDifferences) {
   const SplatLayout layout = {5, 1};
   const size_t stride = layout.outputs() + 3;
@@ -106,7 +86,7 @@ TEST(SplatLayout, GradientsAreThoseOfDifferences) {
   SplatCloud cloud;
   activateSplats(layout, anchors, raw.data(), stride, cloud);
   SplatCloud gradient = cloud;
-  loss(cloud, &gradient);
+  cloudLoss(cloud, &gradient);
   std::vector<float> raw_gradient(raw.size(), -77.0f);
   activateSplatsBackward(layout, anchors, raw.data(), stride, cloud, gradient, raw_gradient.data());
   for (size_t i = 0; i < raw.size(); ++i) {
@@ -121,10 +101,10 @@ TEST(SplatLayout, GradientsAreThoseOfDifferences) {
     SplatCloud other;
     moved[i] = raw[i] + eps;
     activateSplats(layout, anchors, moved.data(), stride, other);
-    const double high = loss(other, nullptr);
+    const double high = cloudLoss(other, nullptr);
     moved[i] = raw[i] - eps;
     activateSplats(layout, anchors, moved.data(), stride, other);
-    const double low = loss(other, nullptr);
+    const double low = cloudLoss(other, nullptr);
     EXPECT_NEAR(static_cast<double>(raw_gradient[i]), (high - low) / (2 * static_cast<double>(eps)),
                 4e-4)
         << "output " << i % stride;
@@ -142,7 +122,7 @@ TEST(SplatLayout, ExtremeOutputsGiveValidSplats) {
     if (std::abs(value) < 1e20f) {
       EXPECT_NO_THROW(validate(cloud, "cloud")) << value;
     }
-    loss(cloud, &gradient);
+    cloudLoss(cloud, &gradient);
     std::vector<float> raw_gradient(raw.size());
     activateSplatsBackward(layout, {kAnchor, std::span(&unit, 1)}, raw.data(), raw.size(), cloud,
                            gradient, raw_gradient.data());
