@@ -144,6 +144,8 @@ def move_slider(window):
             values.append(results[name])
     results['slider begins'] = moves['slider'][0]
     results.update({name: sorted(values)[MOVES // 2] for name, values in moves.items()})
+    while sys.modules['stipple'].scene.sources.is_reading():
+        time.sleep(0.05)
     with measured('slider rests'):
         sync.complete()
     with measured('slider rests drawn'):
