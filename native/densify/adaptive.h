@@ -15,7 +15,7 @@ struct AdaptiveOptions {
   /// Steps from one edit to the next at least, however short the fit: new splats must have taken
   /// their places, and views been seen, before the pulls say where more are needed; else the count
   /// doubles with every edit.
-  uint64_t least_interval = 50;
+  uint64_t least_interval = 100;
   /// Mean length of the screen gradient, per half picture, from which on a splat is too few for
   /// what it covers. Raising it makes fewer splats.
   double gradient_threshold = 2e-4;

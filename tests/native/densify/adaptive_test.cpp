@@ -285,18 +285,18 @@ TEST(Adaptive, ShortFitsScaleTheScheduleWithinReason) {
     }
     return edits;
   };
-  // Half the length, half the interval.
-  const Edits half = editsOf(15000);
-  EXPECT_EQ(half.count, 144);
-  EXPECT_EQ(half.resets, 4);
-  EXPECT_EQ(half.first, 300u);
-  EXPECT_EQ(half.last, 7450u);
-  // Edits need 50 steps between them, resets 300.
+  // Twice the length, twice the interval.
+  const Edits twice = editsOf(60000);
+  EXPECT_EQ(twice.count, 144);
+  EXPECT_EQ(twice.resets, 4);
+  EXPECT_EQ(twice.first, 1200u);
+  EXPECT_EQ(twice.last, 29800u);
+  // Edits need 100 steps between them, resets 300.
   const Edits tenth = editsOf(3000);
-  EXPECT_EQ(tenth.count, 28);  // 100, 150, ..., 1450
+  EXPECT_EQ(tenth.count, 14);  // 100, 200, ..., 1400
   EXPECT_EQ(tenth.resets, 4);
   const Edits short_one = editsOf(500);
-  EXPECT_EQ(short_one.count, 4);  // 50, 100, 150, 200
+  EXPECT_EQ(short_one.count, 2);  // 100, 200
   EXPECT_EQ(short_one.resets, 0);
   EXPECT_EQ(scaleSchedule(500, 30), 1u);
   EXPECT_EQ(scaleSchedule(100, 1), 1u);
