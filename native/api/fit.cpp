@@ -166,6 +166,14 @@ StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleC
   });
 }
 
+StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model) {
+  return guarded([&] {
+    require(model, "model");
+    ModelParts parts = sessionOf(job).model();
+    *model = new StippleModel{job->context, std::move(parts)};
+  });
+}
+
 StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_utf8) {
   return guarded([&] {
     const FitSession& session = sessionOf(job);

@@ -58,6 +58,8 @@ class FitSession final : public FitObserver {
   Trainer& ended() const;
   /// Of such a fit. May be called by several threads.
   SplatCloud decode(uint64_t budget) const;
+  /// The same as a model. Errors: kUnsupported for explicit splats.
+  ModelParts model() const;
   const FitSettings& settings() const { return settings_; }
   const std::string& settingsJson() const { return settings_json_; }
 

@@ -15,7 +15,7 @@ namespace {
 std::unique_ptr<FitModel> makeModel(const ViewSource& views, const FitViews& split,
                                     const FitSettings& settings, Progress* progress) {
   if (settings.is_field) {
-    fail(ErrorCode::kUnsupported, "this version fits explicit splats only, no field");
+    return makeFieldModel(views, split.training, settings.field_model, progress);
   }
   return makeExplicitModel(views, split.training, settings.explicit_model, progress);
 }
@@ -142,6 +142,20 @@ SplatCloud FitSession::decode(uint64_t budget) const {
   Trainer& trainer = ended();
   std::lock_guard<std::mutex> lock(decode_mutex_);
   return trainer.model().splats(budget);
+}
+
+ModelParts FitSession::model() const {
+  FitModel& model = ended().model();
+  std::optional<FieldResult> learned = fieldResult(model);
+  if (!learned) {
+    fail(ErrorCode::kUnsupported, std::string("the ") + model.name() +
+                                      " model has no field; its splats can be made a hierarchy");
+  }
+  auto notes = std::make_shared<const ModelNotes>(ModelNotes{settings_json_, {}});
+  return {
+      FieldSource{std::make_shared<const OctreeDensity>(std::move(learned->density)),
+                  std::make_shared<const FieldDecoder>(std::move(learned->field)), learned->jitter},
+      std::move(notes)};
 }
 
 }  // namespace stipple::api

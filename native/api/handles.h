@@ -16,6 +16,7 @@
 #include "data/sparse_volume.h"
 #include "data/splat_cloud.h"
 #include "data/tri_mesh.h"
+#include "decode/field_decoder.h"
 #include "decode/hierarchy_decoder.h"
 #include "decode/surface_model.h"
 #include "density/octree_density.h"
@@ -46,9 +47,16 @@ struct ModelNotes {
   AssetExtras extras;
 };
 
-/// A source of splats: of a mesh, or of an existing cloud.
+/// What was learned from views.
+struct FieldSource {
+  std::shared_ptr<const OctreeDensity> density;
+  std::shared_ptr<const FieldDecoder> decoder;
+  bool jitter = true;  ///< anchors are anywhere in their leaf; else in its middle
+};
+
+/// A source of splats: of a mesh, of an existing cloud, or learned.
 struct ModelParts {
-  std::variant<SurfaceModel, std::shared_ptr<const HierarchyDecoder>> source;
+  std::variant<SurfaceModel, std::shared_ptr<const HierarchyDecoder>, FieldSource> source;
   std::shared_ptr<const ModelNotes> notes = {};  ///< null where it was not loaded
 };
 

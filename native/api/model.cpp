@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "api/bounds.h"
+#include "api/field.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/hierarchy.h"
@@ -9,6 +10,7 @@
 #include "base/parallel.h"
 #include "io/asset_header.h"
 #include "io/surface_asset.h"
+#include "train/field_model.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -71,6 +73,29 @@ DecodeSettings decodeSettings(const StippleDecodeOptions* options) {
   return settings;
 }
 
+/// Density and decoder of a model that has both.
+struct Sampled {
+  const OctreeDensity* density;
+  const Decoder* decoder;
+  bool jitter;  ///< anchors are anywhere in their leaf; else in its middle
+};
+Sampled sampledOf(const ModelParts& parts) {
+  if (const FieldSource* field = fieldOf(parts)) {
+    return {field->density.get(), field->decoder.get(), field->jitter};
+  }
+  const auto& surface = std::get<SurfaceModel>(parts.source);
+  return {surface.density.get(), surface.decoder.get(), true};
+}
+
+/// Of a field: its own count of Gaussians where one is asked for, which is the default.
+DecodeSettings settingsFor(const ModelParts& parts, DecodeSettings settings) {
+  const FieldSource* field = fieldOf(parts);
+  if (field && settings.gaussians_per_anchor == 1) {
+    settings.gaussians_per_anchor = field->decoder->field().layout.gaussians;
+  }
+  return settings;
+}
+
 std::shared_ptr<const SplatCloud> decode(const ModelParts& parts, const DecodeSettings& settings,
                                          Progress* progress) {
   if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
@@ -79,8 +104,10 @@ std::shared_ptr<const SplatCloud> decode(const ModelParts& parts, const DecodeSe
     request.gaussians_per_anchor = settings.gaussians_per_anchor;
     return std::make_shared<const SplatCloud>((*hierarchy)->decode(request));
   }
-  const auto& model = std::get<SurfaceModel>(parts.source);
-  const AnchorSet anchors = sampleAnchors(*model.density, settings.sampling, progress);
+  const Sampled model = sampledOf(parts);
+  const AnchorSet anchors = model.jitter
+                                ? sampleAnchors(*model.density, settings.sampling, progress)
+                                : fieldAnchors(*model.density, settings.sampling, false);
   DecodeRequest request;
   request.anchors = &anchors;
   request.gaussians_per_anchor = settings.gaussians_per_anchor;
@@ -93,7 +120,7 @@ uint64_t decodeMemoryBound(const ModelParts& parts, const DecodeSettings& settin
   if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
     return (*hierarchy)->memoryBound(settings.sampling.count, settings.gaussians_per_anchor);
   }
-  const auto& model = std::get<SurfaceModel>(parts.source);
+  const Sampled model = sampledOf(parts);
   return sampleMemoryBound(settings.sampling.count, settings.sampling.with_ranks) +
          model.decoder->memoryBound(settings.sampling.count, settings.gaussians_per_anchor);
 }
@@ -102,15 +129,7 @@ SurfaceAsset toAsset(const SurfaceModel& model, const ModelNotes& notes) {
   SurfaceAsset asset;
   asset.settings_json = notes.settings_json;
   asset.extras = notes.extras;
-  const OctreeDensity& density = *model.density;
-  asset.root_origin = density.root().origin;
-  asset.root_side = density.root().side;
-  for (int level = 0; level < density.leafLevel(); ++level) {
-    const auto cells = density.cells(level);
-    const auto log_probabilities = density.logProbabilities(level);
-    asset.cells.emplace_back(cells.begin(), cells.end());
-    asset.log_probabilities.emplace_back(log_probabilities.begin(), log_probabilities.end());
-  }
+  static_cast<OctreeTensors&>(asset) = octreeOf(*model.density);
   asset.surface = *model.surface;
   return asset;
 }
@@ -133,7 +152,9 @@ ModelParts loadSurface(const std::string& path) {
 }
 
 ModelParts loaded(const std::string& path) {
-  return readAssetKind(path) == kAssetHierarchy ? loadHierarchy(path) : loadSurface(path);
+  const std::string kind = readAssetKind(path);
+  if (kind == kAssetHierarchy) return loadHierarchy(path);
+  return kind == kAssetField ? loadField(path) : loadSurface(path);
 }
 
 }  // namespace
@@ -202,6 +223,8 @@ StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf
     const ModelNotes notes = parts.notes ? *parts.notes : ModelNotes();
     if (const Hierarchy* hierarchy = hierarchyOf(parts)) {
       saveHierarchy(**hierarchy, notes, path);
+    } else if (const FieldSource* field = fieldOf(parts)) {
+      saveField(*field, notes, path);
     } else {
       writeSurfaceAsset(toAsset(std::get<SurfaceModel>(parts.source), notes), path);
     }
@@ -222,6 +245,20 @@ StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* in
       out.leaf_count = leaves.size();
       out.sh_degree = static_cast<uint32_t>(leaves.sh_degree);
       fillBounds(leaves.positions, out.bounds_min, out.bounds_max);
+    } else if (const FieldSource* field = fieldOf(parts)) {
+      const FieldParameters& learned = field->decoder->field();
+      out.kind = STIPPLE_MODEL_FIELD;
+      out.leaf_level = static_cast<uint32_t>(field->density->leafLevel());
+      out.leaf_count = field->density->leafCount();
+      out.sh_degree = static_cast<uint32_t>(learned.layout.sh_degree);
+      out.gaussians_per_anchor = learned.layout.gaussians;
+      out.least_anchors = learned.least_anchors;
+      out.most_anchors = learned.most_anchors;
+      const RootCube& root = field->density->root();
+      for (size_t axis = 0; axis < 3; ++axis) {
+        out.bounds_min[axis] = static_cast<float>(root.origin[axis]);
+        out.bounds_max[axis] = static_cast<float>(root.origin[axis] + root.side);
+      }
     } else {
       const auto& surface = std::get<SurfaceModel>(parts.source);
       out.kind = STIPPLE_MODEL_SURFACE;
@@ -238,12 +275,14 @@ StippleStatus stipple_model_density(const StippleModel* model, StippleDensity** 
   return guarded([&] {
     require(model, "model");
     require(density, "density");
-    const auto* surface = std::get_if<SurfaceModel>(&model->parts.source);
-    if (!surface) {
+    if (hierarchyOf(model->parts)) {
       fail(ErrorCode::kUnsupported,
            "this model is the hierarchy of a cloud and has no density; that of a mesh has one");
     }
-    *density = new StippleDensity{model->context, surface->density};
+    const FieldSource* field = fieldOf(model->parts);
+    *density = new StippleDensity{
+        model->context,
+        field ? field->density : std::get<SurfaceModel>(model->parts.source).density};
   });
 }
 
@@ -252,7 +291,7 @@ StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecod
   return guarded([&] {
     require(model, "model");
     require(cloud, "cloud");
-    const DecodeSettings settings = decodeSettings(options);
+    const DecodeSettings settings = settingsFor(model->parts, decodeSettings(options));
     model->context->requireMemory(decodeMemoryBound(model->parts, settings), "this budget");
     withThreads(model->context->thread_count, [&] {
       *cloud = new StippleCloud{model->context, decode(model->parts, settings, nullptr)};
@@ -265,7 +304,7 @@ StippleStatus stipple_model_decode_start(const StippleModel* model,
   return guarded([&] {
     require(model, "model");
     require(job, "job");
-    const DecodeSettings settings = decodeSettings(options);
+    const DecodeSettings settings = settingsFor(model->parts, decodeSettings(options));
     model->context->requireMemory(decodeMemoryBound(model->parts, settings), "this budget");
     const ModelParts parts = model->parts;
     *job = startJob(model->context, [parts, settings](Progress& progress) -> JobResult {
@@ -279,7 +318,8 @@ StippleStatus stipple_model_decode_memory_bound(const StippleModel* model,
                                                 uint64_t* bytes) {
   return guarded([&] {
     require(model, "model");
-    require(bytes, "bytes") = decodeMemoryBound(model->parts, decodeSettings(options));
+    require(bytes, "bytes") =
+        decodeMemoryBound(model->parts, settingsFor(model->parts, decodeSettings(options)));
   });
 }
 

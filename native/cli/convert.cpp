@@ -44,7 +44,7 @@ Source sourceOf(const Context& context, const std::string& path) {
     check(stipple_model_info(source.hierarchy.get(), &model));
     if (model.kind != STIPPLE_MODEL_HIERARCHY) {
       throw Failure("'" + path +
-                    "' holds the surface of a mesh and no splats; stipple decode makes them");
+                    "' holds a model of any budget and no splats; stipple decode makes them");
     }
     source.cloud = cutOf(source.hierarchy, model.leaf_count);
   }

@@ -208,11 +208,16 @@ bool watch(const Job& job) {
 }
 
 void save(const Context& context, const Job& job, const Arguments& arguments, uint32_t model) {
+  const bool is_asset = !hasSplatEnding(arguments.out);
+  if (model == STIPPLE_FIT_FIELD && is_asset) {
+    const auto field = make<Model>(stipple_fit_model, job.get());
+    check(stipple_model_save(field.get(), arguments.out.c_str()));
+    return;
+  }
   const uint64_t budget = arguments.budget ? counted(*arguments.budget, "--budget") : 0;
   auto cloud = make<Cloud>(stipple_fit_cloud, job.get(), budget);
   auto info = sized<StippleCloudInfo>();
   check(stipple_cloud_info(cloud.get(), &info));
-  const bool is_asset = !hasSplatEnding(arguments.out);
   if (model == STIPPLE_FIT_EXPLICIT && (is_asset || (budget > 0 && budget < info.count))) {
     const Model tree = hierarchyOf(context, cloud, arguments.seed);
     if (is_asset) {

@@ -58,6 +58,18 @@ Report describeModel(const Context& context, const std::string& path) {
     report.add("bounds_max", info.bounds_max);
     return report;
   }
+  if (info.kind == STIPPLE_MODEL_FIELD) {
+    report.add("kind", "learned field");
+    report.add("least_anchors", info.least_anchors);
+    report.add("most_anchors", info.most_anchors);
+    report.add("gaussians_per_anchor", uint64_t{info.gaussians_per_anchor});
+    report.add("harmonic_degree", uint64_t{info.sh_degree});
+    report.add("leaf_level", uint64_t{info.leaf_level});
+    report.add("leaves", info.leaf_count);
+    report.add("bounds_min", info.bounds_min);
+    report.add("bounds_max", info.bounds_max);
+    return report;
+  }
   report.add("kind", "surface model");
   report.add("leaf_level", uint64_t{info.leaf_level});
   report.add("leaves", info.leaf_count);

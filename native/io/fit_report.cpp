@@ -155,10 +155,13 @@ std::vector<PlotPanel> fitPlots(const FitHistory& history) {
   quality.lines = {measuredCurve(history.measures, "PSNR", &FitMeasure::psnr, false)};
   panels.push_back(std::move(quality));
 
-  PlotPanel budgets{
-      std::string("Quality by budget, ") + views, "splats", "PSNR, dB", true, false, false, {}};
-  budgets.lines = {measuredCurve(history.by_budget, "PSNR", &FitMeasure::psnr, true)};
-  panels.push_back(std::move(budgets));
+  // One budget is a number, not a curve.
+  if (history.by_budget.size() != 1) {
+    PlotPanel budgets{
+        std::string("Quality by budget, ") + views, "splats", "PSNR, dB", true, false, false, {}};
+    budgets.lines = {measuredCurve(history.by_budget, "PSNR", &FitMeasure::psnr, true)};
+    panels.push_back(std::move(budgets));
+  }
 
   PlotPanel counts{"Splats", "iteration", "splats", false, false, true, {}};
   counts.lines = {curveOf(

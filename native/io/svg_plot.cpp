@@ -93,6 +93,14 @@ std::string tickText(double value) {
   return format("%.4g", value);
 }
 
+/// Lines of the legend: none where there is but one curve to name.
+size_t legendCount(const PlotPanel& panel) {
+  const auto count =
+      static_cast<size_t>(std::count_if(panel.lines.begin(), panel.lines.end(),
+                                        [](const PlotLine& line) { return !line.label.empty(); }));
+  return count < 2 ? 0 : count;
+}
+
 Axis axisOf(const PlotPanel& panel, bool along_x, bool& is_empty) {
   Axis axis;
   axis.is_logarithmic = along_x ? panel.x_is_logarithmic : panel.y_is_logarithmic;
@@ -115,7 +123,10 @@ Axis axisOf(const PlotPanel& panel, bool along_x, bool& is_empty) {
   }
   const double margin = along_x ? 0 : 0.05 * (high - low);
   axis.low = low == 0 ? 0 : low - margin;
-  axis.high = high + margin;
+  // A legend stands above the curves, 15 units a line.
+  const size_t named = along_x ? 0 : legendCount(panel);
+  const double legend = named == 0 ? 0 : 15.0 * static_cast<double>(named) + 4;
+  axis.high = high + margin + legend / (kPanelHeight - kTop - kBottom - legend) * (high - low);
   return axis;
 }
 
@@ -167,9 +178,8 @@ void addAxes(std::string& out, const PlotPanel& panel, const Axis& x, const Axis
 }
 
 void addLegend(std::string& out, const PlotPanel& panel, const Axis& x, const Axis& y) {
-  const long labelled = std::count_if(panel.lines.begin(), panel.lines.end(),
-                                      [](const PlotLine& line) { return !line.label.empty(); });
-  if (labelled < 2) return;
+  const size_t labelled = legendCount(panel);
+  if (labelled == 0) return;
   double widest = 0;
   for (const PlotLine& line : panel.lines) {
     widest = std::max(widest, 6.2 * static_cast<double>(line.label.size()));

@@ -10,7 +10,8 @@ import pytest
 
 from stipple.binding.errors import CancelledError, StippleError
 from stipple.binding.fit import Fit, fit_memory_bound, fit_options
-from stipple.binding.structs import ColourSpace, FitModel, FitQuality, StippleCamera, Transfer
+from stipple.binding.model import DecodeSettings
+from stipple.binding.structs import ColourSpace, FitModel, FitQuality, ModelKind, StippleCamera, Transfer
 from stipple.binding.views import Views
 
 
@@ -72,6 +73,17 @@ def test_a_cancel_keeps_the_best(context, views):
     with pytest.raises(CancelledError):
         fit.wait()
     assert fit.result().info().count > 0
+
+
+def test_a_field_decodes_at_any_budget(context, views):
+    fit = Fit.start(context, views, options(context, model=FitModel.FIELD, iterations=30, least_anchors=16, most_anchors=64,
+                                            gaussians_per_anchor=4))
+    fit.wait()
+    assert fit.result(32).info().count == 128
+    model = fit.model()
+    info = model.info()
+    assert (info.kind, info.most_anchors, info.gaussians_per_anchor) == (ModelKind.FIELD, 64, 4)
+    assert model.decode(DecodeSettings(anchors=20)).info().count == 80
 
 
 def test_resumes_only_the_same_fit(context, views, tmp_path):

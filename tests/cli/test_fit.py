@@ -74,6 +74,22 @@ def test_a_model_decodes_at_any_budget(dataset, tmp_path):
     assert json.loads(run('info', tmp_path / 'cut.ply', '--json').stdout)['count'] == 30
 
 
+def test_a_field_decodes_at_any_budget(dataset, tmp_path):
+    model = tmp_path / 'f.stipple.safetensors'
+    few = ('--model', 'field', '--iterations', 40, '--anchors', 64, '--gaussians-per-anchor', 4)
+    run('fit', dataset, model, *few, '--report', tmp_path / 'r.json')
+    seen = json.loads(run('info', model, '--json').stdout)
+    assert (seen['kind'], seen['most_anchors'], seen['gaussians_per_anchor']) == ('learned field', 64, 4)
+    for anchors in (16, 200):
+        run('decode', model, tmp_path / 'out.ply', '--anchors', anchors)
+        assert json.loads(run('info', tmp_path / 'out.ply', '--json').stdout)['count'] == 4 * anchors
+    report = json.loads((tmp_path / 'r.json').read_text())
+    assert report['measures'][-1]['density_entropy'] > 0
+    assert [row['budget'] for row in report['by_budget']] == [64]
+    run('fit', dataset, tmp_path / 'small.ply', *few, '--budget', 20)
+    assert json.loads(run('info', tmp_path / 'small.ply', '--json').stdout)['count'] == 80
+
+
 def start(*arguments):
     return subprocess.Popen([TOOL, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 

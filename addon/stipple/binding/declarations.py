@@ -163,6 +163,7 @@ FUNCTIONS = {
     'stipple_fit_note': (_status, [_handle, c_uint64, POINTER(c_char_p)]),
     'stipple_fit_preview': (_status, [_handle, _out_handle]),
     'stipple_fit_cloud': (_status, [_handle, c_uint64, _out_handle]),
+    'stipple_fit_model': (_status, [_handle, _out_handle]),
     'stipple_fit_report_save': (_status, [_handle, _path]),
     # volumes
     'stipple_voxelize_options_init': (None, [_to(s.StippleVoxelizeOptions)]),

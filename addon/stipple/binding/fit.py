@@ -66,6 +66,11 @@ class Fit(Job):
         """The best splats, at a budget where the model has budgets; 0: the largest."""
         return Cloud(self.library, new_handle(self.library, 'stipple_fit_cloud', self.pointer, budget))
 
+    def model(self):
+        """A field as a model for any budget; of explicit splats Model.from_cloud_start(result()) makes one."""
+        from .model import Model
+        return Model(self.library, new_handle(self.library, 'stipple_fit_model', self.pointer))
+
     def save_report(self, path):
         """JSON at path, and its curves under the same name with the ending .svg."""
         self._check(self.library.stipple_fit_report_save(self.pointer, path_bytes(path)))

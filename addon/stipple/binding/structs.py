@@ -94,6 +94,7 @@ class ViewRig(IntEnum):
 class ModelKind(IntEnum):
     SURFACE = 0
     HIERARCHY = 1
+    FIELD = 2
 
 
 class CameraModel(IntEnum):
@@ -308,7 +309,8 @@ class StippleRefineOptions(_Sized):
 class StippleModelInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('leaf_count', c_uint64),
                 ('sample_count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3),
-                ('kind', c_uint32), ('sh_degree', c_uint32)]
+                ('kind', c_uint32), ('sh_degree', c_uint32), ('least_anchors', c_uint64), ('most_anchors', c_uint64),
+                ('gaussians_per_anchor', c_uint32), ('reserved', c_uint32)]
 
 
 class StippleDecodeOptions(_Sized):

@@ -501,7 +501,8 @@ void stipple_model_from_cloud_options_init(StippleModelFromCloudOptions* options
 
 typedef enum StippleModelKind {
   STIPPLE_MODEL_SURFACE = 0,  /* of a mesh: density and surface */
-  STIPPLE_MODEL_HIERARCHY = 1 /* of a cloud: its merge tree; any budget up to its count */
+  STIPPLE_MODEL_HIERARCHY = 1, /* of a cloud: its merge tree; any budget up to its count */
+  STIPPLE_MODEL_FIELD = 2     /* learned from views: density and a field of attributes */
 } StippleModelKind;
 
 typedef struct StippleModelInfo {
@@ -513,6 +514,10 @@ typedef struct StippleModelInfo {
   float bounds_max[3];
   uint32_t kind;          /* StippleModelKind */
   uint32_t sh_degree;     /* of the splats that it makes */
+  uint64_t least_anchors; /* field: budgets that it was trained for, else 0 */
+  uint64_t most_anchors;
+  uint32_t gaussians_per_anchor; /* field: splats that it makes of an anchor; else 0 */
+  uint32_t reserved;
 } StippleModelInfo;
 
 typedef struct StippleDecodeOptions {
@@ -520,7 +525,8 @@ typedef struct StippleDecodeOptions {
   uint32_t order;                 /* StippleAnchorOrder, default systematic */
   uint64_t anchor_count;          /* P, 1..STIPPLE_MAX_ANCHORS, default 20,000; of a hierarchy: up to its count */
   uint64_t seed;
-  uint32_t gaussians_per_anchor;  /* K, 1..32, default 1; of a hierarchy: 1 */
+  uint32_t gaussians_per_anchor;  /* K, 1..32, default 1; of a hierarchy: 1; of a field: 1, which stands for
+                                     its own count, or that */
   uint32_t reserved;
 } StippleDecodeOptions;
 void stipple_decode_options_init(StippleDecodeOptions* options);
@@ -1165,6 +1171,9 @@ StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud);
  * budget (anchors of a field; 0: the largest; explicit splats have one size). INVALID_ARGUMENT where no step was
  * taken. */
 StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud);
+/* The same of a field as a model, which stipple_model_save writes and stipple_model_decode turns into splats at any
+ * budget. UNSUPPORTED for explicit splats: stipple_model_from_cloud_start makes a model of their cloud. */
+StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model);
 /* The story of a job that has ended: JSON at path_utf8, and its curves as SVG beside it, under the same name with
  * the ending .svg. Errors: IO; INVALID_ARGUMENT where no step was taken. */
 StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_utf8);
