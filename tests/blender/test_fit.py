@@ -74,6 +74,18 @@ def test_the_same_fit_twice_gives_the_same_splats(stipple, ball, tmp_path):
     assert np.array_equal(first.positions, again.positions) and np.array_equal(first.sh, again.sh)
 
 
+def test_a_field_decodes_at_any_budget(stipple, ball):
+    settings(model='FIELD', view_count=6, view_size=32)
+    obj = fitted()
+    data = obj.data.stipple
+    assert data.source_kind == 'MODEL' and data.gaussians_per_anchor >= 4
+    splats_each = data.gaussians_per_anchor
+    assert stipple.scene.splat_data.count(obj.data) == data.anchors * splats_each
+    for anchors in (200, 700):
+        data.anchors = anchors
+        assert stipple.scene.splat_data.count(obj.data) == anchors * splats_each
+
+
 def test_scene_cameras_serve_as_views(stipple, ball):
     for i in range(5):
         angle = i * 1.2566
@@ -101,7 +113,7 @@ def test_a_cancel_while_it_fits_keeps_the_best(ball, fitting):
         task.poll()
     task.cancel()
     task.wait()
-    assert task.result.count > 0 and fitting.state.figures.iteration < fitting.state.figures.iterations
+    assert task.result.splats.count > 0 and fitting.state.figures.iteration < fitting.state.figures.iterations
 
 
 def test_ending_at_once_puts_the_scene_back(ball, fitting):

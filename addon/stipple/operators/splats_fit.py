@@ -64,9 +64,15 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
         if obj is None:
             obj = splat_data.new_object(result.name, splat_data.new_data(result.name))
             context.collection.objects.link(obj)
+        stipple = obj.data.stipple
         with sync.paused():
-            sources.attach_tree(obj.data, result.path, result.count)
-            obj.data.stipple.ratio = obj.data.stipple.ratio_render = 1.0
+            if result.kind == 'TREE':
+                sources.attach_tree(obj.data, result.path, result.splats.count)
+                stipple.ratio = stipple.ratio_render = 1.0
+            else:
+                stipple.anchors, stipple.seed = result.decoding.anchors, result.decoding.seed
+                stipple.gaussians_per_anchor = result.decoding.gaussians_per_anchor
+                sources.attach_model(obj.data, result.path, [])
         sync.write_decoded(obj.data, result.splats)
         if not bpy.app.background:
             obj[PROPOSED_KEY] = True
@@ -74,7 +80,7 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
             self.report({'WARNING'}, note)
         figures = fitting.state.figures
         quality = f', {figures.best_psnr:.1f} dB on held-out views' if figures.best_psnr == figures.best_psnr else ''
-        self.report({'INFO'}, f"{result.count:,} splats in '{obj.name}'{quality}")
+        self.report({'INFO'}, f"{result.splats.count:,} splats in '{obj.name}'{quality}")
         _redraw(context)
 
     def _show(self, context):

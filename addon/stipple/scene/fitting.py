@@ -41,9 +41,8 @@ class Result:
     name: str
     splats: object      # SplatArrays at the budget of the viewport
     path: str           # of the asset file
-    model: object
-    count: int          # splats at most
-    kind: str           # source kind: 'TREE' or 'MODEL'
+    decoding: object    # DecodeSettings of these splats
+    kind: str           # source kind: 'TREE', or 'MODEL' of a field
 
 
 class FitTask:
@@ -188,18 +187,26 @@ class FitTask:
             state.notes = tuple(self.job.notes())
             if not state.figures.iteration:
                 self.job.wait()  # says why
-            cloud = self.job.result()
+            is_field = settings.model == 'FIELD'
+            made = self.job.model() if is_field else self.job.result()
             if settings.report:
                 self.job.save_report(bpy.path.abspath(settings.report))
         finally:
             self.job = None
-        yield _FIT_END, 'Making the budget slider'
-        job = Model.from_cloud_start(self._native, cloud, seed=settings.seed)
+        yield _FIT_END, 'Keeping the result'
+        if is_field:
+            info = made.info()
+            decoding = DecodeSettings(info.most_anchors, info.gaussians_per_anchor, seed=settings.seed)
+            self._keep(made, decoding, 'MODEL')
+            return
+        job = Model.from_cloud_start(self._native, made, seed=settings.seed)
         yield from self._until_done(job, _FIT_END, 1.0)
-        model, count = job.model(), cloud.info().count
+        self._keep(job.model(), DecodeSettings(made.info().count), 'TREE')
+
+    def _keep(self, model, decoding, kind):
         path = sources.save_model(model, self._path or sources.model_path_for(state.name), bool(self._path))
         sources.remember_model(path, model)
-        self.result = Result(state.name, cloud.read(), path, model, count, 'TREE')
+        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, kind)
 
     def _until_done(self, job, start, end):
         while True:
