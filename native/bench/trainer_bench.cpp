@@ -17,11 +17,11 @@ namespace {
 
 constexpr SplatCase kCases[] = {
     {"15k_256x464", 15000, 256, 464, 0, 1.0},
-    {"150k_800x800", 150000, 800, 800, 0, 1.0},
+    {"50k_800x800", 50000, 800, 800, 0, 1.0},
 };
 constexpr size_t kViews = 8;
-constexpr uint64_t kSteps = 24;
-constexpr int kRounds = 4;
+constexpr uint64_t kSteps = 16;
+constexpr int kRounds = 3;
 
 /// Pictures of the scene, with alpha, whose points are its splats.
 std::shared_ptr<const ViewSource> viewsOf(const SplatCase& c) {
