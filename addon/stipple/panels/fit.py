@@ -88,9 +88,10 @@ def _draw_running(layout, state):
 
 def _draw_figures(layout, figures):
     column = layout.column(align=True)
-    column.label(text=f"Step {figures.iteration:,} of {figures.iterations:,}, {figures.splat_count:,} splats")
+    column.label(text=f"Step {figures.iteration:,} of {figures.iterations:,}")
+    column.label(text=f"{figures.splat_count:,} splats")
     if figures.psnr == figures.psnr:
-        column.label(text=f"{figures.psnr:.1f} dB on held-out views, best {figures.best_psnr:.1f} dB")
+        column.label(text=f"{figures.psnr:.1f} dB held out, best {figures.best_psnr:.1f} dB")
     if figures.estimated_bytes:
         column.label(text=f"About {figures.estimated_seconds:.0f} s in all, {figures.estimated_bytes / 2**20:,.0f} MiB")
     if 0 < figures.iteration < figures.iterations:
