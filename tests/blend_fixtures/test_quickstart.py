@@ -55,7 +55,7 @@ def readme_block(language):
 def test_files_are_there_and_hold_what_they_say(quickstart, environment):
     out, _ = quickstart
     kinds = {'mesh.png': 'picture', 'splats_2000.png': 'picture', 'splats_10000.png': 'picture', 'splats_50000.png': 'picture',
-             'volume.png': 'picture', 'suzanne.ply': 'splats', 'suzanne.vdb': 'volume', 'transforms.json': 'cameras',
+             'volume.png': 'picture', 'suzanne.ply': 'splats', 'suzanne.vdb': 'volume', 'transforms.json': 'data set',
              'suzanne.stipple.safetensors': 'surface model'}
     for name, kind in kinds.items():
         info = subprocess.run(['stipple', 'info', str(out / name), '--json'], env=environment, capture_output=True,
