@@ -70,7 +70,7 @@ def test_suzanne(stipple, tmp_path, model):
     seconds = time.perf_counter() - start
     figures = fitting.state.figures
     result = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
-    cloud = stipple.scene.sources.whole_cloud(result.data)
+    cloud = stipple.scene.sources.decode_data(result.data, stipple.scene.sources.decode_settings(result.data.stipple))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     poses = rigs.around(bpy.context.scene, depsgraph, rigs.bounds_of([obj], depsgraph), HELD_OUT, seed=5)
     renderer = binding.Renderer(stipple.scene.sources.context())
@@ -88,7 +88,7 @@ def test_suzanne(stipple, tmp_path, model):
             if 'STIPPLE_FIT_PICTURES' in os.environ and i < 2:
                 save(os.path.join(os.environ['STIPPLE_FIT_PICTURES'], f'{model.lower()}_{i}.png'), wanted, got)
     print(f'\nSuzanne, {model}: {seconds:.1f} s in all (target {TARGET_SECONDS} s, ratio {TARGET_SECONDS / seconds:.2f}x), '
-          f'{figures.seconds:.1f} s of them {figures.iteration} steps; {result.data.stipple.source_count:,} splats; '
+          f'{figures.seconds:.1f} s of them {figures.iteration} steps; {cloud.info().count:,} splats; '
           f'held-out views over black {np.mean(black):.2f} dB (target {TARGET_PSNR} dB), foreground '
           f'{np.mean(foreground):.2f} dB; trainer measured {figures.best_psnr:.2f} dB', flush=True)
 
