@@ -3,6 +3,7 @@
 
 import importlib
 import json
+import os
 
 import bpy
 import numpy as np
@@ -84,6 +85,13 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     for anchors in (200, 700):
         data.anchors = anchors
         assert stipple.scene.splat_data.count(obj.data) == anchors * splats_each
+    path = bpy.path.abspath(data.source)
+    moved = os.path.join(os.path.dirname(path), 'moved.stipple.safetensors')
+    os.rename(path, moved)
+    scenes.select(obj)
+    assert bpy.ops.stipple.relink(filepath=moved) == {'FINISHED'} and 'moved' in data.source
+    data.anchors = 300
+    assert stipple.scene.splat_data.count(obj.data) == 300 * splats_each
 
 
 def test_scene_cameras_serve_as_views(stipple, ball):

@@ -63,8 +63,9 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
         kind = stipple.source_kind
         made = job.cloud() if kind == 'CLOUD' else job.model()
         info = made.info()
-        if kind != 'CLOUD' and info.kind != (ModelKind.HIERARCHY if kind == 'TREE' else ModelKind.SURFACE):
-            raise invalid(f"'{self._path}' holds {'splats with a budget' if kind == 'MODEL' else 'splats of a mesh'}, "
+        if kind != 'CLOUD' and (info.kind == ModelKind.HIERARCHY) != (kind == 'TREE'):
+            holds = 'splats with a budget' if kind == 'MODEL' else 'splats of a mesh or a field'
+            raise invalid(f"'{self._path}' holds {holds}, "
                           f"but '{data.name}' was made the other way; import it as an object of its own.")
         count = info.count if kind == 'CLOUD' else info.leaf_count
         clears_mask = False
