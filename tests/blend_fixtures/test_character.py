@@ -4,12 +4,9 @@ The stored pictures were looked at: the character stands behind the one column o
 shadow on the floor, and is a hole in the picture of the engine Stipple. What lacks the shadow, or has the character
 before both columns, must not pass.
 """
-import os
-import subprocess
-
 import pytest
 
-from test_pictures import BLENDER, BLENDER_SECONDS, FIXTURES, compare, scripts  # noqa: F401 (a fixture)
+from test_pictures import FIXTURES, compare, render, scripts  # noqa: F401 (a fixture)
 
 # Path tracing: another Blender has another noise. 5.2.2 gets 43.5 dB against 3.4.1's picture; without the shadow it is
 # 30.8 dB, and 21.4 dB with the character before both columns.
@@ -21,13 +18,7 @@ MATTE_FLOOR_DB = 50.0
 @pytest.fixture(scope='module')
 def pictures(scripts, tmp_path_factory):  # noqa: F811
     out = tmp_path_factory.mktemp('character')
-    command = [BLENDER, '-b', '--factory-startup', '--addons', 'stipple', '--python-exit-code', '1', '--python',
-               str(FIXTURES / 'render_character.py'), '--', str(out)]
-    environment = {key: value for key, value in os.environ.items() if key != 'STIPPLE_LIBRARY'}
-    environment.update(BLENDER_USER_SCRIPTS=str(scripts), PATH=f"/usr/bin:{os.environ['PATH']}")
-    result = subprocess.run(command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                            timeout=BLENDER_SECONDS)
-    assert result.returncode == 0, result.stdout[-4000:]
+    render('render_character.py', scripts, out)
     return out
 
 

@@ -56,18 +56,24 @@ def scripts(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope='module', params=SCENES)
-def scene(request, scripts, tmp_path_factory):
-    """(name, folder of its pictures), rendered once."""
-    out = tmp_path_factory.mktemp(request.param)
+def render(script, scripts, *arguments):
+    """Runs a script of blend-fixtures in background Blender, with the add-on of a scripts folder."""
     command = [BLENDER, '-b', '--factory-startup', '--addons', 'stipple', '--python-exit-code', '1', '--python',
-               str(FIXTURES / 'render_splats.py'), '--', str(FIXTURES / f'{request.param}.blend'), str(out)]
+               str(FIXTURES / script), '--', *map(str, arguments)]
     # The zip's own library, not one that the environment names; Debian's Blender asks the first python3 in PATH
     # where its modules are.
     environment = {key: value for key, value in os.environ.items() if key != 'STIPPLE_LIBRARY'}
     environment.update(BLENDER_USER_SCRIPTS=str(scripts), PATH=f"/usr/bin:{os.environ['PATH']}")
-    result = subprocess.run(command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=BLENDER_SECONDS)
+    result = subprocess.run(command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                            timeout=BLENDER_SECONDS)
     assert result.returncode == 0, result.stdout[-4000:]
+
+
+@pytest.fixture(scope='module', params=SCENES)
+def scene(request, scripts, tmp_path_factory):
+    """(name, folder of its pictures), rendered once."""
+    out = tmp_path_factory.mktemp(request.param)
+    render('render_splats.py', scripts, FIXTURES / f'{request.param}.blend', out)
     return request.param, out
 
 

@@ -1,10 +1,7 @@
 """The ten frames of a series of splat files, rendered in background Blender, against stored pictures."""
-import os
-import subprocess
-
 import pytest
 
-from test_pictures import BLENDER, BLENDER_SECONDS, FIXTURES, STORED_FLOOR_DB, compare, scripts  # noqa: F401
+from test_pictures import FIXTURES, STORED_FLOOR_DB, compare, render, scripts  # noqa: F401 (a fixture)
 
 FRAMES = range(1, 11)
 
@@ -13,12 +10,7 @@ FRAMES = range(1, 11)
 def rendered(scripts, tmp_path_factory):  # noqa: F811
     """The folder of the pictures."""
     out = tmp_path_factory.mktemp('series')
-    environment = {key: value for key, value in os.environ.items() if key != 'STIPPLE_LIBRARY'}
-    environment.update(BLENDER_USER_SCRIPTS=str(scripts), PATH=f"/usr/bin:{os.environ['PATH']}")
-    result = subprocess.run([BLENDER, '-b', '--factory-startup', '--addons', 'stipple', '--python-exit-code', '1',
-                             '--python', str(FIXTURES / 'render_series.py'), '--', str(out)], env=environment, text=True,
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=BLENDER_SECONDS)
-    assert result.returncode == 0, result.stdout[-4000:]
+    render('render_series.py', scripts, out)
     return out
 
 

@@ -3,12 +3,11 @@
 The stored pictures were looked at: the two rings pass through each other link by link, the blue one half transparent;
 200 trees of different sizes stand in ten rows; a tree stands around a ball, made of 60, 400 and 6,000 splats.
 """
-import os
 import subprocess
 
 import pytest
 
-from test_pictures import BLENDER, BLENDER_SECONDS, FIXTURES, STORED_FLOOR_DB, compare, scripts  # noqa: F401
+from test_pictures import FIXTURES, STORED_FLOOR_DB, compare, render, scripts  # noqa: F401 (a fixture)
 
 FRAMES = (1, 2, 3)
 
@@ -16,13 +15,7 @@ FRAMES = (1, 2, 3)
 @pytest.fixture(scope='module')
 def pictures(scripts, tmp_path_factory):  # noqa: F811
     out = tmp_path_factory.mktemp('shots')
-    command = [BLENDER, '-b', '--factory-startup', '--addons', 'stipple', '--python-exit-code', '1', '--python',
-               str(FIXTURES / 'render_shots.py'), '--', str(out)]
-    environment = {key: value for key, value in os.environ.items() if key != 'STIPPLE_LIBRARY'}
-    environment.update(BLENDER_USER_SCRIPTS=str(scripts), PATH=f"/usr/bin:{os.environ['PATH']}")
-    result = subprocess.run(command, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                            timeout=BLENDER_SECONDS)
-    assert result.returncode == 0, result.stdout[-4000:]
+    render('render_shots.py', scripts, out)
     return out
 
 
