@@ -10,7 +10,7 @@
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "densify/adaptive.h"
+#include "densify/strategies.h"
 #include "train/explicit_model.h"
 #include "train/render_backend.h"
 
@@ -64,7 +64,7 @@ void steps(benchmark::State& state, const SplatCase& c) {
   OneView view(c);
   ExplicitModelOptions options;
   options.sh_degree = c.degree;
-  const auto model = makeExplicitModel(cloudOf(c), makeAdaptive(), options);
+  const auto model = makeExplicitModel(cloudOf(c), makeStrategy("adaptive"), options);
   const auto backend = makeCpuBackend();
   backend->upload(cloudOf(c));
   RenderOptions render;
@@ -92,9 +92,8 @@ void densifyEvent(benchmark::State& state) {
   ExplicitModelOptions options;
   options.sh_degree = c.degree;
   options.max_splats = c.splats + c.splats / 20;
-  AdaptiveOptions adaptive;
-  adaptive.gradient_threshold = 0;
-  const auto model = makeExplicitModel(cloudOf(c), makeAdaptive(adaptive), options);
+  const char* everything = "adaptive(threshold=1e-9)";
+  const auto model = makeExplicitModel(cloudOf(c), makeStrategy(everything), options);
   double best_step = 1e300, best_event = 1e300;
   withThreads(2, [&] {
     view.step(*model, 598, 30000);

@@ -6,21 +6,13 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "densify/state_arrays.h"
 
 namespace stipple {
 
 namespace {
 
 constexpr size_t kGrain = 1 << 14;
-
-template <class T>
-std::vector<T> arrayOf(const TensorTable& table, const char* name) {
-  const auto found = table.find(name);
-  if (found == table.end() || !std::holds_alternative<std::vector<T>>(found->second.values)) {
-    fail(ErrorCode::kFormat, std::string("the strategy's state has no '") + name + "'");
-  }
-  return std::get<std::vector<T>>(found->second.values);
-}
 
 }  // namespace
 
@@ -47,9 +39,21 @@ void GradientWindow::add(const ViewStatistics& view) {
   parallelFor(count, kGrain, std::cref(add_range));
 }
 
+void GradientWindow::edited(const ControlMoment& moment, const SplatEdit& edit,
+                            size_t count_before) {
+  const size_t count = edit.countAfter(count_before);
+  if (moment.is_event || count != count_before) reset(count);
+}
+
 void GradientWindow::reset(size_t count) {
   sums_.assign(count, 0.0f);
   counts_.assign(count, 0);
+}
+
+std::vector<float> GradientWindow::averages() const {
+  std::vector<float> values(size());
+  for (size_t i = 0; i < values.size(); ++i) values[i] = average(i);
+  return values;
 }
 
 void GradientWindow::put(TensorTable& table) const {
@@ -58,8 +62,8 @@ void GradientWindow::put(TensorTable& table) const {
 }
 
 void GradientWindow::take(const TensorTable& table) {
-  std::vector<float> sums = arrayOf<float>(table, "gradient_sums");
-  std::vector<uint32_t> counts = arrayOf<uint32_t>(table, "visible_counts");
+  std::vector<float> sums = stateArray<float>(table, "gradient_sums");
+  std::vector<uint32_t> counts = stateArray<uint32_t>(table, "visible_counts");
   if (sums.size() != counts.size()) {
     fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(sums.size()) +
                                  " gradient_sums and " + std::to_string(counts.size()) +

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "data/tensor_table.h"
-#include "densify/strategy.h"
+#include "densify/control_part.h"
 
 namespace stipple {
 
@@ -25,11 +25,18 @@ class GradientWindow {
   /// Forgets everything, for this many splats from now on.
   void reset(size_t count);
 
+  /// After an edit: an event, and another number of splats, begin a new window.
+  void edited(const ControlMoment& moment, const SplatEdit& edit, size_t count_before);
+
   size_t size() const { return sums_.size(); }
+  /// Views that saw the splat.
+  uint32_t viewCount(size_t splat) const { return counts_[splat]; }
   /// 0 where no view has seen the splat.
   float average(size_t splat) const {
     return counts_[splat] == 0 ? 0.0f : sums_[splat] / static_cast<float>(counts_[splat]);
   }
+
+  std::vector<float> averages() const;  ///< [N]
 
   /// "gradient_sums" and "visible_counts". Errors of take: kFormat.
   void put(TensorTable& table) const;

@@ -1,5 +1,11 @@
 #include "densify/strategies.h"
 
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <span>
+#include <utility>
+
 #include "base/error.h"
 #include "densify/adaptive.h"
 
@@ -7,35 +13,182 @@ namespace stipple {
 
 namespace {
 
-struct Entry {
-  const char* name;
-  std::unique_ptr<Strategy> (*make)();
+struct StrategyMaker {
+  StrategyEntry entry;
+  ControlAssembly (*make)(StrategySettings&);
 };
 
-constexpr Entry kEntries[] = {
-    {"adaptive", [] { return makeAdaptive(); }},
+struct PartMaker {
+  StrategyEntry entry;
+  std::unique_ptr<ControlPart> (*make)(StrategySettings&);
 };
 
-std::vector<std::string> allNames() {
-  std::vector<std::string> names;
-  for (const Entry& entry : kEntries) names.emplace_back(entry.name);
-  return names;
+ControlAssembly makeAdaptive(StrategySettings& settings) {
+  AdaptiveOptions options;
+  const double threshold = settings.number("threshold", options.pull.copy_threshold, 1e-9, 1e9);
+  options.pull.copy_threshold = options.pull.split_threshold = threshold;
+  return adaptiveControl(options);
+}
+
+constexpr StrategyMaker kStrategies[] = {
+    {{"adaptive", "Copies small splats and splits large ones that the pictures pull at"},
+     makeAdaptive},
+};
+
+constexpr std::span<const PartMaker> kParts = {};
+
+template <typename Maker>
+std::vector<StrategyEntry> entriesOf(std::span<const Maker> makers) {
+  std::vector<StrategyEntry> entries;
+  for (const Maker& maker : makers) entries.push_back(maker.entry);
+  return entries;
+}
+
+std::string listOf(const std::vector<StrategyEntry>& entries) {
+  std::string text;
+  for (const StrategyEntry& entry : entries)
+    text += (text.empty() ? "" : ", ") + std::string(entry.name);
+  return text.empty() ? "none" : text;
+}
+
+/// "name(key=1,other=2)".
+struct Term {
+  std::string name;
+  std::map<std::string, double> values;
+};
+
+[[noreturn]] void failTerm(const std::string& term) {
+  fail(ErrorCode::kInvalidArgument,
+       "strategy has '" + term + "'; name or name(setting=number,...) is allowed");
+}
+
+Term parseTerm(const std::string& text) {
+  Term term;
+  const size_t open = text.find('(');
+  term.name = text.substr(0, open);
+  if (open == std::string::npos) return term;
+  if (text.back() != ')') failTerm(text);
+  std::string inner = text.substr(open + 1, text.size() - open - 2);
+  for (size_t begin = 0; begin < inner.size();) {
+    const size_t end = std::min(inner.find(',', begin), inner.size());
+    const std::string pair = inner.substr(begin, end - begin);
+    const size_t equals = pair.find('=');
+    double value = 0;
+    if (equals == std::string::npos || equals == 0) failTerm(text);
+    const char* last = pair.data() + pair.size();
+    const auto read = std::from_chars(pair.data() + equals + 1, last, value);
+    if (read.ec != std::errc{} || read.ptr != last || !std::isfinite(value)) failTerm(text);
+    term.values[pair.substr(0, equals)] = value;
+    begin = end + 1;
+  }
+  return term;
+}
+
+std::vector<Term> parse(const std::string& text) {
+  std::vector<Term> terms;
+  size_t begin = 0;
+  int depth = 0;
+  for (size_t k = 0; k <= text.size(); ++k) {
+    // A plus inside parentheses belongs to a number.
+    if (k < text.size() && text[k] == '(') ++depth;
+    if (k < text.size() && text[k] == ')') --depth;
+    if (k < text.size() && (text[k] != '+' || depth > 0)) continue;
+    terms.push_back(parseTerm(text.substr(begin, k - begin)));
+    begin = k + 1;
+  }
+  return terms;
 }
 
 }  // namespace
 
+StrategySettings::StrategySettings(std::string owner, std::map<std::string, double> values)
+    : owner_(std::move(owner)), values_(std::move(values)) {}
+
+double StrategySettings::number(const std::string& name, double otherwise, double least,
+                                double most) {
+  known_.push_back(name);
+  const auto found = values_.find(name);
+  if (found == values_.end()) return otherwise;
+  if (!(found->second >= least && found->second <= most)) {
+    fail(ErrorCode::kInvalidArgument, owner_ + "." + name + " is " + std::to_string(found->second) +
+                                          "; " + std::to_string(least) + " to " +
+                                          std::to_string(most) + " is allowed");
+  }
+  return found->second;
+}
+
+uint64_t StrategySettings::count(const std::string& name, uint64_t otherwise, uint64_t most) {
+  const double value = number(name, static_cast<double>(otherwise), 0, static_cast<double>(most));
+  return static_cast<uint64_t>(value);
+}
+
+bool StrategySettings::flag(const std::string& name, bool otherwise) {
+  return number(name, otherwise ? 1 : 0, 0, 1) != 0;
+}
+
+void StrategySettings::requireAllUsed() const {
+  for (const auto& [name, value] : values_) {
+    if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
+    std::string known;
+    for (const std::string& each : known_) known += (known.empty() ? "" : ", ") + each;
+    fail(ErrorCode::kInvalidArgument,
+         owner_ + " has no setting '" + name + "'; there is " + (known.empty() ? "none" : known));
+  }
+}
+
+const std::vector<StrategyEntry>& strategyEntries() {
+  static const std::vector<StrategyEntry> entries =
+      entriesOf(std::span<const StrategyMaker>(kStrategies));
+  return entries;
+}
+
+const std::vector<StrategyEntry>& partEntries() {
+  static const std::vector<StrategyEntry> entries = entriesOf(kParts);
+  return entries;
+}
+
 const std::vector<std::string>& strategyNames() {
-  static const std::vector<std::string> names = allNames();
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const StrategyEntry& entry : strategyEntries()) all.emplace_back(entry.name);
+    return all;
+  }();
   return names;
 }
 
-std::unique_ptr<Strategy> makeStrategy(const std::string& name) {
-  for (const Entry& entry : kEntries) {
-    if (name == entry.name) return entry.make();
+std::unique_ptr<Strategy> makeStrategy(const std::string& text) {
+  const std::vector<Term> terms = parse(text);
+  const auto maker =
+      std::find_if(std::begin(kStrategies), std::end(kStrategies),
+                   [&](const auto& each) { return terms[0].name == each.entry.name; });
+  if (maker == std::end(kStrategies)) {
+    fail(ErrorCode::kInvalidArgument,
+         "strategy is '" + terms[0].name + "'; there is " + listOf(strategyEntries()));
   }
-  std::string known;
-  for (const std::string& each : strategyNames()) known += (known.empty() ? "" : ", ") + each;
-  fail(ErrorCode::kInvalidArgument, "strategy is '" + name + "'; there is " + known);
+  StrategySettings settings(terms[0].name, terms[0].values);
+  ControlAssembly assembly = maker->make(settings);
+  settings.requireAllUsed();
+
+  for (size_t k = 1; k < terms.size(); ++k) {
+    const auto part = std::find_if(kParts.begin(), kParts.end(), [&](const auto& each) {
+      return terms[k].name == each.entry.name;
+    });
+    if (part == kParts.end()) {
+      fail(ErrorCode::kInvalidArgument,
+           "part is '" + terms[k].name + "'; there is " + listOf(partEntries()));
+    }
+    for (size_t before = 1; before < k; ++before) {
+      if (terms[before].name == terms[k].name) {
+        fail(ErrorCode::kInvalidArgument,
+             "strategy names " + terms[k].name + " twice; once is allowed");
+      }
+    }
+    StrategySettings own(terms[k].name, terms[k].values);
+    std::unique_ptr<ControlPart> made = part->make(own);
+    own.requireAllUsed();
+    addPart(assembly, std::move(made));
+  }
+  return makeDensityControl(text.c_str(), std::move(assembly));
 }
 
 }  // namespace stipple

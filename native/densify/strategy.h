@@ -38,6 +38,27 @@ struct ExtraParameter {
   double learning_rate = 0;
 };
 
+/// Of Adam, in the units of raw numbers. Positions: per metre of the cameras' extent, from the
+/// first to the last iteration log-linearly.
+struct LearningRates {
+  double first_position = 1.6e-4;
+  double last_position = 1.6e-6;
+  double rotation = 1e-3;
+  double log_scale = 5e-3;
+  double logit = 0.05;
+  double colour = 2.5e-3;
+  double higher_colour = 2.5e-3 / 20;
+};
+
+/// What a strategy can show of each splat.
+enum class SplatQuantity : uint32_t {
+  kScore = 0,         ///< how much it asks to multiply; of the last event
+  kAge = 1,           ///< iterations since it was made
+  kSplitAxis = 2,     ///< longest axis over the next one, natural logarithm
+  kContribution = 3,  ///< blending weight, summed over pixels and views since the last event
+};
+constexpr size_t kSplatQuantityCount = 4;
+
 /// Derivatives of splats by their stored values, shaped as SplatCloud is.
 struct CloudGradient {
   std::span<float> positions;  ///< [N,3]
@@ -107,6 +128,10 @@ class Strategy {
   /// As users write it: "adaptive".
   virtual const char* name() const = 0;
 
+  /// Once, before the first iteration: changes what a fit begins with, and how fast it learns.
+  virtual void prepare(RawSplats&) const {}
+  virtual void adjustRates(LearningRates&) const {}
+
   /// Once, before the first iteration; the splats start with these, and the parameterisation stays.
   virtual std::vector<ExtraParameter> parameters() const { return {}; }
   /// One array per parameter, [N, row length].
@@ -120,6 +145,9 @@ class Strategy {
   virtual double loss(const FitMoment&, const SplatCloud&, const CloudGradient& /*gradient*/) {
     return 0;
   }
+
+  /// Weight of the mean transmittance behind the last splat of each pixel, in the loss.
+  virtual double transmittanceWeight(const FitMoment&) const { return 0; }
 
   /// After the backward pass, with the statistics asked for.
   virtual void observe(const FitMoment&, const ViewStatistics&) {}
@@ -137,6 +165,9 @@ class Strategy {
   /// Which splats there shall be. The strategy's own arrays per splat follow its answer at once;
   /// whoever called applies it.
   virtual std::optional<SplatEdit> edit(const FitMoment&, const SplatStore&) { return {}; }
+
+  /// [N] for looking at; empty where it has nothing of the kind.
+  virtual std::vector<float> seen(SplatQuantity, const RawSplats&) const { return {}; }
 
   /// What a checkpoint keeps, and takes back. Errors: kFormat for a table of another strategy.
   virtual TensorTable state() const { return {}; }

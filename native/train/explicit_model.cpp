@@ -18,14 +18,6 @@ namespace stipple {
 
 namespace {
 
-/// Rates of Adam. Positions: per metre of the cameras' extent, falling log-linearly.
-constexpr double kFirstPositionRate = 1.6e-4;
-constexpr double kLastPositionRate = 1.6e-6;
-constexpr double kRotationRate = 1e-3;
-constexpr double kLogScaleRate = 5e-3;
-constexpr double kLogitRate = 0.05;
-constexpr double kColourRate = 2.5e-3;
-constexpr double kHigherColourRate = kColourRate / 20;
 /// Iterations, of 30,000, after which harmonics get another degree.
 constexpr uint64_t kDegreeInterval = 1000;
 
@@ -61,12 +53,14 @@ void requireOptions(const ExplicitModelOptions& options) {
 class ExplicitModel final : public FitModel, private Regulariser {
  public:
   ExplicitModel(const SplatCloud& start, std::unique_ptr<Strategy> strategy,
-                const ExplicitModelOptions& options)
+                const ExplicitModelOptions& options, bool begins)
       : strategy_(std::move(strategy)), options_(options), backend_(makeCpuBackend()) {
     backend_->upload(start);
+    if (begins) prepare();
     const std::vector<ExtraParameter> extras = strategy_->parameters();
     if (!extras.empty()) addExtras(extras);
     backend_->parameterise(strategy_->parameterisation());
+    strategy_->adjustRates(rates_);
     loss_options_.ssim_share = options.ssim_share;
   }
 
@@ -143,6 +137,12 @@ class ExplicitModel final : public FitModel, private Regulariser {
   uint64_t memoryBytes() const override { return backend_->memoryBytes(); }
 
  private:
+  void prepare() {
+    TrainingState state = backend_->state();
+    strategy_->prepare(state.splats);
+    backend_->restore(state);
+  }
+
   void addExtras(const std::vector<ExtraParameter>& extras) {
     TrainingState state = backend_->state();
     const std::vector<std::vector<float>> values = strategy_->initialExtras(state.splats);
@@ -171,16 +171,16 @@ class ExplicitModel final : public FitModel, private Regulariser {
         std::min(1.0, static_cast<double>(moment_.iteration) /
                           static_cast<double>(std::max<uint64_t>(1, moment_.iterations)));
     const double position_rate =
-        kFirstPositionRate * std::pow(kLastPositionRate / kFirstPositionRate, progress);
+        rates_.first_position * std::pow(rates_.last_position / rates_.first_position, progress);
     const auto set = [&](ParameterGroup group, double rate) {
       step_options_.learning_rates[static_cast<size_t>(group)] = std::min(rate, kMaxLearningRate);
     };
     set(ParameterGroup::kPositions, position_rate * std::max(moment_.extent, 0.0));
-    set(ParameterGroup::kRotations, kRotationRate);
-    set(ParameterGroup::kLogScales, kLogScaleRate);
-    set(ParameterGroup::kLogits, kLogitRate);
-    set(ParameterGroup::kShFirst, kColourRate);
-    set(ParameterGroup::kShOthers, kHigherColourRate);
+    set(ParameterGroup::kRotations, rates_.rotation);
+    set(ParameterGroup::kLogScales, rates_.log_scale);
+    set(ParameterGroup::kLogits, rates_.logit);
+    set(ParameterGroup::kShFirst, rates_.colour);
+    set(ParameterGroup::kShOthers, rates_.higher_colour);
   }
 
   /// The strategy's part of the loss, called by the backend.
@@ -218,6 +218,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
   std::unique_ptr<Strategy> strategy_;  ///< outlives the backend, which draws by its activations
   ExplicitModelOptions options_;
   std::unique_ptr<RenderBackend> backend_;
+  LearningRates rates_;
   ImageLossOptions loss_options_;
   StepOptions step_options_;
   FitMoment moment_;  ///< of the step under way
@@ -241,14 +242,14 @@ std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
   start.antialias = options.antialias;
   start.seed = options.seed;
   return std::make_unique<ExplicitModel>(startSplats(views, training, start, progress),
-                                         std::move(strategy), options);
+                                         std::move(strategy), options, true);
 }
 
 std::unique_ptr<FitModel> makeExplicitModel(const SplatCloud& start,
                                             std::unique_ptr<Strategy> strategy,
                                             const ExplicitModelOptions& options) {
   requireOptions(options);
-  return std::make_unique<ExplicitModel>(start, std::move(strategy), options);
+  return std::make_unique<ExplicitModel>(start, std::move(strategy), options, false);
 }
 
 }  // namespace stipple

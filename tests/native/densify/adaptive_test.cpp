@@ -1,4 +1,4 @@
-#include "densify/adaptive.h"
+#include "densify/strategies.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -87,7 +87,7 @@ RawSplats after(const SplatEdit& edit, RawSplats splats) {
 /// One view, then the edit of iteration 600.
 std::optional<SplatEdit> firstEdit(const std::vector<Kind>& kinds,
                                    const std::vector<float>& gradients, uint64_t max_splats = 0) {
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   strategy->observe(at(1), Seen(gradients).statistics());
   return editAt(*strategy, at(600, max_splats), splatsOf(kinds));
 }
@@ -132,7 +132,7 @@ TEST(Adaptive, ChildrenAreSpreadAsTheirParentsAre) {
   cloud.scales = {0.09f, 0.03f, 0.01f};
   cloud.opacities = {0.5f};
   RawSplats parents = rowsOf(rawSplats(cloud), std::vector<uint32_t>(4000, 0));
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   strategy->observe(at(1), Seen(std::vector<float>(4000, 1)).statistics());
   const RawSplats children = after(*editAt(*strategy, at(600), parents), parents);
   ASSERT_EQ(children.size(), 8000u);
@@ -151,7 +151,7 @@ TEST(Adaptive, ChildrenAreSpreadAsTheirParentsAre) {
 }
 
 TEST(Adaptive, AveragesOverTheViewsThatSeeASplat) {
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   Seen seen({3e-4f, 3e-4f});
   strategy->observe(at(1), seen.statistics());
   Seen other({0, 0});
@@ -168,7 +168,7 @@ TEST(Adaptive, AveragesOverTheViewsThatSeeASplat) {
 }
 
 TEST(Adaptive, GradientsCountPerHalfPictureAlongBothSides) {
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   Seen seen({0, 0});
   // 100 and 50 pixels are half the sides: 1.2e-4 and 1.7e-4 make 2.08e-4, 1e-4 and 1.7e-4 1.97e-4.
   seen.gradients = {1.2e-6f, 3.4e-6f, 1e-6f, 3.4e-6f};
@@ -181,15 +181,15 @@ TEST(Adaptive, GradientsCountPerHalfPictureAlongBothSides) {
 TEST(Adaptive, RemovesFaintSplatsAndLaterHugeOnes) {
   const std::vector<Kind> kinds = {
       {0.005f, 0.0049f}, {0.2f, 0.5f}, {0.005f, 0.0051f}, {0.005f, 0.5f}};
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   EXPECT_THAT(*editAt(*strategy, at(600), splatsOf(kinds))->keep, ElementsAre(1, 2, 3));
-  const auto later = makeAdaptive();
+  const auto later = makeStrategy("adaptive");
   EXPECT_THAT(*editAt(*later, at(3100), splatsOf(kinds))->keep, ElementsAre(2, 3));
 }
 
 TEST(Adaptive, AHugeSplatLivesOnInChildrenThatAreNot) {
   const std::vector<Kind> kinds = {{0.15f, 0.5f}, {0.17f, 0.5f}, {0.005f, 0.5f}};
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   strategy->observe(at(3001), Seen({1, 1, 0}).statistics());
   // 0.15 / 1.6 is below 0.1, 0.17 / 1.6 is not.
   const auto edit = editAt(*strategy, at(3100), splatsOf(kinds));
@@ -226,7 +226,7 @@ TEST(Adaptive, LeavesSplatsAloneThatNothingPullsAt) {
   EXPECT_FALSE(edit->keep);
   EXPECT_EQ(edit->append.size(), 0u);
   // Of a splat that no view has seen, the average is 0, not 0 / 0.
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   EXPECT_EQ(editAt(*strategy, at(600), splatsOf({{0.05f, 0.5f}}))->append.size(), 0u);
 }
 
@@ -234,12 +234,12 @@ TEST(Adaptive, TheLastSplatStays) {
   const auto edit = firstEdit({{0.005f, 0.001f}, {0.005f, 0.004f}, {0.005f, 0.002f}}, {1, 1, 1});
   EXPECT_THAT(*edit->keep, ElementsAre(1));
   EXPECT_EQ(edit->append.size(), 0u);
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   EXPECT_FALSE(editAt(*strategy, at(600), RawSplats()));
 }
 
 TEST(Adaptive, WithoutAnExtentNothingIsLarge) {
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   strategy->observe(at(1), Seen({1, 1}).statistics());
   FitMoment moment = at(3100);
   moment.extent = 0;
@@ -249,7 +249,7 @@ TEST(Adaptive, WithoutAnExtentNothingIsLarge) {
 }
 
 TEST(Adaptive, KeepsThePublishedSchedule) {
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   std::vector<uint64_t> edits, resets;
   const RawSplats splats = splatsOf({{0.005f, 0.5f}});
   for (uint64_t iteration = 1; iteration <= 30000; ++iteration) {
@@ -272,7 +272,7 @@ TEST(Adaptive, ShortFitsScaleTheScheduleWithinReason) {
     int count = 0, resets = 0;
   };
   const auto editsOf = [&](uint64_t iterations) {
-    const auto strategy = makeAdaptive();
+    const auto strategy = makeStrategy("adaptive");
     Edits edits;
     for (uint64_t iteration = 1; iteration <= iterations; ++iteration) {
       FitMoment moment = at(iteration);
@@ -304,7 +304,7 @@ TEST(Adaptive, ShortFitsScaleTheScheduleWithinReason) {
 }
 
 TEST(Adaptive, AResetLowersOpacitiesAndForgetsTheirMoments) {
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   strategy->observe(at(2990), Seen({1, 0}).statistics());
   RawSplats splats = splatsOf({{0.005f, 0.9f}, {0.005f, 0.006f}});
   const auto edit = editAt(*strategy, at(3000), splats);
@@ -322,7 +322,7 @@ TEST(Adaptive, GoesOnFromItsStateBitForBit) {
   const std::vector<Kind> kinds(200, {0.03f, 0.5f});
   std::vector<float> pulls(200);
   for (size_t i = 0; i < 200; ++i) pulls[i] = 2e-6f * static_cast<float>(i);
-  const auto first = makeAdaptive(), second = makeAdaptive();
+  const auto first = makeStrategy("adaptive"), second = makeStrategy("adaptive");
   first->observe(at(501), Seen(pulls).statistics());
   second->restore(first->state());
   for (Strategy* strategy : {first.get(), second.get()}) {
@@ -338,7 +338,7 @@ TEST(Adaptive, GoesOnFromItsStateBitForBit) {
 TEST(Adaptive, DiceDependOnSeedAndIterationAlone) {
   const std::vector<Kind> kinds(3000, {0.03f, 0.5f});
   const auto placesOf = [&](uint64_t iteration, uint64_t seed, unsigned threads) {
-    const auto strategy = makeAdaptive();
+    const auto strategy = makeStrategy("adaptive");
     std::vector<float> places;
     withThreads(threads, [&] {
       strategy->observe(at(1), Seen(std::vector<float>(3000, 1)).statistics());
@@ -356,7 +356,7 @@ TEST(Adaptive, DiceDependOnSeedAndIterationAlone) {
 }
 
 TEST(Adaptive, RefusesTheStateOfAnother) {
-  const auto strategy = makeAdaptive();
+  const auto strategy = makeStrategy("adaptive");
   const auto messageOf = [&](const std::function<void()>& call) {
     try {
       call();
@@ -365,12 +365,12 @@ TEST(Adaptive, RefusesTheStateOfAnother) {
     }
     return std::string("nothing thrown");
   };
-  EXPECT_THAT(messageOf([&] { strategy->restore({}); }), HasSubstr("no 'gradient_sums'"));
+  EXPECT_THAT(messageOf([&] { strategy->restore({}); }), HasSubstr("no 'births'"));
   TensorTable table = strategy->state();
-  table["visible_counts"] = {{1}, std::vector<uint32_t>{1}};
+  table["screen_pull.visible_counts"] = {{1}, std::vector<uint32_t>{1}};
   EXPECT_THAT(messageOf([&] { strategy->restore(table); }),
               HasSubstr("0 gradient_sums and 1 visible_counts"));
-  table["gradient_sums"] = {{1}, std::vector<float>{-1}};
+  table["screen_pull.gradient_sums"] = {{1}, std::vector<float>{-1}};
   EXPECT_THAT(messageOf([&] { strategy->restore(table); }), HasSubstr("0 and more is allowed"));
 }
 

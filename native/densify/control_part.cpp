@@ -1,0 +1,118 @@
+#include "densify/control_part.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+
+namespace stipple {
+
+ControlMoment controlMoment(const FitMoment& moment, const EventSchedule& schedule) {
+  ControlMoment at;
+  static_cast<FitMoment&>(at) = moment;
+  const uint64_t first = scaleSchedule(schedule.first, moment.iterations);
+  const uint64_t last = scaleSchedule(schedule.last, moment.iterations);
+  const uint64_t interval =
+      std::max(schedule.least_interval, scaleSchedule(schedule.interval, moment.iterations));
+  at.is_learning = moment.iteration < last;
+  at.is_event = at.is_learning && moment.iteration > first && moment.iteration % interval == 0;
+  const uint64_t before = first / interval;  // multiples of the interval up to the first event
+  const uint64_t passed = moment.iteration == 0 ? 0 : (moment.iteration - 1) / interval;
+  at.event = passed > before ? passed - before : 0;
+  at.event_count = last > first ? (last - 1) / interval - before : 0;
+  at.progress = last > first && moment.iteration > first
+                    ? std::min(1.0, static_cast<double>(moment.iteration - first) /
+                                        static_cast<double>(last - first))
+                    : 0.0;
+  return at;
+}
+
+const char* wordsOf(ControlRole role) {
+  switch (role) {
+    case ControlRole::kMultiplication:
+      return "which splats multiply";
+    case ControlRole::kScore:
+      return "which splats multiply first";
+    case ControlRole::kChildren:
+      return "where children are";
+    case ControlRole::kChildOpacity:
+      return "the opacity of children";
+    case ControlRole::kGrowth:
+      return "how many splats there may be";
+    case ControlRole::kRemoval:
+      return "which splats go";
+    case ControlRole::kRecovery:
+      return "which splats go after a reset";
+    case ControlRole::kOpacity:
+      return "when opacities are lowered";
+    case ControlRole::kSteps:
+      return "when a step is taken";
+    case ControlRole::kNoise:
+      return "what is added after a step";
+    case ControlRole::kRegularisation:
+      return "what is added to the loss";
+    case ControlRole::kParameterisation:
+      return "how numbers become splats";
+    case ControlRole::kFilter:
+      return "how splats are filtered";
+  }
+  return "";
+}
+
+void addPart(ControlAssembly& assembly, std::unique_ptr<ControlPart> part) {
+  const ControlRoles added = part->owns();
+  std::erase_if(assembly.parts, [&](const std::unique_ptr<ControlPart>& there) {
+    return there->owns() != 0 && (there->owns() & ~added) == 0;
+  });
+  for (const std::unique_ptr<ControlPart>& there : assembly.parts) {
+    const ControlRoles shared = there->owns() & added;
+    if (shared == 0) continue;
+    const ControlRole role = static_cast<ControlRole>(shared & (~shared + 1));
+    fail(ErrorCode::kInvalidArgument, std::string(part->name()) + " does not go with " +
+                                          there->name() + ": both decide " + wordsOf(role));
+  }
+  assembly.parts.push_back(std::move(part));
+}
+
+void followEdit(const SplatEdit& edit, size_t row_length, float fresh, std::vector<float>& values) {
+  if (edit.keep) {
+    std::vector<float> kept(edit.keep->size() * row_length);
+    for (size_t k = 0; k < edit.keep->size(); ++k) {
+      const size_t row = (*edit.keep)[k];
+      std::copy_n(&values[row * row_length], row_length, &kept[k * row_length]);
+    }
+    values = std::move(kept);
+  }
+  values.resize(values.size() + edit.append.size() * row_length, fresh);
+}
+
+std::vector<uint32_t> drawWithoutReplacement(const FitMoment& moment, RandomUse use,
+                                             std::span<const uint32_t> rows,
+                                             std::span<const double> weights, size_t count) {
+  struct Key {
+    double value;
+    uint32_t row;
+  };
+  std::vector<Key> keys;
+  keys.reserve(rows.size());
+  const uint64_t seed = mixBits(moment.seed) ^ moment.iteration;
+  for (size_t k = 0; k < rows.size(); ++k) {
+    if (!(weights[k] > 0)) continue;
+    const double exponential = -std::log1p(-unitDouble(keyedBits(seed, use, rows[k])));
+    keys.push_back({exponential / weights[k], rows[k]});
+  }
+  const size_t drawn = std::min(count, keys.size());
+  const auto smaller = [](const Key& a, const Key& b) {
+    return a.value < b.value || (a.value == b.value && a.row < b.row);
+  };
+  std::partial_sort(keys.begin(), keys.begin() + static_cast<ptrdiff_t>(drawn), keys.end(),
+                    smaller);
+  std::vector<uint32_t> chosen(drawn);
+  for (size_t k = 0; k < drawn; ++k) chosen[k] = keys[k].row;
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+}  // namespace stipple

@@ -1,0 +1,184 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/random.h"
+#include "data/tensor_table.h"
+#include "densify/strategy.h"
+
+namespace stipple {
+
+/// When density control acts. Iterations are those of a fit of 30,000 (scaleSchedule).
+struct EventSchedule {
+  uint64_t first = 500;     ///< events are after this iteration
+  uint64_t last = 15000;    ///< and before this one
+  uint64_t interval = 100;  ///< iterations from one event to the next
+  /// Steps from one event to the next at least, however short the fit: new splats must have taken
+  /// their places, and views been seen, before statistics say where more are needed; else the count
+  /// doubles with every event.
+  uint64_t least_interval = 100;
+};
+
+/// Where a fit stands, as density control sees it.
+struct ControlMoment : FitMoment {
+  bool is_event = false;     ///< splats multiply and go in this iteration
+  bool is_learning = false;  ///< events are still to come: statistics are worth gathering
+  double progress = 0;       ///< from the first event's window to its end, 0..1
+  uint64_t event = 0;        ///< number of this event or the next one, from 0
+  uint64_t event_count = 0;  ///< of the whole fit
+
+  /// Whether this is what iteration `published` of a fit of 30,000 is here.
+  bool isAt(uint64_t published) const { return iteration == scaleSchedule(published, iterations); }
+  bool isAfter(uint64_t published) const {
+    return iteration > scaleSchedule(published, iterations);
+  }
+};
+
+ControlMoment controlMoment(const FitMoment& moment, const EventSchedule& schedule);
+
+/// What a part of density control decides. No decision has two owners.
+enum class ControlRole : uint32_t {
+  kMultiplication = 1u << 0,     ///< which splats multiply
+  kScore = 1u << 1,              ///< which of them go first where there is no room for all
+  kChildren = 1u << 2,           ///< where their children are, and how large
+  kChildOpacity = 1u << 3,       ///< how opaque they are
+  kGrowth = 1u << 4,             ///< how many splats there may be
+  kRemoval = 1u << 5,            ///< which splats go at an event
+  kRecovery = 1u << 6,           ///< which splats go when opacities have come back from a reset
+  kOpacity = 1u << 7,            ///< opacities that are lowered now and then
+  kSteps = 1u << 8,              ///< in which iterations Adam steps
+  kNoise = 1u << 9,              ///< what is added to numbers after a step
+  kRegularisation = 1u << 10,    ///< what is added to the loss
+  kParameterisation = 1u << 11,  ///< how raw numbers become splats
+  kFilter = 1u << 12,            ///< what is done to splats after that, before they are drawn
+};
+using ControlRoles = uint32_t;
+constexpr ControlRoles roles(ControlRole role) {
+  return static_cast<ControlRoles>(role);
+}
+template <typename... More>
+constexpr ControlRoles roles(ControlRole role, More... more) {
+  return static_cast<ControlRoles>(role) | roles(more...);
+}
+/// In words, for messages: "the opacity of children".
+const char* wordsOf(ControlRole role);
+
+/// A splat that may multiply.
+struct Candidate {
+  uint32_t row = 0;
+  float strength = 0;     ///< the greatest go first where nothing owns kScore
+  bool replaces = false;  ///< two children instead of it, else a copy beside it
+};
+
+/// One decision, or several that belong together, of density control: a publication is a list of
+/// parts, and users add further ones. Hooks are called in the order in which they stand here; those
+/// of a role only of its owner. Hooks without a role are called of all parts.
+/// Determinism: answers depend on the calls and on FitMoment::seed alone, not on threads.
+class ControlPart {
+ public:
+  virtual ~ControlPart() = default;
+
+  /// As users write it: "long_axis_split".
+  virtual const char* name() const = 0;
+  virtual ControlRoles owns() const = 0;
+
+  // ---- once, before the first iteration --------------------------------------------------------
+  /// Changes splats that a fit begins with (not those of a cloud that is densified).
+  virtual void prepare(RawSplats&) const {}
+  virtual void adjustRates(LearningRates&) const {}
+  /// kParameterisation or kFilter.
+  virtual std::vector<ExtraParameter> parameters() const { return {}; }
+  virtual std::vector<std::vector<float>> initialExtras(const RawSplats&) const { return {}; }
+  virtual const Parameterisation* parameterisation() const { return nullptr; }
+
+  // ---- every iteration
+  // ---------------------------------------------------------------------------
+  /// Adds what it wants to `request`; pictures in it have one owner.
+  virtual void request(const ControlMoment&, StatisticRequest&) const {}
+  /// kRegularisation.
+  virtual double loss(const ControlMoment&, const SplatCloud&, const CloudGradient&) { return 0; }
+  /// kRegularisation: weight of the mean transmittance behind the last splat, in the loss.
+  virtual double transmittanceWeight(const ControlMoment&) const { return 0; }
+  virtual void observe(const ControlMoment&, const ViewStatistics&) {}
+  /// kSteps.
+  virtual bool stepGate(const ControlMoment&) const { return true; }
+  /// kNoise.
+  virtual std::optional<SplatEdit> afterStep(const ControlMoment&, const SplatStore&) { return {}; }
+  virtual bool wantsSweep(const ControlMoment&) const { return false; }
+  virtual void sweep(const ControlMoment&, ViewEvaluator&) {}
+
+  // ---- at an event
+  // ---------------------------------------------------------------------------------
+  /// kMultiplication without kChildren: who may multiply, rising rows, each once.
+  virtual std::vector<Candidate> candidates(const ControlMoment&, const RawSplats&) { return {}; }
+  /// kScore: how much each candidate is worth, >= 0. As many as there is room for are drawn without
+  /// replacement, by these weights; those of weight 0 are not.
+  virtual std::vector<double> score(const ControlMoment&, const RawSplats&,
+                                    std::span<const Candidate>) {
+    return {};
+  }
+  /// kChildren: what all of these become. Out: rows that are appended; the order is the part's. The
+  /// parents of those that are replaced go. A part that changes copies to replacements, or the
+  /// other way round, says so in the candidates.
+  virtual RawSplats children(const ControlMoment&, const RawSplats&, std::span<Candidate>) {
+    return {};
+  }
+  /// kChildOpacity without kChildren: new logits of a parent and of its copy, or of two children
+  /// that replace it.
+  virtual float childLogit(float parent_logit) const { return parent_logit; }
+  /// kGrowth: how many splats there may be after this event, beside the hard cap.
+  virtual uint64_t limit(const ControlMoment&, uint64_t /*count*/) { return UINT64_MAX; }
+  /// kMultiplication with kChildren: the whole of it. In: room: splats that there may be at most.
+  /// Out: writes and appended rows; keep where it removes. kRemoval applies to the result.
+  virtual void multiply(const ControlMoment&, const SplatStore&, uint64_t /*room*/, SplatEdit&) {}
+
+  /// kRemoval, at an event, and kRecovery: whether it acts now.
+  virtual bool removesAt(const ControlMoment& moment) const { return moment.is_event; }
+  /// kRemoval and kRecovery. Out: goes [N] of splats, and [M] of the rows that are about to be
+  /// appended; 1 where a splat goes, else left alone.
+  virtual void remove(const ControlMoment&, const RawSplats& /*splats*/,
+                      const RawSplats& /*appended*/, std::span<uint8_t> /*goes*/,
+                      std::span<uint8_t> /*appended_goes*/) {}
+
+  // ---- any iteration, after an event
+  // -----------------------------------------------------------------
+  /// kOpacity: adds writes of logits, and changes those of appended rows.
+  virtual void lowerOpacities(const ControlMoment&, const RawSplats&, SplatEdit&) {}
+
+  // ---- its own numbers
+  // -----------------------------------------------------------------------------
+  /// After every edit: arrays per splat follow, and windows begin anew.
+  virtual void edited(const ControlMoment&, const SplatEdit&, size_t /*count_before*/) {}
+  /// What it sees of each splat, for looking at; empty where it has nothing to show.
+  virtual std::vector<float> seen(SplatQuantity) const { return {}; }
+  virtual void put(TensorTable&) const {}
+  virtual void take(const TensorTable&) {}
+};
+
+/// Density control that is made of parts. Errors: kInvalidArgument where two parts own one role.
+struct ControlAssembly {
+  EventSchedule schedule;
+  std::vector<std::unique_ptr<ControlPart>> parts;
+};
+std::unique_ptr<Strategy> makeDensityControl(const char* name, ControlAssembly assembly);
+
+/// Puts a part into an assembly, in place of one whose roles it covers. Errors: kInvalidArgument
+/// where a part there owns one of its roles and others beside; the message names both and the role.
+void addPart(ControlAssembly& assembly, std::unique_ptr<ControlPart> part);
+
+/// Array values [N, row_length] that follow an edit: rows of `keep`, then `fresh` for new ones.
+void followEdit(const SplatEdit& edit, size_t row_length, float fresh, std::vector<float>& values);
+
+/// The first `count` of a draw without replacement by weights, in rising order: keys E / w, E of
+/// the exponential distribution, keyed by (seed, use, iteration, row). Weights of 0 are not drawn.
+/// Source: Efraimidis, Spirakis, Weighted random sampling with a reservoir, IPL 2006.
+std::vector<uint32_t> drawWithoutReplacement(const FitMoment& moment, RandomUse use,
+                                             std::span<const uint32_t> rows,
+                                             std::span<const double> weights, size_t count);
+
+}  // namespace stipple

@@ -1,0 +1,326 @@
+#include <algorithm>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "densify/control_part.h"
+#include "densify/state_arrays.h"
+
+namespace stipple {
+
+namespace {
+
+/// Rows of `splats` where `goes` is 0.
+std::vector<uint32_t> staying(std::span<const uint8_t> goes) {
+  std::vector<uint32_t> rows;
+  for (uint32_t i = 0; i < goes.size(); ++i) {
+    if (!goes[i]) rows.push_back(i);
+  }
+  return rows;
+}
+
+class DensityControl final : public Strategy {
+ public:
+  DensityControl(const char* name, ControlAssembly assembly)
+      : name_(name), schedule_(assembly.schedule), parts_(std::move(assembly.parts)) {}
+
+  const char* name() const override { return name_.c_str(); }
+
+  void prepare(RawSplats& splats) const override {
+    for (const auto& part : parts_) part->prepare(splats);
+  }
+  void adjustRates(LearningRates& rates) const override {
+    for (const auto& part : parts_) part->adjustRates(rates);
+  }
+
+  std::vector<ExtraParameter> parameters() const override {
+    const ControlPart* part = owner(ControlRole::kParameterisation);
+    return part ? part->parameters() : std::vector<ExtraParameter>{};
+  }
+  std::vector<std::vector<float>> initialExtras(const RawSplats& splats) const override {
+    const ControlPart* part = owner(ControlRole::kParameterisation);
+    return part ? part->initialExtras(splats) : std::vector<std::vector<float>>{};
+  }
+  const Parameterisation* parameterisation() const override {
+    const ControlPart* part = owner(ControlRole::kParameterisation);
+    return part ? part->parameterisation() : nullptr;
+  }
+
+  StatisticRequest requests(const FitMoment& given) const override {
+    StatisticRequest request;
+    for (const auto& part : parts_) part->request(at(given), request);
+    return request;
+  }
+
+  double loss(const FitMoment& given, const SplatCloud& cloud,
+              const CloudGradient& gradient) override {
+    ControlPart* part = owner(ControlRole::kRegularisation);
+    return part ? part->loss(at(given), cloud, gradient) : 0;
+  }
+  double transmittanceWeight(const FitMoment& given) const override {
+    const ControlPart* part = owner(ControlRole::kRegularisation);
+    return part ? part->transmittanceWeight(at(given)) : 0;
+  }
+
+  void observe(const FitMoment& given, const ViewStatistics& view) override {
+    for (const auto& part : parts_) part->observe(at(given), view);
+  }
+
+  bool stepGate(const FitMoment& given) const override {
+    const ControlPart* part = owner(ControlRole::kSteps);
+    return !part || part->stepGate(at(given));
+  }
+
+  std::optional<SplatEdit> afterStep(const FitMoment& given, const SplatStore& store) override {
+    ControlPart* part = owner(ControlRole::kNoise);
+    return part ? part->afterStep(at(given), store) : std::optional<SplatEdit>{};
+  }
+
+  bool wantsSweep(const FitMoment& given) const override {
+    return std::any_of(parts_.begin(), parts_.end(),
+                       [&](const auto& part) { return part->wantsSweep(at(given)); });
+  }
+  void sweep(const FitMoment& given, ViewEvaluator& views) override {
+    const ControlMoment moment = at(given);
+    for (const auto& part : parts_) {
+      if (part->wantsSweep(moment)) part->sweep(moment, views);
+    }
+  }
+
+  std::optional<SplatEdit> edit(const FitMoment& given, const SplatStore& store) override {
+    const ControlMoment moment = at(given);
+    const size_t count = store.splats.size();
+    if (count == 0) return {};
+    followAges(count, moment);
+    SplatEdit edit;
+    if (moment.is_event || removesNow(moment)) {
+      std::vector<uint8_t> goes(count, 0);
+      if (moment.is_event) multiply(moment, store, goes, edit);
+      removeSplats(moment, store.splats, goes, edit);
+    }
+    if (ControlPart* part = owner(ControlRole::kOpacity)) {
+      part->lowerOpacities(moment, store.splats, edit);
+    }
+    if (!moment.is_event && edit.writes.empty() && !edit.keep && edit.append.size() == 0) return {};
+    for (const auto& part : parts_) part->edited(moment, edit, count);
+    followEdit(edit, 1, static_cast<float>(moment.iteration), births_);
+    last_iteration_ = moment.iteration;
+    return edit;
+  }
+
+  std::vector<float> seen(SplatQuantity quantity, const RawSplats& splats) const override {
+    if (quantity == SplatQuantity::kAge && births_.size() == splats.size()) return ages();
+    if (quantity == SplatQuantity::kSplitAxis) return elongations(splats);
+    for (const auto& part : parts_) {
+      std::vector<float> values = part->seen(quantity);
+      if (values.size() == splats.size()) return values;
+    }
+    return {};
+  }
+
+  TensorTable state() const override {
+    TensorTable table;
+    table["births"] = {{births_.size()}, births_};
+    for (const auto& part : parts_) {
+      TensorTable own;
+      part->put(own);
+      for (auto& [key, tensor] : own) {
+        table[std::string(part->name()) + "." + key] = std::move(tensor);
+      }
+    }
+    return table;
+  }
+
+  void restore(const TensorTable& table) override {
+    std::vector<float> births = stateArray<float>(table, "births");
+    for (const auto& part : parts_) {
+      const std::string prefix = std::string(part->name()) + ".";
+      TensorTable own;
+      for (const auto& [key, tensor] : table) {
+        if (key.starts_with(prefix)) own[key.substr(prefix.size())] = tensor;
+      }
+      part->take(own);
+    }
+    births_ = std::move(births);
+  }
+
+ private:
+  ControlMoment at(const FitMoment& moment) const { return controlMoment(moment, schedule_); }
+
+  ControlPart* owner(ControlRole role) const {
+    for (const auto& part : parts_) {
+      if (part->owns() & roles(role)) return part.get();
+    }
+    return nullptr;
+  }
+
+  bool removesNow(const ControlMoment& moment) const {
+    const ControlPart* removal = owner(ControlRole::kRemoval);
+    const ControlPart* recovery = owner(ControlRole::kRecovery);
+    return (removal && removal->removesAt(moment)) || (recovery && recovery->removesAt(moment));
+  }
+
+  /// Births are counted from the first call of a fit.
+  void followAges(size_t count, const ControlMoment& moment) {
+    if (births_.size() != count) births_.assign(count, static_cast<float>(moment.iteration));
+    last_iteration_ = moment.iteration;
+  }
+  std::vector<float> ages() const {
+    std::vector<float> values(births_.size());
+    for (size_t i = 0; i < values.size(); ++i) {
+      values[i] = static_cast<float>(last_iteration_) - births_[i];
+    }
+    return values;
+  }
+
+  static std::vector<float> elongations(const RawSplats& splats) {
+    std::vector<float> values(splats.size());
+    for (size_t i = 0; i < values.size(); ++i) {
+      float s[3] = {splats.log_scales[i * 3], splats.log_scales[i * 3 + 1],
+                    splats.log_scales[i * 3 + 2]};
+      std::sort(s, s + 3);
+      values[i] = s[2] - s[1];
+    }
+    return values;
+  }
+
+  /// Splats that there may be after this event.
+  uint64_t limit(const ControlMoment& moment, size_t count) const {
+    ControlPart* growth = owner(ControlRole::kGrowth);
+    const uint64_t room = growth ? growth->limit(moment, count) : UINT64_MAX;
+    return moment.max_splats > 0 ? std::min(room, moment.max_splats) : room;
+  }
+
+  void multiply(const ControlMoment& moment, const SplatStore& store, std::vector<uint8_t>& goes,
+                SplatEdit& edit) {
+    ControlPart* part = owner(ControlRole::kMultiplication);
+    if (!part) return;
+    const RawSplats& splats = store.splats;
+    const uint64_t room = limit(moment, splats.size());
+    if (part->owns() & roles(ControlRole::kChildren)) {
+      part->multiply(moment, store, room, edit);
+      if (edit.keep) {
+        std::fill(goes.begin(), goes.end(), uint8_t{1});
+        for (const uint32_t row : *edit.keep) goes[row] = 0;
+      }
+      return;
+    }
+    ControlPart* children = owner(ControlRole::kChildren);
+    std::vector<Candidate> chosen = part->candidates(moment, splats);
+    dropHopeless(moment, splats, *children, goes, chosen);
+    chooseFirst(moment, splats, goes, room, chosen);
+    edit.append = children->children(moment, splats, chosen);
+    setChildOpacities(splats, chosen, *children, edit);
+    for (const Candidate& one : chosen) {
+      if (one.replaces) goes[one.row] = 1;
+    }
+  }
+
+  /// Candidates that are about to go multiply only where a child would stay.
+  void dropHopeless(const ControlMoment& moment, const RawSplats& splats, ControlPart& children,
+                    std::vector<uint8_t>& goes, std::vector<Candidate>& candidates) {
+    ControlPart* removal = owner(ControlRole::kRemoval);
+    if (!removal || !removal->removesAt(moment)) return;
+    const RawSplats none = rowsOf(splats, {});
+    removal->remove(moment, splats, none, goes, {});
+    std::erase_if(candidates, [&](Candidate& one) {
+      if (!goes[one.row]) return false;
+      const RawSplats born = children.children(moment, splats, {&one, 1});
+      if (!one.replaces) return true;
+      std::vector<uint8_t> unseen(splats.size(), 0), born_goes(born.size(), 0);
+      const RawSplats parent = rowsOf(splats, {one.row});
+      removal->remove(moment, parent, born, std::span(unseen).first(1), born_goes);
+      return std::find(born_goes.begin(), born_goes.end(), 0) == born_goes.end();
+    });
+  }
+
+  /// Leaves the candidates that there is room for, by row.
+  void chooseFirst(const ControlMoment& moment, const RawSplats& splats,
+                   const std::vector<uint8_t>& goes, uint64_t room,
+                   std::vector<Candidate>& candidates) {
+    uint64_t count = static_cast<uint64_t>(std::count(goes.begin(), goes.end(), 0));
+    std::vector<size_t> order = preferred(moment, splats, room, count, candidates);
+    std::vector<Candidate> chosen;
+    for (const size_t k : order) {
+      const uint64_t added = goes[candidates[k].row] ? 2 : 1;
+      if (count + added > room) continue;
+      count += added;
+      chosen.push_back(candidates[k]);
+    }
+    std::sort(chosen.begin(), chosen.end(),
+              [](const Candidate& a, const Candidate& b) { return a.row < b.row; });
+    candidates = std::move(chosen);
+  }
+
+  /// Candidates in the order in which they get room.
+  std::vector<size_t> preferred(const ControlMoment& moment, const RawSplats& splats, uint64_t room,
+                                uint64_t count, const std::vector<Candidate>& candidates) {
+    std::vector<size_t> order(candidates.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    if (room == UINT64_MAX) return order;
+    if (ControlPart* part = owner(ControlRole::kScore)) {
+      const std::vector<double> weights = part->score(moment, splats, candidates);
+      std::vector<uint32_t> rows(candidates.size());
+      for (size_t k = 0; k < rows.size(); ++k) rows[k] = static_cast<uint32_t>(k);
+      const size_t most = static_cast<size_t>(
+          std::min<uint64_t>(candidates.size(), room > count ? room - count : 0));
+      const std::vector<uint32_t> drawn =
+          drawWithoutReplacement(moment, RandomUse::kDensifyChoice, rows, weights, most);
+      return {drawn.begin(), drawn.end()};
+    }
+    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+      return candidates[a].strength > candidates[b].strength;
+    });
+    return order;
+  }
+
+  void setChildOpacities(const RawSplats& splats, const std::vector<Candidate>& chosen,
+                         const ControlPart& children, SplatEdit& edit) const {
+    const ControlPart* part = owner(ControlRole::kChildOpacity);
+    if (!part || part == &children) return;
+    for (float& logit : edit.append.logits) logit = part->childLogit(logit);
+    RowWrite write;
+    write.array = RawArray::kLogits;
+    for (const Candidate& one : chosen) {
+      if (one.replaces) continue;
+      write.rows.push_back(one.row);
+      write.values.push_back(part->childLogit(splats.logits[one.row]));
+    }
+    if (!write.rows.empty()) edit.writes.push_back(std::move(write));
+  }
+
+  void removeSplats(const ControlMoment& moment, const RawSplats& splats,
+                    std::vector<uint8_t>& goes, SplatEdit& edit) {
+    std::vector<uint8_t> appended_goes(edit.append.size(), 0);
+    for (const ControlRole role : {ControlRole::kRemoval, ControlRole::kRecovery}) {
+      ControlPart* part = owner(role);
+      if (part && part->removesAt(moment)) {
+        part->remove(moment, splats, edit.append, goes, appended_goes);
+      }
+    }
+    std::vector<uint32_t> appended = staying(appended_goes);
+    if (appended.size() < appended_goes.size()) edit.append = rowsOf(edit.append, appended);
+    std::vector<uint32_t> stay = staying(goes);
+    if (stay.empty() && edit.append.size() == 0) {
+      // Without any splat a fit could never grow again.
+      const auto best = std::max_element(splats.logits.begin(), splats.logits.end());
+      stay.push_back(static_cast<uint32_t>(best - splats.logits.begin()));
+    }
+    if (stay.size() < splats.size()) edit.keep = std::move(stay);
+  }
+
+  std::string name_;
+  EventSchedule schedule_;
+  std::vector<std::unique_ptr<ControlPart>> parts_;
+  std::vector<float> births_;  ///< [N] iteration in which each splat was made
+  uint64_t last_iteration_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Strategy> makeDensityControl(const char* name, ControlAssembly assembly) {
+  return std::make_unique<DensityControl>(name, std::move(assembly));
+}
+
+}  // namespace stipple

@@ -1,0 +1,50 @@
+// Based on: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting for Real-Time Radiance
+// Field Rendering, SIGGRAPH 2023, section 5.2.
+
+#include "densify/faint_removal.h"
+
+#include "densify/clone_or_split.h"
+
+namespace stipple {
+
+namespace {
+
+class FaintRemoval final : public ControlPart {
+ public:
+  explicit FaintRemoval(const FaintRemovalOptions& options) : options_(options) {}
+
+  const char* name() const override { return "faint_removal"; }
+  ControlRoles owns() const override { return roles(ControlRole::kRemoval); }
+
+  bool removesAt(const ControlMoment& moment) const override {
+    return moment.is_event && (options_.until == 0 ||
+                               moment.iteration < scaleSchedule(options_.until, moment.iterations));
+  }
+
+  void remove(const ControlMoment& moment, const RawSplats& splats, const RawSplats& appended,
+              std::span<uint8_t> goes, std::span<uint8_t> appended_goes) override {
+    judge(moment, splats, goes);
+    judge(moment, appended, appended_goes);
+  }
+
+ private:
+  void judge(const ControlMoment& moment, const RawSplats& splats, std::span<uint8_t> goes) const {
+    const float least_logit = rawOpacity(static_cast<float>(options_.least_opacity));
+    const bool judges_size = options_.largest_share > 0 && moment.isAfter(options_.size_after);
+    const float huge =
+        judges_size ? logShareOfExtent(moment, options_.largest_share) : kLargestLogScale;
+    for (size_t i = 0; i < goes.size(); ++i) {
+      if (splats.logits[i] < least_logit || largestLogScale(splats, i) > huge) goes[i] = 1;
+    }
+  }
+
+  FaintRemovalOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<ControlPart> makeFaintRemoval(const FaintRemovalOptions& options) {
+  return std::make_unique<FaintRemoval>(options);
+}
+
+}  // namespace stipple

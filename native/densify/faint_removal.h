@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+
+#include "densify/control_part.h"
+
+namespace stipple {
+
+struct FaintRemovalOptions {
+  double least_opacity = 0.005;  ///< fainter splats go
+  /// Of the cameras' extent: larger splats go, once opacities have been reset; 0: none do.
+  double largest_share = 0.1;
+  uint64_t size_after = 3000;  ///< iterations of 30,000 from which on size is judged
+  /// Iterations of 30,000 from which on nothing goes any more; 0: until the last event.
+  uint64_t until = 0;
+};
+
+/// Faint and huge splats go at every event, children that were just made too. Owns kRemoval.
+/// Size is the largest scale in the world; sizes in the picture are not looked at, as the published
+/// program forgets them before it looks.
+std::unique_ptr<ControlPart> makeFaintRemoval(const FaintRemovalOptions& options = {});
+
+}  // namespace stipple

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+
+#include "densify/control_part.h"
+
+namespace stipple {
+
+/// Gradients are those of GradientWindow: per half picture, averaged over the views since the last
+/// event that saw the splat.
+struct ScreenPullOptions {
+  Statistic copy_statistic = Statistic::kScreenGradients;
+  double copy_threshold = 2e-4;  ///< from which on a small splat is copied
+  Statistic split_statistic = Statistic::kScreenGradients;
+  double split_threshold = 2e-4;  ///< from which on a large one is split
+  double small_share = 0.01;      ///< of the cameras' extent: the largest scale of a small splat
+};
+
+/// Splats multiply that views pull at. Owns kMultiplication. Statistics: kScreenGradients or
+/// kAbsoluteScreenGradients.
+std::unique_ptr<ControlPart> makeScreenPull(const ScreenPullOptions& options = {});
+
+}  // namespace stipple

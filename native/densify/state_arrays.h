@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/error.h"
+#include "data/tensor_table.h"
+
+namespace stipple {
+
+/// Numbers of a strategy's state. Errors: kFormat where there are none of that name and type.
+template <class T>
+std::vector<T> stateArray(const TensorTable& table, const std::string& name) {
+  const auto found = table.find(name);
+  if (found == table.end() || !std::holds_alternative<std::vector<T>>(found->second.values)) {
+    fail(ErrorCode::kFormat, "the strategy's state has no '" + name + "'");
+  }
+  return std::get<std::vector<T>>(found->second.values);
+}
+
+}  // namespace stipple

@@ -1,0 +1,114 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "base/error.h"
+#include "densify/adaptive.h"
+#include "densify/control_part.h"
+#include "densify/strategies.h"
+
+namespace stipple {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+/// Decides nothing; stands where roles matter alone.
+class Owner final : public ControlPart {
+ public:
+  Owner(const char* name, ControlRoles owned) : name_(name), owned_(owned) {}
+  const char* name() const override { return name_; }
+  ControlRoles owns() const override { return owned_; }
+
+ private:
+  const char* name_;
+  ControlRoles owned_;
+};
+
+std::vector<std::string> namesOf(const ControlAssembly& assembly) {
+  std::vector<std::string> names;
+  for (const auto& part : assembly.parts) names.emplace_back(part->name());
+  return names;
+}
+
+template <typename Call>
+std::string messageOf(const Call& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "nothing thrown";
+}
+
+TEST(DensityControl, APartTakesThePlaceOfTheOneThatDecidesTheSame) {
+  ControlAssembly assembly = adaptiveControl();
+  addPart(assembly, std::make_unique<Owner>(
+                        "other", roles(ControlRole::kChildren, ControlRole::kChildOpacity)));
+  EXPECT_THAT(namesOf(assembly),
+              ElementsAre("screen_pull", "faint_removal", "opacity_reset", "other"));
+}
+
+TEST(DensityControl, RefusesTwoOwnersOfOneDecisionByName) {
+  ControlAssembly assembly = adaptiveControl();
+  addPart(assembly, std::make_unique<Owner>(
+                        "wide", roles(ControlRole::kChildren, ControlRole::kChildOpacity)));
+  const std::string message = messageOf([&] {
+    addPart(assembly, std::make_unique<Owner>("narrow", roles(ControlRole::kChildOpacity)));
+  });
+  EXPECT_EQ(message, "narrow does not go with wide: both decide the opacity of children");
+}
+
+TEST(DensityControl, SchedulesCountTheirEvents) {
+  FitMoment moment;
+  moment.iterations = 30000;
+  moment.iteration = 600;
+  const EventSchedule schedule;
+  EXPECT_TRUE(controlMoment(moment, schedule).is_event);
+  EXPECT_EQ(controlMoment(moment, schedule).event, 0u);
+  EXPECT_EQ(controlMoment(moment, schedule).event_count, 144u);
+  moment.iteration = 14900;
+  EXPECT_TRUE(controlMoment(moment, schedule).is_event);
+  EXPECT_EQ(controlMoment(moment, schedule).event, 143u);
+  moment.iteration = 15000;
+  EXPECT_FALSE(controlMoment(moment, schedule).is_event);
+  EXPECT_FALSE(controlMoment(moment, schedule).is_learning);
+  EXPECT_EQ(controlMoment(moment, schedule).progress, 1.0);
+  moment.iteration = 500;
+  EXPECT_FALSE(controlMoment(moment, schedule).is_event);
+  EXPECT_EQ(controlMoment(moment, schedule).progress, 0.0);
+}
+
+TEST(DensityControl, DrawsByWeightWithoutReplacement) {
+  FitMoment moment;
+  const std::vector<uint32_t> rows = {0, 1, 2};
+  const std::vector<double> weights = {1, 0, 3};
+  int first_of_three = 0;
+  constexpr int kDraws = 20000;
+  for (int k = 0; k < kDraws; ++k) {
+    moment.iteration = static_cast<uint64_t>(k) + 1;
+    const std::vector<uint32_t> one =
+        drawWithoutReplacement(moment, RandomUse::kDensifyChoice, rows, weights, 1);
+    ASSERT_EQ(one.size(), 1u);
+    ASSERT_NE(one[0], 1u);
+    first_of_three += one[0] == 2;
+  }
+  // Expected 0.75; four standard deviations are 4 sqrt(0.75 0.25 / 20000) = 0.0122.
+  EXPECT_NEAR(first_of_three / double{kDraws}, 0.75, 0.0122);
+  EXPECT_EQ(drawWithoutReplacement(moment, RandomUse::kDensifyChoice, rows, weights, 5).size(), 2u);
+}
+
+TEST(Strategies, RefuseWhatIsNotThere) {
+  EXPECT_THAT(messageOf([] { makeStrategy("adaptive+nothing"); }), HasSubstr("part is 'nothing'"));
+  EXPECT_THAT(messageOf([] { makeStrategy("adaptive(treshold=1)"); }),
+              HasSubstr("adaptive has no setting 'treshold'; there is threshold"));
+  EXPECT_THAT(messageOf([] { makeStrategy("adaptive(threshold=-1)"); }),
+              HasSubstr("adaptive.threshold is -1"));
+  EXPECT_THAT(messageOf([] { makeStrategy("adaptive(threshold"); }), HasSubstr("is allowed"));
+  EXPECT_THAT(messageOf([] { makeStrategy("adaptive(threshold=a)"); }), HasSubstr("is allowed"));
+  EXPECT_THAT(messageOf([] { makeStrategy(""); }), HasSubstr("strategy is ''"));
+}
+
+}  // namespace
+}  // namespace stipple
