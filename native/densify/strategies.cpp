@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "base/error.h"
+#include "densify/absolute.h"
 #include "densify/adaptive.h"
+#include "densify/long_axis_split.h"
 
 namespace stipple {
 
@@ -30,12 +32,34 @@ ControlAssembly makeAdaptive(StrategySettings& settings) {
   return adaptiveControl(options);
 }
 
+ControlAssembly makeAbsolute(StrategySettings& settings) {
+  AbsoluteOptions options;
+  ScreenPullOptions& pull = options.pull;
+  pull.split_threshold = settings.number("threshold", pull.split_threshold, 1e-9, 1e9);
+  pull.copy_threshold = settings.number("copy_threshold", pull.copy_threshold, 1e-9, 1e9);
+  return absoluteControl(options);
+}
+
 constexpr StrategyMaker kStrategies[] = {
     {{"adaptive", "Copies small splats and splits large ones that the pictures pull at"},
      makeAdaptive},
+    {{"absolute", "As adaptive, and finds the blurred splats that lie over fine texture"},
+     makeAbsolute},
 };
 
-constexpr std::span<const PartMaker> kParts = {};
+std::unique_ptr<ControlPart> longAxisSplit(StrategySettings& settings) {
+  LongAxisSplitOptions options;
+  options.offset = settings.number("offset", options.offset, 0, 10);
+  options.long_scale = settings.number("long", options.long_scale, 0.01, 1);
+  options.minor_scale = settings.number("minor", options.minor_scale, 0.01, 1);
+  options.opacity = settings.number("opacity", options.opacity, 0.01, 1);
+  return makeLongAxisSplit(options);
+}
+
+constexpr PartMaker kParts[] = {
+    {{"long_axis_split", "Splits along the longest side, so that two halves fill the same outline"},
+     longAxisSplit},
+};
 
 template <typename Maker>
 std::vector<StrategyEntry> entriesOf(std::span<const Maker> makers) {
@@ -143,7 +167,7 @@ const std::vector<StrategyEntry>& strategyEntries() {
 }
 
 const std::vector<StrategyEntry>& partEntries() {
-  static const std::vector<StrategyEntry> entries = entriesOf(kParts);
+  static const std::vector<StrategyEntry> entries = entriesOf(std::span<const PartMaker>(kParts));
   return entries;
 }
 
@@ -170,10 +194,10 @@ std::unique_ptr<Strategy> makeStrategy(const std::string& text) {
   settings.requireAllUsed();
 
   for (size_t k = 1; k < terms.size(); ++k) {
-    const auto part = std::find_if(kParts.begin(), kParts.end(), [&](const auto& each) {
+    const auto part = std::find_if(std::begin(kParts), std::end(kParts), [&](const auto& each) {
       return terms[k].name == each.entry.name;
     });
-    if (part == kParts.end()) {
+    if (part == std::end(kParts)) {
       fail(ErrorCode::kInvalidArgument,
            "part is '" + terms[k].name + "'; there is " + listOf(partEntries()));
     }

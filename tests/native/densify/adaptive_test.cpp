@@ -5,84 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <set>
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "densify/strategies.h"
+#include "densify/control_scene.h"
 
 namespace stipple {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-/// A fit of the published length whose cameras are spread over one metre.
-FitMoment at(uint64_t iteration, uint64_t max_splats = 0) {
-  FitMoment moment;
-  moment.iteration = iteration;
-  moment.iterations = 30000;
-  moment.extent = 1;
-  moment.seed = 7;
-  moment.max_splats = max_splats;
-  return moment;
-}
-
-struct Kind {
-  float scale;
-  float opacity;
-};
-
-RawSplats splatsOf(const std::vector<Kind>& kinds) {
-  SplatCloud cloud;
-  cloud.sh_degree = 1;
-  cloud.resize(kinds.size());
-  for (size_t i = 0; i < kinds.size(); ++i) {
-    cloud.positions[i * 3] = static_cast<float>(i);
-    cloud.rotations[i * 4] = 1;
-    std::fill_n(&cloud.scales[i * 3], 3, kinds[i].scale);
-    cloud.opacities[i] = kinds[i].opacity;
-    for (size_t k = 0; k < 12; ++k) cloud.sh[i * 12 + k] = static_cast<float>(100 * i + k);
-  }
-  return rawSplats(cloud);
-}
-
-/// What one view of 200 x 100 pixels says: gradients per pixel along x and y.
-struct Seen {
-  std::vector<float> gradients;
-  std::vector<uint8_t> visible;
-
-  /// In: gradients, of each splat, per half picture; along x.
-  explicit Seen(const std::vector<float>& along_x) {
-    for (const float value : along_x) {
-      gradients.insert(gradients.end(), {value / 100, 0.0f});
-      visible.push_back(1);
-    }
-  }
-
-  ViewStatistics statistics() const {
-    ViewStatistics view;
-    view.width = 200;
-    view.height = 100;
-    view.visible = visible;
-    view.arrays[static_cast<size_t>(Statistic::kScreenGradients)] = gradients;
-    return view;
-  }
-};
-
-std::optional<SplatEdit> editAt(Strategy& strategy, const FitMoment& moment,
-                                const RawSplats& splats) {
-  const RawSplats moments = zerosLike(splats);
-  return strategy.edit(moment, {splats, moments, moments});
-}
-
-RawSplats after(const SplatEdit& edit, RawSplats splats) {
-  validate(edit, splats);
-  const EditTarget target{&splats, false};
-  applyEdit(edit, {&target, 1});
-  return splats;
-}
+using namespace stipple::testing;
 
 /// One view, then the edit of iteration 600.
 std::optional<SplatEdit> firstEdit(const std::vector<Kind>& kinds,
@@ -357,14 +291,6 @@ TEST(Adaptive, DiceDependOnSeedAndIterationAlone) {
 
 TEST(Adaptive, RefusesTheStateOfAnother) {
   const auto strategy = makeStrategy("adaptive");
-  const auto messageOf = [&](const std::function<void()>& call) {
-    try {
-      call();
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string("nothing thrown");
-  };
   EXPECT_THAT(messageOf([&] { strategy->restore({}); }), HasSubstr("no 'births'"));
   TensorTable table = strategy->state();
   table["screen_pull.visible_counts"] = {{1}, std::vector<uint32_t>{1}};

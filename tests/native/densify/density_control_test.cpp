@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "base/error.h"
 #include "densify/adaptive.h"
 #include "densify/control_part.h"
+#include "densify/control_scene.h"
 #include "densify/strategies.h"
 
 namespace stipple {
@@ -13,6 +13,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using namespace stipple::testing;
 
 /// Decides nothing; stands where roles matter alone.
 class Owner final : public ControlPart {
@@ -30,16 +31,6 @@ std::vector<std::string> namesOf(const ControlAssembly& assembly) {
   std::vector<std::string> names;
   for (const auto& part : assembly.parts) names.emplace_back(part->name());
   return names;
-}
-
-template <typename Call>
-std::string messageOf(const Call& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "nothing thrown";
 }
 
 TEST(DensityControl, APartTakesThePlaceOfTheOneThatDecidesTheSame) {
