@@ -104,6 +104,8 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     grade_opacity: FloatProperty(name="Opacity", description="Share of every splat's opacity, 0 hides the object",
                                  default=1.0, min=0.0, max=1.0, subtype='FACTOR', options=_CHANGEABLE,
                                  override=_OVERRIDABLE, update=sync.on_property_change)
+    fit_report: PointerProperty(name="Fit Report", description="Curves of the fit that made the splats",
+                                type=bpy.types.Image)
     edited: BoolProperty(name="Edited", description="The splats were edited by hand", options={'HIDDEN'})
 
 

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "io/output_file.h"
+#include "io/svg_plot.h"
 
 namespace stipple {
 
@@ -194,7 +195,7 @@ std::vector<PlotPanel> fitPlots(const FitHistory& history) {
 }
 
 void writeFitPlots(const FitHistory& history, const std::string& path) {
-  writeText(svgOf(fitPlots(history)), path);
+  writeText(svgOf(sheetOf(fitPlots(history))), path);
 }
 
 }  // namespace stipple

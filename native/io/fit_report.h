@@ -3,7 +3,7 @@
 #include <string>
 
 #include "data/fit_history.h"
-#include "io/svg_plot.h"
+#include "io/plot.h"
 
 namespace stipple {
 

@@ -74,6 +74,22 @@ def proposed(window):
     return 'proposed'
 
 
+def report(window):
+    """In a window of its own: no Image Editor is open."""
+    with window.context():
+        assert bpy.ops.stipple.show_report() == {'FINISHED'}
+    return 'report'
+
+
+def close_report(window):
+    reports = module('.scene.fit_reports')
+    (other, area), = reports.editors(bpy.context)
+    facts['report'] = area.spaces.active.image.name
+    facts['windows'] = len(bpy.context.window_manager.windows)
+    with bpy.context.temp_override(window=other):
+        bpy.ops.wm.window_close()
+
+
 def accept(window):
     with window.context():
         assert bpy.ops.stipple.fit_accept() == {'FINISHED'}
@@ -86,4 +102,4 @@ def write(_window):
     (Path(sys.argv[sys.argv.index('--') + 2]) / 'facts.json').write_text(json.dumps(facts))
 
 
-steps = [build, panel, start, previewed, ended, proposed, accept, write]
+steps = [build, panel, start, previewed, ended, proposed, report, close_report, accept, write]

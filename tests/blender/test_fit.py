@@ -65,6 +65,28 @@ def test_a_ball_is_fitted_and_gets_a_budget(stipple, ball, fitting, tmp_path):
     assert stipple.scene.splat_data.count(obj.data) == round(0.25 * count)
 
 
+def test_the_report_is_an_image_that_the_file_keeps(stipple, ball, tmp_path):
+    settings(view_count=4, view_size=32)
+    obj = fitted()
+    name = obj.name
+    image = obj.data.stipple.fit_report
+    assert image.name == 'Sphere Fit Report' and image.packed_file is not None and not image.is_dirty
+    # Two columns of 960 / 2 units at 2 pixels; two rows for one budget.
+    assert tuple(image.size) == (1920, 1280)
+    assert not bpy.ops.stipple.show_report.poll()  # no window
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'b.blend'))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / 'b.blend'))
+    image = bpy.data.objects[name].data.stipple.fit_report
+    pixels = np.empty(1920 * 1280 * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(1280, 1920, 4)
+    # White paper, dark titles at the top (the last rows), blue and orange curves below them.
+    assert np.all(pixels[0, 0] == 1) and (pixels[1230:, :, :3].max(axis=2) < 0.2).sum() > 500
+    colours = pixels[:1200, :, :3].reshape(-1, 3)
+    for wanted in ((0x00, 0x72, 0xb2), (0xd5, 0x5e, 0x00)):
+        assert (np.abs(colours - np.array(wanted) / 255).max(axis=1) < 0.02).sum() > 300
+
+
 def test_the_same_fit_twice_gives_the_same_splats(stipple, ball, tmp_path):
     settings(view_count=4, view_size=32)
     first = stipple.scene.splat_data.read(fitted().data)

@@ -36,6 +36,15 @@ def test_the_end_is_a_proposal_that_replaces_nothing_until_it_is_accepted(shots)
     assert 'Traceback' not in text
 
 
+def test_the_report_opens_in_an_image_editor(shots):
+    pictures, facts, _ = shots
+    assert facts['report'] == 'Sphere Fit Report' and facts['windows'] == 2
+    # White paper with blue curves covers a good part of the screen.
+    shown = pictures['report'].reshape(-1, 3).astype(int)
+    assert (shown.min(axis=1) > 250).sum() > 100_000
+    assert (np.abs(shown - (0x00, 0x72, 0xb2)).max(axis=1) < 12).sum() > 100
+
+
 def test_panel_changes_with_what_happens(shots):
     pictures, _, _ = shots
     assert all(np.ptp(pictures[name]) > 100 for name in ('panel', 'running', 'proposed', 'accepted'))

@@ -165,6 +165,8 @@ FUNCTIONS = {
     'stipple_fit_cloud': (_status, [_handle, c_uint64, _out_handle]),
     'stipple_fit_model': (_status, [_handle, _out_handle]),
     'stipple_fit_report_save': (_status, [_handle, _path]),
+    'stipple_fit_report_draw': (_status, [_handle, c_double, c_uint64, _floats, POINTER(c_uint32),
+                                         POINTER(c_uint32)]),
     # volumes
     'stipple_voxelize_options_init': (None, [_to(s.StippleVoxelizeOptions)]),
     'stipple_voxelize_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleVoxelizeOptions),

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fitting splats to views."""
 
-from ctypes import byref, c_char_p, c_uint64, c_void_p
+from ctypes import byref, c_char_p, c_uint32, c_uint64, c_void_p
+
+import numpy as np
 
 from .cloud import Cloud
 from .errors import check
-from .handle import new_handle, path_bytes
+from .handle import new_handle, path_bytes, pointer_to
 from .job import Job
 from .structs import FitModel, FitQuality, StippleFitFigures, StippleFitOptions
 
@@ -74,3 +76,12 @@ class Fit(Job):
     def save_report(self, path):
         """JSON at path, and its curves under the same name with the ending .svg."""
         self._check(self.library.stipple_fit_report_save(self.pointer, path_bytes(path)))
+
+    def draw_report(self, scale):
+        """The same curves as a picture [H,W,4], display sRGB, row 0 = top; scale 1 is 960 pixels wide."""
+        width, height = c_uint32(), c_uint32()
+        draw = self.library.stipple_fit_report_draw
+        self._check(draw(self.pointer, scale, 0, None, byref(width), byref(height)))
+        pixels = np.empty((height.value, width.value, 4), np.float32)
+        self._check(draw(self.pointer, scale, pixels.size, pointer_to(pixels), byref(width), byref(height)))
+        return pixels

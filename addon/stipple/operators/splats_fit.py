@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from .. import version
 from ..jobs import JobOperator
-from ..scene import fitting, sources, splat_data, sync
+from ..scene import fit_reports, fitting, sources, splat_data, sync
 
 PROPOSED_KEY = 'stipple_fit_proposed'
 _PREVIEW_SECONDS = 1.5
@@ -74,8 +74,10 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
                 stipple.gaussians_per_anchor = result.decoding.gaussians_per_anchor
                 sources.attach_model(obj.data, result.path, [])
         sync.write_decoded(obj.data, result.splats)
+        report = fit_reports.keep(obj.data, obj.name, result.report)
         if not bpy.app.background:
             obj[PROPOSED_KEY] = True
+            fit_reports.show_if_wanted(context, report)
         for note in fitting.state.notes:
             self.report({'WARNING'}, note)
         figures = fitting.state.figures
@@ -139,7 +141,7 @@ class STIPPLE_OT_fit_accept(bpy.types.Operator):
 
 
 class STIPPLE_OT_fit_discard(bpy.types.Operator):
-    """Remove the fitted splats; their file stays"""
+    """Remove the fitted splats and their report; their file stays"""
 
     bl_idname = 'stipple.fit_discard'
     bl_label = "Discard"
@@ -150,7 +152,10 @@ class STIPPLE_OT_fit_discard(bpy.types.Operator):
         return proposed(context) is not None
 
     def execute(self, context):
-        _remove(proposed(context))
+        obj = proposed(context)
+        report = fit_reports.of(obj)
+        _remove(obj)
+        fit_reports.forget(report)
         return {'FINISHED'}
 
 

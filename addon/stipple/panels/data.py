@@ -36,6 +36,8 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
         layout.prop(stipple, 'source')
         if stipple.source_kind != 'NONE':
             layout.operator('stipple.relink', icon='FILEBROWSER')
+        if stipple.fit_report is not None:
+            layout.operator('stipple.show_report', icon='GRAPH')
         if stipple.source_kind != 'MODEL':
             return
         column = layout.column()

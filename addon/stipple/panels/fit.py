@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..operators import splats_fit
+from ..operators import show_report, splats_fit
 from ..scene import fitting
 
 
@@ -41,6 +41,8 @@ class STIPPLE_PT_fit(_FitPanel, bpy.types.Panel):
             layout.label(text=fitting.state.problem, icon='ERROR')
         elif fitting.state.figures is not None:
             _draw_figures(layout, fitting.state.figures)
+        if show_report.reported(context) is not None:
+            layout.operator('stipple.show_report', icon='GRAPH')
 
 
 class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):

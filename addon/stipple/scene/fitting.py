@@ -12,7 +12,7 @@ from ..binding.fit import Fit, fit_options
 from ..binding.model import DecodeSettings, Model
 from ..binding.structs import ColourSpace, FitModel, FitQuality, JobState
 from ..binding.views import Views
-from . import facts, meshes, sources, view_capture, view_rigs
+from . import facts, fit_reports, meshes, sources, view_capture, view_rigs
 
 # Surface samples that a fit of meshes starts from and learns its density on.
 POINT_COUNT = 20_000
@@ -43,6 +43,7 @@ class Result:
     path: str           # of the asset file
     decoding: object    # DecodeSettings of these splats
     kind: str           # source kind: 'TREE', or 'MODEL' of a field
+    report: object      # picture of the fit's curves, [H,W,4]
 
 
 class FitTask:
@@ -189,6 +190,7 @@ class FitTask:
                 self.job.wait()  # says why
             is_field = settings.model == 'FIELD'
             made = self.job.model() if is_field else self.job.result()
+            report = self.job.draw_report(fit_reports.SCALE)
             if settings.report:
                 self.job.save_report(bpy.path.abspath(settings.report))
         finally:
@@ -197,16 +199,16 @@ class FitTask:
         if is_field:
             info = made.info()
             decoding = DecodeSettings(info.most_anchors, info.gaussians_per_anchor, seed=settings.seed)
-            self._keep(made, decoding, 'MODEL')
+            self._keep(made, decoding, 'MODEL', report)
             return
         job = Model.from_cloud_start(self._native, made, seed=settings.seed)
         yield from self._until_done(job, _FIT_END, 1.0)
-        self._keep(job.model(), DecodeSettings(made.info().count), 'TREE')
+        self._keep(job.model(), DecodeSettings(made.info().count), 'TREE', report)
 
-    def _keep(self, model, decoding, kind):
+    def _keep(self, model, decoding, kind, report):
         path = sources.save_model(model, self._path or sources.model_path_for(state.name), bool(self._path))
         sources.remember_model(path, model)
-        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, kind)
+        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, kind, report)
 
     def _until_done(self, job, start, end):
         while True:

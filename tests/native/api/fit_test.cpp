@@ -161,6 +161,17 @@ TEST_F(FitTest, FitsPicturesAndReports) {
   EXPECT_NE(text.find("\"strategy\": \"adaptive\""), std::string::npos);
   EXPECT_NE(text.find("\"iterations\": 60"), std::string::npos);
   EXPECT_TRUE(svg.good());
+  uint32_t width = 0, height = 0;
+  STIPPLE_ASSERT_OK(stipple_fit_report_draw(job, 1, 0, nullptr, &width, &height));
+  EXPECT_EQ(width, 960u);
+  std::vector<float> pixels(4 * size_t{width} * height, -1.0f);
+  expectRefused(stipple_fit_report_draw(job, 1, pixels.size() - 1, pixels.data(), &width, &height),
+                STIPPLE_ERROR_BUFFER_TOO_SMALL, "the picture needs");
+  STIPPLE_ASSERT_OK(stipple_fit_report_draw(job, 1, pixels.size(), pixels.data(), &width, &height));
+  EXPECT_EQ(*std::max_element(pixels.begin(), pixels.end()), 1.0f);
+  EXPECT_EQ(*std::min_element(pixels.begin(), pixels.end()), 0.0f);
+  expectRefused(stipple_fit_report_draw(job, 0, 0, nullptr, &width, &height),
+                STIPPLE_ERROR_INVALID_ARGUMENT, "scale");
   StippleModel* model = nullptr;
   EXPECT_EQ(stipple_job_model(job, &model), STIPPLE_ERROR_INVALID_ARGUMENT);
   expectRefused(stipple_fit_model(job, &model), STIPPLE_ERROR_UNSUPPORTED,

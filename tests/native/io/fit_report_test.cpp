@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "io/svg_plot.h"
 #include "scratch_folder.h"
 
 namespace stipple {
@@ -104,7 +105,7 @@ TEST(SvgPlot, PutsPointsWhereTheAxesSay) {
   line.x = {0, 50, 100, std::numeric_limits<double>::quiet_NaN()};
   line.y = {0, 5, 10, 3};
   panel.lines = {line};
-  const std::string svg = svgOf({panel});
+  const std::string svg = svgOf(sheetOf({panel}));
   // The plot spans 70..464 x 272..34; the upper end of y is 10 + 5 % of 10.
   EXPECT_NE(svg.find("points=\"70.0,272.0 267.0,158.7 464.0,45.3 \""), std::string::npos) << svg;
   EXPECT_NE(svg.find("A &lt; B"), std::string::npos);
@@ -117,7 +118,7 @@ TEST(SvgPlot, ShowsOneValueAndLogarithms) {
   line.x = {1000, -1};
   line.y = {0.01, 5};
   panel.lines = {line};
-  const std::string svg = svgOf({panel});
+  const std::string svg = svgOf(sheetOf({panel}));
   EXPECT_NE(svg.find(">1000<"), std::string::npos);
   EXPECT_NE(svg.find(">0.01<"), std::string::npos);
 }
