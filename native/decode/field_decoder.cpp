@@ -25,7 +25,8 @@ constexpr double kSpacingRange = 3;
 /// The inputs of an anchor behind its features.
 void writeInputs(const FieldParameters& field, const AnchorSet& anchors, size_t i, float spacing,
                  float* to) {
-  const double leaves = std::ldexp(1.0, anchors.leaf_level);
+  // Of the field: a density may end above the leaves.
+  const double leaves = std::ldexp(1.0, field.leaf_level);
   for (size_t axis = 0; axis < 3; ++axis) {
     const double scaled = static_cast<double>(anchors.positions[i * 3 + axis]) * leaves;
     *to++ = static_cast<float>(2 * (scaled - std::floor(scaled)) - 1);

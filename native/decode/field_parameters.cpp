@@ -30,7 +30,6 @@ constexpr float kFeatureAmplitude = 1e-2f;
 constexpr float kLastLayerScale = 0.1f;
 /// At the start Gaussians of an anchor close a plane between them: 0.6 of their own spacing.
 constexpr double kStartingScale = 0.6;
-constexpr double kStartingOpacity = 0.3;
 
 size_t wholeVectors(size_t width) {
   return (width + kVector - 1) / kVector * kVector;
@@ -106,18 +105,17 @@ FieldParameters makeFieldParameters(const FieldShape& shape) {
   field.antialias = shape.antialias;
   field.features = gridOf(kFeatureChannels, shape.leaf_level, kFeatureLevels, shape,
                           kFeatureAmplitude, shape.seed);
-  field.colours =
-      gridOf(kColourChannels, shape.leaf_level, kColourLevels, shape, 0.0f, shape.seed);
+  field.colours = gridOf(kColourChannels, shape.leaf_level, kColourLevels, shape, 0.0f, shape.seed);
   const size_t widths[] = {fieldInputWidth(field), kHidden, kHidden,
                            fieldOutputWidth(shape.layout)};
   field.network = Mlp(widths, shape.seed, kLastLayerScale);
   std::vector<float>& biases = field.network.layers().back().biases;
   const double scale = kLatticeSide * kStartingScale / std::sqrt(shape.layout.gaussians);
+  const double odds = shape.starting_opacity / (1 - shape.starting_opacity);
   for (size_t k = 0; k < shape.layout.gaussians; ++k) {
     std::fill_n(&biases[shape.layout.scale(k)], 3,
                 static_cast<float>(inverseSoftplus(scale) - inverseSoftplus(kLatticeScale)));
-    biases[shape.layout.opacity(k)] =
-        static_cast<float>(std::log(kStartingOpacity / (1 - kStartingOpacity)) - std::log(1 / 9.0));
+    biases[shape.layout.opacity(k)] = static_cast<float>(std::log(odds) - std::log(1 / 9.0));
   }
   return field;
 }

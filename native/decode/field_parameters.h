@@ -19,6 +19,7 @@ struct FieldShape {
   uint64_t least_anchors = 512;  ///< budgets that it is trained for; others count as the nearest
   uint64_t most_anchors = 8192;
   uint64_t surface_cells = 1 << 16;  ///< leaves that it has to tell apart, about
+  double starting_opacity = 0.3;     ///< of its Gaussians, below 1
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kMip;
   uint64_t seed = 0;

@@ -120,20 +120,21 @@ LearnedDensity::LearnedDensity(const RootCube& root, int leaf_level, int active_
 
 LearnedDensity LearnedDensity::fromPoints(std::span<const float> positions,
                                           std::span<const float> weights, const RootCube& root,
-                                          int leaf_level) {
+                                          int leaf_level, int known_level) {
   requireLeafLevel(leaf_level);
+  known_level = std::min(known_level, leaf_level);
   requireFinite(positions.data(), positions.size(), 3, "prior points: position");
   requireFinite(weights.data(), weights.size(), 1, "prior points: weight");
   std::vector<float> kept, kept_weights;
   keepInside(positions, weights, root, kept, kept_weights);
   if (kept_weights.empty()) return LearnedDensity(root, leaf_level);
-  OctreeLeaves children = gatherLeaves(kept, kept_weights, root, leaf_level);
+  OctreeLeaves children = gatherLeaves(kept, kept_weights, root, known_level);
   double total = 0;
   for (const double mass : children.masses) total += mass;
   // Weights count as points: as many as there are, whatever their unit.
   const double to_count = static_cast<double>(kept_weights.size()) / total;
   LearnedDensity density(root, leaf_level);
-  for (size_t l = density.levels_.size(); l-- > 0;) {
+  for (size_t l = static_cast<size_t>(known_level); l-- > 0;) {
     LearnedLevel level;
     OctreeLeaves parents;
     std::vector<Eight> masses;

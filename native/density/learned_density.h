@@ -45,11 +45,13 @@ class LearnedDensity final : public DensityModel {
 
   /// The density that fits the points best: active are the cells with points, and every choice is
   /// the share of the points in each child, with kPriorPseudoCount. Points outside the root count
-  /// for nothing. In: positions [N,3] metres; weights [N] >= 0 or empty.
+  /// for nothing. In: positions [N,3] metres; weights [N] >= 0 or empty; known_level >= 1: the
+  /// points tell of nothing smaller than cells of this level, below which choices are even.
   /// Errors: kInvalidArgument for a value that is negative or not finite; no point inside the root
   /// with positive weight gives the even density.
   static LearnedDensity fromPoints(std::span<const float> positions, std::span<const float> weights,
-                                   const RootCube& root, int leaf_level);
+                                   const RootCube& root, int leaf_level,
+                                   int known_level = kMaxLeafLevel);
 
   /// From stored levels. Errors: kFormat for arrays that do not fit together, cells that are not in
   /// order or whose parent is inactive, numbers that are not finite.

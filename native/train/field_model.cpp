@@ -32,12 +32,21 @@ constexpr size_t kGrain = 1 << 14;
 /// Ends of the stages, as shares of the iterations. The structural loss starts at its minimum, so
 /// its stage is short.
 constexpr double kStructureEnd = 0.01;
-constexpr double kAttributesEnd = 0.3;
 constexpr uint64_t kMostStructureSteps = 20;
 
-constexpr double kNetworkRate = 8e-3;
+/// What depends on whether anything is known of surfaces at the start.
+struct FieldStart {
+  double opacity;
+  double attributes_end;  ///< share of the iterations, from which on the density learns, too
+  double network_rate;
+  double logit_rate;
+};
+constexpr FieldStart kFromSurfaces = {0.3, 0.3, 8e-3, 1e-2};
+/// A thin fog in all of the cube, whose density moves at once: opaque, or learned faster, it clears
+/// everywhere before any place can show that it is worth something.
+constexpr FieldStart kFromNothing = {0.03, 0.0, 2e-3, 5e-2};
+
 constexpr double kGridRate = 1.5e-2;
-constexpr double kLogitRate = 1e-2;
 constexpr double kStructureRate = 2e-2;
 constexpr double kLastRate = 0.02;
 constexpr double kWarmUpShare = 0.02;
@@ -77,11 +86,24 @@ void requireOptions(const FieldModelOptions& options, std::span<const size_t> tr
   }
 }
 
+const FieldStart& howToStart(const ScenePrior& prior) {
+  return prior.weights.empty() ? kFromNothing : kFromSurfaces;
+}
+
 LearnedDensity startDensity(const ScenePrior& prior, int leaf_level) {
   if (prior.weights.empty()) {
     return LearnedDensity(prior.root, leaf_level, std::min(kEvenLevels, leaf_level));
   }
-  return LearnedDensity::fromPoints(prior.positions, prior.weights, prior.root, leaf_level);
+  return LearnedDensity::fromPoints(prior.positions, prior.weights, prior.root, leaf_level,
+                                    prior.known_level);
+}
+
+/// Leaves of a density that hold anything, about: of a surface a cell has four children.
+uint64_t surfaceLeaves(const LearnedDensity& density) {
+  size_t level = density.levels().size() - 1;
+  while (density.levels()[level].cells.empty()) --level;
+  const uint64_t quarters = 2 * (density.levels().size() - level);
+  return density.levels()[level].cells.size() << quarters;
 }
 
 FieldState startOf(const ScenePrior& prior, const FieldModelOptions& options,
@@ -95,10 +117,10 @@ FieldState startOf(const ScenePrior& prior, const FieldModelOptions& options,
   shape.colour_space = colour_space;
   shape.antialias = options.antialias;
   shape.seed = options.seed;
+  shape.starting_opacity = howToStart(prior).opacity;
   FieldParameters checked = makeFieldParameters(shape);  // refuses options before any work
   LearnedDensity density = startDensity(prior, options.leaf_level);
-  // Cells above the leaves with something below: about a quarter of the leaves of a surface.
-  shape.surface_cells = std::max<uint64_t>(4 * density.levels().back().cells.size(), 1 << 14);
+  shape.surface_cells = std::max<uint64_t>(surfaceLeaves(density), 1 << 14);
   return startState(std::move(density), makeFieldParameters(shape));
 }
 
@@ -119,8 +141,8 @@ void moveToCentres(AnchorSet& anchors) {
 
 class FieldModel final : public FitModel {
  public:
-  FieldModel(FieldState state, const FieldModelOptions& options)
-      : options_(options), state_(std::move(state)) {
+  FieldModel(FieldState state, const FieldStart& start, const FieldModelOptions& options)
+      : options_(options), start_(start), state_(std::move(state)) {
     drawn_.keepForBackward(true);
   }
 
@@ -134,7 +156,7 @@ class FieldModel final : public FitModel {
                                                static_cast<uint64_t>(kStructureEnd * iterations))) {
       return structureStep();
     }
-    return renderedStep(moment, view, done >= kAttributesEnd, progress);
+    return renderedStep(moment, view, done >= start_.attributes_end, progress);
   }
 
   SplatCloud splats(uint64_t budget) override {
@@ -238,7 +260,7 @@ class FieldModel final : public FitModel {
       Stopwatch watch(report.seconds.optimiser);
       const double share = rateShare(moment);
       stepField(share);
-      if (learns_density) stepDensity(by_logits_, kLogitRate * share);
+      if (learns_density) stepDensity(by_logits_, start_.logit_rate * share);
     }
     if (learns_density) {
       Stopwatch watch(report.seconds.edit);
@@ -330,10 +352,10 @@ class FieldModel final : public FitModel {
       const LinearLayer& by = gradients_.network[l];
       groups.push_back({layer.weights.data(), by.weights.data(), state_.weights[l].first.data(),
                         state_.weights[l].second.data(), layer.weights.size(), 1,
-                        kNetworkRate * share});
+                        start_.network_rate * share});
       groups.push_back({layer.biases.data(), by.biases.data(), state_.biases[l].first.data(),
                         state_.biases[l].second.data(), layer.biases.size(), 1,
-                        kNetworkRate * share});
+                        start_.network_rate * share});
     }
     adamStep(groups, step, adam);
     std::vector<SparseRows> tables;
@@ -399,6 +421,7 @@ class FieldModel final : public FitModel {
   }
 
   FieldModelOptions options_;
+  FieldStart start_;
   FieldState state_;
   std::optional<OctreeDensity> frozen_;  ///< of the density as it is now
 
@@ -426,7 +449,8 @@ std::unique_ptr<FitModel> makeFieldModel(const ViewSource& views, std::span<cons
   ScenePriorOptions prior_options;
   prior_options.seed = options.seed;
   const ScenePrior prior = scenePrior(views, training, prior_options, progress);
-  return std::make_unique<FieldModel>(startOf(prior, options, views.colourSpace()), options);
+  return std::make_unique<FieldModel>(startOf(prior, options, views.colourSpace()),
+                                      howToStart(prior), options);
 }
 
 std::optional<FieldResult> fieldResult(FitModel& model) {

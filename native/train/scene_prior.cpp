@@ -3,9 +3,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/random.h"
 #include "math/vec.h"
+#include "train/visual_hull.h"
 
 namespace stipple {
 
@@ -180,8 +182,19 @@ ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
   addPoints(views.points(), prior);
   addDepth(views, training, options, prior, progress);
   dropUnseen(views, training, prior);
-  prior.root =
-      prior.weights.empty() ? cubeOfCameras(views, training) : cubeOfPoints(prior.positions);
+  if (!prior.weights.empty()) {
+    prior.root = cubeOfPoints(prior.positions);
+    return prior;
+  }
+  prior.root = cubeOfCameras(views, training);
+  VisualHullOptions hull_options;
+  hull_options.seed = options.seed;
+  VisualHull hull = visualHull(views, training, prior.root, hull_options, progress);
+  if (hull.weights.empty()) return prior;
+  prior.positions = std::move(hull.positions);
+  prior.weights = std::move(hull.weights);
+  prior.root = cubeOfPoints(prior.positions);
+  prior.known_level = hull_options.level;
   return prior;
 }
 

@@ -16,6 +16,8 @@ struct ScenePrior {
   RootCube root;
   std::vector<float> positions;  ///< [N,3] metres, on surfaces; may be empty
   std::vector<float> weights;    ///< [N] >= 0, mean 1
+  /// Cells of this level of the root are the smallest that the points tell of.
+  int known_level = kMaxLeafLevel;
 };
 
 struct ScenePriorOptions {
@@ -26,8 +28,9 @@ struct ScenePriorOptions {
 
 /// Points of the source, and places that the views' depth shows. The root cube holds the points
 /// that at least two cameras see, without the farthest 1 % on either side of each axis where those
-/// reach far out, and a tenth more; without points, the ball that the cameras have in common. In:
-/// training: views of the source, at least one. Errors: those of ViewSource::load; kCancelled.
+/// reach far out, and a tenth more. Without points or depth: points of the visual hull, where
+/// pictures have alpha; else none, and the root is around the ball that the cameras have in common.
+/// In: training: views of the source, at least one. Errors: those of ViewSource::load; kCancelled.
 ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
                       const ScenePriorOptions& options, Progress* progress = nullptr);
 

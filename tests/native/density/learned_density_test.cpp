@@ -300,6 +300,17 @@ TEST(LearnedDensity, TakesPointsThatAreNoUse) {
   EXPECT_EQ(one.activeCellCount(), 3u);
   EXPECT_EQ(sampled(one, 1).size(), 1u);
   const std::vector<float> bad = {0, std::nanf(""), 0};
+  // Told of down to cells of 1/2: below them choices are even, and leaves stay where they are.
+  const LearnedDensity coarse = LearnedDensity::fromPoints(inside, {}, kRoot, 3, 1);
+  EXPECT_EQ(coarse.leafLevel(), 3);
+  EXPECT_EQ(coarse.activeCellCount(), 1u);
+  const std::vector<uint64_t> cell = {0};
+  std::vector<float> choices(8), deep(8);
+  coarse.childLogProbabilities(0, cell, choices);
+  one.childLogProbabilities(0, cell, deep);
+  EXPECT_EQ(choices, deep);
+  coarse.childLogProbabilities(1, cell, choices);
+  for (const float choice : choices) EXPECT_NEAR(choice, -std::log(8.0f), 1e-6f);
   EXPECT_THROW(LearnedDensity::fromPoints(bad, {}, kRoot, 3), Error);
   EXPECT_THROW(LearnedDensity(kRoot, 11), Error);
 }

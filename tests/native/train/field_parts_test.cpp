@@ -5,12 +5,15 @@
 #include <memory>
 #include <vector>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "base/random.h"
 #include "decode/anchor_spacing.h"
 #include "train/field_regularisers.h"
 #include "train/scene_prior.h"
 #include "train/sparse_adam.h"
 #include "train/toy_views.h"
+#include "train/visual_hull.h"
 
 namespace stipple {
 namespace {
@@ -174,8 +177,19 @@ TEST(ScenePrior, TakesPointsFromDepth) {
   }
 }
 
-TEST(ScenePrior, WithoutPointsTakesWhatTheCamerasShare) {
-  const auto views = toyViews(toyBall(100), 12, 16, false);
+/// The same pictures, over black where they have alpha.
+std::shared_ptr<MemoryViewSource> withoutAlpha(const MemoryViewSource& views) {
+  auto opaque = std::make_shared<MemoryViewSource>(views.colourSpace());
+  for (size_t v = 0; v < views.count(); ++v) {
+    ViewPicture picture = views.picture(v);
+    picture.alpha.clear();
+    opaque->add(views.camera(v), std::move(picture));
+  }
+  return opaque;
+}
+
+TEST(ScenePrior, WithoutPointsOrAlphaTakesWhatTheCamerasShare) {
+  const auto views = withoutAlpha(*toyViews(toyBall(100), 12, 16, false));
   const ScenePrior prior = scenePrior(*views, all(*views), {});
   EXPECT_TRUE(prior.weights.empty());
   // Around the origin; half an angle of view of atan(1 / 2.8): radius 3.5 sin of it, 1.18.
@@ -184,6 +198,85 @@ TEST(ScenePrior, WithoutPointsTakesWhatTheCamerasShare) {
   for (const double origin : prior.root.origin) EXPECT_NEAR(origin, -0.5 * side, 0.01);
   const std::vector<size_t> one = {0};
   EXPECT_GT(scenePrior(*views, one, {}).root.side, 0.01);
+}
+
+double lengthOf(const float* p) {
+  return std::hypot(static_cast<double>(p[0]), static_cast<double>(p[1]),
+                    static_cast<double>(p[2]));
+}
+
+/// A small ball, so that the ball that the cameras share is far larger than what they show.
+TEST(ScenePrior, WithoutPointsTakesTheHullOfSilhouettes) {
+  const auto views = toyViews(toyBall(3000, 0.5f), 40, 64, false);
+  const ScenePrior prior = scenePrior(*views, all(*views), {});
+  // Half a ball's splat and a pixel (3.5 / (1.4 * 64) = 0.04) beyond its surface, and a tenth.
+  EXPECT_GT(prior.root.side, 1.05);
+  EXPECT_LT(prior.root.side, 1.4);
+  double sum = 0, near_surface = 0;
+  for (size_t i = 0; i < prior.weights.size(); ++i) {
+    const double length = lengthOf(&prior.positions[i * 3]);
+    // Between 40 silhouettes the hull stands out by some hundredths.
+    EXPECT_LT(length, 0.65);
+    sum += static_cast<double>(prior.weights[i]);
+    if (length > 0.45) near_surface += static_cast<double>(prior.weights[i]);
+  }
+  EXPECT_NEAR(sum / static_cast<double>(prior.weights.size()), 1, 1e-3);
+  // A tenth is spread inside, of which a ball of 0.45 has six tenths at most.
+  EXPECT_GT(near_surface / sum, 0.9);
+  EXPECT_LT(near_surface / sum, 0.99);
+  EXPECT_GT(prior.weights.size(), 30000u);
+}
+
+TEST(VisualHull, IsEmptyWhereSilhouettesTellNothing) {
+  const auto shown = toyViews(toyBall(1000), 8, 32, false);
+  const RootCube where = {{-1.5, -1.5, -1.5}, 3.0};
+  EXPECT_FALSE(visualHull(*shown, all(*shown), where, {}).weights.empty());
+  EXPECT_TRUE(visualHull(*withoutAlpha(*shown), all(*shown), where, {}).weights.empty());
+  for (const float alpha : {0.0f, 1.0f}) {
+    auto even = std::make_shared<MemoryViewSource>(shown->colourSpace());
+    for (size_t v = 0; v < shown->count(); ++v) {
+      ViewPicture picture = shown->picture(v);
+      picture.alpha.assign(picture.alpha.size(), alpha);
+      even->add(shown->camera(v), std::move(picture));
+    }
+    EXPECT_TRUE(visualHull(*even, all(*even), where, {}).weights.empty()) << alpha;
+  }
+}
+
+TEST(VisualHull, ForgivesAHoleInOneOfManySilhouettes) {
+  const auto whole = toyViews(toyBall(3000, 0.5f), 60, 48, false);
+  auto holed = std::make_shared<MemoryViewSource>(whole->colourSpace());
+  for (size_t v = 0; v < whole->count(); ++v) {
+    ViewPicture picture = whole->picture(v);
+    if (v == 7) std::fill(picture.alpha.begin(), picture.alpha.end(), 0.0f);
+    holed->add(whole->camera(v), std::move(picture));
+  }
+  const RootCube where = {{-1, -1, -1}, 2.0};
+  const size_t count = visualHull(*whole, all(*whole), where, {}).weights.size();
+  const size_t with_hole = visualHull(*holed, all(*holed), where, {}).weights.size();
+  EXPECT_NEAR(static_cast<double>(with_hole), static_cast<double>(count),
+              0.2 * static_cast<double>(count));
+}
+
+TEST(VisualHull, HasTheSameBitsForAnyNumberOfThreads) {
+  const auto views = toyViews(toyBall(500), 8, 32, false);
+  VisualHull hulls[2];
+  for (const unsigned threads : {1u, 2u}) {
+    withThreads(threads, [&] {
+      hulls[threads - 1] = visualHull(*views, all(*views), {{-1.5, -1.5, -1.5}, 3.0}, {});
+    });
+  }
+  EXPECT_EQ(hulls[0].positions, hulls[1].positions);
+  EXPECT_EQ(hulls[0].weights, hulls[1].weights);
+}
+
+TEST(VisualHull, RefusesLevelsOutOfRange) {
+  const auto views = toyViews(toyBall(100), 3, 16, false);
+  for (const int level : {2, 9}) {
+    VisualHullOptions options;
+    options.level = level;
+    EXPECT_THROW(visualHull(*views, all(*views), {{-1, -1, -1}, 2.0}, options), Error) << level;
+  }
 }
 
 }  // namespace
