@@ -115,4 +115,27 @@ std::vector<uint32_t> drawWithoutReplacement(const FitMoment& moment, RandomUse 
   return chosen;
 }
 
+std::vector<uint32_t> drawWithReplacement(const FitMoment& moment, RandomUse use, uint64_t first,
+                                          std::span<const double> weights, size_t count) {
+  std::vector<double> sums(weights.size());
+  double sum = 0;
+  uint32_t last = 0;  // of a positive weight: where rounding leads past the end
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] > 0) {
+      sum += weights[i];
+      last = static_cast<uint32_t>(i);
+    }
+    sums[i] = sum;
+  }
+  if (!(sum > 0)) return {};
+  const uint64_t seed = mixBits(moment.seed) ^ moment.iteration;
+  std::vector<uint32_t> drawn(count);
+  for (size_t k = 0; k < count; ++k) {
+    const double place = sum * unitDouble(keyedBits(seed, use, first + k));
+    const auto found = std::upper_bound(sums.begin(), sums.end(), place);
+    drawn[k] = found == sums.end() ? last : static_cast<uint32_t>(found - sums.begin());
+  }
+  return drawn;
+}
+
 }  // namespace stipple

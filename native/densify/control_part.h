@@ -181,4 +181,10 @@ std::vector<uint32_t> drawWithoutReplacement(const FitMoment& moment, RandomUse 
                                              std::span<const uint32_t> rows,
                                              std::span<const double> weights, size_t count);
 
+/// `count` draws with replacement by weights, in the order of drawing: indices of weights, none of
+/// weight 0. Keyed by (seed, use, iteration, first + number of the draw). No draws where every
+/// weight is 0.
+std::vector<uint32_t> drawWithReplacement(const FitMoment& moment, RandomUse use, uint64_t first,
+                                          std::span<const double> weights, size_t count);
+
 }  // namespace stipple

@@ -10,6 +10,7 @@
 #include "densify/absolute.h"
 #include "densify/adaptive.h"
 #include "densify/long_axis_split.h"
+#include "densify/mcmc.h"
 
 namespace stipple {
 
@@ -45,6 +46,8 @@ constexpr StrategyMaker kStrategies[] = {
      makeAdaptive},
     {{"absolute", "As adaptive, and finds the blurred splats that lie over fine texture"},
      makeAbsolute},
+    {{"mcmc", "Moves faint splats to where opaque ones are, up to a number that you set"},
+     mcmcControl},
 };
 
 std::unique_ptr<ControlPart> longAxisSplit(StrategySettings& settings) {

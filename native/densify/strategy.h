@@ -25,6 +25,7 @@ struct FitMoment {
   double extent = 1;            ///< of the cameras: 1.1 times the largest distance from their mean
   uint64_t seed = 0;            ///< of the fit; numbers are keyed by (seed, use, iteration, row)
   uint64_t max_splats = 0;      ///< hard cap of the count; 0: none
+  double position_rate = 0;     ///< of Adam in this iteration, metres
 };
 
 /// An iteration of a published schedule of 30,000 in a fit of another length: every window,
@@ -101,6 +102,8 @@ class ViewEvaluator {
  public:
   virtual ~ViewEvaluator() = default;
   virtual size_t viewCount() const = 0;
+  /// As they are drawn. Valid until the splats change.
+  virtual const SplatCloud& splats() = 0;
   virtual const Camera& camera(size_t view) const = 0;
   /// [H,W,3] what the view should look like, over the background of evaluate().
   virtual std::vector<float> target(size_t view) = 0;

@@ -70,6 +70,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
                   Progress* progress) override {
     moment_ = given;
     moment_.max_splats = smallerLimit(given.max_splats, options_.max_splats);
+    moment_.position_rate = positionRate();
     StepReport report;
     report.stage = "Splats";
     report.splat_count = backend_->splatCount();
@@ -166,16 +167,20 @@ class ExplicitModel final : public FitModel, private Regulariser {
     return options;
   }
 
-  void setRates() {
+  double positionRate() const {
     const double progress =
         std::min(1.0, static_cast<double>(moment_.iteration) /
                           static_cast<double>(std::max<uint64_t>(1, moment_.iterations)));
-    const double position_rate =
-        rates_.first_position * std::pow(rates_.last_position / rates_.first_position, progress);
+    return rates_.first_position *
+           std::pow(rates_.last_position / rates_.first_position, progress) *
+           std::max(moment_.extent, 0.0);
+  }
+
+  void setRates() {
     const auto set = [&](ParameterGroup group, double rate) {
       step_options_.learning_rates[static_cast<size_t>(group)] = std::min(rate, kMaxLearningRate);
     };
-    set(ParameterGroup::kPositions, position_rate * std::max(moment_.extent, 0.0));
+    set(ParameterGroup::kPositions, moment_.position_rate);
     set(ParameterGroup::kRotations, rates_.rotation);
     set(ParameterGroup::kLogScales, rates_.log_scale);
     set(ParameterGroup::kLogits, rates_.logit);

@@ -25,18 +25,22 @@ const Camera& FitViewEvaluator::camera(size_t view) const {
   return pictures_.views().camera(training_[view]);
 }
 
+const SplatCloud& FitViewEvaluator::splats() {
+  if (!cloud_) cloud_ = model_.splats(0);
+  return *cloud_;
+}
+
 void FitViewEvaluator::load(size_t view) {
   camera(view);
   pictures_.load(training_[view], background_, target_);
 }
 
 void FitViewEvaluator::draw(size_t view) {
-  if (!cloud_) cloud_ = model_.splats(0);
   RenderOptions options;
   options.with_depth = false;
   options.with_background = true;
   std::copy_n(background_, 3, options.background);
-  const SplatInstance instance{&*cloud_};
+  const SplatInstance instance{&splats()};
   renderTiled({&instance, 1}, camera(view), options, workspace_, drawn_);
 }
 

@@ -25,6 +25,7 @@ class FitViewEvaluator final : public ViewEvaluator {
   void forgetSplats() { cloud_.reset(); }
 
   size_t viewCount() const override { return training_.size(); }
+  const SplatCloud& splats() override;
   const Camera& camera(size_t view) const override;
   std::vector<float> target(size_t view) override;
   std::vector<float> picture(size_t view) override;
