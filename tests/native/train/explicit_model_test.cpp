@@ -387,7 +387,7 @@ TEST(ExplicitModel, RefusesStatesOfOtherFits) {
   table["adam.step"] = {{1}, std::vector<float>{1}};
   EXPECT_THAT(refused(table), HasSubstr("another type"));
   table = good;
-  table.erase("strategy.state.gradient_sums");
+  ASSERT_EQ(table.erase("strategy.state.screen_pull.gradient_sums"), 1u);
   EXPECT_THAT(refused(table), HasSubstr("no 'gradient_sums'"));
 }
 
