@@ -13,6 +13,8 @@ namespace stipple {
 
 namespace {
 
+constexpr double kFarthest = 1e38;  ///< metres; what would go further stays, and floats hold it
+
 /// Three independent numbers of the standard normal distribution, for one child of a splat.
 Vec3d childOffset(const FitMoment& moment, size_t row, uint64_t child) {
   const uint64_t seed = mixBits(moment.seed) ^ moment.iteration;
@@ -74,8 +76,8 @@ void placeInDistribution(const FitMoment& moment, uint32_t parent, uint64_t chil
   const Vec3d moved = turn * offset;
   for (int axis = 0; axis < 3; ++axis) {
     float& position = children.positions[row * 3 + static_cast<size_t>(axis)];
-    const float place = static_cast<float>(static_cast<double>(position) + moved[axis]);
-    if (std::isfinite(place)) position = place;
+    const double place = static_cast<double>(position) + moved[axis];
+    if (std::abs(place) < kFarthest) position = static_cast<float>(place);
   }
 }
 

@@ -57,6 +57,8 @@ const char* wordsOf(ControlRole role) {
       return "how numbers become splats";
     case ControlRole::kFilter:
       return "how splats are filtered";
+    case ControlRole::kSecondSplit:
+      return "which splats are split once more";
   }
   return "";
 }

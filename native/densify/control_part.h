@@ -56,6 +56,7 @@ enum class ControlRole : uint32_t {
   kRegularisation = 1u << 10,    ///< what is added to the loss
   kParameterisation = 1u << 11,  ///< how raw numbers become splats
   kFilter = 1u << 12,            ///< what is done to splats after that, before they are drawn
+  kSecondSplit = 1u << 13,       ///< which splats are split after that, children too
 };
 using ControlRoles = uint32_t;
 constexpr ControlRoles roles(ControlRole role) {
@@ -136,6 +137,11 @@ class ControlPart {
   /// kMultiplication with kChildren: the whole of it. In: room: splats that there may be at most.
   /// Out: writes and appended rows; keep where it removes. kRemoval applies to the result.
   virtual void multiply(const ControlMoment&, const SplatStore&, uint64_t /*room*/, SplatEdit&) {}
+
+  /// kSecondSplit: splits what there is after multiplication. In: room: splats that there may be at
+  /// most. Out: goes [N], 1 where a splat is replaced; appended rows, in any order.
+  virtual void splitAgain(const ControlMoment&, const RawSplats& /*splats*/, uint64_t /*room*/,
+                          std::span<uint8_t> /*goes*/, RawSplats& /*append*/) {}
 
   /// kRemoval, at an event, and kRecovery: whether it acts now.
   virtual bool removesAt(const ControlMoment& moment) const { return moment.is_event; }

@@ -96,7 +96,12 @@ class DensityControl final : public Strategy {
     SplatEdit edit;
     if (moment.is_event || removesNow(moment)) {
       std::vector<uint8_t> goes(count, 0);
-      if (moment.is_event) multiply(moment, store, goes, edit);
+      if (moment.is_event) {
+        multiply(moment, store, goes, edit);
+        if (ControlPart* part = owner(ControlRole::kSecondSplit)) {
+          part->splitAgain(moment, store.splats, limit(moment, count), goes, edit.append);
+        }
+      }
       removeSplats(moment, store.splats, goes, edit);
     }
     if (ControlPart* part = owner(ControlRole::kOpacity)) {

@@ -11,6 +11,7 @@
 #include "densify/adaptive.h"
 #include "densify/long_axis_split.h"
 #include "densify/mcmc.h"
+#include "densify/volumetric.h"
 
 namespace stipple {
 
@@ -46,6 +47,7 @@ constexpr StrategyMaker kStrategies[] = {
      makeAdaptive},
     {{"absolute", "As adaptive, and finds the blurred splats that lie over fine texture"},
      makeAbsolute},
+    {{"volumetric", "As adaptive, and splits what fills a large volume"}, volumetricControl},
     {{"mcmc", "Moves faint splats to where opaque ones are, up to a number that you set"},
      mcmcControl},
 };
@@ -62,6 +64,8 @@ std::unique_ptr<ControlPart> longAxisSplit(StrategySettings& settings) {
 constexpr PartMaker kParts[] = {
     {{"long_axis_split", "Splits along the longest side, so that two halves fill the same outline"},
      longAxisSplit},
+    {{"volume_split", "Also splits whatever fills a large volume, long shapes into smaller pieces"},
+     volumeSplit},
 };
 
 template <typename Maker>
