@@ -22,6 +22,9 @@ ControlMoment controlMoment(const FitMoment& moment, const EventSchedule& schedu
   const uint64_t passed = moment.iteration == 0 ? 0 : (moment.iteration - 1) / interval;
   at.event = passed > before ? passed - before : 0;
   at.event_count = last > first ? (last - 1) / interval - before : 0;
+  at.interval = interval;
+  const uint64_t next = (before + at.event + 1) * interval;
+  at.until_event = next < last ? next - moment.iteration : UINT64_MAX;
   at.progress = last > first && moment.iteration > first
                     ? std::min(1.0, static_cast<double>(moment.iteration - first) /
                                         static_cast<double>(last - first))
@@ -63,17 +66,21 @@ const char* wordsOf(ControlRole role) {
   return "";
 }
 
+void requireApart(const ControlPart& added, const ControlPart& there) {
+  const ControlRoles shared = there.owns() & added.owns();
+  if (shared == 0) return;
+  const ControlRole role = static_cast<ControlRole>(shared & (~shared + 1));
+  fail(ErrorCode::kInvalidArgument, std::string(added.name()) + " does not go with " +
+                                        there.name() + ": both decide " + wordsOf(role));
+}
+
 void addPart(ControlAssembly& assembly, std::unique_ptr<ControlPart> part) {
   const ControlRoles added = part->owns();
   std::erase_if(assembly.parts, [&](const std::unique_ptr<ControlPart>& there) {
     return there->owns() != 0 && (there->owns() & ~added) == 0;
   });
   for (const std::unique_ptr<ControlPart>& there : assembly.parts) {
-    const ControlRoles shared = there->owns() & added;
-    if (shared == 0) continue;
-    const ControlRole role = static_cast<ControlRole>(shared & (~shared + 1));
-    fail(ErrorCode::kInvalidArgument, std::string(part->name()) + " does not go with " +
-                                          there->name() + ": both decide " + wordsOf(role));
+    requireApart(*part, *there);
   }
   assembly.parts.push_back(std::move(part));
 }

@@ -31,6 +31,8 @@ struct ControlMoment : FitMoment {
   double progress = 0;       ///< from the first event's window to its end, 0..1
   uint64_t event = 0;        ///< number of this event or the next one, from 0
   uint64_t event_count = 0;  ///< of the whole fit
+  uint64_t interval = 100;   ///< iterations from one event to the next
+  uint64_t until_event = 0;  ///< iterations to the next one; UINT64_MAX: there is none any more
 
   /// Whether this is what iteration `published` of a fit of 30,000 is here.
   bool isAt(uint64_t published) const { return iteration == scaleSchedule(published, iterations); }
@@ -87,6 +89,8 @@ class ControlPart {
   /// As users write it: "long_axis_split".
   virtual const char* name() const = 0;
   virtual ControlRoles owns() const = 0;
+  /// Roles that other parts must own, or this one has nothing to do.
+  virtual ControlRoles needs() const { return 0; }
 
   // ---- once, before the first iteration --------------------------------------------------------
   /// Changes splats that a fit begins with (not those of a cloud that is densified).
@@ -166,16 +170,21 @@ class ControlPart {
   virtual void take(const TensorTable&) {}
 };
 
-/// Density control that is made of parts. Errors: kInvalidArgument where two parts own one role.
+/// Density control that is made of parts.
 struct ControlAssembly {
   EventSchedule schedule;
   std::vector<std::unique_ptr<ControlPart>> parts;
 };
+/// Errors: kInvalidArgument where nobody owns what a part needs, or a part would never be asked:
+/// the scores and opacities of children where multiplication is the whole of it.
 std::unique_ptr<Strategy> makeDensityControl(const char* name, ControlAssembly assembly);
 
 /// Puts a part into an assembly, in place of one whose roles it covers. Errors: kInvalidArgument
 /// where a part there owns one of its roles and others beside; the message names both and the role.
 void addPart(ControlAssembly& assembly, std::unique_ptr<ControlPart> part);
+
+/// Errors: kInvalidArgument where both own one role; the message names both and the role.
+void requireApart(const ControlPart& added, const ControlPart& there);
 
 /// Array values [N, row_length] that follow an edit: rows of `keep`, then `fresh` for new ones.
 void followEdit(const SplatEdit& edit, size_t row_length, float fresh, std::vector<float>& values);

@@ -20,6 +20,38 @@ std::vector<uint32_t> staying(std::span<const uint8_t> goes) {
   return rows;
 }
 
+constexpr ControlRole kRoles[] = {
+    ControlRole::kMultiplication, ControlRole::kScore,          ControlRole::kChildren,
+    ControlRole::kChildOpacity,   ControlRole::kGrowth,         ControlRole::kRemoval,
+    ControlRole::kRecovery,       ControlRole::kOpacity,        ControlRole::kSteps,
+    ControlRole::kNoise,          ControlRole::kRegularisation, ControlRole::kParameterisation,
+    ControlRole::kFilter,
+};
+
+/// Refuses parts that nobody would ask.
+void requireUse(const char* name, const ControlAssembly& assembly) {
+  constexpr ControlRoles kWhole = roles(ControlRole::kMultiplication, ControlRole::kChildren);
+  constexpr ControlRoles kOfIt = roles(ControlRole::kScore, ControlRole::kChildOpacity);
+  ControlRoles owned = 0;
+  for (const auto& part : assembly.parts) owned |= part->owns();
+  for (const auto& part : assembly.parts) {
+    for (const ControlRole role : kRoles) {
+      if (part->needs() & ~owned & roles(role)) {
+        fail(ErrorCode::kInvalidArgument, std::string(part->name()) + " does not go with " + name +
+                                              ": nothing there decides " + wordsOf(role));
+      }
+    }
+    if ((part->owns() & kWhole) != kWhole) continue;
+    for (const auto& other : assembly.parts) {
+      if (other == part || !(other->owns() & kOfIt)) continue;
+      const bool is_score = other->owns() & roles(ControlRole::kScore);
+      fail(ErrorCode::kInvalidArgument,
+           std::string(other->name()) + " does not go with " + part->name() + ", which decides " +
+               wordsOf(is_score ? ControlRole::kScore : ControlRole::kChildOpacity) + " itself");
+    }
+  }
+}
+
 class DensityControl final : public Strategy {
  public:
   DensityControl(const char* name, ControlAssembly assembly)
@@ -117,6 +149,11 @@ class DensityControl final : public Strategy {
   std::vector<float> seen(SplatQuantity quantity, const RawSplats& splats) const override {
     if (quantity == SplatQuantity::kAge && births_.size() == splats.size()) return ages();
     if (quantity == SplatQuantity::kSplitAxis) return elongations(splats);
+    if (const ControlPart* part = owner(ControlRole::kScore);
+        part && quantity == SplatQuantity::kScore) {
+      std::vector<float> values = part->seen(quantity);
+      if (values.size() == splats.size()) return values;
+    }
     for (const auto& part : parts_) {
       std::vector<float> values = part->seen(quantity);
       if (values.size() == splats.size()) return values;
@@ -325,6 +362,7 @@ class DensityControl final : public Strategy {
 }  // namespace
 
 std::unique_ptr<Strategy> makeDensityControl(const char* name, ControlAssembly assembly) {
+  requireUse(name, assembly);
   return std::make_unique<DensityControl>(name, std::move(assembly));
 }
 

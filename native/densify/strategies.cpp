@@ -9,8 +9,12 @@
 #include "base/error.h"
 #include "densify/absolute.h"
 #include "densify/adaptive.h"
+#include "densify/growth_control.h"
 #include "densify/long_axis_split.h"
 #include "densify/mcmc.h"
+#include "densify/multi_step_update.h"
+#include "densify/opacity_correction.h"
+#include "densify/recovery_pruning.h"
 #include "densify/volumetric.h"
 
 namespace stipple {
@@ -61,11 +65,42 @@ std::unique_ptr<ControlPart> longAxisSplit(StrategySettings& settings) {
   return makeLongAxisSplit(options);
 }
 
+std::unique_ptr<ControlPart> recoveryPruning(StrategySettings& settings) {
+  RecoveryPruningOptions options;
+  options.share = settings.number("share", options.share, 0, 0.9);
+  return makeRecoveryPruning(options);
+}
+
+std::unique_ptr<ControlPart> growthControl(StrategySettings& settings) {
+  GrowthControlOptions options;
+  options.splats = settings.count("splats", options.splats);
+  return makeGrowthControl(options);
+}
+
+std::unique_ptr<ControlPart> multiStepUpdate(StrategySettings& settings) {
+  MultiStepUpdateOptions options;
+  options.few = settings.count("few", options.few, 1000);
+  options.many = settings.count("many", options.many, 1000);
+  return makeMultiStepUpdate(options);
+}
+
+std::unique_ptr<ControlPart> opacityCorrection(StrategySettings&) {
+  return makeOpacityCorrection();
+}
+
 constexpr PartMaker kParts[] = {
     {{"long_axis_split", "Splits along the longest side, so that two halves fill the same outline"},
      longAxisSplit},
     {{"volume_split", "Also splits whatever fills a large volume, long shapes into smaller pieces"},
      volumeSplit},
+    {{"recovery_pruning", "Removes the splats that stay faint after their opacity was lowered"},
+     recoveryPruning},
+    {{"growth_control", "Adds splats slowly at first, along a curve that ends at the limit"},
+     growthControl},
+    {{"multi_step_update", "Learns from several views at a time towards the end: smoother, faster"},
+     multiStepUpdate},
+    {{"opacity_correction", "Keeps copies together as opaque as the splat that they came from"},
+     opacityCorrection},
 };
 
 template <typename Maker>
@@ -200,6 +235,7 @@ std::unique_ptr<Strategy> makeStrategy(const std::string& text) {
   ControlAssembly assembly = maker->make(settings);
   settings.requireAllUsed();
 
+  std::vector<const ControlPart*> added;
   for (size_t k = 1; k < terms.size(); ++k) {
     const auto part = std::find_if(std::begin(kParts), std::end(kParts), [&](const auto& each) {
       return terms[k].name == each.entry.name;
@@ -217,6 +253,8 @@ std::unique_ptr<Strategy> makeStrategy(const std::string& text) {
     StrategySettings own(terms[k].name, terms[k].values);
     std::unique_ptr<ControlPart> made = part->make(own);
     own.requireAllUsed();
+    for (const ControlPart* before : added) requireApart(*made, *before);
+    added.push_back(made.get());
     addPart(assembly, std::move(made));
   }
   return makeDensityControl(text.c_str(), std::move(assembly));

@@ -18,6 +18,14 @@
 
 namespace stipple {
 
+/// The view that an iteration learns from.
+struct TrainingView {
+  size_t index = 0;  ///< as ViewEvaluator counts them
+  uint32_t width = 0;
+  uint32_t height = 0;
+  std::span<const float> target;  ///< [H,W,3] over the background of the iteration
+};
+
 /// Where a fit stands.
 struct FitMoment {
   uint64_t iteration = 1;       ///< 1 for the first
@@ -26,6 +34,7 @@ struct FitMoment {
   uint64_t seed = 0;            ///< of the fit; numbers are keyed by (seed, use, iteration, row)
   uint64_t max_splats = 0;      ///< hard cap of the count; 0: none
   double position_rate = 0;     ///< of Adam in this iteration, metres
+  const TrainingView* view = nullptr;  ///< of this iteration; nullptr where none is under way
 };
 
 /// An iteration of a published schedule of 30,000 in a fit of another length: every window,

@@ -71,6 +71,10 @@ class ExplicitModel final : public FitModel, private Regulariser {
     moment_ = given;
     moment_.max_splats = smallerLimit(given.max_splats, options_.max_splats);
     moment_.position_rate = positionRate();
+    const size_t pixel_count = size_t{view.camera->width} * view.camera->height;
+    view_under_way_ = {
+        view.index, view.camera->width, view.camera->height, {view.target, pixel_count * 3}};
+    moment_.view = &view_under_way_;
     StepReport report;
     report.stage = "Splats";
     report.splat_count = backend_->splatCount();
@@ -78,7 +82,6 @@ class ExplicitModel final : public FitModel, private Regulariser {
     backend_->forward(*view.camera, renderOptions(view), progress);
     report.seconds.render = watch.lap();
 
-    const size_t pixel_count = size_t{view.camera->width} * view.camera->height;
     const ImageLossValue value =
         backend_->loss({view.target, pixel_count * 3}, loss_options_,
                        {view.weights, view.weights ? pixel_count : size_t{0}});
@@ -227,6 +230,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
   ImageLossOptions loss_options_;
   StepOptions step_options_;
   FitMoment moment_;  ///< of the step under way
+  TrainingView view_under_way_;
 };
 
 }  // namespace

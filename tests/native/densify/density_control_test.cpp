@@ -51,6 +51,15 @@ TEST(DensityControl, RefusesTwoOwnersOfOneDecisionByName) {
   EXPECT_EQ(message, "narrow does not go with wide: both decide the opacity of children");
 }
 
+TEST(DensityControl, RefusesPartsThatNobodyWouldAsk) {
+  ControlAssembly assembly;
+  const ControlRoles whole = roles(ControlRole::kMultiplication, ControlRole::kChildren);
+  addPart(assembly, std::make_unique<Owner>("whole", whole));
+  addPart(assembly, std::make_unique<Owner>("score", roles(ControlRole::kScore)));
+  EXPECT_EQ(messageOf([&] { makeDensityControl("own", std::move(assembly)); }),
+            "score does not go with whole, which decides which splats multiply first itself");
+}
+
 TEST(DensityControl, SchedulesCountTheirEvents) {
   FitMoment moment;
   moment.iterations = 30000;
@@ -59,12 +68,19 @@ TEST(DensityControl, SchedulesCountTheirEvents) {
   EXPECT_TRUE(controlMoment(moment, schedule).is_event);
   EXPECT_EQ(controlMoment(moment, schedule).event, 0u);
   EXPECT_EQ(controlMoment(moment, schedule).event_count, 144u);
+  EXPECT_EQ(controlMoment(moment, schedule).until_event, 0u);
+  EXPECT_EQ(controlMoment(moment, schedule).interval, 100u);
+  moment.iteration = 1;
+  EXPECT_EQ(controlMoment(moment, schedule).until_event, 599u);
+  moment.iteration = 601;
+  EXPECT_EQ(controlMoment(moment, schedule).until_event, 99u);
   moment.iteration = 14900;
   EXPECT_TRUE(controlMoment(moment, schedule).is_event);
   EXPECT_EQ(controlMoment(moment, schedule).event, 143u);
   moment.iteration = 15000;
   EXPECT_FALSE(controlMoment(moment, schedule).is_event);
   EXPECT_FALSE(controlMoment(moment, schedule).is_learning);
+  EXPECT_EQ(controlMoment(moment, schedule).until_event, UINT64_MAX);
   EXPECT_EQ(controlMoment(moment, schedule).progress, 1.0);
   moment.iteration = 500;
   EXPECT_FALSE(controlMoment(moment, schedule).is_event);

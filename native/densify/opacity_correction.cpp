@@ -1,0 +1,26 @@
+// Based on: Rota Bulo, Porzi, Kontschieder, Revising Densification in Gaussian Splatting, ECCV
+// 2024, section 3.3.
+
+#include "densify/opacity_correction.h"
+
+#include "densify/opacity_forms.h"
+
+namespace stipple {
+
+namespace {
+
+class OpacityCorrection final : public ControlPart {
+ public:
+  const char* name() const override { return "opacity_correction"; }
+  ControlRoles owns() const override { return roles(ControlRole::kChildOpacity); }
+  ControlRoles needs() const override { return roles(ControlRole::kMultiplication); }
+  float childLogit(float parent_logit) const override { return sharedOpacityLogit(parent_logit); }
+};
+
+}  // namespace
+
+std::unique_ptr<ControlPart> makeOpacityCorrection() {
+  return std::make_unique<OpacityCorrection>();
+}
+
+}  // namespace stipple
