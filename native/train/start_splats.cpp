@@ -1,6 +1,5 @@
 #include "train/start_splats.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -10,10 +9,13 @@
 #include "base/random.h"
 #include "decode/merge_neighbours.h"
 #include "math/colour.h"
+#include "train/shared_volume.h"
+#include "train/start_points.h"
+#include "train/swept_points.h"
 
 // Based on: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023 (sizes
-// from three neighbours, opacity 0.1). Differs: depth and the cameras' volume serve where there are
-// no points.
+// from three neighbours, opacity 0.1). Differs: depth, the pictures and the cameras' volume serve
+// where there are no points.
 
 namespace stipple {
 
@@ -26,20 +28,10 @@ constexpr double kLeastSquaredSize = 1e-7;  ///< m^2
 constexpr double kLonelyShare = 0.01;
 constexpr size_t kDepthPictures = 64;
 constexpr size_t kVolumeCameras = 64;
+/// One of so many pixels must find a surface.
+constexpr uint64_t kLeastSwept = 4;
 constexpr float kOpaque = 0.5f;
 constexpr size_t kGrain = 1024;
-
-/// Places and their colours, in the compositing space.
-struct StartPoints {
-  std::vector<float> positions;  ///< [N,3]
-  std::vector<float> colours;    ///< [N,3]
-
-  size_t size() const { return positions.size() / 3; }
-  void add(const Vec3d& position, const float* colour) {
-    for (int k = 0; k < 3; ++k) positions.push_back(static_cast<float>(position[k]));
-    colours.insert(colours.end(), colour, colour + 3);
-  }
-};
 
 /// A number that is limited where there is a limit.
 uint64_t capped(uint64_t count, uint64_t limit) {
@@ -87,17 +79,6 @@ StartPoints fromPoints(const ViewSource& views, const StartOptions& options) {
   return start;
 }
 
-Vec3d toWorld(const Camera& camera, const Vec3d& in_camera) {
-  return camera.world_to_camera.topLeftCorner<3, 3>().transpose() *
-         (in_camera - camera.world_to_camera.topRightCorner<3, 1>());
-}
-
-Vec3d unproject(const Camera& camera, double x, double y, double depth) {
-  const double reach = camera.model == CameraModel::kPerspective ? depth : 1.0;
-  return toWorld(camera,
-                 {(x - camera.cx) / camera.fx * reach, (y - camera.cy) / camera.fy * reach, depth});
-}
-
 /// Pixels of the picture where something is, in rows.
 std::vector<uint32_t> seenPixels(const ViewPicture& picture) {
   std::vector<uint32_t> pixels;
@@ -142,82 +123,6 @@ StartPoints fromDepth(const ViewSource& views, std::span<const size_t> training,
   return start;
 }
 
-Vec3d axisOf(const Camera& camera) {
-  return camera.world_to_camera.block<1, 3>(2, 0).transpose();
-}
-
-/// Of any camera; of an orthographic one, the middle of the plane that it looks from.
-Vec3d placeOf(const Camera& camera) {
-  return camera.model == CameraModel::kPerspective ? cameraCentre(camera)
-                                                   : unproject(camera, camera.cx, camera.cy, 0);
-}
-
-/// Sine of half the angle that a camera sees, in its narrower direction; half a side, metres, of an
-/// orthographic one.
-double halfView(const Camera& camera) {
-  const double half = std::min(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy);
-  return camera.model == CameraModel::kPerspective ? half / std::hypot(1.0, half) : half;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-bool sees(const Camera& camera, const Vec3d& point) {
-  const Vec3d at = camera.world_to_camera.topLeftCorner<3, 3>() * point +
-                   camera.world_to_camera.topRightCorner<3, 1>();
-  if (at[2] <= camera.near_plane) return false;
-  const double reach = camera.model == CameraModel::kPerspective ? at[2] : 1.0;
-  const double x = camera.fx * at[0] / reach + camera.cx;
-  const double y = camera.fy * at[1] / reach + camera.cy;
-  return x >= 0 && y >= 0 && x < camera.width && y < camera.height;
-}
-
-struct Ball {
-  Vec3d centre;
-  double radius;
-  size_t least_views;  ///< that see what counts as inside
-};
-
-/// What the cameras look at: a ball around the point nearest to all their axes, as large as most of
-/// them see whole. Cameras that look away from each other have the room around them in common.
-Ball sharedVolume(const std::vector<Camera>& cameras) {
-  const double count = static_cast<double>(cameras.size());
-  Vec3d mean = Vec3d::Zero(), mean_axis = Vec3d::Zero();
-  for (const Camera& camera : cameras) {
-    mean += placeOf(camera) / count;
-    mean_axis += axisOf(camera) / count;
-  }
-  double extent = 0;
-  for (const Camera& camera : cameras) {
-    extent = std::max(extent, (placeOf(camera) - mean).norm());
-  }
-  const double unit = extent > 0 ? extent : 1.0;
-  // Parallel axes have no nearest point: a weak pull ahead of all decides.
-  constexpr double kPull = 1e-3;
-  Mat3d sum = kPull * count * Mat3d::Identity();
-  Vec3d right = kPull * count * (mean + unit * mean_axis);
-  for (const Camera& camera : cameras) {
-    const Vec3d axis = axisOf(camera);
-    const Mat3d across = Mat3d::Identity() - axis * axis.transpose();
-    sum += across;
-    right += across * placeOf(camera);
-  }
-  const Vec3d centre = sum.ldlt().solve(right);
-  std::vector<double> radii;
-  size_t ahead = 0;
-  for (const Camera& camera : cameras) {
-    const double distance = (centre - placeOf(camera)).norm();
-    radii.push_back(camera.model == CameraModel::kPerspective ? distance * halfView(camera)
-                                                              : halfView(camera));
-    if (sees(camera, centre)) ++ahead;
-  }
-  if (2 * ahead >= cameras.size()) return {centre, median(radii), (cameras.size() + 1) / 2};
-  return {mean, 3 * unit, 1};
-}
-
 StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training,
                        const StartOptions& options) {
   std::vector<Camera> cameras;
@@ -225,9 +130,9 @@ StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training
   for (size_t i = 0; i < camera_count; ++i) {
     cameras.push_back(views.camera(training[i * training.size() / camera_count]));
   }
-  const Ball ball = sharedVolume(cameras);
+  const SharedVolume ball = sharedVolume(cameras);
   const uint64_t wanted =
-      capped(options.count > 0 ? options.count : kStartSplatsOfVolume, options.max_count);
+      capped(options.count > 0 ? options.count : kStartSplatsOfPictures, options.max_count);
   constexpr float kGrey[3] = {0.5f, 0.5f, 0.5f};
   /// A ball fills 0.52 of its cube; most of it is seen.
   constexpr uint64_t kTriesPerPoint = 16;
@@ -241,7 +146,8 @@ StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training
     if (place.squaredNorm() > 1) continue;
     const Vec3d point = ball.centre + ball.radius * place;
     size_t seen = 0;
-    for (const Camera& camera : cameras) seen += sees(camera, point);
+    double x = 0, y = 0;
+    for (const Camera& camera : cameras) seen += project(camera, point, x, y);
     // Few of so many tries are inside: then any place in the ball will do.
     if (seen >= ball.least_views || i >= wanted * kTriesPerPoint / 2) start.add(point, kGrey);
   }
@@ -311,7 +217,13 @@ SplatCloud startSplats(const ViewSource& views, std::span<const size_t> training
     points = fromPoints(views, options);
   } else {
     points = fromDepth(views, training, options, progress);
-    if (points.size() == 0) points = fromVolume(views, training, options);
+    if (points.size() == 0) {
+      const uint64_t wanted =
+          capped(options.count > 0 ? options.count : kStartSplatsOfPictures, options.max_count);
+      points = sweptPoints(views, training, wanted, options.seed, progress);
+      // Silhouettes that contradict each other leave nothing standing.
+      if (points.size() < wanted / kLeastSwept) points = fromVolume(views, training, options);
+    }
   }
   return splatsAt(points, views, training, options);
 }

@@ -14,6 +14,7 @@
 #include "densify/strategies.h"
 #include "train/allocation_count.h"
 #include "train/fit_scene.h"
+#include "train/sphere_views.h"
 
 namespace stipple {
 namespace {
@@ -93,6 +94,41 @@ TEST(ExplicitModel, AdaptiveControlAddsSplatsWhereDetailIsMissing) {
   EXPECT_EQ(fixed->splats(0).size(), 20u);
   EXPECT_GT(meanPsnr(model->splats(0), scene()), meanPsnr(fixed->splats(0), scene()) + 3);
   EXPECT_THAT(model->budgets(), ElementsAre(model->splats(0).size()));
+}
+
+/// Looks at the ball from one side.
+std::vector<Camera> camerasInFront(size_t count, uint32_t size) {
+  std::vector<Camera> cameras;
+  for (size_t i = 0; i < count; ++i) {
+    const double turn = 2.399963 * static_cast<double>(i);
+    const double aside =
+        0.5 * std::sqrt((static_cast<double>(i) + 0.5) / static_cast<double>(count));
+    const Vec3d place(1, aside * std::cos(turn), aside * std::sin(turn));
+    cameras.push_back(lookingAtOrigin(3.5 * place.normalized(), size));
+  }
+  return cameras;
+}
+
+// 24.2 and 15.9 dB. Grey splats in the whole volume, which stand where pictures tell nothing, make
+// 17.9 with 1333 of 2000 left, and 11.9.
+TEST(ExplicitModel, FitsViewsWithoutPointsAndKeepsItsSplats) {
+  for (const Behind behind : {Behind::kNothing, Behind::kPattern}) {
+    std::vector<Camera> training, held_out;
+    for (const Camera& camera :
+         behind == Behind::kNothing ? camerasAround(30, 64) : camerasInFront(30, 64)) {
+      (training.size() < 7 * (held_out.size() + 1) ? training : held_out).push_back(camera);
+    }
+    const auto views = sphereViews(training, behind);
+    ExplicitModelOptions options = plain();
+    options.start_splats = 2000;
+    const auto model = startModel(*views, options);
+    EXPECT_GT(model->splats(0).size(), 1800u);
+    Fit fit(*views, *model, 600);
+    fit.run(300);  // edits are after 100 and 200
+    EXPECT_GT(model->splats(0).size(), 2000u);
+    EXPECT_GT(meanPsnr(model->splats(0), *sphereViews(held_out, behind)),
+              behind == Behind::kNothing ? 22.5 : 14.5);
+  }
 }
 
 TEST(ExplicitModel, NeverExceedsTheHardCap) {

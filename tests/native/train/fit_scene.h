@@ -97,7 +97,7 @@ inline PointSet pointsOf(const SplatCloud& cloud, float jitter, uint32_t seed) {
   return points;
 }
 
-/// Takes iterations [first, last] of a fit of `iterations`, over backgrounds of other greys.
+/// Takes iterations [first, last] of a fit of `iterations`, transparent views over other greys.
 class Fit {
  public:
   Fit(const MemoryViewSource& views, FitModel& model, uint64_t iterations)
@@ -116,10 +116,11 @@ class Fit {
       StepView view;
       view.index = index;
       view.camera = &views_.camera(index);
-      const double grey = 0.1 * static_cast<double>(moment_.iteration % 11);
+      const double grey =
+          picture.alpha.empty() ? 0.0 : 0.1 * static_cast<double>(moment_.iteration % 11);
       std::fill_n(view.background, 3, grey);
       target_ = picture.colour;
-      for (size_t i = 0; i < target_.size() && !picture.alpha.empty(); ++i) {
+      for (size_t i = 0; i < target_.size() && grey > 0; ++i) {
         target_[i] += (1 - picture.alpha[i / 3]) * static_cast<float>(grey);
       }
       view.target = target_.data();

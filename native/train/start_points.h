@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "math/vec.h"
+
+namespace stipple {
+
+/// Places where splats may begin, and their colours in the compositing space.
+struct StartPoints {
+  std::vector<float> positions;  ///< [N,3]
+  std::vector<float> colours;    ///< [N,3]
+
+  size_t size() const { return positions.size() / 3; }
+  void add(const Vec3d& position, const float* colour) {
+    for (int k = 0; k < 3; ++k) positions.push_back(static_cast<float>(position[k]));
+    colours.insert(colours.end(), colour, colour + 3);
+  }
+};
+
+}  // namespace stipple
