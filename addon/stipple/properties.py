@@ -6,7 +6,7 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
                        PointerProperty, StringProperty)
 
 from . import version
-from .scene import sequences, sync
+from .scene import fit_proposal, fitting, photo_cameras, sequences, sync
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
 _CHANGEABLE = {'ANIMATABLE'}
@@ -60,6 +60,10 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                         options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good set of anchors", default=0,
                       soft_min=0, options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
+    # Of a field, which was learned for that many splats per anchor and those budgets; 0 of all else.
+    learned_gaussians: IntProperty(options={'HIDDEN'})
+    learned_least: IntProperty(options={'HIDDEN'})
+    learned_most: IntProperty(options={'HIDDEN'})
     detail_weight: FloatProperty(name="Detail Weight", description="How much texture detail and curvature attract "
                                  "anchors, 0 for an even spread. Takes effect with Update from Source", default=1.0,
                                  min=0.0, soft_max=4.0, options=set(), override=_OVERRIDABLE)
@@ -137,9 +141,11 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                               "them", default=True, options=set())
     dataset: StringProperty(name="Folder", description="Folder with photographs and their cameras",
                             subtype='DIR_PATH', options=version.RELATIVE_PATH)
+    up_axis: EnumProperty(name="Up Axis", description="Which way is up in the data set; choose the same for its cameras",
+                          items=photo_cameras.UP_AXES, options=set())
     downscale: IntProperty(name="Downscale", description="Pixels of a photograph along each side for one that is "
                            "learned from", default=1, min=1, soft_max=8, max=64, options=set())
-    max_splats: IntProperty(name="Splats", description="The fit never has more splats than this", default=50000, min=100,
+    max_splats: IntProperty(name="Splats", description="The fit never has more splats than this", default=100000, min=100,
                             soft_max=1000000, max=100000000, options=set())
     quality: EnumProperty(name="Quality", description="How long the fit may learn",
                           items=(('FAST', "Fast", "For a first look"), ('BALANCED', "Balanced", "For most shots"),
@@ -159,6 +165,13 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                                    "most", default=True, options=set())
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,
                       options=set())
+    shown: EnumProperty(name="Show", description="What the 3D view shows until the fit is accepted; renders show the "
+                        "source", items=(('SPLATS', "Splats", "The fit alone"), ('SOURCE', "Source", "What is fitted"),
+                                         ('BOTH', "Both", "One in the other")), options={'SKIP_SAVE'},
+                        update=fit_proposal.on_shown_change)
+    # A bar for Blenders whose layouts have none of their own.
+    progress: FloatProperty(name="Progress", subtype='PERCENTAGE', min=0.0, max=100.0, precision=0,
+                            options={'HIDDEN', 'SKIP_SAVE'}, get=lambda _: 100 * fitting.state.fraction)
     report: StringProperty(name="Report", description="File for the fit's figures (.json, and curves as .svg beside "
                            "it); empty for none", subtype='FILE_PATH', options=version.RELATIVE_PATH)
 

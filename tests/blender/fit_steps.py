@@ -45,32 +45,63 @@ def panel(_window):
 
 
 def start(window):
+    settings = bpy.context.scene.stipple.fit
+    settings.quality = 'FINE_DETAIL'  # runs longer than the test waits
     with window.context():
         assert bpy.ops.stipple.splats_fit('INVOKE_DEFAULT') == {'RUNNING_MODAL'}
 
 
-def previewed(_window):
-    """The preview is there while the fit goes on."""
+def rendering(_window):
+    """Blender draws between two views."""
     state = module('.scene.fitting').state
-    if 'Sphere Fit' not in bpy.data.objects and state.is_running:
+    if 'Rendering' not in state.stage:
         return False
-    facts['previewed_while_running'] = state.is_running
-    bpy.data.objects['Sphere'].hide_set(True)
+    facts['said_while_rendering'] = state.stage
+    return 'rendering'
+
+
+def previewed(window):
+    """The preview is there while the fit goes on, and held-out views were measured."""
+    state = module('.scene.fitting').state
+    assert state.is_running, state.problem
+    if 'Sphere Fit' not in bpy.data.objects or not state.figures.psnr > 20:
+        return False
+    source = bpy.data.objects['Sphere']
+    facts['previewed_while_running'] = source.hide_get() and not source.hide_render
+    facts['estimates'] = state.figures.estimated_seconds, state.figures.estimated_bytes, state.seconds_left
     return 'running'
 
 
+def compare(_window):
+    bpy.context.scene.stipple.fit.shown = 'SOURCE'
+    facts['source_shows'] = not bpy.data.objects['Sphere'].hide_get() and bpy.data.objects['Sphere Fit'].hide_get()
+    return 'source'
+
+
+def escape(window):
+    """A key, as a hand presses it."""
+    bpy.context.scene.stipple.fit.shown = 'SPLATS'
+    press(window, 'ESC')
+
+
+def press(window, key):
+    region = window.region
+    for value in ('PRESS', 'RELEASE'):
+        window.window.event_simulate(type=key, value=value, x=region.x + 200, y=region.y + 200)
+
+
 def ended(_window):
-    if module('.scene.fitting').state.is_running:
+    state = module('.scene.fitting').state
+    if state.is_running:
         return False
-    facts['problem'] = module('.scene.fitting').state.problem
-    facts['psnr'] = module('.scene.fitting').state.figures.best_psnr
+    facts['problem'], facts['psnr'] = state.problem, state.figures.best_psnr
+    facts['steps'], facts['of_steps'] = state.figures.iteration, state.figures.iterations
     return None
 
 
-def proposed(window):
-    bpy.data.objects['Sphere'].hide_set(False)
-    scenes.select(bpy.data.objects['Sphere'])
-    facts['proposed'] = module('.operators.splats_fit').proposed(bpy.context) is not None
+def proposed(_window):
+    facts['proposed'] = module('.scene.fit_proposal').find(bpy.context) is not None
+    facts['nothing_replaced'] = not bpy.data.objects['Sphere'].hide_render
     return 'proposed'
 
 
@@ -81,7 +112,7 @@ def report(window):
     return 'report'
 
 
-def close_report(window):
+def close_report(_window):
     reports = module('.scene.fit_reports')
     (other, area), = reports.editors(bpy.context)
     facts['report'] = area.spaces.active.image.name
@@ -90,11 +121,28 @@ def close_report(window):
         bpy.ops.wm.window_close()
 
 
+def discard(window):
+    with window.context():
+        assert bpy.ops.stipple.fit_discard() == {'FINISHED'}
+    facts['discarded'] = 'Sphere Fit' not in bpy.data.objects and not bpy.data.objects['Sphere'].hide_get()
+    facts['reports_left'] = [image.name for image in bpy.data.images if 'Report' in image.name]
+    scenes.select(bpy.data.objects['Sphere'])
+
+
+def stop(_window):
+    """By the button, once there is something to keep."""
+    state = module('.scene.fitting').state
+    if state.figures is None or not state.figures.psnr > 0:
+        return False
+    assert bpy.ops.stipple.fit_stop() == {'FINISHED'}
+
+
 def accept(window):
     with window.context():
         assert bpy.ops.stipple.fit_accept() == {'FINISHED'}
     facts['source_is_hidden'] = bpy.data.objects['Sphere'].hide_render
     facts['kind'] = bpy.data.objects['Sphere Fit'].data.stipple.source_kind
+    facts['active'] = bpy.context.view_layer.objects.active.name
     return 'accepted'
 
 
@@ -102,4 +150,5 @@ def write(_window):
     (Path(sys.argv[sys.argv.index('--') + 2]) / 'facts.json').write_text(json.dumps(facts))
 
 
-steps = [build, panel, start, previewed, ended, proposed, report, close_report, accept, write]
+steps = [build, panel, start, rendering, previewed, compare, escape, ended, proposed, report, close_report, discard,
+         start, stop, ended, accept, write]

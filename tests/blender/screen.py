@@ -15,13 +15,14 @@ HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT = 1280, 800
 
 
-def run_steps(steps_file, folder, blender, timeout=300, size=(WIDTH, HEIGHT), arguments=()):
-    """Runs the steps of a file (window.py) and returns {name: picture [H,W,3] uint8} and what Blender has written."""
+def run_steps(steps_file, folder, blender, timeout=300, size=(WIDTH, HEIGHT), arguments=(),
+              options=()):
+    """Runs the steps of a file (window.py) in a Blender with these options, and returns {name: picture [H,W,3] uint8} and what Blender has written."""
     if shutil.which('Xvfb') is None:
         pytest.skip('Xvfb is not installed: nothing can be shown in a window')
     with Screen(folder, size) as screen:
         environment = dict(os.environ, DISPLAY=screen.display, LIBGL_ALWAYS_SOFTWARE='1')
-        command = [blender, '--factory-startup', '--window-geometry', '0', '0', *map(str, size), '--python',
+        command = [blender, *options, '--factory-startup', '--window-geometry', '0', '0', *map(str, size), '--python',
                    str(HERE / 'window.py'), '--', str(steps_file), str(folder), str(screen.file), *arguments]
         with open(folder / 'log.txt', 'w') as log:
             process = subprocess.Popen(command, env=environment, cwd=folder, stdout=log, stderr=subprocess.STDOUT)

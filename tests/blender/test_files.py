@@ -235,4 +235,5 @@ def test_dialogs_and_file_handlers_know_the_formats_of_the_library(stipple):
     handler = getattr(bpy.types, 'STIPPLE_FH_splats', None)
     assert (handler is not None) == (bpy.app.version >= (4, 1, 0))
     if handler is not None:
-        assert set(handler.bl_file_extensions.split(';')) == {e for e in formats.READ_ENDINGS if e[0] == '.'}
+        assert set(handler.bl_file_extensions.split(';')) == {'.safetensors'} | {
+            e for e in formats.READ_ENDINGS if e[0] == '.'}

@@ -98,15 +98,25 @@ def test_the_same_fit_twice_gives_the_same_splats(stipple, ball, tmp_path):
 
 
 def test_a_field_decodes_at_any_budget(stipple, ball):
-    settings(model='FIELD', view_count=6, view_size=32)
+    settings(model='FIELD', view_count=6, view_size=32, max_splats=10_000)
     obj = fitted()
     data = obj.data.stipple
-    assert data.source_kind == 'MODEL' and data.gaussians_per_anchor >= 4
-    splats_each = data.gaussians_per_anchor
+    splats_each = data.learned_gaussians
+    assert data.source_kind == 'MODEL' and splats_each >= 4 and data.learned_least < data.learned_most == data.anchors
+    assert data.anchors == 10_000 // splats_each
     assert stipple.scene.splat_data.count(obj.data) == data.anchors * splats_each
     for anchors in (200, 700):
         data.anchors = anchors
         assert stipple.scene.splat_data.count(obj.data) == anchors * splats_each
+    # Splats per anchor are learned: nothing refuses whatever the setting of other models says.
+    for chosen in (1, 5, splats_each):
+        data.gaussians_per_anchor = chosen
+        data.order = 'PROGRESSIVE' if chosen == 5 else 'SYSTEMATIC'
+        data.seed = chosen
+        assert stipple.scene.splat_data.count(obj.data) == 700 * splats_each and not stipple.scene.sync.problems
+        assert stipple.scene.sources.count_of(obj.data, 'RENDER') == 700 * splats_each
+    scenes.select(obj)
+    scenes.refuses(bpy.ops.stipple.delete_floaters, 'decoded from a learned field')
     path = bpy.path.abspath(data.source)
     moved = os.path.join(os.path.dirname(path), 'moved.stipple.safetensors')
     os.rename(path, moved)
@@ -114,6 +124,28 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     assert bpy.ops.stipple.relink(filepath=moved) == {'FINISHED'} and 'moved' in data.source
     data.anchors = 300
     assert stipple.scene.splat_data.count(obj.data) == 300 * splats_each
+
+
+@pytest.mark.parametrize('model', ['FIELD', 'EXPLICIT'])
+def test_an_asset_file_is_imported_with_its_budgets(stipple, ball, model):
+    settings(model=model, view_count=4, view_size=32)
+    obj = fitted()
+    fitted_splats = stipple.scene.splat_data.read(obj.data)
+    path = bpy.path.abspath(obj.data.stipple.source)
+    assert bpy.ops.stipple.splats_import(filepath=path) == {'FINISHED'}
+    imported = bpy.context.object
+    assert imported != obj and imported.name.startswith('Sphere Fit') and 'stipple' not in imported.name
+    data = imported.data.stipple
+    assert data.source_kind == obj.data.stipple.source_kind and data.learned_most == obj.data.stipple.learned_most
+    splats = stipple.scene.splat_data.read(imported.data)
+    assert np.array_equal(splats.positions, fitted_splats.positions)
+    assert np.allclose(imported.matrix_world, obj.matrix_world)
+    before = splats.count
+    if model == 'FIELD':
+        data.anchors //= 2
+    else:
+        data.ratio = 0.5
+    assert stipple.scene.splat_data.count(imported.data) == before // 2
 
 
 def test_scene_cameras_serve_as_views(stipple, ball):

@@ -16,24 +16,40 @@ import screen
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
     pictures, text = screen.run_steps(Path(fit_steps.__file__), folder, bpy.app.binary_path, timeout=500,
-                                     size=(1280, 1060))
+                                      size=(1280, 1060), options=('--enable-event-simulate',))
     return pictures, json.loads((folder / 'facts.json').read_text()), text
+
+
+def halves(picture):
+    """Pixels of the ball's left, red half and of its right, blue one."""
+    colours = picture.reshape(-1, 3).astype(int)
+    return (colours[:, 0] - colours[:, 2] > 80).sum(), (colours[:, 2] - colours[:, 0] > 80).sum()
+
+
+def test_views_are_counted_while_they_are_rendered(shots):
+    _, facts, _ = shots
+    assert facts['said_while_rendering'].startswith('Rendering view ') and facts['said_while_rendering'].endswith('of 12')
 
 
 def test_the_preview_shows_while_it_runs(shots):
     pictures, facts, _ = shots
-    assert facts['previewed_while_running']
-    # Left half red, right half blue: both are in the picture of the preview, whose mesh is hidden.
-    colours = pictures['running'].reshape(-1, 3).astype(int)
-    assert (colours[:, 0] - colours[:, 2] > 80).sum() > 200
-    assert (colours[:, 2] - colours[:, 0] > 80).sum() > 200
+    assert facts['previewed_while_running'] and min(facts['estimates']) > 0
+    # Both halves are in the picture of the preview; the mesh that it stands for is grey in a solid view.
+    assert min(halves(pictures['running'])) > 200 and max(halves(pictures['running'])) > 5000
+    assert facts['source_shows'] and max(halves(pictures['source'])) < 5000
+
+
+def test_escape_keeps_the_best(shots):
+    _, facts, text = shots
+    assert facts['problem'] == '' and facts['psnr'] > 20 and 'Traceback' not in text
+    assert 0 < facts['steps'] < facts['of_steps']
 
 
 def test_the_end_is_a_proposal_that_replaces_nothing_until_it_is_accepted(shots):
-    _, facts, text = shots
-    assert facts['problem'] == '' and facts['psnr'] > 20
-    assert facts['proposed'] and facts['source_is_hidden'] and facts['kind'] == 'TREE'
-    assert 'Traceback' not in text
+    _, facts, _ = shots
+    assert facts['proposed'] and facts['nothing_replaced']
+    assert facts['discarded'] and not facts['reports_left']
+    assert facts['source_is_hidden'] and facts['kind'] == 'TREE' and facts['active'] == 'Sphere Fit'
 
 
 def test_the_report_opens_in_an_image_editor(shots):
@@ -47,5 +63,6 @@ def test_the_report_opens_in_an_image_editor(shots):
 
 def test_panel_changes_with_what_happens(shots):
     pictures, _, _ = shots
-    assert all(np.ptp(pictures[name]) > 100 for name in ('panel', 'running', 'proposed', 'accepted'))
-    assert (pictures['panel'] != pictures['proposed']).any() and (pictures['proposed'] != pictures['accepted']).any()
+    names = ('panel', 'rendering', 'running', 'source', 'proposed', 'accepted')
+    assert all(np.ptp(pictures[name]) > 100 for name in names)
+    assert all((pictures[a] != pictures[b]).any() for a, b in zip(names, names[1:]))

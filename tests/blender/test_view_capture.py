@@ -3,6 +3,8 @@
 
 import importlib
 import math
+import os
+import tempfile
 
 import bpy
 import numpy as np
@@ -178,6 +180,33 @@ def test_views_leave_the_scene_as_it_was(rigs, capture):
             with capture.Capture(bpy.context, [ball], capture.CaptureSettings(engine=engine, size=16)):
                 raise RuntimeError('something fails between two views')
         assert [settings_of(o) for o in owners] == before
+
+
+@pytest.mark.parametrize('engine', ENGINES)
+def test_pictures_are_not_written_to_files(rigs, capture, engine, tmp_path, monkeypatch):
+    """Where the system has memory with a path."""
+    if not hasattr(os, 'memfd_create'):
+        pytest.skip('this system has no memfd_create')
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+    ball = scenes.sphere()
+    bounds = rigs.bounds_of([ball], depsgraph())
+    opened = len(os.listdir('/proc/self/fd'))
+    with capture.Capture(bpy.context, [ball], capture.CaptureSettings(engine=engine, size=16, samples=1)) as views:
+        for i, pose in enumerate(rigs.around(bpy.context.scene, depsgraph(), bounds, 2)):
+            assert views.pose(str(i), pose).linear[8, 8, 3] > 0.9
+            assert not list(tmp_path.rglob('*.exr')) and not list(tmp_path.glob('stipple*'))
+    assert len(os.listdir('/proc/self/fd')) <= opened + 1  # Blender keeps one of its own after a first render
+
+
+def test_a_system_without_such_memory_gets_a_folder_that_is_removed(rigs, capture, tmp_path, monkeypatch):
+    monkeypatch.delattr(os, 'memfd_create', raising=False)
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+    ball = scenes.sphere()
+    pose = rigs.around(bpy.context.scene, depsgraph(), rigs.bounds_of([ball], depsgraph()), 2)[0]
+    with capture.Capture(bpy.context, [ball], capture.CaptureSettings(engine='WORKBENCH', size=16)) as views:
+        assert views.pose('a', pose).linear[8, 8, 3] > 0.9
+        assert list(tmp_path.glob('stipple*'))
+    assert not list(tmp_path.glob('stipple*'))
 
 
 def test_scene_cameras_keep_their_proportions(capture):

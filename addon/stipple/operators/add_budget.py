@@ -8,9 +8,6 @@ from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene import geometry, masks, sources, splat_data, sync
 
-# Splats that the viewport shows at first.
-FIRST_COUNT = 500_000
-
 
 class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
     """Let a slider set how many of the active object's splats are shown, with the least visible loss"""
@@ -51,7 +48,7 @@ class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
         with sync.paused():
             sources.attach_tree(data, path, count)
             visible = sources.visible_count(data.stipple)
-            data.stipple.ratio = min(1.0, FIRST_COUNT / visible)
+            data.stipple.ratio = min(1.0, sources.FIRST_COUNT / visible)
         settings = sources.decode_settings(data.stipple)
         sync.write_decoded(data, sources.decode_data(data, settings).columns())
         self.report({'INFO'}, f"'{obj.name}' shows {settings.anchors:,} of {visible:,} splats")

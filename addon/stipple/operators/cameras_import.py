@@ -10,10 +10,6 @@ from bpy_extras.io_utils import ImportHelper
 from ..binding.errors import StippleError
 from ..scene import frames, photo_cameras, sources
 
-_UP_AXES = (('AUTO', "From Format", "Z of transforms.json, -Y of COLMAP"), ('Z', "Z Up", "As in Blender"),
-            ('-Y', "-Y Up", "As most captured scenes: the frame of their first camera"),
-            ('Y', "Y Up", "As in glTF and most game engines"))
-
 
 class STIPPLE_OT_cameras_import(bpy.types.Operator, ImportHelper):
     """Import the cameras of photos: COLMAP, nerfstudio's transforms.json or NeRF-synthetic"""
@@ -28,7 +24,7 @@ class STIPPLE_OT_cameras_import(bpy.types.Operator, ImportHelper):
                               "view. Photos of a lens that distorts are shown as they are: they fit the view in the middle "
                               "and drift off towards the edges, while fitting takes the distortion out")
     up_axis: EnumProperty(name="Up Axis", description="Which way is up in the data set; choose the same for splats that "
-                          "were fitted to it", items=_UP_AXES)
+                          "were fitted to it", items=photo_cameras.UP_AXES)
     set_resolution: BoolProperty(name="Set Resolution", description="Give the scene the first photo's resolution, so that "
                                  "the camera's view has its frame", default=True)
 
@@ -39,7 +35,7 @@ class STIPPLE_OT_cameras_import(bpy.types.Operator, ImportHelper):
         except StippleError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
-        frame = photo_cameras.frame_of(path) if self.up_axis == 'AUTO' else frames.UP_AXES[self.up_axis]
+        frame = photo_cameras.chosen_frame(path, self.up_axis)
         name = os.path.basename(os.path.normpath(path if os.path.isdir(path) else os.path.dirname(path)))
         collection = bpy.data.collections.new(f'{name} Cameras')
         context.scene.collection.children.link(collection)

@@ -76,9 +76,12 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
                 raise invalid(f"'{self._path}' has {count:,} splats; the source of '{data.name}' had {before:,}. Choose "
                               'another file, or Accept Another Count.')
             clears_mask = count != before
-        kept = stipple.source, stipple.source_stamp, stipple.source_count
+        names = ('source', 'source_stamp', 'source_count', 'learned_gaussians', 'learned_least', 'learned_most')
+        kept = {name: getattr(stipple, name) for name in names}
         try:
             with sync.paused():
+                if kind == 'MODEL':
+                    sources.note_learned(stipple, info)
                 stipple.source = sources.blend_path(self._path)
                 stipple.source_stamp = sources.stamp(self._path)
                 if kind == 'TREE' and clears_mask:
@@ -87,7 +90,8 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
                 self._write(data, made, clears_mask)
         except StippleError:
             with sync.paused():
-                stipple.source, stipple.source_stamp, stipple.source_count = kept
+                for name, value in kept.items():
+                    setattr(stipple, name, value)
             raise
         sync.problems.pop(data.name, None)
         self.report({'INFO'}, f"'{data.name}' comes from '{self._path}' now: {count:,} splats")

@@ -3,8 +3,7 @@
 
 import bpy
 
-from ..scene import fit_reports
-from . import splats_fit
+from ..scene import fit_proposal, fit_reports
 
 
 class STIPPLE_OT_show_report(bpy.types.Operator):
@@ -30,7 +29,7 @@ class STIPPLE_OT_show_report(bpy.types.Operator):
 
 def reported(context):
     """The report of the fit that waits for a decision, else of the active object."""
-    return fit_reports.of(splats_fit.proposed(context)) or fit_reports.of(context.object)
+    return fit_reports.of(fit_proposal.find(context)) or fit_reports.of(context.object)
 
 
 classes = (STIPPLE_OT_show_report,)

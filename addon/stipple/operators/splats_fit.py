@@ -8,9 +8,8 @@ from bpy.props import BoolProperty, StringProperty
 
 from .. import version
 from ..jobs import JobOperator
-from ..scene import fit_reports, fitting, sources, splat_data, sync
+from ..scene import fit_proposal, fit_reports, fitting, sources, splat_data, sync
 
-PROPOSED_KEY = 'stipple_fit_proposed'
 _PREVIEW_SECONDS = 1.5
 
 
@@ -62,8 +61,7 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
         result = job.result
         obj = bpy.data.objects.get(self._preview) if self._preview else None
         if obj is None:
-            obj = splat_data.new_object(result.name, splat_data.new_data(result.name))
-            context.collection.objects.link(obj)
+            obj = self._new_object(context)
         stipple = obj.data.stipple
         with sync.paused():
             if result.kind == 'TREE':
@@ -71,12 +69,13 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
                 stipple.ratio = stipple.ratio_render = 1.0
             else:
                 stipple.anchors, stipple.seed = result.decoding.anchors, result.decoding.seed
-                stipple.gaussians_per_anchor = result.decoding.gaussians_per_anchor
-                sources.attach_model(obj.data, result.path, [])
+                sources.attach_model(obj.data, result.path, [], result.info)
         sync.write_decoded(obj.data, result.splats)
         report = fit_reports.keep(obj.data, obj.name, result.report)
-        if not bpy.app.background:
-            obj[PROPOSED_KEY] = True
+        if bpy.app.background:
+            fit_proposal.accept(context, obj, hide_source=False)
+        else:
+            fit_proposal.propose(obj)
             fit_reports.show_if_wanted(context, report)
         for note in fitting.state.notes:
             self.report({'WARNING'}, note)
@@ -97,10 +96,15 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
         if obj is None:
             if self._preview:
                 return  # removed by hand: it is not wanted
-            obj = splat_data.new_object(fitting.state.name, splat_data.new_data(fitting.state.name))
-            context.collection.objects.link(obj)
+            obj = self._new_object(context)
             self._preview = obj.name
         sync.write(obj.data, splats, '')
+
+    def _new_object(self, context):
+        name = fitting.state.name
+        obj = splat_data.new_object(name, splat_data.new_data(name))
+        fit_proposal.new_object(context, obj, fitting.state.source_names, fitting.state.matrix)
+        return obj
 
     def _failed(self, error):
         self._remove_preview()
@@ -109,64 +113,59 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
     def _remove_preview(self):
         obj = bpy.data.objects.get(self._preview) if self._preview else None
         if obj is not None:
-            _remove(obj)
+            fit_proposal.discard(bpy.context, obj)
         self._preview = ''
 
 
-class STIPPLE_OT_fit_accept(bpy.types.Operator):
+class STIPPLE_OT_fit_stop(bpy.types.Operator):
+    """End the fit now and keep the best so far"""
+
+    bl_idname = 'stipple.fit_stop'
+    bl_label = "Stop and Keep Best"
+
+    @classmethod
+    def poll(cls, _context):
+        return fitting.state.is_running
+
+    def execute(self, _context):
+        fitting.state.wants_stop = True
+        return {'FINISHED'}
+
+
+class _Decision:
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        return fit_proposal.find(context) is not None
+
+
+class STIPPLE_OT_fit_accept(_Decision, bpy.types.Operator):
     """Keep the fitted splats and hide what they were fitted to"""
 
     bl_idname = 'stipple.fit_accept'
     bl_label = "Accept"
-    bl_options = {'REGISTER', 'UNDO'}
 
-    hide_source: BoolProperty(name="Hide Source", description="Hide the selected meshes in the viewport and in renders",
-                              default=True)
-
-    @classmethod
-    def poll(cls, context):
-        return proposed(context) is not None
+    hide_source: BoolProperty(name="Hide Source", description="Hide the meshes that the splats were fitted to, in the "
+                              "viewport and in renders", default=True)
 
     def execute(self, context):
-        obj = proposed(context)
-        del obj[PROPOSED_KEY]
-        if self.hide_source:
-            for source in fitting.meshes.source_objects(context.selected_objects):
-                source.select_set(False)
-                source.hide_set(True)
-                source.hide_render = True
-        obj.select_set(True)
-        context.view_layer.objects.active = obj
+        fit_proposal.accept(context, fit_proposal.find(context), self.hide_source)
         return {'FINISHED'}
 
 
-class STIPPLE_OT_fit_discard(bpy.types.Operator):
+class STIPPLE_OT_fit_discard(_Decision, bpy.types.Operator):
     """Remove the fitted splats and their report; their file stays"""
 
     bl_idname = 'stipple.fit_discard'
     bl_label = "Discard"
-    bl_options = {'REGISTER', 'UNDO'}
-
-    @classmethod
-    def poll(cls, context):
-        return proposed(context) is not None
 
     def execute(self, context):
-        obj = proposed(context)
+        obj = fit_proposal.find(context)
         report = fit_reports.of(obj)
-        _remove(obj)
+        fit_proposal.discard(context, obj)
         fit_reports.forget(report)
         return {'FINISHED'}
-
-
-def proposed(context):
-    """The object of a fit that waits for a decision."""
-    return next((obj for obj in context.view_layer.objects if obj is not None and PROPOSED_KEY in obj), None)
-
-
-def _remove(obj):
-    data = obj.data
-    (bpy.data.pointclouds if isinstance(data, bpy.types.PointCloud) else bpy.data.meshes).remove(data)
 
 
 def _redraw(context):
@@ -176,4 +175,4 @@ def _redraw(context):
                 area.tag_redraw()
 
 
-classes = (STIPPLE_OT_splats_fit, STIPPLE_OT_fit_accept, STIPPLE_OT_fit_discard)
+classes = (STIPPLE_OT_splats_fit, STIPPLE_OT_fit_stop, STIPPLE_OT_fit_accept, STIPPLE_OT_fit_discard)

@@ -64,7 +64,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
             stipple.anchors, stipple.gaussians_per_anchor = self.anchors, self.gaussians_per_anchor
             stipple.order, stipple.seed = self.order, self.seed
             stipple.detail_weight, stipple.color_from = self.detail_weight, self.color_from
-            sources.attach_model(obj.data, path, self._objects)
+            sources.attach_model(obj.data, path, self._objects, model.info())
         sync.write_decoded(obj.data, splats)
         context.collection.objects.link(obj)
         self._select(context, obj)

@@ -11,19 +11,21 @@ from mathutils import Matrix
 from .. import preferences, version
 from ..binding.cloud import Cloud
 from ..binding.errors import StippleError
+from ..binding.model import Model
+from ..binding.structs import ModelKind
 from ..jobs import JobOperator, Task
 from ..scene import formats, frames, numbered, sequences, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
-    """Import Gaussian splats from files"""
+    """Import Gaussian splats from files, or fitted ones with their budgets from asset files"""
 
     bl_idname = 'stipple.splats_import'
     bl_label = "Import Splats"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
     filename_ext = formats.READ_ENDINGS[0]
-    filter_glob: StringProperty(default=formats.glob(formats.READ_ENDINGS), options={'HIDDEN'})
+    filter_glob: StringProperty(default=formats.glob((*formats.READ_ENDINGS, sources.MODEL_SUFFIX)), options={'HIDDEN'})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
     up_axis: EnumProperty(name="Up Axis", description="Which way is up in the files; objects are turned, their data stay "
@@ -56,7 +58,7 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
             for i, (path, frame_count) in enumerate(chosen):
                 task.advance(i / len(chosen), f'Reading {os.path.basename(path)}')
                 try:
-                    loaded.append((path, frame_count, Cloud.load(native, path).columns()))
+                    loaded.append((path, frame_count, *_read(native, path)))
                 except StippleError as error:
                     failed.append(error)
             if not loaded:
@@ -68,8 +70,8 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
         loaded, failed = job.result
         for other in list(context.view_layer.objects.selected):
             other.select_set(False)
-        for path, frame_count, splats in loaded:
-            obj = self._object(path, splats, frame_count)
+        for path, frame_count, splats, model in loaded:
+            obj = self._object(path, splats, model, frame_count)
             context.collection.objects.link(obj)
             obj.select_set(True)
             context.view_layer.objects.active = obj
@@ -82,27 +84,36 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
             self.report({'WARNING'}, str(error))
         total = sum(splat_data.count(o.data) for o in context.view_layer.objects.selected)
         where = f"'{obj.name}'" if len(loaded) == 1 else f'{len(loaded)} objects'
-        in_all = sum(frame_count for _, frame_count, _ in loaded)
+        in_all = sum(frame_count for _, frame_count, *_ in loaded)
         files = '' if in_all == len(loaded) else f' of {in_all} files'
         self.report({'INFO'}, f'{total:,} splats in {where}{files}')
 
-    def _object(self, path, splats, frame_count):
+    def _object(self, path, splats, model, frame_count):
         name = os.path.basename(path)
         form = formats.of_path(path)
-        ending = next((e for e in form.endings if name.lower().endswith(e)), '') if form else os.path.splitext(name)[1]
+        endings = form.endings if form else (sources.MODEL_SUFFIX, os.path.splitext(name)[1])
+        ending = next((e for e in endings if name.lower().endswith(e)), '')
         name = name[:len(name) - len(ending)]
         if frame_count > 1:
             name = os.path.basename(numbered.parse(path).prefix).rstrip('_-. ') or name
         data = splat_data.new_data(name)
         with sync.paused():
             if frame_count > 1:
-                sequences.attach(data, path, frame_count)
+                sequences.attach(data, path, frame_count, 'CLOUD' if model is None else 'TREE')
+            elif model is not None:
+                sources.remember_model(path, model)
+                sources.attach_asset(data, path, model.info())
             else:
                 sources.attach_cloud(data, path)
-        sync.write(data, splats, '')
+        if model is None:
+            sync.write(data, splats, '')
+        else:
+            sync.write_decoded(data, splats)
         obj = splat_data.new_object(data.name, data)
         axis = self.up_axis if self.up_axis != 'AUTO' or form is None else preferences.up_axis(form.name)
-        frame = splats.frame if axis == 'AUTO' else frames.UP_AXES[axis]
+        is_asset = model is not None and model.info().kind != ModelKind.HIERARCHY
+        own = frames.WORLD if is_asset else splats.frame  # what was made of meshes or views stands upright
+        frame = own if axis == 'AUTO' else frames.UP_AXES[axis]
         obj.matrix_world = Matrix(frames.to_world(frame).tolist())
         return obj
 
@@ -118,6 +129,14 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
                 preferences.remember_up_axis(form.name, self.up_axis)
 
 
+def _read(native, path):
+    """(splats, model of an asset file or None)."""
+    if not path.lower().endswith(sources.MODEL_SUFFIX):
+        return Cloud.load(native, path).columns(), None
+    model = Model.load(native, path)
+    return model.decode(sources.first_settings(model.info())).columns(), model
+
+
 classes = (STIPPLE_OT_splats_import,)
 if version.HAS_FILE_HANDLERS:
     class STIPPLE_FH_splats(bpy.types.FileHandler):
@@ -125,7 +144,8 @@ if version.HAS_FILE_HANDLERS:
         bl_label = "Gaussian Splats"
         bl_import_operator = 'stipple.splats_import'
         bl_export_operator = 'stipple.splats_export'
-        bl_file_extensions = ';'.join(ending for ending in formats.READ_ENDINGS if ending.startswith('.'))
+        bl_file_extensions = ';'.join(ending for ending in (*formats.READ_ENDINGS, '.safetensors')
+                                      if ending.startswith('.'))
 
         @classmethod
         def poll_drop(cls, context):

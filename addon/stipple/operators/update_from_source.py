@@ -44,7 +44,7 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
         path = sources.save_model(model, sources.model_path_for(self._object.name))
         sources.remember_model(path, model)
         with sync.paused():
-            sources.attach_model(data, path, self._sources)
+            sources.attach_model(data, path, self._sources, model.info())
         sync.write_decoded(data, splats)
         self.report({'INFO'}, f"{splats.count:,} splats from {len(self._sources)} source objects")
 

@@ -38,7 +38,7 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
             layout.operator('stipple.relink', icon='FILEBROWSER')
         if stipple.fit_report is not None:
             layout.operator('stipple.show_report', icon='GRAPH')
-        if stipple.source_kind != 'MODEL':
+        if stipple.source_kind != 'MODEL' or not stipple.source_objects:
             return
         column = layout.column()
         column.enabled = not stipple.edited
@@ -61,9 +61,14 @@ class STIPPLE_PT_grade(_SplatPanel, bpy.types.Panel):
 class STIPPLE_PT_clean_up(_SplatPanel, bpy.types.Panel):
     bl_label = "Splat Clean Up"
 
-    def draw(self, _context):
+    def draw(self, context):
         layout = self.layout
+        stipple = context.object.data.stipple
         column = layout.column(align=True)
+        if stipple.source_kind == 'MODEL' and not stipple.edited:
+            layout.label(text="Decoded anew at each budget", icon='INFO')
+            layout.operator('stipple.use_as_new_source')
+            column.enabled = False
         column.operator_context = 'INVOKE_DEFAULT'
         column.operator('stipple.delete_floaters')
         column.operator('stipple.crop_by_box')
@@ -82,7 +87,10 @@ class STIPPLE_PT_advanced(_SplatPanel, bpy.types.Panel):
         layout.use_property_split = True
         stipple = context.object.data.stipple
         layout.enabled = not stipple.edited
-        layout.prop(stipple, 'gaussians_per_anchor')
+        if stipple.learned_gaussians:
+            _draw_fixed(layout, "Splats per Anchor", f"{stipple.learned_gaussians}, as learned")
+        else:
+            layout.prop(stipple, 'gaussians_per_anchor')
         layout.prop(stipple, 'order')
 
 
@@ -108,10 +116,24 @@ def _draw_budget(self, context):
         return
     column = box.column()
     column.enabled = not stipple.edited
-    single = stipple.gaussians_per_anchor == 1
+    single = sources.gaussians_per_anchor(stipple) == 1
     column.prop(stipple, 'anchors', text="Splats" if single else "Anchor Budget")
     column.prop(stipple, 'anchors_render', text="Render")
     column.prop(stipple, 'seed')
+    if stipple.learned_most:
+        used = (stipple.anchors, stipple.anchors_render or stipple.anchors)
+        is_beyond = max(used) > stipple.learned_most or min(used) < stipple.learned_least
+        column.label(text=f"Learned for {stipple.learned_least:,} to {stipple.learned_most:,}",
+                     icon='INFO' if is_beyond else 'BLANK1')
+
+
+def _draw_fixed(layout, name, value):
+    """A value that nobody can change, where others have a field."""
+    split = layout.split(factor=0.4)
+    left = split.column()
+    left.alignment = 'RIGHT'
+    left.label(text=name)
+    split.label(text=value)
 
 
 def _shown_label(data):

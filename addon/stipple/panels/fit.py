@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar tab of the 3D view: fitting splats to views."""
 
+import textwrap
+
 import bpy
 
-from ..operators import show_report, splats_fit
-from ..scene import fitting
+from ..operators import show_report
+from ..scene import fit_proposal, fitting
 
 
 class _FitPanel:
@@ -20,27 +22,32 @@ class STIPPLE_PT_fit(_FitPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        settings = context.scene.stipple.fit
+        settings, state = context.scene.stipple.fit, fitting.state
         column = layout.column()
-        column.enabled = not fitting.state.is_running
+        column.enabled = not state.is_running
         _draw_views(column, settings)
         column.separator()
         column.prop(settings, 'max_splats')
         column.prop(settings, 'quality')
         column.prop(settings, 'view_dependent')
-        if fitting.state.is_running:
-            _draw_running(layout, fitting.state)
+        layout.separator()
+        if state.is_running:
+            _draw_running(layout, settings, state)
+            _draw_shown(layout, context)
             return
-        if splats_fit.proposed(context) is not None:
+        if fit_proposal.find(context) is not None:
+            _draw_result(layout, state)
+            _draw_shown(layout, context)
             row = layout.row(align=True)
+            row.scale_y = 1.3
             row.operator('stipple.fit_accept', icon='CHECKMARK')
             row.operator('stipple.fit_discard', icon='X')
         else:
-            layout.operator('stipple.splats_fit', icon='OUTLINER_DATA_POINTCLOUD')
-        if fitting.state.problem:
-            layout.label(text=fitting.state.problem, icon='ERROR')
-        elif fitting.state.figures is not None:
-            _draw_figures(layout, fitting.state.figures)
+            row = layout.row()
+            row.scale_y = 1.3
+            row.operator('stipple.splats_fit', icon='OUTLINER_DATA_POINTCLOUD')
+            if state.problem:
+                _draw_problem(layout, context, state.problem)
         if show_report.reported(context) is not None:
             layout.operator('stipple.show_report', icon='GRAPH')
 
@@ -69,7 +76,9 @@ def _draw_views(layout, settings):
     layout.prop(settings, 'views_from')
     if settings.views_from == 'DATASET':
         layout.prop(settings, 'dataset')
+        layout.prop(settings, 'up_axis')
         layout.prop(settings, 'downscale')
+        layout.operator('stipple.cameras_import', text="Show Cameras", icon='CAMERA_DATA').filepath = settings.dataset
         return
     if settings.views_from == 'RIG':
         layout.prop(settings, 'rig')
@@ -81,23 +90,87 @@ def _draw_views(layout, settings):
     layout.prop(settings, 'transparent')
 
 
-def _draw_running(layout, state):
-    layout.label(text=state.stage, icon='TIME')
-    if state.figures is not None:
-        _draw_figures(layout, state.figures)
-    layout.label(text="Esc keeps the best so far")
+def _draw_running(layout, settings, state):
+    column = layout.column()
+    column.label(text=state.stage)
+    if hasattr(column, 'progress'):
+        column.progress(factor=state.fraction, text=f'{state.fraction:.0%}', type='BAR')
+    else:
+        column.use_property_split = False
+        bar = column.row()
+        bar.prop(settings, 'progress', text="", slider=True)
+    figures = state.figures
+    rows = []
+    if state.seconds_left >= 1:
+        rows.append(("Time Left", duration(state.seconds_left)))
+    if figures is not None and figures.iteration:
+        rows.append(("Step", f'{figures.iteration:,} of {figures.iterations:,}'))
+        rows.append(("Splats", f'{figures.splat_count:,}'))
+        rows.append(("Loss", f'{figures.loss:.4f}'))
+        if figures.psnr == figures.psnr:
+            best = '' if figures.psnr >= figures.best_psnr else f', best {figures.best_psnr:.1f}'
+            rows.append((_measured(figures), f'{figures.psnr:.1f} dB{best}'))
+        if figures.estimated_bytes:
+            rows.append(("Estimate", f'{duration(figures.estimated_seconds)}, {size(figures.estimated_bytes)}'))
+    _draw_rows(layout, rows)
+    if figures is None:
+        layout.label(text="Esc cancels", icon='EVENT_ESC')
+    else:
+        layout.operator('stipple.fit_stop', icon='EVENT_ESC')
 
 
-def _draw_figures(layout, figures):
+def _draw_result(layout, state):
+    figures = state.figures
+    layout.label(text="Not accepted yet", icon='INFO')
+    if figures is None:
+        return
+    rows = [("Splats", f'{figures.splat_count:,}'), ("Steps", f'{figures.iteration:,}'),
+            ("Fitted In", duration(figures.seconds))]
+    if figures.best_psnr == figures.best_psnr:
+        rows.insert(0, (_measured(figures), f'{figures.best_psnr:.1f} dB'))
+    _draw_rows(layout, rows)
+
+
+def _measured(figures):
+    return "On Views" if figures.measured_on_training else "Held Out"
+
+
+def _draw_shown(layout, context):
+    if fit_proposal.comparable(context) is not None:
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(context.scene.stipple.fit, 'shown', expand=True)
+
+
+def _draw_rows(layout, rows):
+    """Names on the left, as settings have them."""
     column = layout.column(align=True)
-    column.label(text=f"Step {figures.iteration:,} of {figures.iterations:,}")
-    column.label(text=f"{figures.splat_count:,} splats")
-    if figures.psnr == figures.psnr:
-        column.label(text=f"{figures.psnr:.1f} dB held out, best {figures.best_psnr:.1f} dB")
-    if figures.estimated_bytes:
-        column.label(text=f"About {figures.estimated_seconds:.0f} s in all, {figures.estimated_bytes / 2**20:,.0f} MiB")
-    if 0 < figures.iteration < figures.iterations:
-        column.label(text=f"{figures.seconds_left:.0f} s left")
+    for name, value in rows:
+        split = column.split(factor=0.4)
+        left = split.column()
+        left.alignment = 'RIGHT'
+        left.label(text=name)
+        split.label(text=value)
+
+
+def _draw_problem(layout, context, problem):
+    """Whole, in as many lines as it takes."""
+    characters = max(20, int(context.region.width / context.preferences.system.ui_scale / 7) - 4)
+    column = layout.column(align=True)
+    for i, line in enumerate(textwrap.wrap(problem, characters)):
+        column.label(text=line, icon='ERROR' if i == 0 else 'BLANK1')
+
+
+def duration(seconds):
+    if seconds < 90:
+        return f'{seconds:.0f} s'
+    if seconds < 90 * 60:
+        return f'{seconds / 60:.0f} min'
+    return f'{seconds / 3600:.1f} h'
+
+
+def size(count):
+    return f'{count / 2**20:,.0f} MiB' if count < 2**30 else f'{count / 2**30:.1f} GiB'
 
 
 classes = (STIPPLE_PT_fit, STIPPLE_PT_fit_advanced)

@@ -107,8 +107,9 @@ def _check(obj):
         raise invalid(f"'{obj.name}' is linked from another file; make it local first.")
     refuse_sequence(obj)
     if data.stipple.source_kind == 'MODEL':
-        raise invalid(f"'{obj.name}' is made from meshes, so there are no splats of a file to hide; edit the meshes, or "
-                      'choose Use as New Source first.')
+        made = 'decoded from a learned field' if data.stipple.learned_gaussians else 'made from meshes'
+        raise invalid(f"'{obj.name}' is {made}, so there are no splats of a file to hide; choose Use as New Source first, "
+                      'which keeps the present ones.')
     if data.stipple.edited or sync.is_edited(data):
         raise invalid(f"'{obj.name}' was edited by hand; choose Use as New Source or Revert to Source first.")
 

@@ -28,8 +28,11 @@ def of(obj):
 
 
 def forget(image):
-    """Removes a report that nothing uses."""
-    if image is not None and not image.users:
+    """Removes a report that no other splats have, from Image Editors too."""
+    if image is None:
+        return
+    users = bpy.data.user_map(subset={image})[image]
+    if all(isinstance(user, bpy.types.Screen) for user in users):
         bpy.data.images.remove(image)
 
 

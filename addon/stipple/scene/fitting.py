@@ -6,19 +6,26 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
+from ..binding import cloud_edit
 from ..binding.errors import CancelledError, StippleError, invalid
 from ..binding.fit import Fit, fit_options
 from ..binding.model import DecodeSettings, Model
 from ..binding.structs import ColourSpace, FitModel, FitQuality, JobState
 from ..binding.views import Views
-from . import facts, fit_reports, meshes, sources, view_capture, view_rigs
+from . import (facts, fit_proposal, fit_reports, frames, meshes, photo_cameras, sources, view_capture,
+               view_rigs)
 
 # Surface samples that a fit of meshes starts from and learns its density on.
 POINT_COUNT = 20_000
 _POLL_SECONDS = 0.02
 # Shares of the whole in the progress bar: until points are known, until views are, until the fit ends.
 _POINTS_END, _VIEWS_END, _FIT_END = 0.05, 0.35, 0.95
+
+# What a native stage is called.
+_STAGES = {'Splats': 'Fitting splats', 'Density': 'Learning where surfaces are', 'Attributes': 'Learning attributes',
+           'Joint': 'Learning density and attributes'}
 
 
 @dataclass
@@ -31,6 +38,11 @@ class State:
     is_running: bool = False
     problem: str = ''
     notes: tuple = ()
+    fraction: float = 0.0
+    seconds_left: float = 0.0  # of what goes on now, 0 where it is not known
+    source_names: tuple = ()  # of the visible objects that it is fitted to
+    matrix: object = None     # of the object to be, to the world
+    wants_stop: bool = False
 
 
 state = State()
@@ -43,6 +55,7 @@ class Result:
     path: str           # of the asset file
     decoding: object    # DecodeSettings of these splats
     kind: str           # source kind: 'TREE', or 'MODEL' of a field
+    info: object        # StippleModelInfo of the asset
     report: object      # picture of the fit's curves, [H,W,4]
 
 
@@ -61,14 +74,19 @@ class FitTask:
         self._cancelled, self._error = False, None
         self._progress = (0.0, 'Preparing')
         self._steps = self._work()
-        state.__init__(name=self._name(), stage='Preparing', is_running=True)
+        self._frame = self._frame_of_views()
+        state.__init__(name=self._name(), stage='Preparing', is_running=True,
+                       source_names=fit_proposal.visible_names(meshes.source_objects(objects)),
+                       matrix=Matrix(frames.to_world(self._frame).tolist()))
 
     def poll(self):
         """(state, fraction 0..1, stage). Takes one step: a view, or a look at a native job."""
         if self._steps is not None:
+            if state.wants_stop:
+                self.cancel()
             try:
                 self._progress = next(self._steps)
-                state.stage = self._progress[1]
+                state.fraction, state.stage = self._progress
                 return (JobState.RUNNING, *self._progress)
             except StopIteration:
                 pass
@@ -113,6 +131,13 @@ class FitTask:
             return bpy.path.display_name_from_filepath(bpy.path.abspath(self._settings.dataset).rstrip('/\\')) + ' Fit'
         return (self._objects[0].name if self._objects else 'Scene') + ' Fit'
 
+    def _frame_of_views(self):
+        """Which way the axes of the splats to be point."""
+        settings = self._settings
+        if settings.views_from != 'DATASET':
+            return frames.WORLD
+        return photo_cameras.chosen_frame(bpy.path.abspath(settings.dataset), settings.up_axis)
+
     def _work(self):
         settings = self._settings
         if settings.views_from == 'DATASET':
@@ -145,9 +170,11 @@ class FitTask:
         capturing = view_capture.CaptureSettings(settings.engine, settings.view_size, settings.samples,
                                                  settings.transparent)
         shots = self._shots()
+        start = time.monotonic()
         with view_capture.Capture(self._context, self._objects, capturing) as capture:
             for i, (name, shot) in enumerate(shots):
                 share = i / len(shots)
+                state.seconds_left = (time.monotonic() - start) * (len(shots) / i - 1) if i else 0.0
                 yield _POINTS_END + (_VIEWS_END - _POINTS_END) * share, f'Rendering view {i + 1} of {len(shots)}'
                 self._check_cancelled()
                 is_pose = isinstance(shot, view_rigs.Pose)
@@ -177,6 +204,10 @@ class FitTask:
         if not settings.view_dependent:
             chosen['sh_degree'] = 0
         options = fit_options(self._native.library, FitModel[settings.model], FitQuality[settings.quality], **chosen)
+        if settings.model == 'FIELD':
+            most = max(1, settings.max_splats // options.gaussians_per_anchor)
+            options.most_anchors = min(options.most_anchors, most)
+            options.least_anchors = min(options.least_anchors, options.most_anchors)
         self.job = Fit.start(self._native, views, options)
         try:
             while True:
@@ -184,7 +215,8 @@ class FitTask:
                 state.figures = self.job.figures()
                 if job_state != JobState.RUNNING:
                     break
-                yield _VIEWS_END + (_FIT_END - _VIEWS_END) * fraction, stage
+                state.seconds_left = state.figures.seconds_left if state.figures.iteration else 0.0
+                yield _VIEWS_END + (_FIT_END - _VIEWS_END) * fraction, _STAGES.get(stage, stage)
             state.notes = tuple(self.job.notes())
             if not state.figures.iteration:
                 self.job.wait()  # says why
@@ -195,12 +227,14 @@ class FitTask:
                 self.job.save_report(bpy.path.abspath(settings.report))
         finally:
             self.job = None
+        state.seconds_left = 0.0
         yield _FIT_END, 'Keeping the result'
         if is_field:
             info = made.info()
             decoding = DecodeSettings(info.most_anchors, info.gaussians_per_anchor, seed=settings.seed)
             self._keep(made, decoding, 'MODEL', report)
             return
+        made = cloud_edit.merge([(made, np.eye(4))], self._frame)  # the same splats, with the label of their frame
         job = Model.from_cloud_start(self._native, made, seed=settings.seed)
         yield from self._until_done(job, _FIT_END, 1.0)
         self._keep(job.model(), DecodeSettings(made.info().count), 'TREE', report)
@@ -208,7 +242,8 @@ class FitTask:
     def _keep(self, model, decoding, kind, report):
         path = sources.save_model(model, self._path or sources.model_path_for(state.name), bool(self._path))
         sources.remember_model(path, model)
-        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, kind, report)
+        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, kind, model.info(),
+                             report)
 
     def _until_done(self, job, start, end):
         while True:

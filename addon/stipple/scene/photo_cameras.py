@@ -12,6 +12,9 @@ from ..binding.structs import CameraModel, Frame
 from ..binding.views import Views
 from . import frames
 
+UP_AXES = (('AUTO', "From Format", "Z of transforms.json, -Y of COLMAP"), ('Z', "Z Up", "As in Blender"),
+           ('-Y', "-Y Up", "As most captured scenes: the frame of their first camera"),
+           ('Y', "Y Up", "As in glTF and most game engines"))
 SENSOR_WIDTH = 36.0  # mm, Blender's own
 _TRANSFORMS = ('transforms.json', 'transforms_train.json')
 _OPENCV_TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -24,6 +27,11 @@ def frame_of(path):
     its first camera."""
     is_transforms = path.lower().endswith('.json') or any(os.path.isfile(os.path.join(path, n)) for n in _TRANSFORMS)
     return frames.WORLD if is_transforms else Frame.RDF
+
+
+def chosen_frame(path, up_axis):
+    """The same, or what an item of UP_AXES says."""
+    return frame_of(path) if up_axis == 'AUTO' else frames.UP_AXES[up_axis]
 
 
 def open_views(context, path):

@@ -21,13 +21,16 @@ from ..binding.cloud import Cloud
 from ..binding.context import Context
 from ..binding.errors import StippleError
 from ..binding.model import DecodeSettings, Model
-from ..binding.structs import AnchorOrder, JobState, Status
+from ..binding.structs import AnchorOrder, JobState, ModelKind, Status
 from . import masks, meshes, splat_data
 
 # Kinds of sources that give splats at any budget.
 MODEL_KINDS = ('MODEL', 'TREE')
 MODEL_SUFFIX = '.stipple.safetensors'
 _MAX_MODELS = 4
+# Splats that the viewport shows at first of a tree.
+FIRST_COUNT = 500_000
+_MAX_INT = 2**31 - 1  # of Blender's properties
 # Splats kept decoded over all cached clouds; 60 bytes each, so 1.2 GB at most.
 _MAX_CACHED_SPLATS = 20_000_000
 
@@ -259,7 +262,12 @@ def decode_settings(stipple, mode='VIEWPORT'):
     anchors = stipple.anchors
     if mode == 'RENDER' and stipple.anchors_render != 0:
         anchors = stipple.anchors_render
-    return DecodeSettings(anchors, stipple.gaussians_per_anchor, AnchorOrder[stipple.order], stipple.seed)
+    return DecodeSettings(anchors, gaussians_per_anchor(stipple), AnchorOrder[stipple.order], stipple.seed)
+
+
+def gaussians_per_anchor(stipple):
+    """Of a model: what a field was learned for, else what is chosen."""
+    return stipple.learned_gaussians or stipple.gaussians_per_anchor
 
 
 def at_most(settings, most):
@@ -376,9 +384,39 @@ def _save(write, path, suffix, overwrite):
     raise StippleError(f"'{stem}' has 1,000 numbered sources already; remove some of them.", Status.ERROR_IO)
 
 
-def attach_model(data, path, objects):
-    """Notes a model as the source of a datablock, with the meshes and settings that it was made from."""
+def note_learned(stipple, info):
+    """Notes what a model was learned for. In: info, StippleModelInfo."""
+    is_field = info.kind == ModelKind.FIELD
+    stipple.learned_gaussians = info.gaussians_per_anchor if is_field else 0
+    budgets = (info.least_anchors, info.most_anchors) if is_field else (0, 0)
+    stipple.learned_least, stipple.learned_most = (min(budget, _MAX_INT) for budget in budgets)
+
+
+def first_settings(info):
+    """How an asset is shown at first. In: info, StippleModelInfo."""
+    if info.kind == ModelKind.HIERARCHY:
+        return DecodeSettings(min(info.leaf_count, FIRST_COUNT))
+    if info.kind == ModelKind.FIELD:
+        return DecodeSettings(info.most_anchors, info.gaussians_per_anchor)
+    return DecodeSettings()
+
+
+def attach_asset(data, path, info):
+    """Notes an asset file as the source of a new datablock, with the budget of first_settings()."""
+    stipple, settings = data.stipple, first_settings(info)
+    if info.kind == ModelKind.HIERARCHY:
+        attach_tree(data, path, info.leaf_count)
+        stipple.ratio, stipple.ratio_render = settings.anchors / info.leaf_count, 1.0
+    else:
+        attach_model(data, path, [], info)
+        stipple.anchors = settings.anchors
+
+
+def attach_model(data, path, objects, info):
+    """Notes a model as the source of a datablock, with the meshes and settings that it was made from. In: info,
+    StippleModelInfo."""
     stipple = data.stipple
+    note_learned(stipple, info)
     stipple.source = blend_path(path)
     stipple.source_stamp = stamp(path)
     stipple.source_kind = 'MODEL'

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scene as cameras see it, picture by picture: what splats are fitted to.
 
-Cycles hands its passes over in memory. EEVEE and Workbench hand nothing to Python: they write one uncompressed picture
-into a folder of their own, which is read and removed.
+Cycles hands its passes over in memory. EEVEE and Workbench write one uncompressed picture at a time, into memory that has
+a path where the system has such (Linux: memfd), else into a folder of their own. In background mode Blender leaves no other
+way to depth, normals and scene linear colours at the samples of a render: the Viewer node keeps its first size there, the
+Render Result has none (3.4, 4.3, 5.2), and GPUOffScreen.draw_view3d() gives the viewport's picture in display colours.
 """
 
 import contextlib
@@ -113,13 +115,12 @@ class Capture:
         else:
             # Its lights turn with the camera: no two views would agree.
             kept.set(scene.display.shading, light='FLAT', color_type='TEXTURE')
-        self._folder = None
+        self._path = None
         if settings.engine != 'CYCLES':
-            self._folder = tempfile.mkdtemp(prefix='stipple-views-')
-            stack.callback(shutil.rmtree, self._folder, True)
+            self._path = _picture_path(stack)
             stack.callback(_set_in_order, render.image_settings, _file_settings(render.image_settings))
             _set_in_order(render.image_settings, {**_MULTI_LAYER, 'color_depth': '32', 'exr_codec': 'NONE'})
-            kept.set(render, filepath=os.path.join(self._folder, 'view'), use_file_extension=True)
+            kept.set(render, filepath=self._path, use_file_extension=False)
         kept.set(render, engine=engine)
         kept.set(render, resolution_x=render.resolution_x, resolution_y=render.resolution_y, resolution_percentage=100,
                  pixel_aspect_x=render.pixel_aspect_x, pixel_aspect_y=render.pixel_aspect_y, use_border=False,
@@ -162,7 +163,7 @@ class Capture:
         scene.camera = camera_object
         self._passes.clear()
         with bpy.context.temp_override(scene=scene, view_layer=self._layer):
-            if self._folder is None:
+            if self._path is None:
                 bpy.ops.render.render(scene=scene.name)
             else:
                 bpy.ops.render.render(write_still=True, scene=scene.name)
@@ -173,10 +174,9 @@ class Capture:
         return self._captured(name, cameras.camera_of(camera_object, scene.render))
 
     def _read_file(self):
-        path = os.path.join(self._folder, 'view.exr')
         try:
-            channels = exr_layers.read(path)
-            os.remove(path)
+            channels = exr_layers.read(self._path)
+            os.truncate(self._path, 0)  # an old picture never passes for a new one
         except (OSError, ValueError) as error:
             raise StippleError(f'A rendered view cannot be read: {error}', Status.ERROR_IO) from None
         for name, letters in (('Combined', 'RGBA'), ('Depth', 'Z'), ('Normal', 'XYZ')):
@@ -200,6 +200,19 @@ class Capture:
             known = is_known[..., None] & (length > 0.5)
             normals = np.where(known, self._passes['Normal'] / np.maximum(length, 1e-9), 0).astype(np.float32)
         return Captured(name, camera, linear, np.where(is_known, depth, 0).astype(np.float32), normals)
+
+
+def _picture_path(stack):
+    """A path that Blender can write a picture to; what is there ends with the stack."""
+    if hasattr(os, 'memfd_create'):
+        memory = os.memfd_create('stipple-view')
+        stack.callback(os.close, memory)
+        path = f'/proc/self/fd/{memory}'
+        if os.path.exists(path):
+            return path
+    folder = tempfile.mkdtemp(prefix='stipple-views-')
+    stack.callback(shutil.rmtree, folder, True)
+    return os.path.join(folder, 'view.exr')
 
 
 def _file_settings(image):

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The object that a fit makes, until it is accepted: what it was fitted to comes back when it is discarded.
+
+Only visibility in the viewport changes by the way. Renders show the source until the proposal is accepted.
+"""
+
+import bpy
+
+# Names of the objects that the splats were fitted to and that were visible then, one a line.
+SOURCES_KEY = 'stipple_fit_sources'
+PROPOSED_KEY = 'stipple_fit_proposed'
+
+
+def new_object(context, obj, names, matrix):
+    """Links the object of a fit. In: names of what it is fitted to; matrix, to the world."""
+    obj.matrix_world = matrix
+    obj[SOURCES_KEY] = '\n'.join(names)
+    context.collection.objects.link(obj)
+    show(context, obj, context.scene.stipple.fit.shown)
+
+
+def visible_names(objects):
+    return [obj.name for obj in objects if not obj.hide_get()]
+
+
+def propose(obj):
+    obj[PROPOSED_KEY] = True
+
+
+def find(context):
+    """The object that waits for a decision, or None."""
+    return next((obj for obj in context.view_layer.objects if obj is not None and PROPOSED_KEY in obj), None)
+
+
+def comparable(context):
+    """The object of a fit, running or waiting, whose source can be shown in its place, or None."""
+    return next((obj for obj in context.view_layer.objects if obj is not None and obj.get(SOURCES_KEY)), None)
+
+
+def on_shown_change(settings, context):
+    """Update function of the choice what is shown."""
+    obj = comparable(context)
+    if obj is not None:
+        show(context, obj, settings.shown)
+
+
+def show(context, obj, which):
+    """which: 'SPLATS', 'SOURCE' or 'BOTH'. What came from photographs has no source to show."""
+    found = _sources(context, obj)
+    obj.hide_set(which == 'SOURCE' and bool(found))
+    for source in found:
+        source.hide_set(which == 'SPLATS')
+
+
+def accept(context, obj, hide_source):
+    for source in _sources(context, obj):
+        source.hide_set(hide_source)
+        if hide_source:
+            source.select_set(False)
+            source.hide_render = True
+    obj.hide_set(False)
+    for key in (PROPOSED_KEY, SOURCES_KEY):
+        if key in obj:
+            del obj[key]
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
+
+
+def discard(context, obj):
+    for source in _sources(context, obj):
+        source.hide_set(False)
+    data = obj.data
+    (bpy.data.pointclouds if isinstance(data, bpy.types.PointCloud) else bpy.data.meshes).remove(data)
+
+
+def _sources(context, obj):
+    objects = context.view_layer.objects
+    return [objects[name] for name in obj.get(SOURCES_KEY, '').split('\n') if name and name in objects]
