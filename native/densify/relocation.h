@@ -36,6 +36,8 @@ class RelocatedSplats {
   /// Appends copies of `count` splats that are drawn by opacity with replacement.
   void appendCopies(const FitMoment& moment, size_t count, RawSplats& append);
 
+  /// The row whose place, turn and colour it has.
+  size_t origin(size_t row) const { return origins_[row]; }
   /// As they are now.
   float logit(size_t row) const { return logits_[row]; }
   const float* position(size_t row) const { return &splats_.positions[origins_[row] * 3]; }

@@ -12,6 +12,7 @@
 #include "densify/growth_control.h"
 #include "densify/long_axis_split.h"
 #include "densify/mcmc.h"
+#include "densify/metropolis.h"
 #include "densify/multi_step_update.h"
 #include "densify/opacity_correction.h"
 #include "densify/recovery_pruning.h"
@@ -54,6 +55,8 @@ constexpr StrategyMaker kStrategies[] = {
     {{"volumetric", "As adaptive, and splits what fills a large volume"}, volumetricControl},
     {{"mcmc", "Moves faint splats to where opaque ones are, up to a number that you set"},
      mcmcControl},
+    {{"metropolis", "Tries new splats where pictures are wrong and keeps them where there is room"},
+     metropolisControl},
 };
 
 std::unique_ptr<ControlPart> longAxisSplit(StrategySettings& settings) {
