@@ -17,8 +17,10 @@ class FaintRemoval final : public ControlPart {
   ControlRoles owns() const override { return roles(ControlRole::kRemoval); }
 
   bool removesAt(const ControlMoment& moment) const override {
-    return moment.is_event && (options_.until == 0 ||
-                               moment.iteration < scaleSchedule(options_.until, moment.iterations));
+    return isEarly(moment) ||
+           (moment.is_event &&
+            (options_.until == 0 ||
+             moment.iteration < scaleSchedule(options_.until, moment.iterations)));
   }
 
   void remove(const ControlMoment& moment, const RawSplats& splats, const RawSplats& appended,
@@ -28,8 +30,13 @@ class FaintRemoval final : public ControlPart {
   }
 
  private:
+  bool isEarly(const ControlMoment& moment) const {
+    return options_.early_at > 0 && moment.isAt(options_.early_at);
+  }
+
   void judge(const ControlMoment& moment, const RawSplats& splats, std::span<uint8_t> goes) const {
-    const float least_logit = rawOpacity(static_cast<float>(options_.least_opacity));
+    const double least = isEarly(moment) ? options_.early_opacity : options_.least_opacity;
+    const float least_logit = rawOpacity(static_cast<float>(least));
     const bool judges_size = options_.largest_share > 0 && moment.isAfter(options_.size_after);
     const float huge =
         judges_size ? logShareOfExtent(moment, options_.largest_share) : kLargestLogScale;

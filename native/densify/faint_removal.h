@@ -13,6 +13,9 @@ struct FaintRemovalOptions {
   uint64_t size_after = 3000;  ///< iterations of 30,000 from which on size is judged
   /// Iterations of 30,000 from which on nothing goes any more; 0: until the last event.
   uint64_t until = 0;
+  /// Once, in this iteration of 30,000, splats fainter than early_opacity go; 0: never.
+  uint64_t early_at = 0;
+  double early_opacity = 0.02;
 };
 
 /// Faint and huge splats go at every event, children that were just made too. Owns kRemoval.

@@ -44,8 +44,10 @@ class ScreenPull final : public ControlPart {
     if (split_window_ && split_window_->size() == 0) split_window_->reset(splats.size());
     const GradientWindow& split_window = split_window_ ? *split_window_ : copy_window_;
     const float small = logShareOfExtent(moment, options_.small_share);
-    const float copy_threshold = static_cast<float>(options_.copy_threshold);
-    const float split_threshold = static_cast<float>(options_.split_threshold);
+    const bool is_late = options_.late_after > 0 && moment.isAfter(options_.late_after);
+    const double share = is_late ? options_.late_share : 1.0;
+    const float copy_threshold = static_cast<float>(share * options_.copy_threshold);
+    const float split_threshold = static_cast<float>(share * options_.split_threshold);
     std::vector<Candidate> found;
     score_.assign(splats.size(), 0.0f);
     for (uint32_t i = 0; i < splats.size(); ++i) {

@@ -14,6 +14,8 @@ struct ScreenPullOptions {
   Statistic split_statistic = Statistic::kScreenGradients;
   double split_threshold = 2e-4;  ///< from which on a large one is split
   double small_share = 0.01;      ///< of the cameras' extent: the largest scale of a small splat
+  uint64_t late_after = 0;  ///< iteration of 30,000 after which both thresholds are ...; 0: never
+  double late_share = 1;    ///< ... this share of themselves
 };
 
 /// Splats multiply that views pull at. Owns kMultiplication. Statistics: kScreenGradients or

@@ -9,7 +9,10 @@
 #include "base/error.h"
 #include "densify/absolute.h"
 #include "densify/adaptive.h"
+#include "densify/direction.h"
+#include "densify/edge_aware_score.h"
 #include "densify/growth_control.h"
+#include "densify/improved.h"
 #include "densify/long_axis_split.h"
 #include "densify/mcmc.h"
 #include "densify/metropolis.h"
@@ -52,12 +55,23 @@ constexpr StrategyMaker kStrategies[] = {
      makeAdaptive},
     {{"absolute", "As adaptive, and finds the blurred splats that lie over fine texture"},
      makeAbsolute},
+    {{"improved",
+      "Splits along the longest side where pictures have edges: sharper with fewer splats"},
+     improvedControl},
+    {{"direction", "As adaptive, and looks whether the pixels of a splat agree: fewer splats"},
+     directionControl},
     {{"volumetric", "As adaptive, and splits what fills a large volume"}, volumetricControl},
     {{"mcmc", "Moves faint splats to where opaque ones are, up to a number that you set"},
      mcmcControl},
     {{"metropolis", "Tries new splats where pictures are wrong and keeps them where there is room"},
      metropolisControl},
 };
+
+std::unique_ptr<ControlPart> edgeAwareScore(StrategySettings& settings) {
+  EdgeAwareScoreOptions options;
+  options.views = settings.count("views", options.views, 1000);
+  return makeEdgeAwareScore(options);
+}
 
 std::unique_ptr<ControlPart> longAxisSplit(StrategySettings& settings) {
   LongAxisSplitOptions options;
@@ -92,6 +106,7 @@ std::unique_ptr<ControlPart> opacityCorrection(StrategySettings&) {
 }
 
 constexpr PartMaker kParts[] = {
+    {{"edge_aware_score", "Adds detail first where the pictures have edges"}, edgeAwareScore},
     {{"long_axis_split", "Splits along the longest side, so that two halves fill the same outline"},
      longAxisSplit},
     {{"volume_split", "Also splits whatever fills a large volume, long shapes into smaller pieces"},
