@@ -22,25 +22,6 @@ HELD_OUT = 8
 TARGET_SECONDS, TARGET_PSNR = 180, 32.0
 
 
-def suzanne():
-    bpy.ops.mesh.primitive_monkey_add(size=2)
-    obj = bpy.context.object
-    obj.modifiers.new('Subdivision', 'SUBSURF').render_levels = 2
-    obj.modifiers[0].levels = 2
-    obj.data.polygons.foreach_set('use_smooth', [True] * len(obj.data.polygons))
-    material = scenes.material('Skin', (0.7, 0.35, 0.15), obj)
-    tree = material.node_tree
-    noise = tree.nodes.new('ShaderNodeTexNoise')
-    noise.inputs['Scale'].default_value = 6
-    tree.links.new(noise.outputs['Color'], scenes.principled(material).inputs['Base Color'])
-    bpy.context.scene.world = bpy.data.worlds.new('Sky')
-    bpy.context.scene.world.use_nodes = True
-    bpy.ops.object.light_add(type='SUN', rotation=(0.6, 0.3, 0))
-    bpy.context.object.data.energy = 3
-    scenes.select(obj)
-    return obj
-
-
 def display(linear):
     """[H,W,3] over black, as a Standard view shows scene linear premultiplied pictures."""
     alpha = np.maximum(linear[..., 3:], 1e-6)
@@ -59,7 +40,7 @@ def test_suzanne(stipple, tmp_path, model):
     fitting = importlib.import_module('.scene.fitting', stipple.__name__)
     binding = importlib.import_module('.binding.renderer', stipple.__name__)
     structs = importlib.import_module('.binding.structs', stipple.__name__)
-    obj = suzanne()
+    obj = scenes.suzanne()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
     settings = bpy.context.scene.stipple.fit
     settings.model = model

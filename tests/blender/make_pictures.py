@@ -2,18 +2,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the pictures of windows in docs/images.
 
-    python3 tests/blender/run.py tests/blender/make_pictures.py
+    python3 tests/blender/run.py tests/blender/make_pictures.py                     # all of them
+    python3 tests/blender/run.py tests/blender/make_pictures.py -k fit_tour         # those of fits: minutes
 
 Not a test of the suite: its name keeps it out.
 """
 
 import json
+import shutil
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
+import fit_tour_steps
 import picture_steps
 import screen
 import tour_steps
@@ -21,9 +24,12 @@ import tour_steps
 IMAGES = Path(__file__).resolve().parent.parent.parent / 'docs' / 'images'
 
 
-@pytest.mark.parametrize('steps,size', ((picture_steps, (screen.WIDTH, screen.HEIGHT)), (tour_steps, (1600, 1300))))
+@pytest.mark.parametrize('steps,size', ((picture_steps, (screen.WIDTH, screen.HEIGHT)), (tour_steps, (1600, 1300)),
+                                        (fit_tour_steps, (1600, 1000))), ids=lambda value: getattr(value, '__name__', ''))
 def test_pictures_of_windows(tmp_path, steps, size):
-    shots, _ = screen.run_steps(Path(steps.__file__), tmp_path, bpy.app.binary_path, size=size)
+    shots, _ = screen.run_steps(Path(steps.__file__), tmp_path, bpy.app.binary_path, timeout=1500, size=size)
+    for made in tmp_path.glob('*.png'):  # by the steps themselves
+        shutil.copy(made, IMAGES / made.name)
     for name, shot in shots.items():
         part = tmp_path / f'{name}.json'
         if part.exists():

@@ -77,6 +77,26 @@ def sphere(name='Sphere', segments=32, rings=16, radius=1.0):
     return obj
 
 
+def suzanne():
+    """A head with a pattern, sun and sky, selected."""
+    bpy.ops.mesh.primitive_monkey_add(size=2)
+    obj = bpy.context.object
+    obj.modifiers.new('Subdivision', 'SUBSURF').render_levels = 2
+    obj.modifiers[0].levels = 2
+    obj.data.polygons.foreach_set('use_smooth', [True] * len(obj.data.polygons))
+    skin = material('Skin', (0.7, 0.35, 0.15), obj)
+    tree = skin.node_tree
+    noise = tree.nodes.new('ShaderNodeTexNoise')
+    noise.inputs['Scale'].default_value = 6
+    tree.links.new(noise.outputs['Color'], principled(skin).inputs['Base Color'])
+    bpy.context.scene.world = bpy.data.worlds.new('Sky')
+    bpy.context.scene.world.use_nodes = True
+    bpy.ops.object.light_add(type='SUN', rotation=(0.6, 0.3, 0))
+    bpy.context.object.data.energy = 3
+    select(obj)
+    return obj
+
+
 def camera(location=(0.0, 0.0, 6.0), rotation=(0.0, 0.0, 0.0), width=64, height=64, **settings):
     data = bpy.data.cameras.new('camera')
     for key, value in settings.items():

@@ -78,7 +78,11 @@ def _draw_views(layout, settings):
         layout.prop(settings, 'dataset')
         layout.prop(settings, 'up_axis')
         layout.prop(settings, 'downscale')
-        layout.operator('stipple.cameras_import', text="Show Cameras", icon='CAMERA_DATA').filepath = settings.dataset
+        row = layout.row()
+        row.enabled = bool(settings.dataset)
+        row.operator_context = 'EXEC_DEFAULT'  # the folder is chosen
+        shown = row.operator('stipple.cameras_import', text="Show Cameras", icon='CAMERA_DATA')
+        shown.filepath, shown.up_axis = settings.dataset, settings.up_axis
         return
     if settings.views_from == 'RIG':
         layout.prop(settings, 'rig')
