@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "densify/strategies.h"
 #include "train/explicit_model.h"
 #include "train/fit_scene.h"
 
@@ -66,6 +67,17 @@ TEST(FittingStability, ViewsThatAreBlackOrTransparentEverywhere) {
   for (const float alpha : {1.0f, 0.0f}) {
     const auto model = fitted(*constantViews(0, alpha, 4), 700, small());
     EXPECT_GT(model->splats(0).size(), 0u);
+  }
+}
+
+/// Flat pictures have no edges, and nothing pulls once they are matched.
+TEST(FittingStability, FlatViewsByEveryStrategy) {
+  for (const std::string& name : strategyNames()) {
+    SCOPED_TRACE(name);
+    ExplicitModelOptions options = small();
+    options.strategy = name;
+    EXPECT_GT(fitted(*constantViews(0.5f, 1, 4), 700, options)->splats(0).size(), 0u);
+    EXPECT_GT(fitted(*constantViews(0.5f, 0, 1), 500, options, 0.0)->splats(0).size(), 0u);
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "densify/strategies.h"
+#include "splat/render_backward.h"
 #include "train/explicit_model.h"
 #include "train/fit_scene.h"
 #include "train/picture_store.h"
@@ -116,6 +117,74 @@ TEST_P(EveryStrategy, GoesOnBitForBitFromACheckpoint) {
 
 INSTANTIATE_TEST_SUITE_P(Fit, EveryStrategy, ::testing::ValuesIn(strategyNames()),
                          [](const auto& strategy) { return strategy.param; });
+
+/// Each part in the strategy that most are made for.
+class EveryPart : public ::testing::TestWithParam<std::string> {};
+
+std::vector<std::string> partNames() {
+  std::vector<std::string> names;
+  for (const StrategyEntry& entry : partEntries()) names.emplace_back(entry.name);
+  return names;
+}
+
+TEST_P(EveryPart, LearnsTheViewsWithinTheCap) {
+  Looking fit("adaptive+" + GetParam());
+  fit.run(10);
+  const double before = meanPsnr(fit.model().splats(0), *scene());
+  fit.run(510);  // a reset at 300, a recovery at 400
+  validate(fit.model().splats(0), "fitted");
+  EXPECT_LE(fit.most(), kCap);
+  EXPECT_GT(meanPsnr(fit.model().splats(0), *scene()),
+            before + 2);  // growth_control still holds the number back
+}
+
+INSTANTIATE_TEST_SUITE_P(Fit, EveryPart, ::testing::ValuesIn(partNames()),
+                         [](const auto& part) { return part.param; });
+
+TEST(Strategies, PartsGoTogether) {
+  Looking fit(
+      "direction+edge_aware_score+long_axis_split+recovery_pruning+growth_control+"
+      "multi_step_update");
+  fit.run(510);
+  validate(fit.model().splats(0), "fitted");
+  EXPECT_LE(fit.most(), kCap);
+  EXPECT_GT(meanPsnr(fit.model().splats(0), *scene()), 20);
+}
+
+/// Shares of the weight of edges that splats and the background take add up to the whole.
+TEST(Strategies, EdgesAreSharedByWhatCoversThem) {
+  // One opaque splat that fills the picture, in front of nothing.
+  SplatCloud cloud = ballOfSplats(60, 1);
+  const Camera camera = camerasAround(1, 48)[0];
+  const std::vector<float> edges(48 * 48, 1.0f);
+  for (const size_t count : {size_t{1}, size_t{60}}) {
+    if (count == 1) {
+      cloud.resize(1);
+      std::fill_n(cloud.scales.begin(), 3, 0.5f);
+    } else {
+      cloud = ballOfSplats(60, 1);
+    }
+    const SplatInstance instance{&cloud};
+    const RenderResult drawn = renderTiled({&instance, 1}, camera, {});
+    BackwardInput input;
+    const std::vector<float> none(48 * 48 * 4, 0.0f);
+    input.colour_gradient = none;
+    input.edge_weights = edges;
+    input.with_blending_weights = true;
+    const BackwardResult result = renderBackward({&instance, 1}, camera, {}, input);
+    double by_splats = 0, behind = 0;
+    for (const float weight : result.instances[0].edge_weights) {
+      by_splats += static_cast<double>(weight);
+    }
+    for (size_t i = 3; i < drawn.colour.size(); i += 4) {
+      behind += 1 - static_cast<double>(drawn.colour[i]);
+    }
+    // Sums of 2304 pixels in float32.
+    EXPECT_NEAR(by_splats + behind, 48 * 48, 48 * 48 * 1e-5);
+    EXPECT_GT(by_splats, 48);
+    EXPECT_EQ(result.instances[0].edge_weights, result.instances[0].blending_weights);
+  }
+}
 
 }  // namespace
 }  // namespace stipple
