@@ -69,20 +69,9 @@ class CoherenceWindow {
     table["length_sums"] = {{lengths_.size()}, lengths_};
   }
   void take(const TensorTable& table) {
-    std::vector<float> aligned = stateArray<float>(table, "aligned_sums");
-    std::vector<float> lengths = stateArray<float>(table, "length_sums");
-    if (aligned.size() != lengths.size()) {
-      fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(aligned.size()) +
-                                   " aligned_sums and " + std::to_string(lengths.size()) +
-                                   " length_sums; as many are needed");
-    }
-    for (const std::vector<float>* values : {&aligned, &lengths}) {
-      for (const float value : *values) {
-        if (value >= 0 && std::isfinite(value)) continue;
-        fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(value) +
-                                     " among its sums of lengths; 0 and more is allowed");
-      }
-    }
+    std::vector<float> aligned = stateSums(table, "aligned_sums");
+    std::vector<float> lengths = stateSums(table, "length_sums");
+    requireAsMany(aligned.size(), "aligned_sums", lengths.size(), "length_sums");
     aligned_ = std::move(aligned);
     lengths_ = std::move(lengths);
   }

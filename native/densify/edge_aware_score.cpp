@@ -7,7 +7,6 @@
 #include "densify/edge_aware_score.h"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "base/error.h"
@@ -85,12 +84,7 @@ class EdgeAwareScore final : public ControlPart {
     table["views"] = {{views_.size()}, views_};
   }
   void take(const TensorTable& table) override {
-    std::vector<float> sums = stateArray<float>(table, "edge_sums");
-    for (const float sum : sums) {
-      if (sum >= 0 && std::isfinite(sum)) continue;
-      fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(sum) +
-                                   " among edge_sums; 0 and more is allowed");
-    }
+    std::vector<float> sums = stateSums(table, "edge_sums");
     views_ = stateArray<uint64_t>(table, "views");
     sums_ = std::move(sums);
   }

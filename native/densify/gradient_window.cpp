@@ -62,19 +62,9 @@ void GradientWindow::put(TensorTable& table) const {
 }
 
 void GradientWindow::take(const TensorTable& table) {
-  std::vector<float> sums = stateArray<float>(table, "gradient_sums");
+  std::vector<float> sums = stateSums(table, "gradient_sums");
   std::vector<uint32_t> counts = stateArray<uint32_t>(table, "visible_counts");
-  if (sums.size() != counts.size()) {
-    fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(sums.size()) +
-                                 " gradient_sums and " + std::to_string(counts.size()) +
-                                 " visible_counts; as many are needed");
-  }
-  for (const float sum : sums) {
-    if (!(sum >= 0) || !std::isfinite(sum)) {
-      fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(sum) +
-                                   " among gradient_sums; 0 and more is allowed");
-    }
-  }
+  requireAsMany(sums.size(), "gradient_sums", counts.size(), "visible_counts");
   sums_ = std::move(sums);
   counts_ = std::move(counts);
 }

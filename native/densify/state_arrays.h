@@ -19,4 +19,11 @@ std::vector<T> stateArray(const TensorTable& table, const std::string& name) {
   return std::get<std::vector<T>>(found->second.values);
 }
 
+/// The same for sums of lengths and weights: errors also where one is negative or not finite.
+std::vector<float> stateSums(const TensorTable& table, const std::string& name);
+
+/// Errors: kFormat where one is of another number of splats than the other.
+void requireAsMany(size_t count, const std::string& name, size_t other_count,
+                   const std::string& other_name);
+
 }  // namespace stipple
