@@ -11,6 +11,7 @@
 #include "densify/adaptive.h"
 #include "densify/direction.h"
 #include "densify/edge_aware_score.h"
+#include "densify/frequency.h"
 #include "densify/growth_control.h"
 #include "densify/improved.h"
 #include "densify/long_axis_split.h"
@@ -61,6 +62,9 @@ constexpr StrategyMaker kStrategies[] = {
     {{"direction", "As adaptive, and looks whether the pixels of a splat agree: fewer splats"},
      directionControl},
     {{"volumetric", "As adaptive, and splits what fills a large volume"}, volumetricControl},
+    {{"frequency",
+      "Lets sizes follow how close splats stand, and asks pairs of views what to remove"},
+     frequencyControl},
     {{"mcmc", "Moves faint splats to where opaque ones are, up to a number that you set"},
      mcmcControl},
     {{"metropolis", "Tries new splats where pictures are wrong and keeps them where there is room"},
