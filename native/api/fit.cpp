@@ -33,6 +33,20 @@ StippleFitOptions completedOptions(const StippleFitOptions* options) {
   return completed(options, defaults, "options");
 }
 
+FitSession& sessionOf(const StippleJob* job) {
+  const StippleJob& given = require(job, "job");
+  if (!given.fit) fail(ErrorCode::kInvalidArgument, "this job does not fit splats to views");
+  return *given.fit;
+}
+
+std::string plotPathOf(const std::string& path) {
+  return std::filesystem::path(path).replace_extension(".svg").string();
+}
+
+}  // namespace
+
+namespace stipple::api {
+
 std::shared_ptr<const ViewSource> sourceOf(const StippleViews& views) {
   if (!views.source) {
     fail(ErrorCode::kInvalidArgument,
@@ -41,7 +55,6 @@ std::shared_ptr<const ViewSource> sourceOf(const StippleViews& views) {
   return views.source;
 }
 
-/// What the data set says of its views; where it says nothing, every so many-th is held out.
 FitViews splitOf(const StippleViews& views, const ViewSource& source, uint64_t holdout) {
   FitViews split;
   for (size_t v = 0; v < views.notes.size(); ++v) {
@@ -57,17 +70,7 @@ FitViews splitOf(const StippleViews& views, const ViewSource& source, uint64_t h
   return split;
 }
 
-FitSession& sessionOf(const StippleJob* job) {
-  const StippleJob& given = require(job, "job");
-  if (!given.fit) fail(ErrorCode::kInvalidArgument, "this job does not fit splats to views");
-  return *given.fit;
-}
-
-std::string plotPathOf(const std::string& path) {
-  return std::filesystem::path(path).replace_extension(".svg").string();
-}
-
-}  // namespace
+}  // namespace stipple::api
 
 extern "C" {
 

@@ -32,6 +32,11 @@ struct FitSettings {
 /// Errors: kInvalidArgument, with the name of the option.
 FitSettings fitSettings(const StippleFitOptions& options);
 
+/// The pictures of views. Errors: kInvalidArgument where there are cameras alone.
+std::shared_ptr<const ViewSource> sourceOf(const StippleViews& views);
+/// What the data set says of its views; where it says nothing, every so many-th is held out.
+FitViews splitOf(const StippleViews& views, const ViewSource& source, uint64_t holdout);
+
 /// What a checkpoint must agree with: everything that the steps depend on.
 std::string settingsText(const FitSettings& settings, const ViewSource& views);
 /// Refuses texts that differ. In: path, of the checkpoint.
@@ -40,6 +45,8 @@ void requireSameSettings(const std::string& stored, const std::string& wanted,
 
 /// About what a fit allocates, bytes.
 uint64_t fitMemoryBound(const FitSettings& settings, const ViewSource& views);
+/// About what looking at views in turn allocates: those that are kept, and one at work. Bytes.
+uint64_t pictureMemoryBound(const ViewSource& views, uint64_t picture_bytes);
 
 /// One fit: what its job works on, and what others ask of it meanwhile.
 class FitSession final : public FitObserver {

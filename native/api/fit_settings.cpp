@@ -211,7 +211,7 @@ void requireSameSettings(const std::string& stored, const std::string& wanted,
                                         "same");
 }
 
-uint64_t fitMemoryBound(const FitSettings& settings, const ViewSource& views) {
+uint64_t pictureMemoryBound(const ViewSource& views, uint64_t picture_bytes) {
   uint64_t all_pixels = 0, most_pixels = 0;
   for (size_t v = 0; v < views.count(); ++v) {
     const Camera& camera = views.camera(v);
@@ -220,10 +220,13 @@ uint64_t fitMemoryBound(const FitSettings& settings, const ViewSource& views) {
     most_pixels = std::max(most_pixels, pixels);
   }
   // A kept picture: colour, alpha and mask in 4 bytes each at worst.
-  const uint64_t kept = std::min(settings.trainer.picture_bytes, all_pixels * 5 * sizeof(float));
+  const uint64_t kept = std::min(picture_bytes, all_pixels * 5 * sizeof(float));
   // At work: one being loaded and one waiting with depth and normals (9 floats), the target (5),
   // what is drawn (4), its derivative (4), what drawing keeps (16) and the loss.
-  const uint64_t working = most_pixels * (2 * 9 + 5 + 4 + 4 + 16 + 4) * sizeof(float);
+  return kept + most_pixels * (2 * 9 + 5 + 4 + 4 + 16 + 4) * sizeof(float);
+}
+
+uint64_t fitMemoryBound(const FitSettings& settings, const ViewSource& views) {
   const int degree =
       settings.is_field ? settings.field_model.sh_degree : settings.explicit_model.sh_degree;
   const uint64_t row = (11 + shCoefficientCount(degree) * 3) * sizeof(float);
@@ -233,7 +236,7 @@ uint64_t fitMemoryBound(const FitSettings& settings, const ViewSource& views) {
   // Parameters, two moments, derivatives and what is drawn; the first three once more as the best
   // and once more while a checkpoint is written, with a quarter of spare room; 150 bytes of
   // drawing.
-  return kept + working + count * (row * 13 + 150);
+  return pictureMemoryBound(views, settings.trainer.picture_bytes) + count * (row * 13 + 150);
 }
 
 }  // namespace stipple::api

@@ -8,7 +8,7 @@
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "data/memory_view_source.h"
+#include "bench/splat_views.h"
 #include "train/explicit_model.h"
 #include "train/trainer.h"
 
@@ -22,34 +22,6 @@ constexpr SplatCase kCases[] = {
 constexpr size_t kViews = 8;
 constexpr uint64_t kSteps = 16;
 constexpr int kRounds = 3;
-
-/// Pictures of the scene, with alpha, whose points are its splats.
-std::shared_ptr<const ViewSource> viewsOf(const SplatCase& c) {
-  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
-  const SplatCloud& cloud = cloudOf(c);
-  const SplatInstance instance{&cloud};
-  for (size_t v = 0; v < kViews; ++v) {
-    Camera camera = cameraOf(c);
-    camera.world_to_camera(0, 3) += 0.01 * static_cast<double>(v);
-    const RenderResult drawn = renderTiled({&instance, 1}, camera, {});
-    ViewPicture picture;
-    picture.width = c.width;
-    picture.height = c.height;
-    for (size_t i = 0; i < drawn.colour.size(); i += 4) {
-      for (size_t k = 0; k < 3; ++k) {
-        picture.colour.push_back(std::clamp(drawn.colour[i + k], 0.0f, 1.0f));
-      }
-      picture.alpha.push_back(drawn.colour[i + 3]);
-    }
-    views->add(camera, std::move(picture));
-  }
-  PointSet points;
-  points.positions = cloud.positions;
-  points.colours.assign(cloud.size() * 3, 0.5f);
-  points.opacities.assign(cloud.size(), 1.0f);
-  views->setPoints(std::move(points));
-  return views;
-}
 
 std::unique_ptr<FitModel> modelOf(const ViewSource& views, const FitViews& split) {
   ExplicitModelOptions options;
@@ -109,7 +81,7 @@ double bareSeconds(const std::shared_ptr<const ViewSource>& views) {
 }
 
 void steps(benchmark::State& state, const SplatCase& c) {
-  const auto views = viewsOf(c);
+  const auto views = viewsOf(c, kViews);
   double ours = 1e300, bare = 1e300;
   for (auto round : state) {
     (void)round;

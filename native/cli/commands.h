@@ -15,6 +15,7 @@ void addRender(CLI::App& app, const Context& context);
 void addVoxelize(CLI::App& app, const Context& context);
 void addMesh(CLI::App& app, const Context& context);
 void addFit(CLI::App& app, const Context& context);
+void addDensify(CLI::App& app, const Context& context);
 void addCompare(CLI::App& app, const Context& context);
 
 /// What a file holds, told by its ending.

@@ -11,8 +11,10 @@
 #include <thread>
 
 #include "cli/commands.h"
+#include "cli/dataset.h"
 #include "cli/formats.h"
 #include "cli/hierarchy.h"
+#include "cli/numbers.h"
 #include "cli/report.h"
 
 namespace stipple::cli {
@@ -21,7 +23,6 @@ namespace {
 
 constexpr int kBarWidth = 24;
 constexpr auto kPollInterval = std::chrono::milliseconds(50);
-constexpr int64_t kMost = int64_t{1} << 40;
 
 struct Arguments {
   std::string dataset, out, model = "explicit", quality = "balanced", background = "random", report;
@@ -45,15 +46,6 @@ uint32_t placeOf(const std::string& name, std::initializer_list<const char*> nam
   throw Failure("'" + name + "' is not known");  // CLI11 has checked it
 }
 
-/// Negative numbers must reach the message as they were typed.
-uint64_t counted(int64_t value, const char* name, int64_t first = 1) {
-  if (value < first || value > kMost) {
-    throw Failure(std::string(name) + " is " + std::to_string(value) + "; " +
-                  std::to_string(first) + " or more is allowed");
-  }
-  return static_cast<uint64_t>(value);
-}
-
 StippleFitOptions optionsOf(const Arguments& arguments, const std::string& checkpoint) {
   StippleFitOptions options;
   stipple_fit_options_init(&options);
@@ -74,36 +66,24 @@ StippleFitOptions optionsOf(const Arguments& arguments, const std::string& check
     options.least_anchors = std::min(options.least_anchors, options.most_anchors);
   }
   if (arguments.gaussians_per_anchor) {
-    options.gaussians_per_anchor = static_cast<uint32_t>(std::min<uint64_t>(
-        counted(*arguments.gaussians_per_anchor, "--gaussians-per-anchor"), UINT32_MAX));
+    options.gaussians_per_anchor =
+        counted32(*arguments.gaussians_per_anchor, "--gaussians-per-anchor");
   }
   if (arguments.iterations) options.iterations = counted(*arguments.iterations, "--iterations");
   if (arguments.sh_degree) {
-    options.sh_degree = static_cast<uint32_t>(
-        std::min<uint64_t>(counted(*arguments.sh_degree, "--sh-degree", 0), UINT32_MAX));
+    options.sh_degree = counted32(*arguments.sh_degree, "--sh-degree", 0);
   }
   if (!arguments.strategy.empty()) options.strategy_utf8 = arguments.strategy.c_str();
   options.background = placeOf(arguments.background, {"black", "white", "random"});
-  options.holdout = static_cast<uint32_t>(
-      std::min<uint64_t>(counted(arguments.holdout, "--holdout", 0), UINT32_MAX));
+  options.holdout = counted32(arguments.holdout, "--holdout", 0);
   options.jitter = !arguments.no_jitter;
   options.density_gradient = !arguments.no_density_gradient;
   options.seed = arguments.seed;
-  options.picture_bytes = static_cast<uint64_t>(std::max(0.0, arguments.picture_mib) * 0x1p20);
+  options.picture_bytes = bytesOfMebibytes(arguments.picture_mib);
   options.checkpoint_path_utf8 = checkpoint.c_str();
   options.checkpoint_interval = counted(arguments.checkpoint_every, "--checkpoint-every", 0);
   options.resume = arguments.resume;
   return options;
-}
-
-Views openViews(const Context& context, const Arguments& arguments) {
-  StippleViewsOpenOptions options;
-  stipple_views_open_options_init(&options);
-  options.downscale = static_cast<uint32_t>(
-      std::min<uint64_t>(counted(arguments.downscale, "--downscale"), UINT32_MAX));
-  options.cache_bytes = 0;  // the fit keeps them
-  return make<Views>(stipple_views_open, context.get(), arguments.dataset.c_str(),
-                     const_cast<const StippleViewsOpenOptions*>(&options));
 }
 
 volatile std::sig_atomic_t g_interrupted = 0;
@@ -245,7 +225,7 @@ void fit(const Context& context, const Arguments& arguments) {
     throw Failure("--resume needs '" + checkpoint + "', which is not there");
   }
   const StippleFitOptions options = optionsOf(arguments, checkpoint);
-  const Views views = openViews(context, arguments);
+  const Views views = openViews(context, arguments.dataset, arguments.downscale);
   const auto job =
       make<Job>(stipple_fit_start, context.get(), const_cast<const StippleViews*>(views.get()),
                 const_cast<const StippleFitOptions*>(&options));

@@ -34,6 +34,7 @@ int run(int argc, char** argv) {
   addVoxelize(app, context);
   addMesh(app, context);
   addFit(app, context);
+  addDensify(app, context);
   addCompare(app, context);
   try {
     app.parse(argc, argv);

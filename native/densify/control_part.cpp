@@ -9,7 +9,30 @@
 
 namespace stipple {
 
+namespace {
+
+/// A standalone event stands where an event of a whole fit would.
+ControlMoment standaloneMoment(const FitMoment& moment, const EventSchedule& schedule) {
+  const StandaloneEvent& given = *moment.standalone;
+  ControlMoment at;
+  static_cast<FitMoment&>(at) = moment;
+  at.iterations = FitMoment{}.iterations;
+  at.iteration =
+      schedule.first + (schedule.last - schedule.first) * (given.index + 1) / (given.count + 1);
+  at.is_event = given.is_now;
+  at.is_learning = true;
+  at.takes_steps = false;
+  at.progress = static_cast<double>(given.index + 1) / static_cast<double>(given.count);
+  at.event = given.index;
+  at.event_count = given.count;
+  at.until_event = given.is_now ? 0 : given.looks_left;
+  return at;
+}
+
+}  // namespace
+
 ControlMoment controlMoment(const FitMoment& moment, const EventSchedule& schedule) {
+  if (moment.standalone) return standaloneMoment(moment, schedule);
   ControlMoment at;
   static_cast<FitMoment&>(at) = moment;
   const uint64_t first = scaleSchedule(schedule.first, moment.iterations);

@@ -28,6 +28,7 @@ struct EventSchedule {
 struct ControlMoment : FitMoment {
   bool is_event = false;     ///< splats multiply and go in this iteration
   bool is_learning = false;  ///< events are still to come: statistics are worth gathering
+  bool takes_steps = true;   ///< else what is lowered now does not come back
   double progress = 0;       ///< from the first event's window to its end, 0..1
   uint64_t event = 0;        ///< number of this event or the next one, from 0
   uint64_t event_count = 0;  ///< of the whole fit
@@ -41,6 +42,7 @@ struct ControlMoment : FitMoment {
   }
 };
 
+/// Standalone events are spread over the window of the schedule; the last one has progress 1.
 ControlMoment controlMoment(const FitMoment& moment, const EventSchedule& schedule);
 
 /// What a part of density control decides. No decision has two owners.

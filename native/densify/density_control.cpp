@@ -136,8 +136,9 @@ class DensityControl final : public Strategy {
       }
       removeSplats(moment, store.splats, goes, edit);
     }
-    if (ControlPart* part = owner(ControlRole::kOpacity)) {
-      part->lowerOpacities(moment, store.splats, edit);
+    ControlPart* lowering = owner(ControlRole::kOpacity);
+    if (lowering && moment.takes_steps) {
+      lowering->lowerOpacities(moment, store.splats, edit);
     }
     if (!moment.is_event && edit.writes.empty() && !edit.keep && edit.append.size() == 0) return {};
     for (const auto& part : parts_) part->edited(moment, edit, count);
@@ -199,7 +200,7 @@ class DensityControl final : public Strategy {
 
   bool removesNow(const ControlMoment& moment) const {
     const ControlPart* removal = owner(ControlRole::kRemoval);
-    const ControlPart* recovery = owner(ControlRole::kRecovery);
+    const ControlPart* recovery = moment.takes_steps ? owner(ControlRole::kRecovery) : nullptr;
     return (removal && removal->removesAt(moment)) || (recovery && recovery->removesAt(moment));
   }
 
@@ -336,6 +337,7 @@ class DensityControl final : public Strategy {
                     std::vector<uint8_t>& goes, SplatEdit& edit) {
     std::vector<uint8_t> appended_goes(edit.append.size(), 0);
     for (const ControlRole role : {ControlRole::kRemoval, ControlRole::kRecovery}) {
+      if (role == ControlRole::kRecovery && !moment.takes_steps) continue;
       ControlPart* part = owner(role);
       if (part && part->removesAt(moment)) {
         part->remove(moment, splats, edit.append, goes, appended_goes);

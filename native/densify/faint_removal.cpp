@@ -37,7 +37,9 @@ class FaintRemoval final : public ControlPart {
   void judge(const ControlMoment& moment, const RawSplats& splats, std::span<uint8_t> goes) const {
     const double least = isEarly(moment) ? options_.early_opacity : options_.least_opacity;
     const float least_logit = rawOpacity(static_cast<float>(least));
-    const bool judges_size = options_.largest_share > 0 && moment.isAfter(options_.size_after);
+    // Of a finished cloud huge splats are its sky: without steps nothing takes their place.
+    const bool judges_size =
+        options_.largest_share > 0 && moment.takes_steps && moment.isAfter(options_.size_after);
     const float huge =
         judges_size ? logShareOfExtent(moment, options_.largest_share) : kLargestLogScale;
     for (size_t i = 0; i < goes.size(); ++i) {

@@ -8,7 +8,8 @@ namespace stipple {
 
 struct FaintRemovalOptions {
   double least_opacity = 0.005;  ///< fainter splats go
-  /// Of the cameras' extent: larger splats go, once opacities have been reset; 0: none do.
+  /// Of the cameras' extent: larger splats go, once opacities have been reset; 0: none do. Nor do
+  /// those of a cloud that takes no steps.
   double largest_share = 0.1;
   uint64_t size_after = 3000;  ///< iterations of 30,000 from which on size is judged
   /// Iterations of 30,000 from which on nothing goes any more; 0: until the last event.

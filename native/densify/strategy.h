@@ -26,6 +26,14 @@ struct TrainingView {
   std::span<const float> target;  ///< [H,W,3] over the background of the iteration
 };
 
+/// Density control of a cloud that is there, without steps (train/densify_cloud.h).
+struct StandaloneEvent {
+  uint64_t index = 0;
+  uint64_t count = 1;
+  bool is_now = false;      ///< else its statistics are being gathered
+  uint64_t looks_left = 0;  ///< at views, before it
+};
+
 /// Where a fit stands.
 struct FitMoment {
   uint64_t iteration = 1;       ///< 1 for the first
@@ -35,6 +43,7 @@ struct FitMoment {
   uint64_t max_splats = 0;      ///< hard cap of the count; 0: none
   double position_rate = 0;     ///< of Adam in this iteration, metres
   const TrainingView* view = nullptr;  ///< of this iteration; nullptr where none is under way
+  std::optional<StandaloneEvent> standalone = {};  ///< there is no fit
 };
 
 /// An iteration of a published schedule of 30,000 in a fit of another length: every window,

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "densify/strategies.h"
+#include "train/backend_control.h"
 #include "train/render_backend.h"
 #include "train/splat_tables.h"
 #include "train/start_splats.h"
@@ -57,9 +58,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
       : strategy_(std::move(strategy)), options_(options), backend_(makeCpuBackend()) {
     backend_->upload(start);
     if (begins) prepare();
-    const std::vector<ExtraParameter> extras = strategy_->parameters();
-    if (!extras.empty()) addExtras(extras);
-    backend_->parameterise(strategy_->parameterisation());
+    step_options_.extra_rates = beginControl(*backend_, *strategy_);
     strategy_->adjustRates(rates_);
     loss_options_.ssim_share = options.ssim_share;
   }
@@ -92,7 +91,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     report.ssim = value.ssim;
     report.seconds.backward = watch.lap();
 
-    if (request.any()) observe(view);
+    if (request.any()) observeView(*backend_, *strategy_, moment_, view);
     report.seconds.edit = watch.lap();
     if (strategy_->stepGate(moment_)) {
       setRates();
@@ -102,9 +101,12 @@ class ExplicitModel final : public FitModel, private Regulariser {
     }
     report.seconds.optimiser = watch.lap();
 
-    apply(strategy_->afterStep(moment_, store()));
+    const auto apply = [this](const std::optional<SplatEdit>& edit) {
+      applyControl(*backend_, *strategy_, moment_, edit);
+    };
+    apply(strategy_->afterStep(moment_, storeOf(*backend_)));
     if (views && strategy_->wantsSweep(moment_)) strategy_->sweep(moment_, *views);
-    apply(strategy_->edit(moment_, store()));
+    apply(strategy_->edit(moment_, storeOf(*backend_)));
     report.seconds.edit += watch.lap();
     return report;
   }
@@ -147,18 +149,6 @@ class ExplicitModel final : public FitModel, private Regulariser {
     backend_->restore(state);
   }
 
-  void addExtras(const std::vector<ExtraParameter>& extras) {
-    TrainingState state = backend_->state();
-    const std::vector<std::vector<float>> values = strategy_->initialExtras(state.splats);
-    for (const ExtraParameter& extra : extras) {
-      state.splats.extra_lengths.push_back(extra.row_length);
-      step_options_.extra_rates.push_back(extra.learning_rate);
-    }
-    state.splats.extras = values;
-    state.first_moments = state.second_moments = zerosLike(state.splats);
-    backend_->restore(state);
-  }
-
   RenderOptions renderOptions(const StepView& view) const {
     RenderOptions options;
     options.with_depth = false;
@@ -194,33 +184,6 @@ class ExplicitModel final : public FitModel, private Regulariser {
   /// The strategy's part of the loss, called by the backend.
   double evaluate(const SplatCloud& cloud, const CloudGradient& gradient) override {
     return strategy_->loss(moment_, cloud, gradient);
-  }
-
-  void observe(const StepView& view) {
-    ViewStatistics statistics;
-    statistics.view = view.index;
-    statistics.width = view.camera->width;
-    statistics.height = view.camera->height;
-    statistics.camera = view.camera;
-    backend_->lendStatistics(statistics);
-    strategy_->observe(moment_, statistics);
-  }
-
-  SplatStore store() const {
-    const TrainingState& state = backend_->state();
-    return {state.splats, state.first_moments, state.second_moments};
-  }
-
-  void apply(const std::optional<SplatEdit>& edit) {
-    if (!edit) return;
-    const size_t before = backend_->splatCount();
-    const size_t after = edit->countAfter(before);
-    if (moment_.max_splats > 0 && after > std::max<size_t>(before, moment_.max_splats)) {
-      fail(ErrorCode::kInternal, std::string("strategy ") + strategy_->name() + " makes " +
-                                     std::to_string(after) + " splats; at most " +
-                                     std::to_string(moment_.max_splats) + " are allowed");
-    }
-    backend_->edit(*edit);
   }
 
   std::unique_ptr<Strategy> strategy_;  ///< outlives the backend, which draws by its activations

@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
 
 namespace stipple {
 
-FitViewEvaluator::FitViewEvaluator(FitModel& model, PictureStore& pictures,
+FitViewEvaluator::FitViewEvaluator(std::function<SplatCloud()> splats, PictureStore& pictures,
                                    const std::vector<size_t>& training, const double background[3],
                                    double ssim_share)
-    : model_(model), pictures_(pictures), training_(training) {
+    : splats_(std::move(splats)), pictures_(pictures), training_(training) {
   std::copy_n(background, 3, background_);
   loss_options_.ssim_share = ssim_share;
   workspace_.keepForBackward(true);
@@ -26,7 +27,7 @@ const Camera& FitViewEvaluator::camera(size_t view) const {
 }
 
 const SplatCloud& FitViewEvaluator::splats() {
-  if (!cloud_) cloud_ = model_.splats(0);
+  if (!cloud_) cloud_ = splats_();
   return *cloud_;
 }
 

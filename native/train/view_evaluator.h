@@ -2,24 +2,26 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "densify/strategy.h"
 #include "splat/render_backward.h"
-#include "train/fit_model.h"
 #include "train/image_loss.h"
 #include "train/picture_store.h"
 
 namespace stipple {
 
 /// Draws the training views of a fit for strategies that look around between steps, with the splats
-/// that the model has when forgetSplats() was called last. Views are numbered as StepView::index.
+/// that there are when forgetSplats() was called last. Views are numbered as StepView::index.
 class FitViewEvaluator final : public ViewEvaluator {
  public:
-  /// In: references outlive this; background [3] behind transparent views.
-  FitViewEvaluator(FitModel& model, PictureStore& pictures, const std::vector<size_t>& training,
-                   const double background[3], double ssim_share);
+  /// In: splats: gives them as they are now; references outlive this; background [3] behind
+  /// transparent views.
+  FitViewEvaluator(std::function<SplatCloud()> splats, PictureStore& pictures,
+                   const std::vector<size_t>& training, const double background[3],
+                   double ssim_share);
 
   /// Call where the splats may have changed.
   void forgetSplats() { cloud_.reset(); }
@@ -35,7 +37,7 @@ class FitViewEvaluator final : public ViewEvaluator {
   void load(size_t view);
   void draw(size_t view);
 
-  FitModel& model_;
+  std::function<SplatCloud()> splats_;
   PictureStore& pictures_;
   const std::vector<size_t>& training_;
   double background_[3];

@@ -167,6 +167,8 @@ FUNCTIONS = {
     'stipple_fit_report_save': (_status, [_handle, _path]),
     'stipple_fit_report_draw': (_status, [_handle, c_double, c_uint64, _floats, POINTER(c_uint32),
                                          POINTER(c_uint32)]),
+    'stipple_densify_options_init': (None, [_to(s.StippleDensifyOptions)]),
+    'stipple_densify_start': (_status, [_handle, _handle, _handle, _to(s.StippleDensifyOptions), _out_handle]),
     # volumes
     'stipple_voxelize_options_init': (None, [_to(s.StippleVoxelizeOptions)]),
     'stipple_voxelize_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleVoxelizeOptions),

@@ -450,6 +450,12 @@ class StippleFitFigures(_Sized):
                 ('preview_iteration', c_uint64), ('stage', c_char * 64)]
 
 
+class StippleDensifyOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('event_count', c_uint32), ('strategy_utf8', c_char_p),
+                ('max_splats', c_uint64), ('seed', c_uint64), ('picture_bytes', c_uint64), ('holdout', c_uint32),
+                ('reserved', c_uint32)]
+
+
 class StippleVoxelizeOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('resolution', c_uint32), ('voxel_size', c_double),
                 ('low_pass', c_double), ('cut_off_sigma', c_double), ('min_density', c_double)]

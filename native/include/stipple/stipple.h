@@ -1185,6 +1185,30 @@ StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_ut
 StippleStatus stipple_fit_report_draw(const StippleJob* job, double scale, uint64_t capacity, float* pixels,
                                       uint32_t* width, uint32_t* height);
 
+typedef struct StippleDensifyOptions {
+  uint32_t struct_size;
+  uint32_t event_count;        /* 1..1000, default 1: how often splats multiply and go */
+  const char* strategy_utf8;   /* how; NULL: "adaptive" */
+  uint64_t max_splats;         /* hard cap; 0, the default: twice as many as there are */
+  uint64_t seed;
+  uint64_t picture_bytes;      /* of pictures kept in memory, default 1 GiB; others are loaded when wanted */
+  uint32_t holdout;            /* every so many-th view by name is left out, default 0: none. A split that the data
+                                  set names wins where it is not 0 */
+  uint32_t reserved;
+} StippleDensifyOptions;
+void stipple_densify_options_init(StippleDensifyOptions* options);
+
+/* Density control of a finished cloud, as a job (stipple_job_cloud): its splats are copied, split and removed as a
+ * strategy says, with what views tell of them; nothing takes a step and no opacity is reset. Splats that stay come
+ * first, in their order and bit for bit, then new ones. A fit of the result moves them to their places.
+ * In: views: of the cloud's colour space and frame, with pictures; transparent ones stand before black.
+ * Errors of the start: INVALID_ARGUMENT for an empty cloud, views without pictures or of another colour space, a
+ * strategy that is not there (says which are), options out of range; MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for
+ * views that show nothing; those of reading pictures. Threads and determinism: the same bits for any number of threads. Cost: for
+ * each event one drawing and one backward pass per view. docs/methods/densification.md. */
+StippleStatus stipple_densify_start(StippleContext* context, const StippleCloud* cloud, const StippleViews* views,
+                                    const StippleDensifyOptions* options, StippleJob** job);
+
 /* ---- volumes ----------------------------------------------------------------------------------- */
 
 typedef struct StippleVoxelizeOptions {

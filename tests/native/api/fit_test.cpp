@@ -11,89 +11,24 @@
 #include <thread>
 #include <vector>
 
-#include "fixtures.h"
+#include "fit_views.h"
 
 namespace stipple::test {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kViewCount = 12;
-
-/// Pictures of three splats from a ring of cameras, and where those splats are.
-class FitTest : public ApiTest {
+/// A fit of them.
+class FitTest : public FitViewsTest {
  protected:
   void SetUp() override {
-    ApiTest::SetUp();
-    std::string pattern = (fs::temp_directory_path() / "stipple_fit_XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-    STIPPLE_ASSERT_OK(stipple_views_create(context_, STIPPLE_COLOUR_DISPLAY, &views_));
-    addViews(views_, 1.0f);
+    FitViewsTest::SetUp();
     stipple_fit_options_init(&options_);
     options_.iterations = 60;
     options_.max_splats = 200;
     options_.sh_degree = 0;
     options_.measure_interval = 10;
   }
-  void TearDown() override {
-    stipple_views_free(views_);
-    fs::remove_all(folder_);
-    ApiTest::TearDown();
-  }
-
-  StippleCloud* scene() {
-    const float positions[9] = {-0.3f, 0, 0, 0.3f, 0.1f, 0, 0, -0.2f, 0.3f};
-    const float rotations[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
-    const float scales[9] = {0.15f, 0.15f, 0.15f, 0.2f, 0.1f, 0.1f, 0.1f, 0.1f, 0.2f};
-    const float opacities[3] = {0.9f, 0.8f, 0.95f};
-    const float sh[9] = {1.2f, -1, -1, -1, 1.2f, -1, -1, -1, 1.5f};
-    auto arrays = sized<StippleCloudArrays>();
-    arrays.count = 3;
-    arrays.positions = positions;
-    arrays.rotations = rotations;
-    arrays.scales = scales;
-    arrays.opacities = opacities;
-    arrays.sh = sh;
-    StippleCloud* cloud = nullptr;
-    STIPPLE_EXPECT_OK(stipple_cloud_create(context_, &arrays, &cloud));
-    return cloud;
-  }
-
-  /// In: brightness, a factor of all colours; 0 makes black pictures.
-  void addViews(StippleViews* views, float brightness) {
-    StippleCloud* cloud = scene();
-    StippleRenderOptions render_options;
-    stipple_render_options_init(&render_options);
-    render_options.output_colour = STIPPLE_OUTPUT_COMPOSITED;
-    for (int v = 0; v < kViewCount; ++v) {
-      const double angle = 2 * 3.141592653589793 * v / kViewCount;
-      StippleCamera camera = frontCamera();
-      const double c = std::cos(angle), s = std::sin(angle);
-      // The front camera, with the world turned about y.
-      const double matrix[16] = {c, 0, s, 0, 0, -1, 0, 0, s, 0, -c, 3, 0, 0, 0, 1};
-      std::copy(matrix, matrix + 16, camera.world_to_camera);
-      std::vector<float> rgba = render(context_, cloud, render_options, camera);
-      for (size_t i = 0; i < rgba.size(); ++i) {
-        if (brightness == 0) rgba[i] = i % 4 == 3 ? 1.0f : 0.0f;
-      }
-      auto picture = sized<StippleViewPicture>();
-      picture.transfer = STIPPLE_TRANSFER_SRGB;
-      picture.rgba = rgba.data();
-      const std::string name = std::to_string(100 + v);
-      STIPPLE_ASSERT_OK(stipple_views_add(views, &camera, &picture, name.c_str()));
-    }
-    stipple_cloud_free(cloud);
-    const float positions[9] = {-0.3f, 0, 0, 0.3f, 0.1f, 0, 0, -0.2f, 0.3f};
-    const float colours[9] = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
-    auto points = sized<StippleViewPoints>();
-    points.count = 3;
-    points.positions = positions;
-    points.colours = colours;
-    STIPPLE_ASSERT_OK(stipple_views_set_points(views, &points));
-  }
-
-  std::string path(const char* name) const { return (folder_ / name).string(); }
 
   StippleJob* start() {
     StippleJob* job = nullptr;
@@ -108,23 +43,10 @@ class FitTest : public ApiTest {
   }
 
   /// Every number of the result.
-  std::vector<float> result(const StippleJob* job) {
+  static std::vector<float> result(const StippleJob* job) {
     StippleCloud* cloud = nullptr;
     STIPPLE_EXPECT_OK(stipple_fit_cloud(job, 0, &cloud));
-    auto info = sized<StippleCloudInfo>();
-    STIPPLE_EXPECT_OK(stipple_cloud_info(cloud, &info));
-    const uint64_t n = info.count;
-    std::vector<float> all(n * (3 + 4 + 3 + 1 + 3));
-    auto buffers = sized<StippleCloudBuffers>();
-    buffers.capacity = n;
-    buffers.positions = all.data();
-    buffers.rotations = buffers.positions + 3 * n;
-    buffers.scales = buffers.rotations + 4 * n;
-    buffers.opacities = buffers.scales + 3 * n;
-    buffers.sh = buffers.opacities + n;
-    STIPPLE_EXPECT_OK(stipple_cloud_read(cloud, &buffers));
-    stipple_cloud_free(cloud);
-    return all;
+    return taken(cloud);
   }
 
   static void waitForIteration(const StippleJob* job, uint64_t iteration) {
@@ -133,14 +55,6 @@ class FitTest : public ApiTest {
     }
   }
 
-  static void expectRefused(StippleStatus seen, StippleStatus wanted, const char* text) {
-    EXPECT_EQ(seen, wanted);
-    EXPECT_NE(std::string(stipple_last_error_message()).find(text), std::string::npos)
-        << stipple_last_error_message();
-  }
-
-  fs::path folder_;
-  StippleViews* views_ = nullptr;
   StippleFitOptions options_;
 };
 

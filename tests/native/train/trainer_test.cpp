@@ -368,7 +368,7 @@ TEST(FitViewEvaluator, DrawsAndJudgesTrainingViews) {
   ColourModel model;
   const double white[3] = {1, 1, 1};
   const std::vector<size_t> training = {2, 0};
-  FitViewEvaluator evaluator(model, pictures, training, white, 0.2);
+  FitViewEvaluator evaluator([&] { return model.splats(0); }, pictures, training, white, 0.2);
   EXPECT_EQ(evaluator.viewCount(), 2u);
   EXPECT_EQ(&evaluator.camera(0), &views->camera(2));
   // Half of 0.27 and half of white; a grey splat that lets 0.01 of white through.

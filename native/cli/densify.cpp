@@ -1,0 +1,89 @@
+#include <memory>
+#include <optional>
+
+#include "cli/commands.h"
+#include "cli/dataset.h"
+#include "cli/formats.h"
+#include "cli/numbers.h"
+#include "cli/report.h"
+
+namespace stipple::cli {
+
+namespace {
+
+struct Arguments {
+  std::string in, out, dataset, strategy = "adaptive";
+  std::optional<int64_t> gaussians;
+  int64_t events = 1;
+  int64_t downscale = 1;
+  int64_t holdout = 0;
+  uint64_t seed = 0;
+  double picture_mib = 1024;
+};
+
+uint64_t countOf(const Cloud& cloud) {
+  auto info = sized<StippleCloudInfo>();
+  check(stipple_cloud_info(cloud.get(), &info));
+  return info.count;
+}
+
+void densify(const Context& context, const Arguments& arguments) {
+  if (!hasSplatEnding(arguments.out)) {
+    throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
+                  " is expected");
+  }
+  StippleDensifyOptions options;
+  stipple_densify_options_init(&options);
+  options.strategy_utf8 = arguments.strategy.c_str();
+  if (arguments.gaussians) options.max_splats = counted(*arguments.gaussians, "--gaussians");
+  options.event_count = counted32(arguments.events, "--events");
+  options.holdout = counted32(arguments.holdout, "--holdout", 0);
+  options.seed = arguments.seed;
+  options.picture_bytes = bytesOfMebibytes(arguments.picture_mib);
+  const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
+  const Views views = openViews(context, arguments.dataset, arguments.downscale);
+  const auto job =
+      make<Job>(stipple_densify_start, context.get(), const_cast<const StippleCloud*>(cloud.get()),
+                const_cast<const StippleViews*>(views.get()),
+                const_cast<const StippleDensifyOptions*>(&options));
+  finish(job);
+  const auto made = make<Cloud>(stipple_job_cloud, job.get());
+  check(stipple_cloud_save(made.get(), arguments.out.c_str(), nullptr));
+  Report report;
+  report.add("gaussians_before", countOf(cloud));
+  report.add("gaussians", countOf(made));
+  report.print(false);
+}
+
+}  // namespace
+
+void addDensify(CLI::App& app, const Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  Arguments& to = *arguments;
+  CLI::App* command = app.add_subcommand(
+      "densify", "Splits, copies and removes splats where pictures ask for it; nothing is trained");
+  command->add_option("in", to.in, "Splats")->required();
+  command->add_option("out", to.out, "Splats (.ply and others)")->required();
+  command
+      ->add_option("--dataset", to.dataset,
+                   "COLMAP folder, or transforms.json or its folder, with the pictures")
+      ->required();
+  command->add_option("--strategy", to.strategy, "How splats are added and removed")
+      ->capture_default_str();
+  command->add_option("--gaussians", to.gaussians,
+                      "The most splats there may be; default: twice as many as there are");
+  command->add_option("--events", to.events, "How often splats multiply and go")
+      ->capture_default_str();
+  command->add_option("--downscale", to.downscale, "Pictures are made smaller by this factor")
+      ->capture_default_str();
+  command->add_option("--holdout", to.holdout, "Every so many-th picture is left out; 0: none")
+      ->capture_default_str();
+  command
+      ->add_option("--picture-memory", to.picture_mib,
+                   "MiB of pictures kept; others are read again whenever they are wanted")
+      ->capture_default_str();
+  command->add_option("--seed", to.seed)->capture_default_str();
+  command->callback([arguments, &context] { densify(context, *arguments); });
+}
+
+}  // namespace stipple::cli
