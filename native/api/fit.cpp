@@ -116,8 +116,10 @@ StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* vie
     require(context, "context");
     require(views, "views");
     require(job, "job");
-    FitSettings settings = fitSettings(completedOptions(options));
+    const StippleFitOptions given = completedOptions(options);
+    FitSettings settings = fitSettings(given);
     const std::shared_ptr<const ViewSource> source = sourceOf(*views);
+    holdToMemory(given.max_bytes, *source, settings);
     context->state->requireMemory(fitMemoryBound(settings, *source), "this fit");
     FitViews split = splitOf(*views, *source, settings.holdout);
     auto session = std::make_shared<FitSession>(source, std::move(split), std::move(settings));
@@ -134,9 +136,11 @@ StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* vie
 StippleStatus stipple_fit_memory_bound(const StippleViews* views, const StippleFitOptions* options,
                                        uint64_t* bytes) {
   return guarded([&] {
-    require(views, "views");
-    require(bytes, "bytes") =
-        fitMemoryBound(fitSettings(completedOptions(options)), *sourceOf(*views));
+    const std::shared_ptr<const ViewSource> source = sourceOf(require(views, "views"));
+    const StippleFitOptions given = completedOptions(options);
+    FitSettings settings = fitSettings(given);
+    holdToMemory(given.max_bytes, *source, settings);
+    require(bytes, "bytes") = fitMemoryBound(settings, *source);
   });
 }
 

@@ -43,6 +43,10 @@ std::string settingsText(const FitSettings& settings, const ViewSource& views);
 void requireSameSettings(const std::string& stored, const std::string& wanted,
                          const std::string& path);
 
+/// Lowers caps until the fit stays below about this many bytes; 0: any number. Errors: kMemoryLimit
+/// where one splat, or the field that is asked for, needs more.
+void holdToMemory(uint64_t max_bytes, const ViewSource& views, FitSettings& settings);
+
 /// About what a fit allocates, bytes.
 uint64_t fitMemoryBound(const FitSettings& settings, const ViewSource& views);
 /// About what looking at views in turn allocates: those that are kept, and one at work. Bytes.

@@ -7,6 +7,7 @@
 #include "api/fit.h"
 #include "api/guard.h"
 #include "base/random.h"
+#include "densify/strategies.h"
 
 namespace stipple::api {
 
@@ -100,6 +101,17 @@ Pairs settingsPairs(const FitSettings& settings, const ViewSource& views) {
   return pairs;
 }
 
+/// Fields have few.
+void requireFieldStrategy(const std::string& name) {
+  std::string known;
+  for (const StrategyEntry& entry : fieldStrategyEntries()) {
+    if (name == entry.name) return;
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  fail(ErrorCode::kInvalidArgument,
+       "strategy is '" + name + "', which is not one of fields; there is " + known);
+}
+
 /// The names and values of a flat JSON object as settingsText writes it.
 Pairs pairsOf(const std::string& text) {
   Pairs pairs;
@@ -165,6 +177,10 @@ FitSettings fitSettings(const StippleFitOptions& given) {
     field.antialias = antialias;
     field.ssim_share = given.ssim_share;
     field.density_gradient = given.density_gradient != 0;
+    if (given.strategy_utf8) {
+      requireFieldStrategy(given.strategy_utf8);
+      field.density_gradient = true;
+    }
     field.jitter = given.jitter != 0;
     field.seed = given.seed;
     return settings;
@@ -229,14 +245,36 @@ uint64_t pictureMemoryBound(const ViewSource& views, uint64_t picture_bytes) {
 uint64_t fitMemoryBound(const FitSettings& settings, const ViewSource& views) {
   const int degree =
       settings.is_field ? settings.field_model.sh_degree : settings.explicit_model.sh_degree;
-  const uint64_t row = (11 + shCoefficientCount(degree) * 3) * sizeof(float);
   const uint64_t count = settings.is_field ? settings.field_model.most_anchors *
                                                  settings.field_model.gaussians_per_anchor
                                            : settings.explicit_model.max_splats;
-  // Parameters, two moments, derivatives and what is drawn; the first three once more as the best
-  // and once more while a checkpoint is written, with a quarter of spare room; 150 bytes of
-  // drawing.
-  return pictureMemoryBound(views, settings.trainer.picture_bytes) + count * (row * 13 + 150);
+  return pictureMemoryBound(views, settings.trainer.picture_bytes) + count * bytesPerSplat(degree);
+}
+
+void holdToMemory(uint64_t max_bytes, const ViewSource& views, FitSettings& settings) {
+  if (max_bytes == 0) return;
+  uint64_t& kept = settings.trainer.picture_bytes;
+  kept = std::min(kept, max_bytes / 2);
+  const uint64_t pictures = pictureMemoryBound(views, kept);
+  const uint64_t room = max_bytes > pictures ? max_bytes - pictures : 0;
+  const auto refuse = [&](uint64_t needed, const std::string& what) {
+    fail(ErrorCode::kMemoryLimit, "options->max_bytes is " + std::to_string(max_bytes) + "; " +
+                                      what + " and the pictures at work take about " +
+                                      std::to_string(needed));
+  };
+  if (settings.is_field) {
+    const uint64_t needed = fitMemoryBound(settings, views);
+    if (needed > max_bytes) {
+      refuse(needed, std::to_string(settings.field_model.most_anchors) + " anchors");
+    }
+    return;
+  }
+  ExplicitModelOptions& model = settings.explicit_model;
+  const uint64_t each = bytesPerSplat(model.sh_degree);
+  if (room < each) refuse(pictures + each, "one splat");
+  model.max_splats = std::min(model.max_splats, room / each);
+  model.start_splats = std::min(model.start_splats, model.max_splats);
+  settings.trainer.max_splats = model.max_splats;
 }
 
 }  // namespace stipple::api

@@ -79,7 +79,8 @@ class SameViews {
       training_.push_back(v);
     }
     pictures_ = std::make_unique<PictureStore>(source, uint64_t{1} << 28);
-    evaluator_ = std::make_unique<FitViewEvaluator>(model, *pictures_, training_, kBlack, 0.2);
+    evaluator_ = std::make_unique<FitViewEvaluator>([&model] { return model.splats(0); },
+                                                    *pictures_, training_, kBlack, 0.2);
   }
   FitViewEvaluator& evaluator() { return *evaluator_; }
 

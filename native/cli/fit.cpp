@@ -33,6 +33,7 @@ struct Arguments {
   int64_t checkpoint_every = 0;
   uint64_t seed = 0;
   double picture_mib = 1024;
+  double memory_mib = 0;
   bool resume = false, no_jitter = false, no_density_gradient = false;
 };
 
@@ -57,8 +58,11 @@ StippleFitOptions optionsOf(const Arguments& arguments, const std::string& check
         "--anchors and --gaussians-per-anchor belong to --model field; explicit splats take "
         "--gaussians");
   }
-  if (model == STIPPLE_FIT_FIELD && (arguments.gaussians || !arguments.strategy.empty())) {
-    throw Failure("--gaussians and --strategy belong to --model explicit; a field takes --anchors");
+  if (model == STIPPLE_FIT_FIELD && arguments.gaussians) {
+    throw Failure("--gaussians belongs to --model explicit; a field takes --anchors");
+  }
+  if (arguments.no_density_gradient && !arguments.strategy.empty()) {
+    throw Failure("--no-density-gradient and --strategy say both how a field's density is learned");
   }
   if (arguments.gaussians) options.max_splats = counted(*arguments.gaussians, "--gaussians");
   if (arguments.anchors) {
@@ -80,10 +84,30 @@ StippleFitOptions optionsOf(const Arguments& arguments, const std::string& check
   options.density_gradient = !arguments.no_density_gradient;
   options.seed = arguments.seed;
   options.picture_bytes = bytesOfMebibytes(arguments.picture_mib);
+  options.max_bytes = bytesOfMebibytes(arguments.memory_mib);
   options.checkpoint_path_utf8 = checkpoint.c_str();
   options.checkpoint_interval = counted(arguments.checkpoint_every, "--checkpoint-every", 0);
   options.resume = arguments.resume;
   return options;
+}
+
+/// "name   summary" of all strategies, then of the parts.
+void printStrategies() {
+  const auto print = [](const char* title, auto count, auto info) {
+    std::printf("%s\n", title);
+    uint64_t entries = 0;
+    check(count(&entries));
+    for (uint64_t i = 0; i < entries; ++i) {
+      auto entry = sized<StippleStrategyInfo>();
+      check(info(i, &entry));
+      const bool is_field = entry.model == STIPPLE_FIT_FIELD;
+      std::printf("  %-24s %s%s\n", entry.name_utf8, entry.summary_utf8,
+                  is_field ? " (--model field)" : "");
+    }
+  };
+  print("strategies", stipple_strategy_count, stipple_strategy_info);
+  print("parts, after a strategy and +", stipple_strategy_part_count, stipple_strategy_part_info);
+  throw CLI::Success();
 }
 
 volatile std::sig_atomic_t g_interrupted = 0;
@@ -265,7 +289,10 @@ void addFit(CLI::App& app, const Context& context) {
   command->add_option("--model", to.model, "explicit, or field (a learned density)")
       ->check(CLI::IsMember({"explicit", "field"}))
       ->capture_default_str();
-  command->add_option("--strategy", to.strategy, "Explicit: how splats are added and removed");
+  command->add_option(
+      "--strategy", to.strategy,
+      "How splats are added and removed: name(setting=number)+part; see --strategies");
+  command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts");
   command->add_option("--quality", to.quality, "Sets iterations and counts")
       ->check(CLI::IsMember({"fast", "balanced", "fine"}))
       ->capture_default_str();
@@ -290,6 +317,10 @@ void addFit(CLI::App& app, const Context& context) {
       ->add_option("--picture-memory", to.picture_mib,
                    "MiB of pictures kept; others are read again whenever they are wanted")
       ->capture_default_str();
+  command
+      ->add_option("--memory", to.memory_mib,
+                   "MiB of the whole fit, about: fewer splats and pictures are kept; 0: any number")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--report", to.report,
                       "JSON of the whole fit; curves go beside it with the ending .svg");
   command

@@ -21,6 +21,9 @@ class GrowthControl final : public ControlPart {
 
   uint64_t limit(const ControlMoment& moment, uint64_t) override {
     const uint64_t whole = most(moment);
+    if (!moment.takes_steps) {
+      return static_cast<uint64_t>(static_cast<double>(whole) * std::sqrt(moment.progress));
+    }
     const uint64_t first = scaleSchedule(options_.first, moment.iterations);
     const uint64_t last = scaleSchedule(options_.last, moment.iterations);
     if (moment.iteration >= last) return whole;

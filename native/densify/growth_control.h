@@ -17,7 +17,8 @@ struct GrowthControlOptions {
 };
 
 /// How many splats there may be grows as the square root of time: few while their places are still
-/// wrong, so that those that come are worth having. Clouds that begin with more wait. Owns kGrowth.
+/// wrong, so that those that come are worth having. Clouds that begin with more wait. Without
+/// steps, events count instead of iterations. Owns kGrowth.
 std::unique_ptr<ControlPart> makeGrowthControl(const GrowthControlOptions& options = {});
 
 }  // namespace stipple

@@ -244,8 +244,22 @@ const std::vector<std::string>& strategyNames() {
   return names;
 }
 
+const std::vector<StrategyEntry>& fieldStrategyEntries() {
+  static const std::vector<StrategyEntry> entries = {
+      {"learned_density",
+       "Moves a density towards the places where splats bring pictures nearest"}};
+  return entries;
+}
+
 std::unique_ptr<Strategy> makeStrategy(const std::string& text) {
   const std::vector<Term> terms = parse(text);
+  for (const StrategyEntry& entry : fieldStrategyEntries()) {
+    if (terms[0].name != entry.name) continue;
+    fail(ErrorCode::kInvalidArgument, std::string(entry.name) +
+                                          " moves the density of a field, which explicit splats "
+                                          "do not have; there is " +
+                                          listOf(strategyEntries()));
+  }
   const auto maker =
       std::find_if(std::begin(kStrategies), std::end(kStrategies),
                    [&](const auto& each) { return terms[0].name == each.entry.name; });

@@ -68,13 +68,21 @@ class CloudDensifier {
   }
 
   void look(size_t index) {
-    const StatisticRequest request = strategy_->requests(moment_);
-    if (!request.any()) return;
     StepView view;
     view.index = index;
     view.camera = &pictures_.views().camera(shown_[index]);
     pictures_.load(shown_[index], kBlack, target_);
     if (index + 1 < shown_.size()) pictures_.prefetch(shown_[index + 1]);
+    const TrainingView looked_at{index, target_.width, target_.height, target_.colour};
+    moment_.standalone->looks_left = shown_.size() - index;
+    moment_.view = &looked_at;
+    lookAt(view);
+    moment_.view = nullptr;
+  }
+
+  void lookAt(const StepView& view) {
+    const StatisticRequest request = strategy_->requests(moment_);
+    if (!request.any()) return;
     RenderOptions drawing;
     drawing.with_depth = false;
     drawing.with_background = true;

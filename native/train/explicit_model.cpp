@@ -198,6 +198,13 @@ class ExplicitModel final : public FitModel, private Regulariser {
 
 }  // namespace
 
+uint64_t bytesPerSplat(int sh_degree) {
+  constexpr uint64_t kOthers = 11;  // place, turn, size, opacity
+  constexpr uint64_t kOfDrawing = 250;  // with statistics
+  const uint64_t row = (kOthers + shCoefficientCount(sh_degree) * 3) * sizeof(float);
+  return row * 13 + kOfDrawing;
+}
+
 std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
                                             std::span<const size_t> training,
                                             const ExplicitModelOptions& options,

@@ -24,6 +24,11 @@ struct ExplicitModelOptions {
   uint64_t seed = 0;
 };
 
+/// Bytes that a fit takes for each splat at its largest, about: parameters, two moments and
+/// derivatives, the first three once more as the best state and once more in a checkpoint, what
+/// drawing keeps, and a quarter of spare room where arrays grow.
+uint64_t bytesPerSplat(int sh_degree);
+
 /// Splats with parameters of their own, started from what the views know of surfaces: their points,
 /// else their depth, else the volume that the cameras share (start_splats.h).
 /// In: training: the views that may be looked at. Source of constants: Kerbl, Kopanas, Leimkuehler,

@@ -11,6 +11,7 @@ import pytest
 from stipple.binding.errors import CancelledError, StippleError
 from stipple.binding.fit import Fit, fit_memory_bound, fit_options
 from stipple.binding.model import DecodeSettings
+from stipple.binding.strategies import check_strategy, strategies, strategy_parts
 from stipple.binding.structs import ColourSpace, FitModel, FitQuality, ModelKind, StippleCamera, Transfer
 from stipple.binding.views import Views
 
@@ -108,6 +109,17 @@ def test_unknown_names_are_errors(context, views):
         fit_options(context.library, iteration=3)
     with pytest.raises(StippleError, match='adaptive'):
         Fit.start(context, views, options(context, strategy='best')).wait()
+
+
+def test_lists_strategies_and_parts(context):
+    known = strategies(context.library)
+    assert known[0].name == 'adaptive'
+    assert [entry.name for entry in known if entry.model == FitModel.FIELD] == ['learned_density']
+    parts = strategy_parts(context.library)
+    assert 'long_axis_split' in [entry.name for entry in parts]
+    check_strategy(context.library, 'adaptive+long_axis_split')
+    with pytest.raises(StippleError, match="part is 'nothing'"):
+        check_strategy(context.library, 'adaptive+nothing')
 
 
 def test_memory_grows_with_the_cap(context, views):

@@ -31,6 +31,23 @@ def test_a_model_decodes_at_any_budget(dataset, tmp_path):
     assert json.loads(run('info', tmp_path / 'cut.ply', '--json').stdout)['count'] == 30
 
 
+def test_lists_strategies_and_parts():
+    lines = run('fit', '--strategies').stdout.splitlines()
+    names = [line.split()[0] for line in lines if line.startswith('  ')]
+    assert names[0] == 'adaptive'
+    assert {'absolute', 'learned_density', 'long_axis_split'} <= set(names)
+    assert lines.index('strategies') < lines.index('parts, after a strategy and +')
+    assert all(len(line.split()) > 4 for line in lines if line.startswith('  '))
+
+
+def test_memory_holds_the_count(dataset, tmp_path):
+    steps = ('--iterations', 300, '--sh-degree', 0, '--strategy', 'adaptive(threshold=1e-9)')
+    free, held = (int(figures(run('fit', dataset, tmp_path / f'{name}.ply', *steps, *more).stdout)['gaussians'])
+                  for name, more in (('free', ()), ('held', ('--memory', 1))))
+    # 12 pictures of 48 x 36 in half of it; a splat of degree 0 takes 978 bytes.
+    assert held <= 2**20 / 978 < free
+
+
 def test_a_field_decodes_at_any_budget(dataset, tmp_path):
     model = tmp_path / 'f.stipple.safetensors'
     few = ('--model', 'field', '--iterations', 40, '--anchors', 64, '--gaussians-per-anchor', 4)
@@ -102,6 +119,10 @@ def test_ctrl_c_keeps_the_best(dataset, tmp_path):
     (('{dataset}', 'out.ply', '--anchors', 100), '--model field'),
     (('{dataset}', 'out.ply', '--model', 'field', '--gaussians', 100), '--model explicit'),
     (('{dataset}', 'out.ply', '--iterations', 0), '--iterations is 0'),
+    (('{dataset}', 'out.ply', '--strategy', 'learned_density'), 'explicit splats do not have'),
+    (('{dataset}', 'out.ply', '--model', 'field', '--strategy', 'adaptive'), 'there is learned_density'),
+    (('{dataset}', 'out.ply', '--model', 'field', '--strategy', 'learned_density', '--no-density-gradient'), 'both'),
+    (('{dataset}', 'out.ply', '--memory', 0.001), 'max_bytes is 1048'),
     (('{dataset}', 'out.ply', '--sh-degree', 5), 'sh_degree is 5'),
     (('{dataset}', 'out.ply', '--downscale', 0), 'downscale'),
 ])

@@ -167,6 +167,11 @@ FUNCTIONS = {
     'stipple_fit_report_save': (_status, [_handle, _path]),
     'stipple_fit_report_draw': (_status, [_handle, c_double, c_uint64, _floats, POINTER(c_uint32),
                                          POINTER(c_uint32)]),
+    'stipple_strategy_count': (_status, [POINTER(c_uint64)]),
+    'stipple_strategy_info': (_status, [c_uint64, _to(s.StippleStrategyInfo)]),
+    'stipple_strategy_part_count': (_status, [POINTER(c_uint64)]),
+    'stipple_strategy_part_info': (_status, [c_uint64, _to(s.StippleStrategyInfo)]),
+    'stipple_strategy_check': (_status, [_path]),
     'stipple_densify_options_init': (None, [_to(s.StippleDensifyOptions)]),
     'stipple_densify_start': (_status, [_handle, _handle, _handle, _to(s.StippleDensifyOptions), _out_handle]),
     # volumes

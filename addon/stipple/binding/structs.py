@@ -439,7 +439,7 @@ class StippleFitOptions(_Sized):
                 ('antialias', c_uint32), ('background', c_uint32), ('density_gradient', c_uint32), ('jitter', c_uint32),
                 ('holdout', c_uint32), ('resume', c_uint32), ('seed', c_uint64), ('ssim_share', c_double),
                 ('picture_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
-                ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double)]
+                ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double), ('max_bytes', c_uint64)]
 
 
 class StippleFitFigures(_Sized):
@@ -448,6 +448,10 @@ class StippleFitFigures(_Sized):
                 ('psnr', c_double), ('best_psnr', c_double), ('seconds', c_double), ('seconds_left', c_double),
                 ('estimated_seconds', c_double), ('estimated_bytes', c_uint64), ('note_count', c_uint64),
                 ('preview_iteration', c_uint64), ('stage', c_char * 64)]
+
+
+class StippleStrategyInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('model', c_uint32), ('name_utf8', c_char_p), ('summary_utf8', c_char_p)]
 
 
 class StippleDensifyOptions(_Sized):

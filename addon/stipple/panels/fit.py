@@ -6,7 +6,7 @@ import textwrap
 import bpy
 
 from ..operators import show_report
-from ..scene import fit_proposal, fitting
+from ..scene import fit_proposal, fitting, splat_data
 
 
 class _FitPanel:
@@ -70,6 +70,22 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
             layout.prop(settings, 'strategy')
         layout.prop(settings, 'seed')
         layout.prop(settings, 'report')
+
+
+class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):
+    bl_label = "Densify"
+    bl_parent_id = 'STIPPLE_PT_fit'
+    bl_options = {'DEFAULT_CLOSED'}
+
+    @classmethod
+    def poll(cls, context):
+        return splat_data.is_splat_object(context.object)
+
+    def draw(self, context):
+        layout = self.layout
+        layout.enabled = not fitting.state.is_running
+        layout.label(text=f"Splats of '{context.object.name}', with the views above")
+        layout.operator('stipple.splats_densify', icon='OUTLINER_DATA_POINTCLOUD')
 
 
 def _draw_views(layout, settings):
@@ -177,4 +193,4 @@ def size(count):
     return f'{count / 2**20:,.0f} MiB' if count < 2**30 else f'{count / 2**30:.1f} GiB'
 
 
-classes = (STIPPLE_PT_fit, STIPPLE_PT_fit_advanced)
+classes = (STIPPLE_PT_fit, STIPPLE_PT_fit_advanced, STIPPLE_PT_densify)

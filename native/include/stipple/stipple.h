@@ -1094,7 +1094,10 @@ typedef enum StippleFitBackground {
 typedef struct StippleFitOptions {
   uint32_t struct_size;
   uint32_t model;              /* StippleFitModel, default explicit */
-  const char* strategy_utf8;   /* explicit: how splats are added and removed; NULL: "adaptive" */
+  const char* strategy_utf8;   /* how splats are added and removed: a strategy that stipple_strategy_info lists,
+                                  with its settings, and parts beside or instead of its own:
+                                  "adaptive(threshold=0.0003)+long_axis_split". NULL: "adaptive"; of a field, as
+                                  density_gradient says */
   uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
   uint64_t max_splats;         /* explicit: hard cap, 1..2^28 */
   uint64_t start_splats;       /* explicit; 0, the default: as many as points are known */
@@ -1118,6 +1121,8 @@ typedef struct StippleFitOptions {
   const char* checkpoint_path_utf8; /* NULL, the default: none are written */
   uint64_t checkpoint_interval; /* iterations; 0, the default: by time alone */
   double checkpoint_seconds;   /* default 60; 0: by iterations alone */
+  uint64_t max_bytes;          /* of the whole fit, about; 0, the default: none. Lowers max_splats and
+                                  picture_bytes as far as it needs */
 } StippleFitOptions;
 void stipple_fit_options_init(StippleFitOptions* options);
 /* Sets model, iterations, counts, degree and antialias as a user's choice of quality asks for; the others stay.
@@ -1184,6 +1189,23 @@ StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_ut
  * Threads and determinism: the same bits everywhere. Cost: about 0.1 s at scale 2. */
 StippleStatus stipple_fit_report_draw(const StippleJob* job, double scale, uint64_t capacity, float* pixels,
                                       uint32_t* width, uint32_t* height);
+
+/* A way of adding and removing splats, or a part of one. The texts live as long as the library. */
+typedef struct StippleStrategyInfo {
+  uint32_t struct_size;
+  uint32_t model;            /* StippleFitModel that it is for */
+  const char* name_utf8;     /* as StippleFitOptions::strategy_utf8 takes it */
+  const char* summary_utf8;  /* one sentence for artists */
+} StippleStrategyInfo;
+StippleStatus stipple_strategy_count(uint64_t* count);
+/* index 0..count-1, in the order in which they are shown. */
+StippleStatus stipple_strategy_info(uint64_t index, StippleStrategyInfo* info);
+/* Parts that go into strategies of explicit splats, by "strategy+part". */
+StippleStatus stipple_strategy_part_count(uint64_t* count);
+StippleStatus stipple_strategy_part_info(uint64_t index, StippleStrategyInfo* info);
+/* Whether explicit splats take this strategy. Errors: INVALID_ARGUMENT for a name or setting that is not there, a
+ * part that does not go with another (says which, and what both decide), a strategy of fields. */
+StippleStatus stipple_strategy_check(const char* strategy_utf8);
 
 typedef struct StippleDensifyOptions {
   uint32_t struct_size;

@@ -37,7 +37,7 @@ class Looking {
       : model_(makeExplicitModel(*scene(), allViews(*scene()), options(strategy))),
         training_(allViews(*scene())),
         pictures_(scene(), 1 << 24),
-        views_(*model_, pictures_, training_, kBlack, 0.2),
+        views_([this] { return model_->splats(0); }, pictures_, training_, kBlack, 0.2),
         fit_(*scene(), *model_, 3000) {}
 
   void run(uint64_t last) {

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splats of an object multiply and go where views ask for it."""
+
+import bpy
+from bpy.props import IntProperty, StringProperty
+
+from ..jobs import JobOperator
+from ..scene import densifying, edits, fitting, masks, sources, splat_data, sync
+
+
+class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
+    """Split, copy and remove the active object's splats where renders of the selected objects, or the photographs of a
+    data set, ask for it. Nothing is trained"""
+
+    bl_idname = 'stipple.splats_densify'
+    bl_label = "Densify Splats"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    strategy: StringProperty(name="Strategy", description="How splats are added and removed; empty for the strategy of "
+                             "the fit's settings")
+    events: IntProperty(name="Events", description="How often splats multiply and go; between two all views are looked "
+                        "at again", default=1, min=1, soft_max=20, max=1000)
+    max_splats: IntProperty(name="Splats", description="There are never more splats than this; 0 for twice as many as "
+                            "there are", default=0, min=0, max=100000000)
+
+    @classmethod
+    def poll(cls, context):
+        return (context.mode == 'OBJECT' and splat_data.is_splat_object(context.object)
+                and context.object.data.library is None and not fitting.state.is_running)
+
+    def invoke(self, context, _event):
+        return self.run_in_window(context)
+
+    def start(self, context):
+        self._object = context.object
+        edits.refuse_sequence(self._object)
+        settings = context.scene.stipple.fit
+        objects = [] if settings.views_from == 'DATASET' else fitting.seen_objects(context)
+        cloud = sources.full_cloud(self._object.data)
+        self._count = cloud.info().count
+        chosen = {'strategy': self.strategy or settings.strategy, 'event_count': self.events,
+                  'max_splats': self.max_splats, 'seed': settings.seed}
+        return densifying.DensifyTask(context, objects, settings, self._object, cloud, chosen)
+
+    def modal(self, context, event):
+        result = super().modal(context, event)
+        # Nothing may change while views are rendered.
+        return {'RUNNING_MODAL'} if self._job is not None and self._job.holds_scene else result
+
+    def finish(self, _context, job):
+        model, cloud = job.result
+        obj, count = self._object, cloud.info().count
+        path = sources.save_model(model, sources.model_path_for(obj.name))
+        sources.remember_model(path, model)
+        # A datablock of its own: the old one may have other users, and undo goes back to it.
+        data = obj.data.copy()
+        with sync.paused():
+            masks.clear(data)
+            sources.attach_tree(data, path, count)
+            data.stipple.ratio = data.stipple.ratio_render = 1.0
+        sync.write_decoded(data, cloud.read())
+        obj.data = data
+        self.report({'INFO'}, f"{count:,} splats in '{obj.name}', {self._count:,} before")
+
+
+classes = (STIPPLE_OT_splats_densify,)
