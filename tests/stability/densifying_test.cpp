@@ -6,6 +6,7 @@
 
 #include "base/random.h"
 #include "densify/edge_weights.h"
+#include "densify/known_views.h"
 #include "densify/strategies.h"
 
 // Strategies that are told extreme things about extreme splats, with traps on: their edits stay
@@ -72,6 +73,28 @@ struct Told {
   }
 };
 
+/// What views show to a strategy that looks around: pictures of hard colours, one behind
+/// everything.
+testing::KnownViews hardViews(const RawSplats& splats, const Strategy& strategy, bool same) {
+  testing::KnownViews views;
+  views.cloud = activated(splats);
+  if (strategy.parameterisation()) strategy.parameterisation()->activate(splats, views.cloud);
+  const Kinds colours{{0, 1, 0.5f, -1, 1e6f, 1e-30f}};
+  for (uint64_t v = 0; v < 3; ++v) {
+    testing::KnownView view = testing::plainView(testing::forwardCamera(64, 32, 50), 0.5f, 0.5f);
+    if (v == 2) view.camera.world_to_camera(2, 3) = -1e18;
+    for (size_t k = 0; k < view.target.size() && !same; ++k) {
+      view.target[k] = colours.at(k, v);
+      view.picture[k] = colours.at(k, v + 8);
+    }
+    const Told told(splats.size(), v, same);
+    view.visible = told.visible;
+    view.statistics = told.arrays;
+    views.views.push_back(view);
+  }
+  return views;
+}
+
 void expectFinite(const RawSplats& splats) {
   for (size_t i = 0; i < arrayCount(splats); ++i) {
     for (const float value : arrayOf(splats, static_cast<RawArray>(i))) {
@@ -85,6 +108,10 @@ void drive(const std::string& name, double extent, uint64_t cap, bool same) {
   SCOPED_TRACE(name + ", extent " + std::to_string(extent));
   const auto strategy = makeStrategy(name);
   RawSplats splats = extremeSplats();
+  for (const ExtraParameter& extra : strategy->parameters()) {
+    splats.extra_lengths.push_back(extra.row_length);
+  }
+  splats.extras = strategy->initialExtras(splats);
   const std::vector<float> target(64 * 32 * 3, 0.5f);
   FitMoment moment;
   moment.extent = extent;
@@ -99,6 +126,10 @@ void drive(const std::string& name, double extent, uint64_t cap, bool same) {
     strategy->requests(moment);
     const Told told(splats.size(), iteration % 8, same);
     strategy->observe(moment, told.view);
+    if (strategy->wantsSweep(moment)) {
+      testing::KnownViews views = hardViews(splats, *strategy, same);
+      strategy->sweep(moment, views);
+    }
     const RawSplats moments = zerosLike(splats);
     for (const auto& edit : {strategy->afterStep(moment, {splats, moments, moments}),
                              strategy->edit(moment, {splats, moments, moments})}) {
@@ -119,8 +150,10 @@ TEST(DensifyingStability, GradientsOfEverySizeOnSplatsOfEverySize) {
   for (const char* name :
        {"adaptive", "absolute", "improved", "direction", "direction(power=1000)",
         "adaptive+long_axis_split+recovery_pruning+edge_aware_score+growth_control",
-        "absolute+opacity_correction",
-        "improved+long_axis_split(offset=10,long=0.01,minor=0.01)"}) {
+        "absolute+opacity_correction", "improved+long_axis_split(offset=10,long=0.01,minor=0.01)",
+        "volumetric", "volumetric(exponent=1,least_shrink=1,largest_shrink=1000000)", "mcmc",
+        "mcmc(noise=1e12)", "metropolis", "metropolis(released=1,crowding=0)", "frequency",
+        "frequency(threshold=1e-12,quantile=0)"}) {
     for (const double extent : {0.0, 1e-12, 5.0, 1e12}) {
       drive(name, extent, 400, false);
       drive(name, extent, 400, true);

@@ -241,9 +241,9 @@ struct Scene {
     for (size_t v = 0; v < view_count; ++v) {
       KnownView view = plainView(forwardCamera(100, 100, 90), 0.5f, 0.5f);
       view.visible.assign(count, 1);
-      view.blending_weights.assign(count, 1.0f);
+      view.of(Statistic::kBlendingWeights).assign(count, 1.0f);
       // Per pixel of a picture whose half is 50.
-      view.gradient_norms.assign(count, norm / 50);
+      view.of(Statistic::kScreenGradientNorms).assign(count, norm / 50);
       views.views.push_back(view);
     }
   }
@@ -264,7 +264,7 @@ std::vector<float> stripes(int shift) {
 
 TEST(Frequency, HighOnesGetTwoChildrenAndStay) {
   Scene scene(40);
-  for (KnownView& view : scene.views.views) view.gradient_norms[5] = 2.0f / 50;
+  for (KnownView& view : scene.views.views) view.of(Statistic::kScreenGradientNorms)[5] = 2.0f / 50;
   const auto strategy = makeStrategy("frequency(quantile=1)");
   const Edited now = scene.event(*strategy, publishedMoment(1000));
   ASSERT_EQ(now.splats.size(), 42u);
@@ -296,10 +296,10 @@ TEST(Frequency, GoesWhereTwoViewsDisagree) {
   // Splat 0: its best two views agree. 1: they do not. 2: one view. 3: none.
   for (size_t v = 0; v < 3; ++v) {
     KnownView& view = scene.views.views[v];
-    view.blending_weights[0] = v == 1 ? 0.5f : 1.0f;
-    view.blending_weights[1] = v == 2 ? 0.5f : 1.0f;
+    view.of(Statistic::kBlendingWeights)[0] = v == 1 ? 0.5f : 1.0f;
+    view.of(Statistic::kBlendingWeights)[1] = v == 2 ? 0.5f : 1.0f;
     view.visible[2] = v == 2;
-    view.blending_weights[3] = 0;
+    view.of(Statistic::kBlendingWeights)[3] = 0;
   }
   const auto early = makeStrategy("frequency");
   EXPECT_GE(scene.event(*early, publishedMoment(1000)).splats.size(), 40u);
@@ -344,7 +344,7 @@ TEST(Frequency, ThinsOutByChanceWhereAllIsLearned) {
 
 TEST(Frequency, KeepsToTheCapByTheHighestGradients) {
   Scene scene(40);
-  for (KnownView& view : scene.views.views) view.gradient_norms[7] = 2.0f / 50;
+  for (KnownView& view : scene.views.views) view.of(Statistic::kScreenGradientNorms)[7] = 2.0f / 50;
   for (const uint64_t cap : {uint64_t{43}, uint64_t{40}, uint64_t{10}}) {
     const auto strategy = makeStrategy("frequency");
     const Edited now = scene.event(*strategy, publishedMoment(1000, cap));
@@ -382,7 +382,8 @@ TEST(Frequency, SameForAnyNumberOfThreads) {
     withThreads(threads, [&] {
       Scene scene(3000);
       for (size_t i = 0; i < 3000; ++i) {
-        scene.views.views[0].gradient_norms[i] = static_cast<float>(i % 17) / 50;
+        scene.views.views[0].of(Statistic::kScreenGradientNorms)[i] =
+            static_cast<float>(i % 17) / 50;
       }
       for (int v = 0; v < 3; ++v) scene.views.views[static_cast<size_t>(v)].target = stripes(v);
       results[threads - 1] = scene.event(*makeStrategy("frequency"), publishedMoment(1500)).splats;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "densify/strategy.h"
@@ -24,15 +25,14 @@ struct KnownView {
   std::vector<float> target;   ///< [H,W,3]
   std::vector<float> picture;  ///< [H,W,3]
   std::vector<uint8_t> visible;
-  std::vector<float> blending_weights;
-  std::vector<float> gradient_norms;
+  std::array<std::vector<float>, kStatisticCount> statistics;
+  std::vector<float>& of(Statistic one) { return statistics[static_cast<size_t>(one)]; }
 };
 
 /// A view whose target and picture are of one colour each.
 inline KnownView plainView(const Camera& camera, float target, float picture) {
   const size_t count = size_t{camera.width} * camera.height * 3;
-  return {camera, std::vector<float>(count, target), std::vector<float>(count, picture), {}, {},
-          {}};
+  return {camera, std::vector<float>(count, target), std::vector<float>(count, picture), {}, {}};
 }
 
 class KnownViews final : public ViewEvaluator {
@@ -58,8 +58,7 @@ class KnownViews final : public ViewEvaluator {
     statistics_.height = known.camera.height;
     statistics_.camera = &known.camera;
     statistics_.visible = known.visible;
-    statistics_.arrays[static_cast<size_t>(Statistic::kBlendingWeights)] = known.blending_weights;
-    statistics_.arrays[static_cast<size_t>(Statistic::kScreenGradientNorms)] = known.gradient_norms;
+    for (size_t k = 0; k < kStatisticCount; ++k) statistics_.arrays[k] = known.statistics[k];
     return statistics_;
   }
 
