@@ -2,24 +2,25 @@
 """Steps of make_pictures.py for docs/fitting_in_blender.md: from a mesh to a field and its budgets, then from pictures of a
 data set; window.py runs them."""
 
-import json
-import math
 import sys
 from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Euler
+from mathutils import Euler, Vector
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
+import photo_set  # noqa: E402
 import scenes  # noqa: E402
 import tour_steps  # noqa: E402
 from fit_steps import module  # noqa: E402
 
-BUDGETS = (64, 512, 4096)
+VIEW_COUNT = 40
+BUDGETS = (128, 512, 4096)
 PICTURE_SIDE = 320
 PHOTO_COUNT, PHOTO_SIDE = 40, 256
+TAB_PX = (12, 78)  # from the sidebar's upper right corner to the middle of its second tab
 GREY = 0.22  # behind pictures without a world, display
 
 
@@ -35,26 +36,36 @@ def state():
     return module('.scene.fitting').state
 
 
-def first_tab():
-    """Our panels come first in the sidebar, which then opens with them."""
+def few_tabs(window):
+    """Leaves one tab before ours in the sidebar, which Blender itself has, and so a place to click on."""
     others = [panel for panel in bpy.types.Panel.__subclasses__()
               if getattr(panel, 'bl_space_type', '') == 'VIEW_3D' and getattr(panel, 'bl_region_type', '') == 'UI'
-              and getattr(panel, 'is_registered', False)]
-    parents_last = sorted(others, key=lambda panel: not getattr(panel, 'bl_parent_id', ''))
-    for panel in parents_last:
+              and getattr(panel, 'is_registered', False) and getattr(panel, 'bl_category', '') != 'Stipple']
+    for panel in sorted(others, key=lambda panel: not getattr(panel, 'bl_parent_id', '')):
         bpy.utils.unregister_class(panel)
-    for panel in sorted(reversed(parents_last), key=lambda panel: getattr(panel, 'bl_category', '') != 'Stipple'):
-        bpy.utils.register_class(panel)
+    advanced = module('.panels.fit').STIPPLE_PT_fit_advanced
+    bpy.utils.unregister_class(advanced)
+    advanced.bl_options = set()  # open
+    bpy.utils.register_class(advanced)
+    window.space.show_region_ui = True
+
+
+def open_tab(window):
+    """A click on the second tab: before 4.0 no property says which is open."""
+    region = next(r for r in window.area.regions if r.type == 'UI')
+    x, y = region.x + region.width - TAB_PX[0], region.y + region.height - TAB_PX[1]
+    window.window.event_simulate(type='MOUSEMOVE', value='NOTHING', x=x, y=y)
+    for value in ('PRESS', 'RELEASE'):
+        window.window.event_simulate(type='LEFTMOUSE', value=value, x=x, y=y)
 
 
 def build(window):
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
+    few_tabs(window)
     scenes.suzanne()
-    camera = scenes.camera(location=(0.0, -6.2, 0.5), rotation=(1.49, 0.0, 0.0), width=PICTURE_SIDE, height=PICTURE_SIDE)
+    camera = scenes.camera(location=(0.0, -4.3, 0.2), rotation=(1.524, 0.0, 0.0), width=PICTURE_SIDE, height=PICTURE_SIDE)
     camera.hide_set(True)
-    first_tab()
-    window.space.show_region_ui = True
     window.space.shading.type = 'SOLID'
     window.space.shading.color_type = 'TEXTURE'
     window.space.overlay.show_relationship_lines = False
@@ -62,8 +73,14 @@ def build(window):
     view.view_perspective = 'PERSP'
     view.view_distance, view.view_location = 6.0, (0.0, 0.0, 0.0)
     view.view_rotation = Euler((1.35, 0.0, 0.45)).to_quaternion()
+    next(obj for obj in bpy.data.objects if obj.type == 'LIGHT').hide_set(True)
+    fit().view_count, fit().samples = VIEW_COUNT, 32
     fit().model, fit().quality = 'FIELD', 'FAST'
+
+
+def panel(window):
     tour_steps.show_tab(window, 'DATA')
+    return 'fit_start'
 
 
 def start(window):
@@ -111,7 +128,7 @@ def budgets(_window):
         bpy.ops.render.render(write_still=True)
         pictures.append(over_grey(scene.render.filepath + '.png'))
         Path(scene.render.filepath + '.png').unlink()
-    save(np.concatenate(pictures, axis=1), folder() / 'fit_budgets.png')
+    photo_set.save(np.concatenate(pictures, axis=1), folder() / 'fit_budgets.png')
 
 
 def budget(window):
@@ -130,45 +147,13 @@ def over_grey(path):
     return pixels[..., :3] * pixels[..., 3:] + GREY * (1 - pixels[..., 3:])
 
 
-def save(colours, path, alpha=None):
-    """In: colours [H,W,3] display, row 0 = bottom."""
-    height, width = colours.shape[:2]
-    pixels = np.ones((height, width, 4), np.float32)
-    pixels[..., :3] = colours
-    if alpha is not None:
-        pixels[..., 3] = alpha
-    image = bpy.data.images.new('saved', width, height, alpha=True)
-    image.pixels.foreach_set(pixels.reshape(-1))
-    image.filepath_raw, image.file_format = str(path), 'PNG'
-    image.save()
-    bpy.data.images.remove(image)
-
-
 def photographs(_window):
-    """A data set as nerfstudio and NeRF-synthetic have it: pictures, and where their cameras stood."""
-    rigs, capture = module('.scene.view_rigs'), module('.scene.view_capture')
+    capture = module('.scene.view_capture')
     source = bpy.data.objects['Suzanne']
     source.hide_set(False)
     source.hide_render = False
-    graph = bpy.context.evaluated_depsgraph_get()
-    poses = rigs.around(bpy.context.scene, graph, rigs.bounds_of([source], graph), PHOTO_COUNT, seed=3)
-    data = folder() / 'photos'
-    data.mkdir()
-    frames = []
-    settings = capture.CaptureSettings('CYCLES', PHOTO_SIDE, 32)
-    with capture.Capture(bpy.context, [source], settings) as views:
-        for i, pose in enumerate(poses):
-            seen = views.pose(f'{i:03d}', pose).linear[::-1]
-            alpha = np.maximum(seen[..., 3:], 1e-6)
-            straight = np.clip(seen[..., :3] / alpha, 0, 1)
-            shown = np.where(straight <= 0.0031308, 12.92 * straight, 1.055 * straight ** (1 / 2.4) - 0.055)
-            save(shown, data / f'{i:03d}.png', seen[..., 3])
-            frames.append({'file_path': f'{i:03d}.png', 'transform_matrix': [list(row) for row in pose.matrix]})
-    angle = poses[0].angle
-    length = 0.5 * PHOTO_SIDE / math.tan(0.5 * angle)
-    centre = 0.5 * PHOTO_SIDE
-    (data / 'transforms.json').write_text(json.dumps(
-        {'w': PHOTO_SIDE, 'h': PHOTO_SIDE, 'fl_x': length, 'fl_y': length, 'cx': centre, 'cy': centre, 'frames': frames}))
+    photo_set.write(module('.scene.view_rigs'), capture, source, folder() / 'photos', PHOTO_COUNT,
+                    capture.CaptureSettings('CYCLES', PHOTO_SIDE, 32))
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
 
@@ -179,16 +164,21 @@ def import_cameras(window):
     fit().model, fit().quality = 'EXPLICIT', 'FAST'
     bpy.context.scene.render.engine = 'STIPPLE'
     assert bpy.ops.stipple.cameras_import(filepath=fit().dataset) == {'FINISHED'}
-    window.region_data.view_distance = 11.0
+    window.region_data.view_distance = 20.0
     return 'fit_photos'
 
 
 def through_a_camera(window):
     with window.context():
         assert bpy.ops.stipple.fit_accept() == {'FINISHED'}
+    cameras = [obj for obj in bpy.data.objects if obj.type == 'CAMERA']
+    towards = Vector((0.4, -1.0, 0.25)).normalized()
+    bpy.context.scene.camera = max(cameras, key=lambda obj: obj.matrix_world.translation.normalized().dot(towards))
+    window.space.show_region_ui = False
+    window.space.overlay.show_extras = False
     window.region_data.view_perspective = 'CAMERA'
     return 'fit_photo_view'
 
 
-steps = [build, start, running, ended, proposal, report, accept, budgets, budget, photographs, import_cameras, start, ended,
+steps = [build, open_tab, panel, start, running, ended, proposal, report, accept, budgets, budget, photographs, import_cameras, start, ended,
          through_a_camera]

@@ -8,7 +8,9 @@ import os
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
+import photo_set
 import scenes
 
 
@@ -124,6 +126,8 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     assert bpy.ops.stipple.relink(filepath=moved) == {'FINISHED'} and 'moved' in data.source
     data.anchors = 300
     assert stipple.scene.splat_data.count(obj.data) == 300 * splats_each
+    assert bpy.ops.stipple.use_as_new_source() == {'FINISHED'}
+    assert data.source_kind == 'CLOUD' and data.learned_gaussians == data.learned_most == 0
 
 
 @pytest.mark.parametrize('model', ['FIELD', 'EXPLICIT'])
@@ -154,6 +158,34 @@ def test_scene_cameras_serve_as_views(stipple, ball):
         scenes.camera(location=(4 * np.sin(angle), -4 * np.cos(angle), 0), rotation=(np.pi / 2, 0, angle))
     settings(views_from='CAMERAS', view_size=32)
     assert stipple.scene.splat_data.count(fitted().data) > 0
+
+
+@pytest.mark.parametrize('up_axis,up', [('AUTO', (0, 0, 1)), ('-Y', (0, -1, 0))])
+def test_photographs_are_fitted_where_their_cameras_stand(stipple, ball, tmp_path, up_axis, up):
+    name = stipple.__name__
+    capture = importlib.import_module('.scene.view_capture', name)
+    ball.location.z = 0.5
+    bpy.context.view_layer.update()
+    photo_set.write(importlib.import_module('.scene.view_rigs', name), capture, ball, tmp_path / 'photos', 12,
+                    capture.CaptureSettings('WORKBENCH', 48))
+    bpy.data.objects.remove(ball)
+    settings(views_from='DATASET', dataset=str(tmp_path / 'photos'), up_axis=up_axis)
+    assert bpy.ops.stipple.cameras_import(filepath=str(tmp_path / 'photos'), up_axis=up_axis) == {'FINISHED'}
+    obj = fitted()
+    assert obj.name == 'photos Fit' and obj.hide_get() is False
+    bpy.context.view_layer.update()
+    # Half a metre up in the data set's world, wherever that points.
+    centre = obj.matrix_world @ Vector(np.median(stipple.scene.splat_data.read(obj.data).positions, axis=0).tolist())
+    assert (centre - 0.5 * (obj.matrix_world @ Vector((0, 0, 1)))).length < 0.2
+    assert (obj.matrix_world @ Vector(up) - Vector((0, 0, 1))).length < 1e-5
+    cameras = [other for other in bpy.data.objects if other.type == 'CAMERA']
+    assert len(cameras) == 12
+    for camera in cameras:
+        towards = (centre - camera.matrix_world.translation).normalized()
+        assert (camera.matrix_world.to_quaternion() @ Vector((0, 0, -1))).dot(towards) > 0.99
+    # Its file says which way is up.
+    assert bpy.ops.stipple.splats_import(filepath=bpy.path.abspath(obj.data.stipple.source)) == {'FINISHED'}
+    assert np.allclose(bpy.context.object.matrix_world, obj.matrix_world)
 
 
 def test_a_cancel_while_views_are_rendered_leaves_nothing(ball, fitting, stipple):

@@ -341,6 +341,7 @@ def attach_tree(data, path, count):
     stipple.source_stamp = stamp(path)
     stipple.source_kind = 'TREE'
     stipple.source_count = count
+    note_learned(stipple, None)
     stipple.is_sequence = False
     stipple.source_objects.clear()
     stipple.source_changed = stipple.edited = False
@@ -352,6 +353,7 @@ def attach_cloud(data, path):
     stipple.source = blend_path(path)
     stipple.source_stamp = stamp(path)
     stipple.source_kind = 'CLOUD'
+    note_learned(stipple, None)
     stipple.is_sequence = False
     stipple.source_objects.clear()
     stipple.source_changed = stipple.edited = False
@@ -385,8 +387,8 @@ def _save(write, path, suffix, overwrite):
 
 
 def note_learned(stipple, info):
-    """Notes what a model was learned for. In: info, StippleModelInfo."""
-    is_field = info.kind == ModelKind.FIELD
+    """Notes what a model was learned for. In: info, StippleModelInfo, or None for all that is not learned."""
+    is_field = info is not None and info.kind == ModelKind.FIELD
     stipple.learned_gaussians = info.gaussians_per_anchor if is_field else 0
     budgets = (info.least_anchors, info.most_anchors) if is_field else (0, 0)
     stipple.learned_least, stipple.learned_most = (min(budget, _MAX_INT) for budget in budgets)
