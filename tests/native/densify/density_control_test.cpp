@@ -106,6 +106,30 @@ TEST(DensityControl, DrawsByWeightWithoutReplacement) {
   EXPECT_EQ(drawWithoutReplacement(moment, RandomUse::kDensifyChoice, rows, weights, 5).size(), 2u);
 }
 
+/// Every part in every strategy, and every two parts: made, or refused with what they share.
+TEST(Strategies, TakeEveryPartOrSayWhyNot) {
+  std::vector<std::string> refused;
+  const auto attempt = [&](const std::string& text, const std::string& part) {
+    const std::string message = messageOf([&] { makeStrategy(text); });
+    if (message == "nothing thrown") return;
+    EXPECT_THAT(message, HasSubstr(part + " does not go with ")) << text;
+    EXPECT_THAT(message, HasSubstr("decide")) << text;
+    refused.push_back(text);
+  };
+  for (const std::string& name : strategyNames()) {
+    for (const StrategyEntry& part : partEntries()) {
+      attempt(name + "+" + part.name, part.name);
+      for (const StrategyEntry& second : partEntries()) {
+        if (part.name == second.name) continue;
+        if (name == "adaptive") attempt(name + "+" + part.name + "+" + second.name, second.name);
+      }
+    }
+  }
+  EXPECT_THAT(refused,
+              ::testing::IsSupersetOf({"improved+opacity_correction", "mcmc+long_axis_split",
+                                       "adaptive+opacity_correction+long_axis_split"}));
+}
+
 TEST(Strategies, RefuseWhatIsNotThere) {
   EXPECT_THAT(messageOf([] { makeStrategy("adaptive+nothing"); }), HasSubstr("part is 'nothing'"));
   EXPECT_THAT(messageOf([] { makeStrategy("adaptive(treshold=1)"); }),
