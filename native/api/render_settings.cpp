@@ -22,7 +22,7 @@ RenderSettings renderSettings(const StippleRenderOptions* options, const Instanc
   stipple_render_options_init(&defaults);
   const StippleRenderOptions given = completed(options, defaults, "options");
   RenderSettings settings;
-  settings.method = enumValue<StippleRenderMethod>(given.method, 1, "options->method");
+  settings.method = enumValue<StippleRenderMethod>(given.method, 3, "options->method");
   settings.options.low_pass = enumValue<LowPass>(given.low_pass, 3, "options->low_pass");
   settings.options.blend_space =
       enumValue<BlendSpace>(given.blend_space, 1, "options->blend_space");

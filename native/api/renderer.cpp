@@ -9,6 +9,7 @@
 #include "api/render_settings.h"
 #include "base/parallel.h"
 #include "math/colour.h"
+#include "splat/ray_render.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -48,6 +49,10 @@ void finishLayers(float* colour, const RenderSettings& settings,
       for (size_t c = 0; c < 4; ++c) pixel[c] += weight * surface[i * 4 + c];
     }
   });
+}
+
+bool followsRays(StippleRenderMethod method) {
+  return method == STIPPLE_RENDER_RAYS || method == STIPPLE_RENDER_YARDSTICK;
 }
 
 template <typename Result>
@@ -121,7 +126,9 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     settings.options.with_median_depth = out.median_depth != nullptr;
     settings.options.with_counts = out.counts != nullptr;
     settings.options.with_transmittance = out.transmittance != nullptr;
-    const RenderMemory memory = renderMemory(placed.list, view, settings.options);
+    const RenderMemory memory = followsRays(settings.method)
+                                    ? rayMemory(placed.list, view, settings.options)
+                                    : renderMemory(placed.list, view, settings.options);
     renderer->context->requirePictureMemory(memory.sum(), "this picture of " + sizeText(view),
                                             memory.pair_bytes);
     *job = startJob(renderer->context, [memory = renderer->memory, placed = std::move(placed),
@@ -129,6 +136,11 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
       if (settings.method == STIPPLE_RENDER_REFERENCE) {
         deliverPicture(renderReference(placed.list, view, settings.options, &progress), settings,
                        out);
+      } else if (followsRays(settings.method)) {
+        const bool is_yardstick = settings.method == STIPPLE_RENDER_YARDSTICK;
+        deliverPicture(renderRays(placed.list, view, settings.options,
+                                  is_yardstick ? rayYardstick() : RayOptions{}, &progress),
+                       settings, out);
       } else {
         renderTiledTo(*memory, placed, view, settings, out, progress);
       }

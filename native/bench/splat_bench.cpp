@@ -9,6 +9,7 @@
 #include "bench/splat_floor.h"
 #include "bench/splat_scene.h"
 #include "splat/cpu/tiled_render.h"
+#include "splat/ray_render.h"
 
 namespace stipple::bench {
 namespace {
@@ -169,6 +170,31 @@ void asHoldout(benchmark::State& state, const SplatCase& c) {
       [&] { draw(c, kernel, 2); });
 }
 
+/// Exact rays, and rays without any limit, against the whole tiled call.
+void alongRays(benchmark::State& state, const SplatCase& c) {
+  const SplatInstance instance{&cloudOf(c)};
+  draw(c, chosenTileKernel(), 2);
+  double rays = 1e300, yardstick = 1e300, tiled = 1e300;
+  for (auto step : state) {
+    (void)step;
+    const auto follow = [&](const RayOptions& options) {
+      return secondsOf([&] {
+        withThreads(2, [&] { renderRays({&instance, 1}, cameraOf(c), {}, options); });
+      });
+    };
+    tiled = std::min(tiled, secondsOf([&] { draw(c, chosenTileKernel(), 2); }));
+    rays = std::min(rays, follow({}));
+    yardstick = std::min(yardstick, follow(rayYardstick()));
+    state.SetIterationTime(rays);
+  }
+  label(state, c);
+  state.counters["tiled_ms"] = 1e3 * tiled;
+  state.counters["rays_ms"] = 1e3 * rays;
+  state.counters["yardstick_ms"] = 1e3 * yardstick;
+  state.counters["ratio_rays_to_tiled"] = rays / tiled;
+  state.counters["ratio_yardstick_to_tiled"] = yardstick / tiled;
+}
+
 void add(const std::string& name, void (*run)(benchmark::State&, const SplatCase&),
          const SplatCase& c, int iterations) {
   benchmark::RegisterBenchmark(name.c_str(), run, c)
@@ -183,6 +209,7 @@ const bool registered = [] {
     add(std::string("splat.forward_2_threads_") + c.name, againstOneThread, c, kRepeats);
     add(std::string("splat.forward_avx2_") + c.name, againstNarrow, c, 2);
     add(std::string("splat.forward_scalar_") + c.name, againstScalar, c, 2);
+    add(std::string("splat.rays_") + c.name, alongRays, c, 2);
     add(std::string("splat.surface_") + c.name, withSurface, c, kRepeats);
     add(std::string("splat.holdout_") + c.name, asHoldout, c, kRepeats);
   }

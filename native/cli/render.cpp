@@ -43,6 +43,8 @@ StippleRenderOptions optionsOf(const Arguments& arguments) {
   StippleRenderOptions options;
   stipple_render_options_init(&options);
   if (arguments.accuracy == "double") options.method = STIPPLE_RENDER_REFERENCE;
+  if (arguments.accuracy == "rays") options.method = STIPPLE_RENDER_RAYS;
+  if (arguments.accuracy == "reference") options.method = STIPPLE_RENDER_YARDSTICK;
   if (arguments.low_pass == "classic") options.low_pass = STIPPLE_LOW_PASS_CLASSIC;
   if (arguments.low_pass == "mip") options.low_pass = STIPPLE_LOW_PASS_MIP;
   if (arguments.low_pass == "none") options.low_pass = STIPPLE_LOW_PASS_NONE;
@@ -105,8 +107,12 @@ void addRender(CLI::App& app, const Context& context) {
   command->add_option("--view", arguments->view, "Which camera of the file")->capture_default_str();
   command->add_option("--width", arguments->width, "Pixels; default: as the camera says");
   command->add_option("--height", arguments->height, "Pixels");
-  command->add_option("--accuracy", arguments->accuracy, "final, or double (slow, the yardstick)")
-      ->check(CLI::IsMember({"final", "double"}))
+  command
+      ->add_option(
+          "--accuracy", arguments->accuracy,
+          "final; double (the same in double precision); rays (exact projection and order); "
+          "reference (rays without any limit, the yardstick)")
+      ->check(CLI::IsMember({"final", "double", "rays", "reference"}))
       ->capture_default_str();
   command
       ->add_option("--colour", arguments->colour,

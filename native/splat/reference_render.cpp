@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "splat/double_pixel.h"
 #include "splat/render.h"
 #include "splat/scene.h"
-#include "splat/surface.h"
 
 // The definition of correct: every visible splat in order at every pixel, in double.
 
@@ -16,13 +16,6 @@ struct ReferenceSplat {
   double colour[3];
   uint32_t key;
   bool is_holdout;
-};
-
-/// What shows and what only hides, of splats at one pixel: sums of w, and of w z.
-struct Shares {
-  double shown = 0;
-  double shown_depth = 0;
-  double hidden = 0;
 };
 
 std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene) {
@@ -52,17 +45,7 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
   const std::vector<ReferenceSplat> splats = visibleInOrder(scene);
 
   ReferenceResult result;
-  result.width = camera.width;
-  result.height = camera.height;
-  const size_t pixel_count = static_cast<size_t>(camera.width) * camera.height;
-  result.colour.resize(pixel_count * 4);
-  if (options.with_depth) result.depth.resize(pixel_count);
-  if (options.with_median_depth) result.median_depth.resize(pixel_count);
-  if (options.with_counts) result.counts.resize(pixel_count);
-  if (options.with_transmittance) result.transmittance.resize(pixel_count);
-  const bool with_surface = hasSurface(options);
-  result.surface_weight.resize(with_surface ? pixel_count : 0);
-
+  sizeResult(camera, options, result);
   std::vector<const ReferenceSplat*> row;
   for (uint32_t y = 0; y < camera.height; ++y) {
     advance(progress, static_cast<double>(y) / camera.height, "Rendering the reference");
@@ -77,10 +60,7 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
     for (uint32_t x = 0; x < camera.width; ++x) {
       const double px = x + 0.5;
       const size_t i = static_cast<size_t>(y) * camera.width + x;
-      PixelBlend<double> pixel;
-      Shares shares;
-      SurfaceAtPixel<double> surface{};
-      if (with_surface) surface = surfaceAt<double>(options.surface, i);
+      DoublePixel pixel(options, i);
       for (const ReferenceSplat* splat : row) {
         const Projected<double>& p = splat->projected;
         const double dx = px - p.footprint.mean_x;
@@ -88,56 +68,12 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
         const double alpha = splatAlpha(
             p.footprint.opacity, halfSquaredDistance(p.footprint, dx, py - p.footprint.mean_y));
         if (!(alpha > 0)) continue;
-        if (with_surface && !pixel.isBefore(surface, orderingDepth(p.depth))) {
-          pixel.addSurface(surface);
-          if (pixel.finished) break;
-        }
-        const double weight = pixel.transmittance * alpha;
-        pixel.add(alpha, splat->colour, p.depth);
-        if (pixel.finished) break;
-        (splat->is_holdout ? shares.hidden : shares.shown) += weight;
-        if (!splat->is_holdout) shares.shown_depth += weight * p.depth;
+        if (!pixel.add(alpha, splat->colour, p.depth, splat->is_holdout)) break;
       }
-      if (with_surface && pixel.surface_weight < 0) pixel.addSurface(surface);
-      // Sum of w: 1 - T where all shows.
-      double coverage = with_surface ? pixel.splatCoverage(surface) : 1.0 - pixel.transmittance;
-      double weighted_depth = pixel.weighted_depth;
-      if (shares.hidden > 0) {
-        coverage = shares.shown;
-        weighted_depth = shares.shown_depth;
-      }
-      for (size_t c = 0; c < 3; ++c) {
-        result.colour[i * 4 + c] =
-            pixel.colour[c] +
-            (options.with_background ? pixel.transmittance * options.background[c] : 0.0);
-      }
-      result.colour[i * 4 + 3] = options.with_background ? 1.0 - shares.hidden : coverage;
-      if (with_surface) {
-        result.surface_weight[i] = pixel.surface_weight;
-        result.colour[i * 4 + 3] =
-            alphaApart(surface, pixel.surface_weight, coverage, options.with_background) -
-            (options.with_background ? shares.hidden : 0.0);
-      }
-      const double empty = static_cast<double>(kEmptyDepth);
-      if (options.with_depth) {
-        result.depth[i] = coverage > 0 ? weighted_depth / coverage : empty;
-        if (with_surface) {
-          result.depth[i] =
-              depthWithSurface(weighted_depth, coverage, surface, pixel.surface_weight, empty);
-        }
-      }
-      if (options.with_median_depth) {
-        result.median_depth[i] = pixel.has_median ? pixel.median_depth : empty;
-      }
-      if (options.with_counts) result.counts[i] = pixel.count;
-      if (options.with_transmittance) result.transmittance[i] = pixel.transmittance;
+      pixel.write(options, i, result);
     }
   }
-  if (with_surface && options.surface.colour && !options.splats_apart) {
-    addSurface(options.surface.colour, result.surface_weight.data(), pixel_count,
-               result.colour.data());
-  }
-  if (!options.splats_apart) result.surface_weight.clear();
+  finishSurface(options, result);
   advance(progress, 1.0, "Rendering the reference");
   return result;
 }

@@ -122,6 +122,8 @@ class OutputColour(IntEnum):
 class RenderMethod(IntEnum):
     TILED = 0
     REFERENCE = 1
+    RAYS = 2
+    YARDSTICK = 3
 
 
 class Side(IntEnum):

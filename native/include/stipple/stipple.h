@@ -745,7 +745,12 @@ typedef enum StippleOutputColour {
 
 typedef enum StippleRenderMethod {
   STIPPLE_RENDER_TILED = 0,
-  STIPPLE_RENDER_REFERENCE = 1 /* double precision, every splat at every pixel: small pictures only */
+  STIPPLE_RENDER_REFERENCE = 1, /* the same in double precision, every splat at every pixel: small pictures only */
+  /* Along the rays of the pixels, in the order in which splats are densest there: exact at wide angles and for
+   * splats that are close or cross each other. Double precision, many times as slow as the first. */
+  STIPPLE_RENDER_RAYS = 2,
+  /* The same without any limit: no alpha is held below 1, no pixel ends early, and nothing above 1e-9 is left out. */
+  STIPPLE_RENDER_YARDSTICK = 3
 } StippleRenderMethod;
 
 typedef struct StippleRenderOptions {
@@ -1022,7 +1027,7 @@ typedef struct StippleBackwardResult {
  * 1/255), where a pixel ends and the order of blending are taken as fixed.
  * In: gradients [count], one per instance; result may be NULL. The pictures and buffers must stay valid
  * until the job has ended.
- * Errors of the start: those of drawing; INVALID_ARGUMENT for STIPPLE_RENDER_REFERENCE, for an output that is
+ * Errors of the start: those of drawing; INVALID_ARGUMENT for a method other than TILED, an output that is
  * converted after compositing (choose STIPPLE_OUTPUT_COMPOSITED), for a statistic without its picture;
  * BUFFER_TOO_SMALL; MEMORY_LIMIT before anything is allocated. Of the job: INVALID_ARGUMENT for a value
  * outside its range. Nothing is written unless the job ends well.

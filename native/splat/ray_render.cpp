@@ -1,0 +1,205 @@
+#include "splat/ray_render.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "base/parallel.h"
+#include "splat/ray_splats.h"
+#include "splat/scene.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr uint32_t kTileSide = 16;   ///< pixels
+constexpr uint32_t kBlockSide = 64;  ///< pixels, whole tiles
+
+/// origin + place * direction; the view z of a point is its place.
+struct Ray {
+  Vec3d origin;
+  Vec3d direction;
+};
+
+Ray rayThrough(const View<double>& view, double x, double y) {
+  const double slope_x = (x - view.cx) / view.fx;
+  const double slope_y = (y - view.cy) / view.fy;
+  if (view.perspective) return {Vec3d::Zero(), {slope_x, slope_y, 1}};
+  return {{slope_x, slope_y, 0}, {0, 0, 1}};
+}
+
+struct Rectangle {
+  uint32_t x0, y0, x1, y1;  ///< pixels; the ends are outside
+};
+
+/// A cone, or a cylinder, around the rays of a rectangle.
+class Beam {
+ public:
+  Beam(const View<double>& view, const Rectangle& area) {
+    const double x[2] = {area.x0 + 0.5, area.x1 - 0.5}, y[2] = {area.y0 + 0.5, area.y1 - 0.5};
+    const Ray middle = rayThrough(view, 0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
+    origin_ = middle.origin;
+    axis_ = middle.direction.normalized();
+    // The rectangle is convex on the picture plane, so its corners are the farthest.
+    for (int corner = 0; corner < 4; ++corner) {
+      const Ray ray = rayThrough(view, x[corner & 1], y[corner >> 1]);
+      radius_ = std::max(radius_, (ray.origin - origin_).norm());
+      sine_ = std::max(sine_, crossProduct(axis_, ray.direction.normalized()).norm());
+    }
+    sine_ = std::min(1.0, sine_ * (1 + 1e-9));
+    cosine_ = std::sqrt(std::max(0.0, 1 - sine_ * sine_));
+  }
+
+  bool touches(const Vec3d& centre, double radius) const {
+    const Vec3d offset = centre - origin_;
+    const double reach = radius + radius_;
+    if (offset.squaredNorm() <= reach * reach) return true;
+    const double along = offset.dot(axis_);
+    const double across = (offset - along * axis_).norm();
+    // Distance from the surface of the cone, where that is nearest.
+    return across * cosine_ - along * sine_ <= reach;
+  }
+
+ private:
+  Vec3d origin_, axis_;
+  double radius_ = 0;  ///< of the cylinder
+  double sine_ = 0, cosine_ = 1;
+};
+
+/// A splat that shows at a pixel.
+struct Hit {
+  double place;
+  double alpha;
+  uint32_t splat;
+};
+
+class RayPicture {
+ public:
+  RayPicture(const PlacedScene& scene, std::vector<RaySplat> splats, const RenderOptions& options,
+             const RayOptions& rays, RenderResult& result)
+      : view_(scene.view),
+        splats_(std::move(splats)),
+        options_(options),
+        rays_(rays),
+        result_(result) {}
+
+  /// Blocks of one row of blocks, from pixel row y0 on.
+  void drawRow(uint32_t y0) {
+    const size_t columns = (result_.width + kBlockSide - 1) / kBlockSide;
+    parallelFor(columns, 1, [&](size_t begin, size_t end) {
+      for (size_t column = begin; column < end; ++column) {
+        drawBlock(static_cast<uint32_t>(column) * kBlockSide, y0);
+      }
+    });
+  }
+
+ private:
+  Rectangle cut(uint32_t x0, uint32_t y0, uint32_t side) const {
+    return {x0, y0, std::min(x0 + side, result_.width), std::min(y0 + side, result_.height)};
+  }
+
+  void drawBlock(uint32_t x0, uint32_t y0) {
+    const Rectangle block = cut(x0, y0, kBlockSide);
+    const Beam beam(view_, block);
+    std::vector<uint32_t> near_block, near_tile;
+    for (uint32_t i = 0; i < splats_.size(); ++i) {
+      if (beam.touches(splats_[i].centre, splats_[i].radius)) near_block.push_back(i);
+    }
+    std::vector<Hit> hits;
+    for (uint32_t y = block.y0; y < block.y1; y += kTileSide) {
+      for (uint32_t x = block.x0; x < block.x1; x += kTileSide) {
+        const Rectangle tile = cut(x, y, kTileSide);
+        const Beam narrow(view_, tile);
+        near_tile.clear();
+        for (const uint32_t i : near_block) {
+          if (narrow.touches(splats_[i].centre, splats_[i].radius)) near_tile.push_back(i);
+        }
+        for (uint32_t py = tile.y0; py < tile.y1; ++py) {
+          for (uint32_t px = tile.x0; px < tile.x1; ++px) drawPixel(px, py, near_tile, hits);
+        }
+      }
+    }
+  }
+
+  void drawPixel(uint32_t x, uint32_t y, const std::vector<uint32_t>& near_tile,
+                 std::vector<Hit>& hits) {
+    findHits(rayThrough(view_, x + 0.5, y + 0.5), near_tile, hits);
+    if (rays_.order == RayOrder::kResponse) {
+      std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
+        return a.place < b.place || (a.place == b.place && a.splat < b.splat);
+      });
+    }
+    const size_t i = static_cast<size_t>(y) * result_.width + x;
+    DoublePixel pixel(options_, i, rays_.limits.ends_early);
+    for (const Hit& hit : hits) {
+      const RaySplat& splat = splats_[hit.splat];
+      if (!pixel.add(hit.alpha, splat.colour, hit.place, splat.is_holdout)) break;
+    }
+    pixel.write(options_, i, result_);
+  }
+
+  void findHits(const Ray& ray, const std::vector<uint32_t>& near_tile,
+                std::vector<Hit>& hits) const {
+    hits.clear();
+    for (const uint32_t i : near_tile) {
+      const RaySplat& splat = splats_[i];
+      const RayResponse response = respond(splat, ray.origin, ray.direction);
+      if (!(response.place >= view_.near_plane && response.place <= view_.far_plane)) continue;
+      const double full = splat.opacity * std::exp(-0.5 * response.squared_distance);
+      if (!(full >= rays_.limits.least_alpha)) continue;
+      const double depth = rays_.order == RayOrder::kCentre ? splat.centre[2] : response.place;
+      hits.push_back({depth, std::min(full, rays_.limits.most_alpha), i});
+    }
+  }
+
+  const View<double>& view_;
+  std::vector<RaySplat> splats_;
+  const RenderOptions& options_;
+  const RayOptions& rays_;
+  RenderResult& result_;
+};
+
+}  // namespace
+
+RayOptions rayYardstick() {
+  RayOptions rays;
+  rays.limits.least_alpha = 1e-9;
+  rays.limits.most_alpha = 1;
+  rays.limits.ends_early = false;
+  return rays;
+}
+
+RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& camera,
+                       const RenderOptions& options) {
+  uint64_t splats = 0;
+  for (const SplatInstance& instance : instances) {
+    splats += instance.cloud ? instance.cloud->size() : 0;
+  }
+  RenderMemory memory;
+  // Made range by range, gathered (which may double its room), sorted; and the order.
+  memory.splat_bytes = splats * (4 * sizeof(RaySplat) + 2 * sizeof(uint32_t));
+  // Of each thread, splats near its block and its tile, and those that show at a pixel.
+  memory.pair_bytes = splats * threadLimit() * 2 * (2 * sizeof(uint32_t) + sizeof(Hit));
+  memory.result_bytes = renderMemory({}, camera, options).result_bytes;
+  return memory;
+}
+
+RenderResult renderRays(std::span<const SplatInstance> instances, const Camera& camera,
+                        const RenderOptions& options, const RayOptions& rays, Progress* progress) {
+  const PlacedScene scene = placeScene(instances, camera, options);
+  advance(progress, 0.0, "Placing splats");
+  std::vector<RaySplat> splats = raySplats(scene, rays.limits.least_alpha);
+  RenderResult result;
+  sizeResult(camera, options, result);
+  result.visible_count = splats.size();
+  RayPicture picture(scene, std::move(splats), options, rays, result);
+  for (uint32_t y = 0; y < camera.height; y += kBlockSide) {
+    advance(progress, static_cast<double>(y) / camera.height, "Following rays");
+    picture.drawRow(y);
+  }
+  finishSurface(options, result);
+  advance(progress, 1.0, "Following rays");
+  return result;
+}
+
+}  // namespace stipple

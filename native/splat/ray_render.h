@@ -1,0 +1,47 @@
+#pragma once
+
+#include <span>
+
+#include "base/progress.h"
+#include "splat/double_pixel.h"
+#include "splat/render.h"
+
+namespace stipple {
+
+/// In which order splats come at a pixel.
+enum class RayOrder : uint32_t {
+  kResponse =
+      0,        ///< by where on the pixel's ray each is densest: right where splats interpenetrate
+  kCentre = 1,  ///< by the view z of the centres, as the tiled renderer has them
+};
+
+struct RayOptions {
+  RayOrder order = RayOrder::kResponse;
+  BlendLimits limits;
+};
+
+/// The yardstick: nothing is left out that could show, no alpha is limited and no pixel ends early.
+/// What is fainter than 1e-9 is skipped.
+RayOptions rayYardstick();
+
+/// Draws splats along the rays of the pixels: alpha = o exp(-m^2 / 2), m the smallest Mahalanobis
+/// distance of the ray from the splat. That is what a Gaussian in space looks like in a perspective
+/// picture; the affine projection of renderTiled agrees with it for splats that are small, far away
+/// and near the middle, and not at wide angles or close by. The low-pass is one in space, of the
+/// width that a pixel has at the splat's centre: variance v (z/f)^2 for v px^2, with the same
+/// compensation of opacity. Depths are those of the largest response on the ray.
+/// Double precision. Same bits for any number of threads. Cost: O(splats * blocks of 64 x 64 +
+/// pixels * splats near their tile). Errors: those of renderTiled.
+/// Based on: Moenne-Loccoz et al., 3D Gaussian Ray Tracing, SIGGRAPH Asia 2024 (the response along
+/// a ray); Zwicker et al., EWA Volume Splatting, Visualization 2001 (low-pass). Differs: tiles
+/// instead of a tree of boxes; the distance is that of the cross product, which cancels nothing
+/// near the axis of a needle.
+RenderResult renderRays(std::span<const SplatInstance> instances, const Camera& camera,
+                        const RenderOptions& options, const RayOptions& rays,
+                        Progress* progress = nullptr);
+
+/// Upper bound of the bytes that renderRays allocates: per splat, and its result.
+RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& camera,
+                       const RenderOptions& options);
+
+}  // namespace stipple
