@@ -122,7 +122,9 @@ void steps(benchmark::State& state, const SplatCase& c) {
 struct EventSettings {
   const char* name;
   const char* strategy;
-  bool caps = true;  ///< by the hard cap
+  bool caps = true;         ///< by the hard cap
+  uint64_t event = 600;     ///< the iteration that is timed
+  uint64_t interval = 100;  ///< iterations between two
 };
 constexpr EventSettings kEventSettings[] = {
     {"adaptive", "adaptive(threshold=1e-9)"},
@@ -130,6 +132,9 @@ constexpr EventSettings kEventSettings[] = {
     // 3,727,100 sqrt(100 / 14,000) = 315,000, its count at 600.
     {"improved", "improved(threshold=1e-9,splats=3727100)", false},
     {"direction", "direction(threshold=1e-9)"},
+    {"volumetric", "volumetric(threshold=1e-9)"},
+    // Its second event, which removes too.
+    {"frequency", "frequency(threshold=1e-9)", true, 1500, 500},
 };
 
 EventSettings settingsOf(const std::string& name) {
@@ -141,10 +146,10 @@ EventSettings settingsOf(const std::string& name) {
 
 /// Iterations before an event in which strategies may gather what others do not.
 constexpr uint64_t kLastIterations = 10;
-constexpr uint64_t kEvent = 600;
 
 /// What an event costs beyond the iterations that it follows, from its statistics to the edited
-/// parameters, against 100 of those: the last 10 and the edit, less 10 that gather nothing more.
+/// parameters, against those until the next one: the last 10 and the edit, less 10 that gather
+/// nothing more.
 void densifyEvent(benchmark::State& state, const std::string& name) {
   const SplatCase& c = kEventCase;
   const EventSettings settings = settingsOf(name);
@@ -157,21 +162,21 @@ void densifyEvent(benchmark::State& state, const std::string& name) {
   double best_step = 1e300, best_last = 1e300, best_edit = 1e300;
   size_t count = 0;
   withThreads(2, [&] {
-    view.step(*model, kEvent - 60, 30000, &views.evaluator());
+    view.step(*model, settings.event - 60, 30000, &views.evaluator());
     const TensorTable saved = model->state();
     for (auto round : state) {
       (void)round;
       model->restore(saved);
-      uint64_t iteration = kEvent - 60;
+      uint64_t iteration = settings.event - 60;
       const auto step = [&] {
         views.evaluator().forgetSplats();
         return view.step(*model, ++iteration, 30000, &views.evaluator());
       };
       step();
       for (int k = 0; k < 4; ++k) best_step = std::min(best_step, secondsOf(step));
-      iteration = kEvent - kLastIterations;
+      iteration = settings.event - kLastIterations;
       double last = 0, edit = 0;
-      while (iteration < kEvent) {
+      while (iteration < settings.event) {
         last += secondsOf([&] { edit = step().seconds.edit; });
       }
       state.SetIterationTime(last);
@@ -184,9 +189,11 @@ void densifyEvent(benchmark::State& state, const std::string& name) {
   state.counters["best_ms"] = 1e3 * event;
   state.counters["edit_ms"] = 1e3 * best_edit;
   state.counters["splats_after"] = static_cast<double>(count);
-  state.counters["reference_ms"] = 1e5 * best_step;
-  state.counters["ratio_100_iterations"] = 100 * best_step / event;
-  state.counters["target_100_iterations"] = 20;
+  const double between = static_cast<double>(settings.interval) * best_step;
+  const std::string against = std::to_string(settings.interval) + "_iterations";
+  state.counters["reference_ms"] = 1e3 * between;
+  state.counters["ratio_" + against] = between / event;
+  state.counters["target_" + against] = 20;
 }
 
 const bool registered = [] {

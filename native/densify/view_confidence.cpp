@@ -81,11 +81,14 @@ double patchSimilarity(const FootprintPatch& a, const FootprintPatch& b) {
   double variance_a = 0, variance_b = 0, covariance = 0;
   for (size_t k = 0; k < kFootprintSamples; ++k) {
     if (a[k] == kOutside || b[k] == kOutside) continue;
-    const double weight = footprintSamples()[k].weight / weights;
+    const double weight = footprintSamples()[k].weight;
     variance_a += weight * (a[k] - mean_a) * (a[k] - mean_a);
     variance_b += weight * (b[k] - mean_b) * (b[k] - mean_b);
     covariance += weight * (a[k] - mean_a) * (b[k] - mean_b);
   }
+  variance_a /= weights;
+  variance_b /= weights;
+  covariance /= weights;
   const double c1 = 0.01 * 0.01 * kWhite * kWhite, c2 = 0.03 * 0.03 * kWhite * kWhite;
   const double similarity =
       (2 * mean_a * mean_b + c1) * (2 * covariance + c2) /
@@ -142,9 +145,11 @@ std::vector<float> BestViews::confidences(ViewEvaluator& views) const {
       }
     });
   }
-  for (size_t k = 0; k < tested.size(); ++k) {
-    confidences[tested[k]] = static_cast<float>(patchSimilarity(patches[k][0], patches[k][1]));
-  }
+  parallelFor(tested.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t k = begin; k < end; ++k) {
+      confidences[tested[k]] = static_cast<float>(patchSimilarity(patches[k][0], patches[k][1]));
+    }
+  });
   return confidences;
 }
 
