@@ -101,6 +101,7 @@ def ended(_window):
 
 def proposed(_window):
     facts['proposed'] = module('.scene.fit_proposal').find(bpy.context) is not None
+    facts['count'] = module('.scene.fitting').state.kept_count
     facts['nothing_replaced'] = not bpy.data.objects['Sphere'].hide_render
     return 'proposed'
 

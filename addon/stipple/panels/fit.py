@@ -144,7 +144,7 @@ def _draw_result(layout, state):
     layout.label(text="Not accepted yet", icon='INFO')
     if figures is None:
         return
-    rows = [("Splats", f'{figures.splat_count:,}'), ("Steps", f'{figures.iteration:,}'),
+    rows = [("Splats", f'{state.kept_count:,}'), ("Steps", f'{figures.iteration:,}'),
             ("Fitted In", duration(figures.seconds))]
     if figures.best_psnr == figures.best_psnr:
         rows.insert(0, (_measured(figures), f'{figures.best_psnr:.1f} dB'))

@@ -37,6 +37,7 @@ class State:
     source_names: tuple = ()  # of the visible objects that it is fitted to
     matrix: object = None     # of the object to be, to the world
     wants_stop: bool = False
+    kept_count: int = 0       # splats of the result
 
 
 state = State()
@@ -144,6 +145,7 @@ class FitTask(ViewTask):
         sources.remember_model(path, model)
         self.result = Result(state.name, model.decode(decoding).read(), path, decoding, kind, model.info(),
                              report)
+        state.kept_count = self.result.splats.count
 
 
 def seen_objects(context):
