@@ -51,10 +51,9 @@ class BallViews {
     camera.fx = camera.fy = size;
     camera.cx = camera.cy = 0.5 * size;
     camera.world_to_camera(2, 3) = 3.0;
-    ViewPicture picture;
-    picture.width = picture.height = size;
-    picture.colour.assign(size_t{3} * size * size, 0.3f);
-    views_.add(camera, picture);
+    picture_.width = picture_.height = size;
+    picture_.colour.assign(size_t{3} * size * size, 0.3f);
+    views_.add(camera, picture_);
   }
 
   std::unique_ptr<FitModel> model(const FieldCase& c, int leaf_level) const {
@@ -72,14 +71,16 @@ class BallViews {
     moment.iterations = 2 * iteration;  // so always in the stage that does most
     StepView view;
     view.camera = &views_.camera(0);
-    view.target = views_.picture(0).colour.data();
+    view.target = picture_.colour.data();
     return model.step(moment, view, nullptr, nullptr);
   }
 
   const MemoryViewSource& views() const { return views_; }
+  const ViewPicture& picture() const { return picture_; }
 
  private:
   MemoryViewSource views_;
+  ViewPicture picture_;
 };
 
 void steps(benchmark::State& state, const FieldCase& c) {
@@ -92,7 +93,7 @@ void steps(benchmark::State& state, const FieldCase& c) {
   options.with_depth = false;
   const auto passes = [&] {
     backend->forward(few.views().camera(0), options);
-    backend->loss(few.views().picture(0).colour, {});
+    backend->loss(few.picture().colour, {});
     StatisticRequest request;
     request.contributions = true;
     backend->backward(request);

@@ -7,10 +7,11 @@
 
 namespace stipple {
 
-void MemoryViewSource::add(const Camera& camera, ViewPicture picture, std::string name) {
+void MemoryViewSource::add(const Camera& camera, const ViewPicture& picture, std::string name) {
   if (name.empty()) name = "view " + std::to_string(views_.size());
   validateView(camera, picture, name);
-  views_.push_back(std::make_shared<const View>(View{camera, std::move(picture), std::move(name)}));
+  auto packed = std::make_shared<const PackedPicture>(picture);
+  views_.push_back(std::make_shared<const View>(View{camera, std::move(packed), std::move(name)}));
 }
 
 void MemoryViewSource::setPoints(PointSet points) {

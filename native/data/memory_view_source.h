@@ -4,19 +4,20 @@
 #include <string>
 #include <vector>
 
+#include "data/packed_picture.h"
 #include "data/view_source.h"
 
 namespace stipple {
 
-/// Views whose pictures are in memory: renders of a Blender scene, and whatever small. Copies share
-/// the pictures.
+/// Views whose pictures are in memory: renders of a Blender scene, and whatever small. They are
+/// kept packed, so that they come back as PackedPicture says. Copies share the pictures.
 class MemoryViewSource final : public ViewSource {
  public:
   explicit MemoryViewSource(ColourSpace colour_space) : colour_space_(colour_space) {}
 
   /// Errors: kInvalidArgument, as validateView(); nothing is added then. In: name, empty for
   /// "view" and its number.
-  void add(const Camera& camera, ViewPicture picture, std::string name = {});
+  void add(const Camera& camera, const ViewPicture& picture, std::string name = {});
   /// In: positions and colours [N,3] and opacities [N], the other arrays of N or empty.
   /// Errors: kInvalidArgument for array sizes that disagree and values that are not finite.
   void setPoints(PointSet points);
@@ -25,16 +26,16 @@ class MemoryViewSource final : public ViewSource {
   const Camera& camera(size_t view) const override { return at(view).camera; }
   std::string name(size_t view) const override { return at(view).name; }
   ColourSpace colourSpace() const override { return colour_space_; }
-  ViewPicture load(size_t view) const override { return at(view).picture; }
+  ViewPicture load(size_t view) const override { return at(view).picture->unpacked(); }
+  std::shared_ptr<const PackedPicture> packed(size_t view) const override {
+    return at(view).picture;
+  }
   const PointSet& points() const override { return points_; }
-
-  /// The picture without a copy; valid as long as this source or a copy of it.
-  const ViewPicture& picture(size_t view) const { return at(view).picture; }
 
  private:
   struct View {
     Camera camera;
-    ViewPicture picture;
+    std::shared_ptr<const PackedPicture> picture;
     std::string name;
   };
 

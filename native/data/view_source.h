@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,8 @@ struct ViewPicture {
   std::vector<float> normals;  ///< [H,W,3] unit, world; 0 where unknown
 };
 
+class PackedPicture;
+
 /// What a data set says a view is for.
 enum class ViewRole : uint32_t { kNone = 0, kTrain = 1, kTest = 2, kValidation = 3 };
 
@@ -47,6 +50,11 @@ class ViewSource {
   /// May be called by several threads at once. Errors: kIo, kFormat (names the picture), and
   /// kInvalidArgument for numbers that are not finite.
   virtual ViewPicture load(size_t view) const = 0;
+
+  /// The same in little room (packed_picture.h), for those who keep pictures; depth and normals may
+  /// be missing. Sources that have pictures in memory give those. Errors: also those of
+  /// validateView().
+  virtual std::shared_ptr<const PackedPicture> packed(size_t view) const;
 
   /// Where surfaces are known to be: points of a reconstruction or samples of meshes, in the
   /// cameras' world. Colours are scene linear. May be empty.

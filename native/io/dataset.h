@@ -5,15 +5,16 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "data/packed_picture.h"
 #include "data/view_source.h"
 #include "io/dataset_files.h"
-#include "io/packed_picture.h"
 
 namespace stipple {
 
 struct DatasetOptions {
   uint32_t downscale = 1;  ///< 1..64, pixels of the file along each side of a pixel, by area
-  /// Pictures that stay in memory, about 6 bytes per pixel and 8 with alpha; the others are read
+  /// Pictures that stay in memory, about 3 bytes per pixel of 8-bit files, 6 of others, and
+  /// a third more with alpha; the others are read
   /// again when they are wanted.
   uint64_t cache_bytes = uint64_t{1} << 30;
 };

@@ -699,8 +699,8 @@ StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
                                  const StippleViewsOpenOptions* options, StippleViews** views);
 /* No views yet. In: colour_space, a StippleColourSpace: that of the splats to be. */
 StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_space, StippleViews** views);
-/* Copies the picture. name_utf8 may be NULL: "view" and its number. A job that uses the views does not see
- * what is added after its start. Errors: INVALID_ARGUMENT, by name and pixel, for values that are not finite or
+/* Copies the picture (0..1 as 16 bits). name_utf8 may be NULL: "view" and its number. Jobs under way do not see
+ * what is added. Errors: INVALID_ARGUMENT, by name and pixel, for values that are not finite or
  * out of range, and for views that were not made by stipple_views_create; MEMORY_LIMIT. */
 StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera,
                                 const StippleViewPicture* picture, const char* name_utf8);

@@ -52,8 +52,9 @@ std::string messageOf(const std::function<void()>& call) {
 
 TEST(MemoryViewSource, GivesBackWhatWasAdded) {
   MemoryViewSource views(ColourSpace::kLinear);
-  ViewPicture picture = pictureOf(3, 2, 0.5f);
-  picture.alpha.assign(6, 0.75f);
+  // Whole 255ths come back bit for bit.
+  ViewPicture picture = pictureOf(3, 2, 51.0f / 255.0f);
+  picture.alpha.assign(6, 153.0f / 255.0f);
   views.add(cameraOf(3, 2), picture, "front");
   views.add(cameraOf(4, 4), pictureOf(4, 4, 1.0f));
   views.setPoints(onePoint(0, 0, 2));

@@ -41,7 +41,7 @@ std::vector<size_t> trainingViews() {
 }
 
 std::vector<float> targetOf(const MemoryViewSource& views, size_t v, const double* background) {
-  const ViewPicture& picture = views.picture(v);
+  const ViewPicture picture = views.load(v);
   std::vector<float> target = picture.colour;
   for (size_t i = 0; i < target.size(); ++i) {
     const float alpha = picture.alpha.empty() ? 1.0f : picture.alpha[i / 3];
@@ -62,7 +62,7 @@ std::vector<StepReport> train(FitModel& model, const MemoryViewSource& views, ui
     StepView view;
     view.index = training[(i * 7) % training.size()];
     view.camera = &views.camera(view.index);
-    const bool opaque = views.picture(view.index).alpha.empty();
+    const bool opaque = views.load(view.index).alpha.empty();
     std::fill_n(view.background, 3, opaque || i % 2 == 0 ? 0.0 : 1.0);
     const std::vector<float> target = targetOf(views, view.index, view.background);
     view.target = target.data();
@@ -78,11 +78,12 @@ double heldOutPsnr(FitModel& model, const MemoryViewSource& views, uint64_t budg
   size_t count = 0;
   for (size_t v = 0; v < kViews; v += 6) {
     const RenderResult drawn = renderTiled({&instance, 1}, views.camera(v), {});
+    const ViewPicture picture = views.load(v);
     double squares = 0;
     for (size_t i = 0; i < drawn.colour.size(); i += 4) {
       for (size_t c = 0; c < 3; ++c) {
         const double d = static_cast<double>(drawn.colour[i + c]) -
-                         static_cast<double>(views.picture(v).colour[i / 4 * 3 + c]);
+                         static_cast<double>(picture.colour[i / 4 * 3 + c]);
         squares += d * d;
       }
     }
@@ -118,7 +119,8 @@ double psnrOfNothing(const MemoryViewSource& views) {
   double sum = 0;
   for (size_t v = 0; v < kViews; v += 6) {
     double squares = 0;
-    for (const float c : views.picture(v).colour) squares += static_cast<double>(c * c);
+    const ViewPicture picture = views.load(v);
+    for (const float c : picture.colour) squares += static_cast<double>(c * c);
     sum += -10 * std::log10(squares / (3.0 * kSize * kSize));
   }
   return sum / (kViews / 6);
@@ -139,7 +141,7 @@ TEST(FieldModel, LearnsWhereNothingButCamerasIsKnown) {
   const auto with_alpha = toyViews(toyBall(6000), kViews, kSize, false);
   auto views = std::make_shared<MemoryViewSource>(with_alpha->colourSpace());
   for (size_t v = 0; v < kViews; ++v) {
-    ViewPicture picture = with_alpha->picture(v);
+    ViewPicture picture = with_alpha->load(v);
     picture.alpha.clear();
     views->add(with_alpha->camera(v), std::move(picture));
   }

@@ -181,7 +181,7 @@ TEST(ScenePrior, TakesPointsFromDepth) {
 std::shared_ptr<MemoryViewSource> withoutAlpha(const MemoryViewSource& views) {
   auto opaque = std::make_shared<MemoryViewSource>(views.colourSpace());
   for (size_t v = 0; v < views.count(); ++v) {
-    ViewPicture picture = views.picture(v);
+    ViewPicture picture = views.load(v);
     picture.alpha.clear();
     opaque->add(views.camera(v), std::move(picture));
   }
@@ -235,7 +235,7 @@ TEST(VisualHull, IsEmptyWhereSilhouettesTellNothing) {
   for (const float alpha : {0.0f, 1.0f}) {
     auto even = std::make_shared<MemoryViewSource>(shown->colourSpace());
     for (size_t v = 0; v < shown->count(); ++v) {
-      ViewPicture picture = shown->picture(v);
+      ViewPicture picture = shown->load(v);
       picture.alpha.assign(picture.alpha.size(), alpha);
       even->add(shown->camera(v), std::move(picture));
     }
@@ -247,7 +247,7 @@ TEST(VisualHull, ForgivesAHoleInOneOfManySilhouettes) {
   const auto whole = toyViews(toyBall(3000, 0.5f), 60, 48, false);
   auto holed = std::make_shared<MemoryViewSource>(whole->colourSpace());
   for (size_t v = 0; v < whole->count(); ++v) {
-    ViewPicture picture = whole->picture(v);
+    ViewPicture picture = whole->load(v);
     if (v == 7) std::fill(picture.alpha.begin(), picture.alpha.end(), 0.0f);
     holed->add(whole->camera(v), std::move(picture));
   }

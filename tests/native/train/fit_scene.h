@@ -105,6 +105,7 @@ class Fit {
     moment_.iterations = iterations;
     moment_.extent = 1.1 * 3.5;
     moment_.seed = 5;
+    for (size_t v = 0; v < views.count(); ++v) pictures_.push_back(views.load(v));
   }
   FitMoment& moment() { return moment_; }
 
@@ -112,7 +113,7 @@ class Fit {
     StepReport report;
     for (; moment_.iteration <= last; ++moment_.iteration) {
       const size_t index = (moment_.iteration * 7) % views_.count();
-      const ViewPicture& picture = views_.picture(index);
+      const ViewPicture& picture = pictures_[index];
       StepView view;
       view.index = index;
       view.camera = &views_.camera(index);
@@ -133,6 +134,7 @@ class Fit {
  private:
   const MemoryViewSource& views_;
   FitModel& model_;
+  std::vector<ViewPicture> pictures_;
   FitMoment moment_;
   std::vector<float> target_;
 };
@@ -143,10 +145,11 @@ inline double meanPsnr(const SplatCloud& cloud, const MemoryViewSource& views) {
   double sum = 0;
   for (size_t v = 0; v < views.count(); ++v) {
     const RenderResult drawn = renderTiled({&instance, 1}, views.camera(v), {});
+    const ViewPicture picture = views.load(v);
     double squares = 0;
     for (size_t i = 0; i < drawn.colour.size(); ++i) {
       if (i % 4 == 3) continue;
-      const double wanted = static_cast<double>(views.picture(v).colour[i / 4 * 3 + i % 4]);
+      const double wanted = static_cast<double>(picture.colour[i / 4 * 3 + i % 4]);
       squares += std::pow(static_cast<double>(drawn.colour[i]) - wanted, 2);
     }
     sum += -10 * std::log10(squares / static_cast<double>(drawn.colour.size() / 4 * 3) + 1e-12);

@@ -340,28 +340,6 @@ TEST(ViewMeasure, CountsOnlyWhatMasksAndAlphaLeave) {
   EXPECT_GT(without.psnr, 80);
 }
 
-TEST(PackedNumbers, KeepWhatTheyPromise) {
-  std::vector<float> bytes, shares, others, seen;
-  for (int i = 0; i < 256; ++i) bytes.push_back(static_cast<float>(i) / 255.0f);
-  for (int i = 0; i < 1000; ++i) shares.push_back(static_cast<float>(i) / 999.0f);
-  others = {-1.0f, 0.5f, 1e9f};
-  PackedNumbers packed;
-  packed.pack(bytes);
-  EXPECT_EQ(packed.byteCount(), 256u);
-  packed.unpack(seen);
-  EXPECT_EQ(seen, bytes);
-  packed.pack(shares);
-  EXPECT_EQ(packed.byteCount(), 2000u);
-  packed.unpack(seen);
-  for (size_t i = 0; i < shares.size(); ++i) EXPECT_NEAR(seen[i], shares[i], 7.7e-6);
-  packed.pack(others);
-  packed.unpack(seen);
-  EXPECT_EQ(seen, others);
-  packed.pack({});
-  packed.unpack(seen);
-  EXPECT_TRUE(seen.empty());
-}
-
 TEST(FitViewEvaluator, DrawsAndJudgesTrainingViews) {
   const auto views = colourViews(3, 0.25f, 0.5f, 0.75f, 0.5f);
   PictureStore pictures(views, 1 << 20);
