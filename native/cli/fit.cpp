@@ -233,12 +233,46 @@ void save(const Context& context, const Job& job, const Arguments& arguments, ui
   check(stipple_cloud_save(cloud.get(), arguments.out.c_str(), nullptr));
 }
 
+/// Told before hours of work, not after them.
+void requireFolder(const std::string& path) {
+  const std::filesystem::path parent = std::filesystem::path(path).parent_path();
+  const std::string folder = parent.empty() ? "." : parent.string();
+  if (!std::filesystem::is_directory(folder)) {
+    throw Failure("'" + path + "' cannot be written: there is no folder '" + folder + "'");
+  }
+  if (access(folder.c_str(), W_OK) != 0) {
+    throw Failure("'" + path + "' cannot be written: the folder '" + folder + "' is read-only");
+  }
+}
+
+/// A result that cannot be written where it was wanted (a full disk) goes where temporary files go.
+void saveSomewhere(const Context& context, const Job& job, const Arguments& arguments,
+                   uint32_t model) {
+  try {
+    save(context, job, arguments, model);
+  } catch (const Failure& failure) {
+    Arguments elsewhere = arguments;
+    const std::string name = std::filesystem::path(arguments.out).filename().string();
+    elsewhere.out = (std::filesystem::temp_directory_path() /
+                     ("stipple-" + std::to_string(getpid()) + "-" + name))
+                        .string();
+    try {
+      save(context, job, elsewhere, model);
+    } catch (const Failure&) {
+      throw failure;
+    }
+    throw Failure(std::string(failure.what()) + "; the result is in '" + elsewhere.out + "'");
+  }
+}
+
 void fit(const Context& context, const Arguments& arguments) {
   const bool is_asset = !hasSplatEnding(arguments.out);
   if (is_asset && fileKind(arguments.out) != FileKind::kModel) {
     throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
                   " or .stipple.safetensors is expected");
   }
+  requireFolder(arguments.out);
+  if (!arguments.report.empty()) requireFolder(arguments.report);
   const std::string checkpoint = arguments.out + ".checkpoint.safetensors";
   const bool is_left = std::filesystem::exists(checkpoint);
   if (is_left && !arguments.resume) {
@@ -254,7 +288,7 @@ void fit(const Context& context, const Arguments& arguments) {
       make<Job>(stipple_fit_start, context.get(), const_cast<const StippleViews*>(views.get()),
                 const_cast<const StippleFitOptions*>(&options));
   const bool is_whole = watch(job);
-  save(context, job, arguments, options.model);
+  saveSomewhere(context, job, arguments, options.model);
   if (!arguments.report.empty()) {
     check(stipple_fit_report_save(job.get(), arguments.report.c_str()));
   }

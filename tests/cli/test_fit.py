@@ -1,8 +1,13 @@
 """`stipple fit`: from pictures to splats and models, stopped, killed and resumed."""
 import json
+import os
+import resource
+import shutil
 import signal
+import struct
 import subprocess
 import time
+import zlib
 
 import pytest
 from fit_dataset import TOOL, dataset, error, figures, run  # noqa: F401
@@ -64,8 +69,9 @@ def test_a_field_decodes_at_any_budget(dataset, tmp_path):
     assert json.loads(run('info', tmp_path / 'small.ply', '--json').stdout)['count'] == 80
 
 
-def start(*arguments):
-    return subprocess.Popen([TOOL, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def start(*arguments, environment=None, **options):
+    return subprocess.Popen([TOOL, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                            env=environment, **options)
 
 
 def wait_for(path):
@@ -111,9 +117,118 @@ def test_ctrl_c_keeps_the_best(dataset, tmp_path):
     assert checkpoint.read_bytes() == before
 
 
+def test_a_result_that_has_no_place_any_more_is_kept_elsewhere(dataset, tmp_path):
+    folder, spare = tmp_path / 'gone', tmp_path / 'spare'
+    folder.mkdir()
+    spare.mkdir()
+    process = start('fit', dataset, folder / 'out.ply', '--iterations', 100000, '--gaussians', 300, '--sh-degree', 0,
+                    '--checkpoint-every', 5, environment={**os.environ, 'TMPDIR': str(spare)})
+    wait_for(folder / 'out.ply.checkpoint.safetensors')
+    shutil.rmtree(folder)
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=60)
+    assert process.returncode == 1
+    kept, = spare.iterdir()
+    assert f"the result is in '{kept}'" in stderr.strip().splitlines()[-1]
+    assert json.loads(run('info', kept, '--json').stdout)['count'] > 0
+
+
+def test_a_full_disk_at_a_checkpoint_is_a_note(dataset, tmp_path):
+    def limit():  # A checkpoint is larger, the result smaller: writes beyond fail as on a full disk.
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+    process = start('fit', dataset, tmp_path / 'out.ply', *FEW, '--checkpoint-every', 20, preexec_fn=limit)
+    _, stderr = process.communicate(timeout=60)
+    assert process.returncode == 0, stderr
+    assert stderr.count('note: the checkpoint is not saved') == 1
+    assert [path.name for path in tmp_path.iterdir()] == ['out.ply']
+
+
+def test_checkpoints_that_cannot_be_read_stay_as_they_are(dataset, tmp_path):
+    out = tmp_path / 'out.ply'
+    checkpoint = tmp_path / 'out.ply.checkpoint.safetensors'
+    steps = ('--iterations', 100000, '--gaussians', 300, '--sh-degree', 0)
+    process = start('fit', dataset, out, *steps, '--checkpoint-every', 5)
+    wait_for(checkpoint)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    whole, splats = checkpoint.read_bytes(), out.read_bytes()
+    version = b'"stipple_version":"1.0"'
+    assert version in whole
+    for damaged, text in ((whole[:len(whole) // 2], 'holds'), (whole[:40], 'truncated'), (b'', 'holds 0 bytes'),
+                          (whole.replace(version, version.replace(b'1', b'9')), 'version 9; version 1 is supported')):
+        checkpoint.write_bytes(damaged)
+        line = error('fit', dataset, out, *steps, '--resume')
+        assert checkpoint.name in line and text in line
+        assert (checkpoint.read_bytes(), out.read_bytes()) == (damaged, splats)
+
+
+@pytest.fixture
+def copy(dataset, tmp_path):
+    shutil.copytree(dataset, tmp_path / 'copy')
+    return tmp_path / 'copy'
+
+
+def scene(folder, **changes):
+    path = folder / 'transforms.json'
+    path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+
+
+def write_picture(path, pixel, width=48, height=36):
+    """A PNG in one colour of 8 bits a channel."""
+    def chunk(kind, data):
+        return struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
+    rows = (b'\0' + bytes(pixel) * width) * height
+    header = struct.pack('>IIBBBBB', width, height, 8, 2 if len(pixel) == 3 else 6, 0, 0, 0)
+    path.write_bytes(b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', header) + chunk(b'IDAT', zlib.compress(rows)) +
+                     chunk(b'IEND', b''))
+
+
+def no_camera(folder):
+    scene(folder, frames=[])
+
+
+def missing_picture(folder):
+    (folder / 'images' / '03.png').unlink()
+
+
+def other_size(folder):
+    write_picture(folder / 'images' / '03.png', (9, 9, 9), 40, 36)
+
+
+def black(folder):
+    for path in (folder / 'images').iterdir():
+        write_picture(path, (0, 0, 0))
+
+
+def transparent(folder):
+    for path in (folder / 'images').iterdir():
+        write_picture(path, (0, 0, 0, 0))
+
+
+@pytest.mark.parametrize('damage, text', [
+    (no_camera, 'at least one camera is needed'), (missing_picture, '03.png'),
+    (other_size, '03.png is 40 x 36 pixels; its camera is said to be 48 x 36 pixels'),
+    (black, 'black everywhere'), (transparent, 'transparent everywhere')],
+    ids=lambda value: getattr(value, '__name__', ''))
+def test_one_line_says_what_is_wrong_with_views(copy, tmp_path, damage, text):
+    damage(copy)
+    assert text in error('fit', copy, tmp_path / 'out.ply', *FEW)
+    assert not (tmp_path / 'out.ply').exists()
+
+
+def test_one_view_is_fitted_with_a_note(copy, tmp_path):
+    frames = json.loads((copy / 'transforms.json').read_text())['frames']
+    scene(copy, frames=frames[:1])
+    assert 'note: there is one view' in run('fit', copy, tmp_path / 'out.ply', *FEW).stderr
+    assert (tmp_path / 'out.ply').exists()
+
+
 @pytest.mark.parametrize('arguments, text', [
     (('missing', 'out.ply'), 'missing'),
     (('{dataset}', 'out.txt'), 'out.txt'),
+    (('{dataset}', 'nowhere/out.ply'), 'no folder'),
+    (('{dataset}', 'out.ply', '--report', '/nowhere/r.json'), "no folder '/nowhere'"),
     (('{dataset}', 'out.ply', '--resume'), 'out.ply.checkpoint.safetensors'),
     (('{dataset}', 'out.ply', '--strategy', 'best'), 'adaptive'),
     (('{dataset}', 'out.ply', '--anchors', 100), '--model field'),
