@@ -1,15 +1,18 @@
 // Based on: DeG, density-sampled Gaussians (arXiv 2605.16355), attribute decoder: K Gaussians per
 // anchor. Differs: features on octree levels and a small network in place of a transformer; lengths
-// in units of the anchors' spacing; colours are also read where each Gaussian is.
+// in units of the anchors' spacing; neighbours are an input; details are read where each Gaussian
+// is.
 #include "decode/field_decoder.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
 #include "base/error.h"
 #include "base/parallel.h"
 #include "decode/anchor_spacing.h"
+#include "decode/merge_neighbours.h"
 
 namespace stipple {
 
@@ -21,10 +24,37 @@ constexpr double kMiddleBudget = 11;
 constexpr double kBudgetRange = 3;
 /// log2(spacing sqrt(P)) is near 0 where anchors are spread as on the faces of a cube.
 constexpr double kSpacingRange = 3;
+/// Neighbours farther than this, in units of the spacing, count as at it.
+constexpr double kFarthest = 4;
+/// Details change sizes by no more than a factor of 150, and odds by no more than float32 holds.
+constexpr float kLargestLogScale = 5;
+constexpr float kLargestLogit = 40;
+
+/// Where the neighbours are: on which side more room is left, and which way the surface lies.
+void writeNeighbours(const AnchorSet& anchors, size_t i, float spacing, const uint32_t* neighbours,
+                     float* to) {
+  std::array<double, kNeighbourInputs> sums{};
+  size_t count = 0;
+  for (; count < kSpacingNeighbours && neighbours[count] != kNoPlace; ++count) {
+    std::array<double, 3> d;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const float offset =
+          anchors.positions[neighbours[count] * size_t{3} + axis] - anchors.positions[i * 3 + axis];
+      d[axis] = static_cast<double>(offset / spacing);
+      sums[axis] += d[axis];
+      sums[3 + axis] += d[axis] * d[axis];
+    }
+    for (size_t axis = 0; axis < 3; ++axis) sums[6 + axis] += d[axis] * d[(axis + 1) % 3];
+  }
+  for (const double sum : sums) {
+    const double mean = sum / static_cast<double>(std::max<size_t>(count, 1));
+    *to++ = static_cast<float>(std::clamp(mean, -kFarthest, kFarthest));
+  }
+}
 
 /// The inputs of an anchor behind its features.
 void writeInputs(const FieldParameters& field, const AnchorSet& anchors, size_t i, float spacing,
-                 float* to) {
+                 const uint32_t* neighbours, float* to) {
   // Of the field: a density may end above the leaves.
   const double leaves = std::ldexp(1.0, field.leaf_level);
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -42,6 +72,58 @@ void writeInputs(const FieldParameters& field, const AnchorSet& anchors, size_t 
     const double cell = std::ldexp(1.0, -level.level);
     *to++ = static_cast<float>(cell / (cell + static_cast<double>(spacing)));
   }
+  if (seesNeighbours(field)) writeNeighbours(anchors, i, spacing, neighbours, to);
+}
+
+float scaleFactor(float detail) {
+  return std::exp(std::clamp(detail, -kLargestLogScale, kLargestLogScale));
+}
+
+/// In and out: cloud: in the unit cube.
+void addDetails(const FieldTape& tape, size_t channels, SplatCloud& cloud) {
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) {
+      const float* detail = &tape.details[n * channels];
+      for (size_t c = 0; c < 3; ++c) cloud.sh[n * cloud.shStride() + c] += detail[c];
+      if (channels <= kColourChannels) continue;
+      // logistic(logit(o) + d) without the logit, which 0 and 1 have none of.
+      const float odds =
+          std::exp(std::clamp(detail[kDetailOpacity], -kLargestLogit, kLargestLogit));
+      const float o = cloud.opacities[n];
+      cloud.opacities[n] = o * odds / (1.0f - o + o * odds);
+      const float scale = scaleFactor(detail[kDetailScale]);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        cloud.scales[n * 3 + axis] *= scale;
+        cloud.positions[n * 3 + axis] += tape.footprints[n] * detail[kDetailOffset + axis];
+      }
+    }
+  });
+}
+
+/// Derivatives by the details; those by the scales become derivatives by the scales without them.
+/// Of opacities there is nothing to change: what follows takes them by their logits, which details
+/// are added to. In: side: of the root; cloud in the world, gradient by the unit cube.
+void detailGradient(FieldTape& tape, size_t channels, float side, const SplatCloud& cloud,
+                    SplatCloud& gradient) {
+  tape.detail_gradient.resize(tape.details.size());
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) {
+      float* to = &tape.detail_gradient[n * channels];
+      for (size_t c = 0; c < 3; ++c) to[c] = gradient.sh[n * cloud.shStride() + c];
+      if (channels <= kColourChannels) continue;
+      const float* detail = &tape.details[n * channels];
+      const float o = cloud.opacities[n];
+      to[kDetailOpacity] = gradient.opacities[n] * o * (1.0f - o);
+      const float scale = scaleFactor(detail[kDetailScale]);
+      float by_scale = 0;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        by_scale += gradient.scales[n * 3 + axis] * cloud.scales[n * 3 + axis] / side;
+        gradient.scales[n * 3 + axis] *= scale;
+        to[kDetailOffset + axis] = tape.footprints[n] * gradient.positions[n * 3 + axis];
+      }
+      to[kDetailScale] = std::abs(detail[kDetailScale]) < kLargestLogScale ? by_scale : 0.0f;
+    }
+  });
 }
 
 }  // namespace
@@ -61,7 +143,8 @@ SplatCloud FieldDecoder::decode(const DecodeRequest& request) const {
 
 uint64_t FieldDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const {
   const uint64_t splat = (11 + 3 * shCoefficientCount(field_->layout.sh_degree)) * sizeof(float);
-  const uint64_t gaussian = splat + 4 * sizeof(float);  // centre, footprint
+  // Centre, place, footprint, details.
+  const uint64_t gaussian = splat + (7 + field_->details.channels()) * sizeof(float);
   uint64_t floats = fieldInputWidth(*field_) + 2;
   for (const LinearLayer& layer : field_->network.layers()) floats += 2 * layer.outputs;
   // The search for neighbours: places as double and float, a tree, six numbers.
@@ -85,7 +168,8 @@ void FieldDecoder::forward(const AnchorSet& anchors, FieldTape& tape, SplatCloud
     for (size_t i = begin; i < end; ++i) {
       tape.units[i] = tape.spacing[i] / static_cast<float>(kLatticeSide);
       std::fill_n(&tape.footprints[i * gaussians], gaussians, share * tape.spacing[i]);
-      writeInputs(field, anchors, i, tape.spacing[i], &tape.inputs[i * width + feature_width]);
+      writeInputs(field, anchors, i, tape.spacing[i], &tape.neighbours[i * kSpacingNeighbours],
+                  &tape.inputs[i * width + feature_width]);
     }
   });
   field.features.concatenate({anchors.positions, tape.spacing}, tape.inputs.data(), width);
@@ -94,8 +178,12 @@ void FieldDecoder::forward(const AnchorSet& anchors, FieldTape& tape, SplatCloud
   cloud.antialias = field.antialias;
   activateSplats(field.layout, {anchors.positions, tape.units}, tape.network.output().data(),
                  fieldOutputWidth(field.layout), cloud);
+  tape.places.assign(cloud.positions.begin(), cloud.positions.end());
+  const size_t channels = field.details.channels();
+  tape.details.assign(cloud.size() * channels, 0.0f);
+  field.details.addSum({tape.places, tape.footprints}, tape.details.data(), channels);
+  addDetails(tape, channels, cloud);
   tape.centres.assign(cloud.positions.begin(), cloud.positions.end());
-  field.colours.addSum({tape.centres, tape.footprints}, cloud.sh.data(), cloud.shStride());
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin * 3; i < end * 3; ++i) {
       cloud.positions[i] = static_cast<float>(
@@ -116,10 +204,12 @@ void FieldDecoder::backward(const AnchorSet& anchors, FieldTape& tape, const Spl
       cloud_gradient.scales[i] *= side;
     }
   });
-  const FeaturePlaces centres = {tape.centres, tape.footprints};
-  const float* by_colour = cloud_gradient.sh.data();
-  field.colours.backwardSum(centres, by_colour, cloud.shStride(), gradients.colours);
-  field.colours.addPositionGradient(centres, by_colour, cloud.shStride(), cloud_gradient.positions);
+  detailGradient(tape, field.details.channels(), side, cloud, cloud_gradient);
+  const FeaturePlaces places = {tape.places, tape.footprints};
+  const size_t channels = field.details.channels();
+  field.details.backwardSum(places, tape.detail_gradient.data(), channels, gradients.details);
+  field.details.addPositionGradient(places, tape.detail_gradient.data(), channels,
+                                    cloud_gradient.positions);
   tape.raw_gradient.assign(tape.network.output().size(), 0.0f);
   activateSplatsBackward(field.layout, {anchors.positions, tape.units},
                          tape.network.output().data(), fieldOutputWidth(field.layout), cloud,

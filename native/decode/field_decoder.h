@@ -16,8 +16,11 @@ struct FieldTape {
   std::vector<float> units;          ///< [P] of the layout
   std::vector<float> inputs;         ///< [P, input width]
   MlpTape network;
-  std::vector<float> centres;     ///< [N,3] of the Gaussians, unit cube
+  std::vector<float> places;      ///< [N,3] where details are read, unit cube
   std::vector<float> footprints;  ///< [N] of the Gaussians, unit cube
+  std::vector<float> details;     ///< [N, detail channels]
+  std::vector<float> centres;     ///< [N,3] of the Gaussians, unit cube
+  std::vector<float> detail_gradient;
   std::vector<float> raw_gradient;
   std::vector<float> input_gradient;
 };

@@ -12,13 +12,12 @@ namespace stipple {
 
 namespace {
 
-/// Levels of features and of colours; the finest are those of the leaves.
-constexpr int kFeatureLevels = 6;
-constexpr int kColourLevels = 2;
+/// Of features and of details each.
+constexpr int kGridLevels = 6;
 constexpr size_t kFeatureChannels = 8;
-constexpr size_t kColourChannels = 3;
 constexpr size_t kHidden = 64;
-/// Numbers of the input beside features: place in the leaf 3, budget, spacing.
+/// Numbers of the input beside features, levels and neighbours: place in the leaf 3, budget,
+/// spacing.
 constexpr size_t kOtherInputs = 5;
 /// Vectors of 16 floats are the widest there are.
 constexpr size_t kVector = 16;
@@ -57,12 +56,19 @@ void requireShape(int leaf_level, const SplatLayout& layout, uint64_t least, uin
   require(most <= kMaxAnchorCount, "largest budget", most, "at most 2^28");
 }
 
+/// Cells as wide as places on surfaces are apart, which cover about the cube's own six faces: of
+/// finer ones most are never read twice, and what they learn is noise.
+int finestLevel(uint64_t places, const FieldShape& shape) {
+  const double level = std::ceil(0.5 * std::log2(static_cast<double>(places)));
+  return std::clamp(static_cast<int>(level), 1, shape.leaf_level);
+}
+
 /// Levels that end with `finest`, none below 1; with as many rows as surface cells need there.
-FeatureGrid gridOf(size_t channels, int finest, int level_count, const FieldShape& shape,
-                   float amplitude, uint64_t seed) {
+FeatureGrid gridOf(size_t channels, int finest, const FieldShape& shape, float amplitude,
+                   uint64_t seed) {
   std::vector<int> levels;
   std::vector<uint32_t> rows;
-  for (int level = std::max(1, finest - level_count + 1); level <= finest; ++level) {
+  for (int level = std::max(1, finest - kGridLevels + 1); level <= finest; ++level) {
     // A surface has a quarter of its cells one level above; corners are about twice the cells.
     const double cells =
         2.0 * static_cast<double>(shape.surface_cells) * std::pow(4.0, level - shape.leaf_level);
@@ -76,16 +82,21 @@ FeatureGrid gridOf(size_t channels, int finest, int level_count, const FieldShap
 }  // namespace
 
 uint64_t FieldParameters::bytes() const {
-  uint64_t bytes = features.bytes() + colours.bytes();
+  uint64_t bytes = features.bytes() + details.bytes();
   for (const LinearLayer& layer : network.layers()) {
     bytes += (layer.weights.size() + layer.biases.size()) * sizeof(float);
   }
   return bytes;
 }
 
+bool seesNeighbours(const FieldParameters& field) {
+  return field.details.channels() != kColourChannels;
+}
+
 size_t fieldInputWidth(const FieldParameters& field) {
   const size_t levels = field.features.levels().size();
-  return wholeVectors(levels * field.features.channels() + kOtherInputs + levels);
+  const size_t neighbours = seesNeighbours(field) ? kNeighbourInputs : 0;
+  return wholeVectors(levels * field.features.channels() + kOtherInputs + levels + neighbours);
 }
 
 size_t fieldOutputWidth(const SplatLayout& layout) {
@@ -103,9 +114,10 @@ FieldParameters makeFieldParameters(const FieldShape& shape) {
   field.most_anchors = shape.most_anchors;
   field.colour_space = shape.colour_space;
   field.antialias = shape.antialias;
-  field.features = gridOf(kFeatureChannels, shape.leaf_level, kFeatureLevels, shape,
+  const uint64_t splats = shape.most_anchors * shape.layout.gaussians;
+  field.features = gridOf(kFeatureChannels, finestLevel(shape.most_anchors, shape), shape,
                           kFeatureAmplitude, shape.seed);
-  field.colours = gridOf(kColourChannels, shape.leaf_level, kColourLevels, shape, 0.0f, shape.seed);
+  field.details = gridOf(kDetailChannels, finestLevel(splats, shape), shape, 0.0f, shape.seed);
   const size_t widths[] = {fieldInputWidth(field), kHidden, kHidden,
                            fieldOutputWidth(shape.layout)};
   field.network = Mlp(widths, shape.seed, kLastLayerScale);
@@ -131,7 +143,9 @@ void validate(const FieldParameters& field) {
   require("width of the network's input", field.network.inputWidth(), fieldInputWidth(field));
   require("width of the network's output", field.network.outputWidth(),
           fieldOutputWidth(field.layout));
-  require("count of colour channels", field.colours.channels(), kColourChannels);
+  const size_t channels = field.details.channels();
+  require("count of detail channels", channels,
+          channels == kColourChannels ? kColourChannels : kDetailChannels);
 }
 
 }  // namespace stipple

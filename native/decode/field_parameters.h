@@ -25,6 +25,15 @@ struct FieldShape {
   uint64_t seed = 0;
 };
 
+/// What is read where a Gaussian is: numbers added to its first harmonic (3), the logit of its
+/// opacity and the logarithms of its scales (one for all), and an offset in units of its footprint.
+/// Fields of the first asset files have colours alone.
+constexpr size_t kColourChannels = 3;
+constexpr size_t kDetailOpacity = 3;
+constexpr size_t kDetailScale = 4;
+constexpr size_t kDetailOffset = 5;
+constexpr size_t kDetailChannels = 8;
+
 /// Everything that an attribute field has learned.
 struct FieldParameters {
   RootCube root;
@@ -35,7 +44,7 @@ struct FieldParameters {
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kMip;
   FeatureGrid features;  ///< read where an anchor is; the network's input
-  FeatureGrid colours;   ///< read where a Gaussian is; added to its first harmonic
+  FeatureGrid details;   ///< read where a Gaussian is, [kDetailChannels], or colours alone
   Mlp network;
 
   uint64_t bytes() const;
@@ -44,6 +53,11 @@ struct FieldParameters {
 /// A field that knows nothing: grey Gaussians on a lattice around each anchor, as large as the
 /// anchors' spacing. Errors: kInvalidArgument for a shape out of range.
 FieldParameters makeFieldParameters(const FieldShape& shape);
+
+/// Means of the offsets to an anchor's neighbours and of their products, in units of the spacing.
+constexpr size_t kNeighbourInputs = 9;
+/// Of fields with all details; those with colours alone do not.
+bool seesNeighbours(const FieldParameters& field);
 
 /// Widths of the network's input and output: whole vectors, the rest is 0 and unused.
 size_t fieldInputWidth(const FieldParameters& field);
@@ -55,7 +69,7 @@ void validate(const FieldParameters& field);
 /// Derivatives by all of it. Those of grids are kept by rows, as a step touches few of them.
 struct FieldGradients {
   std::vector<FeatureGradient> features;
-  std::vector<FeatureGradient> colours;
+  std::vector<FeatureGradient> details;
   std::vector<LinearLayer> network;
 };
 

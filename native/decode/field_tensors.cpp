@@ -12,7 +12,8 @@ namespace stipple {
 namespace {
 
 constexpr char kFeatures[] = "field.features.level";
-constexpr char kColours[] = "field.colours.level";
+constexpr char kDetails[] = "field.details.level";
+constexpr char kColours[] = "field.colours.level";  ///< of fields without other details
 constexpr char kNetwork[] = "field.network.layer";
 
 Tensor tensorOf(const std::vector<float>& values, size_t width) {
@@ -61,9 +62,9 @@ TensorTable tensorsOfField(const FieldParameters& field) {
     table[kFeatures + std::to_string(level.level)] =
         tensorOf(level.values, field.features.channels());
   }
-  for (const FeatureLevel& level : field.colours.levels()) {
-    table[kColours + std::to_string(level.level)] =
-        tensorOf(level.values, field.colours.channels());
+  const std::string details = field.details.channels() == kColourChannels ? kColours : kDetails;
+  for (const FeatureLevel& level : field.details.levels()) {
+    table[details + std::to_string(level.level)] = tensorOf(level.values, field.details.channels());
   }
   for (size_t l = 0; l < field.network.layers().size(); ++l) {
     const LinearLayer& layer = field.network.layers()[l];
@@ -77,7 +78,9 @@ TensorTable tensorsOfField(const FieldParameters& field) {
 FieldParameters fieldOfTensors(const TensorTable& table, const FieldParameters& like) {
   FieldParameters field = like;
   field.features = gridOf(table, kFeatures);
-  field.colours = gridOf(table, kColours);
+  const auto first = table.lower_bound(kColours);
+  const bool is_old = first != table.end() && first->first.starts_with(kColours);
+  field.details = gridOf(table, is_old ? kColours : kDetails);
   std::vector<LinearLayer> layers;
   for (size_t l = 0;; ++l) {
     const std::string stem = kNetwork + std::to_string(l);

@@ -5,7 +5,7 @@
 
 namespace stipple {
 
-/// What a field has learned, as named tensors: "field.features.levelL", "field.colours.levelL",
+/// What a field has learned, as named tensors: "field.features.levelL", "field.details.levelL",
 /// "field.network.layerI.weights" and ".biases".
 TensorTable tensorsOfField(const FieldParameters& field);
 

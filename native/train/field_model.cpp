@@ -54,6 +54,10 @@ constexpr double kWarmUpSteps = 100;
 /// Few steps: the second moment must follow within a hundred of them.
 constexpr double kBeta2 = 0.99;
 
+/// Budgets are drawn up to this many times the largest, and held to it: without it, at the end of
+/// the range, the network hears of smaller budgets alone, and the last octave loses.
+constexpr double kReach = 2;
+
 /// Pull of the prior on the density beside the loss, whose mean size per anchor is 1.
 constexpr double kPriorShare = 0.02;
 constexpr uint64_t kDrawWindow = 100;
@@ -278,9 +282,9 @@ class FieldModel final : public FitModel {
           std::min(most, std::max<uint64_t>(1, moment.max_splats / options_.gaussians_per_anchor));
     }
     const double least = static_cast<double>(std::min(options_.least_anchors, most));
+    const double drawn = least * std::pow(kReach * static_cast<double>(most) / least, u);
     AnchorSamplingOptions sampling;
-    sampling.count =
-        static_cast<uint64_t>(std::llround(least * std::pow(static_cast<double>(most) / least, u)));
+    sampling.count = std::min(most, static_cast<uint64_t>(std::llround(drawn)));
     sampling.seed = keyedBits(options_.seed, RandomUse::kAnchorSeed, moment.iteration);
     AnchorSet anchors = sampleAnchors(state_.density, sampling);
     if (!options_.jitter) moveToCentres(anchors);
@@ -368,10 +372,10 @@ class FieldModel final : public FitModel {
       }
     };
     add(field.features, gradients_.features, state_.features);
-    add(field.colours, gradients_.colours, state_.colours);
+    add(field.details, gradients_.details, state_.details);
     sparseAdamStep(tables, step, adam, scratch_);
     for (FeatureGradient& by : gradients_.features) by.clear(field.features.channels());
-    for (FeatureGradient& by : gradients_.colours) by.clear(field.colours.channels());
+    for (FeatureGradient& by : gradients_.details) by.clear(field.details.channels());
   }
 
   void stepDensity(const DensityGradient& gradient, double rate) {

@@ -65,10 +65,10 @@ void forEachFieldArray(State& state, const Visit& visit) {
     visit("field.features.level" + std::to_string(level.level), field.features.channels(),
           level.values, state.features[l]);
   }
-  for (size_t l = 0; l < state.colours.size(); ++l) {
-    auto& level = field.colours.levels()[l];
-    visit("field.colours.level" + std::to_string(level.level), field.colours.channels(),
-          level.values, state.colours[l]);
+  for (size_t l = 0; l < state.details.size(); ++l) {
+    auto& level = field.details.levels()[l];
+    visit("field.details.level" + std::to_string(level.level), field.details.channels(),
+          level.values, state.details[l]);
   }
   for (size_t l = 0; l < state.weights.size(); ++l) {
     auto& layer = field.network.layers()[l];
@@ -97,8 +97,8 @@ FieldState startState(LearnedDensity density, FieldParameters field) {
   for (const FeatureLevel& level : state.field->features.levels()) {
     state.features.push_back(zeros(level.values.size()));
   }
-  for (const FeatureLevel& level : state.field->colours.levels()) {
-    state.colours.push_back(zeros(level.values.size()));
+  for (const FeatureLevel& level : state.field->details.levels()) {
+    state.details.push_back(zeros(level.values.size()));
   }
   for (const LinearLayer& layer : state.field->network.layers()) {
     state.weights.push_back(zeros(layer.weights.size()));

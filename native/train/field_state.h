@@ -25,7 +25,7 @@ struct FieldState {
   std::shared_ptr<FieldParameters> field;
   std::vector<Moments> logits;    ///< per level
   std::vector<Moments> features;  ///< per level
-  std::vector<Moments> colours;   ///< per level
+  std::vector<Moments> details;   ///< per level
   std::vector<Moments> weights;   ///< per layer of the network
   std::vector<Moments> biases;
   uint64_t density_steps = 0;

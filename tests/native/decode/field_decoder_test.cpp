@@ -12,6 +12,7 @@
 #include "base/random.h"
 #include "decode/anchor_spacing.h"
 #include "decode/cloud_loss.h"
+#include "decode/field_tensors.h"
 
 namespace stipple {
 namespace {
@@ -46,7 +47,7 @@ FieldShape smallShape(uint32_t gaussians, int sh_degree) {
   return shape;
 }
 
-/// A field whose features and colours are not small, so that all of it matters.
+/// A field whose features and details are not small, so that all of it matters.
 FieldParameters livelyField(uint32_t gaussians, int sh_degree) {
   FieldParameters field = makeFieldParameters(smallShape(gaussians, sh_degree));
   uint64_t number = 0;
@@ -58,15 +59,16 @@ FieldParameters livelyField(uint32_t gaussians, int sh_degree) {
     }
   };
   fill(field.features, 2.0f);
-  // Colours rise evenly along each axis: between cells they have no kinks, which would keep
+  // Details rise evenly along each axis: between cells they have no kinks, which would keep
   // differences from being derivatives.
-  FeatureLevel& colours = field.colours.levels()[0];
-  const size_t side = (size_t{1} << colours.level) + 1;
-  EXPECT_EQ(colours.row_count, side * side * side);
-  for (size_t i = 0; i < colours.values.size(); ++i) {
-    const size_t row = i / 3;
+  FeatureLevel& details = field.details.levels()[0];
+  const size_t side = (size_t{1} << details.level) + 1;
+  EXPECT_EQ(details.row_count, side * side * side);
+  const size_t channels = field.details.channels();
+  for (size_t i = 0; i < details.values.size(); ++i) {
+    const size_t row = i / channels;
     const size_t place[] = {row % side, row / side % side, row / side / side};
-    colours.values[i] = 0.1f * static_cast<float>(place[i % 3]);
+    details.values[i] = 0.1f * static_cast<float>(place[i % channels % 3]);
   }
   for (float& weight : field.network.layers().back().weights) weight *= 5.0f;
   return field;
@@ -193,9 +195,69 @@ TEST(FieldDecoder, GradientsAreThoseOfDifferences) {
     }
   };
   compareGrid(field.features, gradients.features, "feature");
-  compareGrid(field.colours, gradients.colours, "colour");
+  compareGrid(field.details, gradients.details, "detail");
   EXPECT_GT(compared, 300u);
   EXPECT_GT(largest, 1.0);
+}
+
+/// One channel of the details of a field that knows nothing else.
+SplatCloud withDetail(size_t channel, float value) {
+  auto field = std::make_shared<FieldParameters>(makeFieldParameters(smallShape(4, 0)));
+  for (FeatureLevel& level : field->details.levels()) {
+    if (level.level != field->details.levels()[0].level) continue;
+    for (size_t i = channel; i < level.values.size(); i += kDetailChannels) level.values[i] = value;
+  }
+  const AnchorSet anchors = planeAnchors(5, 2);
+  DecodeRequest request;
+  request.anchors = &anchors;
+  request.gaussians_per_anchor = 4;
+  return FieldDecoder(field).decode(request);
+}
+
+TEST(FieldDecoder, DetailsChangeWhatTheyStandFor) {
+  const SplatCloud plain = withDetail(0, 0.0f);
+  const SplatCloud coloured = withDetail(1, 0.5f);
+  const SplatCloud clear = withDetail(kDetailOpacity, -3.0f);
+  const SplatCloud small = withDetail(kDetailScale, -1.0f);
+  const SplatCloud moved = withDetail(kDetailOffset + 2, 0.25f);
+  for (size_t n = 0; n < plain.size(); ++n) {
+    // The coarsest level counts nearly whole: its cells of a half are far wider than a footprint.
+    const float share = (coloured.sh[n * 3 + 1] - plain.sh[n * 3 + 1]) / 0.5f;
+    EXPECT_GT(share, 0.97f);
+    EXPECT_LE(share, 1.0f + 1e-5f);
+    EXPECT_EQ(coloured.sh[n * 3], plain.sh[n * 3]);
+    const float odds = std::exp(-3.0f * share) * plain.opacities[n] / (1 - plain.opacities[n]);
+    EXPECT_NEAR(clear.opacities[n], odds / (1 + odds), 1e-5f);
+    EXPECT_EQ(clear.positions[n * 3], plain.positions[n * 3]);
+    EXPECT_NEAR(small.scales[n * 3] / plain.scales[n * 3], std::exp(-share), 1e-4f);
+    EXPECT_GT(moved.positions[n * 3 + 2], plain.positions[n * 3 + 2]);
+    EXPECT_EQ(moved.positions[n * 3 + 1], plain.positions[n * 3 + 1]);
+  }
+}
+
+/// What the first asset files hold: colours alone, and a network that does not see neighbours.
+TEST(FieldDecoder, TakesFieldsWithColoursAlone) {
+  FieldParameters field = livelyField(4, 0);
+  const TensorTable whole = tensorsOfField(field);
+  EXPECT_EQ(whole.count("field.details.level5"), 1u);
+  std::vector<FeatureLevel> levels = field.details.levels();
+  for (FeatureLevel& level : levels) level.values.assign(level.row_count * kColourChannels, 0.5f);
+  field.details = FeatureGrid(kColourChannels, levels);
+  const size_t widths[] = {fieldInputWidth(field), 16, fieldOutputWidth(field.layout)};
+  field.network = Mlp(widths, 1, 1.0f);
+  const TensorTable table = tensorsOfField(field);
+  EXPECT_EQ(table.count("field.colours.level5"), 1u);
+  EXPECT_EQ(table.count("field.details.level5"), 0u);
+  auto read = std::make_shared<FieldParameters>(fieldOfTensors(table, field));
+  EXPECT_FALSE(seesNeighbours(*read));
+  const AnchorSet anchors = planeAnchors(5, 4);
+  DecodeRequest request;
+  request.anchors = &anchors;
+  request.gaussians_per_anchor = 4;
+  const SplatCloud cloud = FieldDecoder(read).decode(request);
+  EXPECT_NO_THROW(validate(cloud, "cloud"));
+  read->details = FeatureGrid(5, {});
+  EXPECT_THROW(validate(*read), Error);
 }
 
 TEST(FieldDecoder, HasTheSameBitsForAnyNumberOfThreads) {

@@ -246,7 +246,7 @@ TEST(FieldModel, ItsResultDecodesWithoutIt) {
     const FieldResult result = *fieldResult(*model);
     // As an asset keeps it: tensors, and everything else apart.
     FieldParameters bare = *result.field;
-    bare.features = bare.colours = FeatureGrid();
+    bare.features = bare.details = FeatureGrid();
     bare.network = Mlp();
     const auto field =
         std::make_shared<FieldParameters>(fieldOfTensors(tensorsOfField(*result.field), bare));
@@ -286,8 +286,8 @@ TEST(FieldModel, RefusesTensorsOfAnotherField) {
   EXPECT_THAT(messageOf(table), ::testing::HasSubstr("its shape needs 16"));
   table = good;
   for (int level = 0; level < 12; ++level)
-    table.erase("field.colours.level" + std::to_string(level));
-  EXPECT_THAT(messageOf(table), ::testing::HasSubstr("no tensor field.colours.level"));
+    table.erase("field.details.level" + std::to_string(level));
+  EXPECT_THAT(messageOf(table), ::testing::HasSubstr("no tensor field.details.level"));
 }
 
 TEST(FieldModel, HasTheSameBitsForAnyNumberOfThreads) {
@@ -330,8 +330,8 @@ TEST(FieldModel, RefusesStatesThatAreNotItsOwn) {
   table["octree.level0.cells"].values = std::vector<float>{0.0f};
   EXPECT_THAT(messageOf(table), ::testing::HasSubstr("another type"));
   table = good;
-  std::get<std::vector<float>>(table["field.features.level6"].values)[3] = std::nanf("");
-  EXPECT_THAT(messageOf(table), ::testing::HasSubstr("field.features.level6"));
+  std::get<std::vector<float>>(table["field.features.level5"].values)[3] = std::nanf("");
+  EXPECT_THAT(messageOf(table), ::testing::HasSubstr("field.features.level5"));
 }
 
 TEST(FieldModel, RefusesOptionsOutOfRange) {
