@@ -6,7 +6,7 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
                        PointerProperty, StringProperty)
 
 from . import version
-from .scene import fit_proposal, fitting, photo_cameras, sequences, sync
+from .scene import fit_proposal, fitting, photo_cameras, sequences, strategies, sync
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
 _CHANGEABLE = {'ANIMATABLE'}
@@ -159,8 +159,9 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                                ('FIELD', "Density Field", "A density of anchors, which decodes at any budget")),
                         options=set())
     strategy: EnumProperty(name="Strategy", description="How splats are added and removed while they are fitted",
-                           items=(('adaptive', "Adaptive", "Clones small and splits large splats where the picture "
-                                   "still moves them (Kerbl and others, 2023)"),), options=set())
+                           items=strategies.strategy_items, default=0, options=set())
+    parts: EnumProperty(name="Parts", description="What the strategy does beside, or instead of its own way",
+                        items=strategies.part_items, options={'ENUM_FLAG'})
     density_gradient: BoolProperty(name="Learn Density", description="Move anchors to where they help the picture "
                                    "most", default=True, options=set())
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,

@@ -233,3 +233,23 @@ def test_messages(ball, stipple):
     settings(views_from='RIG', dataset='')
     refuses(bpy.ops.stipple.splats_fit, 'no mesh')
     assert not bpy.data.objects
+
+
+def test_strategies_and_parts_are_those_of_the_library(stipple, ball, fitting):
+    strategies = importlib.import_module('.scene.strategies', stipple.__name__)
+    native = importlib.import_module('.binding.strategies', stipple.__name__)
+    library = stipple.scene.sources.context().library
+    assert [item[0] for item in strategies.part_items()] == [entry.name for entry in native.strategy_parts(library)]
+    names = [item[0] for item in strategies.strategy_items()]
+    assert names[0] == 'adaptive' and 'learned_density' not in names
+    assert len({item[3] for item in strategies.strategy_items()}) == len(names)
+
+    chosen = settings(strategy='improved', parts={'opacity_correction'})
+    assert strategies.text_of(chosen) == 'improved+opacity_correction'
+    problem = strategies.problem(strategies.text_of(chosen))
+    assert 'opacity_correction does not go with long_axis_split' in problem
+    with pytest.raises(RuntimeError, match='does not go with'):
+        bpy.ops.stipple.splats_fit()
+    chosen.parts = {'growth_control'}
+    assert strategies.problem(strategies.text_of(chosen)) is None
+    assert fitted().data.stipple.source_count <= 2000

@@ -5,7 +5,7 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..jobs import JobOperator
-from ..scene import densifying, edits, fitting, masks, sources, splat_data, sync
+from ..scene import densifying, edits, fitting, masks, sources, splat_data, strategies, sync
 
 
 class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
@@ -35,10 +35,12 @@ class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
         self._object = context.object
         edits.refuse_sequence(self._object)
         settings = context.scene.stipple.fit
+        strategy = self.strategy or strategies.text_of(settings)
+        strategies.require(strategy)
         objects = [] if settings.views_from == 'DATASET' else fitting.seen_objects(context)
         cloud = sources.full_cloud(self._object.data)
         self._count = cloud.info().count
-        chosen = {'strategy': self.strategy or settings.strategy, 'event_count': self.events,
+        chosen = {'strategy': strategy, 'event_count': self.events,
                   'max_splats': self.max_splats, 'seed': settings.seed}
         return densifying.DensifyTask(context, objects, settings, self._object, cloud, chosen)
 

@@ -6,7 +6,7 @@ import textwrap
 import bpy
 
 from ..operators import show_report
-from ..scene import fit_proposal, fitting, splat_data
+from ..scene import fit_proposal, fitting, splat_data, strategies
 
 
 class _FitPanel:
@@ -67,7 +67,7 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
         if settings.model == 'FIELD':
             layout.prop(settings, 'density_gradient')
         else:
-            layout.prop(settings, 'strategy')
+            _draw_strategy(layout, context, settings)
         layout.prop(settings, 'seed')
         layout.prop(settings, 'report')
 
@@ -86,6 +86,21 @@ class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):
         layout.enabled = not fitting.state.is_running
         layout.label(text=f"Splats of '{context.object.name}', with the views above")
         layout.operator('stipple.splats_densify', icon='OUTLINER_DATA_POINTCLOUD')
+
+
+def _draw_strategy(layout, context, settings):
+    layout.prop(settings, 'strategy')
+    sentence = strategies.summary(settings.strategy)
+    if sentence:
+        _draw_text(layout, context, sentence)
+    column = layout.column(align=True)
+    column.use_property_split = False
+    for name, title, _sentence, _bit in strategies.part_items():
+        is_chosen = name in settings.parts
+        column.prop_enum(settings, 'parts', name, text=title, icon='CHECKBOX_HLT' if is_chosen else 'CHECKBOX_DEHLT')
+    problem = strategies.problem(strategies.text_of(settings))
+    if problem:
+        _draw_problem(layout, context, problem)
 
 
 def _draw_views(layout, settings):
@@ -174,11 +189,16 @@ def _draw_rows(layout, rows):
 
 
 def _draw_problem(layout, context, problem):
+    _draw_text(layout, context, problem, 'ERROR')
+
+
+def _draw_text(layout, context, text, icon='NONE'):
     """Whole, in as many lines as it takes."""
-    characters = max(20, int(context.region.width / context.preferences.system.ui_scale / 7) - 4)
+    width = int(context.region.width / context.preferences.system.ui_scale / 7) - 4
+    characters = max(16, width if icon == 'NONE' else width - 4)
     column = layout.column(align=True)
-    for i, line in enumerate(textwrap.wrap(problem, characters)):
-        column.label(text=line, icon='ERROR' if i == 0 else 'BLANK1')
+    for i, line in enumerate(textwrap.wrap(text, characters)):
+        column.label(text=line, icon=icon if i == 0 or icon == 'NONE' else 'BLANK1')
 
 
 def duration(seconds):

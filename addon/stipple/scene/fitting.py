@@ -11,7 +11,7 @@ from ..binding import cloud_edit
 from ..binding.fit import Fit, fit_options
 from ..binding.model import DecodeSettings, Model
 from ..binding.structs import FitModel, FitQuality, JobState
-from . import fit_proposal, fit_reports, frames, meshes, photo_cameras, sources
+from . import fit_proposal, fit_reports, frames, meshes, photo_cameras, sources, strategies
 from .view_task import VIEWS_END, ViewTask
 
 # Share of the whole in the progress bar until the fit ends.
@@ -58,6 +58,8 @@ class FitTask(ViewTask):
     """cancel() while it fits ends with the best so far."""
 
     def __init__(self, context, objects, settings, path):
+        if settings.model == 'EXPLICIT':
+            strategies.require(strategies.text_of(settings))
         super().__init__(context, objects, settings)
         self._path = path
         self._frame = self._frame_of_views()
@@ -101,7 +103,7 @@ class FitTask(ViewTask):
         settings = self._settings
         chosen = {'density_gradient': int(settings.density_gradient), 'seed': settings.seed}
         if settings.model == 'EXPLICIT':
-            chosen.update(max_splats=settings.max_splats, strategy=settings.strategy)
+            chosen.update(max_splats=settings.max_splats, strategy=strategies.text_of(settings))
         if not settings.view_dependent:
             chosen['sh_degree'] = 0
         options = fit_options(self._native.library, FitModel[settings.model], FitQuality[settings.quality], **chosen)
