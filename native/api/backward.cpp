@@ -20,7 +20,8 @@ using namespace stipple::api;
 
 namespace {
 
-/// The caller's buffers, each for the array of kGradientArrays in its place.
+/// The caller's buffers, each for the array of kGradientArrays in its place. What comes after
+/// those is for density control alone.
 constexpr float* StippleSplatGradients::*kBuffers[] = {
     &StippleSplatGradients::positions,
     &StippleSplatGradients::rotations,
@@ -35,7 +36,7 @@ constexpr float* StippleSplatGradients::*kBuffers[] = {
     &StippleSplatGradients::screen_gradient_norms,
     &StippleSplatGradients::errors,
     &StippleSplatGradients::largest_errors};
-static_assert(std::size(kBuffers) == std::size(kGradientArrays));
+static_assert(kGradientArrays[std::size(kBuffers) - 1].values == &SplatGradients::largest_errors);
 
 using Buffers = std::vector<StippleSplatGradients>;
 

@@ -9,6 +9,7 @@
 
 #include "base/random.h"
 #include "data/tensor_table.h"
+#include "densify/splat_filter.h"
 #include "densify/strategy.h"
 
 namespace stipple {
@@ -98,10 +99,12 @@ class ControlPart {
   /// Changes splats that a fit begins with (not those of a cloud that is densified).
   virtual void prepare(RawSplats&) const {}
   virtual void adjustRates(LearningRates&) const {}
-  /// kParameterisation or kFilter.
+  /// kParameterisation.
   virtual std::vector<ExtraParameter> parameters() const { return {}; }
   virtual std::vector<std::vector<float>> initialExtras(const RawSplats&) const { return {}; }
   virtual const Parameterisation* parameterisation() const { return nullptr; }
+  /// kFilter.
+  virtual const SplatFilter* filter() const { return nullptr; }
 
   // ---- every iteration
   // ---------------------------------------------------------------------------
@@ -129,15 +132,21 @@ class ControlPart {
                                     std::span<const Candidate>) {
     return {};
   }
-  /// kChildren: what all of these become. Out: rows that are appended; the order is the part's. The
-  /// parents of those that are replaced go. A part that changes copies to replacements, or the
-  /// other way round, says so in the candidates.
+  /// kScore: copies and replacements get room in proportion to their numbers, before either is
+  /// drawn.
+  virtual bool drawsByKind() const { return false; }
+  /// kChildren: what all of these become. Out: rows that are appended, copies first, in the order
+  /// of their candidates; the rest in an order of the part's. The parents of those that are
+  /// replaced go. A part that changes copies to replacements, or the other way round, says so in
+  /// the candidates.
   virtual RawSplats children(const ControlMoment&, const RawSplats&, std::span<Candidate>) {
     return {};
   }
   /// kChildOpacity without kChildren: new logits of a parent and of its copy, or of two children
   /// that replace it.
   virtual float childLogit(float parent_logit) const { return parent_logit; }
+  /// kChildOpacity: children that replace their parent keep its opacity.
+  virtual bool changesCopiesAlone() const { return false; }
   /// kGrowth: how many splats there may be after this event, beside the hard cap.
   virtual uint64_t limit(const ControlMoment&, uint64_t /*count*/) { return UINT64_MAX; }
   /// kMultiplication with kChildren: the whole of it. In: room: splats that there may be at most.

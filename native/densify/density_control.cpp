@@ -55,7 +55,13 @@ void requireUse(const char* name, const ControlAssembly& assembly) {
 class DensityControl final : public Strategy {
  public:
   DensityControl(const char* name, ControlAssembly assembly)
-      : name_(name), schedule_(assembly.schedule), parts_(std::move(assembly.parts)) {}
+      : name_(name), schedule_(assembly.schedule), parts_(std::move(assembly.parts)) {
+    const ControlPart* how = owner(ControlRole::kParameterisation);
+    const ControlPart* filtering = owner(ControlRole::kFilter);
+    if (filtering) {
+      filtered_.emplace(how ? how->parameterisation() : nullptr, *filtering->filter());
+    }
+  }
 
   const char* name() const override { return name_.c_str(); }
 
@@ -75,6 +81,7 @@ class DensityControl final : public Strategy {
     return part ? part->initialExtras(splats) : std::vector<std::vector<float>>{};
   }
   const Parameterisation* parameterisation() const override {
+    if (filtered_) return &*filtered_;
     const ControlPart* part = owner(ControlRole::kParameterisation);
     return part ? part->parameterisation() : nullptr;
   }
@@ -304,13 +311,9 @@ class DensityControl final : public Strategy {
     if (room == UINT64_MAX) return order;
     if (ControlPart* part = owner(ControlRole::kScore)) {
       const std::vector<double> weights = part->score(moment, splats, candidates);
-      std::vector<uint32_t> rows(candidates.size());
-      for (size_t k = 0; k < rows.size(); ++k) rows[k] = static_cast<uint32_t>(k);
       const size_t most = static_cast<size_t>(
           std::min<uint64_t>(candidates.size(), room > count ? room - count : 0));
-      const std::vector<uint32_t> drawn =
-          drawWithoutReplacement(moment, RandomUse::kDensifyChoice, rows, weights, most);
-      return {drawn.begin(), drawn.end()};
+      return drawn(moment, candidates, weights, most, part->drawsByKind());
     }
     std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
       return candidates[a].strength > candidates[b].strength;
@@ -318,11 +321,39 @@ class DensityControl final : public Strategy {
     return order;
   }
 
+  /// Places of candidates, by their weights.
+  static std::vector<size_t> drawn(const ControlMoment& moment,
+                                   const std::vector<Candidate>& candidates,
+                                   const std::vector<double>& weights, size_t most, bool by_kind) {
+    std::vector<size_t> places;
+    for (const bool replaces : {false, true}) {
+      std::vector<uint32_t> rows;
+      std::vector<double> own;
+      for (size_t k = 0; k < candidates.size(); ++k) {
+        if (by_kind && candidates[k].replaces != replaces) continue;
+        rows.push_back(static_cast<uint32_t>(k));
+        own.push_back(weights[k]);
+      }
+      if (rows.empty()) continue;
+      for (const uint32_t row : drawWithoutReplacement(moment, RandomUse::kDensifyChoice, rows, own,
+                                                       most * rows.size() / candidates.size())) {
+        places.push_back(row);
+      }
+      if (!by_kind) break;
+    }
+    return places;
+  }
+
   void setChildOpacities(const RawSplats& splats, const std::vector<Candidate>& chosen,
                          const ControlPart& children, SplatEdit& edit) const {
     const ControlPart* part = owner(ControlRole::kChildOpacity);
     if (!part || part == &children) return;
-    for (float& logit : edit.append.logits) logit = part->childLogit(logit);
+    const size_t copied = static_cast<size_t>(
+        std::count_if(chosen.begin(), chosen.end(), [](const auto& one) { return !one.replaces; }));
+    const size_t changed = part->changesCopiesAlone() ? copied : edit.append.size();
+    for (size_t k = 0; k < changed; ++k) {
+      edit.append.logits[k] = part->childLogit(edit.append.logits[k]);
+    }
     RowWrite write;
     write.array = RawArray::kLogits;
     for (const Candidate& one : chosen) {
@@ -357,6 +388,7 @@ class DensityControl final : public Strategy {
   std::string name_;
   EventSchedule schedule_;
   std::vector<std::unique_ptr<ControlPart>> parts_;
+  std::optional<FilteredParameterisation> filtered_;  ///< where a part filters
   std::vector<float> births_;  ///< [N] iteration in which each splat was made
   uint64_t last_iteration_ = 0;
 };

@@ -17,9 +17,12 @@ enum class Statistic : uint32_t {
   kScreenGradientNorms = 5,
   kErrors = 6,
   kLargestErrors = 7,
+  kCoveredPixels = 8,
+  kCoveredErrors = 9,
+  kCoveredDistances = 10,
 };
 
-constexpr size_t kStatisticCount = 8;
+constexpr size_t kStatisticCount = 11;
 
 /// Which of them a pass shall gather; each costs time only where it is asked for. Pictures have the
 /// size of the view.
@@ -28,13 +31,17 @@ struct StatisticRequest {
   bool blending_weights = false;
   bool screen_gradients = false;           ///< signed ones: next to nothing beside the pass itself
   bool absolute_screen_gradients = false;  ///< and lengths
+  bool covered = false;                    ///< pixels and distances, and errors where there are any
   std::vector<float> contribution_weights = {};  ///< [H,W] >= 0; empty: 1
   std::vector<float> edge_weights = {};          ///< [H,W] not empty: edge weights are gathered
   std::vector<float> errors = {};                ///< [H,W] not empty: errors are gathered
+  /// Instead of `errors`: those of structure, 1 - SSIM of the picture and the view's target, mean
+  /// of the channels, times what a mask says.
+  bool structure_errors = false;
 
   bool any() const {
     return contributions || blending_weights || screen_gradients || absolute_screen_gradients ||
-           !edge_weights.empty() || !errors.empty();
+           structure_errors || covered || !edge_weights.empty() || !errors.empty();
   }
 };
 

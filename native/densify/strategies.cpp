@@ -11,6 +11,7 @@
 #include "densify/adaptive.h"
 #include "densify/direction.h"
 #include "densify/edge_aware_score.h"
+#include "densify/filter_3d.h"
 #include "densify/frequency.h"
 #include "densify/growth_control.h"
 #include "densify/improved.h"
@@ -20,6 +21,8 @@
 #include "densify/multi_step_update.h"
 #include "densify/opacity_correction.h"
 #include "densify/recovery_pruning.h"
+#include "densify/revised.h"
+#include "densify/taming.h"
 #include "densify/volumetric.h"
 
 namespace stipple {
@@ -69,6 +72,10 @@ constexpr StrategyMaker kStrategies[] = {
      mcmcControl},
     {{"metropolis", "Tries new splats where pictures are wrong and keeps them where there is room"},
      metropolisControl},
+    {{"taming", "Spends a budget of splats on those that matter most to the pictures"},
+     tamingControl},
+    {{"revised", "Multiplies the splats that show what pictures get wrong, at a steady pace"},
+     revisedControl},
 };
 
 std::unique_ptr<ControlPart> edgeAwareScore(StrategySettings& settings) {
@@ -123,6 +130,9 @@ constexpr PartMaker kParts[] = {
      multiStepUpdate},
     {{"opacity_correction", "Keeps copies together as opaque as the splat that they came from"},
      opacityCorrection},
+    {{"filter_3d",
+      "Makes no splat finer than the pictures can show, so that zooming in stays smooth"},
+     filter3d},
 };
 
 template <typename Maker>

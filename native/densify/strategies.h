@@ -46,8 +46,9 @@ const std::vector<std::string>& strategyNames();
 /// A strategy with the settings of its publication, and parts beside or instead of its own:
 /// "adaptive", "adaptive+long_axis_split+growth_control", "improved(threshold=0.0002)". A part
 /// takes the place of the strategy's own that decides the same. Errors: kInvalidArgument for a
-/// strategy, part or setting that is not there (the message says which are), a strategy of fields, a
-/// part that is named twice, and one that does not go with another (says which, and what both decide).
+/// strategy, part or setting that is not there (the message says which are), a strategy of fields,
+/// a part that is named twice, and one that does not go with another (says which, and what both
+/// decide).
 std::unique_ptr<Strategy> makeStrategy(const std::string& text);
 
 }  // namespace stipple

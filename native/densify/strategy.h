@@ -94,8 +94,8 @@ class Parameterisation {
   virtual ~Parameterisation() = default;
   /// Out: cloud, of as many splats, where the usual activation has already written.
   virtual void activate(const RawSplats& raw, SplatCloud& cloud) const = 0;
-  /// In: derivatives by the stored values of the cloud. Out: by_raw, where the usual derivatives
-  /// stand already and those of extras are 0.
+  /// In: derivatives by the stored values of the cloud, which it may change. Out: by_raw, where the
+  /// usual derivatives stand already and those of extras are 0.
   virtual void adjoint(const RawSplats& raw, const SplatCloud& cloud, const CloudGradient& by_cloud,
                        RawSplats& by_raw) const = 0;
 };
@@ -106,6 +106,7 @@ struct ViewStatistics {
   uint32_t width = 0;   ///< pixels
   uint32_t height = 0;  ///< pixels
   const Camera* camera = nullptr;
+  double loss = 0;  ///< of the picture against its target, where ViewEvaluator tells
   /// [N] 1 where the splat passed culling; what densification papers call visible.
   std::span<const uint8_t> visible;
   /// Of a statistic that was asked for; empty for the others.
@@ -179,7 +180,8 @@ class Strategy {
   /// After the step: small changes of numbers (noise), as writes.
   virtual std::optional<SplatEdit> afterStep(const FitMoment&, const SplatStore&) { return {}; }
 
-  /// Before an edit: looks at further views. Called where wantsSweep says so.
+  /// Before an edit: looks at further views. Called where wantsSweep says so. It may change how the
+  /// parameterisation makes splats.
   virtual bool wantsSweep(const FitMoment&) const { return false; }
   virtual void sweep(const FitMoment&, ViewEvaluator&) {}
 

@@ -55,6 +55,9 @@ enum BackwardField : size_t {
   kFieldNorm,
   kFieldError,
   kFieldLargestError,  ///< a maximum, not a sum
+  kFieldPixels,        ///< that show the splat
+  kFieldPixelErrors,   ///< their errors, without weights
+  kFieldDistances,     ///< of theirs from the centre, pixels
   kStatisticsFieldCount,
   kMostFields,  ///< with depth
 };
@@ -159,6 +162,12 @@ void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardWan
   sums[kFieldNorm] += lengthOf(std::abs(by_x), std::abs(by_y));
   sums[kFieldError] += weight * loss.error;
   sums[kFieldLargestError] = std::max(sums[kFieldLargestError], weight * loss.error);
+
+  const T dx = splat.g0 / splat.l00;
+  const T dy = (splat.g1 - splat.l10 * dx) / splat.l11;
+  sums[kFieldPixels] += T(1);
+  sums[kFieldPixelErrors] += loss.error;
+  sums[kFieldDistances] += lengthOf(std::abs(dx), std::abs(dy));
 }
 
 }  // namespace stipple

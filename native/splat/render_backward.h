@@ -19,6 +19,9 @@ struct BackwardInput {
   /// [H,W,4] dL/d(premultiplied R, G, B, alpha) of RenderResult::colour. With a background the
   /// alpha of the picture is constant, so its derivative counts for nothing.
   std::span<const float> colour_gradient;
+  /// dL/d(coverage) of every pixel, coverage being 1 minus the transmittance behind its last splat:
+  /// beside the derivative by alpha, and also where a background makes alpha constant.
+  double coverage_gradient = 0;
   /// [H,W,3] picture minus target in the blending space, before any clamp. Not empty: leave-one-out
   /// contributions are wanted.
   std::span<const float> residual;
@@ -32,6 +35,9 @@ struct BackwardInput {
   bool with_screen_gradients = false;  ///< signed ones: they cost next to nothing
   /// Absolute screen gradients and lengths, whose sums over pixels each pixel has to add to.
   bool with_absolute_screen_gradients = false;
+  /// What the pixels that show a splat are, each counting alike: covered pixels and distances, and
+  /// covered errors where there are errors.
+  bool with_covered = false;
   /// [H,W] dL/d(expected depth), per metre, of RenderResult::depth. Empty: the loss does not depend
   /// on it. Where nothing covers a pixel it counts for nothing. The median depth is that of one
   /// splat, chosen by a threshold: a step function of everything else, so it has no derivative
@@ -59,6 +65,9 @@ struct SplatGradients {
   std::vector<float> screen_gradient_norms;      ///< [N] sum over pixels of the length
   std::vector<float> errors;                     ///< [N] sum of error times T alpha
   std::vector<float> largest_errors;             ///< [N] largest error times T alpha of one pixel
+  std::vector<float> covered_pixels;             ///< [N] that show the splat
+  std::vector<float> covered_errors;             ///< [N] sum of their errors, without weights
+  std::vector<float> covered_distances;          ///< [N] sum of theirs from its centre, pixels
 };
 
 /// Every array of SplatGradients.
@@ -81,7 +90,10 @@ inline constexpr GradientArray kGradientArrays[] = {
     {"absolute_screen_gradients", &SplatGradients::absolute_screen_gradients, 2, true},
     {"screen_gradient_norms", &SplatGradients::screen_gradient_norms, 1, true},
     {"errors", &SplatGradients::errors, 1, true},
-    {"largest_errors", &SplatGradients::largest_errors, 1, true}};
+    {"largest_errors", &SplatGradients::largest_errors, 1, true},
+    {"covered_pixels", &SplatGradients::covered_pixels, 1, true},
+    {"covered_errors", &SplatGradients::covered_errors, 1, true},
+    {"covered_distances", &SplatGradients::covered_distances, 1, true}};
 
 struct BackwardResult {
   /// One per instance, in their order. Those of a cloud that is placed twice are to be added.

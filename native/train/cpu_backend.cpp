@@ -31,7 +31,7 @@ constexpr const GradientArray* kStatistics =
     std::find_if(std::begin(kGradientArrays), std::end(kGradientArrays),
                  [](const GradientArray& array) { return array.is_statistic; });
 static_assert(std::end(kGradientArrays) - kStatistics ==
-              static_cast<ptrdiff_t>(Statistic::kLargestErrors) + 1);
+              static_cast<ptrdiff_t>(kStatisticCount));
 
 /// Arrays of one checkpoint, which must belong together.
 void requireLike(const RawSplats& splats, const RawSplats& others, const char* what) {
@@ -172,17 +172,23 @@ class CpuBackend final : public RenderBackend {
       input.residual_weights = request.contribution_weights;
     }
     input.edge_weights = request.edge_weights;
-    input.errors = request.errors;
+    input.errors = errorsOf(request);
     input.with_blending_weights = request.blending_weights;
     input.with_screen_gradients = request.screen_gradients;
     input.with_absolute_screen_gradients = request.absolute_screen_gradients;
+    input.with_covered = request.covered;
+    double regularisation = 0;
+    const double light = regulariser ? regulariser->transmittanceWeight() : 0;
+    if (light != 0) {
+      regularisation = light * meanTransmittance();
+      input.coverage_gradient = -light / static_cast<double>(picture_.transmittance.size());
+    }
     stage_ = Stage::kLoss;
     const Lent lent(*this);
     renderBackward(workspace_, picture_, input, backward_workspace_, gradients_, UINT64_MAX,
                    progress);
     SplatGradients& by = gradients_.instances[0];
-    double regularisation = 0;
-    if (regulariser) regularisation = regulariser->evaluate(cloud_, spansOf(by));
+    if (regulariser) regularisation += regulariser->evaluate(cloud_, spansOf(by));
     if (how_) {
       throughActivations(held_.splats, cloud_, *how_, by, by_raw_);
     } else {
@@ -365,6 +371,30 @@ class CpuBackend final : public RenderBackend {
       });
     }
     are_kept_ = true;
+  }
+
+  std::span<const float> errorsOf(const StatisticRequest& request) const {
+    if (!request.structure_errors) return request.errors;
+    if (!request.errors.empty()) {
+      fail(ErrorCode::kInvalidArgument,
+           "both errors and structure errors are asked for; one of them is allowed");
+    }
+    const std::span<const float> errors = image_loss_.structureErrors();
+    if (errors.empty()) {
+      fail(ErrorCode::kInvalidArgument,
+           "structure errors are asked for; the loss must be one with structure errors");
+    }
+    return errors;
+  }
+
+  double meanTransmittance() const {
+    if (picture_.transmittance.empty()) {
+      fail(ErrorCode::kInvalidArgument,
+           "the loss has the mean transmittance; the picture must be drawn with it");
+    }
+    double sum = 0;
+    for (const float value : picture_.transmittance) sum += static_cast<double>(value);
+    return sum / static_cast<double>(picture_.transmittance.size());
   }
 
   void subtractTarget() {

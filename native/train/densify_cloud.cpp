@@ -47,6 +47,7 @@ class CloudDensifier {
   SplatCloud run() {
     for (uint64_t event = 0; event < options_.event_count; ++event) {
       moment_.standalone = StandaloneEvent{event, options_.event_count, false};
+      sweep();
       for (size_t view = 0; view < shown_.size(); ++view) {
         advance(progress_, done(event, view), "Looking at views");
         look(view);
@@ -55,6 +56,8 @@ class CloudDensifier {
       advance(progress_, done(event, shown_.size()), "Densifying");
       change();
     }
+    moment_.standalone->is_now = false;
+    sweep();  // for what looks at new splats
     advance(progress_, 1.0, "Densifying");
     return result();
   }
@@ -87,19 +90,24 @@ class CloudDensifier {
     drawing.with_depth = false;
     drawing.with_background = true;
     backend_->forward(*view.camera, drawing);
+    loss_options_.with_structure_errors = request.structure_errors;
     backend_->loss(target_.colour, loss_options_, target_.weights);
     backend_->backward(request);
     observeView(*backend_, *strategy_, moment_, view);
   }
 
   void change() {
-    if (strategy_->wantsSweep(moment_)) {
-      evaluator_.forgetSplats();
-      strategy_->sweep(moment_, evaluator_);
-    }
+    sweep();
     const std::optional<SplatEdit> edit = strategy_->edit(moment_, storeOf(*backend_));
     applyControl(*backend_, *strategy_, moment_, edit);
     if (edit) follow(*edit);
+  }
+
+  void sweep() {
+    if (!strategy_->wantsSweep(moment_)) return;
+    evaluator_.forgetSplats();
+    strategy_->sweep(moment_, evaluator_);
+    if (strategy_->parameterisation()) backend_->parameterise(strategy_->parameterisation());
   }
 
   /// Which splats are still those of the cloud.

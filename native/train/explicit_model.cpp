@@ -77,14 +77,16 @@ class ExplicitModel final : public FitModel, private Regulariser {
     StepReport report;
     report.stage = "Splats";
     report.splat_count = backend_->splatCount();
+    transmittance_weight_ = view.is_opaque ? strategy_->transmittanceWeight(moment_) : 0.0;
     Stopwatch watch;
     backend_->forward(*view.camera, renderOptions(view), progress);
     report.seconds.render = watch.lap();
 
+    const StatisticRequest request = strategy_->requests(moment_);
+    loss_options_.with_structure_errors = request.structure_errors;
     const ImageLossValue value =
         backend_->loss({view.target, pixel_count * 3}, loss_options_,
                        {view.weights, view.weights ? pixel_count : size_t{0}});
-    const StatisticRequest request = strategy_->requests(moment_);
     const BackwardSummary summary = backend_->backward(request, this, progress);
     report.loss = value.loss + summary.regularisation;
     report.l1 = value.l1;
@@ -105,7 +107,10 @@ class ExplicitModel final : public FitModel, private Regulariser {
       applyControl(*backend_, *strategy_, moment_, edit);
     };
     apply(strategy_->afterStep(moment_, storeOf(*backend_)));
-    if (views && strategy_->wantsSweep(moment_)) strategy_->sweep(moment_, *views);
+    if (views && strategy_->wantsSweep(moment_)) {
+      strategy_->sweep(moment_, *views);
+      if (strategy_->parameterisation()) backend_->parameterise(strategy_->parameterisation());
+    }
     apply(strategy_->edit(moment_, storeOf(*backend_)));
     report.seconds.edit += watch.lap();
     return report;
@@ -153,6 +158,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     RenderOptions options;
     options.with_depth = false;
     options.with_background = true;
+    options.with_transmittance = transmittance_weight_ != 0;
     std::copy_n(view.background, 3, options.background);
     const uint64_t degree = moment_.iteration / scaleSchedule(kDegreeInterval, moment_.iterations);
     options.sh_degree_limit =
@@ -186,6 +192,8 @@ class ExplicitModel final : public FitModel, private Regulariser {
     return strategy_->loss(moment_, cloud, gradient);
   }
 
+  double transmittanceWeight() const override { return transmittance_weight_; }
+
   std::unique_ptr<Strategy> strategy_;  ///< outlives the backend, which draws by its activations
   ExplicitModelOptions options_;
   std::unique_ptr<RenderBackend> backend_;
@@ -194,6 +202,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
   StepOptions step_options_;
   FitMoment moment_;  ///< of the step under way
   TrainingView view_under_way_;
+  double transmittance_weight_ = 0;  ///< of the step under way
 };
 
 }  // namespace

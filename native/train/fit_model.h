@@ -41,6 +41,7 @@ struct StepView {
   const Camera* camera = nullptr;
   const float* target = nullptr;   ///< [H,W,3] in the compositing space
   const float* weights = nullptr;  ///< [H,W] or null: 1
+  bool is_opaque = true;           ///< the view has no alpha: all of it is meant to be covered
   double background[3] = {0, 0, 0};
 };
 

@@ -90,7 +90,8 @@ struct Task {
   const float* weights;
   GradientView gradient;
   float l1_scale, ssim_scale;
-  double* row_sums;  ///< [tile column, height, 2]: 1 - SSIM and |x - y|
+  double* row_sums;         ///< [tile column, height, 2]: 1 - SSIM and |x - y|
+  float* structure_errors;  ///< [H,W] or null
 
   template <class View>
   auto run(const View& view, size_t row, size_t column) const {
@@ -237,11 +238,23 @@ class TilePass {
     double* sums = task_.row_sums + 2 * (tile_column * task_.tiling.height + row);
     if (c == 0) sums[0] = sums[1] = 0;
     const float* own_weights = weights ? weights + own_left : nullptr;
+    if (task_.structure_errors) addErrors(row, c, scratch_.errors.data() + own_left, own_weights);
     const Row& differences = scratch_.differences[slot(row)][c];
     sums[0] +=
         task_.kernel.sumMagnitudes(scratch_.errors.data() + own_left, own_weights, own_count);
     sums[1] +=
         task_.kernel.sumMagnitudes(differences.data() + kPictureReach, own_weights, own_count);
+  }
+
+  /// Of one channel; the first one begins the row.
+  void addErrors(size_t row, size_t c, const float* errors, const float* weights) {
+    const size_t count = tile_.column_end - tile_.column_begin;
+    float* out = task_.structure_errors + row * task_.tiling.width + tile_.column_begin;
+    for (size_t i = 0; i < count; ++i) {
+      // Rounding may leave an error of 0 slightly negative.
+      const float error = std::max(0.0f, errors[i]) * (weights ? weights[i] : 1.0f) * (1.0f / 3.0f);
+      out[i] = c == 0 ? error : out[i] + error;
+    }
   }
 
   void clearMapMargins(Row* maps) {
@@ -378,6 +391,7 @@ struct ImageLoss::Workspace {
   std::vector<TileScratch*> idle;
   std::vector<double> row_sums;
   std::vector<double> weight_sums;
+  std::vector<float> structure_errors;
   std::mutex mutex;
   std::atomic<bool> all_usable{true};
 };
@@ -388,7 +402,12 @@ ImageLoss::~ImageLoss() = default;
 
 size_t ImageLoss::workspaceBytes() const {
   return workspace_->scratches.size() * sizeof(TileScratch) +
-         (workspace_->row_sums.capacity() + workspace_->weight_sums.capacity()) * sizeof(double);
+         (workspace_->row_sums.capacity() + workspace_->weight_sums.capacity()) * sizeof(double) +
+         workspace_->structure_errors.capacity() * sizeof(float);
+}
+
+std::span<const float> ImageLoss::structureErrors() const {
+  return workspace_->structure_errors;
 }
 
 ImageLossValue ImageLoss::evaluate(uint32_t width, uint32_t height, PictureView rendered,
@@ -400,6 +419,8 @@ ImageLossValue ImageLoss::evaluate(uint32_t width, uint32_t height, PictureView 
          "ssim_share is " + std::to_string(share) + "; it must be within 0 and 1");
   }
   ImageLossValue value;
+  workspace_->structure_errors.resize(
+      options.with_structure_errors ? static_cast<size_t>(width) * height : 0);
   if (width == 0 || height == 0) return value;
   if (!rendered.values || !target.values) {
     fail(ErrorCode::kInvalidArgument, "the rendered and the target picture must not be null");
@@ -418,7 +439,8 @@ ImageLossValue ImageLoss::evaluate(uint32_t width, uint32_t height, PictureView 
                      gradient,
                      static_cast<float>((1 - share) * unit),
                      static_cast<float>(share * unit),
-                     workspace_->row_sums.data()};
+                     workspace_->row_sums.data(),
+                     options.with_structure_errors ? workspace_->structure_errors.data() : nullptr};
   Workspace& workspace = *workspace_;
   // Two captured references fit std::function without an allocation.
   parallelFor(tiling.count(), 1, [&workspace, &task](size_t begin, size_t end) {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 namespace stipple {
 
@@ -26,6 +27,7 @@ struct GradientView {
 struct ImageLossOptions {
   /// lambda, 0..1: the share of 1 - SSIM beside L1. Raising it favours structure over levels.
   double ssim_share = 0.2;
+  bool with_structure_errors = false;  ///< keeps what structureErrors() gives
 };
 
 struct ImageLossValue {
@@ -65,6 +67,10 @@ class ImageLoss {
   ImageLossValue evaluate(uint32_t width, uint32_t height, PictureView rendered, PictureView target,
                           const float* weights, GradientView gradient,
                           const ImageLossOptions& options = {});
+
+  /// [H,W] of the last call, where it was asked for: 1 - SSIM of each pixel, 0..2, the mean of its
+  /// channels, times its weight. Valid until the next call.
+  std::span<const float> structureErrors() const;
 
   /// Bytes of working memory held now.
   size_t workspaceBytes() const;

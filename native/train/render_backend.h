@@ -36,12 +36,15 @@ struct StepOptions {
   AdamOptions adam;
 };
 
-/// A part of the loss that depends on the splats alone, not on a picture.
+/// A part of the loss that depends on no target.
 class Regulariser {
  public:
   virtual ~Regulariser() = default;
-  /// Returns: its value. Its derivative is added to `gradient`.
+  /// Returns: the value of what depends on the splats alone. Its derivative is added to `gradient`.
   virtual double evaluate(const SplatCloud& cloud, const CloudGradient& gradient) = 0;
+  /// Beside that: weight of the mean transmittance behind the last splat of each pixel. Where it is
+  /// not 0, the picture must have been drawn with transmittance.
+  virtual double transmittanceWeight() const { return 0; }
 };
 
 /// Of one backward pass; what they are is said at SplatGradients and BackwardResult.
@@ -108,7 +111,7 @@ class RenderBackend {
                               std::span<const float> weights = {}) = 0;
 
   /// Derivatives of that loss by the raw parameters, and statistics. In: regulariser: what adds to
-  /// the loss, or null.
+  /// the loss, or null; structure errors need a loss with them.
   virtual BackwardSummary backward(const StatisticRequest& request,
                                    Regulariser* regulariser = nullptr,
                                    Progress* progress = nullptr) = 0;

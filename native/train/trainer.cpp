@@ -155,6 +155,7 @@ void Trainer::step(Pace& pace) {
   }
   view.target = target_.colour.data();
   view.weights = target_.weights.empty() ? nullptr : target_.weights.data();
+  view.is_opaque = target_.alpha.empty();
   evaluator_->forgetSplats();
   // A step is never left half-way: what was cancelled must go on bit for bit.
   const StepReport report = model_->step(moment, view, evaluator_.get(), nullptr);

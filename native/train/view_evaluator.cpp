@@ -62,10 +62,12 @@ const ViewStatistics& FitViewEvaluator::evaluate(size_t view, const StatisticReq
   load(view);
   draw(view);
   colour_gradient_.resize(drawn_.colour.size());
-  loss_.evaluate(drawn_.width, drawn_.height, {drawn_.colour.data(), PixelLayout::kRgba},
-                 {target_.colour.data(), PixelLayout::kRgb},
-                 target_.weights.empty() ? nullptr : target_.weights.data(),
-                 {colour_gradient_.data(), PixelLayout::kRgba}, loss_options_);
+  loss_options_.with_structure_errors = request.structure_errors;
+  const ImageLossValue value =
+      loss_.evaluate(drawn_.width, drawn_.height, {drawn_.colour.data(), PixelLayout::kRgba},
+                     {target_.colour.data(), PixelLayout::kRgb},
+                     target_.weights.empty() ? nullptr : target_.weights.data(),
+                     {colour_gradient_.data(), PixelLayout::kRgba}, loss_options_);
   BackwardInput input;
   input.colour_gradient = colour_gradient_;
   if (request.contributions) {
@@ -79,10 +81,11 @@ const ViewStatistics& FitViewEvaluator::evaluate(size_t view, const StatisticReq
     input.residual_weights = request.contribution_weights;
   }
   input.edge_weights = request.edge_weights;
-  input.errors = request.errors;
+  input.errors = request.structure_errors ? loss_.structureErrors() : request.errors;
   input.with_blending_weights = request.blending_weights;
   input.with_screen_gradients = request.screen_gradients;
   input.with_absolute_screen_gradients = request.absolute_screen_gradients;
+  input.with_covered = request.covered;
   renderBackward(workspace_, drawn_, input, backward_workspace_, backward_);
   visibleFlags(workspace_, visible_);
   statistics_ = {};
@@ -90,6 +93,7 @@ const ViewStatistics& FitViewEvaluator::evaluate(size_t view, const StatisticReq
   statistics_.width = drawn_.width;
   statistics_.height = drawn_.height;
   statistics_.camera = &camera(view);
+  statistics_.loss = value.loss;
   statistics_.visible = visible_;
   size_t next = 0;
   for (const GradientArray& array : kGradientArrays) {

@@ -279,8 +279,8 @@ TEST(BackwardStability, RefusesWhatIsNotFinite) {
   const auto inputOf = [&](const std::vector<float>& values) {
     const std::span<const float> all = values;
     return BackwardInput{
-        all,  all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true,
-        true, all.first(n)};
+        all,  0.5,  all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true,
+        true, true, all.first(n)};
   };
   const auto refused = [&](const SplatCloud& cloud, const BackwardInput& input) {
     const SplatInstance instance{&cloud};

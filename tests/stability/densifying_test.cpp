@@ -148,8 +148,8 @@ void drive(const std::string& name, double extent, uint64_t cap, bool same) {
 
 TEST(DensifyingStability, GradientsOfEverySizeOnSplatsOfEverySize) {
   for (const char* name :
-       {"adaptive", "absolute", "improved", "direction", "direction(power=1000)",
-        "adaptive+long_axis_split+recovery_pruning+edge_aware_score+growth_control",
+       {"adaptive", "absolute", "improved", "direction", "direction(power=1000)", "taming",
+        "revised", "adaptive+long_axis_split+recovery_pruning+edge_aware_score+growth_control",
         "absolute+opacity_correction", "improved+long_axis_split(offset=10,long=0.01,minor=0.01)",
         "volumetric", "volumetric(exponent=1,least_shrink=1,largest_shrink=1000000)", "mcmc",
         "mcmc(noise=1e12)", "metropolis", "metropolis(released=1,crowding=0)", "frequency",

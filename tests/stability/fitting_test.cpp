@@ -3,8 +3,11 @@
 #include <cmath>
 
 #include "densify/strategies.h"
+#include "train/densify_cloud.h"
 #include "train/explicit_model.h"
 #include "train/fit_scene.h"
+#include "train/picture_store.h"
+#include "train/view_evaluator.h"
 
 // Fits of views that say little, wrong things or nothing, with traps on: every number stays finite.
 
@@ -42,6 +45,18 @@ std::shared_ptr<MemoryViewSource> constantViews(float colour, float alpha, size_
     picture.width = picture.height = 24;
     picture.colour.assign(24 * 24 * 3, colour * alpha);
     picture.alpha.assign(24 * 24, alpha);
+    views->add(camera, std::move(picture));
+  }
+  views->setPoints(pointsOf(ballOfSplats(50, 3), 0, 1));
+  return views;
+}
+
+std::shared_ptr<MemoryViewSource> onePixelViews() {
+  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  for (const Camera& camera : camerasAround(3, 1)) {
+    ViewPicture picture;
+    picture.width = picture.height = 1;
+    picture.colour = {0.9f, 0.1f, 0.4f};
     views->add(camera, std::move(picture));
   }
   views->setPoints(pointsOf(ballOfSplats(50, 3), 0, 1));
@@ -124,14 +139,57 @@ TEST(FittingStability, EveryPointAtOnePlace) {
 }
 
 TEST(FittingStability, PicturesOfOnePixel) {
-  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
-  for (const Camera& camera : camerasAround(3, 1)) {
-    ViewPicture picture;
-    picture.width = picture.height = 1;
-    picture.colour = {0.9f, 0.1f, 0.4f};
-    views->add(camera, std::move(picture));
-  }
+  const auto views = onePixelViews();
+  views->setPoints({});
   fitted(*views, 300, small());
+}
+
+/// Of methods that look at further views, or whose splats are filtered.
+constexpr const char* kLookingStrategies[] = {"revised", "taming", "adaptive+filter_3d",
+                                              "taming+filter_3d+growth_control"};
+
+TEST(FittingStability, StrategiesThatLookAroundWhereViewsSayNothing) {
+  const double black[3] = {0, 0, 0};
+  for (const char* strategy : kLookingStrategies) {
+    for (const auto& views : {constantViews(0, 1, 4), constantViews(0.5f, 0, 4),
+                              constantViews(1e3f, 1, 1), onePixelViews()}) {
+      SCOPED_TRACE(strategy);
+      ExplicitModelOptions options = small();
+      options.strategy = strategy;
+      const std::vector<size_t> training = allViews(*views);
+      const auto model = makeExplicitModel(*views, training, options);
+      PictureStore pictures(views, 1 << 20);
+      FitViewEvaluator evaluator([&] { return model->splats(0); }, pictures, training, black, 0.2);
+      Fit fit(*views, *model, 3000);
+      for (uint64_t iteration = 1; iteration <= 410; ++iteration) {
+        evaluator.forgetSplats();
+        EXPECT_TRUE(std::isfinite(fit.run(iteration, &evaluator).loss));
+      }
+      expectFinite(model->state());
+      validate(model->splats(0), "fitted");
+    }
+  }
+}
+
+TEST(FittingStability, FinishedSplatsOfAnySizeAreDensified) {
+  SplatCloud cloud = ballOfSplats(50, 3);
+  std::fill_n(&cloud.scales[0], 3, 1e-30f);
+  std::fill_n(&cloud.scales[3], 3, 1e20f);
+  cloud.scales[6] = 1e3f;
+  cloud.scales[7] = 1e-6f;
+  cloud.opacities[9] = 0.0f;
+  cloud.opacities[10] = 1.0f;
+  for (const char* strategy : kLookingStrategies) {
+    for (const auto& views : {constantViews(0, 1, 4), constantViews(1e3f, 1, 1), onePixelViews()}) {
+      SCOPED_TRACE(strategy);
+      DensifyOptions options;
+      options.strategy = strategy;
+      options.event_count = 2;
+      const SplatCloud made = densifyCloud(cloud, views, allViews(*views), options);
+      validate(made, "densified");
+      EXPECT_LE(made.size(), 100u);
+    }
+  }
 }
 
 }  // namespace

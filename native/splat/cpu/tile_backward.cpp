@@ -43,6 +43,7 @@ PixelLoss<double> lossAt(const PictureLoss& picture, size_t pixel) {
     loss.gradient[c] = static_cast<double>(input.colour_gradient[pixel * 4 + c]);
   }
   if (picture.picture->with_background) loss.gradient[3] = 0.0;
+  loss.gradient[3] += input.coverage_gradient;
   if (picture.wants.mode == BackwardMode::kGradients) return loss;
   const double weight = valueAt(input.residual_weights, pixel, 1.0);
   for (size_t c = 0; c < 3; ++c) {
@@ -182,6 +183,10 @@ void TileBackward::takeLoss(const Tile& tile, size_t index, double* background) 
       }
       for (const float value : seen) background[c] += static_cast<double>(value);
     }
+  }
+  if (input.coverage_gradient != 0) {
+    const float by_coverage = static_cast<float>(input.coverage_gradient);
+    for (float& value : pixels.gradient[3]) value += by_coverage;
   }
   if (loss_->wants.depth) {
     std::copy_n(kept.depth.get() + index * kTilePixelCount, kTilePixelCount, pixels.depth);

@@ -121,7 +121,10 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
     Vec sum_red = zero, sum_green = zero, sum_blue = zero;
     Vec sum_contribution = zero, sum_weight = zero, sum_edge = zero, sum_error = zero;
     Vec sum_x = zero, sum_y = zero, sum_norm = zero, largest_error = zero;
+    Vec sum_pixels = zero, sum_pixel_errors = zero, sum_distances = zero;
     Vec sum_depth = zero;
+    const Vec inverse_l00 = hn::Set(d, kStatistics ? 1.0f / splat.l00 : 0.0f);
+    const Vec inverse_l11 = hn::Set(d, kStatistics ? 1.0f / splat.l11 : 0.0f);
     for (size_t column = 0; column < kTileSide; column += lanes) {
       const Vec x = hn::Iota(d, static_cast<float>(column));
       const Vec g0 = hn::MulAdd(hn::Set(d, splat.l00), x, hn::Set(d, splat.g0));
@@ -198,7 +201,14 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
               hn::MulAdd(g0, hn::Set(d, splat.l00), hn::Mul(g1, hn::Set(d, splat.l10)));
           const Vec by_x = hn::Abs(hn::Mul(scaled, along));
           const Vec by_y = hn::Abs(hn::Mul(scaled, hn::Mul(g1, l11)));
-          const Vec error = hn::Mul(weight, hn::Load(d, pixels.error + i));
+          const Vec pixel_error = hn::Load(d, pixels.error + i);
+          const Vec error = hn::Mul(weight, pixel_error);
+          const Vec dx = hn::Mul(g0, inverse_l00);
+          const Vec dy = hn::Mul(hn::NegMulAdd(hn::Set(d, splat.l10), dx, g1), inverse_l11);
+          const Vec distance = lengthOfLanes(d, hn::Abs(dx), hn::Abs(dy));
+          sum_pixels = hn::Add(sum_pixels, hn::IfThenElseZero(shows, one));
+          sum_pixel_errors = hn::Add(sum_pixel_errors, hn::IfThenElseZero(shows, pixel_error));
+          sum_distances = hn::Add(sum_distances, hn::IfThenElseZero(shows, distance));
           sum_weight = hn::Add(sum_weight, weight);
           sum_edge = hn::MulAdd(weight, hn::Load(d, pixels.edge + i), sum_edge);
           sum_x = hn::Add(sum_x, by_x);
@@ -225,6 +235,8 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
     if constexpr (kStatistics) {
       sumFour(d, sum_x, sum_y, sum_norm, sum_error, out + kFieldAbsoluteX);
       out[kFieldLargestError] = hn::GetLane(hn::MaxOfLanes(d, largest_error));
+      sumFour(d, sum_pixels, sum_pixel_errors, sum_distances, zero, four);
+      std::copy(four, four + 3, out + kFieldPixels);
     }
     if constexpr (kDepth) out[kFieldCount - 1] = sumOfLanes(d, sum_depth);
     if (HWY_UNLIKELY(is_judged)) {

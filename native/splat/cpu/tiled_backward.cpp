@@ -60,6 +60,12 @@ void requireSizes(const KeptPicture& picture, const BackwardInput& input) {
   requireSize(input.residual_weights, pixel_count, 1, true, "residual_weights");
   requireSize(input.edge_weights, pixel_count, 1, true, "edge_weights");
   requireSize(input.errors, pixel_count, 1, true, "errors");
+  if (!std::isfinite(input.coverage_gradient) ||
+      std::abs(input.coverage_gradient) > static_cast<double>(kLargestInput)) {
+    fail(ErrorCode::kInvalidArgument, "coverage_gradient is " +
+                                          std::to_string(input.coverage_gradient) +
+                                          "; -1e4 to 1e4 is allowed");
+  }
 }
 
 /// Names the value that the tiles found.
@@ -74,7 +80,7 @@ void requireRanges(const BackwardInput& input) {
 
 BackwardWants wantsOf(const BackwardInput& input) {
   const bool with_depth = !input.depth_gradient.empty();
-  if (input.with_blending_weights || input.with_absolute_screen_gradients ||
+  if (input.with_blending_weights || input.with_absolute_screen_gradients || input.with_covered ||
       !input.edge_weights.empty() || !input.errors.empty()) {
     return {BackwardMode::kStatistics, with_depth};
   }
@@ -91,6 +97,8 @@ bool isWanted(const GradientArray& array, const BackwardInput& input) {
   if (isOneOf(&G::edge_weights)) return !input.edge_weights.empty();
   if (isOneOf(&G::errors, &G::largest_errors)) return !input.errors.empty();
   if (isOneOf(&G::screen_gradients)) return input.with_screen_gradients;
+  if (isOneOf(&G::covered_pixels, &G::covered_distances)) return input.with_covered;
+  if (isOneOf(&G::covered_errors)) return input.with_covered && !input.errors.empty();
   return input.with_absolute_screen_gradients;
 }
 
@@ -189,6 +197,10 @@ void storeStatistics(const BackwardInput& input, const float* sums, const double
     out.errors[index] = sums[kFieldError];
     out.largest_errors[index] = sums[kFieldLargestError];
   }
+  if (!input.with_covered) return;
+  out.covered_pixels[index] = sums[kFieldPixels];
+  out.covered_distances[index] = sums[kFieldDistances];
+  if (!input.errors.empty()) out.covered_errors[index] = sums[kFieldPixelErrors];
 }
 
 /// Slots [begin, end).

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
 #include "splat/cpu/tiled_backward.h"
@@ -353,6 +354,30 @@ TEST(Backward, DoesNotDependOnTheLengthOfAQuaternion) {
     EXPECT_NEAR(along, 0, 1e-6 * largestOf(one.rotations));
   }
   EXPECT_EQ(one.positions, other.positions);
+}
+
+TEST(RenderBackward, CoverageHasADerivativeOverABackgroundToo) {
+  Scene scene = oneCloud(smallCloud(20, 1, 90));
+  const size_t count = pixelCount(scene.camera);
+  std::vector<float> weights(count * 4, 0.0f);
+  for (size_t i = 0; i < count; ++i) weights[i * 4 + 3] = 0.25f;
+  const BackwardResult by_alpha = backward(scene, weights);
+
+  BackwardInput input;
+  const std::vector<float> none(count * 4, 0.0f);
+  input.colour_gradient = none;
+  input.coverage_gradient = 0.25;
+  scene.options.with_background = true;
+  scene.options.background[1] = 0.7;
+  const BackwardResult by_coverage =
+      renderBackward(scene.instances(), scene.camera, scene.options, input);
+  for (const NamedArray& array : kArrays) {
+    EXPECT_EQ(by_coverage.instances[0].*array.gradient, by_alpha.instances[0].*array.gradient)
+        << array.name;
+  }
+  EXPECT_GT(largestOf(by_alpha.instances[0].opacities), 0.1);
+  input.coverage_gradient = std::nan("");
+  EXPECT_THROW(renderBackward(scene.instances(), scene.camera, scene.options, input), Error);
 }
 
 }  // namespace

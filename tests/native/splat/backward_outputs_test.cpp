@@ -41,7 +41,7 @@ struct Scene {
     if (wanted == Wanted::kContributions) return made;
     made.edge_weights = weights;
     made.errors = weights;
-    made.with_blending_weights = true;
+    made.with_blending_weights = made.with_covered = true;
     made.with_screen_gradients = made.with_absolute_screen_gradients = true;
     return made;
   }

@@ -8,6 +8,7 @@
 #include "splat/backward_cases.h"
 #include "splat/cpu/tile_kernel_backward.h"
 #include "splat/cpu/tiled_backward.h"
+#include "splat/reference_backward.h"
 
 // Contributions are judged by rendering the double reference again without the splat, statistics by
 // differences of it.
@@ -223,6 +224,51 @@ TEST(ErrorContributions, SumAndLargestAgreeWithThePixelsOneByOne) {
     EXPECT_EQ(all.largest_errors[i], largest[i]);
   }
   EXPECT_GT(*std::max_element(largest.begin(), largest.end()), 0.1f);
+}
+
+TEST(CoveredPixels, AreThoseThatShowTheSplatHoweverLittleOfIt) {
+  const SplatCloud cloud = smallCloud(15, 0, 245);
+  const Camera camera = frontCamera(21, 19, 16, 3);
+  const std::vector<float> gradient(pixelCount(camera) * 4, 1.0f);
+  const std::vector<float> errors = randomWeights(pixelCount(camera), 21, 0, 1);
+  const SplatInstance instance{&cloud};
+  BackwardInput input;
+  input.colour_gradient = gradient;
+  input.with_covered = true;
+  const SplatGradients bare = renderBackward({&instance, 1}, camera, {}, input).instances[0];
+  EXPECT_TRUE(bare.covered_errors.empty());
+  EXPECT_TRUE(bare.blending_weights.empty());
+  input.errors = errors;
+  const SplatGradients all = renderBackward({&instance, 1}, camera, {}, input).instances[0];
+  EXPECT_EQ(all.covered_pixels, bare.covered_pixels);
+
+  // Where a pixel shows a splat, an error of that pixel alone is one of the splat.
+  const PlacedScene scene = placeScene({&instance, 1}, camera, {});
+  const std::vector<testing::ReferenceSplat> splats = testing::visibleInOrder(scene);
+  std::vector<double> counts(cloud.size()), sums(cloud.size()), distances(cloud.size());
+  for (size_t pixel = 0; pixel < errors.size(); ++pixel) {
+    std::vector<float> single(errors.size(), 0.0f);
+    single[pixel] = 1.0f;
+    input.errors = single;
+    const SplatGradients one = renderBackward({&instance, 1}, camera, {}, input).instances[0];
+    for (const testing::ReferenceSplat& splat : splats) {
+      if (!(one.errors[splat.index] > 0)) continue;
+      const Footprint<double>& f = splat.projected.footprint;
+      EXPECT_EQ(one.covered_errors[splat.index], 1.0f);
+      ++counts[splat.index];
+      sums[splat.index] += static_cast<double>(errors[pixel]);
+      distances[splat.index] +=
+          std::hypot(static_cast<double>(pixel % camera.width) + 0.5 - f.mean_x,
+                     static_cast<double>(pixel / camera.width) + 0.5 - f.mean_y);
+    }
+  }
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    EXPECT_EQ(all.covered_pixels[i], counts[i]);
+    // Sums of float32 in another order; distances through the inverse of their metric.
+    EXPECT_NEAR(all.covered_errors[i], sums[i], 1e-6 * (1 + sums[i]));
+    EXPECT_NEAR(all.covered_distances[i], distances[i], 1e-5 * (1 + distances[i]));
+  }
+  EXPECT_GT(*std::max_element(counts.begin(), counts.end()), 20);
 }
 
 TEST(ScreenGradients, AgreeWithThePixelsOneByOne) {

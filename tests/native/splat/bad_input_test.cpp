@@ -41,8 +41,16 @@ struct Call {
 
   SplatInstance instance() const { return {&cloud, matrix}; }
   BackwardInput input() const {
-    return {colour_gradient, residual, residual_weights, edge_weights, errors, true, true, true,
-            depth_gradient};
+    BackwardInput made;
+    made.colour_gradient = colour_gradient;
+    made.residual = residual;
+    made.residual_weights = residual_weights;
+    made.edge_weights = edge_weights;
+    made.errors = errors;
+    made.with_blending_weights = made.with_screen_gradients = true;
+    made.with_absolute_screen_gradients = made.with_covered = true;
+    made.depth_gradient = depth_gradient;
+    return made;
   }
 };
 
@@ -288,8 +296,8 @@ void expectNothingDrawn(const SplatCloud& cloud, const Camera& camera) {
   const std::span<const float> all = pictures;
   const size_t n = pixelCount(camera);
   const BackwardInput input = {
-      all,  all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true,
-      true, all.first(n)};
+      all,  0.5,  all.first(n * 3), all.first(n), all.first(n), all.first(n), true, true,
+      true, true, all.first(n)};
   const BackwardResult result = renderBackward({&instance, 1}, camera, options, input);
   double by_red = 0;
   for (size_t i = 0; i < n; ++i) by_red += static_cast<double>(pictures[i * 4]);

@@ -452,6 +452,89 @@ TEST(CpuBackend, RegularisersActThroughTheActivations) {
   EXPECT_EQ(with.positions, without.positions);
 }
 
+/// Some of the light that passes all splats.
+class Light final : public Regulariser {
+ public:
+  double evaluate(const SplatCloud&, const CloudGradient&) override { return 0; }
+  double transmittanceWeight() const override { return 3; }
+};
+
+TEST(CpuBackend, TheLossHasTheMeanTransmittanceAndItsDerivative) {
+  const auto backend = makeCpuBackend();
+  backend->upload(smallCloud(30, 1, 740));
+  RenderOptions options = overGrey();
+  const std::vector<float> wanted = target(741);
+  Light light;
+  backend->forward(camera(), options);
+  backend->loss(wanted, {});
+  EXPECT_THAT(messageOf([&] { backend->backward({}, &light); }), HasSubstr("drawn with it"));
+  options.with_transmittance = true;
+  const auto regularisation = [&](RenderBackend& of) {
+    of.forward(camera(), options);
+    of.loss(wanted, {});
+    return of.backward({}, &light).regularisation;
+  };
+  const double value = regularisation(*backend);
+  EXPECT_GT(value, 0.1);
+  EXPECT_LT(value, 2.9);
+  const RawSplats with = backend->gradients();
+  backend->backward({});
+  const RawSplats without = backend->gradients();
+
+  // Every third logit by central differences. A step of 2^-5 leaves 1e-4 of the slope; means of
+  // float32 transmittances are off by 6e-8, over the step 2e-6. The end of a splat at alpha = 1/255
+  // is taken as fixed, but moves with its opacity o: a share (1/255) / (o - 1/255) of the slope
+  // in the mean; with few pixels at its end up to three times that.
+  const TrainingState start = backend->state();
+  double largest = 0;
+  for (size_t i = 0; i < start.splats.size(); i += 3) {
+    double values[2];
+    for (int side = 0; side < 2; ++side) {
+      TrainingState moved = start;
+      moved.splats.logits[i] += side == 0 ? 0.03125f : -0.03125f;
+      const auto other = makeCpuBackend();
+      other->restore(moved);
+      values[side] = regularisation(*other);
+    }
+    const double expected = (values[0] - values[1]) / 0.0625;
+    largest = std::max(largest, std::abs(expected));
+    const double opacity = static_cast<double>(activatedOpacity(start.splats.logits[i]));
+    const double share = 3.0 / 255 / (opacity - 1.0 / 255);
+    EXPECT_NEAR(with.logits[i] - without.logits[i], expected, share * std::abs(expected) + 1e-5);
+  }
+  EXPECT_GT(largest, 1e-3);
+}
+
+TEST(CpuBackend, StructureErrorsAreThoseOfTheLoss) {
+  const auto backend = makeCpuBackend();
+  backend->upload(smallCloud(40, 0, 750));
+  const std::vector<float> wanted = target(751);
+  StatisticRequest request;
+  request.structure_errors = true;
+  EXPECT_TRUE(request.any());
+  backend->forward(camera(), overGrey());
+  backend->loss(wanted, {});
+  EXPECT_THAT(messageOf([&] { backend->backward(request); }), HasSubstr("with structure errors"));
+  ImageLossOptions options;
+  options.with_structure_errors = true;
+  backend->loss(wanted, options);
+  backend->backward(request);
+  const std::vector<float> seen = backend->statistic(Statistic::kErrors);
+
+  const std::vector<float> drawn = backend->picture();
+  ImageLoss loss;
+  loss.evaluate(camera().width, camera().height, {drawn.data(), PixelLayout::kRgba},
+                {wanted.data(), PixelLayout::kRgb}, nullptr, {}, options);
+  const std::span<const float> errors = loss.structureErrors();
+  StatisticRequest by_hand;
+  by_hand.errors.assign(errors.begin(), errors.end());
+  backend->backward(by_hand);
+  EXPECT_EQ(backend->statistic(Statistic::kErrors), seen);
+  EXPECT_GT(*std::max_element(seen.begin(), seen.end()), 0.1f);
+  by_hand.structure_errors = true;
+  EXPECT_THAT(messageOf([&] { backend->backward(by_hand); }), HasSubstr("one of them is allowed"));
+}
+
 /// Positions that are moved by three extra numbers per splat, doubled.
 class Moved final : public Parameterisation {
  public:

@@ -126,6 +126,7 @@ class Fit {
       }
       view.target = target_.data();
       view.weights = picture.weights.empty() ? nullptr : picture.weights.data();
+      view.is_opaque = picture.alpha.empty();
       report = model_.step(moment_, view, evaluator, nullptr);
     }
     return report;

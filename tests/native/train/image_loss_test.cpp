@@ -20,6 +20,9 @@ using testing::Pictures;
 using testing::Planes;
 using testing::randomPictures;
 using testing::referenceLoss;
+using testing::ssimErrorAt;
+using testing::weightAt;
+using testing::weightSum;
 
 struct Evaluated {
   ImageLossValue value;
@@ -81,6 +84,38 @@ TEST(ImageLoss, GivesTheReferenceValue) {
         EXPECT_NEAR(seen.loss, expected.loss, 5e-6);
       }
     }
+  }
+}
+
+TEST(ImageLoss, KeepsTheStructureErrorOfEachPixel) {
+  constexpr size_t kWidth = 300, kHeight = 101;  // two tiles in each direction
+  const Pictures p = randomPictures(kWidth, kHeight, 0.3, 4);
+  const std::vector<float> x = p.rendered.planar(), y = p.target.planar();
+  for (const auto& weights : {std::vector<float>(), someWeights(kWidth * kHeight)}) {
+    ImageLoss loss;
+    ImageLossOptions options;
+    options.with_structure_errors = true;
+    const ImageLossValue value = loss.evaluate(
+        kWidth, kHeight, {x.data(), PixelLayout::kPlanar}, {y.data(), PixelLayout::kPlanar},
+        weights.empty() ? nullptr : weights.data(), {}, options);
+    const std::span<const float> errors = loss.structureErrors();
+    ASSERT_EQ(errors.size(), kWidth * kHeight);
+    double sum = 0;
+    for (const float error : errors) sum += static_cast<double>(error);
+    // Their weighted mean is that of the loss; both are sums of the same float32 numbers.
+    EXPECT_NEAR(1 - sum / weightSum(p.rendered, weights), value.ssim, 1e-6);
+    for (const size_t pixel :
+         {size_t{0}, size_t{150}, 50 * kWidth + 149, 51 * kWidth + 150, kWidth * kHeight - 1}) {
+      double expected = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        expected += ssimErrorAt(p.rendered, p.target, c, pixel / kWidth, pixel % kWidth) / 3;
+      }
+      // The variance's 5e-7 against C2 at most, times two.
+      EXPECT_NEAR(errors[pixel], expected * weightAt(weights, pixel), 1e-3);
+    }
+    loss.evaluate(kWidth, kHeight, {x.data(), PixelLayout::kPlanar},
+                  {y.data(), PixelLayout::kPlanar}, nullptr, {});
+    EXPECT_TRUE(loss.structureErrors().empty());
   }
 }
 
