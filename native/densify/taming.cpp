@@ -123,7 +123,12 @@ class TamingScore final : public ControlPart {
 
   void edited(const ControlMoment& moment, const SplatEdit& edit, size_t count_before) override {
     pulls_.edited(moment, edit, count_before);
-    if (moment.is_event) seen_.assign(scores_->of.begin(), scores_->of.end());
+    if (moment.is_event) {
+      constexpr double kMost = 1e30;  // of splats that are larger than the scene by far
+      seen_.resize(scores_->of.size());
+      std::transform(scores_->of.begin(), scores_->of.end(), seen_.begin(),
+                     [kMost](double score) { return static_cast<float>(std::min(score, kMost)); });
+    }
     if (seen_.size() == count_before) followEdit(edit, 1, 0.0f, seen_);
     scores_->of.clear();
   }

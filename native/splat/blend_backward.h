@@ -116,6 +116,16 @@ T lengthOf(T a, T b) {
   return larger * std::sqrt(T(1) + ratio * ratio);
 }
 
+/// Ends of what offsetOf divides by and gives: splats that are larger than any picture by far.
+constexpr double kLeastSlope = 1e-12;
+constexpr double kMostOffset = 1e6;  ///< pixels
+
+/// Pixels from the centre along one axis, from g = l * offset, l > 0.
+template <typename T>
+T offsetOf(T g, T l) {
+  return std::clamp(g / std::max(l, T(kLeastSlope)), T(-kMostOffset), T(kMostOffset));
+}
+
 /// Takes one splat off the pixel and adds to its sums [backwardFieldCount(wants)].
 ///
 /// With D = sum(w z)/A, A = 1 - T the coverage, dD = (sum(z dw) - D sum(dw))/A: depth is a fourth
@@ -163,8 +173,8 @@ void takeOff(const SplatAtPixel<T>& splat, const PixelLoss<T>& loss, BackwardWan
   sums[kFieldError] += weight * loss.error;
   sums[kFieldLargestError] = std::max(sums[kFieldLargestError], weight * loss.error);
 
-  const T dx = splat.g0 / splat.l00;
-  const T dy = (splat.g1 - splat.l10 * dx) / splat.l11;
+  const T dx = offsetOf(splat.g0, splat.l00);
+  const T dy = offsetOf(splat.g1 - splat.l10 * dx, splat.l11);
   sums[kFieldPixels] += T(1);
   sums[kFieldPixelErrors] += loss.error;
   sums[kFieldDistances] += lengthOf(std::abs(dx), std::abs(dy));

@@ -123,8 +123,11 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
     Vec sum_x = zero, sum_y = zero, sum_norm = zero, largest_error = zero;
     Vec sum_pixels = zero, sum_pixel_errors = zero, sum_distances = zero;
     Vec sum_depth = zero;
-    const Vec inverse_l00 = hn::Set(d, kStatistics ? 1.0f / splat.l00 : 0.0f);
-    const Vec inverse_l11 = hn::Set(d, kStatistics ? 1.0f / splat.l11 : 0.0f);
+    constexpr float kLeast = static_cast<float>(kLeastSlope);
+    const Vec inverse_l00 = hn::Set(d, kStatistics ? 1.0f / std::max(splat.l00, kLeast) : 0.0f);
+    const Vec inverse_l11 = hn::Set(d, kStatistics ? 1.0f / std::max(splat.l11, kLeast) : 0.0f);
+    const Vec most_offset = hn::Set(d, static_cast<float>(kMostOffset));
+    const Vec least_offset = hn::Neg(most_offset);
     for (size_t column = 0; column < kTileSide; column += lanes) {
       const Vec x = hn::Iota(d, static_cast<float>(column));
       const Vec g0 = hn::MulAdd(hn::Set(d, splat.l00), x, hn::Set(d, splat.g0));
@@ -203,8 +206,12 @@ void takeOffSplats(const TileSplat* splats, size_t count, const TakeOffOptions& 
           const Vec by_y = hn::Abs(hn::Mul(scaled, hn::Mul(g1, l11)));
           const Vec pixel_error = hn::Load(d, pixels.error + i);
           const Vec error = hn::Mul(weight, pixel_error);
-          const Vec dx = hn::Mul(g0, inverse_l00);
-          const Vec dy = hn::Mul(hn::NegMulAdd(hn::Set(d, splat.l10), dx, g1), inverse_l11);
+          // Lanes where nothing shows may hold any number.
+          const Vec shown_g0 = hn::IfThenElseZero(shows, g0);
+          const Vec shown_g1 = hn::IfThenElseZero(shows, g1);
+          const Vec dx = hn::Clamp(hn::Mul(shown_g0, inverse_l00), least_offset, most_offset);
+          const Vec across = hn::NegMulAdd(hn::Set(d, splat.l10), dx, shown_g1);
+          const Vec dy = hn::Clamp(hn::Mul(across, inverse_l11), least_offset, most_offset);
           const Vec distance = lengthOfLanes(d, hn::Abs(dx), hn::Abs(dy));
           sum_pixels = hn::Add(sum_pixels, hn::IfThenElseZero(shows, one));
           sum_pixel_errors = hn::Add(sum_pixel_errors, hn::IfThenElseZero(shows, pixel_error));
