@@ -60,6 +60,17 @@ def image_material(name, image, obj):
     return mat
 
 
+def two_coloured_ball(folder):
+    """A selected ball of two colours, lit by the world alone, in a file saved in that folder."""
+    obj = sphere(segments=24, rings=12)
+    image_material('Halves', half_image(), obj)
+    bpy.context.scene.world = bpy.data.worlds.new('Sky')
+    bpy.context.scene.world.color = (0.5, 0.5, 0.5)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / 'a.blend'))
+    select(obj)
+    return obj
+
+
 def half_image(name='halves', left=(1.0, 0.0, 0.0), right=(0.0, 0.0, 1.0), side=64):
     """Left half one colour, right half another."""
     image = bpy.data.images.new(name, side, side)

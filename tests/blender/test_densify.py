@@ -10,12 +10,7 @@ import scenes
 @pytest.fixture
 def ball(tmp_path):
     """A ball with two colours and few splats that stand for it."""
-    obj = scenes.sphere(segments=24, rings=12)
-    scenes.image_material('Halves', scenes.half_image(), obj)
-    bpy.context.scene.world = bpy.data.worlds.new('Sky')
-    bpy.context.scene.world.color = (0.5, 0.5, 0.5)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
-    scenes.select(obj)
+    obj = scenes.two_coloured_ball(tmp_path)
     chosen = bpy.context.scene.stipple.fit
     for name, value in {'view_count': 6, 'view_size': 48, 'engine': 'WORKBENCH', 'max_splats': 150,
                         'quality': 'FAST'}.items():

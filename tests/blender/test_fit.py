@@ -21,14 +21,7 @@ def fitting(stipple):
 
 @pytest.fixture
 def ball(tmp_path):
-    """A ball with two colours, lit by the world alone, in a saved file."""
-    obj = scenes.sphere(segments=24, rings=12)
-    scenes.image_material('Halves', scenes.half_image(), obj)
-    bpy.context.scene.world = bpy.data.worlds.new('Sky')
-    bpy.context.scene.world.color = (0.5, 0.5, 0.5)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
-    scenes.select(obj)
-    return obj
+    return scenes.two_coloured_ball(tmp_path)
 
 
 def settings(**values):

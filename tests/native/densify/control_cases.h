@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "densify/control_part.h"
+#include "densify/control_scene.h"
 #include "densify/strategies.h"
 
 // Splats and moments that strategies are asked about.
@@ -16,12 +17,8 @@ namespace stipple::testing {
 
 /// A fit of the published length whose cameras are spread as those of its scenes.
 inline FitMoment publishedMoment(uint64_t iteration, uint64_t max_splats = 0) {
-  FitMoment moment;
-  moment.iteration = iteration;
-  moment.iterations = 30000;
+  FitMoment moment = at(iteration, max_splats);
   moment.extent = 5;
-  moment.seed = 7;
-  moment.max_splats = max_splats;
   moment.position_rate = 1e-3;
   return moment;
 }
@@ -54,18 +51,12 @@ inline RawSplats countedMoments(const RawSplats& splats) {
   return moments;
 }
 
-inline std::optional<SplatEdit> editAt(Strategy& strategy, const FitMoment& moment,
-                                       const RawSplats& splats) {
-  const RawSplats moments = zerosLike(splats);
-  return strategy.edit(moment, {splats, moments, moments});
-}
-
 /// Splats, and moments that moved with them.
 struct Edited {
   RawSplats splats;
   RawSplats moments;
 };
-inline Edited after(const SplatEdit& edit, const RawSplats& splats) {
+inline Edited moved(const SplatEdit& edit, const RawSplats& splats) {
   validate(edit, splats);
   Edited now{splats, countedMoments(splats)};
   const EditTarget targets[] = {{&now.splats, false}, {&now.moments, true}};

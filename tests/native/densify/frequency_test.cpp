@@ -249,7 +249,7 @@ struct Scene {
   }
   Edited event(Strategy& strategy, const FitMoment& moment) {
     if (strategy.wantsSweep(moment)) strategy.sweep(moment, views);
-    return after(*editAt(strategy, moment, splats), splats);
+    return moved(*editAt(strategy, moment, splats), splats);
   }
 };
 

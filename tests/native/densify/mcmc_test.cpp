@@ -67,7 +67,7 @@ TEST(Mcmc, AnotherPartMayDecideHowManyThereAre) {
 TEST(Mcmc, EventsKeepTheCompositeOfEverySplat) {
   const RawSplats splats = mixedSplats(500, 3, -1, 3);
   const auto strategy = makeStrategy("mcmc");
-  const Edited now = after(*editAt(*strategy, publishedMoment(600), splats), splats);
+  const Edited now = moved(*editAt(*strategy, publishedMoment(600), splats), splats);
   ASSERT_EQ(now.splats.size(), 525u);
   // By place: copies stand where their sources do.
   for (size_t i = 0; i < 500; ++i) {
@@ -92,7 +92,7 @@ TEST(Mcmc, OneSplatAllTiedAndAllDead) {
   EXPECT_EQ(editAt(*makeStrategy("mcmc"), publishedMoment(600), tied)->countAfter(100), 105u);
   RawSplats dead = mixedSplats(100, 1, -9, -8);
   const auto edit = editAt(*makeStrategy("mcmc"), publishedMoment(600), dead);
-  EXPECT_EQ(after(*edit, dead).splats.size(), 105u);
+  EXPECT_EQ(moved(*edit, dead).splats.size(), 105u);
 }
 
 /// Moves of `count` equal splats at the origin.
@@ -102,7 +102,7 @@ std::vector<float> movesOf(size_t count, float logit, const FitMoment& moment) {
   std::fill(splats.logits.begin(), splats.logits.end(), logit);
   const RawSplats moments = zerosLike(splats);
   const auto edit = makeStrategy("mcmc")->afterStep(moment, {splats, moments, moments});
-  return edit ? after(*edit, splats).splats.positions : std::vector<float>{};
+  return edit ? moved(*edit, splats).splats.positions : std::vector<float>{};
 }
 
 TEST(Mcmc, FaintSplatsTrembleAsTheyAreShaped) {
@@ -157,10 +157,10 @@ TEST(Mcmc, NoiseDoesNotDependOnTheUnitOfTheScene) {
   const auto a = strategy->afterStep(moment, {metres, metres, metres});
   const auto b = strategy->afterStep(large, {millimetres, millimetres, millimetres});
   ASSERT_TRUE(a && b);
-  const RawSplats moved = after(*a, metres).splats, also = after(*b, millimetres).splats;
-  for (size_t k = 0; k < moved.positions.size(); ++k) {
+  const RawSplats by_metres = moved(*a, metres).splats, also = moved(*b, millimetres).splats;
+  for (size_t k = 0; k < by_metres.positions.size(); ++k) {
     // Rounding of logarithms and places in float32.
-    EXPECT_NEAR(also.positions[k] / 1000, moved.positions[k], 2e-6f);
+    EXPECT_NEAR(also.positions[k] / 1000, by_metres.positions[k], 2e-6f);
   }
 }
 
@@ -207,14 +207,14 @@ TEST(SizeRegulariser, ItsDerivativeIsThatOfItsValue) {
 TEST(Mcmc, StateComesBackBitForBit) {
   const auto strategy = makeStrategy("mcmc");
   RawSplats splats = mixedSplats(300, 8);
-  splats = after(*editAt(*strategy, publishedMoment(600), splats), splats).splats;
+  splats = moved(*editAt(*strategy, publishedMoment(600), splats), splats).splats;
   const auto other = makeStrategy("mcmc");
   other->restore(strategy->state());
   const auto a = editAt(*strategy, publishedMoment(700), splats);
   const auto b = editAt(*other, publishedMoment(700), splats);
-  EXPECT_TRUE(areSame(after(*a, splats).splats, after(*b, splats).splats));
-  EXPECT_EQ(strategy->seen(SplatQuantity::kAge, after(*a, splats).splats),
-            other->seen(SplatQuantity::kAge, after(*b, splats).splats));
+  EXPECT_TRUE(areSame(moved(*a, splats).splats, moved(*b, splats).splats));
+  EXPECT_EQ(strategy->seen(SplatQuantity::kAge, moved(*a, splats).splats),
+            other->seen(SplatQuantity::kAge, moved(*b, splats).splats));
 }
 
 TEST(Mcmc, RefusesSettingsThatItDoesNotHave) {

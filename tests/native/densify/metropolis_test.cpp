@@ -67,7 +67,7 @@ TEST(Metropolis, SplatsAreBornWherePicturesAreWrong) {
   KnownViews views = viewsOf(splats);
   const auto strategy = makeStrategy("metropolis(crowding=0,coarse=0,fine=16000)");
   const auto edit = eventOf(*strategy, publishedMoment(600), splats, views);
-  const Edited now = after(*edit, splats);
+  const Edited now = moved(*edit, splats);
   EXPECT_THAT(views.drawn, ElementsAre(0));  // 1 - 100/14500 of two views
   const std::vector<float> score = strategy->seen(SplatQuantity::kScore, now.splats);
   ASSERT_EQ(score.size(), now.splats.size());
@@ -107,7 +107,7 @@ TEST(Metropolis, CopiesArriveWholeAndAsCloseAsTheBatchSays) {
   for (const bool released : {false, true}) {
     const auto strategy = makeStrategy(std::string("metropolis(crowding=0,coarse=60000,fine=0") +
                                        (released ? ",released=1)" : ")"));
-    const Edited now = after(*eventOf(*strategy, moment, splats, views), splats);
+    const Edited now = moved(*eventOf(*strategy, moment, splats, views), splats);
     const size_t births = now.splats.size() - kCount;
     ASSERT_GT(births, 5000u);
     Mat3d seen = Mat3d::Zero();
@@ -166,7 +166,7 @@ TEST(Metropolis, WhatNoViewSeesDoesNotTry) {
   for (size_t i = 0; i < 250; ++i) splats.positions[i * 3 + 2] = -2;
   KnownViews views = viewsOf(splats);
   const Edited now =
-      after(*eventOf(*makeStrategy("metropolis(crowding=0)"), publishedMoment(600), splats, views),
+      moved(*eventOf(*makeStrategy("metropolis(crowding=0)"), publishedMoment(600), splats, views),
             splats);
   ASSERT_GT(now.splats.size(), 600u);
   for (size_t i = 500; i < now.splats.size(); ++i) EXPECT_GT(now.splats.positions[i * 3 + 2], 0);
@@ -187,7 +187,7 @@ TEST(Metropolis, FaintOnesMoveBeforeBirths) {
   for (size_t i = 0; i < 100; ++i) splats.logits[i] = -8;
   KnownViews views = viewsOf(splats);
   const auto strategy = makeStrategy("metropolis(coarse=0,fine=0)");
-  const Edited now = after(*eventOf(*strategy, publishedMoment(600), splats, views), splats);
+  const Edited now = moved(*eventOf(*strategy, publishedMoment(600), splats, views), splats);
   ASSERT_EQ(now.splats.size(), 200u);
   for (const float logit : now.splats.logits) EXPECT_GT(logit, -6);
 }
@@ -197,7 +197,7 @@ TEST(Metropolis, OneSplatAllDeadAndNoLookAround) {
     RawSplats splats = mixedSplats(count, 1, -9, -8);
     const auto strategy = makeStrategy("metropolis");
     const auto edit = editAt(*strategy, publishedMoment(600), splats);  // nobody swept
-    EXPECT_GE(after(*edit, splats).splats.size(), count);
+    EXPECT_GE(moved(*edit, splats).splats.size(), count);
     KnownViews none;
     none.cloud = activated(splats);
     EXPECT_TRUE(eventOf(*strategy, publishedMoment(700), splats, none));
@@ -249,7 +249,7 @@ TEST(Metropolis, SameForAnyNumberOfThreads) {
       KnownViews views = viewsOf(splats);
       const auto strategy = makeStrategy("metropolis");
       results[threads - 1] =
-          after(*eventOf(*strategy, publishedMoment(600), splats, views), splats).splats;
+          moved(*eventOf(*strategy, publishedMoment(600), splats, views), splats).splats;
     });
   }
   EXPECT_GT(results[0].size(), 3000u);

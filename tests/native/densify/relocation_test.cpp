@@ -104,7 +104,7 @@ TEST(RelocatedSplats, DeadOnesBecomeCopiesOfLivingOnes) {
   EXPECT_THAT(relocated.drawCounts(), ElementsAre(0, 3, 0, 0));
   SplatEdit edit;
   relocated.write(edit);
-  const Edited now = after(edit, splats);
+  const Edited now = moved(edit, splats);
   const RelocationShare share = relocationShare(0, 4);
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_FLOAT_EQ(now.splats.logits[i], static_cast<float>(share.logit));
@@ -179,7 +179,7 @@ TEST(RelocatedSplats, SameForAnyNumberOfThreads) {
       relocated.write(edits[threads - 1]);
     });
   }
-  EXPECT_TRUE(areSame(after(edits[0], splats).splats, after(edits[1], splats).splats));
+  EXPECT_TRUE(areSame(moved(edits[0], splats).splats, moved(edits[1], splats).splats));
 }
 
 }  // namespace

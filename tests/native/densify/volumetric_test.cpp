@@ -32,7 +32,7 @@ RawSplats splatsOfScales(const std::vector<std::array<double, 3>>& scales) {
 Edited afterVolumes(const RawSplats& splats, const std::string& settings = "",
                     FitMoment moment = publishedMoment(600)) {
   const auto strategy = makeStrategy("volumetric" + settings);
-  return after(*editAt(*strategy, moment, splats), splats);
+  return moved(*editAt(*strategy, moment, splats), splats);
 }
 
 double volumeOf(const std::array<double, 3>& s) {
@@ -89,7 +89,7 @@ TEST(Volumetric, RoundSplatsComeToRest) {
   RawSplats splats = splatsOfScales({{0.42, 0.42, 0.42}});
   const auto strategy = makeStrategy("volumetric");
   for (uint64_t iteration = 600; iteration <= 2000; iteration += 100) {
-    splats = after(*editAt(*strategy, publishedMoment(iteration), splats), splats).splats;
+    splats = moved(*editAt(*strategy, publishedMoment(iteration), splats), splats).splats;
   }
   EXPECT_EQ(splats.size(), 4u);
 }
@@ -124,7 +124,7 @@ TEST(Volumetric, ChildrenOfAdaptiveControlAreLookedAtToo) {
   view.visible = visible;
   view.arrays[static_cast<size_t>(Statistic::kScreenGradients)] = gradients;
   strategy->observe(publishedMoment(1), view);
-  const Edited now = after(*editAt(*strategy, publishedMoment(600), splats), splats);
+  const Edited now = moved(*editAt(*strategy, publishedMoment(600), splats), splats);
   ASSERT_EQ(now.splats.size(), 4u);
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_NEAR(std::exp(now.splats.log_scales[i * 3]), 0.5 / 1.6 / 1.6, 1e-6);
