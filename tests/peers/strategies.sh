@@ -2,7 +2,8 @@
 # Fits four sets of pictures with every strategy of density control and writes the table and the plot of the docs.
 #   bash tests/peers/strategies.sh [--seeds 3] [--iterations 3000] [--strategies a,b] [--scenes a,b] [--photos FOLDER]
 # Blender renders the pictures (make_photos.py). Fits that are done are kept in build/peers/strategies/results.jsonl and not done
-# again, so that a night's work may be cut off and goes on. Nobody else should use the machine: seconds are compared.
+# again, so that a night's work may be cut off and goes on. Time is that of the processors, so that
+# other work on the machine changes it little.
 # STIPPLE_BUILD_DIR: as fit.sh. STIPPLE_STRATEGIES_DIR: instead of build/peers/strategies. Exit 77: something is missing, and which.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws seconds and PSNR of strategies as SVG: a panel for each scene, a mark for the mean of each strategy."""
+"""Draws processor seconds and PSNR of strategies as SVG: a panel for each scene, a mark for the mean of each strategy."""
 
 import math
 import statistics
@@ -18,7 +18,7 @@ def ticks(low, high, count=5):
 
 def panel(rows, title, names, left, top):
     width, height = PANEL
-    means = {name: [(row['seconds'], row['psnr']) for row in rows if row['strategy'] == name] for name in names}
+    means = {name: [(row['processor_seconds'], row['psnr']) for row in rows if row['strategy'] == name] for name in names}
     means = {name: tuple(statistics.mean(values) for values in zip(*found)) for name, found in means.items() if found}
     seconds, quality = zip(*means.values())
     x_low, x_high = math.log10(min(seconds)) - 0.05, math.log10(max(seconds)) + 0.05
@@ -47,7 +47,7 @@ def panel(rows, title, names, left, top):
 
 
 def plot(rows, scenes):
-    """In: rows with scene, strategy, seconds and psnr; scenes: title by name. Returns: SVG text."""
+    """In: rows with scene, strategy, processor_seconds and psnr; scenes: title by name. Returns: SVG text."""
     names = sorted({row['strategy'] for row in rows})
     shown = [scene for scene in scenes if any(row['scene'] == scene for row in rows)]
     columns = min(2, len(shown))
@@ -59,7 +59,7 @@ def plot(rows, scenes):
         left = MARGIN[0] + index % columns * (PANEL[0] + MARGIN[0])
         top = MARGIN[1] + index // columns * (PANEL[1] + MARGIN[1] + GAP)
         parts += panel([row for row in rows if row['scene'] == scene], scenes[scene], names, left, top)
-        parts.append(f'<text x="{left + PANEL[0] / 2}" y="{top + PANEL[1] + 34}" text-anchor="middle">seconds</text>'
+        parts.append(f'<text x="{left + PANEL[0] / 2}" y="{top + PANEL[1] + 34}" text-anchor="middle">processor seconds</text>'
                      f'<text transform="translate({left - 40},{top + PANEL[1] / 2}) rotate(-90)" text-anchor="middle">'
                      'PSNR of held-out views, dB</text>')
     for index, name in enumerate(names):
