@@ -100,6 +100,7 @@ def _make_engine():
             try:
                 self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
                 if self._instances:
+                    facts.refuse_stereo(depsgraph.scene.render)
                     self._camera(depsgraph, None)
                     # Cycles' passes tell nothing of what it holds out, and of shadow catchers only what falls on them.
                     self._holdouts = mattes.gather(depsgraph, 'HOLDOUTS')
@@ -146,6 +147,7 @@ def _make_engine():
             matte = mattes.surface(self._holdouts, camera, self._wait) if self._holdouts else None
             cycles = self._layers_of(passes, picture, world, matte)
             renderer = Renderer(sources.context())
+            self._say_memory(renderer, self._instances, camera)
             if self._catchers and cycles.has_shadows():
                 self._light_what_is_before_catchers(cycles, renderer, picture, camera, shadow_margin)
             task = renderer.start(self._instances, camera, renderer.options(blend_space=picture.blend_space),

@@ -22,6 +22,8 @@ POLL_SECONDS = 0.01
 class NativeWork:
     """What the engines share: native jobs that Blender can cancel, and one message for what goes wrong."""
 
+    _stats = ''  # what the status says beside the stage of the work
+
     def _wait(self, job):
         """Until the job ends; a cancel in Blender cancels it."""
         while True:
@@ -31,12 +33,22 @@ class NativeWork:
                 return
             if self._cancelled():
                 job.cancel()
-            self.update_stats('', stage)
-            self.update_progress(fraction)
+            self._say(fraction, stage)
             time.sleep(POLL_SECONDS)
 
     def _cancelled(self):
         return self.test_break()
+
+    def _say(self, fraction, stage):
+        self.update_stats(self._stats, stage)
+        self.update_progress(fraction)
+
+    def _say_memory(self, renderer, placed, camera):
+        """What drawing these instances takes at most, in Blender's status."""
+        count = sum(entry[0].info().count for entry in placed)
+        mebibytes = renderer.memory_bound(placed, camera) / 2 ** 20
+        self._stats = f'{count:,} splats, at most {mebibytes:,.0f} MiB'
+        self.update_memory_stats(memory_used=mebibytes, memory_peak=mebibytes)
 
     def _warn(self, message):
         self.report({'WARNING'}, message)
@@ -63,6 +75,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
         """Decodes what the view layer shows, from the evaluated settings."""
         self._instances = None
         try:
+            facts.refuse_stereo(depsgraph.scene.render)
             wanted = 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS'
             self._mattes = mattes.gather(depsgraph, wanted)
             self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
@@ -77,6 +90,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
             picture = facts.picture_facts(scene, depsgraph.view_layer)
             camera = cameras.camera_of(self.camera_override or scene.camera, scene.render, picture.border)
             renderer = Renderer(sources.context())
+            self._say_memory(renderer, self._instances, camera)
             options = renderer.options(blend_space=picture.blend_space, background=picture.background)
             task = renderer.start(self._instances, camera, options, picture.with_depth, surface=self._matte(camera))
             self._wait(task.job)

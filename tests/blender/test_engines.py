@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splats with meshes: Cycles + Stipple, and meshes as mattes under Stipple."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
 
 import scenes
+import screen
 from shots import EMPTY, MESH, SPLAT, camera, emission, mesh_between, prepare, set_world, splat_wall  # noqa: F401
+
+HERE = Path(__file__).resolve().parent
 
 # ---- Cycles + Stipple ---------------------------------------------------------------------------
 
@@ -292,6 +297,53 @@ def test_a_panoramic_camera_is_one_error(stipple, camera, tmp_path):
     prepare('STIPPLE_CYCLES')
     camera.data.type = 'PANO'
     scenes.refuses(lambda: scenes.render_pixels(tmp_path), 'is of type PANO')
+
+
+@pytest.mark.parametrize('engine', ['STIPPLE', 'STIPPLE_CYCLES'])
+def test_stereo_pictures_are_one_error(stipple, camera, tmp_path, engine):
+    mesh_between(stipple)
+    scene = prepare(engine)
+    scene.render.use_multiview = True
+    scenes.refuses(lambda: scenes.render_pixels(tmp_path), 'Stereoscopy is on with 2 views')
+    scene.render.use_multiview = False
+    assert scenes.render_pixels(tmp_path, 'one')[30, 45, 3] > 0.98
+
+
+@pytest.mark.parametrize('engine', ['STIPPLE', 'STIPPLE_CYCLES'])
+def test_the_status_says_how_far_and_how_much(stipple, camera, tmp_path, monkeypatch, engine):
+    """Splats, memory and the stage of the work, while the picture is made."""
+    mesh_between(stipple)
+    prepare(engine)
+    said = []
+    found = stipple.engine.NativeWork
+    say = found._say
+
+    def note(self, fraction, stage):
+        said.append((fraction, self._stats, stage))
+        say(self, fraction, stage)
+
+    monkeypatch.setattr(found, '_say', note)
+    monkeypatch.setattr(stipple.engine, 'POLL_SECONDS', 0.0)
+    bpy.context.scene.render.resolution_percentage = 800
+    bpy.ops.render.render()
+    assert said and all(0.0 <= fraction <= 1.0 for fraction, _, _ in said)
+    stats, stage = said[-1][1:]
+    # 480 x 480 pixels of colour and depth alone are 4.4 MiB.
+    assert stage and stats.startswith('7,200 splats, at most ') and 4 < int(stats.split()[-2]) < 100, stats
+
+
+@pytest.mark.parametrize('engine', ['STIPPLE', 'STIPPLE_CYCLES'])
+def test_a_window_and_the_background_give_the_same_bits(stipple, tmp_path, engine):
+    mesh_between(stipple)
+    scenes.camera((0.4, 0.2, 6), width=60, height=60, lens=60.0)
+    prepare(engine)
+    expected = scenes.render_pixels(tmp_path, 'background')
+    blend = tmp_path / 'scene.blend'
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    folder = tmp_path / 'window'
+    folder.mkdir()
+    screen.run_steps(HERE / 'render_steps.py', folder, bpy.app.binary_path, options=(str(blend),))
+    np.testing.assert_array_equal(np.load(folder / 'picture.npy'), expected)
 
 
 def test_cycles_itself_renders_on(stipple, camera, tmp_path):

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import version
-from ..binding.structs import BlendSpace
+from ..binding.errors import StippleError
+from ..binding.structs import BlendSpace, Status
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,14 @@ def picture_facts(scene, view_layer):
         border = Border(x0, y0, x1 - x0, y1 - y0)
     background = None if render.film_transparent else world_colour(scene.world)
     return PictureFacts(width, height, border, background, blend_space(scene), view_layer.use_pass_z)
+
+
+def refuse_stereo(render):
+    """Errors: StippleError where a picture of several views is wanted."""
+    if render.use_multiview:
+        count = sum(view.use for view in render.views)
+        raise StippleError(f'Stereoscopy is on with {count} views; splats are rendered in pictures of one view, with '
+                           'Output Properties > Stereoscopy off.', Status.ERROR_UNSUPPORTED)
 
 
 def blend_space(scene):
