@@ -22,6 +22,7 @@ from strategy_plot import plot
 SCENES = {'fine_texture': 'fine texture', 'thin_structures': 'thin structures', 'furnished_room': 'room',
           'still_life': 'photo set'}
 MOST_SPLATS = 100000
+DOWNSCALE = 2                         # of the pictures of 464 x 256, so that three seeds fit in a night on two cores
 UNSCALED = ('adaptive', 'improved')   # also for 30,000 iterations, on the first scene
 THIRD = 3                             # of adaptive's count, which the best strategies get once more
 BEST = 5                              # so many of them, beside adaptive itself
@@ -37,7 +38,7 @@ def fit(stipple, dataset, folder, job):
     """One fit as a process of its own: its figures."""
     report, result = folder / 'report.json', folder / 'result.stipple.safetensors'
     command = [stipple, 'fit', dataset, result, '--iterations', job['iterations'], '--seed', job['seed'], '--holdout', 8,
-               '--report', report]
+               '--downscale', job['downscale'], '--report', report]
     if job['strategy'] == 'learned_density':
         command += ['--model', 'field']
     else:
@@ -65,7 +66,7 @@ class Results:
         self.rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
     def find(self, **wanted):
-        return [row for row in self.rows if all(row[key] == value for key, value in wanted.items())]
+        return [row for row in self.rows if all(row.get(key) == value for key, value in wanted.items())]
 
     def add(self, row):
         self.rows.append(row)
@@ -82,7 +83,7 @@ def best(results, scene, iterations):
 
 def jobs(given, names, results):
     """Rounds of every scene and strategy, so that a night that is cut off leaves whole rounds."""
-    base = {'iterations': given.iterations, 'most': MOST_SPLATS, 'kind': 'full'}
+    base = {'iterations': given.iterations, 'most': MOST_SPLATS, 'downscale': DOWNSCALE, 'kind': 'full'}
     for seed in range(given.seeds):
         for scene in given.scenes:
             for name in names:
@@ -122,7 +123,7 @@ def write_page(results, given):
     lines = ['# What every strategy reaches', '',
              f'Written by `tests/peers/strategies.sh`: {given.iterations} iterations, at most {MOST_SPLATS:,} splats, '
              f'{seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every eighth view held out, '
-             'pictures of 464 × 256.',
+             f'pictures of {464 // DOWNSCALE} × {256 // DOWNSCALE}.',
              f'All fits together: {sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on '
              f'{os.cpu_count()} cores, {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours by the clock; '
              f'load of the machine meanwhile {statistics.mean(row["load"] for row in results.rows):.1f}.', '',
