@@ -44,6 +44,8 @@ def fit(stipple, dataset, folder, job):
     else:
         command[3] = folder / 'result.ply'
         command += ['--strategy', job['strategy'], '--gaussians', job['most']]
+    for left in folder.glob('result.*'):  # of a night that was cut off
+        left.unlink()
     start = time.perf_counter()
     process = subprocess.Popen([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     message = process.stderr.read()
