@@ -99,9 +99,8 @@ BackwardInput inputFrom(const StippleBackwardInput* input, const Buffers& buffer
   if (given.depth_gradient) made.depth_gradient = {given.depth_gradient, pixel_count};
   made.with_blending_weights = wanted(&StippleSplatGradients::blending_weights);
   made.with_screen_gradients = wanted(&StippleSplatGradients::screen_gradients);
-  made.with_absolute_screen_gradients =
-      wanted(&StippleSplatGradients::absolute_screen_gradients) ||
-      wanted(&StippleSplatGradients::screen_gradient_norms);
+  made.with_absolute_screen_gradients = wanted(&StippleSplatGradients::absolute_screen_gradients) ||
+                                        wanted(&StippleSplatGradients::screen_gradient_norms);
   return made;
 }
 
@@ -186,6 +185,10 @@ StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer,
     require(job, "job");
     Instances placed = instancesFrom(instances, count);
     const RenderSettings settings = renderSettings(options, placed);
+    if (settings.has_accuracy) {
+      fail(ErrorCode::kInvalidArgument,
+           "options->accuracy is set, which a backward pass does not follow; it must be NULL");
+    }
     requireDerivative(settings, placed);
     const Camera view = cameraFrom(camera);
     validate(view);

@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "api/cloud_cuts.h"
 #include "data/image.h"
 #include "data/memory_view_source.h"
 #include "data/sparse_volume.h"
@@ -78,6 +79,8 @@ struct RendererMemory {
   RenderResult result;
   BackwardWorkspace backward_workspace;
   BackwardResult backward_result;
+
+  CloudCuts cuts;  ///< has a lock of its own
 
   std::mutex order_mutex;  ///< of order_workspace: an order and a picture may be made at once
   DrawOrderWorkspace order_workspace;

@@ -1,5 +1,8 @@
 #include "api/render_settings.h"
 
+#include <algorithm>
+
+#include "api/accuracy.h"
 #include "api/guard.h"
 #include "math/colour.h"
 #include "splat/surface.h"
@@ -13,6 +16,29 @@ bool compositesInDisplaySpace(const Instances& instances, BlendSpace blend_space
   return blend_space == BlendSpace::kAsTrained &&
          (instances.list.empty() ||
           instances.list.front().cloud->colour_space == ColourSpace::kDisplay);
+}
+
+void takeAccuracy(const StippleAccuracy& given, RenderSettings& settings) {
+  const StippleAccuracy accuracy = accuracyFrom(&given, "options->accuracy");
+  if (settings.method != STIPPLE_RENDER_TILED) {
+    fail(ErrorCode::kInvalidArgument,
+         "options->method is " + std::to_string(settings.method) +
+             " beside options->accuracy, which chooses the method itself; 0 is allowed with it");
+  }
+  RenderOptions& options = settings.options;
+  if (accuracy.antialiasing == STIPPLE_SAMPLING_MIP) {
+    if (options.low_pass != LowPass::kFromCloud && options.low_pass != LowPass::kMip) {
+      fail(ErrorCode::kInvalidArgument,
+           "options->low_pass is " + std::to_string(static_cast<uint32_t>(options.low_pass)) +
+               ", and options->accuracy asks for mip; 0 or 2 is allowed with that");
+    }
+    options.low_pass = LowPass::kMip;
+  }
+  options.sh_degree_limit =
+      std::min(options.sh_degree_limit, static_cast<int>(accuracy.sh_degree_limit));
+  settings.accuracy = renderAccuracy(accuracy);
+  settings.budget_share = accuracy.budget_share;
+  settings.has_accuracy = true;
 }
 
 }  // namespace
@@ -43,6 +69,7 @@ RenderSettings renderSettings(const StippleRenderOptions* options, const Instanc
                               given.surface_colour, given.matte_opacity};
   settings.options.splats_apart = given.surface_colour != nullptr;
   settings.splat_light = given.splat_light;
+  if (given.accuracy) takeAccuracy(*given.accuracy, settings);
   return settings;
 }
 

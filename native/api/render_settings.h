@@ -3,6 +3,7 @@
 #include <stipple/stipple.h>
 
 #include "api/instances.h"
+#include "splat/accurate_render.h"
 #include "splat/render.h"
 
 namespace stipple::api {
@@ -12,6 +13,9 @@ struct RenderSettings {
   StippleRenderMethod method = STIPPLE_RENDER_TILED;
   bool linearise = false;  ///< the composited values are display values and light is asked for
   const float* splat_light = nullptr;  ///< [H,W,3]
+  RenderAccuracy accuracy;  ///< of STIPPLE_RENDER_TILED
+  double budget_share = 1;
+  bool has_accuracy = false;
 };
 
 /// The options of the caller in the library's own terms. NULL: defaults.

@@ -9,7 +9,7 @@
 #include "api/render_settings.h"
 #include "base/parallel.h"
 #include "math/colour.h"
-#include "splat/ray_render.h"
+#include "splat/accurate_render.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -72,15 +72,21 @@ void deliverPicture(const Result& picture, const RenderSettings& settings,
 }
 
 /// In the renderer's own memory, or in new where another job of the same renderer is using that.
-void renderTiledTo(RendererMemory& memory, const Instances& placed, const Camera& view,
-                   const RenderSettings& settings, const StippleRenderBuffers& out,
-                   Progress& progress) {
+void renderAccurateTo(RendererMemory& memory, Instances placed, const Camera& view,
+                      const RenderSettings& settings, const StippleRenderBuffers& out,
+                      Progress& progress) {
+  memory.cuts.cut(placed, settings.budget_share, &progress);
   const std::unique_lock<std::mutex> lock(memory.mutex, std::try_to_lock);
   if (lock.owns_lock()) {
-    renderTiled(placed.list, view, settings.options, memory.workspace, memory.result, &progress);
+    renderAccurate(placed.list, view, settings.options, settings.accuracy, memory.workspace,
+                   memory.result, &progress);
     deliverPicture(memory.result, settings, out);
   } else {
-    deliverPicture(renderTiled(placed.list, view, settings.options, &progress), settings, out);
+    RenderWorkspace workspace;
+    RenderResult result;
+    renderAccurate(placed.list, view, settings.options, settings.accuracy, workspace, result,
+                   &progress);
+    deliverPicture(result, settings, out);
   }
 }
 
@@ -126,10 +132,12 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     settings.options.with_median_depth = out.median_depth != nullptr;
     settings.options.with_counts = out.counts != nullptr;
     settings.options.with_transmittance = out.transmittance != nullptr;
-    const RenderMemory memory = followsRays(settings.method)
-                                    ? rayMemory(placed.list, view, settings.options)
-                                    : renderMemory(placed.list, view, settings.options);
-    renderer->context->requirePictureMemory(memory.sum(), "this picture of " + sizeText(view),
+    const RenderMemory memory =
+        followsRays(settings.method)
+            ? rayMemory(placed.list, view, settings.options)
+            : accurateMemory(placed.list, view, settings.options, settings.accuracy);
+    const uint64_t bytes = memory.sum() + CloudCuts::memoryBound(placed, settings.budget_share);
+    renderer->context->requirePictureMemory(bytes, "this picture of " + sizeText(view),
                                             memory.pair_bytes);
     *job = startJob(renderer->context, [memory = renderer->memory, placed = std::move(placed),
                                         settings, view, out](Progress& progress) {
@@ -142,7 +150,7 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
                                   is_yardstick ? rayYardstick() : RayOptions{}, &progress),
                        settings, out);
       } else {
-        renderTiledTo(*memory, placed, view, settings, out, progress);
+        renderAccurateTo(*memory, placed, view, settings, out, progress);
       }
       return JobResult{};
     });

@@ -2,6 +2,8 @@
 #include <memory>
 #include <vector>
 
+#include "cli/accuracy_options.h"
+#include "cli/camera_options.h"
 #include "cli/commands.h"
 #include "cli/report.h"
 
@@ -11,40 +13,16 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> in;
-  std::string camera, out, accuracy = "final", colour, low_pass, blend = "as-trained";
-  uint64_t view = 0;
-  uint32_t width = 0, height = 0;
+  std::string out, colour, low_pass, blend = "as-trained";
+  AccuracyArguments accuracy;
+  CameraArguments camera;
   std::vector<double> background;
 };
 
-constexpr uint32_t kDefaultSide = 800;
-
-/// The view at the asked size; one missing side follows from the other.
-StippleCamera cameraOf(const Context& context, const Arguments& arguments) {
-  const auto views = make<Views>(stipple_views_load, context.get(), arguments.camera.c_str());
-  auto camera = sized<StippleCamera>();
-  check(stipple_views_camera(views.get(), arguments.view, &camera));
-  uint32_t width = arguments.width, height = arguments.height;
-  const bool sized_view = camera.width > 0 && camera.height > 0;
-  const double aspect = sized_view ? static_cast<double>(camera.width) / camera.height : 1.0;
-  if (width == 0 && height == 0) {
-    width = sized_view ? camera.width : kDefaultSide;
-    height = sized_view ? camera.height : kDefaultSide;
-  } else if (width == 0) {
-    width = std::max(1u, static_cast<uint32_t>(height * aspect + 0.5));
-  } else if (height == 0) {
-    height = std::max(1u, static_cast<uint32_t>(width / aspect + 0.5));
-  }
-  check(stipple_camera_resize(&camera, width, height));
-  return camera;
-}
-
-StippleRenderOptions optionsOf(const Arguments& arguments) {
+StippleRenderOptions optionsOf(const Arguments& arguments, const StippleAccuracy& accuracy) {
   StippleRenderOptions options;
   stipple_render_options_init(&options);
-  if (arguments.accuracy == "double") options.method = STIPPLE_RENDER_REFERENCE;
-  if (arguments.accuracy == "rays") options.method = STIPPLE_RENDER_RAYS;
-  if (arguments.accuracy == "reference") options.method = STIPPLE_RENDER_YARDSTICK;
+  options.accuracy = &accuracy;
   if (arguments.low_pass == "classic") options.low_pass = STIPPLE_LOW_PASS_CLASSIC;
   if (arguments.low_pass == "mip") options.low_pass = STIPPLE_LOW_PASS_MIP;
   if (arguments.low_pass == "none") options.low_pass = STIPPLE_LOW_PASS_NONE;
@@ -61,8 +39,9 @@ void render(const Context& context, const Arguments& arguments) {
   if (fileKind(arguments.out) != FileKind::kImage) {
     throw Failure("'" + arguments.out + "' is not a picture; .png or .exr is expected");
   }
-  const StippleCamera camera = cameraOf(context, arguments);
-  const StippleRenderOptions options = optionsOf(arguments);
+  const StippleCamera camera = cameraOf(context, arguments.camera);
+  const StippleAccuracy accuracy = accuracyOf(arguments.accuracy);
+  const StippleRenderOptions options = optionsOf(arguments, accuracy);
   std::vector<Cloud> clouds;
   std::vector<StippleInstance> instances;
   for (const std::string& path : arguments.in) {
@@ -102,18 +81,8 @@ void addRender(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("render", "A picture of splats");
   command->add_option("in", arguments->in, "Splat files, rendered together")->required();
-  command->add_option("--camera", arguments->camera, "transforms.json, or a COLMAP folder")
-      ->required();
-  command->add_option("--view", arguments->view, "Which camera of the file")->capture_default_str();
-  command->add_option("--width", arguments->width, "Pixels; default: as the camera says");
-  command->add_option("--height", arguments->height, "Pixels");
-  command
-      ->add_option(
-          "--accuracy", arguments->accuracy,
-          "final; double (the same in double precision); rays (exact projection and order); "
-          "reference (rays without any limit, the yardstick)")
-      ->check(CLI::IsMember({"final", "double", "rays", "reference"}))
-      ->capture_default_str();
+  addCameraOptions(*command, arguments->camera);
+  addAccuracyOptions(*command, arguments->accuracy);
   command
       ->add_option("--colour", arguments->colour,
                    "Write composited (display) or scene linear values as they are, whatever the "

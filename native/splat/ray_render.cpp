@@ -1,10 +1,13 @@
 #include "splat/ray_render.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "base/parallel.h"
+#include "splat/affine_splats.h"
 #include "splat/ray_splats.h"
 #include "splat/scene.h"
 
@@ -12,8 +15,8 @@ namespace stipple {
 
 namespace {
 
-constexpr uint32_t kTileSide = 16;   ///< pixels
-constexpr uint32_t kBlockSide = 64;  ///< pixels, whole tiles
+constexpr uint32_t kTileSide = 16;              ///< pixels
+constexpr uint32_t kBlockSide = kRayBlockSide;  ///< pixels, whole tiles
 
 /// origin + place * direction; the view z of a point is its place.
 struct Ray {
@@ -73,9 +76,75 @@ struct Hit {
   uint32_t splat;
 };
 
-class RayPicture {
+/// A box in the picture.
+class Window {
  public:
-  RayPicture(const PlacedScene& scene, std::vector<RaySplat> splats, const RenderOptions& options,
+  Window(const View<double>&, const Rectangle& area)
+      : x_{area.x0 + 0.5, area.x1 - 0.5}, y_{area.y0 + 0.5, area.y1 - 0.5} {}
+
+  bool touches(double x, double y, double half_x, double half_y) const {
+    return x + half_x >= x_[0] && x - half_x <= x_[1] && y + half_y >= y_[0] && y - half_y <= y_[1];
+  }
+
+ private:
+  double x_[2], y_[2];
+};
+
+/// How splats are met along rays.
+struct AlongRays {
+  using Splat = RaySplat;
+  using Area = Beam;
+  using Line = Ray;
+
+  static bool touches(const Beam& beam, const RaySplat& splat) {
+    return beam.touches(splat.centre, splat.radius);
+  }
+  static Ray lineThrough(const View<double>& view, double x, double y) {
+    return rayThrough(view, x, y);
+  }
+  /// Returns false where the splat is not between the near and the far plane.
+  static bool meet(const View<double>& view, const RaySplat& splat, const Ray& ray, double& place,
+                   double& opacity, double& half_distance) {
+    const RayResponse response = respond(splat, ray.origin, ray.direction);
+    if (!(response.place >= view.near_plane && response.place <= view.far_plane)) return false;
+    place = response.place;
+    opacity = splat.opacity;
+    half_distance = 0.5 * response.squared_distance;
+    return true;
+  }
+  static double centreDepth(const RaySplat& splat) { return splat.centre[2]; }
+};
+
+/// How they are met where each is an ellipse in the picture.
+struct InPicture {
+  using Splat = AffineSplat;
+  using Area = Window;
+  using Line = std::array<double, 2>;
+
+  static bool touches(const Window& window, const AffineSplat& splat) {
+    const Footprint<double>& f = splat.footprint;
+    return window.touches(f.mean_x, f.mean_y, splat.half_x, splat.half_y);
+  }
+  static Line lineThrough(const View<double>&, double x, double y) { return {x, y}; }
+  static bool meet(const View<double>&, const AffineSplat& splat, const Line& pixel, double& place,
+                   double& opacity, double& half_distance) {
+    const Footprint<double>& f = splat.footprint;
+    const double dx = pixel[0] - f.mean_x, dy = pixel[1] - f.mean_y;
+    place = splat.depthAt(dx, dy);
+    opacity = f.opacity;
+    half_distance = halfSquaredDistance(f, dx, dy);
+    return true;
+  }
+  static double centreDepth(const AffineSplat& splat) { return splat.depth; }
+};
+
+template <typename Meeting>
+class RayPicture {
+  using Splat = typename Meeting::Splat;
+  using Area = typename Meeting::Area;
+
+ public:
+  RayPicture(const PlacedScene& scene, std::vector<Splat> splats, const RenderOptions& options,
              const RayOptions& rays, RenderResult& result)
       : view_(scene.view),
         splats_(std::move(splats)),
@@ -83,13 +152,10 @@ class RayPicture {
         rays_(rays),
         result_(result) {}
 
-  /// Blocks of one row of blocks, from pixel row y0 on.
-  void drawRow(uint32_t y0) {
-    const size_t columns = (result_.width + kBlockSide - 1) / kBlockSide;
-    parallelFor(columns, 1, [&](size_t begin, size_t end) {
-      for (size_t column = begin; column < end; ++column) {
-        drawBlock(static_cast<uint32_t>(column) * kBlockSide, y0);
-      }
+  /// Blocks [begin, end) of a list.
+  void drawBlocks(std::span<const PixelArea> blocks) {
+    parallelFor(blocks.size(), 1, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) drawBlock(blocks[i].x0, blocks[i].y0);
     });
   }
 
@@ -100,19 +166,19 @@ class RayPicture {
 
   void drawBlock(uint32_t x0, uint32_t y0) {
     const Rectangle block = cut(x0, y0, kBlockSide);
-    const Beam beam(view_, block);
+    const Area around(view_, block);
     std::vector<uint32_t> near_block, near_tile;
     for (uint32_t i = 0; i < splats_.size(); ++i) {
-      if (beam.touches(splats_[i].centre, splats_[i].radius)) near_block.push_back(i);
+      if (Meeting::touches(around, splats_[i])) near_block.push_back(i);
     }
     std::vector<Hit> hits;
     for (uint32_t y = block.y0; y < block.y1; y += kTileSide) {
       for (uint32_t x = block.x0; x < block.x1; x += kTileSide) {
         const Rectangle tile = cut(x, y, kTileSide);
-        const Beam narrow(view_, tile);
+        const Area narrow(view_, tile);
         near_tile.clear();
         for (const uint32_t i : near_block) {
-          if (narrow.touches(splats_[i].centre, splats_[i].radius)) near_tile.push_back(i);
+          if (Meeting::touches(narrow, splats_[i])) near_tile.push_back(i);
         }
         for (uint32_t py = tile.y0; py < tile.y1; ++py) {
           for (uint32_t px = tile.x0; px < tile.x1; ++px) drawPixel(px, py, near_tile, hits);
@@ -123,7 +189,7 @@ class RayPicture {
 
   void drawPixel(uint32_t x, uint32_t y, const std::vector<uint32_t>& near_tile,
                  std::vector<Hit>& hits) {
-    findHits(rayThrough(view_, x + 0.5, y + 0.5), near_tile, hits);
+    findHits(Meeting::lineThrough(view_, x + 0.5, y + 0.5), near_tile, hits);
     if (rays_.order == RayOrder::kResponse) {
       std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
         return a.place < b.place || (a.place == b.place && a.splat < b.splat);
@@ -132,32 +198,59 @@ class RayPicture {
     const size_t i = static_cast<size_t>(y) * result_.width + x;
     DoublePixel pixel(options_, i, rays_.limits.ends_early);
     for (const Hit& hit : hits) {
-      const RaySplat& splat = splats_[hit.splat];
+      const Splat& splat = splats_[hit.splat];
       if (!pixel.add(hit.alpha, splat.colour, hit.place, splat.is_holdout)) break;
     }
     pixel.write(options_, i, result_);
   }
 
-  void findHits(const Ray& ray, const std::vector<uint32_t>& near_tile,
+  void findHits(const typename Meeting::Line& line, const std::vector<uint32_t>& near_tile,
                 std::vector<Hit>& hits) const {
     hits.clear();
     for (const uint32_t i : near_tile) {
-      const RaySplat& splat = splats_[i];
-      const RayResponse response = respond(splat, ray.origin, ray.direction);
-      if (!(response.place >= view_.near_plane && response.place <= view_.far_plane)) continue;
-      const double full = splat.opacity * std::exp(-0.5 * response.squared_distance);
-      if (!(full >= rays_.limits.least_alpha)) continue;
-      const double depth = rays_.order == RayOrder::kCentre ? splat.centre[2] : response.place;
+      const Splat& splat = splats_[i];
+      double place, opacity, half_distance;
+      if (!Meeting::meet(view_, splat, line, place, opacity, half_distance)) continue;
+      const double full = opacity * std::exp(-half_distance);
+      if (full < rays_.limits.least_alpha) continue;
+      const double depth = rays_.order == RayOrder::kCentre ? Meeting::centreDepth(splat) : place;
       hits.push_back({depth, std::min(full, rays_.limits.most_alpha), i});
     }
   }
 
   const View<double>& view_;
-  std::vector<RaySplat> splats_;
+  std::vector<Splat> splats_;
   const RenderOptions& options_;
   const RayOptions& rays_;
   RenderResult& result_;
 };
+
+std::vector<PixelArea> blocksOf(const RenderResult& result, std::span<const PixelArea> areas) {
+  if (!areas.empty()) return {areas.begin(), areas.end()};
+  std::vector<PixelArea> blocks;
+  for (uint32_t y = 0; y < result.height; y += kBlockSide) {
+    for (uint32_t x = 0; x < result.width; x += kBlockSide) {
+      blocks.push_back({x, y, kBlockSide, kBlockSide});
+    }
+  }
+  return blocks;
+}
+
+template <typename Meeting>
+void drawAll(const PlacedScene& scene, std::vector<typename Meeting::Splat> splats,
+             const RenderOptions& options, const RayOptions& rays, RenderResult& result,
+             Progress* progress) {
+  result.visible_count = splats.size();
+  RayPicture<Meeting> picture(scene, std::move(splats), options, rays, result);
+  const std::vector<PixelArea> blocks = blocksOf(result, rays.areas);
+  // So that a cancel is heard ten times a second, and no thread waits long for the others.
+  const size_t at_once = 4 * threadLimit();
+  for (size_t first = 0; first < blocks.size(); first += at_once) {
+    advance(progress, static_cast<double>(first) / static_cast<double>(blocks.size()),
+            "Following rays");
+    picture.drawBlocks({blocks.data() + first, std::min(at_once, blocks.size() - first)});
+  }
+}
 
 }  // namespace
 
@@ -177,7 +270,8 @@ RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& c
   }
   RenderMemory memory;
   // Made range by range, gathered (which may double its room), sorted; and the order.
-  memory.splat_bytes = splats * (4 * sizeof(RaySplat) + 2 * sizeof(uint32_t));
+  memory.splat_bytes =
+      splats * (4 * std::max(sizeof(RaySplat), sizeof(AffineSplat)) + 2 * sizeof(uint32_t));
   // Of each thread, splats near its block and its tile, and those that show at a pixel.
   memory.pair_bytes = splats * threadLimit() * 2 * (2 * sizeof(uint32_t) + sizeof(Hit));
   memory.result_bytes = renderMemory({}, camera, options).result_bytes;
@@ -188,14 +282,14 @@ RenderResult renderRays(std::span<const SplatInstance> instances, const Camera& 
                         const RenderOptions& options, const RayOptions& rays, Progress* progress) {
   const PlacedScene scene = placeScene(instances, camera, options);
   advance(progress, 0.0, "Placing splats");
-  std::vector<RaySplat> splats = raySplats(scene, rays.limits.least_alpha);
   RenderResult result;
   sizeResult(camera, options, result);
-  result.visible_count = splats.size();
-  RayPicture picture(scene, std::move(splats), options, rays, result);
-  for (uint32_t y = 0; y < camera.height; y += kBlockSide) {
-    advance(progress, static_cast<double>(y) / camera.height, "Following rays");
-    picture.drawRow(y);
+  if (rays.projection == RayProjection::kRay) {
+    drawAll<AlongRays>(scene, raySplats(scene, rays.limits.least_alpha), options, rays, result,
+                       progress);
+  } else {
+    drawAll<InPicture>(scene, affineSplats(scene, rays.limits.least_alpha), options, rays, result,
+                       progress);
   }
   finishSurface(options, result);
   advance(progress, 1.0, "Following rays");

@@ -15,10 +15,28 @@ enum class RayOrder : uint32_t {
   kCentre = 1,  ///< by the view z of the centres, as the tiled renderer has them
 };
 
+/// What the picture makes of a splat.
+enum class RayProjection : uint32_t {
+  kRay = 0,     ///< what each pixel's ray meets
+  kAffine = 1,  ///< an ellipse, by the derivative of the projection at the splat's centre
+};
+
+/// Some pixels of a picture.
+struct PixelArea {
+  uint32_t x0 = 0, y0 = 0;
+  uint32_t width = 0, height = 0;
+};
+
 struct RayOptions {
   RayOrder order = RayOrder::kResponse;
+  RayProjection projection = RayProjection::kRay;
   BlendLimits limits;
+  /// Pixels to draw, whole blocks of kRayBlockSide from multiples of it on; the others stay 0.
+  /// Empty: all.
+  std::span<const PixelArea> areas = {};
 };
+
+constexpr uint32_t kRayBlockSide = 64;
 
 /// The yardstick: nothing is left out that could show, no alpha is limited and no pixel ends early.
 /// What is fainter than 1e-9 is skipped.
@@ -30,6 +48,8 @@ RayOptions rayYardstick();
 /// and near the middle, and not at wide angles or close by. The low-pass is one in space, of the
 /// width that a pixel has at the splat's centre: variance v (z/f)^2 for v px^2, with the same
 /// compensation of opacity. Depths are those of the largest response on the ray.
+/// With RayProjection::kAffine alpha is that of renderReference, and the place of the largest
+/// response the mean depth of the affine Gaussian behind the pixel.
 /// Double precision. Same bits for any number of threads. Cost: O(splats * blocks of 64 x 64 +
 /// pixels * splats near their tile). Errors: those of renderTiled.
 /// Based on: Moenne-Loccoz et al., 3D Gaussian Ray Tracing, SIGGRAPH Asia 2024 (the response along

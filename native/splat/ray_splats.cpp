@@ -2,18 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
-#include "base/parallel.h"
 #include "math/covariance.h"
 #include "math/principal_axes.h"
+#include "splat/depth_order.h"
 #include "splat/projection.h"
 
 namespace stipple {
 
 namespace {
-
-constexpr size_t kGrain = 1024;
 
 /// Whether a matrix only turns, mirrors and scales evenly.
 bool isSimilarity(const Mat3d& linear, double& scale) {
@@ -94,30 +91,14 @@ class Maker {
 }  // namespace
 
 std::vector<RaySplat> raySplats(const PlacedScene& scene, double least_alpha) {
-  std::vector<RaySplat> splats;
-  for (const PlacedCloud& placed : scene.clouds) {
-    const Maker maker(scene, placed, least_alpha);
-    const size_t count = placed.cloud->size();
-    std::vector<std::vector<RaySplat>> made(rangeCount(count, kGrain));
-    parallelFor(count, kGrain, [&](size_t begin, size_t end) {
-      RaySplat splat;
-      for (size_t i = begin; i < end; ++i) {
-        if (maker.make(i, splat)) made[begin / kGrain].push_back(splat);
-      }
-    });
-    for (const std::vector<RaySplat>& range : made) {
-      splats.insert(splats.end(), range.begin(), range.end());
-    }
-  }
-  std::vector<uint32_t> order(splats.size());
-  std::iota(order.begin(), order.end(), uint32_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return depthKey(splats[a].centre[2]) < depthKey(splats[b].centre[2]);
-  });
-  std::vector<RaySplat> sorted;
-  sorted.reserve(splats.size());
-  for (const uint32_t i : order) sorted.push_back(splats[i]);
-  return sorted;
+  std::vector<Maker> makers;
+  for (const PlacedCloud& placed : scene.clouds) makers.emplace_back(scene, placed, least_alpha);
+  return splatsInDepthOrder<RaySplat>(
+      scene,
+      [&](const PlacedCloud& placed, size_t i, RaySplat& splat) {
+        return makers[static_cast<size_t>(&placed - scene.clouds.data())].make(i, splat);
+      },
+      [](const RaySplat& splat) { return splat.centre[2]; });
 }
 
 }  // namespace stipple

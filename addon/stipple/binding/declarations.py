@@ -113,6 +113,13 @@ FUNCTIONS = {
     'stipple_views_view_info': (_status, [_handle, c_uint64, _to(s.StippleViewInfo)]),
     'stipple_views_read': (_status, [_handle, c_uint64, _to(s.StippleViewBuffers)]),
     'stipple_views_read_points': (_status, [_handle, c_uint64, _floats, _floats]),
+    # accuracy
+    'stipple_accuracy_init': (_status, [c_uint32, _to(s.StippleAccuracy)]),
+    'stipple_accuracy_check': (_status, [_to(s.StippleAccuracy)]),
+    'stipple_accuracy_knob_count': (_status, [POINTER(c_uint64)]),
+    'stipple_accuracy_knob_info': (_status, [c_uint64, _to(s.StippleAccuracyKnobInfo)]),
+    'stipple_accuracy_level_name': (c_char_p, [c_uint32]),
+    'stipple_accuracy_verdict': (c_char_p, [c_double]),
     # rendering
     'stipple_render_options_init': (None, [_to(s.StippleRenderOptions)]),
     'stipple_renderer_create': (_status, [_handle, _out_handle]),

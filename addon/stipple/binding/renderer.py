@@ -74,8 +74,9 @@ class Renderer(Handle):
         super().__init__(context.library, new_handle(context.library, 'stipple_renderer_create', context.pointer))
 
     def options(self, blend_space=BlendSpace.AS_TRAINED, output_colour=OutputColour.SCENE_LINEAR,
-                low_pass=LowPass.FROM_CLOUD, method=RenderMethod.TILED, background=None):
-        """background: three values in output_colour's space, or None for a transparent picture."""
+                low_pass=LowPass.FROM_CLOUD, method=RenderMethod.TILED, background=None, accuracy=None):
+        """background: three values in output_colour's space, or None for a transparent picture. accuracy: a
+        StippleAccuracy, or None for final."""
         options = StippleRenderOptions()
         self.library.stipple_render_options_init(byref(options))
         options.blend_space, options.output_colour = int(blend_space), int(output_colour)
@@ -83,6 +84,8 @@ class Renderer(Handle):
         if background is not None:
             options.with_background = 1
             options.background = (c_double * 3)(*background)
+        if accuracy is not None:
+            options.accuracy = pointer(accuracy)
         return options
 
     def start(self, instances, camera, options, with_depth=True, median_depth=False, surface=None,

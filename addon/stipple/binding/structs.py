@@ -126,6 +126,34 @@ class RenderMethod(IntEnum):
     YARDSTICK = 3
 
 
+class AccuracyLevel(IntEnum):
+    DRAFT = 0
+    PREVIEW = 1
+    FINAL = 2
+    REFERENCE = 3
+
+
+class SplatOrder(IntEnum):
+    CENTRE = 0
+    PIXEL = 1
+
+
+class Projection(IntEnum):
+    AFFINE = 0
+    RAY = 1
+
+
+class Sampling(IntEnum):
+    AS_TRAINED = 0
+    MIP = 1
+    SAMPLES = 2
+
+
+class Precision(IntEnum):
+    FLOAT = 0
+    DOUBLE = 1
+
+
 class Side(IntEnum):
     INSIDE = 0
     OUTSIDE = 1
@@ -170,6 +198,11 @@ ENUMS = {
     'StippleBlendSpace': (BlendSpace, 'STIPPLE_BLEND_'),
     'StippleOutputColour': (OutputColour, 'STIPPLE_OUTPUT_'),
     'StippleRenderMethod': (RenderMethod, 'STIPPLE_RENDER_'),
+    'StippleAccuracyLevel': (AccuracyLevel, 'STIPPLE_ACCURACY_'),
+    'StippleSplatOrder': (SplatOrder, 'STIPPLE_ORDER_'),
+    'StippleProjection': (Projection, 'STIPPLE_PROJECTION_'),
+    'StippleSampling': (Sampling, 'STIPPLE_SAMPLING_'),
+    'StipplePrecision': (Precision, 'STIPPLE_PRECISION_'),
     'StippleSide': (Side, 'STIPPLE_SIDE_'),
     'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
     'StippleFitModel': (FitModel, 'STIPPLE_FIT_'),
@@ -361,12 +394,23 @@ class StippleInstance(_Sized):
                 ('grade', POINTER(StippleGrade))]
 
 
+class StippleAccuracy(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('level', c_uint32), ('order', c_uint32), ('projection', c_uint32),
+                ('antialiasing', c_uint32), ('samples_per_side', c_uint32), ('sh_degree_limit', c_uint32),
+                ('precision', c_uint32), ('least_alpha', c_double), ('budget_share', c_double)]
+
+
+class StippleAccuracyKnobInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('has_bound', c_uint32), ('name_utf8', c_char_p), ('label_utf8', c_char_p),
+                ('bound_utf8', c_char_p)]
+
+
 class StippleRenderOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('method', c_uint32), ('low_pass', c_uint32), ('blend_space', c_uint32),
                 ('output_colour', c_uint32), ('sh_degree_limit', c_uint32), ('with_background', c_uint32),
                 ('reserved', c_uint32), ('background', c_double * 3), ('surface_width', c_uint32),
                 ('surface_height', c_uint32), ('surface_depth', _floats), ('surface_colour', _floats),
-                ('matte_opacity', _floats), ('splat_light', _floats)]
+                ('matte_opacity', _floats), ('splat_light', _floats), ('accuracy', POINTER(StippleAccuracy))]
 
 
 class StippleMeshInstance(_Sized):

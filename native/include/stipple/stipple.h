@@ -715,6 +715,84 @@ StippleStatus stipple_views_read(const StippleViews* views, uint64_t index, cons
 StippleStatus stipple_views_read_points(const StippleViews* views, uint64_t capacity, float* positions,
                                         float* colours);
 
+/* ---- accuracy ---------------------------------------------------------------------------------- */
+
+/* What of a picture trades exactness for time. A level sets every knob; the knobs may then be changed one by
+ * one. stipple_accuracy_knob_info says how far off each may be, in words for people:
+ *   order           unbounded: where splats cross, centre shows one of them in front as a whole
+ *   projection      unbounded: affine grows with the angle that a splat fills and its distance from the axis
+ *   least_alpha     x leaves out less than x / (1 - x) of a colour for each splat; no bound for all of them
+ *   sh_degree_limit unbounded: at most the sum of what the left out harmonics can add to a splat's colour
+ *   antialiasing    no error but another filter: mip and samples show what as-trained aliases
+ *   precision       float: 1e-5 of the largest colour where no needle is end-on; double: 1e-7 of the result
+ *   budget_share    unbounded: splats are merged, the smallest change first
+ *   level           all but reference end a pixel at a transmittance of 1e-4 (at most 1e-4 of the largest colour)
+ *                   and hold alpha to 0.99 (0.01 of the colours behind, for each splat) */
+typedef enum StippleAccuracyLevel {
+  STIPPLE_ACCURACY_DRAFT = 0,    /* a quarter of the splats, colours of degree 1 */
+  STIPPLE_ACCURACY_PREVIEW = 1,  /* half of the splats, colours of degree 2 */
+  STIPPLE_ACCURACY_FINAL = 2,    /* all of them, as splats are trained */
+  STIPPLE_ACCURACY_REFERENCE = 3 /* the yardstick: exact rays and order, no limit, in double */
+} StippleAccuracyLevel;
+
+typedef enum StippleSplatOrder {
+  STIPPLE_ORDER_CENTRE = 0, /* by the view z of the centres */
+  STIPPLE_ORDER_PIXEL = 1   /* by where behind each pixel a splat is densest: right where splats cross, nothing
+                               pops when the camera turns */
+} StippleSplatOrder;
+
+typedef enum StippleProjection {
+  STIPPLE_PROJECTION_AFFINE = 0, /* ellipses, as splats are trained */
+  STIPPLE_PROJECTION_RAY = 1     /* what each pixel's ray meets: right at wide angles and close by */
+} StippleProjection;
+
+typedef enum StippleSampling {
+  STIPPLE_SAMPLING_AS_TRAINED = 0, /* low_pass of the render options */
+  STIPPLE_SAMPLING_MIP = 1,        /* 0.1 px^2 with compensation: right when zoomed out */
+  STIPPLE_SAMPLING_SAMPLES = 2     /* the picture at samples_per_side times the size, averaged by area as it is
+                                      composited */
+} StippleSampling;
+
+typedef enum StipplePrecision {
+  STIPPLE_PRECISION_FLOAT = 0,
+  STIPPLE_PRECISION_DOUBLE = 1
+} StipplePrecision;
+
+typedef struct StippleAccuracy {
+  uint32_t struct_size;
+  uint32_t level;            /* StippleAccuracyLevel. Reference: also without any limit of alpha and transmittance;
+                                it needs order pixel, projection ray and precision double */
+  uint32_t order;            /* StippleSplatOrder */
+  uint32_t projection;       /* StippleProjection */
+  uint32_t antialiasing;     /* StippleSampling */
+  uint32_t samples_per_side; /* 1..16; above 1 with STIPPLE_SAMPLING_SAMPLES alone */
+  uint32_t sh_degree_limit;  /* 0..4; with the render options' the smaller counts */
+  uint32_t precision;        /* StipplePrecision */
+  double least_alpha;        /* fainter splats are skipped; above 0 and below 1; 1/255 as splats are trained */
+  double budget_share;       /* of each cloud's splats, above 0 to 1: below 1 it is merged into the nearest cloud of
+                                that size, once (about 3 us per splat and core pair), and kept by the renderer */
+} StippleAccuracy;
+/* Sets every knob as a level has it. In: level, a StippleAccuracyLevel. Errors: INVALID_ARGUMENT. */
+StippleStatus stipple_accuracy_init(uint32_t level, StippleAccuracy* accuracy);
+/* Whether a picture can be drawn so. Errors: INVALID_ARGUMENT, with the knob, its value and what is allowed. */
+StippleStatus stipple_accuracy_check(const StippleAccuracy* accuracy);
+
+/* Texts in English; they live as long as the library. */
+typedef struct StippleAccuracyKnobInfo {
+  uint32_t struct_size;
+  uint32_t has_bound;        /* 1: the error has the bound that the text states; 0: it has none */
+  const char* name_utf8;     /* the field of StippleAccuracy */
+  const char* label_utf8;
+  const char* bound_utf8;    /* how far off it may be, and what it costs: one or two sentences */
+} StippleAccuracyKnobInfo;
+StippleStatus stipple_accuracy_knob_count(uint64_t* count);
+StippleStatus stipple_accuracy_knob_info(uint64_t index, StippleAccuracyKnobInfo* info);
+/* "draft", "preview", "final", "reference"; NULL for others. Lives as long as the library. */
+const char* stipple_accuracy_level_name(uint32_t level);
+/* What a PSNR means to who looks: "looks identical" from 45 dB on, "hard to see" from 38, "visible side by side"
+ * from 30, else "obvious"; never NULL. Lives as long as the library. */
+const char* stipple_accuracy_verdict(double psnr);
+
 /* ---- rendering --------------------------------------------------------------------------------- */
 
 typedef struct StippleInstance {
@@ -779,6 +857,9 @@ typedef struct StippleRenderOptions {
   /* [H,W,3] >= 0, factors of all that is not the surface, in output_colour's space: shadows that fall on
    * splats. NULL: 1. */
   const float* splat_light;
+  /* How exact the picture is, and what that costs. Read during the call. NULL: as final. Otherwise method must be
+   * STIPPLE_RENDER_TILED. Not for backward passes. */
+  const StippleAccuracy* accuracy;
 } StippleRenderOptions;
 void stipple_render_options_init(StippleRenderOptions* options);
 

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Accuracy from a script: levels, knobs, every combination, and what is refused."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from stipple.binding.accuracy import accuracy, accuracy_knobs, accuracy_level_name, accuracy_verdict
+from stipple.binding.cloud import Cloud, SplatArrays
+from stipple.binding.errors import StippleError
+from stipple.binding.model import DecodeSettings, Model
+from stipple.binding.renderer import Renderer
+from stipple.binding.structs import (AccuracyLevel, LowPass, OutputColour, Precision, Projection, RenderMethod, Sampling,
+                                     SplatOrder, StippleAccuracy, StippleCamera)
+
+WIDTH, HEIGHT, COUNT = 40, 30, 60
+
+
+def camera_of(scale=1):
+    camera = StippleCamera(width=WIDTH * scale, height=HEIGHT * scale, fx=30 * scale, fy=30 * scale,
+                           cx=WIDTH / 2 * scale, cy=HEIGHT / 2 * scale, near_plane=0.01, far_plane=100)
+    camera.world_to_camera[:] = [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 2.5, 0, 0, 0, 1]
+    return camera
+
+
+@pytest.fixture(scope='module')
+def cloud(context):
+    random = np.random.default_rng(3)
+    return Cloud.create(context, SplatArrays(
+        random.uniform(-1, 1, (COUNT, 3)).astype(np.float32), random.normal(size=(COUNT, 4)).astype(np.float32),
+        random.uniform(0.03, 0.3, (COUNT, 3)).astype(np.float32), random.uniform(0.2, 0.95, COUNT).astype(np.float32),
+        random.uniform(-0.6, 0.6, (COUNT, 9, 3)).astype(np.float32)))
+
+
+@pytest.fixture(scope='module')
+def renderer(context):
+    return Renderer(context)
+
+
+def drawn(renderer, cloud, chosen=None, scale=1, **options):
+    options = renderer.options(output_colour=OutputColour.COMPOSITED, accuracy=chosen, **options)
+    task = renderer.start([(cloud, np.eye(4))], camera_of(scale), options, with_depth=False)
+    task.job.wait()
+    return task.colour
+
+
+def test_levels_are_what_they_say(library, renderer, cloud):
+    final = drawn(renderer, cloud, accuracy(library))
+    assert np.array_equal(final, drawn(renderer, cloud))
+    reference = drawn(renderer, cloud, accuracy(library, AccuracyLevel.REFERENCE))
+    assert np.array_equal(reference, drawn(renderer, cloud, method=RenderMethod.YARDSTICK))
+    errors = [np.abs(drawn(renderer, cloud, accuracy(library, level)) - reference).mean()
+              for level in (AccuracyLevel.DRAFT, AccuracyLevel.PREVIEW, AccuracyLevel.FINAL)]
+    assert errors[0] > errors[1] > errors[2] > 0
+    assert [accuracy_level_name(library, level) for level in AccuracyLevel] == ['draft', 'preview', 'final', 'reference']
+
+
+def test_double_is_the_reference_of_the_tiled_renderer(library, renderer, cloud):
+    double = drawn(renderer, cloud, accuracy(library, precision=Precision.DOUBLE))
+    # Both are double; sums differ by the float32 of the result.
+    assert np.abs(double - drawn(renderer, cloud, method=RenderMethod.REFERENCE)).max() < 2e-7
+
+
+def test_every_combination_draws_what_its_double_draws(library, renderer, cloud):
+    combinations = itertools.product(SplatOrder, Projection, (1 / 255, 0.05, 1e-6), (0, 4), (1.0, 0.5),
+                                     (Sampling.AS_TRAINED, Sampling.MIP, Sampling.SAMPLES))
+    for order, projection, least_alpha, degree, share, sampling in combinations:
+        knobs = dict(order=order, projection=projection, least_alpha=least_alpha, sh_degree_limit=degree,
+                     budget_share=share, antialiasing=sampling, samples_per_side=2 if sampling == Sampling.SAMPLES else 1)
+        picture = drawn(renderer, cloud, accuracy(library, **knobs))
+        double = drawn(renderer, cloud, accuracy(library, precision=Precision.DOUBLE, **knobs))
+        assert np.isfinite(picture).all() and picture[..., 3].min() >= 0 and picture[..., 3].max() <= 1, knobs
+        # A splat whose alpha is at the cut-off to float32 may be in one of the two alone.
+        assert np.abs(picture - double).max() < 1e-4 + least_alpha, knobs
+        assert np.abs(picture - double).mean() < 2e-5, knobs
+
+
+def test_samples_are_a_larger_picture_averaged(library, renderer, cloud):
+    large = drawn(renderer, cloud, scale=3)
+    averaged = large.reshape(HEIGHT, 3, WIDTH, 3, 4).mean((1, 3))
+    sampled = drawn(renderer, cloud, accuracy(library, antialiasing=Sampling.SAMPLES, samples_per_side=3))
+    assert np.abs(sampled - averaged).max() < 2e-7
+
+
+def test_share_is_the_cloud_merged_to_so_many(library, context, renderer, cloud):
+    job = Model.from_cloud_start(context, cloud, view_count=0)
+    job.wait()
+    half = job.model().decode(DecodeSettings(COUNT // 2))
+    assert np.array_equal(drawn(renderer, cloud, accuracy(library, budget_share=0.5)), drawn(renderer, half))
+
+
+@pytest.mark.parametrize('knobs, text', [
+    (dict(level=7), 'level is 7; 0 to 3 is allowed'),
+    (dict(order=2), 'order is 2; 0 to 1 is allowed'),
+    (dict(projection=9), 'projection is 9; 0 to 1 is allowed'),
+    (dict(antialiasing=3), 'antialiasing is 3; 0 to 2 is allowed'),
+    (dict(precision=2), 'precision is 2; 0 to 1 is allowed'),
+    (dict(sh_degree_limit=5), 'sh_degree_limit is 5; 0 to 4 is allowed'),
+    (dict(samples_per_side=0), 'samples_per_side is 0; 1 to 16 is allowed'),
+    (dict(samples_per_side=17), 'samples_per_side is 17; 1 to 16 is allowed'),
+    (dict(samples_per_side=4), 'samples_per_side is 4 without antialiasing by samples'),
+    (dict(least_alpha=0), 'least_alpha is 0; a number above 0 and below 1 is allowed'),
+    (dict(least_alpha=float('nan')), 'least_alpha is nan; a number above 0'),
+    (dict(budget_share=0), 'budget_share is 0; a number above 0 and up to 1 is allowed'),
+    (dict(budget_share=1.5), 'budget_share is 1.5; a number above 0 and up to 1'),
+])
+def test_bad_knobs_are_refused(library, renderer, cloud, knobs, text):
+    with pytest.raises(StippleError, match=text.replace('.', r'\.')):
+        accuracy(library, **knobs)
+    made = accuracy(library)
+    for name, value in knobs.items():
+        setattr(made, name, value)
+    with pytest.raises(StippleError, match='options->accuracy->' + text.replace('.', r'\.')):
+        drawn(renderer, cloud, made)
+
+
+def test_contradictions_are_refused(library, renderer, cloud):
+    with pytest.raises(StippleError, match='level is reference with a knob below it'):
+        accuracy(library, AccuracyLevel.REFERENCE, precision=Precision.FLOAT)
+    with pytest.raises(StippleError, match=r'options->method is 2 beside options->accuracy'):
+        drawn(renderer, cloud, accuracy(library), method=RenderMethod.RAYS)
+    with pytest.raises(StippleError, match=r'options->low_pass is 1, and options->accuracy asks for mip'):
+        drawn(renderer, cloud, accuracy(library, antialiasing=Sampling.MIP), low_pass=LowPass.CLASSIC)
+    large = camera_of()
+    large.width = 65536
+    options = renderer.options(accuracy=accuracy(library, antialiasing=Sampling.SAMPLES, samples_per_side=2))
+    with pytest.raises(StippleError, match='131072 samples wide; at most 65536 is allowed'):
+        renderer.start([(cloud, np.eye(4))], large, options, with_depth=False)
+    with pytest.raises(TypeError, match="no knob 'speed'"):
+        accuracy(library, speed=1)
+
+
+def test_every_knob_says_its_bound(library):
+    knobs = accuracy_knobs(library)
+    fields = {name for name, *_ in StippleAccuracy._fields_} - {'struct_size'}
+    assert {knob.name for knob in knobs} == fields
+    for knob in knobs:
+        assert knob.label and knob.bound.endswith('.') and len(knob.bound) > 40
+        assert knob.has_bound != knob.bound.startswith('No bound')
+
+
+def test_verdicts_are_words(library):
+    assert [accuracy_verdict(library, psnr) for psnr in (float('inf'), 45, 38, 30, 29.9)] == [
+        'looks identical', 'looks identical', 'hard to see', 'visible side by side', 'obvious']
