@@ -21,9 +21,9 @@ struct Preset {
   uint64_t most_anchors;
 };
 constexpr Preset kPresets[] = {
-    {500, 50000, 4096},     // fast
-    {2000, 150000, 8192},   // balanced
-    {7000, 500000, 16384},  // fine detail
+    {500, 50000, 8192},     // fast
+    {2000, 150000, 16384},   // balanced
+    {7000, 500000, 32768},  // fine detail
 };
 constexpr int kDegreeOfExplicit = 3;
 

@@ -23,8 +23,8 @@ struct FieldCase {
   uint64_t anchors;
   uint32_t size;  ///< pixels a side
 };
-constexpr FieldCase kCases[] = {{"2k_256x256", 2048, 256}, {"8k_512x512", 8192, 512}};
-constexpr uint32_t kGaussians = 8;
+constexpr FieldCase kCases[] = {{"4k_256x256", 4096, 256}, {"16k_512x512", 16384, 512}};
+constexpr uint32_t kGaussians = 4;
 constexpr int kSteps = 10;
 
 /// Points of a ball, as many as make an octree of some size, and one picture of another colour.

@@ -334,7 +334,8 @@ void addFit(CLI::App& app, const Context& context) {
       command->add_option("--gaussians", to.gaussians, "Explicit: the most splats there may be");
   command->add_option("--anchors", to.anchors, "Field: the largest budget that is trained")
       ->excludes(gaussians);
-  command->add_option("--gaussians-per-anchor", to.gaussians_per_anchor, "Field: 4 to 32");
+  command->add_option("--gaussians-per-anchor", to.gaussians_per_anchor,
+                      "Field: 4, the default, to 32");
   command->add_option("--iterations", to.iterations, "Steps, one view each");
   command->add_option("--sh-degree", to.sh_degree, "0 (colour without view) to 4");
   command->add_option("--downscale", to.downscale, "Pictures are made smaller by this factor")

@@ -16,8 +16,8 @@ struct FieldShape {
   RootCube root;
   int leaf_level = 8;  ///< of the anchors' octree
   SplatLayout layout;
-  uint64_t least_anchors = 512;  ///< budgets that it is trained for; others count as the nearest
-  uint64_t most_anchors = 8192;
+  uint64_t least_anchors = 1024;  ///< budgets that it is trained for; others count as the nearest
+  uint64_t most_anchors = 16384;
   uint64_t surface_cells = 1 << 16;  ///< leaves that it has to tell apart, about
   double starting_opacity = 0.3;     ///< of its Gaussians, below 1
   ColourSpace colour_space = ColourSpace::kDisplay;
@@ -39,8 +39,8 @@ struct FieldParameters {
   RootCube root;
   int leaf_level = 8;
   SplatLayout layout;
-  uint64_t least_anchors = 512;
-  uint64_t most_anchors = 8192;
+  uint64_t least_anchors = 1024;
+  uint64_t most_anchors = 16384;
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kMip;
   FeatureGrid features;  ///< read where an anchor is; the network's input

@@ -14,7 +14,7 @@ namespace stipple {
 /// [3K centre | 3K colour | 3K scale | 4K rotation | K opacity | K spread], and behind it, where
 /// colour depends on the view, [K, harmonics above the first, 3]. Gaussian-major within each.
 struct SplatLayout {
-  uint32_t gaussians = 8;  ///< K, 4..32
+  uint32_t gaussians = 4;  ///< K, 4..32
   int sh_degree = 0;       ///< 0..kMaxShDegree
 
   size_t higherCoefficients() const { return (shCoefficientCount(sh_degree) - 1) * 3; }

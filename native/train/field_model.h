@@ -17,9 +17,9 @@
 namespace stipple {
 
 struct FieldModelOptions {
-  uint64_t least_anchors = 512;  ///< budgets are drawn log-uniformly between these two
-  uint64_t most_anchors = 8192;
-  uint32_t gaussians_per_anchor = 8;  ///< K, 4..32
+  uint64_t least_anchors = 1024;  ///< budgets are drawn log-uniformly between these two
+  uint64_t most_anchors = 16384;
+  uint32_t gaussians_per_anchor = 4;  ///< K, 4..32; few: more places learn what they look like
   int leaf_level = 8;                 ///< of the octree, 1..10
   int sh_degree = 0;                  ///< above 0: colour depends on the view
   Antialias antialias = Antialias::kMip;

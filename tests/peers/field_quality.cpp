@@ -1,7 +1,8 @@
 // Fits fields to data sets of make_objects.py and says how good they are at every budget, beside
 // explicit splats of as many iterations and their cuts.
-//   field_quality ITERATIONS SEEDS LEAST MOST GAUSSIANS DOWNSCALE DATASET...
-// LEAST, MOST: budgets, anchors; GAUSSIANS: per anchor; every sixth view is held out.
+//   field_quality ITERATIONS SEEDS LEAST MOST GAUSSIANS DOWNSCALE ARMS DATASET...
+// LEAST, MOST: budgets, anchors; GAUSSIANS: per anchor; ARMS: what is fitted, parted by commas;
+// every sixth view is held out.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +11,7 @@
 #include <iterator>
 #include <map>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,10 +27,14 @@ namespace stipple {
 namespace {
 
 constexpr uint64_t kHoldOut = 6;
+/// Fits that are compared.
+const std::string kField = "field", kGradientOff = "gradient off", kJitterOff = "jitter off",
+                  kCut = "explicit cut";
 
 struct Settings {
   uint64_t iterations, seeds, least, most;
   uint32_t gaussians;
+  std::vector<std::string> arms;
 
   std::vector<uint64_t> budgets() const {
     std::vector<uint64_t> all;
@@ -154,6 +160,26 @@ void printDifferences(const std::string& name, const std::vector<Curve>& on,
   std::printf("\n");
 }
 
+Curve curveOf(const Scene& scene, const std::string& arm, uint64_t seed) {
+  if (arm == kField) return scene.field(seed, true, true);
+  if (arm == kGradientOff) return scene.field(seed, false, true);
+  if (arm == kJitterOff) return scene.field(seed, true, false);
+  if (arm == kCut) return scene.cuts(seed);
+  throw std::invalid_argument("'" + arm + "' is not one of " + kField + ", " + kGradientOff + ", " +
+                              kJitterOff + ", " + kCut);
+}
+
+/// What is asked for, parted by commas.
+std::vector<std::string> armsOf(const std::string& text) {
+  std::vector<std::string> arms;
+  for (size_t at = 0; at <= text.size();) {
+    const size_t end = std::min(text.find(',', at), text.size());
+    arms.push_back(text.substr(at, end - at));
+    at = end + 1;
+  }
+  return arms;
+}
+
 void run(const Settings& settings, uint32_t downscale, const std::vector<std::string>& paths) {
   std::printf("%-28s", "Gaussians");
   for (const uint64_t b : settings.budgets()) {
@@ -166,10 +192,7 @@ void run(const Settings& settings, uint32_t downscale, const std::vector<std::st
     const std::string name = path.substr(path.find_last_of('/') + 1);
     std::map<std::string, std::vector<Curve>> here;
     for (uint64_t seed = 0; seed < settings.seeds; ++seed) {
-      here["field"].push_back(scene.field(seed, true, true));
-      here["gradient off"].push_back(scene.field(seed, false, true));
-      here["jitter off"].push_back(scene.field(seed, true, false));
-      here["explicit, cut"].push_back(scene.cuts(seed));
+      for (const std::string& arm : settings.arms) here[arm].push_back(curveOf(scene, arm, seed));
     }
     for (const auto& [what, curves] : here) {
       print(name + ", " + what, mean(curves));
@@ -177,24 +200,30 @@ void run(const Settings& settings, uint32_t downscale, const std::vector<std::st
     }
   }
   for (const auto& [what, curves] : all) print("all, " + what, mean(curves));
-  printDifferences("gradient on - off", all["field"], all["gradient off"]);
-  printDifferences("jitter on - off", all["field"], all["jitter off"]);
-  printDifferences("field - explicit, cut", all["field"], all["explicit, cut"]);
+  const auto compare = [&all](const char* name, const std::string& other) {
+    if (all.contains(kField) && all.contains(other)) {
+      printDifferences(name, all[kField], all[other]);
+    }
+  };
+  compare("gradient on - off", kGradientOff);
+  compare("jitter on - off", kJitterOff);
+  compare("field - explicit cut", kCut);
 }
 
 }  // namespace
 }  // namespace stipple
 
 int main(int argc, char** argv) {
-  if (argc < 8) {
+  if (argc < 9) {
     std::fprintf(stderr,
-                 "field_quality ITERATIONS SEEDS LEAST MOST GAUSSIANS DOWNSCALE DATASET...\n");
+                 "field_quality ITERATIONS SEEDS LEAST MOST GAUSSIANS DOWNSCALE ARMS DATASET...\n");
     return 2;
   }
   const auto number = [&](int i) { return std::strtoull(argv[i], nullptr, 10); };
   try {
-    stipple::run({number(1), number(2), number(3), number(4), static_cast<uint32_t>(number(5))},
-                 static_cast<uint32_t>(number(6)), {argv + 7, argv + argc});
+    stipple::run({number(1), number(2), number(3), number(4), static_cast<uint32_t>(number(5)),
+                  stipple::armsOf(argv[7])},
+                 static_cast<uint32_t>(number(6)), {argv + 8, argv + argc});
   } catch (const std::exception& error) {
     std::fprintf(stderr, "field_quality: %s\n", error.what());
     return 1;

@@ -3,6 +3,7 @@
 # their cuts: three objects (make_objects.py) by as many seeds. See README.md here.
 #   bash tests/peers/field_quality.sh
 # ITERATIONS (300), SEEDS (3), LEAST (64) and MOST (1024) anchors, GAUSSIANS (4) per anchor, DOWNSCALE (2) of 160 x 160.
+# For less than all of it: ARMS (all, parted by commas), OBJECTS (head cage heap).
 # STIPPLE_BUILD_DIR: our build (default build/release). Exit 77: something is missing, and which.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -22,5 +23,6 @@ if [[ ! -f $objects/heap/transforms.json ]]; then
   blender -b --factory-startup -P "$root/tests/peers/make_objects.py" -- "$objects" >"$objects/log" 2>&1 \
     || missing "the objects could not be rendered; the end of $objects/log says why."
 fi
+read -r -a names <<<"${OBJECTS:-head cage heap}"
 exec "$program" "${ITERATIONS:-300}" "${SEEDS:-3}" "${LEAST:-64}" "${MOST:-1024}" "${GAUSSIANS:-4}" "${DOWNSCALE:-2}" \
-  "$objects/head" "$objects/cage" "$objects/heap"
+  "${ARMS:-field,gradient off,jitter off,explicit cut}" "${names[@]/#/$objects/}"

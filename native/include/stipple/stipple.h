@@ -1187,9 +1187,11 @@ typedef struct StippleFitOptions {
   uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
   uint64_t max_splats;         /* explicit: hard cap, 1..2^28 */
   uint64_t start_splats;       /* explicit; 0, the default: as many as points are known */
-  uint64_t least_anchors;      /* field: budgets of training, 1..STIPPLE_MAX_ANCHORS */
+  uint64_t least_anchors;      /* field: budgets of training, 1..STIPPLE_MAX_ANCHORS; default 1,024 to what the
+                                  quality says: 8,192, 16,384 or 32,768 */
   uint64_t most_anchors;
-  uint32_t gaussians_per_anchor; /* field: 4..32 */
+  uint32_t gaussians_per_anchor; /* field: 4, the default, to 32. At an equal number of splats fewer per anchor
+                                  are better and cost more: anchors are what the network works for */
   uint32_t sh_degree;          /* 0..4; 0: colour does not depend on the view */
   uint32_t antialias;          /* StippleAntialias that the splats are made for */
   uint32_t background;         /* StippleFitBackground, default random */

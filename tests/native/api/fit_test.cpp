@@ -168,6 +168,16 @@ TEST_F(FitTest, ACheckpointThatCannotBeWrittenIsANote) {
   stipple_job_free(job);
 }
 
+TEST_F(FitTest, PresetsOfFieldsDoubleTheirAnchorsAndMakeFourSplatsOfEach) {
+  uint64_t anchors = 4096;
+  for (const uint32_t quality : {STIPPLE_FIT_FAST, STIPPLE_FIT_BALANCED, STIPPLE_FIT_FINE_DETAIL}) {
+    STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, quality));
+    EXPECT_EQ(options_.gaussians_per_anchor, 4u) << quality;
+    EXPECT_EQ(options_.most_anchors, anchors *= 2) << quality;
+    EXPECT_EQ(options_.least_anchors, 1024u) << quality;
+  }
+}
+
 TEST_F(FitTest, AFieldIsAModelOfAnyBudget) {
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.iterations = 40;
@@ -314,7 +324,7 @@ TEST_F(FitTest, RefusesOptionsOutOfRange) {
   options_.resume = 1;
   refused("checkpoint_path_utf8 is NULL");
   options_.model = STIPPLE_FIT_FIELD;
-  options_.least_anchors = 9000;
+  options_.least_anchors = options_.most_anchors + 1;
   refused("options->most_anchors is");
   options_.model = STIPPLE_FIT_FIELD;
   options_.gaussians_per_anchor = 3;
