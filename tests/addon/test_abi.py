@@ -134,7 +134,8 @@ def test_field_kinds_match(header):
              'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
              'const StippleCloud*': c_void_p, 'const StippleGrade*': POINTER(structs.StippleGrade),
              'const StippleMesh*': c_void_p, 'const char*': c_char_p,
-             'const StippleAccuracy*': POINTER(structs.StippleAccuracy)}
+             'const StippleAccuracy*': POINTER(structs.StippleAccuracy),
+             'const StippleEffectsSurvey*': POINTER(structs.StippleEffectsSurvey)}
     for name, body in re.findall(r'typedef struct (\w+) \{(.*?)\}', header, flags=re.S):
         mine = dict(structs.STRUCTS[name]._fields_)
         for statement in filter(None, (' '.join(part.split()) for part in body.split(';'))):

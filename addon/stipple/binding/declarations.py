@@ -131,6 +131,10 @@ FUNCTIONS = {
                                                 POINTER(c_uint64)]),
     # drawing by a graphics card
     'stipple_cloud_pack': (_status, [_handle, _floats, c_uint64]),
+    'stipple_effects_survey': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
+                                         _to(s.StippleEffectsSurvey)]),
+    'stipple_effect_facts_init': (None, [_to(s.StippleEffectFacts)]),
+    'stipple_effects_plan': (_status, [_to(s.StippleEffectFacts), _to(s.StippleEffectRow), c_uint64]),
     'stipple_renderer_order_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                _to(s.StippleDrawOrderBuffers), _out_handle]),
     'stipple_renderer_order_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64, POINTER(c_uint64)]),

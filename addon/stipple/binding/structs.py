@@ -154,6 +154,27 @@ class Precision(IntEnum):
     DOUBLE = 1
 
 
+class Effect(IntEnum):
+    VIEW_COLOUR = 0
+    MOTION = 1
+    MOTION_BLUR = 2
+    DEPTH_OF_FIELD = 3
+    EXACT_PROJECTION = 4
+    ZOOM_ANTIALIASING = 5
+    TRANSPARENT_FILM = 6
+    DEPTH_PASS = 7
+    NORMAL_PASS = 8
+    OBJECT_INDEX_PASS = 9
+    MESH_OCCLUSION = 10
+    GLOBAL_ORDER = 11
+
+
+class EffectChoice(IntEnum):
+    AUTO = 0
+    ON = 1
+    OFF = 2
+
+
 class Side(IntEnum):
     INSIDE = 0
     OUTSIDE = 1
@@ -203,6 +224,8 @@ ENUMS = {
     'StippleProjection': (Projection, 'STIPPLE_PROJECTION_'),
     'StippleSampling': (Sampling, 'STIPPLE_SAMPLING_'),
     'StipplePrecision': (Precision, 'STIPPLE_PRECISION_'),
+    'StippleEffect': (Effect, 'STIPPLE_EFFECT_'),
+    'StippleEffectChoice': (EffectChoice, 'STIPPLE_EFFECT_'),
     'StippleSide': (Side, 'STIPPLE_SIDE_'),
     'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
     'StippleFitModel': (FitModel, 'STIPPLE_FIT_'),
@@ -420,6 +443,29 @@ class StippleMeshInstance(_Sized):
 class StippleRenderBuffers(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour', _floats), ('depth', _floats),
                 ('median_depth', _floats), ('counts', POINTER(c_uint32)), ('transmittance', _floats)]
+
+
+class StippleEffectsSurvey(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('sh_degree', c_uint32), ('splat_count', c_uint64),
+                ('looked_count', c_uint64), ('seen_count', c_uint64), ('object_count', c_uint64),
+                ('mixed_count', c_uint64), ('view_change', c_double * 5), ('affine_error_px', c_double),
+                ('error_ahead_px', c_double), ('field_of_view', c_double), ('widening', c_double)]
+
+
+class StippleEffectFacts(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('view_colour', c_uint32), ('exact_projection', c_uint32),
+                ('zoom_antialiasing', c_uint32), ('global_order', c_uint32), ('camera_model', c_uint32),
+                ('motion_blur', c_uint32), ('camera_moves', c_uint32), ('moving_objects', c_uint64),
+                ('shutter_frames', c_double), ('depth_of_field', c_uint32), ('transparent_film', c_uint32),
+                ('depth_pass', c_uint32), ('normal_pass', c_uint32), ('object_index_pass', c_uint32),
+                ('reserved', c_uint32), ('aperture_radius', c_double), ('focus_distance', c_double),
+                ('hiding_meshes', c_uint64), ('view_share', c_double), ('largest_error_px', c_double),
+                ('largest_widening', c_double), ('seconds', c_double * 12), ('survey', POINTER(StippleEffectsSurvey))]
+
+
+class StippleEffectRow(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('effect', c_uint32), ('is_on', c_uint32), ('sh_degree', c_uint32),
+                ('seconds', c_double), ('reason', c_char * 256)]
 
 
 class StippleDrawOrderBuffers(_Sized):

@@ -905,6 +905,98 @@ StippleStatus stipple_mesh_depth_start(StippleContext* context, const StippleMes
                                        uint64_t count, const StippleCamera* camera, float* depth,
                                        StippleJob** job);
 
+/* ---- effects that a picture needs ---------------------------------------------------------------- */
+
+#define STIPPLE_EFFECT_COUNT 12u
+
+/* Rows of a plan, in this order. */
+typedef enum StippleEffect {
+  STIPPLE_EFFECT_VIEW_COLOUR = 0,       /* colours that change with the view */
+  STIPPLE_EFFECT_MOTION = 1,            /* something moves while the shutter is open */
+  STIPPLE_EFFECT_MOTION_BLUR = 2,       /* and that shows */
+  STIPPLE_EFFECT_DEPTH_OF_FIELD = 3,
+  STIPPLE_EFFECT_EXACT_PROJECTION = 4,  /* along rays: panoramas, wide angles, splats close by */
+  STIPPLE_EFFECT_ZOOM_ANTIALIASING = 5, /* splats smaller than pixels keep their light */
+  STIPPLE_EFFECT_TRANSPARENT_FILM = 6,
+  STIPPLE_EFFECT_DEPTH_PASS = 7,
+  STIPPLE_EFFECT_NORMAL_PASS = 8,
+  STIPPLE_EFFECT_OBJECT_INDEX_PASS = 9,
+  STIPPLE_EFFECT_MESH_OCCLUSION = 10,
+  STIPPLE_EFFECT_GLOBAL_ORDER = 11      /* splats of several objects sorted together */
+} StippleEffect;
+
+/* Of the effects that no switch of a scene decides. */
+typedef enum StippleEffectChoice {
+  STIPPLE_EFFECT_AUTO = 0,
+  STIPPLE_EFFECT_ON = 1,
+  STIPPLE_EFFECT_OFF = 2
+} StippleEffectChoice;
+
+/* What splats and a camera say. "Unusual" is what 1 % of what is seen exceeds, each splat weighing as much as it
+ * covers, times its opacity. */
+typedef struct StippleEffectsSurvey {
+  uint32_t struct_size;
+  uint32_t sh_degree;      /* the largest of the clouds */
+  uint64_t splat_count;
+  uint64_t looked_count;   /* 131,072 at most, evenly over all */
+  uint64_t seen_count;     /* of those, in the picture */
+  uint64_t object_count;   /* instances with splats */
+  uint64_t mixed_count;    /* instances whose range of depths meets that of another: all depths are read */
+  double view_change[5];   /* [degree] root mean square over all directions of what its harmonics add to a colour */
+  double affine_error_px;  /* by which the affine projection moves what shows of an unusual splat; a bound */
+  double error_ahead_px;   /* what it would be in the middle of the picture */
+  double field_of_view;    /* radians, across the wider diagonal; 0 for models that are not perspective */
+  double widening;         /* area of the splats with the low-pass that they were made for over that without */
+} StippleEffectsSurvey;
+
+/* Looks at splats. In: instances [count], as for a render. Out: survey. Errors: INVALID_ARGUMENT as of a render.
+ * Threads and determinism: blocks; the same result for any number of threads. Cost: O(131,072), tens of
+ * milliseconds; with several instances also a pass over all positions. */
+StippleStatus stipple_effects_survey(StippleContext* context, const StippleInstance* instances, uint64_t count,
+                                     const StippleCamera* camera, StippleEffectsSurvey* survey);
+
+typedef struct StippleEffectFacts {
+  uint32_t struct_size;
+  uint32_t view_colour;       /* StippleEffectChoice */
+  uint32_t exact_projection;  /* StippleEffectChoice */
+  uint32_t zoom_antialiasing; /* StippleEffectChoice */
+  uint32_t global_order;      /* StippleEffectChoice */
+  uint32_t camera_model;      /* StippleCameraModel */
+  uint32_t motion_blur;       /* 1: switched on in the scene */
+  uint32_t camera_moves;      /* 1: while the shutter is open */
+  uint64_t moving_objects;    /* instances of splats that move while it is */
+  double shutter_frames;      /* how long it is open */
+  uint32_t depth_of_field;    /* 1: switched on in the camera */
+  uint32_t transparent_film;
+  uint32_t depth_pass;
+  uint32_t normal_pass;
+  uint32_t object_index_pass;
+  uint32_t reserved;
+  double aperture_radius;     /* metres */
+  double focus_distance;      /* metres */
+  uint64_t hiding_meshes;     /* that stand between splats */
+  double view_share;          /* 0..1 of the change of colour with the view that is kept; default 0.999 */
+  double largest_error_px;    /* of the affine projection before the exact one is needed; default 1 */
+  double largest_widening;    /* before anti-aliasing for all zooms is needed, >= 1; default 1.5 */
+  double seconds[12];         /* [effect] measured by the caller; NaN, the default: not measured */
+  const StippleEffectsSurvey* survey; /* NULL: nobody has looked; Auto then keeps what the picture might need */
+} StippleEffectFacts;
+void stipple_effect_facts_init(StippleEffectFacts* facts);
+
+typedef struct StippleEffectRow {
+  uint32_t struct_size;
+  uint32_t effect;    /* StippleEffect */
+  uint32_t is_on;
+  uint32_t sh_degree; /* of VIEW_COLOUR: harmonics up to here are needed; else 0 */
+  double seconds;     /* as in the facts */
+  char reason[256];   /* one sentence in UTF-8, without a full stop */
+} StippleEffectRow;
+
+/* From facts to the effects that a picture needs, one row of each. In: capacity, rows that there is room for;
+ * rows[0].struct_size must be set and is that of all. Errors: INVALID_ARGUMENT for a fact outside its range, BUFFER_TOO_SMALL.
+ * Cost: none. */
+StippleStatus stipple_effects_plan(const StippleEffectFacts* facts, StippleEffectRow* rows, uint64_t capacity);
+
 /* ---- drawing by a graphics card ------------------------------------------------------------------ */
 
 /* A view that turns is drawn with splats projected by the card, blended back to front in an order that a
