@@ -5,9 +5,9 @@
 
 #include "api/guard.h"
 #include "api/job.h"
+#include "api/plot.h"
 #include "base/parallel.h"
 #include "io/fit_report.h"
-#include "io/plot_picture.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -199,17 +199,8 @@ StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_ut
 StippleStatus stipple_fit_report_draw(const StippleJob* job, double scale, uint64_t capacity,
                                       float* pixels, uint32_t* width, uint32_t* height) {
   return guarded([&] {
-    const PlotSheet sheet = sheetOf(fitPlots(sessionOf(job).ended().history()));
-    const uint64_t count = uint64_t{4} *
-                           (require(width, "width") = plotPixels(sheet.width, scale)) *
-                           (require(height, "height") = plotPixels(sheet.height, scale));
-    if (!pixels) return;
-    if (capacity < count) {
-      fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) +
-                                           " floats; the picture needs " + std::to_string(count));
-    }
-    const Image image = pictureOf(sheet, scale);
-    std::copy(image.pixels.begin(), image.pixels.end(), pixels);
+    deliverPlot(sheetOf(fitPlots(sessionOf(job).ended().history())), scale, capacity, pixels, width,
+                height);
   });
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "api/cloud_cuts.h"
+#include "data/accuracy_report.h"
 #include "data/image.h"
 #include "data/memory_view_source.h"
 #include "data/sparse_volume.h"
@@ -70,6 +71,12 @@ struct ViewNote {
   uint32_t source_width = 0;
   uint32_t source_height = 0;
   bool is_distorted = false;
+};
+
+/// A view, measured.
+struct AccuracyResult {
+  AccuracyReport report;
+  std::vector<StippleAccuracy> accuracies;  ///< of its rows
 };
 
 /// What a renderer keeps from one picture to the next; its jobs hold a share.
@@ -140,4 +147,8 @@ struct StippleVolume {
 struct StippleImage {
   stipple::api::Context context;
   std::shared_ptr<const stipple::Image> image;
+};
+
+struct StippleAccuracyReport {
+  std::shared_ptr<const stipple::api::AccuracyResult> result;
 };

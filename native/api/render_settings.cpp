@@ -11,13 +11,6 @@ namespace stipple::api {
 
 namespace {
 
-/// True when the composited values are display values.
-bool compositesInDisplaySpace(const Instances& instances, BlendSpace blend_space) {
-  return blend_space == BlendSpace::kAsTrained &&
-         (instances.list.empty() ||
-          instances.list.front().cloud->colour_space == ColourSpace::kDisplay);
-}
-
 void takeAccuracy(const StippleAccuracy& given, RenderSettings& settings) {
   const StippleAccuracy accuracy = accuracyFrom(&given, "options->accuracy");
   if (settings.method != STIPPLE_RENDER_TILED) {
@@ -42,6 +35,12 @@ void takeAccuracy(const StippleAccuracy& given, RenderSettings& settings) {
 }
 
 }  // namespace
+
+bool compositesInDisplaySpace(const Instances& instances, BlendSpace blend_space) {
+  return blend_space == BlendSpace::kAsTrained &&
+         (instances.list.empty() ||
+          instances.list.front().cloud->colour_space == ColourSpace::kDisplay);
+}
 
 RenderSettings renderSettings(const StippleRenderOptions* options, const Instances& instances) {
   StippleRenderOptions defaults;

@@ -13,13 +13,16 @@ struct RenderSettings {
   StippleRenderMethod method = STIPPLE_RENDER_TILED;
   bool linearise = false;  ///< the composited values are display values and light is asked for
   const float* splat_light = nullptr;  ///< [H,W,3]
-  RenderAccuracy accuracy;  ///< of STIPPLE_RENDER_TILED
+  RenderAccuracy accuracy;             ///< of STIPPLE_RENDER_TILED
   double budget_share = 1;
   bool has_accuracy = false;
 };
 
 /// The options of the caller in the library's own terms. NULL: defaults.
 RenderSettings renderSettings(const StippleRenderOptions* options, const Instances& instances);
+
+/// True when the composited values are display values.
+bool compositesInDisplaySpace(const Instances& instances, BlendSpace blend_space);
 
 /// Refuses a surface or light that is not one of the camera's picture.
 void validateLayers(const RenderSettings& settings, const Camera& camera);

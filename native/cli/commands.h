@@ -17,6 +17,7 @@ void addMesh(CLI::App& app, const Context& context);
 void addFit(CLI::App& app, const Context& context);
 void addDensify(CLI::App& app, const Context& context);
 void addCompare(CLI::App& app, const Context& context);
+void addAccuracy(CLI::App& app, const Context& context);
 
 /// What a file holds, told by its ending.
 enum class FileKind { kSplats, kMesh, kModel, kViews, kVolume, kImage };

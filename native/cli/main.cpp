@@ -36,6 +36,7 @@ int run(int argc, char** argv) {
   addFit(app, context);
   addDensify(app, context);
   addCompare(app, context);
+  addAccuracy(app, context);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& answer) {

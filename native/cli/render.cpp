@@ -5,6 +5,7 @@
 #include "cli/accuracy_options.h"
 #include "cli/camera_options.h"
 #include "cli/commands.h"
+#include "cli/placed_clouds.h"
 #include "cli/report.h"
 
 namespace stipple::cli {
@@ -42,23 +43,14 @@ void render(const Context& context, const Arguments& arguments) {
   const StippleCamera camera = cameraOf(context, arguments.camera);
   const StippleAccuracy accuracy = accuracyOf(arguments.accuracy);
   const StippleRenderOptions options = optionsOf(arguments, accuracy);
-  std::vector<Cloud> clouds;
-  std::vector<StippleInstance> instances;
-  for (const std::string& path : arguments.in) {
-    clouds.push_back(make<Cloud>(stipple_cloud_load, context.get(), path.c_str()));
-    auto instance = sized<StippleInstance>();
-    instance.cloud = clouds.back().get();
-    for (int i = 0; i < 4; ++i) instance.matrix[i * 5] = 1.0;
-    instances.push_back(instance);
-  }
+  const PlacedClouds clouds(context, arguments.in);
   std::vector<float> colour(size_t{camera.width} * camera.height * 4);
   auto buffers = sized<StippleRenderBuffers>();
   buffers.colour = colour.data();
   const auto renderer = make<Renderer>(stipple_renderer_create, context.get());
   const auto start = std::chrono::steady_clock::now();
   const auto job =
-      make<Job>(stipple_renderer_render_start, renderer.get(),
-                const_cast<const StippleInstance*>(instances.data()), uint64_t{instances.size()},
+      make<Job>(stipple_renderer_render_start, renderer.get(), clouds.instances(), clouds.count(),
                 &camera, &options, const_cast<const StippleRenderBuffers*>(&buffers));
   finish(job);
   const double seconds =

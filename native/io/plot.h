@@ -14,6 +14,9 @@ struct PlotLine {
   std::vector<double> y;
   bool is_faint = false;     ///< behind the others
   bool has_markers = false;  ///< a dot at each point
+  bool has_stroke = true;    ///< through the points
+  /// [x.size()] beside each point, where there is room; or empty.
+  std::vector<std::string> names;
 };
 
 struct PlotPanel {
@@ -49,8 +52,13 @@ struct PlotSheet {
   std::vector<PlotMark> marks;
 };
 
+struct PanelSize {
+  double width = 480;
+  double height = 320;
+};
+
 /// Panels side by side, two in a row, with axes, ticks and legends. A panel without a point to show
 /// says so.
-PlotSheet sheetOf(const std::vector<PlotPanel>& panels);
+PlotSheet sheetOf(const std::vector<PlotPanel>& panels, PanelSize size = {});
 
 }  // namespace stipple

@@ -10,8 +10,6 @@ namespace stipple {
 
 namespace {
 
-constexpr double kPanelWidth = 480;
-constexpr double kPanelHeight = 320;
 constexpr double kLeft = 70, kRight = 16, kTop = 34, kBottom = 48;
 constexpr int kTicks = 5;
 constexpr double kFaint = 0.35;
@@ -87,7 +85,7 @@ size_t legendCount(const PlotPanel& panel) {
   return count < 2 ? 0 : count;
 }
 
-Axis axisOf(const PlotPanel& panel, bool along_x, bool& is_empty) {
+Axis axisOf(const PlotPanel& panel, PanelSize size, bool along_x, bool& is_empty) {
   Axis axis;
   axis.is_logarithmic = along_x ? panel.x_is_logarithmic : panel.y_is_logarithmic;
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -107,12 +105,14 @@ Axis axisOf(const PlotPanel& panel, bool along_x, bool& is_empty) {
     low -= least;
     high += least;
   }
-  const double margin = along_x ? 0 : 0.05 * (high - low);
+  const bool has_names = std::any_of(panel.lines.begin(), panel.lines.end(),
+                                     [](const PlotLine& line) { return !line.names.empty(); });
+  const double margin = along_x && !has_names ? 0 : 0.05 * (high - low);
   axis.low = low == 0 ? 0 : low - margin;
   // A legend stands above the curves, 15 units a line.
   const size_t named = along_x ? 0 : legendCount(panel);
   const double legend = named == 0 ? 0 : 15.0 * static_cast<double>(named) + 4;
-  axis.high = high + margin + legend / (kPanelHeight - kTop - kBottom - legend) * (high - low);
+  axis.high = high + margin + legend / (size.height - kTop - kBottom - legend) * (high - low);
   return axis;
 }
 
@@ -163,11 +163,74 @@ void addLine(PanelMarks& marks, const PlotLine& line, uint32_t colour, const Axi
     points.push_back({x.at(line.x[i]), y.at(line.y[i])});
   }
   if (points.empty()) return;
-  PlotMark& stroke = marks.stroke(points, colour, line.is_faint ? 1 : 1.8);
-  if (line.is_faint) stroke.opacity = kFaint;
+  if (line.has_stroke) {
+    PlotMark& stroke = marks.stroke(points, colour, line.is_faint ? 1 : 1.8);
+    if (line.is_faint) stroke.opacity = kFaint;
+  }
   if (!line.has_markers) return;
   for (const auto& [left, top] : points) marks.dot(left, top, colour, 2.5);
 }
+
+/// Names of points, placed one after the other where they cover neither a point nor each other.
+class NamePlaces {
+ public:
+  NamePlaces(PanelMarks& marks, const Axis& x, const Axis& y) : marks_(marks), x_(x), y_(y) {}
+
+  void keepClear(const PlotLine& line) {
+    for (size_t i = 0; i < std::min(line.x.size(), line.y.size()); ++i) {
+      if (!x_.shows(line.x[i]) || !y_.shows(line.y[i])) continue;
+      const double x = x_.at(line.x[i]), y = y_.at(line.y[i]);
+      taken_.push_back({x - 3, y - 3, x + 3, y + 3});
+    }
+  }
+
+  void add(const PlotLine& line) {
+    for (size_t i = 0; i < std::min({line.x.size(), line.y.size(), line.names.size()}); ++i) {
+      if (!x_.shows(line.x[i]) || !y_.shows(line.y[i])) continue;
+      place(x_.at(line.x[i]), y_.at(line.y[i]), line.names[i]);
+    }
+  }
+
+ private:
+  struct Box {
+    double left, top, right, bottom;
+  };
+
+  void place(double x, double y, const std::string& name) {
+    const double width = 6.0 * static_cast<double>(name.size());
+    // Right, left, above and below, then the same further off.
+    for (double far = 0; far < 60; far += 12) {
+      const double tries[][2] = {{x + 6, y + 4 - far},         {x - 6 - width, y + 4 - far},
+                                 {x + 6, y + 4 + far},         {x - 6 - width, y + 4 + far},
+                                 {x - width / 2, y - 7 - far}, {x - width / 2, y + 15 + far}};
+      for (const auto& [left, base] : tries) {
+        const Box box = {left, base - 10, left + width, base + 2};
+        if (!isFree(box)) continue;
+        taken_.push_back(box);
+        if (far > 0)
+          marks_.stroke({{x, y}, {std::clamp(x, left, left + width), base - 3}}, kGrid, 1);
+        marks_.text(left, base, TextAnchor::kStart, name).size = 10;
+        return;
+      }
+    }
+  }
+
+  bool isFree(const Box& box) const {
+    if (box.left < x_.first + 2 || box.right > x_.last - 2 || box.top < y_.last + 2 ||
+        box.bottom > y_.first - 2) {
+      return false;
+    }
+    return std::none_of(taken_.begin(), taken_.end(), [&](const Box& other) {
+      return box.left < other.right && other.left < box.right && box.top < other.bottom &&
+             other.top < box.bottom;
+    });
+  }
+
+  PanelMarks& marks_;
+  const Axis& x_;
+  const Axis& y_;
+  std::vector<Box> taken_;
+};
 
 void addAxes(PanelMarks& marks, const PlotPanel& panel, const Axis& x, const Axis& y) {
   for (const double tick : ticksOf(x)) {
@@ -211,40 +274,43 @@ void addLegend(PanelMarks& marks, const PlotPanel& panel, const Axis& x, const A
   }
 }
 
-void addPanel(PanelMarks& marks, const PlotPanel& panel) {
-  PlotMark& title = marks.text(kPanelWidth / 2, 20, TextAnchor::kMiddle, panel.title);
+void addPanel(PanelMarks& marks, const PlotPanel& panel, PanelSize size) {
+  PlotMark& title = marks.text(size.width / 2, 20, TextAnchor::kMiddle, panel.title);
   title.is_bold = true;
   title.size = kTitleSize;
   bool no_x = false, no_y = false;
-  Axis x = axisOf(panel, true, no_x);
-  Axis y = axisOf(panel, false, no_y);
+  Axis x = axisOf(panel, size, true, no_x);
+  Axis y = axisOf(panel, size, false, no_y);
   if (no_x || no_y) {
-    marks.text(kPanelWidth / 2, kPanelHeight / 2, TextAnchor::kMiddle, "nothing was measured");
+    marks.text(size.width / 2, size.height / 2, TextAnchor::kMiddle, "nothing was measured");
     return;
   }
   x.first = kLeft;
-  x.last = kPanelWidth - kRight;
-  y.first = kPanelHeight - kBottom;
+  x.last = size.width - kRight;
+  y.first = size.height - kBottom;
   y.last = kTop;
   addAxes(marks, panel, x, y);
   for (size_t i = 0; i < panel.lines.size(); ++i) {
     addLine(marks, panel.lines[i], kColours[i % std::size(kColours)], x, y);
   }
+  NamePlaces names(marks, x, y);
+  for (const PlotLine& line : panel.lines) names.keepClear(line);
+  for (const PlotLine& line : panel.lines) names.add(line);
   addLegend(marks, panel, x, y);
 }
 
 }  // namespace
 
-PlotSheet sheetOf(const std::vector<PlotPanel>& panels) {
+PlotSheet sheetOf(const std::vector<PlotPanel>& panels, PanelSize size) {
   const size_t columns = std::min<size_t>(2, std::max<size_t>(1, panels.size()));
   const size_t rows = (panels.size() + columns - 1) / columns;
   PlotSheet sheet;
-  sheet.width = kPanelWidth * static_cast<double>(columns);
-  sheet.height = kPanelHeight * static_cast<double>(std::max<size_t>(1, rows));
+  sheet.width = size.width * static_cast<double>(columns);
+  sheet.height = size.height * static_cast<double>(std::max<size_t>(1, rows));
   for (size_t i = 0; i < panels.size(); ++i) {
-    PanelMarks marks(sheet.marks, kPanelWidth * static_cast<double>(i % columns),
-                     kPanelHeight * static_cast<double>(i / columns));
-    addPanel(marks, panels[i]);
+    PanelMarks marks(sheet.marks, size.width * static_cast<double>(i % columns),
+                     size.height * static_cast<double>(i / columns));
+    addPanel(marks, panels[i], size);
   }
   return sheet;
 }

@@ -164,14 +164,6 @@ class Averaging {
   RenderResult& out_;
 };
 
-RayOptions rayOptions(const RenderAccuracy& accuracy) {
-  RayOptions rays;
-  rays.order = accuracy.order;
-  rays.projection = accuracy.projection;
-  rays.limits = accuracy.limits;
-  return rays;
-}
-
 }  // namespace
 
 bool isTiled(const RenderAccuracy& accuracy) {
@@ -180,6 +172,18 @@ bool isTiled(const RenderAccuracy& accuracy) {
          accuracy.precision == Precision::kFloat &&
          accuracy.limits.least_alpha == usual.least_alpha &&
          accuracy.limits.most_alpha == usual.most_alpha && accuracy.limits.ends_early;
+}
+
+bool isSlow(const RenderAccuracy& accuracy) {
+  return accuracy.samples_per_side == 1 && !isTiled(accuracy);
+}
+
+RayOptions rayOptions(const RenderAccuracy& accuracy) {
+  RayOptions rays;
+  rays.order = accuracy.order;
+  rays.projection = accuracy.projection;
+  rays.limits = accuracy.limits;
+  return rays;
 }
 
 void renderAccurate(std::span<const SplatInstance> instances, const Camera& camera,

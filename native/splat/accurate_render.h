@@ -20,6 +20,10 @@ constexpr uint32_t kMaxSamplesPerSide = 16;
 
 /// Whether renderTiled draws this picture; else renderRays.
 bool isTiled(const RenderAccuracy& accuracy);
+/// Whether it is renderRays, every splat near a block at each of its pixels, with one sample each.
+bool isSlow(const RenderAccuracy& accuracy);
+/// What renderRays is told then.
+RayOptions rayOptions(const RenderAccuracy& accuracy);
 
 /// Draws with the cheapest renderer that keeps what `accuracy` asks for. Of an averaged picture
 /// colour, alpha and transmittance are means; depth is the mean weighted by alpha; median depth the

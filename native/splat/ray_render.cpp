@@ -246,7 +246,8 @@ void drawAll(const PlacedScene& scene, std::vector<typename Meeting::Splat> spla
   // So that a cancel is heard ten times a second, and no thread waits long for the others.
   const size_t at_once = 4 * threadLimit();
   for (size_t first = 0; first < blocks.size(); first += at_once) {
-    advance(progress, static_cast<double>(first) / static_cast<double>(blocks.size()),
+    const double done = static_cast<double>(first) / static_cast<double>(blocks.size());
+    advance(progress, rays.progress_begin + done * (rays.progress_end - rays.progress_begin),
             "Following rays");
     picture.drawBlocks({blocks.data() + first, std::min(at_once, blocks.size() - first)});
   }
@@ -281,7 +282,7 @@ RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& c
 RenderResult renderRays(std::span<const SplatInstance> instances, const Camera& camera,
                         const RenderOptions& options, const RayOptions& rays, Progress* progress) {
   const PlacedScene scene = placeScene(instances, camera, options);
-  advance(progress, 0.0, "Placing splats");
+  advance(progress, rays.progress_begin, "Placing splats");
   RenderResult result;
   sizeResult(camera, options, result);
   if (rays.projection == RayProjection::kRay) {
@@ -292,7 +293,7 @@ RenderResult renderRays(std::span<const SplatInstance> instances, const Camera& 
                        progress);
   }
   finishSurface(options, result);
-  advance(progress, 1.0, "Following rays");
+  advance(progress, rays.progress_end, "Following rays");
   return result;
 }
 

@@ -34,6 +34,7 @@ struct RayOptions {
   /// Pixels to draw, whole blocks of kRayBlockSide from multiples of it on; the others stay 0.
   /// Empty: all.
   std::span<const PixelArea> areas = {};
+  double progress_begin = 0, progress_end = 1;  ///< fractions that drawing goes through
 };
 
 constexpr uint32_t kRayBlockSide = 64;

@@ -135,7 +135,8 @@ def test_field_kinds_match(header):
              'const StippleCloud*': c_void_p, 'const StippleGrade*': POINTER(structs.StippleGrade),
              'const StippleMesh*': c_void_p, 'const char*': c_char_p,
              'const StippleAccuracy*': POINTER(structs.StippleAccuracy),
-             'const StippleEffectsSurvey*': POINTER(structs.StippleEffectsSurvey)}
+             'const StippleEffectsSurvey*': POINTER(structs.StippleEffectsSurvey),
+             'StippleAccuracy': structs.StippleAccuracy}
     for name, body in re.findall(r'typedef struct (\w+) \{(.*?)\}', header, flags=re.S):
         mine = dict(structs.STRUCTS[name]._fields_)
         for statement in filter(None, (' '.join(part.split()) for part in body.split(';'))):

@@ -2,13 +2,16 @@
 """Accuracy from a script: levels, knobs, every combination, and what is refused."""
 
 import itertools
+import json
+import math
 
 import numpy as np
 import pytest
 
-from stipple.binding.accuracy import accuracy, accuracy_knobs, accuracy_level_name, accuracy_verdict
+from stipple.binding.accuracy import (AccuracyMeasurement, accuracy, accuracy_knobs, accuracy_level_name,
+                                      accuracy_verdict)
 from stipple.binding.cloud import Cloud, SplatArrays
-from stipple.binding.errors import StippleError
+from stipple.binding.errors import CancelledError, StippleError
 from stipple.binding.model import DecodeSettings, Model
 from stipple.binding.renderer import Renderer
 from stipple.binding.structs import (AccuracyLevel, LowPass, OutputColour, Precision, Projection, RenderMethod, Sampling,
@@ -143,3 +146,116 @@ def test_every_knob_says_its_bound(library):
 def test_verdicts_are_words(library):
     assert [accuracy_verdict(library, psnr) for psnr in (float('inf'), 45, 38, 30, 29.9)] == [
         'looks identical', 'looks identical', 'hard to see', 'visible side by side', 'obvious']
+
+
+@pytest.fixture(scope='module')
+def report(context, cloud):
+    job = AccuracyMeasurement.start(context, [(cloud, np.eye(4))], camera_of(), repetitions=3)
+    job.wait()
+    return job.report()
+
+
+def psnr_of(picture, reference):
+    return -10 * math.log10(((picture.astype(np.float64) - reference) ** 2).mean())
+
+
+def test_measured_errors_are_those_of_the_pictures(library, renderer, cloud, report):
+    reference = drawn(renderer, cloud, accuracy(library, AccuracyLevel.REFERENCE))
+    assert report.info.compared_pixels == WIDTH * HEIGHT and report.info.splat_count == COUNT
+    for row in report.rows[:-1]:
+        picture = drawn(renderer, cloud, row.setting)
+        assert row.psnr == pytest.approx(psnr_of(picture, reference), abs=1e-6), row.name
+        assert row.largest_error == pytest.approx(np.abs(picture - reference).max(), abs=1e-7), row.name
+        ordered = np.sort(np.abs(picture - reference), axis=None)
+        assert row.error_99_9 == pytest.approx(ordered[math.ceil(0.999 * ordered.size) - 1], abs=1e-7), row.name
+        assert row.seconds_low <= row.seconds <= row.seconds_high and row.repetitions == 3
+    assert report.rows[-1].name == 'reference' and math.isinf(report.rows[-1].psnr)
+    assert [row.name for row in report.rows[:4]] == ['draft', 'preview', 'final', 'final + degree 0']
+    assert report.rows[0].splat_count == COUNT // 4
+
+
+def test_the_front_has_what_nothing_beats(report):
+    for row in report.rows:
+        beaten = any(other.seconds <= row.seconds and other.psnr >= row.psnr and (other.seconds, -other.psnr) != (
+            row.seconds, -row.psnr) for other in report.rows)
+        assert row.is_on_front != beaten, row.name
+
+
+def test_a_setting_is_chosen_by_time_or_by_quality(report):
+    fast = report.best_within(report.rows[0].seconds)
+    assert fast.psnr == max(row.psnr for row in report.rows if row.seconds <= report.rows[0].seconds)
+    assert report.best_within(1e9).name == 'reference'
+    good = report.cheapest_above(report.rows[2].psnr)
+    assert good.seconds == min(row.seconds for row in report.rows if row.psnr >= report.rows[2].psnr)
+    with pytest.raises(StippleError, match=r'no setting draws this view within 1e-06 ms; the fastest, .*, needs .* ms'):
+        report.best_within(1e-9)
+    with pytest.raises(StippleError, match='the time budget is -1 s; more than 0 is allowed'):
+        report.best_within(-1)
+    with pytest.raises(StippleError, match='the PSNR asked for is inf dB'):
+        report.cheapest_above(math.inf)
+
+
+def test_a_quality_that_nothing_has_is_refused(library, context, cloud):
+    far = accuracy(library, AccuracyLevel.REFERENCE, sh_degree_limit=0)
+    job = AccuracyMeasurement.start(context, [(cloud, np.eye(4))], camera_of(), settings=[far], repetitions=1)
+    job.wait()
+    report = job.report()
+    assert [row.name for row in report.rows] == ['reference + degree 0', 'reference']
+    assert report.cheapest_above(1e6).name == 'reference'  # its own picture has no error
+
+
+def test_reports_are_written_by_ending(report, tmp_path):
+    for ending in ('json', 'csv', 'svg'):
+        report.save(tmp_path / f'report.{ending}')
+    read = json.loads((tmp_path / 'report.json').read_text())
+    assert [row['name'] for row in read['settings']] == [row.name for row in report.rows]
+    assert read['settings'][-1]['psnr'] is None and read['settings'][0]['knobs']['share'] == '0.25'
+    lines = (tmp_path / 'report.csv').read_text().splitlines()
+    assert len(lines) == len(report.rows) + 1 and lines[1].startswith('"draft",')
+    svg = (tmp_path / 'report.svg').read_text()
+    assert svg.startswith('<svg') and 'milliseconds' in svg and '>preview<' in svg
+    with pytest.raises(StippleError, match=r'has no ending of a report; \.json, \.csv and \.svg are allowed'):
+        report.save(tmp_path / 'report.txt')
+    picture = report.draw(1.0)
+    assert picture.shape == (520, 840, 4) and picture.min() < 0.3 and (picture[..., 3] == 1).all()
+
+
+def test_a_large_picture_is_compared_in_blocks(library, context, renderer, cloud):
+    double = accuracy(library, precision=Precision.DOUBLE)
+    job = AccuracyMeasurement.start(context, [(cloud, np.eye(4))], camera_of(8), settings=[accuracy(library), double],
+                                    reference_pixels=8192, repetitions=2, most_seconds=0.02)
+    job.wait()
+    report = job.report()
+    assert report.info.compared_pixels == 8192  # two blocks of 64 x 64, of 320 x 240 pixels
+    final, exact, reference = report.rows
+    assert not final.is_estimated and reference.is_estimated
+    assert exact.psnr == pytest.approx(final.psnr, abs=0.01)
+    assert exact.seconds > final.seconds
+
+
+def test_measuring_refuses_what_it_cannot_measure(library, context, renderer, cloud):
+    empty = Cloud.create(context, SplatArrays(*(np.zeros((0, n), np.float32) for n in (3, 4, 3)),
+                                              np.zeros(0, np.float32), np.zeros((0, 1, 3), np.float32)))
+    for instances in ([], [(empty, np.eye(4))]):
+        with pytest.raises(StippleError, match='the instances have 0 splats; measuring needs at least 1'):
+            AccuracyMeasurement.start(context, instances, camera_of())
+    placed = [(cloud, np.eye(4))]
+    for fields, text in ((dict(repetitions=0), 'repetitions is 0; 1 to 1000'),
+                         (dict(most_seconds=0), 'most_seconds is 0 s; more than 0 is allowed')):
+        with pytest.raises(StippleError, match=text):
+            AccuracyMeasurement.start(context, placed, camera_of(), **fields)
+    with pytest.raises(StippleError, match=r'render->accuracy is set'):
+        AccuracyMeasurement.start(context, placed, camera_of(), renderer.options(accuracy=accuracy(library)))
+    bad = accuracy(library)
+    bad.samples_per_side = 0
+    with pytest.raises(StippleError, match=r'options->settings\[1\]->samples_per_side is 0; 1 to 16 is allowed'):
+        AccuracyMeasurement.start(context, placed, camera_of(), settings=[accuracy(library), bad])
+
+
+def test_measuring_stops_when_it_is_cancelled(library, context, cloud):
+    job = AccuracyMeasurement.start(context, [(cloud, np.eye(4))], camera_of(20), repetitions=1000, most_seconds=1000)
+    job.cancel()
+    with pytest.raises(CancelledError):
+        job.wait()
+    with pytest.raises(StippleError, match='has not ended well'):
+        job.report()

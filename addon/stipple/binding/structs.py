@@ -436,6 +436,25 @@ class StippleRenderOptions(_Sized):
                 ('matte_opacity', _floats), ('splat_light', _floats), ('accuracy', POINTER(StippleAccuracy))]
 
 
+class StippleAccuracyMeasureOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('repetitions', c_uint32), ('reference_pixels', c_uint64),
+                ('most_seconds', c_double), ('settings', POINTER(StippleAccuracy)), ('setting_count', c_uint64)]
+
+
+class StippleAccuracyReportInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('width', c_uint32), ('height', c_uint32), ('thread_count', c_uint32),
+                ('compared_pixels', c_uint64), ('splat_count', c_uint64), ('row_count', c_uint64),
+                ('cut_seconds', c_double)]
+
+
+class StippleAccuracyRow(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('is_on_front', c_uint32), ('name_utf8', c_char_p),
+                ('setting', StippleAccuracy), ('seconds', c_double), ('seconds_low', c_double),
+                ('seconds_high', c_double), ('psnr', c_double), ('largest_error', c_double), ('error_99_9', c_double),
+                ('splat_count', c_uint64), ('visible_count', c_uint64), ('repetitions', c_uint32),
+                ('is_estimated', c_uint32)]
+
+
 class StippleMeshInstance(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('mesh', c_void_p), ('matrix', _matrix)]
 

@@ -721,10 +721,11 @@ StippleStatus stipple_views_read_points(const StippleViews* views, uint64_t capa
  * one. stipple_accuracy_knob_info says how far off each may be, in words for people:
  *   order           unbounded: where splats cross, centre shows one of them in front as a whole
  *   projection      unbounded: affine grows with the angle that a splat fills and its distance from the axis
- *   least_alpha     x leaves out less than x / (1 - x) of a colour for each splat; no bound for all of them
+ *   least_alpha     each splat below x takes at most x of a pixel's colour with it, N of them 1 - (1 - x)^N
  *   sh_degree_limit unbounded: at most the sum of what the left out harmonics can add to a splat's colour
  *   antialiasing    no error but another filter: mip and samples show what as-trained aliases
- *   precision       float: 1e-5 of the largest colour where no needle is end-on; double: 1e-7 of the result
+ *   precision       float: within 1e-4 of the largest colour where no threshold falls on the other side; double:
+ *                   rounding of the result, 6e-8
  *   budget_share    unbounded: splats are merged, the smallest change first
  *   level           all but reference end a pixel at a transmittance of 1e-4 (at most 1e-4 of the largest colour)
  *                   and hold alpha to 0.99 (0.01 of the colours behind, for each splat) */
@@ -887,6 +888,86 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer, const Sti
 StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
                                             const StippleInstance* instances, uint64_t count,
                                             const StippleCamera* camera, uint64_t* bytes);
+
+/* ---- what accuracy costs --------------------------------------------------------------------------- */
+
+typedef struct StippleAccuracyReport StippleAccuracyReport; /* a view, measured */
+
+typedef struct StippleAccuracyMeasureOptions {
+  uint32_t struct_size;
+  uint32_t repetitions;       /* 1..1000, default 7: timings of each setting, in turns, so that what else the
+                                 machine does meets all alike */
+  /* Pixels that are compared with the reference, default 65536; 0: all. Where the picture has more, blocks of
+   * 64 x 64 at its full size, spread evenly over it: the reference draws nothing else. Times are of whole pictures. */
+  uint64_t reference_pixels;
+  /* Default 60. No further turn begins after so many seconds of them. Of a setting in double precision whose picture
+   * would take a twentieth of it, only the compared pixels are drawn, and its time follows from those. */
+  double most_seconds;
+  const StippleAccuracy* settings; /* [setting_count]; NULL: the levels, and final with each knob moved alone. The
+                                      reference is always there too, as the last row */
+  uint64_t setting_count;
+} StippleAccuracyMeasureOptions;
+void stipple_accuracy_measure_options_init(StippleAccuracyMeasureOptions* options);
+
+typedef struct StippleAccuracyReportInfo {
+  uint32_t struct_size;
+  uint32_t width;             /* pixels of the picture */
+  uint32_t height;
+  uint32_t thread_count;
+  uint64_t compared_pixels;
+  uint64_t splat_count;       /* of all clouds */
+  uint64_t row_count;
+  double cut_seconds;         /* merging clouds for budget_share: once, and in no row's time */
+} StippleAccuracyReportInfo;
+
+typedef struct StippleAccuracyRow {
+  uint32_t struct_size;
+  uint32_t is_on_front;       /* 1: no other setting is as fast and as good (Pareto) */
+  const char* name_utf8;      /* "preview", "final + projection ray"; lives as long as the report */
+  StippleAccuracy setting;
+  double seconds;             /* of a picture: the median */
+  double seconds_low;         /* quartiles */
+  double seconds_high;
+  double psnr;                /* dB over the four channels, display values, peak 1; infinite where nothing differs */
+  double largest_error;       /* of a channel of a compared pixel */
+  double error_99_9;          /* 99.9 % of them are no further off */
+  uint64_t splat_count;       /* that the setting draws from */
+  uint64_t visible_count;     /* of them in view */
+  uint32_t repetitions;
+  uint32_t is_estimated;      /* 1: seconds follow from the compared pixels; the picture was not drawn whole */
+} StippleAccuracyRow;
+
+/* Draws instances [count] from a camera at every setting, and against the reference, as a job. In: render, or NULL:
+ * low-pass, blending space and background; without accuracy, surface and light.
+ * Errors of the start: those of stipple_renderer_render_start; INVALID_ARGUMENT for instances without splats and for
+ * options out of range. Threads and determinism: errors are the same for any number of threads.
+ * Cost: the reference's compared pixels, then every setting repetitions + 1 times. docs/accuracy_and_time.md. */
+StippleStatus stipple_accuracy_measure_start(StippleContext* context, const StippleInstance* instances,
+                                             uint64_t count, const StippleCamera* camera,
+                                             const StippleRenderOptions* render,
+                                             const StippleAccuracyMeasureOptions* options, StippleJob** job);
+/* The result of a job of measuring that has ended well. */
+StippleStatus stipple_job_accuracy_report(const StippleJob* job, StippleAccuracyReport** report);
+void stipple_accuracy_report_free(StippleAccuracyReport* report);
+StippleStatus stipple_accuracy_report_info(const StippleAccuracyReport* report, StippleAccuracyReportInfo* info);
+/* In: index 0..row_count-1. */
+StippleStatus stipple_accuracy_report_row(const StippleAccuracyReport* report, uint64_t index,
+                                          StippleAccuracyRow* row);
+/* The row with the highest PSNR among those of at most so many seconds. Errors: INVALID_ARGUMENT where none is that
+ * fast, with what the fastest needs. */
+StippleStatus stipple_accuracy_report_best_within(const StippleAccuracyReport* report, double seconds,
+                                                  uint64_t* index);
+/* The fastest row of at least so many dB. Errors: INVALID_ARGUMENT where none reaches them, with what is reached. */
+StippleStatus stipple_accuracy_report_cheapest_above(const StippleAccuracyReport* report, double psnr,
+                                                     uint64_t* index);
+/* By ending: .json (everything), .csv (a line for each row), .svg (the plot). docs/formats.md, Accuracy report. */
+StippleStatus stipple_accuracy_report_save(const StippleAccuracyReport* report, const char* path_utf8);
+/* Error against time, both logarithmic, with named settings and the front, as stipple_fit_report_draw draws; the plot
+ * is 840 units wide. */
+StippleStatus stipple_accuracy_report_draw(const StippleAccuracyReport* report, double scale, uint64_t capacity,
+                                           float* pixels, uint32_t* width, uint32_t* height);
+
+/* ---- meshes between splats ------------------------------------------------------------------------- */
 
 typedef struct StippleMeshInstance {
   uint32_t struct_size;

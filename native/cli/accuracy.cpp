@@ -1,0 +1,112 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "cli/camera_options.h"
+#include "cli/commands.h"
+#include "cli/placed_clouds.h"
+#include "cli/report.h"
+
+namespace stipple::cli {
+
+namespace {
+
+using AccuracyReport = Handle<StippleAccuracyReport, stipple_accuracy_report_free>;
+
+struct Arguments {
+  std::vector<std::string> in, out;
+  CameraArguments camera;
+  std::optional<uint32_t> repetitions;
+  std::optional<uint64_t> reference_pixels;
+  std::optional<double> seconds, within, above;
+};
+
+StippleAccuracyMeasureOptions optionsOf(const Arguments& arguments) {
+  StippleAccuracyMeasureOptions options;
+  stipple_accuracy_measure_options_init(&options);
+  if (arguments.repetitions) options.repetitions = *arguments.repetitions;
+  if (arguments.reference_pixels) options.reference_pixels = *arguments.reference_pixels;
+  if (arguments.seconds) options.most_seconds = *arguments.seconds;
+  return options;
+}
+
+StippleAccuracyRow rowOf(const AccuracyReport& report, uint64_t index) {
+  auto row = sized<StippleAccuracyRow>();
+  check(stipple_accuracy_report_row(report.get(), index, &row));
+  return row;
+}
+
+/// A star marks what is best for its time; an e times that were not measured whole.
+void printTable(const AccuracyReport& report, uint64_t count) {
+  std::printf("%-42s %10s %17s %8s %8s %8s %10s  %s\n", "setting", "ms", "quartiles", "PSNR",
+              "largest", "99.9 %", "splats", "looks");
+  for (uint64_t i = 0; i < count; ++i) {
+    const StippleAccuracyRow row = rowOf(report, i);
+    char quartiles[32] = "";
+    if (row.repetitions > 1) {
+      std::snprintf(quartiles, sizeof(quartiles), "%.4g-%.4g", row.seconds_low * 1e3,
+                    row.seconds_high * 1e3);
+    }
+    std::printf("%-42s %9.4g%s %17s %8.2f %8.4f %8.4f %10llu  %s%s\n", row.name_utf8,
+                row.seconds * 1e3, row.is_estimated ? "e" : " ", quartiles, row.psnr,
+                row.largest_error, row.error_99_9, static_cast<unsigned long long>(row.splat_count),
+                stipple_accuracy_verdict(row.psnr), row.is_on_front ? " *" : "");
+  }
+}
+
+void measure(const Context& context, const Arguments& arguments) {
+  const StippleCamera camera = cameraOf(context, arguments.camera);
+  const PlacedClouds clouds(context, arguments.in);
+  const StippleAccuracyMeasureOptions options = optionsOf(arguments);
+  const auto job =
+      make<Job>(stipple_accuracy_measure_start, context.get(), clouds.instances(), clouds.count(),
+                &camera, static_cast<const StippleRenderOptions*>(nullptr), &options);
+  finish(job);
+  const auto report =
+      make<AccuracyReport>(stipple_job_accuracy_report, const_cast<const StippleJob*>(job.get()));
+  auto info = sized<StippleAccuracyReportInfo>();
+  check(stipple_accuracy_report_info(report.get(), &info));
+  for (const std::string& path : arguments.out) {
+    check(stipple_accuracy_report_save(report.get(), path.c_str()));
+  }
+  std::printf("%u x %u pixels, %llu of them compared, %llu splats, %u threads\n", info.width,
+              info.height, static_cast<unsigned long long>(info.compared_pixels),
+              static_cast<unsigned long long>(info.splat_count), info.thread_count);
+  printTable(report, info.row_count);
+  uint64_t index = 0;
+  if (arguments.within) {
+    check(stipple_accuracy_report_best_within(report.get(), *arguments.within / 1e3, &index));
+    std::printf("best within %g ms: %s\n", *arguments.within, rowOf(report, index).name_utf8);
+  }
+  if (arguments.above) {
+    check(stipple_accuracy_report_cheapest_above(report.get(), *arguments.above, &index));
+    std::printf("cheapest above %g dB: %s\n", *arguments.above, rowOf(report, index).name_utf8);
+  }
+}
+
+}  // namespace
+
+void addAccuracy(CLI::App& app, const Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("accuracy", "What each setting of accuracy costs in time, for a view");
+  command->add_option("in", arguments->in, "Splat files, measured together")->required();
+  addCameraOptions(*command, arguments->camera);
+  command->add_option("-o,--out", arguments->out, "Reports: .json, .csv, .svg")->required();
+  command->add_option("--repetitions", arguments->repetitions,
+                      "Timings of each setting, in turns; default 7");
+  command->add_option(
+      "--reference-pixels", arguments->reference_pixels,
+      "Compared with the reference, spread over the picture; 0: all; default 65536");
+  command->add_option("--seconds", arguments->seconds,
+                      "No further turn begins after so many; default 60");
+  command->add_option("--within", arguments->within,
+                      "Milliseconds: say the best setting that needs no more");
+  command->add_option("--above", arguments->above, "dB: say the cheapest setting that reaches it");
+  command->callback([arguments, &context] { measure(context, *arguments); });
+}
+
+}  // namespace stipple::cli

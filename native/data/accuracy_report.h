@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace stipple {
+
+/// What one setting of accuracy costs, and how far its picture is from the reference.
+struct AccuracyRow {
+  std::string name;  ///< "preview", "final + projection ray"
+  /// Knobs with their values as text, in the order in which they are shown.
+  std::vector<std::pair<std::string, std::string>> knobs;
+  double seconds = 0;       ///< of a picture: median of the repetitions
+  double seconds_low = 0;   ///< their lower quartile
+  double seconds_high = 0;  ///< and upper
+  uint32_t repetitions = 0;
+  bool is_estimated = false;   ///< from the pixels that were drawn, not from whole pictures
+  double psnr = 0;             ///< dB, peak 1, all four channels; infinite where nothing differs
+  double largest_error = 0;    ///< of any channel of any compared pixel
+  double error_99_9 = 0;       ///< 99.9 % of the channels of compared pixels are no further off
+  uint64_t splat_count = 0;    ///< that the setting has
+  uint64_t visible_count = 0;  ///< of them in view
+  bool is_on_front = false;    ///< no other row is as fast and as good
+};
+
+struct AccuracyReport {
+  uint32_t width = 0;  ///< pixels of the picture
+  uint32_t height = 0;
+  uint64_t compared_pixels = 0;  ///< against the reference, in blocks spread over the picture
+  uint64_t splat_count = 0;      ///< of all clouds, uncut
+  uint32_t thread_count = 0;
+  double cut_seconds = 0;  ///< to merge clouds for the shares, once and not part of any row
+  std::vector<AccuracyRow> rows;
+};
+
+/// Sets is_on_front of every row.
+void markFront(AccuracyReport& report);
+
+/// The row with the largest PSNR among those of at most `seconds`. Errors: kInvalidArgument, with
+/// the least that any row needs, where there is none; for a budget that is not above 0.
+size_t bestWithin(const AccuracyReport& report, double seconds);
+
+/// The fastest row of at least `psnr` dB. Errors: kInvalidArgument, with the best that any row but
+/// the reference itself has, where there is none.
+size_t cheapestAbove(const AccuracyReport& report, double psnr);
+
+/// PSNR and errors of a row. In: differences from the reference, any sign; they are reordered.
+void setErrors(std::vector<float>& differences, AccuracyRow& row);
+
+/// Median and quartiles of a row's times. In: at least one, seconds.
+void setSeconds(std::vector<double> times, AccuracyRow& row);
+
+/// Text of a time: "12.4 ms", "3.21 s".
+std::string timeText(double seconds);
+
+}  // namespace stipple
