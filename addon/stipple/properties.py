@@ -6,7 +6,7 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
                        PointerProperty, StringProperty)
 
 from . import version
-from .scene import fit_proposal, fitting, photo_cameras, sequences, strategies, sync
+from .scene import fit_proposal, fitting, overlays, photo_cameras, sequences, strategies, sync
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
 _CHANGEABLE = {'ANIMATABLE'}
@@ -177,6 +177,19 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                            "it); empty for none", subtype='FILE_PATH', options=version.RELATIVE_PATH)
 
 
+class STIPPLE_PG_overlay(bpy.types.PropertyGroup):
+    """What the 3D view colours splats by."""
+
+    kind: EnumProperty(name="Color By", description="What splats are coloured by in the 3D view, to look at density "
+                       "control", items=overlays.KINDS, options=set(), update=overlays.on_change)
+    auto_range: BoolProperty(name="Auto Range", description="From the lowest to the highest of what is shown, without a few "
+                             "extremes", default=True, options=set(), update=overlays.on_change)
+    low: FloatProperty(name="From", description="Value of the darkest color", default=0.0, options=set(),
+                       update=overlays.on_change)
+    high: FloatProperty(name="To", description="Value of the brightest color", default=1.0, options=set(),
+                        update=overlays.on_change)
+
+
 class STIPPLE_PG_scene(bpy.types.PropertyGroup):
     splat_color: EnumProperty(
         name="Splat Color", description="Space in which splats are blended over each other",
@@ -192,6 +205,7 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         "none of its shadows", default=0.5, min=0.0, soft_max=10.0, subtype='DISTANCE', options=set(),
         override=_OVERRIDABLE)
     fit: PointerProperty(type=STIPPLE_PG_fit)
+    overlay: PointerProperty(type=STIPPLE_PG_overlay)
     max_splats: IntProperty(
         name="Max Splats", description="Splats that the viewport shows at most, over all objects and their instances; 0 "
         "for no limit. Objects share them in proportion to their own budgets", default=0, min=0, soft_max=10000000,
@@ -202,7 +216,7 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         options=set(), override=_OVERRIDABLE)
 
 
-classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_fit, STIPPLE_PG_scene)
+classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_fit, STIPPLE_PG_overlay, STIPPLE_PG_scene)
 
 
 def register():

@@ -21,13 +21,14 @@ class ViewEllipses:
         self._sorted = SplatView(context)
         self._target = None
 
-    def draw(self, shaders, context, depsgraph, entries, with_depth):
-        """Draws viewed splats; returns whether a new order is on its way. Errors: StippleError."""
+    def draw(self, shaders, context, depsgraph, entries, with_depth, overlay=None):
+        """Draws viewed splats; returns whether a new order is on its way. overlay: gives them other colours. Errors:
+        StippleError."""
         x, y, width, height = gpu.state.viewport_get()
         region_data = context.region_data
         camera = cameras.from_view(region_data, width, height)
         with_selection = _shows_outlines(context.space_data)
-        shown = _shown(entries, depsgraph, context.view_layer if with_selection else None)
+        shown = _shown(overlay or viewed, entries, depsgraph, context.view_layer if with_selection else None)
         with_selection = any(entry.selected for entry in shown)
         is_sorting = self._sorted.update(shown, camera)
         depth = _scene_depth(x, y, width, height) if with_depth else None
@@ -96,12 +97,12 @@ class Target:
         return np.array(values, np.float32).reshape(height, width, 4)
 
 
-def _shown(entries, depsgraph, view_layer):
-    """view_layer: whose selection is shown, None for no selection."""
+def _shown(clouds, entries, depsgraph, view_layer):
+    """clouds: has cloud_of(). view_layer: whose selection is shown, None for no selection."""
     shown = []
     for entry in entries:
         try:
-            cloud, info = viewed.cloud_of(entry, depsgraph)
+            cloud, info = clouds.cloud_of(entry, depsgraph)
         except StippleError as error:
             sync.problems[entry.obj.data.name] = str(error)
             continue

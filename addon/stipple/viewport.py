@@ -14,7 +14,7 @@ from bpy.app.handlers import persistent
 
 from . import preferences, version
 from .binding.errors import StippleError
-from .scene import cameras, sources, sync, viewed
+from .scene import overlays, sources, sync, viewed
 from .view_picture import ViewPicture
 
 __all__ = ('ViewPicture', 'register', 'unregister')
@@ -24,7 +24,7 @@ POLL_SECONDS = 0.01
 MAX_VIEWS = 8
 
 log = logging.getLogger('stipple')
-_state = {'handler': None, 'drawing': None}
+_state = {'handler': None, 'legend_handler': None, 'drawing': None}
 
 
 class _Drawing:
@@ -39,29 +39,50 @@ class _Drawing:
         self._shaders = None
         self._shaders_failed = False
         self._views = {}  # by RegionView3D, the one that was drawn last at the end
+        self._overlays = {}  # by RegionView3D, of those that show one
 
     def draw(self, context, space, region_data):
         depsgraph = context.evaluated_depsgraph_get()
         scene = self._scene.update(depsgraph)
         shown = viewed.shown(scene, space, depsgraph)
+        overlay = self._overlay(context, space, region_data, shown, depsgraph)
         if not shown:
             return
         ellipses, points = split(shown, _points_above())
         if space.shading.type == 'WIREFRAME' or self._shaders_failed:
             ellipses, points = [], shown
         if points:
-            self._points.draw(points, depsgraph)
+            self._points.draw(points, depsgraph, overlay)
         if ellipses:
             hidden = bool(points) or viewed.hides_splats(scene, space, depsgraph)
             try:
-                self._draw_ellipses(context, depsgraph, ellipses, hidden)
+                self._draw_ellipses(context, depsgraph, ellipses, hidden, overlay)
                 note_problem('')
             except StippleError as error:
                 self._shaders_failed = isinstance(error, self._ellipses.ShaderError)
                 note_problem(str(error))
-                self._points.draw(ellipses, depsgraph)
+                self._points.draw(ellipses, depsgraph, overlay)
 
-    def _draw_ellipses(self, context, depsgraph, entries, with_depth):
+    def _overlay(self, context, space, region_data, shown, depsgraph):
+        """What colours the splats of a view, None where they have their own colours."""
+        key = region_data.as_pointer()
+        if not shown or not overlays.is_on(context.scene, space):
+            self._overlays.pop(key, None)
+            return None
+        while len(self._overlays) >= MAX_VIEWS and key not in self._overlays:
+            self._overlays.pop(next(iter(self._overlays)))
+        overlay = self._overlays.setdefault(key, overlays.Overlay())
+        overlay.update(shown, depsgraph, context.scene)
+        return overlay
+
+    def draw_legend(self, context, region, region_data):
+        overlay = self._overlays.get(region_data.as_pointer())
+        if overlay is not None:
+            from . import view_legend
+            system = context.preferences.system
+            view_legend.draw(overlay.scale, overlays.settings_of(context.scene).kind, region.width, system.ui_scale)
+
+    def _draw_ellipses(self, context, depsgraph, entries, with_depth, overlay):
         if self._shaders is None:
             self._shaders = self._ellipses.Shaders()
         key = context.region_data.as_pointer()
@@ -71,7 +92,7 @@ class _Drawing:
         self._views[key] = view
         while len(self._views) > MAX_VIEWS:
             self._views.pop(next(iter(self._views))).close()
-        if view.draw(self._shaders, context, depsgraph, entries, with_depth):
+        if view.draw(self._shaders, context, depsgraph, entries, with_depth, overlay):
             _poll_later()
 
     def is_sorting(self):
@@ -128,6 +149,22 @@ def _draw():
         viewed.state['off'] = True
 
 
+def _draw_legend():
+    """The same, after the splats, in pixels."""
+    context = bpy.context
+    drawing, region_data = _state['drawing'], context.region_data
+    if drawing is None or region_data is None or viewed.state['off']:
+        return
+    if context.space_data.shading.type == 'RENDERED' and context.engine == sync.ENGINE:
+        return
+    try:
+        drawing.draw_legend(context, context.region, region_data)
+    except Exception as error:
+        log.exception('The legend of the overlay cannot be drawn')
+        note_problem(f'The legend of the overlay cannot be drawn: {error}.')
+        viewed.state['off'] = True
+
+
 def _poll_later():
     if not bpy.app.timers.is_registered(_poll):
         bpy.app.timers.register(_poll, first_interval=POLL_SECONDS)
@@ -160,14 +197,16 @@ def register():
     if bpy.app.background or version.HAS_NATIVE_SPLATS:
         return
     _state['handler'] = bpy.types.SpaceView3D.draw_handler_add(_draw, (), 'WINDOW', 'POST_VIEW')
+    _state['legend_handler'] = bpy.types.SpaceView3D.draw_handler_add(_draw_legend, (), 'WINDOW', 'POST_PIXEL')
     bpy.app.handlers.load_pre.append(_forget)
 
 
 def unregister():
     viewed.unregister()
     if _state['handler'] is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_state['handler'], 'WINDOW')
-        _state['handler'] = None
+        for name in ('handler', 'legend_handler'):
+            bpy.types.SpaceView3D.draw_handler_remove(_state[name], 'WINDOW')
+            _state[name] = None
         bpy.app.handlers.load_pre.remove(_forget)
     if bpy.app.timers.is_registered(_poll):
         bpy.app.timers.unregister(_poll)

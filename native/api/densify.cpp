@@ -76,8 +76,9 @@ StippleStatus stipple_densify_start(StippleContext* context, const StippleCloud*
     const FitViews split = splitOf(*views, *source, given.holdout);
     *job = startJob(context->state, [start, source, split, settings](Progress& progress) {
       checkViews(*source, {}, &progress);
-      return JobResult{std::make_shared<const SplatCloud>(
-          densifyCloud(*start, source, split.training, settings, &progress))};
+      SplatQuantities seen;
+      SplatCloud made = densifyCloud(*start, source, split.training, settings, &progress, &seen);
+      return JobResult{SeenCloud(std::move(made), std::move(seen))};
     });
   });
 }

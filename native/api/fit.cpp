@@ -158,19 +158,23 @@ StippleStatus stipple_fit_note(const StippleJob* job, uint64_t index, const char
 StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud) {
   return guarded([&] {
     require(cloud, "cloud");
-    std::shared_ptr<const SplatCloud> newest = sessionOf(job).takePreview();
-    *cloud = newest ? new StippleCloud{job->context, std::move(newest)} : nullptr;
+    SeenCloud newest = sessionOf(job).takePreview();
+    *cloud = newest.cloud ? new StippleCloud{job->context, newest.cloud, newest.seen} : nullptr;
   });
+}
+
+StippleStatus stipple_fit_watch_contributions(StippleJob* job, uint32_t watched) {
+  return guarded(
+      [&] { sessionOf(job).watchContributions(enumValue<uint32_t>(watched, 1, "watched") == 1); });
 }
 
 StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud) {
   return guarded([&] {
     require(cloud, "cloud");
-    Trainer& trainer = sessionOf(job).ended();
-    std::shared_ptr<const SplatCloud> made;
-    withThreads(job->context->thread_count,
-                [&] { made = std::make_shared<const SplatCloud>(trainer.model().splats(budget)); });
-    *cloud = new StippleCloud{job->context, std::move(made)};
+    const FitSession& session = sessionOf(job);
+    SeenCloud made;
+    withThreads(job->context->thread_count, [&] { made = session.decode(budget); });
+    *cloud = new StippleCloud{job->context, made.cloud, made.seen};
   });
 }
 

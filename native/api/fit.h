@@ -63,12 +63,13 @@ class FitSession final : public FitObserver {
   StippleFitFigures figuresNow() const;
   const char* noteAt(uint64_t index) const;
   /// The newest preview, and a request for another.
-  std::shared_ptr<const SplatCloud> takePreview();
+  SeenCloud takePreview();
+  void watchContributions(bool wanted) { contributions_are_wanted_ = wanted; }
 
   /// The trainer of a fit that has ended with something to show. Errors: kInvalidArgument.
   Trainer& ended() const;
   /// Of such a fit. May be called by several threads.
-  SplatCloud decode(uint64_t budget) const;
+  SeenCloud decode(uint64_t budget) const;
   /// The same as a model. Errors: kUnsupported for explicit splats.
   ModelParts model() const;
   const FitSettings& settings() const { return settings_; }
@@ -77,7 +78,8 @@ class FitSession final : public FitObserver {
   void figures(const FitFigures& figures) override;
   void note(const std::string& text) override;
   bool wantsPreview() override;
-  void preview(SplatCloud cloud) override;
+  bool wantsContributions() override { return contributions_are_wanted_; }
+  void preview(SplatCloud cloud, SplatQuantities seen) override;
   void save(const TensorTable& table) override;
 
  private:
@@ -93,9 +95,10 @@ class FitSession final : public FitObserver {
   FitFigures figures_;
   std::string stage_ = "Checking views";
   std::deque<std::string> notes_;  ///< texts stay where they are
-  std::shared_ptr<const SplatCloud> preview_;
+  SeenCloud preview_;
   uint64_t preview_iteration_ = 0;
   std::atomic<bool> preview_is_wanted_{false};
+  std::atomic<bool> contributions_are_wanted_{false};
 };
 
 }  // namespace stipple::api

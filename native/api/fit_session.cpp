@@ -80,8 +80,8 @@ bool FitSession::wantsPreview() {
   return preview_is_wanted_.exchange(false);
 }
 
-void FitSession::preview(SplatCloud cloud) {
-  auto shared = std::make_shared<const SplatCloud>(std::move(cloud));
+void FitSession::preview(SplatCloud cloud, SplatQuantities seen) {
+  SeenCloud shared(std::move(cloud), std::move(seen));
   std::lock_guard<std::mutex> lock(mutex_);
   preview_ = std::move(shared);
   preview_iteration_ = trainer_->iteration();
@@ -123,7 +123,7 @@ const char* FitSession::noteAt(uint64_t index) const {
   return notes_[index].c_str();
 }
 
-std::shared_ptr<const SplatCloud> FitSession::takePreview() {
+SeenCloud FitSession::takePreview() {
   preview_is_wanted_ = true;
   std::lock_guard<std::mutex> lock(mutex_);
   return preview_;
@@ -138,10 +138,11 @@ Trainer& FitSession::ended() const {
   return *trainer_;
 }
 
-SplatCloud FitSession::decode(uint64_t budget) const {
+SeenCloud FitSession::decode(uint64_t budget) const {
   Trainer& trainer = ended();
   std::lock_guard<std::mutex> lock(decode_mutex_);
-  return trainer.model().splats(budget);
+  SplatCloud cloud = trainer.model().splats(budget);
+  return SeenCloud(std::move(cloud), trainer.seen());
 }
 
 ModelParts FitSession::model() const {

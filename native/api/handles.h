@@ -17,6 +17,7 @@
 #include "data/memory_view_source.h"
 #include "data/sparse_volume.h"
 #include "data/splat_cloud.h"
+#include "data/splat_quantities.h"
 #include "data/tri_mesh.h"
 #include "decode/field_decoder.h"
 #include "decode/hierarchy_decoder.h"
@@ -62,6 +63,17 @@ struct ModelParts {
   std::shared_ptr<const ModelNotes> notes = {};  ///< null where it was not loaded
 };
 
+/// Splats, and what density control saw of them.
+struct SeenCloud {
+  SeenCloud() = default;
+  SeenCloud(SplatCloud splats, SplatQuantities quantities)
+      : cloud(std::make_shared<const SplatCloud>(std::move(splats))),
+        seen(std::make_shared<const SplatQuantities>(std::move(quantities))) {}
+
+  std::shared_ptr<const SplatCloud> cloud;
+  std::shared_ptr<const SplatQuantities> seen;
+};
+
 /// What is known of a view beside its camera; texts are handed out as they lie here.
 struct ViewNote {
   std::string name;
@@ -104,6 +116,7 @@ struct StippleContext {
 struct StippleCloud {
   stipple::api::Context context;
   std::shared_ptr<const stipple::SplatCloud> cloud;
+  std::shared_ptr<const stipple::SplatQuantities> seen = {};  ///< null: nothing is known
   /// rowsAreValid() has accepted the cloud, which never changes: drawing need not ask again.
   mutable std::atomic<bool> is_checked{false};
 };

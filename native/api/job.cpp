@@ -96,8 +96,14 @@ StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model) {
 
 StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud) {
   return guarded([&] {
-    const auto& made =
-        jobResult<std::shared_ptr<const stipple::SplatCloud>>(require(job, "job"), "cloud");
+    {
+      std::lock_guard<std::mutex> lock(require(job, "job").mutex);
+      if (const auto* made = std::get_if<SeenCloud>(&job->result)) {
+        require(cloud, "cloud") = new StippleCloud{job->context, made->cloud, made->seen};
+        return;
+      }
+    }
+    const auto& made = jobResult<std::shared_ptr<const stipple::SplatCloud>>(*job, "cloud");
     require(cloud, "cloud") = new StippleCloud{job->context, made};
   });
 }

@@ -2,7 +2,12 @@
 
 #include <stipple/stipple.h>
 
+#include <algorithm>
+
 #include "api/guard.h"
+#include "api/handles.h"
+#include "base/parallel.h"
+#include "data/splat_quantities.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -57,6 +62,31 @@ StippleStatus stipple_strategy_part_info(uint64_t index, StippleStrategyInfo* in
 
 StippleStatus stipple_strategy_check(const char* strategy_utf8) {
   return guarded([&] { makeStrategy(&require(strategy_utf8, "strategy_utf8")); });
+}
+
+StippleStatus stipple_cloud_quantity(const StippleCloud* cloud, uint32_t quantity,
+                                     uint64_t capacity, float* values, uint64_t* count) {
+  return guarded([&] {
+    require(cloud, "cloud");
+    require(count, "count") = 0;
+    const SplatQuantity wanted =
+        enumValue<SplatQuantity>(quantity, kSplatQuantityCount - 1, "quantity");
+    const size_t splats = cloud->cloud->size();
+    const bool is_axis = wanted == SplatQuantity::kSplitAxis;
+    const bool is_known = cloud->seen && !is_axis && cloud->seen->of(wanted).size() == splats;
+    *count = is_axis ? splats * 3 : is_known ? splats : 0;
+    if (!values || *count == 0) return;
+    if (capacity < *count) {
+      fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " floats; " +
+                                           std::to_string(*count) + " are needed");
+    }
+    std::vector<float> axes;
+    if (is_axis) {
+      withThreads(cloud->context->thread_count, [&] { axes = splitAxes(*cloud->cloud); });
+    }
+    const std::vector<float>& found = is_axis ? axes : cloud->seen->of(wanted);
+    std::copy(found.begin(), found.end(), values);
+  });
 }
 
 }  // extern "C"

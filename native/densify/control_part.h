@@ -175,8 +175,9 @@ class ControlPart {
   // -----------------------------------------------------------------------------
   /// After every edit: arrays per splat follow, and windows begin anew.
   virtual void edited(const ControlMoment&, const SplatEdit&, size_t /*count_before*/) {}
-  /// What it sees of each splat, for looking at; empty where it has nothing to show.
-  virtual std::vector<float> seen(SplatQuantity) const { return {}; }
+  /// [N] how much each splat asked to multiply at the last event, for looking at; empty where it
+  /// does not tell.
+  virtual std::vector<float> scores() const { return {}; }
   virtual void put(TensorTable&) const {}
   virtual void take(const TensorTable&) {}
 };

@@ -149,29 +149,23 @@ class DensityControl final : public Strategy {
     }
     if (!moment.is_event && edit.writes.empty() && !edit.keep && edit.append.size() == 0) return {};
     for (const auto& part : parts_) part->edited(moment, edit, count);
-    followEdit(edit, 1, static_cast<float>(moment.iteration), births_);
-    last_iteration_ = moment.iteration;
+    followEdit(edit, 1, static_cast<float>(clock(moment)), births_);
+    scores_ = scoresOf(births_.size());
     return edit;
   }
 
-  std::vector<float> seen(SplatQuantity quantity, const RawSplats& splats) const override {
-    if (quantity == SplatQuantity::kAge && births_.size() == splats.size()) return ages();
-    if (quantity == SplatQuantity::kSplitAxis) return elongations(splats);
-    if (const ControlPart* part = owner(ControlRole::kScore);
-        part && quantity == SplatQuantity::kScore) {
-      std::vector<float> values = part->seen(quantity);
-      if (values.size() == splats.size()) return values;
-    }
-    for (const auto& part : parts_) {
-      std::vector<float> values = part->seen(quantity);
-      if (values.size() == splats.size()) return values;
-    }
-    return {};
+  SplatQuantities seen(size_t splat_count) const override {
+    SplatQuantities quantities;
+    if (births_.size() == splat_count) quantities.age = ages();
+    if (scores_.size() == splat_count) quantities.score = scores_;
+    return quantities;
   }
 
   TensorTable state() const override {
     TensorTable table;
     table["births"] = {{births_.size()}, births_};
+    table["clock"] = {{1}, std::vector<uint64_t>{clock_}};
+    table["scores"] = {{scores_.size()}, scores_};
     for (const auto& part : parts_) {
       TensorTable own;
       part->put(own);
@@ -193,6 +187,9 @@ class DensityControl final : public Strategy {
       part->take(own);
     }
     births_ = std::move(births);
+    // Only for looking at: a state without them goes on all the same.
+    clock_ = table.contains("clock") ? stateArray<uint64_t>(table, "clock").at(0) : 0;
+    scores_ = table.contains("scores") ? stateArray<float>(table, "scores") : std::vector<float>{};
   }
 
  private:
@@ -211,26 +208,30 @@ class DensityControl final : public Strategy {
     return (removal && removal->removesAt(moment)) || (recovery && recovery->removesAt(moment));
   }
 
-  /// Births are counted from the first call of a fit.
+  /// What ages are counted in: iterations; without a fit, events.
+  static uint64_t clock(const ControlMoment& moment) {
+    return moment.standalone ? moment.standalone->index + 1 : moment.iteration;
+  }
+  /// Births are counted from the first call of a fit; splats of a finished cloud were there before.
   void followAges(size_t count, const ControlMoment& moment) {
-    if (births_.size() != count) births_.assign(count, static_cast<float>(moment.iteration));
-    last_iteration_ = moment.iteration;
+    clock_ = clock(moment);
+    if (births_.size() == count) return;
+    births_.assign(count, moment.standalone ? 0.0f : static_cast<float>(clock_));
+  }
+  /// What the owner of scores tells, else the first part that tells any.
+  std::vector<float> scoresOf(size_t count) const {
+    std::vector<float> values;
+    if (const ControlPart* part = owner(ControlRole::kScore)) values = part->scores();
+    for (const auto& part : parts_) {
+      if (values.size() == count) break;
+      values = part->scores();
+    }
+    return values.size() == count ? values : std::vector<float>{};
   }
   std::vector<float> ages() const {
     std::vector<float> values(births_.size());
     for (size_t i = 0; i < values.size(); ++i) {
-      values[i] = static_cast<float>(last_iteration_) - births_[i];
-    }
-    return values;
-  }
-
-  static std::vector<float> elongations(const RawSplats& splats) {
-    std::vector<float> values(splats.size());
-    for (size_t i = 0; i < values.size(); ++i) {
-      float s[3] = {splats.log_scales[i * 3], splats.log_scales[i * 3 + 1],
-                    splats.log_scales[i * 3 + 2]};
-      std::sort(s, s + 3);
-      values[i] = s[2] - s[1];
+      values[i] = static_cast<float>(clock_) - births_[i];
     }
     return values;
   }
@@ -389,8 +390,9 @@ class DensityControl final : public Strategy {
   EventSchedule schedule_;
   std::vector<std::unique_ptr<ControlPart>> parts_;
   std::optional<FilteredParameterisation> filtered_;  ///< where a part filters
-  std::vector<float> births_;  ///< [N] iteration in which each splat was made
-  uint64_t last_iteration_ = 0;
+  std::vector<float> births_;                         ///< [N] when each splat was made
+  uint64_t clock_ = 0;                                ///< of the last call
+  std::vector<float> scores_;                         ///< [N] of the last event
 };
 
 }  // namespace

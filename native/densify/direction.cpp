@@ -123,9 +123,7 @@ class DirectionPull final : public ControlPart {
   }
 
   /// Of the last event, in units of the threshold.
-  std::vector<float> seen(SplatQuantity quantity) const override {
-    return quantity == SplatQuantity::kScore ? score_ : std::vector<float>{};
-  }
+  std::vector<float> scores() const override { return score_; }
 
   void put(TensorTable& table) const override {
     pull_.put(table);

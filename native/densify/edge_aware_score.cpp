@@ -75,9 +75,7 @@ class EdgeAwareScore final : public ControlPart {
   }
 
   /// Of the last event; new splats have 0.
-  std::vector<float> seen(SplatQuantity quantity) const override {
-    return quantity == SplatQuantity::kScore ? shown_ : std::vector<float>{};
-  }
+  std::vector<float> scores() const override { return shown_; }
 
   void put(TensorTable& table) const override {
     table["edge_sums"] = {{sums_.size()}, sums_};

@@ -95,9 +95,7 @@ class FrequencyControl final : public ControlPart {
   }
 
   /// Gradients of the last event, in units of the threshold.
-  std::vector<float> seen(SplatQuantity quantity) const override {
-    return quantity == SplatQuantity::kScore ? score_ : std::vector<float>{};
-  }
+  std::vector<float> scores() const override { return score_; }
 
   void put(TensorTable& table) const override { table["is_new"] = {{is_new_.size()}, is_new_}; }
   void take(const TensorTable& table) override { is_new_ = stateArray<float>(table, "is_new"); }

@@ -60,9 +60,7 @@ class OpacityRelocation final : public ControlPart {
   }
 
   /// How often it was drawn at the last event.
-  std::vector<float> seen(SplatQuantity quantity) const override {
-    return quantity == SplatQuantity::kScore ? draws_ : std::vector<float>{};
-  }
+  std::vector<float> scores() const override { return draws_; }
 
  private:
   McmcOptions options_;

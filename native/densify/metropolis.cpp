@@ -185,9 +185,7 @@ class MetropolisBirth final : public ControlPart {
   }
 
   /// Importance at the last event, 0..1.
-  std::vector<float> seen(SplatQuantity quantity) const override {
-    return quantity == SplatQuantity::kScore ? score_ : std::vector<float>{};
-  }
+  std::vector<float> scores() const override { return score_; }
 
  private:
   static uint64_t annealed(const ControlMoment& moment, uint64_t count) {

@@ -67,9 +67,7 @@ class ErrorPeaks final : public ControlPart {
   }
 
   /// Of the last event, in units of the threshold.
-  std::vector<float> seen(SplatQuantity quantity) const override {
-    return quantity == SplatQuantity::kScore ? score_ : std::vector<float>{};
-  }
+  std::vector<float> scores() const override { return score_; }
 
   void put(TensorTable& table) const override { table["peaks"] = {{peaks_.size()}, peaks_}; }
   void take(const TensorTable& table) override {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "data/splat_cloud.h"
+#include "data/splat_quantities.h"
 #include "data/tensor_table.h"
 #include "densify/raw_splats.h"
 #include "densify/splat_edit.h"
@@ -68,15 +69,6 @@ struct LearningRates {
   double colour = 2.5e-3;
   double higher_colour = 2.5e-3 / 20;
 };
-
-/// What a strategy can show of each splat.
-enum class SplatQuantity : uint32_t {
-  kScore = 0,         ///< how much it asks to multiply; of the last event
-  kAge = 1,           ///< iterations since it was made
-  kSplitAxis = 2,     ///< longest axis over the next one, natural logarithm
-  kContribution = 3,  ///< blending weight, summed over pixels and views since the last event
-};
-constexpr size_t kSplatQuantityCount = 4;
 
 /// Derivatives of splats by their stored values, shaped as SplatCloud is.
 struct CloudGradient {
@@ -189,8 +181,8 @@ class Strategy {
   /// whoever called applies it.
   virtual std::optional<SplatEdit> edit(const FitMoment&, const SplatStore&) { return {}; }
 
-  /// [N] for looking at; empty where it has nothing of the kind.
-  virtual std::vector<float> seen(SplatQuantity, const RawSplats&) const { return {}; }
+  /// Scores and ages of so many splats, for looking at; empty where it has none.
+  virtual SplatQuantities seen(size_t /*splat_count*/) const { return {}; }
 
   /// What a checkpoint keeps, and takes back. Errors: kFormat for a table of another strategy.
   virtual TensorTable state() const { return {}; }

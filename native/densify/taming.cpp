@@ -133,9 +133,7 @@ class TamingScore final : public ControlPart {
     scores_->of.clear();
   }
 
-  std::vector<float> seen(SplatQuantity quantity) const override {
-    return quantity == SplatQuantity::kScore ? seen_ : std::vector<float>{};
-  }
+  std::vector<float> scores() const override { return seen_; }
   void put(TensorTable& table) const override { pulls_.put(table); }
   void take(const TensorTable& table) override { pulls_.take(table); }
 

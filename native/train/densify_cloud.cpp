@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "densify/strategies.h"
 #include "train/backend_control.h"
+#include "train/contributions.h"
 #include "train/held_out.h"
 #include "train/picture_store.h"
 #include "train/view_evaluator.h"
@@ -60,6 +61,14 @@ class CloudDensifier {
     sweep();  // for what looks at new splats
     advance(progress_, 1.0, "Densifying");
     return result();
+  }
+
+  /// At the splats that came out.
+  SplatQuantities look() {
+    SplatQuantities quantities = strategy_->seen(backend_->splatCount());
+    evaluator_.forgetSplats();
+    quantities.contribution = meanContributions(evaluator_, kContributionViews);
+    return quantities;
   }
 
  private:
@@ -154,12 +163,15 @@ class CloudDensifier {
 
 SplatCloud densifyCloud(const SplatCloud& cloud, std::shared_ptr<const ViewSource> views,
                         std::span<const size_t> shown, const DensifyOptions& options,
-                        Progress* progress) {
+                        Progress* progress, SplatQuantities* seen) {
   requireDensifiable(cloud, *views, options);
   if (shown.empty()) {
     fail(ErrorCode::kInvalidArgument, "there are no views to look at; at least one is needed");
   }
-  return CloudDensifier(cloud, std::move(views), shown, options, progress).run();
+  CloudDensifier densifier(cloud, std::move(views), shown, options, progress);
+  SplatCloud made = densifier.run();
+  if (seen) *seen = densifier.look();
+  return made;
 }
 
 void requireDensifiable(const SplatCloud& cloud, const ViewSource& views,

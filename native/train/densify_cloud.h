@@ -7,6 +7,7 @@
 
 #include "base/progress.h"
 #include "data/splat_cloud.h"
+#include "data/splat_quantities.h"
 #include "data/view_source.h"
 
 namespace stipple {
@@ -36,9 +37,11 @@ struct DensifyOptions {
 /// out of range, a strategy that is not there; those of ViewSource::load; kCancelled.
 /// Same result for any number of threads. Cost: for each event one drawing and one backward pass
 /// per view.
+/// Out: seen, where it is not null: what the strategy saw of the splats that come out, and what
+/// they contribute to kContributionViews of the views.
 SplatCloud densifyCloud(const SplatCloud& cloud, std::shared_ptr<const ViewSource> views,
                         std::span<const size_t> shown, const DensifyOptions& options,
-                        Progress* progress = nullptr);
+                        Progress* progress = nullptr, SplatQuantities* seen = nullptr);
 
 /// The errors that are known before any view is looked at.
 void requireDensifiable(const SplatCloud& cloud, const ViewSource& views,

@@ -118,6 +118,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
 
   SplatCloud splats(uint64_t) override { return backend_->download(); }
   std::vector<uint64_t> budgets() const override { return {backend_->splatCount()}; }
+  SplatQuantities seen() const override { return strategy_->seen(backend_->splatCount()); }
 
   TensorTable state() const override {
     TensorTable table;
@@ -208,7 +209,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
 }  // namespace
 
 uint64_t bytesPerSplat(int sh_degree) {
-  constexpr uint64_t kOthers = 11;  // place, turn, size, opacity
+  constexpr uint64_t kOthers = 11;      // place, turn, size, opacity
   constexpr uint64_t kOfDrawing = 250;  // with statistics
   const uint64_t row = (kOthers + shCoefficientCount(sh_degree) * 3) * sizeof(float);
   return row * 13 + kOfDrawing;

@@ -65,6 +65,8 @@ class FitModel {
   virtual SplatCloud splats(uint64_t budget) = 0;
   /// Budgets at which held-out views are worth measuring, ascending; one for a model of one size.
   virtual std::vector<uint64_t> budgets() const = 0;
+  /// Scores and ages of splats(0), where density control has any.
+  virtual SplatQuantities seen() const { return {}; }
   /// Entropy of the density, nats; not of models without one.
   virtual std::optional<double> densityEntropy() const { return {}; }
 

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "train/contributions.h"
 #include "train/fit_state.h"
 
 namespace stipple {
@@ -19,6 +20,8 @@ namespace {
 /// something, few enough to take no time beside the steps.
 constexpr size_t kMeasuredViews = 8;
 constexpr size_t kFinallyMeasuredViews = 200;
+// Of previews, that contributions are measured over.
+constexpr size_t kPreviewedViews = 8;
 constexpr uint64_t kMeasuresPerFit = 20;
 constexpr uint64_t kLeastMeasureInterval = 100;
 /// Iterations whose loss and time are averaged for the figures.
@@ -203,6 +206,16 @@ void Trainer::measureBudgets() {
   }
 }
 
+/// In: most_views, of those that contributions are measured over; 0: they are not.
+SplatQuantities Trainer::look(size_t most_views) {
+  SplatQuantities quantities = model_->seen();
+  if (most_views > 0) {
+    evaluator_->forgetSplats();
+    quantities.contribution = meanContributions(*evaluator_, most_views);
+  }
+  return quantities;
+}
+
 void Trainer::save(FitObserver& observer, Pace& pace) {
   try {
     observer.save(state());
@@ -269,7 +282,10 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
     const bool time_is_over =
         options_.checkpoint_seconds > 0 && secondsSince(pace.saved) >= options_.checkpoint_seconds;
     if (interval_is_over || time_is_over) save(observer, pace);
-    if (observer.wantsPreview()) observer.preview(model_->splats(0));
+    if (observer.wantsPreview()) {
+      const size_t views = observer.wantsContributions() ? kPreviewedViews : 0;
+      observer.preview(model_->splats(0), look(views));
+    }
     report(observer, pace);
     if (progress && !progress->cancelled()) {
       progress->advance(static_cast<double>(iteration_) / static_cast<double>(options_.iterations),
@@ -286,7 +302,10 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
       measure();
     }
     keepBest();
-    if (!error && iteration_ > 0) measureBudgets();
+    if (!error && iteration_ > 0) {
+      measureBudgets();
+      seen_ = look(kContributionViews);
+    }
   } catch (...) {
     if (!error) error = std::current_exception();
     keepBest();

@@ -10,6 +10,7 @@
 #include "base/progress.h"
 #include "data/fit_history.h"
 #include "data/splat_cloud.h"
+#include "data/splat_quantities.h"
 #include "data/tensor_table.h"
 #include "data/view_source.h"
 #include "train/fit_model.h"
@@ -67,7 +68,9 @@ class FitObserver {
   /// One sentence on something that the user should know; the fit goes on.
   virtual void note(const std::string&) {}
   virtual bool wantsPreview() { return false; }
-  virtual void preview(SplatCloud) {}  ///< the splats as they are now, where they were wanted
+  virtual bool wantsContributions() { return false; }  ///< with previews
+  /// The splats as they are now, where they were wanted, and what density control sees of them.
+  virtual void preview(SplatCloud, SplatQuantities) {}
   /// To be kept for restore(). Errors become notes: the fit goes on.
   virtual void save(const TensorTable&) {}
 };
@@ -98,6 +101,9 @@ class Trainer {
   uint64_t iteration() const { return iteration_; }
   FitModel& model() { return *model_; }
   const FitHistory& history() const { return history_; }
+  /// What density control has seen of the result: of splats(0) once run() has ended; contributions
+  /// over kContributionViews views.
+  const SplatQuantities& seen() const { return seen_; }
 
   /// For a checkpoint, while run() is under way or before. Errors of restore: kFormat for a table
   /// of another fit or with parts missing.
@@ -116,6 +122,7 @@ class Trainer {
   void report(FitObserver& observer, const Pace& pace) const;
   void keepBest();
   void measureBudgets();
+  SplatQuantities look(size_t most_views);
   void backgroundOf(uint64_t iteration, double background[3]) const;
   uint64_t measureInterval() const;
 
@@ -133,6 +140,7 @@ class Trainer {
 
   uint64_t iteration_ = 0;
   FitHistory history_;
+  SplatQuantities seen_;
   /// Of history_.best_iteration, where that is not the present one.
   std::optional<TensorTable> best_;
 };

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splat clouds."""
 
-from ctypes import byref
-from dataclasses import dataclass
+from ctypes import byref, c_uint64
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .errors import invalid
 from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
 from .job import Job
-from .structs import (Antialias, ColourSpace, Frame, StippleCloudArrays, StippleCloudBuffers, StippleCloudColumnBuffers,
+from .structs import (Antialias, ColourSpace, Frame, SplatQuantity, StippleCloudArrays, StippleCloudBuffers, StippleCloudColumnBuffers,
                       StippleCloudColumns, StippleCloudComparison, StippleCloudInfo, StippleCloudSaveOptions)
 
 # Floats of a splat in each attribute that Blender stores. 'base' is the harmonics of degree 0 and the opacity; those above
@@ -32,6 +32,7 @@ class SplatArrays:
     colour_space: int = ColourSpace.DISPLAY
     antialias: int = Antialias.CLASSIC
     frame: int = Frame.UNKNOWN  # which way the axes of the positions point
+    seen: dict = field(default_factory=dict)  # what density control saw of each: [N] by SplatQuantity, SPLIT_AXIS never
 
     @property
     def count(self):
@@ -62,6 +63,7 @@ class CloudColumns:
         self.count, self.sh_degree = info.count, info.sh_degree
         self.colour_space, self.antialias = ColourSpace(info.colour_space), Antialias(info.antialias)
         self.frame = Frame(info.frame)
+        self.seen = cloud.seen()
         self._room = np.empty(4 * info.count, np.float32)
 
     def column(self, name):
@@ -142,7 +144,7 @@ class Cloud(Handle):
         n, coefficients = info.count, (info.sh_degree + 1) ** 2
         arrays = SplatArrays(np.empty((n, 3), np.float32), np.empty((n, 4), np.float32), np.empty((n, 3), np.float32),
                              np.empty(n, np.float32), np.empty((n, coefficients, 3), np.float32),
-                             ColourSpace(info.colour_space), Antialias(info.antialias), Frame(info.frame))
+                             ColourSpace(info.colour_space), Antialias(info.antialias), Frame(info.frame), self.seen())
         buffers = StippleCloudBuffers(capacity=n, positions=pointer_to(arrays.positions),
                                       rotations=pointer_to(arrays.rotations), scales=pointer_to(arrays.scales),
                                       opacities=pointer_to(arrays.opacities), sh=pointer_to(arrays.sh))
@@ -151,6 +153,22 @@ class Cloud(Handle):
 
     def columns(self):
         return CloudColumns(self)
+
+    def quantity(self, kind):
+        """[N] or, of SPLIT_AXIS, [N,3] of a SplatQuantity; None where it is not known."""
+        count = c_uint64()
+        self._check(self.library.stipple_cloud_quantity(self.pointer, int(kind), 0, None, byref(count)))
+        if count.value == 0:
+            return None
+        values = np.empty(count.value, np.float32)
+        self._check(self.library.stipple_cloud_quantity(self.pointer, int(kind), values.size, pointer_to(values),
+                                                        byref(count)))
+        return values.reshape(-1, 3) if kind == SplatQuantity.SPLIT_AXIS else values
+
+    def seen(self):
+        """What density control saw of each splat, as SplatArrays has it."""
+        found = {kind: self.quantity(kind) for kind in SplatQuantity if kind != SplatQuantity.SPLIT_AXIS}
+        return {kind: values for kind, values in found.items() if values is not None}
 
     def read_column(self, name, values):
         """Fills a contiguous array with an attribute as Blender stores it (COLUMN_WIDTHS)."""

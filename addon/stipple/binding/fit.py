@@ -64,6 +64,10 @@ class Fit(Job):
         self._check(self.library.stipple_fit_preview(self.pointer, byref(pointer)))
         return Cloud(self.library, pointer.value) if pointer.value else None
 
+    def watch_contributions(self, watched):
+        """Whether previews tell what each splat contributes: a few views are drawn for each."""
+        self._check(self.library.stipple_fit_watch_contributions(self.pointer, int(watched)))
+
     def result(self, budget=0):
         """The best splats, at a budget where the model has budgets; 0: the largest."""
         return Cloud(self.library, new_handle(self.library, 'stipple_fit_cloud', self.pointer, budget))

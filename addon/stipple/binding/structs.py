@@ -4,6 +4,8 @@
 from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p, sizeof
 from enum import IntEnum
 
+from .fit_enums import FitBackground, FitModel, FitQuality, SplatQuantity
+
 ABI_VERSION = 1
 MAX_ANCHORS = 1 << 28
 NO_INDEX = 0xFFFFFFFF
@@ -186,23 +188,6 @@ class Transfer(IntEnum):
 
 
 # Each enumeration: the C type and what its values' names start with.
-class FitModel(IntEnum):
-    EXPLICIT = 0
-    FIELD = 1
-
-
-class FitQuality(IntEnum):
-    FAST = 0
-    BALANCED = 1
-    FINE_DETAIL = 2
-
-
-class FitBackground(IntEnum):
-    BLACK = 0
-    WHITE = 1
-    RANDOM = 2
-
-
 ENUMS = {
     'StippleStatus': (Status, 'STIPPLE_'),
     'StippleJobState': (JobState, 'STIPPLE_JOB_'),
@@ -230,6 +215,7 @@ ENUMS = {
     'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
     'StippleFitModel': (FitModel, 'STIPPLE_FIT_'),
     'StippleFitQuality': (FitQuality, 'STIPPLE_FIT_'),
+    'StippleSplatQuantity': (SplatQuantity, 'STIPPLE_QUANTITY_'),
     'StippleFitBackground': (FitBackground, 'STIPPLE_FIT_BACKGROUND_'),
 }
 

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from .. import version
 from ..jobs import JobOperator
-from ..scene import fit_proposal, fit_reports, fitting, sources, splat_data, sync
+from ..scene import fit_proposal, fit_reports, fitting, overlays, sources, splat_data, sync
 
 _PREVIEW_SECONDS = 1.5
 
@@ -89,7 +89,7 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
         if time.monotonic() - self._shown_at < _PREVIEW_SECONDS:
             return
         self._shown_at = time.monotonic()
-        splats = self._job.preview()
+        splats = self._job.preview(overlays.shows_contributions(context.scene))
         if splats is None:
             return
         obj = bpy.data.objects.get(self._preview) if self._preview else None

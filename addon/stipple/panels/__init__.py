@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing only."""
 
-from . import data, fit, menus, render, sequence
+from . import data, fit, menus, overlay, render, sequence
 
-classes = data.classes + sequence.classes + render.classes + fit.classes + menus.classes
+classes = data.classes + sequence.classes + render.classes + fit.classes + overlay.classes + menus.classes
 
 
 def register():

@@ -82,8 +82,10 @@ class FitTask(ViewTask):
         state.is_running = False
         state.problem = '' if error is None else str(error)
 
-    def preview(self):
-        """The splats as they are now (SplatArrays), or None."""
+    def preview(self, with_contributions=False):
+        """The splats as they are now (SplatArrays), or None. with_contributions: the next one tells them."""
+        if self.job is not None:
+            self.job.watch_contributions(with_contributions)
         cloud = None if self.job is None else self.job.preview()
         return None if cloud is None else cloud.read()
 
@@ -137,16 +139,19 @@ class FitTask(ViewTask):
             decoding = DecodeSettings(info.most_anchors, info.gaussians_per_anchor, seed=settings.seed)
             self._keep(made, decoding, 'MODEL', report)
             return
+        seen = made.seen()
         made = cloud_edit.merge([(made, np.eye(4))], self._frame)  # the same splats, with the label of their frame
         job = Model.from_cloud_start(self._native, made, seed=settings.seed)
         yield from self._until_done(job, _FIT_END, 1.0)
-        self._keep(job.model(), DecodeSettings(made.info().count), 'TREE', report)
+        self._keep(job.model(), DecodeSettings(made.info().count), 'TREE', report, seen)
 
-    def _keep(self, model, decoding, kind, report):
+    def _keep(self, model, decoding, kind, report, seen=None):
+        """seen: of the splats at these settings."""
         path = sources.save_model(model, self._path or sources.model_path_for(state.name), bool(self._path))
         sources.remember_model(path, model)
         self.result = Result(state.name, model.decode(decoding).read(), path, decoding, kind, model.info(),
                              report)
+        self.result.splats.seen = seen or {}
         state.kept_count = self.result.splats.count
 
 

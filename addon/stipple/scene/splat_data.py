@@ -4,7 +4,8 @@
 5.2 and later: a point cloud with the attributes of Blender's own splats. Before: a mesh of vertices
 with the same names. `rotation` is w,x,y,z; `radiance:base` holds the DC harmonics and the opacity;
 `radiance:sh_<i>` the other coefficients, one colour each. Under a grade these are what is shown, and
-`ungraded:base` and `ungraded:sh_<i>` keep the colours and opacities as they were.
+`ungraded:base` and `ungraded:sh_<i>` keep the colours and opacities as they were. `seen:score`,
+`seen:age` and `seen:contribution` are what density control saw of the splats that it made.
 """
 
 import zlib
@@ -16,7 +17,7 @@ import numpy as np
 from .. import version
 from ..binding.cloud import Cloud, SplatArrays, sh_degree_of
 from ..binding.errors import StippleError
-from ..binding.structs import Antialias, ColourSpace, Frame, Status
+from ..binding.structs import Antialias, ColourSpace, Frame, SplatQuantity, Status
 
 LAYOUT_KEY = 'stipple_layout'
 LAYOUT = 1
@@ -25,6 +26,10 @@ ANTIALIAS_KEY = 'stipple_antialias'
 FRAME_KEY = 'stipple_frame'
 _COLOUR_SPACES = {ColourSpace.DISPLAY: 'srgb_rec709_display', ColourSpace.LINEAR: 'lin_rec709_display'}
 _ANTIALIAS = {Antialias.CLASSIC: 'classic', Antialias.MIP: 'mip'}
+# Attributes of what density control saw.
+SEEN_NAMES = {SplatQuantity.SCORE: 'seen:score', SplatQuantity.AGE: 'seen:age',
+              SplatQuantity.CONTRIBUTION: 'seen:contribution'}
+SEEN_SOURCE_KEY = 'stipple_seen_source'
 # Smallest scale that is stored, metres: viewers take logarithms, of which zero has none.
 MIN_SCALE = 1e-9
 
@@ -96,6 +101,7 @@ def write(data, splats, ungraded=None):
     _set(data, 'rotation', version.ROTATION_TYPE, splats.column('rotations'))
     _write_colours(data, 'radiance', splats)
     _write_colours(data, 'ungraded', ungraded)
+    _write_seen(data, (splats if ungraded is None else ungraded).seen)
     _mark(data, splats)
 
 
@@ -112,6 +118,43 @@ def _write_colours(data, prefix, splats):
     for name in [a.name for a in data.attributes if a.name.startswith(f'{prefix}:sh_')]:
         if int(name.rpartition('_')[2]) >= rest:
             data.attributes.remove(data.attributes[name])
+
+
+def _write_seen(data, seen):
+    for kind, name in SEEN_NAMES.items():
+        if kind in seen:
+            _set(data, name, 'FLOAT', seen[kind])
+        elif name in data.attributes:
+            data.attributes.remove(data.attributes[name])
+
+
+def read_seen(data, kind):
+    """[N] what density control saw of the splats of a datablock (SplatQuantity), None where it is not known."""
+    attribute = data.attributes.get(SEEN_NAMES[kind])
+    if attribute is None or attribute.data_type != 'FLOAT' or attribute.domain != 'POINT':
+        return None
+    return np.array(version.attribute_values(attribute.data, 'value', count(data), 1), np.float32)
+
+
+def keep_seen(data, source, seen):
+    """Keeps what was seen of all splats of a source, for when its whole budget is shown again."""
+    for kind, name in SEEN_NAMES.items():
+        if kind in seen:
+            data[f'stipple_{name}'] = np.ascontiguousarray(seen[kind], np.float32).tobytes()
+        else:
+            data.pop(f'stipple_{name}', None)
+    data[SEEN_SOURCE_KEY] = source
+
+
+def kept_seen(data, source, count):
+    """What keep_seen() kept of a source of `count` splats."""
+    found = {}
+    if data.get(SEEN_SOURCE_KEY) == source:
+        for kind, name in SEEN_NAMES.items():
+            values = np.frombuffer(data.get(f'stipple_{name}', b''), np.float32)
+            if len(values) == count:
+                found[kind] = values
+    return found
 
 
 def _is_editable(data):
@@ -180,7 +223,12 @@ def _read(data, original, prefix):
         sh[:, i + 1] = values.reshape(n, 3)
     return SplatArrays(columns['positions'].reshape(n, 3).copy(), columns['rotations'].reshape(n, 4).copy(),
                        columns['scales'].reshape(n, 3).copy(), base[:, 3].copy(), sh,
-                       *_marks(data if original is None else original))
+                       *_marks(data if original is None else original), _seen(data))
+
+
+def _seen(data):
+    found = {kind: read_seen(data, kind) for kind in SEEN_NAMES}
+    return {kind: values for kind, values in found.items() if values is not None}
 
 
 def _cloud(native, data, original, prefix):

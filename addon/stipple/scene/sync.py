@@ -88,7 +88,10 @@ def _wanted(data, depsgraph, mode, most):
 def _decoded(data, settings):
     settings.check()
     sources.check_unchanged(data)
-    return sources.decode_data(data, settings).columns()
+    made = sources.decode_data(data, settings).columns()
+    if not masks.key(data):
+        made.seen = splat_data.kept_seen(data, data.stipple.source, made.count)
+    return made
 
 
 def regrade(data, grade):
@@ -111,6 +114,7 @@ def write(data, splats, key, grade=None):
 
 def write_decoded(data, splats):
     """Stores splats that were decoded with the present settings."""
+    splat_data.keep_seen(data, data.stipple.source, splats.seen)
     write(data, splats, written_key(data, sources.decode_settings(data.stipple)))
 
 

@@ -72,7 +72,7 @@ def gather(depsgraph):
             key = (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
             found.append(ViewedSplats(key, owner, original, _state_of(obj, original, count), count,
                                       version.copy_of_evaluated_matrix(entry.matrix_world)))
-    shown = {_cloud_key(entry.obj) for entry in found}
+    shown = {cloud_key(entry.obj) for entry in found}
     for key in [key for key in _clouds if key not in shown]:
         del _clouds[key]
     return Viewed(tuple(found), frozenset(others))
@@ -134,7 +134,7 @@ def is_edited(data):
 
 
 def _stored(obj, original, state):
-    key = _cloud_key(original)
+    key = cloud_key(original)
     known = _clouds.get(key)
     if known is None or known[0] != state:
         cloud = sources.cloud_from_object(obj)
@@ -142,7 +142,8 @@ def _stored(obj, original, state):
     return known[1], known[2]
 
 
-def _cloud_key(original):
+def cloud_key(original):
+    """What the splats of an object are kept under."""
     return original.data.name_full, original.name_full if len(original.modifiers) else ''
 
 

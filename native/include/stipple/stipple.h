@@ -1433,6 +1433,9 @@ StippleStatus stipple_fit_note(const StippleJob* job, uint64_t index, const char
 /* The splats as they are now, for looking at while the job runs. Never waits: gives the newest copy, and asks the
  * job for another after the step that it is at. Out: cloud, NULL where there is none yet. */
 StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud);
+/* Whether previews tell what each splat contributes (stipple_cloud_quantity): 1, or 0, as a fit begins. It then draws
+ * 8 views for every preview; steps are the same either way. */
+StippleStatus stipple_fit_watch_contributions(StippleJob* job, uint32_t watched);
 /* The result of a job that has ended, however it ended: the state that did best on held-out views, decoded at a
  * budget (anchors of a field; 0: the largest; explicit splats have one size). INVALID_ARGUMENT where no step was
  * taken. */
@@ -1450,6 +1453,24 @@ StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_ut
  * Threads and determinism: the same bits everywhere. Cost: about 0.1 s at scale 2. */
 StippleStatus stipple_fit_report_draw(const StippleJob* job, double scale, uint64_t capacity, float* pixels,
                                       uint32_t* width, uint32_t* height);
+
+/* What can be shown of each splat, to look at density control. */
+typedef enum StippleSplatQuantity {
+  STIPPLE_QUANTITY_SCORE = 0,       /* [N] how much it asked to multiply at the last event, in the strategy's units: most
+                                       count in thresholds, where 1 multiplies */
+  STIPPLE_QUANTITY_AGE = 1,         /* [N] iterations since it was made; of densified clouds, events */
+  STIPPLE_QUANTITY_SPLIT_AXIS = 2,  /* [N,3] the longest axis, in the cloud's frame, times 1 - second axis / longest: 0
+                                       for a round splat, length 1 for a needle */
+  STIPPLE_QUANTITY_CONTRIBUTION = 3 /* [N] pixels that it fills: blending weights, summed; mean of up to 16 views, 8
+                                       in previews */
+} StippleSplatQuantity;
+/* Reads what is known of each splat of a preview or the result of a fit, or of a densified cloud; the split axis of
+ * any cloud.
+ * In: quantity StippleSplatQuantity; capacity, floats of values. Out: values, or NULL: only the number is wanted;
+ * count, floats: 0 where nothing of the kind is known, as of clouds from elsewhere and of fields, which no strategy
+ * gives scores or ages. Errors: BUFFER_TOO_SMALL, with count set. The same bits for any number of threads. */
+StippleStatus stipple_cloud_quantity(const StippleCloud* cloud, uint32_t quantity, uint64_t capacity, float* values,
+                                     uint64_t* count);
 
 /* A way of adding and removing splats, or a part of one. The texts live as long as the library. */
 typedef struct StippleStrategyInfo {

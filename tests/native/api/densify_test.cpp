@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -68,6 +69,40 @@ TEST_F(DensifyTest, SplitsWhatThePicturesPullAt) {
   EXPECT_GT(once.size(), 2 * kNumbers);
   EXPECT_LE(once.size(), 10 * kNumbers);
   for (const float value : once) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST_F(DensifyTest, TellsWhichSplatsAreNewAndWhatTheyContribute) {
+  options_.max_splats = 10;
+  options_.event_count = 3;
+  StippleJob* job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_densify_start(context_, cloud_, views_, &options_, &job));
+  STIPPLE_ASSERT_OK(stipple_job_wait(job));
+  StippleCloud* made = nullptr;
+  STIPPLE_ASSERT_OK(stipple_job_cloud(job, &made));
+  stipple_job_free(job);
+  auto info = sized<StippleCloudInfo>();
+  STIPPLE_ASSERT_OK(stipple_cloud_info(made, &info));
+  std::vector<float> values(info.count);
+  uint64_t count = 0;
+  for (const StippleSplatQuantity quantity :
+       {STIPPLE_QUANTITY_AGE, STIPPLE_QUANTITY_SCORE, STIPPLE_QUANTITY_CONTRIBUTION}) {
+    STIPPLE_ASSERT_OK(stipple_cloud_quantity(made, quantity, values.size(), values.data(), &count));
+    ASSERT_EQ(count, info.count);
+    if (quantity != STIPPLE_QUANTITY_AGE) continue;
+    // New splats come last.
+    EXPECT_EQ(values.back(), 0);
+    EXPECT_LE(*std::max_element(values.begin(), values.end()), 3);
+    EXPECT_TRUE(std::is_sorted(values.rbegin(), values.rend()));
+  }
+  EXPECT_GT(*std::max_element(values.begin(), values.end()), 1);
+  stipple_cloud_free(made);
+  // A cloud from elsewhere tells its axes alone.
+  STIPPLE_ASSERT_OK(stipple_cloud_quantity(cloud_, STIPPLE_QUANTITY_AGE, 0, nullptr, &count));
+  EXPECT_EQ(count, 0u);
+  float axis[3];
+  STIPPLE_ASSERT_OK(stipple_cloud_quantity(cloud_, STIPPLE_QUANTITY_SPLIT_AXIS, 3, axis, &count));
+  EXPECT_EQ(count, 3u);
+  EXPECT_NEAR(axis[0], 1 - 0.2 / 0.3, 1e-6);  // stored scales have 24 bits
 }
 
 TEST_F(DensifyTest, GivesTheSameBitsForAnyThreads) {

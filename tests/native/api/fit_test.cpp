@@ -113,6 +113,79 @@ TEST_F(FitTest, ACancelKeepsTheBestAndAPreviewIsThere) {
   stipple_job_free(job);
 }
 
+/// What is known of each splat of a cloud.
+std::vector<float> quantityOf(const StippleCloud* cloud, StippleSplatQuantity quantity) {
+  uint64_t count = 0;
+  STIPPLE_EXPECT_OK(stipple_cloud_quantity(cloud, quantity, 0, nullptr, &count));
+  std::vector<float> values(count);
+  STIPPLE_EXPECT_OK(stipple_cloud_quantity(cloud, quantity, count, values.data(), &count));
+  return values;
+}
+
+TEST_F(FitTest, TellsWhatDensityControlSawOfTheResult) {
+  options_.iterations = 300;
+  StippleJob* job = start();
+  STIPPLE_ASSERT_OK(stipple_job_wait(job));
+  StippleCloud* cloud = nullptr;
+  STIPPLE_ASSERT_OK(stipple_fit_cloud(job, 0, &cloud));
+  auto info = sized<StippleCloudInfo>();
+  STIPPLE_ASSERT_OK(stipple_cloud_info(cloud, &info));
+  const std::vector<float> ages = quantityOf(cloud, STIPPLE_QUANTITY_AGE);
+  ASSERT_EQ(ages.size(), info.count);
+  const float oldest = *std::max_element(ages.begin(), ages.end());
+  EXPECT_GT(oldest, 0);
+  EXPECT_LT(oldest, 300);
+  EXPECT_GE(*std::min_element(ages.begin(), ages.end()), 0);
+  EXPECT_EQ(quantityOf(cloud, STIPPLE_QUANTITY_SCORE).size(), info.count);
+  EXPECT_EQ(quantityOf(cloud, STIPPLE_QUANTITY_SPLIT_AXIS).size(), 3 * info.count);
+  // No view has more than all its pixels, which splats and what is behind them share.
+  const std::vector<float> pixels = quantityOf(cloud, STIPPLE_QUANTITY_CONTRIBUTION);
+  ASSERT_EQ(pixels.size(), info.count);
+  double sum = 0;
+  for (const float one : pixels) sum += static_cast<double>(one);
+  EXPECT_GT(sum, 1);
+  EXPECT_LT(sum, 1.0001 * 64 * 48);  // sums of floats
+  uint64_t count = 0;
+  float value = -1;
+  expectRefused(stipple_cloud_quantity(cloud, STIPPLE_QUANTITY_AGE, info.count - 1, &value, &count),
+                STIPPLE_ERROR_BUFFER_TOO_SMALL, "floats; ");
+  EXPECT_EQ(count, info.count);
+  EXPECT_EQ(value, -1);
+  expectRefused(stipple_cloud_quantity(cloud, 4, 0, nullptr, &count),
+                STIPPLE_ERROR_INVALID_ARGUMENT, "quantity is 4");
+  stipple_cloud_free(cloud);
+  stipple_job_free(job);
+}
+
+TEST_F(FitTest, PreviewsTellContributionsWhereTheyAreWatched) {
+  options_.iterations = 1000000;
+  StippleJob* job = start();
+  expectRefused(stipple_fit_watch_contributions(job, 2), STIPPLE_ERROR_INVALID_ARGUMENT, "watched");
+  const auto preview = [&] {
+    StippleCloud* cloud = nullptr;
+    for (int i = 0; i < 20000 && !cloud; ++i) {
+      STIPPLE_EXPECT_OK(stipple_fit_preview(job, &cloud));
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return cloud;
+  };
+  StippleCloud* cloud = preview();
+  ASSERT_NE(cloud, nullptr);
+  EXPECT_FALSE(quantityOf(cloud, STIPPLE_QUANTITY_AGE).empty());
+  EXPECT_TRUE(quantityOf(cloud, STIPPLE_QUANTITY_CONTRIBUTION).empty());
+  stipple_cloud_free(cloud);
+  STIPPLE_ASSERT_OK(stipple_fit_watch_contributions(job, 1));
+  std::vector<float> pixels;
+  for (int i = 0; i < 2000 && pixels.empty(); ++i) {
+    cloud = preview();
+    pixels = quantityOf(cloud, STIPPLE_QUANTITY_CONTRIBUTION);
+    stipple_cloud_free(cloud);
+  }
+  EXPECT_FALSE(pixels.empty());
+  STIPPLE_ASSERT_OK(stipple_job_cancel(job));
+  stipple_job_free(job);
+}
+
 TEST_F(FitTest, ResumesBitForBit) {
   options_.iterations = 40;
   StippleJob* whole = start();

@@ -103,8 +103,7 @@ TEST(Direction, CoherenceIsTakenWithinViews) {
   strategy->observe(at(1), Seen({2.4e-4f}, {2.4e-4f}).statistics());
   strategy->observe(at(2), Seen({-2.4e-4f}, {2.4e-4f}).statistics());
   EXPECT_EQ(editAt(*strategy, at(600), splatsOf({{kLarge, 0.5f}}))->append.size(), 0u);
-  EXPECT_NEAR(strategy->seen(SplatQuantity::kScore, splatsOf({{kLarge, 0.5f}}))[0], 1.2 * 0.8,
-              1e-5);
+  EXPECT_NEAR(strategy->seen(splatsOf({{kLarge, 0.5f}}).size()).score[0], 1.2 * 0.8, 1e-5);
 }
 
 TEST(Direction, HardInputsChangeNothing) {

@@ -151,7 +151,7 @@ TEST(EdgeAwareScore, ViewsWeighTheSame) {
   const auto edit = editAt(*strategy, at(600, 3), splats);
   EXPECT_EQ(edit->append.size(), 0u);
   // Over the means of what is positive: 4, 0.002 and 6.
-  const std::vector<float> seen = strategy->seen(SplatQuantity::kScore, splats);
+  const std::vector<float> seen = strategy->seen(splats.size()).score;
   ASSERT_EQ(seen.size(), 3u);
   EXPECT_NEAR(seen[0], 0.5f + 0.5f, 1e-6f);
   EXPECT_NEAR(seen[1], 1.5f + 1.5f + 4.0f / 6, 1e-6f);
@@ -245,7 +245,7 @@ TEST(EdgeAwareScore, EveryViewCountsAfterARecovery) {
   EXPECT_THAT(views.drawn, ElementsAre(0, 2, 4));
   const RawSplats splats = splatsOf(std::vector<Kind>(3, {0.005f, 0.5f}));
   editAt(*strategy, at(3400, 3), splats);
-  EXPECT_THAT(strategy->seen(SplatQuantity::kScore, splats), ElementsAre(2, 3, 0));
+  EXPECT_THAT(strategy->seen(splats.size()).score, ElementsAre(2, 3, 0));
 }
 
 TEST(EdgeAwareScore, GoesOnFromItsStateInTheMiddleOfItsViews) {
@@ -283,7 +283,7 @@ TEST(EdgeAwareScore, ScoresFollowSplatsThatGoBetweenItsViews) {
   ASSERT_EQ(3663 % 111, 0);
   const auto edit = editAt(*strategy, moment, splats);
   ASSERT_EQ(edit->countAfter(10), 8u + 8u);
-  EXPECT_EQ(strategy->seen(SplatQuantity::kScore, after(*edit, splats)).size(), 16u);
+  EXPECT_EQ(strategy->seen(after(*edit, splats).size()).score.size(), 16u);
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ TEST(Mcmc, EventsKeepTheCompositeOfEverySplat) {
     // Logits in float32: 1e-7 times the number of copies.
     EXPECT_NEAR(1 - clear, opacityOf(splats.logits[i]), 1e-6);
   }
-  const std::vector<float> draws = strategy->seen(SplatQuantity::kScore, now.splats);
+  const std::vector<float> draws = strategy->seen(now.splats.size()).score;
   ASSERT_EQ(draws.size(), 525u);
   EXPECT_EQ(std::accumulate(draws.begin(), draws.end(), 0.0f), 25.0f);
 }
@@ -213,8 +213,8 @@ TEST(Mcmc, StateComesBackBitForBit) {
   const auto a = editAt(*strategy, publishedMoment(700), splats);
   const auto b = editAt(*other, publishedMoment(700), splats);
   EXPECT_TRUE(areSame(moved(*a, splats).splats, moved(*b, splats).splats));
-  EXPECT_EQ(strategy->seen(SplatQuantity::kAge, moved(*a, splats).splats),
-            other->seen(SplatQuantity::kAge, moved(*b, splats).splats));
+  EXPECT_EQ(strategy->seen(moved(*a, splats).splats.size()).age,
+            other->seen(moved(*b, splats).splats.size()).age);
 }
 
 TEST(Mcmc, RefusesSettingsThatItDoesNotHave) {

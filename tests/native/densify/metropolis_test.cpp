@@ -69,7 +69,7 @@ TEST(Metropolis, SplatsAreBornWherePicturesAreWrong) {
   const auto edit = eventOf(*strategy, publishedMoment(600), splats, views);
   const Edited now = moved(*edit, splats);
   EXPECT_THAT(views.drawn, ElementsAre(0));  // 1 - 100/14500 of two views
-  const std::vector<float> score = strategy->seen(SplatQuantity::kScore, now.splats);
+  const std::vector<float> score = strategy->seen(now.splats.size()).score;
   ASSERT_EQ(score.size(), now.splats.size());
   size_t left = 0;
   for (size_t i = kCount; i < now.splats.size(); ++i) {
@@ -211,7 +211,7 @@ TEST(Metropolis, ReleasedReadsPixelsAtTheWorldsPlaces) {
   views.views[0].camera.world_to_camera(2, 3) = -100;
   const auto strategy = makeStrategy("metropolis(released=1,coarse=0,fine=0)");
   eventOf(*strategy, publishedMoment(600), splats, views);
-  const std::vector<float> score = strategy->seen(SplatQuantity::kScore, splats);
+  const std::vector<float> score = strategy->seen(splats.size()).score;
   ASSERT_EQ(score.size(), 2000u);
   // World x from 0 to 1 is the width, wrong left of 0.5. Away from that edge and from the border of
   // the picture, splats of one side read the same.

@@ -28,7 +28,11 @@ class Listener : public FitObserver {
   }
   void note(const std::string& text) override { notes.push_back(text); }
   bool wantsPreview() override { return preview_at == all.size(); }
-  void preview(SplatCloud cloud) override { previews.push_back(std::move(cloud)); }
+  bool wantsContributions() override { return wants_contributions; }
+  void preview(SplatCloud cloud, SplatQuantities seen) override {
+    previews.push_back(std::move(cloud));
+    seen_in_preview = std::move(seen);
+  }
   void save(const TensorTable& table) override {
     if (disk_is_full) fail(ErrorCode::kIo, "a.safetensors cannot be written: No space left");
     saved.push_back(table);
@@ -37,6 +41,8 @@ class Listener : public FitObserver {
   std::vector<FitFigures> all;
   std::vector<std::string> notes;
   std::vector<SplatCloud> previews;
+  SplatQuantities seen_in_preview;
+  bool wants_contributions = false;
   std::vector<TensorTable> saved;
   Progress progress;
   uint64_t cancel_at = UINT64_MAX;

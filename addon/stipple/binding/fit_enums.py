@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Enumerations of stipple.h that fits and density control have; structs.py hands them out with all others."""
+
+from enum import IntEnum
+
+
+class FitModel(IntEnum):
+    EXPLICIT = 0
+    FIELD = 1
+
+
+class FitQuality(IntEnum):
+    FAST = 0
+    BALANCED = 1
+    FINE_DETAIL = 2
+
+
+class FitBackground(IntEnum):
+    BLACK = 0
+    WHITE = 1
+    RANDOM = 2
+
+
+class SplatQuantity(IntEnum):
+    SCORE = 0
+    AGE = 1
+    SPLIT_AXIS = 2
+    CONTRIBUTION = 3
