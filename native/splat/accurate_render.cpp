@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "math/empty_depth.h"
+#include "splat/cpu/ray_tiles.h"
 #include "splat/surface.h"
 
 namespace stipple {
@@ -175,7 +176,7 @@ bool isTiled(const RenderAccuracy& accuracy) {
 }
 
 bool isSlow(const RenderAccuracy& accuracy) {
-  return accuracy.samples_per_side == 1 && !isTiled(accuracy);
+  return accuracy.samples_per_side == 1 && accuracy.precision == Precision::kDouble;
 }
 
 RayOptions rayOptions(const RenderAccuracy& accuracy) {
@@ -207,6 +208,8 @@ void renderAccurate(std::span<const SplatInstance> instances, const Camera& came
     Averaging(large, n, camera, result).run();
   } else if (isTiled(accuracy)) {
     renderTiled(instances, camera, options, workspace, result, progress);
+  } else if (accuracy.precision == Precision::kFloat) {
+    result = renderRayTiles(instances, camera, options, rayOptions(accuracy), progress);
   } else {
     result = renderRays(instances, camera, options, rayOptions(accuracy), progress);
   }
@@ -219,7 +222,9 @@ RenderMemory accurateMemory(std::span<const SplatInstance> instances, const Came
   const uint32_t n = accuracy.samples_per_side;
   const Camera large = n > 1 ? enlarged(camera, n) : camera;
   RenderMemory memory = isTiled(accuracy) ? renderMemory(instances, large, options)
-                                          : rayMemory(instances, large, options);
+                        : accuracy.precision == Precision::kFloat
+                            ? rayTileMemory(instances, large, options)
+                            : rayMemory(instances, large, options);
   if (n > 1) {
     memory.result_bytes += renderMemory({}, camera, options).result_bytes;
     const uint64_t pixels = static_cast<uint64_t>(large.width) * large.height;
