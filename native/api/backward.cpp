@@ -192,6 +192,7 @@ StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer,
     requireDerivative(settings, placed);
     const Camera view = cameraFrom(camera);
     validate(view);
+    requireImagePlane(view, "the backward pass");
     Buffers buffers = buffersFrom(gradients, placed);
     const BackwardInput given = inputFrom(input, buffers, view);
     if (result) complete(result, "result");
@@ -220,6 +221,7 @@ StippleStatus stipple_renderer_backward_memory_bound(const StippleRenderer* rend
     const Instances placed = instancesFrom(instances, count);
     const Camera view = cameraFrom(camera);
     validate(view);
+    requireImagePlane(view, "the backward pass");
     const Buffers buffers = buffersFrom(gradients, placed);
     *bytes = backwardMemoryBound(placed.list, view, {}, inputFrom(input, buffers, view));
   });

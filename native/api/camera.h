@@ -17,7 +17,7 @@ std::string sizeText(const Camera& camera);
 /// The other way round; struct_size is left to the caller.
 StippleCamera cameraTo(const Camera& camera);
 
-/// "PINHOLE" or "ORTHOGRAPHIC".
+/// As transforms.json has it: "PINHOLE", "ORTHOGRAPHIC", "EQUIRECTANGULAR", ...
 const char* modelName(const Camera& camera);
 
 /// Refuses the number of a view that is not there.

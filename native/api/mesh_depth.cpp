@@ -54,6 +54,7 @@ StippleStatus stipple_mesh_depth_start(StippleContext* context,
     PlacedMeshes placed = meshesFrom(instances, count);
     const Camera view = cameraFrom(camera);
     validate(view);
+    requireImagePlane(view, "the depth of meshes");
     context->state->requireMemory(meshDepthMemoryBound(placed.list), "the depth of meshes");
     *job = startJob(context->state, [placed = std::move(placed), view, depth](Progress& progress) {
       const size_t pixel_count = static_cast<size_t>(view.width) * view.height;

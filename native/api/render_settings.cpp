@@ -34,6 +34,37 @@ void takeAccuracy(const StippleAccuracy& given, RenderSettings& settings) {
   settings.has_accuracy = true;
 }
 
+Sampling samplingFrom(const StippleRenderOptions& given, const Instances& instances) {
+  Sampling sampling;
+  sampling.samples = given.samples;
+  if (given.lens) {
+    const StippleLens lens = complete(given.lens, "options->lens");
+    sampling.aperture = {lens.aperture_radius, lens.focus_distance, lens.blades, lens.rotation,
+                         lens.ratio == 0 ? 1.0 : lens.ratio};
+  }
+  if (given.shutter) {
+    const StippleShutter shutter = complete(given.shutter, "options->shutter");
+    Shutter& made = sampling.shutter;
+    made.step_count = shutter.step_count;
+    if (made.step_count < 2 || made.step_count > kMaxShutterSteps) {
+      fail(ErrorCode::kInvalidArgument, "options->shutter->step_count is " +
+                                            std::to_string(made.step_count) +
+                                            "; 2 to 1025 is allowed");
+    }
+    const auto take = [](const double* matrices, size_t count, std::vector<Mat4d>& out) {
+      if (!matrices) return;
+      for (size_t i = 0; i < count; ++i) {
+        out.push_back(Eigen::Map<const Mat4d>(matrices + i * 16));
+      }
+    };
+    take(shutter.cameras, made.step_count, made.camera);
+    take(shutter.instances, made.step_count * instances.list.size(), made.instances);
+    if (shutter.curve) made.curve.assign(shutter.curve, shutter.curve + shutter.curve_count);
+  }
+  validate(sampling, instances.list.size());
+  return sampling;
+}
+
 }  // namespace
 
 bool compositesInDisplaySpace(const Instances& instances, BlendSpace blend_space) {
@@ -69,6 +100,9 @@ RenderSettings renderSettings(const StippleRenderOptions* options, const Instanc
   settings.options.splats_apart = given.surface_colour != nullptr;
   settings.splat_light = given.splat_light;
   if (given.accuracy) takeAccuracy(*given.accuracy, settings);
+  settings.sampling = samplingFrom(given, instances);
+  settings.averages_light = output == STIPPLE_OUTPUT_COMPOSITED && isSampled(settings.sampling) &&
+                            compositesInDisplaySpace(instances, settings.options.blend_space);
   return settings;
 }
 

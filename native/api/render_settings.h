@@ -4,7 +4,7 @@
 
 #include "api/instances.h"
 #include "splat/accurate_render.h"
-#include "splat/render.h"
+#include "splat/sampled_render.h"
 
 namespace stipple::api {
 
@@ -16,6 +16,9 @@ struct RenderSettings {
   RenderAccuracy accuracy;             ///< of STIPPLE_RENDER_TILED
   double budget_share = 1;
   bool has_accuracy = false;
+  Sampling sampling;
+  /// Composited values are display values and stay so, but light is what pictures are averaged in.
+  bool averages_light = false;
 };
 
 /// The options of the caller in the library's own terms. NULL: defaults.

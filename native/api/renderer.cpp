@@ -16,16 +16,22 @@ using namespace stipple::api;
 
 namespace {
 
-/// Premultiplied display values → premultiplied scene linear values, in place.
-void lineariseColour(float* colour, size_t pixel_count) {
+/// Applies `curve` to the colours of premultiplied pixels, in place.
+template <typename Curve>
+void changeColour(float* colour, size_t pixel_count, const Curve& curve) {
   parallelFor(pixel_count, 1 << 14, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       float* pixel = colour + i * 4;
       const float alpha = pixel[3];
       if (alpha <= 0.0f) continue;
-      for (int c = 0; c < 3; ++c) pixel[c] = srgbToLinear(pixel[c] / alpha) * alpha;
+      for (int c = 0; c < 3; ++c) pixel[c] = curve(pixel[c] / alpha) * alpha;
     }
   });
+}
+
+/// Premultiplied display values → premultiplied scene linear values, in place.
+void lineariseColour(float* colour, size_t pixel_count) {
+  changeColour(colour, pixel_count, [](float value) { return srgbToLinear(value); });
 }
 
 template <typename From, typename To>
@@ -55,17 +61,28 @@ bool followsRays(StippleRenderMethod method) {
   return method == STIPPLE_RENDER_RAYS || method == STIPPLE_RENDER_YARDSTICK;
 }
 
+RayOptions raysOf(StippleRenderMethod method) {
+  return method == STIPPLE_RENDER_YARDSTICK ? rayYardstick() : RayOptions{};
+}
+
+/// In: is_light, whether the colours have been linearised where that was wanted.
 template <typename Result>
 void deliverPicture(const Result& picture, const RenderSettings& settings,
-                    const StippleRenderBuffers& buffers) {
+                    const StippleRenderBuffers& buffers, bool is_light = false) {
   copyTo(picture.colour, buffers.colour);
   copyTo(picture.depth, buffers.depth);
   copyTo(picture.median_depth, buffers.median_depth);
   copyTo(picture.counts, buffers.counts);
   copyTo(picture.transmittance, buffers.transmittance);
+  copyTo(picture.normal, buffers.normal);
+  copyTo(picture.objects, buffers.object_index);
   if (!buffers.colour) return;
   const size_t pixel_count = static_cast<size_t>(picture.width) * picture.height;
-  if (settings.linearise) lineariseColour(buffers.colour, pixel_count);
+  if (is_light && settings.averages_light) {
+    changeColour(buffers.colour, pixel_count, [](float value) { return linearToSrgb(value); });
+  } else if (!is_light && settings.linearise) {
+    lineariseColour(buffers.colour, pixel_count);
+  }
   if (settings.options.surface.colour || settings.splat_light) {
     finishLayers(buffers.colour, settings, picture.surface_weight, pixel_count);
   }
@@ -88,6 +105,60 @@ void renderAccurateTo(RendererMemory& memory, Instances placed, const Camera& vi
                    &progress);
     deliverPicture(result, settings, out);
   }
+}
+
+/// One of the pictures of an average.
+void drawPicture(RenderWorkspace& workspace, const RenderSettings& settings,
+                 std::span<const SplatInstance> instances, const Camera& camera,
+                 const RenderOptions& options, RenderResult& result, Progress* progress) {
+  if (followsRays(settings.method)) {
+    result = renderRays(instances, camera, options, raysOf(settings.method), progress);
+  } else if (settings.method == STIPPLE_RENDER_REFERENCE) {
+    const ReferenceResult drawn = renderReference(instances, camera, options, progress);
+    result.width = drawn.width;
+    result.height = drawn.height;
+    const auto take = [](const auto& from, auto& to) {
+      to.resize(from.size());
+      copyTo(from, to.data());
+    };
+    take(drawn.colour, result.colour);
+    take(drawn.depth, result.depth);
+    take(drawn.median_depth, result.median_depth);
+    take(drawn.counts, result.counts);
+    take(drawn.surface_weight, result.surface_weight);
+    take(drawn.transmittance, result.transmittance);
+    take(drawn.normal, result.normal);
+    take(drawn.objects, result.objects);
+  } else {
+    renderAccurate(instances, camera, options, settings.accuracy, workspace, result, progress);
+  }
+}
+
+void renderSampledTo(RendererMemory& memory, Instances placed, const Camera& view,
+                     const RenderSettings& settings, const StippleRenderBuffers& out,
+                     Progress& progress) {
+  memory.cuts.cut(placed, settings.budget_share, &progress);
+  // Another job of the same renderer may be using its memory.
+  const std::unique_lock<std::mutex> lock(memory.mutex, std::try_to_lock);
+  RenderWorkspace own;
+  RenderWorkspace& workspace = lock.owns_lock() ? memory.workspace : own;
+  const DrawMoment draw = [&](std::span<const SplatInstance> instances, const Camera& camera,
+                              const RenderOptions& options, RenderResult& result,
+                              Progress* listener) {
+    drawPicture(workspace, settings, instances, camera, options, result, listener);
+    if (settings.linearise || settings.averages_light) {
+      lineariseColour(result.colour.data(), result.colour.size() / 4);
+    }
+  };
+  RenderResult result;
+  renderSampled(placed.list, view, settings.options, settings.sampling, draw, result, &progress);
+  deliverPicture(result, settings, out, true);
+}
+
+uint64_t sampledMemory(const Instances& placed, const Camera& view,
+                       const RenderSettings& settings) {
+  if (!isSampled(settings.sampling)) return 0;
+  return renderSampledBytes(placed.list.size(), view, settings.options, settings.sampling);
 }
 
 }  // namespace
@@ -125,6 +196,11 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     RenderSettings settings = renderSettings(options, placed);
     const Camera view = cameraFrom(camera);
     validate(view);
+    const bool is_tiled = settings.method == STIPPLE_RENDER_TILED;
+    const bool is_exact = is_tiled && settings.accuracy.projection == RayProjection::kRay;
+    if (!followsRays(settings.method) && !is_exact) {
+      requireImagePlane(view, "the affine projection of splats");
+    }
     validateLayers(settings, view);
     const StippleRenderBuffers out =
         completeUpTo(buffers, offsetof(StippleRenderBuffers, transmittance), "buffers");
@@ -132,23 +208,27 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     settings.options.with_median_depth = out.median_depth != nullptr;
     settings.options.with_counts = out.counts != nullptr;
     settings.options.with_transmittance = out.transmittance != nullptr;
+    settings.options.with_normal = out.normal != nullptr;
+    settings.options.with_objects = out.object_index != nullptr;
     const RenderMemory memory =
         followsRays(settings.method)
             ? rayMemory(placed.list, view, settings.options)
             : accurateMemory(placed.list, view, settings.options, settings.accuracy);
-    const uint64_t bytes = memory.sum() + CloudCuts::memoryBound(placed, settings.budget_share);
+    const uint64_t bytes = memory.sum() + CloudCuts::memoryBound(placed, settings.budget_share) +
+                           sampledMemory(placed, view, settings);
     renderer->context->requirePictureMemory(bytes, "this picture of " + sizeText(view),
                                             memory.pair_bytes);
     *job = startJob(renderer->context, [memory = renderer->memory, placed = std::move(placed),
                                         settings, view, out](Progress& progress) {
-      if (settings.method == STIPPLE_RENDER_REFERENCE) {
+      if (isSampled(settings.sampling)) {
+        renderSampledTo(*memory, placed, view, settings, out, progress);
+      } else if (settings.method == STIPPLE_RENDER_REFERENCE) {
         deliverPicture(renderReference(placed.list, view, settings.options, &progress), settings,
                        out);
       } else if (followsRays(settings.method)) {
-        const bool is_yardstick = settings.method == STIPPLE_RENDER_YARDSTICK;
-        deliverPicture(renderRays(placed.list, view, settings.options,
-                                  is_yardstick ? rayYardstick() : RayOptions{}, &progress),
-                       settings, out);
+        deliverPicture(
+            renderRays(placed.list, view, settings.options, raysOf(settings.method), &progress),
+            settings, out);
       } else {
         renderAccurateTo(*memory, placed, view, settings, out, progress);
       }

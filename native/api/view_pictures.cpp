@@ -152,6 +152,7 @@ StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera
     // Before the arrays are made: an absurd size is refused as such.
     try {
       validate(seen_by);
+      requireImagePlane(seen_by, "fitting");
     } catch (const Error& error) {
       fail(error.code(), name + ": " + error.what());
     }

@@ -1,3 +1,5 @@
+#include <cstddef>
+
 #include "api/camera.h"
 #include "api/guard.h"
 #include "api/handles.h"
@@ -7,9 +9,10 @@
 namespace stipple::api {
 
 Camera cameraFrom(const StippleCamera* camera) {
-  const StippleCamera given = complete(camera, "camera");
+  const StippleCamera given =
+      completeUpTo(camera, offsetof(StippleCamera, field_of_view), "camera");
   Camera made;
-  made.model = enumValue<CameraModel>(given.model, 1, "camera->model");
+  made.model = enumValue<CameraModel>(given.model, 4, "camera->model");
   made.width = given.width;
   made.height = given.height;
   made.fx = given.fx;
@@ -19,6 +22,7 @@ Camera cameraFrom(const StippleCamera* camera) {
   made.world_to_camera = Eigen::Map<const Mat4d>(given.world_to_camera);
   made.near_plane = given.near_plane;
   made.far_plane = given.far_plane;
+  made.field_of_view = given.field_of_view;
   return made;
 }
 
@@ -38,11 +42,24 @@ StippleCamera cameraTo(const Camera& camera) {
   Eigen::Map<Mat4d>(out.world_to_camera) = camera.world_to_camera;
   out.near_plane = camera.near_plane;
   out.far_plane = camera.far_plane;
+  out.field_of_view = camera.field_of_view;
   return out;
 }
 
 const char* modelName(const Camera& camera) {
-  return camera.model == CameraModel::kOrthographic ? "ORTHOGRAPHIC" : "PINHOLE";
+  switch (camera.model) {
+    case CameraModel::kPerspective:
+      return "PINHOLE";
+    case CameraModel::kOrthographic:
+      return "ORTHOGRAPHIC";
+    case CameraModel::kEquirectangular:
+      return "EQUIRECTANGULAR";
+    case CameraModel::kFisheyeEquidistant:
+      return "FISHEYE_EQUIDISTANT";
+    case CameraModel::kFisheyeEquisolid:
+      return "FISHEYE_EQUISOLID";
+  }
+  return "PINHOLE";
 }
 
 void requireView(const StippleViews& views, uint64_t index) {

@@ -6,7 +6,9 @@ namespace stipple {
 
 void Progress::advance(double fraction, const char* stage) {
   throwIfCancelled();
-  fraction_.store(fraction, std::memory_order_relaxed);
+  fraction_.store(part_begin_.load(std::memory_order_relaxed) +
+                      part_size_.load(std::memory_order_relaxed) * fraction,
+                  std::memory_order_relaxed);
   std::lock_guard<std::mutex> lock(mutex_);
   if (stage_ != stage) stage_ = stage;
 }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <vector>
@@ -5,6 +6,7 @@
 #include "cli/accuracy_options.h"
 #include "cli/camera_options.h"
 #include "cli/commands.h"
+#include "cli/lens_options.h"
 #include "cli/placed_clouds.h"
 #include "cli/report.h"
 
@@ -15,6 +17,8 @@ namespace {
 struct Arguments {
   std::vector<std::string> in;
   std::string out, colour, low_pass, blend = "as-trained";
+  std::string depth, normal, index;
+  LensArguments lens;
   AccuracyArguments accuracy;
   CameraArguments camera;
   std::vector<double> background;
@@ -36,22 +40,58 @@ StippleRenderOptions optionsOf(const Arguments& arguments, const StippleAccuracy
   return options;
 }
 
+/// One more buffer of the picture, and the file that it goes to.
+class Pass {
+ public:
+  Pass(const std::string& path, const StippleCamera& camera, uint32_t channels)
+      : path_(path), width_(camera.width), height_(camera.height), channels_(channels) {
+    if (path.empty()) return;
+    if (!path.ends_with(".exr")) {
+      throw Failure("'" + path + "' cannot hold distances or numbers; .exr is expected");
+    }
+    pixels_.resize(size_t{width_} * height_ * channels);
+  }
+
+  float* pixels() { return path_.empty() ? nullptr : pixels_.data(); }
+
+  void save(const Context& context) const {
+    if (path_.empty()) return;
+    const auto image = make<Image>(stipple_image_create, context.get(), width_, height_, channels_,
+                                   static_cast<uint32_t>(STIPPLE_TRANSFER_LINEAR), pixels_.data());
+    check(stipple_image_save(image.get(), path_.c_str(), 1u));
+  }
+
+ private:
+  std::string path_;
+  uint32_t width_, height_, channels_;
+  std::vector<float> pixels_;
+};
+
 void render(const Context& context, const Arguments& arguments) {
   if (fileKind(arguments.out) != FileKind::kImage) {
     throw Failure("'" + arguments.out + "' is not a picture; .png or .exr is expected");
   }
-  const StippleCamera camera = cameraOf(context, arguments.camera);
+  StippleCamera camera = cameraOf(context, arguments.camera);
+  const LensSettings lens(context, arguments.camera, arguments.lens, camera);
   const StippleAccuracy accuracy = accuracyOf(arguments.accuracy);
-  const StippleRenderOptions options = optionsOf(arguments, accuracy);
+  StippleRenderOptions options = optionsOf(arguments, accuracy);
+  lens.putInto(options);
   const PlacedClouds clouds(context, arguments.in);
+  Pass depth(arguments.depth, camera, 1), normal(arguments.normal, camera, 3);
+  Pass index(arguments.index, camera, 1);
   std::vector<float> colour(size_t{camera.width} * camera.height * 4);
   auto buffers = sized<StippleRenderBuffers>();
   buffers.colour = colour.data();
+  buffers.depth = depth.pixels();
+  buffers.normal = normal.pixels();
+  std::vector<uint32_t> objects(index.pixels() ? size_t{camera.width} * camera.height : 0);
+  if (index.pixels()) buffers.object_index = objects.data();
   const auto renderer = make<Renderer>(stipple_renderer_create, context.get());
   const auto start = std::chrono::steady_clock::now();
-  const auto job =
-      make<Job>(stipple_renderer_render_start, renderer.get(), clouds.instances(), clouds.count(),
-                &camera, &options, const_cast<const StippleRenderBuffers*>(&buffers));
+  const auto job = make<Job>(stipple_renderer_render_start, renderer.get(), clouds.instances(),
+                             clouds.count(), const_cast<const StippleCamera*>(&camera),
+                             const_cast<const StippleRenderOptions*>(&options),
+                             const_cast<const StippleRenderBuffers*>(&buffers));
   finish(job);
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -60,6 +100,9 @@ void render(const Context& context, const Arguments& arguments) {
                                  const_cast<const float*>(colour.data()));
   // A named colour keeps the values as they are; else the format decides (PNG display, EXR linear).
   check(stipple_image_save(image.get(), arguments.out.c_str(), arguments.colour.empty() ? 0u : 1u));
+  std::transform(objects.begin(), objects.end(), index.pixels(),
+                 [](uint32_t object) { return static_cast<float>(object); });
+  for (const Pass* pass : {&depth, &normal, &index}) pass->save(context);
   Report report;
   report.add("width", uint64_t{camera.width});
   report.add("height", uint64_t{camera.height});
@@ -74,6 +117,7 @@ void addRender(CLI::App& app, const Context& context) {
   CLI::App* command = app.add_subcommand("render", "A picture of splats");
   command->add_option("in", arguments->in, "Splat files, rendered together")->required();
   addCameraOptions(*command, arguments->camera);
+  addLensOptions(*command, arguments->lens);
   addAccuracyOptions(*command, arguments->accuracy);
   command
       ->add_option("--colour", arguments->colour,
@@ -89,6 +133,11 @@ void addRender(CLI::App& app, const Context& context) {
       ->add_option("--background", arguments->background,
                    "R G B, in the space of the output; default: transparent")
       ->expected(3);
+  command->add_option("--depth", arguments->depth, "Also the depths, metres, into this .exr");
+  command->add_option("--normal", arguments->normal,
+                      "Also the normals, in the world, into this .exr");
+  command->add_option("--index", arguments->index,
+                      "Also which file shows, from 1 on, 0 where none does, into this .exr");
   command->add_option("-o,--out", arguments->out, ".png or .exr")->required();
   command->callback([arguments, &context] { render(context, *arguments); });
 }

@@ -168,6 +168,7 @@ void checkCameras(const ViewSource& views, std::vector<std::string>& warnings) {
 void validateView(const Camera& camera, const ViewPicture& picture, const std::string& name) {
   try {
     validate(camera);
+    requireImagePlane(camera, "fitting");
   } catch (const Error& error) {
     fail(error.code(), name + ": " + error.what());
   }

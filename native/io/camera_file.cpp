@@ -90,18 +90,32 @@ class FrameReader {
     return static_cast<uint32_t>(*value);
   }
 
+  static std::optional<CameraModel> wideModel(const std::string& name) {
+    if (name == "EQUIRECTANGULAR") return CameraModel::kEquirectangular;
+    if (name == "FISHEYE_EQUIDISTANT") return CameraModel::kFisheyeEquidistant;
+    if (name == "FISHEYE_EQUISOLID") return CameraModel::kFisheyeEquisolid;
+    return std::nullopt;
+  }
+
   void readModel(CameraView& view) const {
     view.camera_model = text("camera_model").value_or("PINHOLE");
     const std::string& model = view.camera_model;
     bool fisheye = model == "OPENCV_FISHEYE";
-    if (model == "ORTHOGRAPHIC") {
+    if (const std::optional<CameraModel> wide = wideModel(model)) {
+      view.camera.model = *wide;
+      if (distorted_ != Distorted::kRefuse) {
+        failHere("has the camera model " + model + "; splats are not fitted to its pictures",
+                 ErrorCode::kUnsupported);
+      }
+    } else if (model == "ORTHOGRAPHIC") {
       view.camera.model = CameraModel::kOrthographic;
     } else if (!fisheye && model != "PINHOLE" && model != "SIMPLE_PINHOLE" &&
                model != "PERSPECTIVE" && model != "OPENCV" && model != "FULL_OPENCV" &&
                model != "SIMPLE_RADIAL" && model != "RADIAL") {
       failHere("has the camera model '" + model.substr(0, 60) +
-                   "'; PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE and "
-                   "ORTHOGRAPHIC are supported",
+                   "'; PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, "
+                   "ORTHOGRAPHIC, EQUIRECTANGULAR, FISHEYE_EQUIDISTANT and FISHEYE_EQUISOLID are "
+                   "supported",
                ErrorCode::kUnsupported);
     }
     const Json* flag = find("is_fisheye");
@@ -179,6 +193,10 @@ class FrameReader {
       if (!scale) failHere("is orthographic but has no 'ortho_scale'");
       camera.fx = (width > 0 ? width : 1.0) / positive("ortho_scale", *scale);
       camera.fy = camera.fx;
+    } else if (camera.model == CameraModel::kEquirectangular) {
+      // All around, whatever focal lengths say: writers do not agree on theirs.
+      camera.fx = (width > 0 ? width : 1.0) / (2 * M_PI);
+      camera.fy = (height > 0 ? height : 0.5) / M_PI;
     } else {
       const std::optional<double> fx = focal("fl_x", "camera_angle_x", width);
       // Without a size an angle over the height says nothing about the width.
@@ -187,6 +205,9 @@ class FrameReader {
       if (!fx && !fy) failHere("has neither 'fl_x' nor 'camera_angle_x'");
       camera.fx = fx ? *fx : *fy;
       camera.fy = fy ? *fy : *fx;
+    }
+    if (!hasImagePlane(camera) && camera.model != CameraModel::kEquirectangular) {
+      camera.field_of_view = number("field_of_view").value_or(0.0);
     }
     if (camera.width == 0) {
       camera.cx = camera.cy = 0.5;
@@ -265,8 +286,8 @@ ViewRole splitOfName(const std::string& path) {
 std::map<std::string, ViewRole> namedSplits(const Json& file) {
   std::map<std::string, ViewRole> splits;
   const std::pair<const char*, ViewRole> lists[] = {{"train_filenames", ViewRole::kTrain},
-                                                     {"test_filenames", ViewRole::kTest},
-                                                     {"val_filenames", ViewRole::kValidation}};
+                                                    {"test_filenames", ViewRole::kTest},
+                                                    {"val_filenames", ViewRole::kValidation}};
   for (const auto& [key, split] : lists) {
     const auto found = file.find(key);
     if (found == file.end() || !found->is_array()) continue;

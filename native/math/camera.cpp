@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <string>
 
 #include "base/error.h"
@@ -20,6 +21,42 @@ std::string shown(double value) {
   char text[32];
   std::snprintf(text, sizeof(text), "%g", value);
   return text;
+}
+
+/// A pixel more than the whole sphere: sizes are rounded.
+void requireWithin(double pixels, double per_radian, double limit, const char* side) {
+  if (pixels <= limit * per_radian + 1) return;
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  fail(ErrorCode::kInvalidArgument, std::string("the panorama is ") +
+                                        shown(pixels / per_radian * kDegrees) + " degrees " + side +
+                                        "; at most " + shown(limit * kDegrees) + " is allowed");
+}
+
+void requireFieldOfView(const Camera& camera) {
+  requireFinite(camera.field_of_view, "camera.field_of_view");
+  const double limit = 2 * std::numbers::pi;
+  switch (camera.model) {
+    case CameraModel::kEquirectangular:
+      requireWithin(camera.width, camera.fx, limit, "wide");
+      requireWithin(camera.height, camera.fy, limit / 2, "high");
+      [[fallthrough]];
+    case CameraModel::kPerspective:
+    case CameraModel::kOrthographic:
+      if (camera.field_of_view == 0) return;
+      fail(ErrorCode::kInvalidArgument,
+           "camera.field_of_view is " + shown(camera.field_of_view) +
+               "; it is that of fisheyes, for other cameras 0 is allowed");
+    case CameraModel::kFisheyeEquidistant:
+    case CameraModel::kFisheyeEquisolid:
+      // A little more: 360 degrees in single precision.
+      if (camera.field_of_view >= 0 && camera.field_of_view <= limit * (1 + 1e-6)) return;
+      fail(ErrorCode::kInvalidArgument, "the fisheye's field of view is " +
+                                            shown(camera.field_of_view * 180 / std::numbers::pi) +
+                                            " degrees; 0 to 360 is allowed");
+  }
+  fail(ErrorCode::kInvalidArgument, "camera.model is " +
+                                        std::to_string(static_cast<uint32_t>(camera.model)) +
+                                        "; 0 to 4 is allowed");
 }
 
 void requireRigid(const Mat4d& matrix) {
@@ -61,13 +98,25 @@ void validate(const Camera& camera) {
   requireRigid(camera.world_to_camera);
   requireFinite(camera.near_plane, "camera.near_plane");
   requireFinite(camera.far_plane, "camera.far_plane");
-  const bool perspective = camera.model == CameraModel::kPerspective;
+  const bool is_orthographic = camera.model == CameraModel::kOrthographic;
   if (!(camera.far_plane > camera.near_plane) ||
-      (perspective && !(camera.near_plane >= kMinNear))) {
+      (!is_orthographic && !(camera.near_plane >= kMinNear))) {
     fail(ErrorCode::kInvalidArgument,
          "camera near and far planes are " + std::to_string(camera.near_plane) + " and " +
              std::to_string(camera.far_plane) + " m; 1e-9 <= near < far is needed");
   }
+  requireFieldOfView(camera);
+}
+
+void requireImagePlane(const Camera& camera, const char* who) {
+  if (hasImagePlane(camera)) return;
+  const char* model = camera.model == CameraModel::kEquirectangular      ? "equirectangular"
+                      : camera.model == CameraModel::kFisheyeEquidistant ? "fisheye equidistant"
+                                                                         : "fisheye equisolid";
+  fail(ErrorCode::kInvalidArgument, std::string(who) +
+                                        " needs a perspective or orthographic camera; "
+                                        "this one is " +
+                                        model + ", which is drawn along rays only");
 }
 
 Vec3d cameraCentre(const Camera& camera) {

@@ -149,6 +149,7 @@ void drawInstance(const TriMesh& mesh, const Mat4d& object_to_camera,
 void drawMeshDepth(std::span<const MeshInstance> instances, const Camera& camera,
                    std::span<float> depth, Progress* progress) {
   validate(camera);
+  requireImagePlane(camera, "the depth of meshes");
   const size_t pixel_count = static_cast<size_t>(camera.width) * camera.height;
   if (depth.size() != pixel_count) {
     fail(ErrorCode::kInvalidArgument, "depth has room for " + std::to_string(depth.size()) +

@@ -100,6 +100,8 @@ class Averaging {
     out.counts.resize(large.counts.empty() ? 0 : count);
     out.surface_weight.resize(large.surface_weight.empty() ? 0 : count);
     out.transmittance.resize(large.transmittance.empty() ? 0 : count);
+    out.normal.resize(large.normal.empty() ? 0 : count * 3);
+    out.objects.resize(large.objects.empty() ? 0 : count);
   }
 
   void run() {
@@ -147,8 +149,27 @@ class Averaging {
       gather(large_.counts, width_ * n_, n_, x, y, squares.counts);
       out_.counts[out] = *std::max_element(squares.counts.begin(), squares.counts.end());
     }
+    passes(x, y);
     average(large_.surface_weight, out_.surface_weight, x, y, squares);
     average(large_.transmittance, out_.transmittance, x, y, squares);
+  }
+
+  void passes(size_t x, size_t y) {
+    const size_t out = y * width_ + x, row = width_ * n_;
+    if (!out_.objects.empty()) {
+      out_.objects[out] = large_.objects[(y * n_ + n_ / 2) * row + x * n_ + n_ / 2];
+    }
+    if (out_.normal.empty()) return;
+    Vec3d sum = Vec3d::Zero();
+    for (size_t i = 0; i < n_ * n_; ++i) {
+      const float* normal = &large_.normal[((y * n_ + i / n_) * row + x * n_ + i % n_) * 3];
+      sum += Vec3f(normal[0], normal[1], normal[2]).cast<double>();
+    }
+    const double length = sum.norm();
+    for (size_t k = 0; k < 3; ++k) {
+      out_.normal[out * 3 + k] =
+          length > 0 ? static_cast<float>(sum[static_cast<Eigen::Index>(k)] / length) : 0.0f;
+    }
   }
 
   void average(const std::vector<float>& from, std::vector<float>& to, size_t x, size_t y,
@@ -208,7 +229,7 @@ void renderAccurate(std::span<const SplatInstance> instances, const Camera& came
     Averaging(large, n, camera, result).run();
   } else if (isTiled(accuracy)) {
     renderTiled(instances, camera, options, workspace, result, progress);
-  } else if (accuracy.precision == Precision::kFloat) {
+  } else if (accuracy.precision == Precision::kFloat && hasImagePlane(camera)) {
     result = renderRayTiles(instances, camera, options, rayOptions(accuracy), progress);
   } else {
     result = renderRays(instances, camera, options, rayOptions(accuracy), progress);
@@ -222,7 +243,7 @@ RenderMemory accurateMemory(std::span<const SplatInstance> instances, const Came
   const uint32_t n = accuracy.samples_per_side;
   const Camera large = n > 1 ? enlarged(camera, n) : camera;
   RenderMemory memory = isTiled(accuracy) ? renderMemory(instances, large, options)
-                        : accuracy.precision == Precision::kFloat
+                        : accuracy.precision == Precision::kFloat && hasImagePlane(camera)
                             ? rayTileMemory(instances, large, options)
                             : rayMemory(instances, large, options);
   if (n > 1) {

@@ -27,7 +27,8 @@ RayOptions rayOptions(const RenderAccuracy& accuracy);
 
 /// Draws with the cheapest renderer that keeps what `accuracy` asks for. Of an averaged picture
 /// colour, alpha and transmittance are means; depth is the mean weighted by alpha; median depth the
-/// median of the medians, the nearer of two; counts the largest.
+/// median of the medians, the nearer of two; counts the largest; normals the mean, made unit again;
+/// objects those of the middle.
 /// In: workspace, used where the picture is tiled. Out: result.
 /// Errors: those of renderTiled; kInvalidArgument for samples outside their range and for an
 /// averaged picture above 65,536 pixels a side.

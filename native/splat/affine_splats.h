@@ -15,6 +15,7 @@ struct AffineSplat {
   double slope[2];        ///< metres per pixel: depth + slope . d, d from the centre
   double colour[3];
   bool is_holdout;
+  uint32_t index;  ///< among all splats of the picture
 
   /// Depth of the largest response behind a pixel: the mean of z, given the pixel, of the Gaussian
   /// that the affine projection makes of the splat.

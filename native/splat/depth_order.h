@@ -10,8 +10,9 @@
 
 namespace stipple {
 
-/// What make(placed cloud, index, splat) accepts of every splat of a scene, by the rounded view z
-/// that depth(splat) tells, ties in the order of the scene. Same for any number of threads.
+/// What make(placed cloud, index, splat) accepts of every splat of a scene, with its index, by the
+/// rounded depth that depth(splat) tells, ties in the order of the scene. Same for any number of
+/// threads.
 template <typename Splat, typename Make, typename Depth>
 std::vector<Splat> splatsInDepthOrder(const PlacedScene& scene, Make make, Depth depth) {
   constexpr size_t kGrain = 1024;
@@ -22,7 +23,9 @@ std::vector<Splat> splatsInDepthOrder(const PlacedScene& scene, Make make, Depth
     parallelFor(count, kGrain, [&](size_t begin, size_t end) {
       Splat splat;
       for (size_t i = begin; i < end; ++i) {
-        if (make(placed, i, splat)) made[begin / kGrain].push_back(splat);
+        if (!make(placed, i, splat)) continue;
+        splat.index = static_cast<uint32_t>(placed.first_index + i);
+        made[begin / kGrain].push_back(splat);
       }
     });
     for (const std::vector<Splat>& range : made) {

@@ -35,9 +35,18 @@ class DoublePixel {
     } else {
       addWhole(alpha, weight, colour, depth);
     }
+    weight_ = weight;
     (is_holdout ? hidden_ : shown_) += weight;
     if (!is_holdout) shown_depth_ += weight * depth;
     return true;
+  }
+
+  /// Of the splat that was blended last.
+  double weight() const { return weight_; }
+
+  /// Of the surface itself, once write() has been called.
+  double ownSurfaceWeight() const {
+    return has_surface_ && surface_.shows ? blend_.surface_weight * surface_.opacity : 0.0;
   }
 
   /// Writes pixel `i` of a result that has its arrays; colours are without the surface's.
@@ -99,7 +108,7 @@ class DoublePixel {
   SurfaceAtPixel<double> surface_{};
   bool has_surface_;
   bool ends_early_;
-  double shown_ = 0, shown_depth_ = 0, hidden_ = 0;
+  double shown_ = 0, shown_depth_ = 0, hidden_ = 0, weight_ = 0;
 };
 
 /// Arrays of a result for what the options ask for.
@@ -113,6 +122,8 @@ void sizeResult(const Camera& camera, const RenderOptions& options, Result& resu
   if (options.with_median_depth) result.median_depth.resize(pixel_count);
   if (options.with_counts) result.counts.resize(pixel_count);
   if (options.with_transmittance) result.transmittance.resize(pixel_count);
+  if (options.with_normal) result.normal.resize(pixel_count * 3);
+  if (options.with_objects) result.objects.resize(pixel_count);
   result.surface_weight.resize(hasSurface(options) ? pixel_count : 0);
 }
 

@@ -162,6 +162,7 @@ namespace {
 uint64_t placeInstances(std::span<const SplatInstance> instances, const Camera& camera,
                         const DrawOrderOutput& output, std::vector<OrderedCloud>& clouds) {
   validate(camera);
+  requireImagePlane(camera, "the order for a graphics card");
   if (output.sh_degree_limit < 0 || output.sh_degree_limit > kMaxShDegree) {
     fail(ErrorCode::kInvalidArgument,
          "sh_degree_limit is " + std::to_string(output.sh_degree_limit) + "; 0 to 4 is allowed");

@@ -21,7 +21,8 @@ namespace stipple {
 /// What the projection needs to know of the camera.
 template <typename T>
 struct View {
-  bool perspective;
+  bool perspective;  ///< rays come from one point: all models but the orthographic
+  bool is_wide;      ///< directions instead of a plane: nothing of the projection below applies
   T fx, fy, cx, cy;
   T width, height;
   T near_plane, far_plane;
@@ -35,7 +36,8 @@ struct View {
 template <typename T>
 View<T> makeView(const Camera& camera) {
   View<T> view{};
-  view.perspective = camera.model == CameraModel::kPerspective;
+  view.perspective = camera.model != CameraModel::kOrthographic;
+  view.is_wide = !hasImagePlane(camera);
   view.fx = T(camera.fx);
   view.fy = T(camera.fy);
   view.cx = T(camera.cx);

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "base/parallel.h"
 #include "splat/affine_splats.h"
+#include "splat/pixel_passes.h"
 #include "splat/ray_splats.h"
 #include "splat/scene.h"
 
@@ -18,55 +20,86 @@ namespace {
 constexpr uint32_t kTileSide = 16;              ///< pixels
 constexpr uint32_t kBlockSide = kRayBlockSide;  ///< pixels, whole tiles
 
-/// origin + place * direction; the view z of a point is its place.
-struct Ray {
-  Vec3d origin;
-  Vec3d direction;
-};
-
-Ray rayThrough(const View<double>& view, double x, double y) {
-  const double slope_x = (x - view.cx) / view.fx;
-  const double slope_y = (y - view.cy) / view.fy;
-  if (view.perspective) return {Vec3d::Zero(), {slope_x, slope_y, 1}};
-  return {{slope_x, slope_y, 0}, {0, 0, 1}};
-}
-
 struct Rectangle {
   uint32_t x0, y0, x1, y1;  ///< pixels; the ends are outside
 };
 
-/// A cone, or a cylinder, around the rays of a rectangle.
+/// A cone of up to all directions, or a cylinder, around the rays of a rectangle's pixels.
 class Beam {
  public:
-  Beam(const View<double>& view, const Rectangle& area) {
-    const double x[2] = {area.x0 + 0.5, area.x1 - 0.5}, y[2] = {area.y0 + 0.5, area.y1 - 0.5};
-    const Ray middle = rayThrough(view, 0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
-    origin_ = middle.origin;
-    axis_ = middle.direction.normalized();
-    // The rectangle is convex on the picture plane, so its corners are the farthest.
-    for (int corner = 0; corner < 4; ++corner) {
-      const Ray ray = rayThrough(view, x[corner & 1], y[corner >> 1]);
-      radius_ = std::max(radius_, (ray.origin - origin_).norm());
-      sine_ = std::max(sine_, crossProduct(axis_, ray.direction.normalized()).norm());
+  Beam(const View<double>& view, const CameraRays& rays, const Rectangle& area) {
+    if (view.is_wide) {
+      aroundPixels(rays, area);
+    } else {
+      aroundCorners(rays, area);
     }
-    sine_ = std::min(1.0, sine_ * (1 + 1e-9));
-    cosine_ = std::sqrt(std::max(0.0, 1 - sine_ * sine_));
+    // Slack for rounding; beyond a half turn there is nothing.
+    angle_ = std::min(std::numbers::pi, angle_ * (1 + 1e-9));
+    sine_ = std::sin(angle_);
+    cosine_ = std::cos(angle_);
   }
 
   bool touches(const Vec3d& centre, double radius) const {
+    if (is_empty_) return false;
     const Vec3d offset = centre - origin_;
     const double reach = radius + radius_;
     if (offset.squaredNorm() <= reach * reach) return true;
     const double along = offset.dot(axis_);
     const double across = (offset - along * axis_).norm();
-    // Distance from the surface of the cone, where that is nearest.
-    return across * cosine_ - along * sine_ <= reach;
+    // Distance times the sine of the angle beyond the cone: that from its surface, where it is
+    // nearest; below 0 inside.
+    if (across * cosine_ - along * sine_ > reach) return false;
+    // At more than a right angle beyond it, its tip is nearest.
+    const double angle = std::atan2(across, along);
+    return angle - angle_ < 0.5 * std::numbers::pi + 1e-9;
   }
 
  private:
+  /// The rectangle is convex on the picture plane, so its corners are the farthest.
+  void aroundCorners(const CameraRays& rays, const Rectangle& area) {
+    const double x[2] = {area.x0 + 0.5, area.x1 - 0.5}, y[2] = {area.y0 + 0.5, area.y1 - 0.5};
+    PixelRay middle, ray;
+    rays.through(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]), middle);
+    origin_ = middle.origin;
+    axis_ = middle.direction.normalized();
+    is_empty_ = false;
+    for (int corner = 0; corner < 4; ++corner) {
+      rays.through(x[corner & 1], y[corner >> 1], ray);
+      take(ray);
+    }
+  }
+
+  /// A rectangle of directions may turn around a pole or the whole sphere: every pixel is asked.
+  void aroundPixels(const CameraRays& rays, const Rectangle& area) {
+    PixelRay ray;
+    Vec3d sum = Vec3d::Zero();
+    const auto for_each = [&](const auto& body) {
+      for (uint32_t y = area.y0; y < area.y1; ++y) {
+        for (uint32_t x = area.x0; x < area.x1; ++x) {
+          if (rays.through(x + 0.5, y + 0.5, ray)) body();
+        }
+      }
+    };
+    for_each([&] {
+      sum += ray.direction;
+      is_empty_ = false;
+    });
+    const double length = sum.norm();
+    origin_ = Vec3d::Zero();
+    axis_ = length > 1e-9 ? Vec3d(sum / length) : Vec3d(0, 0, 1);
+    for_each([&] { take(ray); });
+  }
+
+  void take(const PixelRay& ray) {
+    radius_ = std::max(radius_, (ray.origin - origin_).norm());
+    const double across = crossProduct(axis_, ray.direction).norm();
+    angle_ = std::max(angle_, std::atan2(across, axis_.dot(ray.direction)));
+  }
+
   Vec3d origin_, axis_;
+  bool is_empty_ = true;
   double radius_ = 0;  ///< of the cylinder
-  double sine_ = 0, cosine_ = 1;
+  double angle_ = 0, sine_ = 0, cosine_ = 1;
 };
 
 /// A splat that shows at a pixel.
@@ -76,10 +109,16 @@ struct Hit {
   uint32_t splat;
 };
 
+/// Memory of one thread.
+struct Scratch {
+  std::vector<Hit> hits;
+  PixelPasses passes;
+};
+
 /// A box in the picture.
 class Window {
  public:
-  Window(const View<double>&, const Rectangle& area)
+  Window(const View<double>&, const CameraRays&, const Rectangle& area)
       : x_{area.x0 + 0.5, area.x1 - 0.5}, y_{area.y0 + 0.5, area.y1 - 0.5} {}
 
   bool touches(double x, double y, double half_x, double half_y) const {
@@ -94,17 +133,18 @@ class Window {
 struct AlongRays {
   using Splat = RaySplat;
   using Area = Beam;
-  using Line = Ray;
+  using Line = PixelRay;
 
   static bool touches(const Beam& beam, const RaySplat& splat) {
     return beam.touches(splat.centre, splat.radius);
   }
-  static Ray lineThrough(const View<double>& view, double x, double y) {
-    return rayThrough(view, x, y);
+  /// Returns false where the picture shows nothing.
+  static bool lineThrough(const CameraRays& rays, double x, double y, PixelRay& ray) {
+    return rays.through(x, y, ray);
   }
   /// Returns false where the splat is not between the near and the far plane.
-  static bool meet(const View<double>& view, const RaySplat& splat, const Ray& ray, double& place,
-                   double& opacity, double& half_distance) {
+  static bool meet(const View<double>& view, const RaySplat& splat, const PixelRay& ray,
+                   double& place, double& opacity, double& half_distance) {
     const RayResponse response = respond(splat, ray.origin, ray.direction);
     if (!(response.place >= view.near_plane && response.place <= view.far_plane)) return false;
     place = response.place;
@@ -112,7 +152,9 @@ struct AlongRays {
     half_distance = 0.5 * response.squared_distance;
     return true;
   }
-  static double centreDepth(const RaySplat& splat) { return splat.centre[2]; }
+  static double centreDepth(const View<double>& view, const RaySplat& splat) {
+    return depthOf(view, splat.centre);
+  }
 };
 
 /// How they are met where each is an ellipse in the picture.
@@ -125,7 +167,10 @@ struct InPicture {
     const Footprint<double>& f = splat.footprint;
     return window.touches(f.mean_x, f.mean_y, splat.half_x, splat.half_y);
   }
-  static Line lineThrough(const View<double>&, double x, double y) { return {x, y}; }
+  static bool lineThrough(const CameraRays&, double x, double y, Line& pixel) {
+    pixel = {x, y};
+    return true;
+  }
   static bool meet(const View<double>&, const AffineSplat& splat, const Line& pixel, double& place,
                    double& opacity, double& half_distance) {
     const Footprint<double>& f = splat.footprint;
@@ -135,7 +180,7 @@ struct InPicture {
     half_distance = halfSquaredDistance(f, dx, dy);
     return true;
   }
-  static double centreDepth(const AffineSplat& splat) { return splat.depth; }
+  static double centreDepth(const View<double>&, const AffineSplat& splat) { return splat.depth; }
 };
 
 template <typename Meeting>
@@ -144,10 +189,12 @@ class RayPicture {
   using Area = typename Meeting::Area;
 
  public:
-  RayPicture(const PlacedScene& scene, std::vector<Splat> splats, const RenderOptions& options,
-             const RayOptions& rays, RenderResult& result)
+  RayPicture(const PlacedScene& scene, const Camera& camera, std::vector<Splat> splats,
+             const RenderOptions& options, const RayOptions& rays, RenderResult& result)
       : view_(scene.view),
+        camera_rays_(camera, options.lens),
         splats_(std::move(splats)),
+        pass_values_(passValues(scene, splats_, options)),
         options_(options),
         rays_(rays),
         result_(result) {}
@@ -166,42 +213,55 @@ class RayPicture {
 
   void drawBlock(uint32_t x0, uint32_t y0) {
     const Rectangle block = cut(x0, y0, kBlockSide);
-    const Area around(view_, block);
+    const Area around(view_, camera_rays_, block);
     std::vector<uint32_t> near_block, near_tile;
     for (uint32_t i = 0; i < splats_.size(); ++i) {
       if (Meeting::touches(around, splats_[i])) near_block.push_back(i);
     }
-    std::vector<Hit> hits;
+    Scratch scratch;
     for (uint32_t y = block.y0; y < block.y1; y += kTileSide) {
       for (uint32_t x = block.x0; x < block.x1; x += kTileSide) {
         const Rectangle tile = cut(x, y, kTileSide);
-        const Area narrow(view_, tile);
+        const Area narrow(view_, camera_rays_, tile);
         near_tile.clear();
         for (const uint32_t i : near_block) {
           if (Meeting::touches(narrow, splats_[i])) near_tile.push_back(i);
         }
         for (uint32_t py = tile.y0; py < tile.y1; ++py) {
-          for (uint32_t px = tile.x0; px < tile.x1; ++px) drawPixel(px, py, near_tile, hits);
+          for (uint32_t px = tile.x0; px < tile.x1; ++px) drawPixel(px, py, near_tile, scratch);
         }
       }
     }
   }
 
-  void drawPixel(uint32_t x, uint32_t y, const std::vector<uint32_t>& near_tile,
-                 std::vector<Hit>& hits) {
-    findHits(Meeting::lineThrough(view_, x + 0.5, y + 0.5), near_tile, hits);
+  void drawPixel(uint32_t x, uint32_t y, const std::vector<uint32_t>& near_tile, Scratch& scratch) {
+    std::vector<Hit>& hits = scratch.hits;
+    PixelPasses& passes = scratch.passes;
+    passes.clear();
+    const size_t i = static_cast<size_t>(y) * result_.width + x;
+    typename Meeting::Line line;
+    if (!Meeting::lineThrough(camera_rays_, x + 0.5, y + 0.5, line)) {
+      // Nothing comes from there, not the background either.
+      RenderOptions nothing = options_;
+      nothing.with_background = false;
+      DoublePixel(nothing, i).write(nothing, i, result_);
+      passes.write(options_, i, 0, result_);
+      return;
+    }
+    findHits(line, near_tile, hits);
     if (rays_.order == RayOrder::kResponse) {
       std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
         return a.place < b.place || (a.place == b.place && a.splat < b.splat);
       });
     }
-    const size_t i = static_cast<size_t>(y) * result_.width + x;
     DoublePixel pixel(options_, i, rays_.limits.ends_early);
     for (const Hit& hit : hits) {
       const Splat& splat = splats_[hit.splat];
       if (!pixel.add(hit.alpha, splat.colour, hit.place, splat.is_holdout)) break;
+      if (!splat.is_holdout) pass_values_.add(pixel.weight(), hit.splat, passes);
     }
     pixel.write(options_, i, result_);
+    passes.write(options_, i, pixel.ownSurfaceWeight(), result_);
   }
 
   void findHits(const typename Meeting::Line& line, const std::vector<uint32_t>& near_tile,
@@ -213,13 +273,16 @@ class RayPicture {
       if (!Meeting::meet(view_, splat, line, place, opacity, half_distance)) continue;
       const double full = opacity * std::exp(-half_distance);
       if (full < rays_.limits.least_alpha) continue;
-      const double depth = rays_.order == RayOrder::kCentre ? Meeting::centreDepth(splat) : place;
+      const double depth =
+          rays_.order == RayOrder::kCentre ? Meeting::centreDepth(view_, splat) : place;
       hits.push_back({depth, std::min(full, rays_.limits.most_alpha), i});
     }
   }
 
   const View<double>& view_;
+  const CameraRays camera_rays_;
   std::vector<Splat> splats_;
+  const PassValues pass_values_;
   const RenderOptions& options_;
   const RayOptions& rays_;
   RenderResult& result_;
@@ -237,11 +300,11 @@ std::vector<PixelArea> blocksOf(const RenderResult& result, std::span<const Pixe
 }
 
 template <typename Meeting>
-void drawAll(const PlacedScene& scene, std::vector<typename Meeting::Splat> splats,
-             const RenderOptions& options, const RayOptions& rays, RenderResult& result,
-             Progress* progress) {
+void drawAll(const PlacedScene& scene, const Camera& camera,
+             std::vector<typename Meeting::Splat> splats, const RenderOptions& options,
+             const RayOptions& rays, RenderResult& result, Progress* progress) {
   result.visible_count = splats.size();
-  RayPicture<Meeting> picture(scene, std::move(splats), options, rays, result);
+  RayPicture<Meeting> picture(scene, camera, std::move(splats), options, rays, result);
   const std::vector<PixelArea> blocks = blocksOf(result, rays.areas);
   // So that a cancel is heard ten times a second, and no thread waits long for the others.
   const size_t at_once = 4 * threadLimit();
@@ -273,6 +336,7 @@ RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& c
   // Made range by range, gathered (which may double its room), sorted; and the order.
   memory.splat_bytes =
       splats * (4 * std::max(sizeof(RaySplat), sizeof(AffineSplat)) + 2 * sizeof(uint32_t));
+  if (hasPasses(options)) memory.splat_bytes += splats * (sizeof(Vec3d) + sizeof(uint32_t));
   // Of each thread, splats near its block and its tile, and those that show at a pixel.
   memory.pair_bytes = splats * threadLimit() * 2 * (2 * sizeof(uint32_t) + sizeof(Hit));
   memory.result_bytes = renderMemory({}, camera, options).result_bytes;
@@ -281,16 +345,19 @@ RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& c
 
 RenderResult renderRays(std::span<const SplatInstance> instances, const Camera& camera,
                         const RenderOptions& options, const RayOptions& rays, Progress* progress) {
-  const PlacedScene scene = placeScene(instances, camera, options);
+  if (rays.projection == RayProjection::kAffine) {
+    requireImagePlane(camera, "the affine projection of splats");
+  }
+  const PlacedScene scene = placeSceneForRays(instances, camera, options);
   advance(progress, rays.progress_begin, "Placing splats");
   RenderResult result;
   sizeResult(camera, options, result);
   if (rays.projection == RayProjection::kRay) {
-    drawAll<AlongRays>(scene, raySplats(scene, rays.limits.least_alpha), options, rays, result,
-                       progress);
+    drawAll<AlongRays>(scene, camera, raySplats(scene, rays.limits.least_alpha), options, rays,
+                       result, progress);
   } else {
-    drawAll<InPicture>(scene, affineSplats(scene, rays.limits.least_alpha), options, rays, result,
-                       progress);
+    drawAll<InPicture>(scene, camera, affineSplats(scene, rays.limits.least_alpha), options, rays,
+                       result, progress);
   }
   finishSurface(options, result);
   advance(progress, rays.progress_end, "Following rays");

@@ -53,6 +53,8 @@ RayOptions rayYardstick();
 /// response the mean depth of the affine Gaussian behind the pixel.
 /// Double precision. Same bits for any number of threads. Cost: O(splats * blocks of 64 x 64 +
 /// pixels * splats near their tile). Errors: those of renderTiled.
+/// Panoramas and fisheyes too: there z is the distance from the camera everywhere, the width of a
+/// pixel is that at the equator or the axis, and what a fisheye does not see stays empty.
 /// Based on: Moenne-Loccoz et al., 3D Gaussian Ray Tracing, SIGGRAPH Asia 2024 (the response along
 /// a ray); Zwicker et al., EWA Volume Splatting, Visualization 2001 (low-pass). Differs: tiles
 /// instead of a tree of boxes; the distance is that of the cross product, which cancels nothing

@@ -52,7 +52,7 @@ class Maker {
     const float* position = &placed_.cloud->positions[index * 3];
     splat.centre =
         placed_.linear * Vec3d(position[0], position[1], position[2]) + placed_.translation;
-    const double z = splat.centre[2];
+    const double z = depthOf(view, splat.centre);
     if (!(z >= view.near_plane && z <= view.far_plane)) return false;
     const double pixel = (view.perspective ? z : 1.0) / std::sqrt(view.fx * view.fy);
     const PrincipalAxes axes = axesOf(placed_, is_similarity_, scale_, index);
@@ -98,7 +98,7 @@ std::vector<RaySplat> raySplats(const PlacedScene& scene, double least_alpha) {
       [&](const PlacedCloud& placed, size_t i, RaySplat& splat) {
         return makers[static_cast<size_t>(&placed - scene.clouds.data())].make(i, splat);
       },
-      [](const RaySplat& splat) { return splat.centre[2]; });
+      [&](const RaySplat& splat) { return depthOf(scene.view, splat.centre); });
 }
 
 }  // namespace stipple

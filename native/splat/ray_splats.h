@@ -17,6 +17,7 @@ struct RaySplat {
   double opacity;
   double colour[3];
   bool is_holdout;
+  uint32_t index;  ///< among all splats of the picture
 };
 
 /// Where a ray comes nearest to a splat.
@@ -32,8 +33,13 @@ inline RayResponse respond(const RaySplat& splat, const Vec3d& origin, const Vec
   return {-from.dot(along) / length, crossProduct(from, along).squaredNorm() / length};
 }
 
+/// View z, or the distance from a camera without an image plane.
+inline double depthOf(const View<double>& view, const Vec3d& centre) {
+  return view.is_wide ? centre.norm() : centre[2];
+}
+
 /// Splats that may show an alpha of least_alpha or more somewhere, centres between the near and the
-/// far plane; by rounded view z, then by place in the scene.
+/// far plane; by rounded depth, then by place in the scene.
 std::vector<RaySplat> raySplats(const PlacedScene& scene, double least_alpha);
 
 }  // namespace stipple

@@ -2,8 +2,10 @@
 #include <numeric>
 
 #include "splat/double_pixel.h"
+#include "splat/pixel_passes.h"
 #include "splat/render.h"
 #include "splat/scene.h"
+#include "splat/splat_normal.h"
 
 // The definition of correct: every visible splat in order at every pixel, in double.
 
@@ -16,9 +18,11 @@ struct ReferenceSplat {
   double colour[3];
   uint32_t key;
   bool is_holdout;
+  Vec3d normal;
+  uint32_t object;
 };
 
-std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene) {
+std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene, bool with_normal) {
   std::vector<ReferenceSplat> splats;
   for (const PlacedCloud& placed : scene.clouds) {
     for (size_t i = 0; i < placed.cloud->size(); ++i) {
@@ -27,6 +31,8 @@ std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene) {
       splatColour(scene, placed, i, splat.colour);
       splat.key = depthKey(splat.projected.depth);
       splat.is_holdout = placed.is_holdout;
+      splat.normal = with_normal ? splatNormal(scene, placed, i) : Vec3d(0, 0, 0);
+      splat.object = static_cast<uint32_t>(placed.instance) + 1;
       if (splat.is_holdout) std::fill(splat.colour, splat.colour + 3, 0.0);
       splats.push_back(splat);
     }
@@ -42,11 +48,12 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
                                 const RenderOptions& options, Progress* progress) {
   const PlacedScene scene = placeScene(instances, camera, options);
   advance(progress, 0.0, "Projecting splats");
-  const std::vector<ReferenceSplat> splats = visibleInOrder(scene);
+  const std::vector<ReferenceSplat> splats = visibleInOrder(scene, options.with_normal);
 
   ReferenceResult result;
   sizeResult(camera, options, result);
   std::vector<const ReferenceSplat*> row;
+  PixelPasses passes;
   for (uint32_t y = 0; y < camera.height; ++y) {
     advance(progress, static_cast<double>(y) / camera.height, "Rendering the reference");
     const double py = y + 0.5;
@@ -61,6 +68,7 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
       const double px = x + 0.5;
       const size_t i = static_cast<size_t>(y) * camera.width + x;
       DoublePixel pixel(options, i);
+      passes.clear();
       for (const ReferenceSplat* splat : row) {
         const Projected<double>& p = splat->projected;
         const double dx = px - p.footprint.mean_x;
@@ -69,8 +77,10 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
             p.footprint.opacity, halfSquaredDistance(p.footprint, dx, py - p.footprint.mean_y));
         if (!(alpha > 0)) continue;
         if (!pixel.add(alpha, splat->colour, p.depth, splat->is_holdout)) break;
+        if (!splat->is_holdout) passes.add(pixel.weight(), splat->normal, splat->object);
       }
       pixel.write(options, i, result);
+      passes.write(options, i, pixel.ownSurfaceWeight(), result);
     }
   }
   finishSurface(options, result);

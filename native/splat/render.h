@@ -8,7 +8,7 @@
 #include "base/progress.h"
 #include "data/colour_grade.h"
 #include "data/splat_cloud.h"
-#include "math/camera.h"
+#include "math/camera_rays.h"
 #include "math/empty_depth.h"
 #include "math/vec.h"
 
@@ -64,6 +64,11 @@ struct RenderOptions {
   bool with_median_depth = false;
   bool with_counts = false;  ///< also the number of splats blended per pixel
   bool with_transmittance = false;
+  bool with_normal = false;
+  bool with_objects = false;
+  /// Of a panorama or fisheye, where rays start across each of them; colours stay those that splats
+  /// show to the middle of the lens.
+  LensPoint lens = {};
   SurfaceLayer surface = {};
   /// True: the colour is left without the surface's, and surface_weight tells what that counts for:
   /// for who changes the splats' colours before addSurface. Depth has the surface all the same.
@@ -80,8 +85,14 @@ struct RenderResult {
   std::vector<uint32_t> counts;       ///< [H,W]
   std::vector<float> surface_weight;  ///< [H,W] transmittance before the surface; if splats_apart
   std::vector<float> transmittance;   ///< [H,W] of all, holdouts and surface too
-  uint64_t visible_count = 0;         ///< splats that passed culling
-  uint64_t number = 0;                ///< of this drawing, another for every call; 0: none
+  /// [H,W,3] of the splats that show: mean, in the world, of their shortest axes as far as they
+  /// turn to the camera, by weight, made unit again; 0 where none shows.
+  std::vector<float> normal;
+  /// [H,W] 1 + the instance whose splats weigh most together, the first of equals; 0 where nothing
+  /// shows and where the surface weighs as much.
+  std::vector<uint32_t> objects;
+  uint64_t visible_count = 0;  ///< splats that passed culling
+  uint64_t number = 0;         ///< of this drawing, another for every call; 0: none
 };
 
 /// Tiled CPU renderer: culling, one depth sort, tiles in parallel.
@@ -123,7 +134,7 @@ void renderTiled(std::span<const SplatInstance> instances, const Camera& camera,
 
 /// Upper bounds of the bytes that renderTiled allocates, by what they grow with.
 struct RenderMemory {
-  uint64_t splat_bytes = 0;   ///< at most 112 per splat, and 11 MiB
+  uint64_t splat_bytes = 0;   ///< at most 112 per splat, and 11 MiB; 16 more for all passes
   uint64_t pixel_bytes = 0;   ///< at most 64 per pixel: counters of the tiles, what is kept
   uint64_t pair_bytes = 0;    ///< 4 per pair of splat and tile, at most 136 MB or 4 per splat
   uint64_t result_bytes = 0;  ///< the picture itself
@@ -153,6 +164,8 @@ struct ReferenceResult {
   std::vector<uint32_t> counts;        ///< [H,W]
   std::vector<double> surface_weight;  ///< [H,W]
   std::vector<double> transmittance;   ///< [H,W]
+  std::vector<double> normal;          ///< [H,W,3]
+  std::vector<uint32_t> objects;       ///< [H,W]
 };
 ReferenceResult renderReference(std::span<const SplatInstance> instances, const Camera& camera,
                                 const RenderOptions& options, Progress* progress = nullptr);

@@ -48,7 +48,7 @@ PlacedCloud place(const SplatInstance& instance, const Camera& camera,
   placed.linear = to_view * object;
   placed.translation = to_view * origin + translationPart(camera.world_to_camera);
   const Mat3d to_object = inverse(object);
-  placed.eye = camera.model == CameraModel::kPerspective
+  placed.eye = camera.model != CameraModel::kOrthographic
                    ? Vec3d(to_object * (cameraCentre(camera) - origin))
                    : Vec3d(to_object * to_view.row(2).transpose());
   placed.instance = 0;
@@ -68,14 +68,13 @@ std::string nameOf(size_t instance) {
   return "instance " + std::to_string(instance);
 }
 
-}  // namespace
-
-void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& camera,
-                      const RenderOptions& options, PlacedScene& scene) {
+void placeUnread(std::span<const SplatInstance> instances, const Camera& camera,
+                 const RenderOptions& options, PlacedScene& scene) {
   validate(camera);
   validateOptions(options);
   validateSurface(options.surface, camera);
   scene.view = makeView<double>(camera);
+  scene.view_to_world = linearPart(camera.world_to_camera).transpose();
   scene.clouds.clear();
   scene.splat_count = 0;
   scene.has_holdouts = false;
@@ -109,6 +108,23 @@ void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& ca
   }
 }
 
+void checkClouds(const PlacedScene& scene) {
+  const SplatCloud* checked = nullptr;
+  for (const PlacedCloud& placed : scene.clouds) {
+    // Many copies of one cloud usually follow each other.
+    if (placed.cloud != checked) validate(*placed.cloud, nameOf(placed.instance).c_str());
+    checked = placed.cloud;
+  }
+}
+
+}  // namespace
+
+void placeSceneUnread(std::span<const SplatInstance> instances, const Camera& camera,
+                      const RenderOptions& options, PlacedScene& scene) {
+  requireImagePlane(camera, "the affine projection of splats");
+  placeUnread(instances, camera, options, scene);
+}
+
 void refuseCloud(const PlacedCloud& placed) {
   validate(*placed.cloud, nameOf(placed.instance).c_str());
   fail(ErrorCode::kInvalidArgument,
@@ -119,12 +135,15 @@ PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& c
                        const RenderOptions& options) {
   PlacedScene scene;
   placeSceneUnread(instances, camera, options, scene);
-  const SplatCloud* checked = nullptr;
-  for (const PlacedCloud& placed : scene.clouds) {
-    // Many copies of one cloud usually follow each other.
-    if (placed.cloud != checked) validate(*placed.cloud, nameOf(placed.instance).c_str());
-    checked = placed.cloud;
-  }
+  checkClouds(scene);
+  return scene;
+}
+
+PlacedScene placeSceneForRays(std::span<const SplatInstance> instances, const Camera& camera,
+                              const RenderOptions& options) {
+  PlacedScene scene;
+  placeUnread(instances, camera, options, scene);
+  checkClouds(scene);
   return scene;
 }
 

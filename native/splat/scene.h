@@ -17,7 +17,7 @@ struct PlacedCloud {
   const SplatCloud* cloud;
   Mat3d linear;       ///< object to view
   Vec3d translation;  ///< object to view, metres
-  /// Perspective: the camera's centre in object space. Orthographic: the viewing direction there.
+  /// The camera's centre in object space. Orthographic: the viewing direction there.
   Vec3d eye;
   size_t instance;       ///< of the caller's list
   bool is_checked;       ///< SplatInstance::values_are_checked
@@ -40,6 +40,7 @@ struct PlacedCloud {
 /// differ.
 struct PlacedScene {
   View<double> view;
+  Mat3d view_to_world;  ///< a rotation
   std::vector<PlacedCloud> clouds;
   uint64_t splat_count = 0;
   bool has_holdouts = false;
@@ -53,6 +54,11 @@ constexpr double kHoldoutColour = -1;
 /// BlendSpace::kAsTrained.
 PlacedScene placeScene(std::span<const SplatInstance> instances, const Camera& camera,
                        const RenderOptions& options);
+
+/// The same, for panoramas and fisheyes too, which placeScene refuses: nobody but who follows rays
+/// can draw them.
+PlacedScene placeSceneForRays(std::span<const SplatInstance> instances, const Camera& camera,
+                              const RenderOptions& options);
 
 /// The same into memory that may have held a scene, except that the splats' values are not read:
 /// whoever reads them first must hold each row to rowsAreValid, and call refuseCloud where one is

@@ -134,6 +134,8 @@ def test_field_kinds_match(header):
              'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
              'const StippleCloud*': c_void_p, 'const StippleGrade*': POINTER(structs.StippleGrade),
              'const StippleMesh*': c_void_p, 'const char*': c_char_p,
+             'const double*': POINTER(c_double), 'const StippleLens*': POINTER(structs.StippleLens),
+             'const StippleShutter*': POINTER(structs.StippleShutter),
              'const StippleAccuracy*': POINTER(structs.StippleAccuracy),
              'const StippleEffectsSurvey*': POINTER(structs.StippleEffectsSurvey),
              'StippleAccuracy': structs.StippleAccuracy}

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Enumerations and structs of stipple.h, field by field; tests/addon compares them with the header."""
+"""Structs of stipple.h, field by field, and its enumerations; tests/addon compares them with the header."""
 
 from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p, sizeof
-from enum import IntEnum
 
-from .fit_enums import FitBackground, FitModel, FitQuality, SplatQuantity
+from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, CameraModel, ColourSpace, ENUMS, Effect,
+                    EffectChoice, FitBackground, FitModel, FitQuality, Frame, JobState, LowPass, MaterialColour,
+                    ModelKind, OutputColour, Precision, Projection, RenderMethod, Sampling, Side, SplatOrder,
+                    SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
 
 ABI_VERSION = 1
 MAX_ANCHORS = 1 << 28
@@ -16,208 +18,6 @@ MAX_SH_COLUMNS = 24
 
 _floats = POINTER(c_float)
 _matrix = c_double * 16
-
-
-class Status(IntEnum):
-    OK = 0
-    ERROR_INVALID_ARGUMENT = 1
-    ERROR_OUT_OF_MEMORY = 2
-    ERROR_MEMORY_LIMIT = 3
-    ERROR_IO = 4
-    ERROR_FORMAT = 5
-    ERROR_UNSUPPORTED = 6
-    ERROR_UNAVAILABLE = 7
-    ERROR_CANCELLED = 8
-    ERROR_BUFFER_TOO_SMALL = 9
-    ERROR_INTERNAL = 10
-
-
-class JobState(IntEnum):
-    RUNNING = 0
-    DONE = 1
-    FAILED = 2
-    CANCELLED = 3
-
-
-class ColourSpace(IntEnum):
-    DISPLAY = 0
-    LINEAR = 1
-
-
-class Antialias(IntEnum):
-    CLASSIC = 0
-    MIP = 1
-
-
-class Frame(IntEnum):
-    UNKNOWN = 0
-    LDB = 1
-    RDB = 2
-    LUB = 3
-    RUB = 4
-    LDF = 5
-    RDF = 6
-    LUF = 7
-    RUF = 8
-    LFD = 9
-    RFD = 10
-    LFU = 11
-    RFU = 12
-    LBD = 13
-    RBD = 14
-    LBU = 15
-    RBU = 16
-
-
-class MaterialColour(IntEnum):
-    CONSTANT = 0
-    TEXTURE = 1
-    CORNER = 2
-
-
-class ViewSplit(IntEnum):
-    NONE = 0
-    TRAIN = 1
-    TEST = 2
-    VALIDATION = 3
-
-
-class AnchorOrder(IntEnum):
-    SYSTEMATIC = 0
-    PROGRESSIVE = 1
-
-
-class ViewRig(IntEnum):
-    AUTOMATIC = 0
-    AROUND = 1
-    INSIDE = 2
-
-
-class ModelKind(IntEnum):
-    SURFACE = 0
-    HIERARCHY = 1
-    FIELD = 2
-
-
-class CameraModel(IntEnum):
-    PERSPECTIVE = 0
-    ORTHOGRAPHIC = 1
-
-
-class LowPass(IntEnum):
-    FROM_CLOUD = 0
-    CLASSIC = 1
-    MIP = 2
-    NONE = 3
-
-
-class BlendSpace(IntEnum):
-    AS_TRAINED = 0
-    SCENE_LINEAR = 1
-
-
-class OutputColour(IntEnum):
-    SCENE_LINEAR = 0
-    COMPOSITED = 1
-
-
-class RenderMethod(IntEnum):
-    TILED = 0
-    REFERENCE = 1
-    RAYS = 2
-    YARDSTICK = 3
-
-
-class AccuracyLevel(IntEnum):
-    DRAFT = 0
-    PREVIEW = 1
-    FINAL = 2
-    REFERENCE = 3
-
-
-class SplatOrder(IntEnum):
-    CENTRE = 0
-    PIXEL = 1
-
-
-class Projection(IntEnum):
-    AFFINE = 0
-    RAY = 1
-
-
-class Sampling(IntEnum):
-    AS_TRAINED = 0
-    MIP = 1
-    SAMPLES = 2
-
-
-class Precision(IntEnum):
-    FLOAT = 0
-    DOUBLE = 1
-
-
-class Effect(IntEnum):
-    VIEW_COLOUR = 0
-    MOTION = 1
-    MOTION_BLUR = 2
-    DEPTH_OF_FIELD = 3
-    EXACT_PROJECTION = 4
-    ZOOM_ANTIALIASING = 5
-    TRANSPARENT_FILM = 6
-    DEPTH_PASS = 7
-    NORMAL_PASS = 8
-    OBJECT_INDEX_PASS = 9
-    MESH_OCCLUSION = 10
-    GLOBAL_ORDER = 11
-
-
-class EffectChoice(IntEnum):
-    AUTO = 0
-    ON = 1
-    OFF = 2
-
-
-class Side(IntEnum):
-    INSIDE = 0
-    OUTSIDE = 1
-
-
-class Transfer(IntEnum):
-    LINEAR = 0
-    SRGB = 1
-
-
-# Each enumeration: the C type and what its values' names start with.
-ENUMS = {
-    'StippleStatus': (Status, 'STIPPLE_'),
-    'StippleJobState': (JobState, 'STIPPLE_JOB_'),
-    'StippleColourSpace': (ColourSpace, 'STIPPLE_COLOUR_'),
-    'StippleAntialias': (Antialias, 'STIPPLE_ANTIALIAS_'),
-    'StippleFrame': (Frame, 'STIPPLE_FRAME_'),
-    'StippleMaterialColour': (MaterialColour, 'STIPPLE_MATERIAL_'),
-    'StippleAnchorOrder': (AnchorOrder, 'STIPPLE_ORDER_'),
-    'StippleViewRig': (ViewRig, 'STIPPLE_RIG_'),
-    'StippleViewSplit': (ViewSplit, 'STIPPLE_VIEW_SPLIT_'),
-    'StippleModelKind': (ModelKind, 'STIPPLE_MODEL_'),
-    'StippleCameraModel': (CameraModel, 'STIPPLE_CAMERA_'),
-    'StippleLowPass': (LowPass, 'STIPPLE_LOW_PASS_'),
-    'StippleBlendSpace': (BlendSpace, 'STIPPLE_BLEND_'),
-    'StippleOutputColour': (OutputColour, 'STIPPLE_OUTPUT_'),
-    'StippleRenderMethod': (RenderMethod, 'STIPPLE_RENDER_'),
-    'StippleAccuracyLevel': (AccuracyLevel, 'STIPPLE_ACCURACY_'),
-    'StippleSplatOrder': (SplatOrder, 'STIPPLE_ORDER_'),
-    'StippleProjection': (Projection, 'STIPPLE_PROJECTION_'),
-    'StippleSampling': (Sampling, 'STIPPLE_SAMPLING_'),
-    'StipplePrecision': (Precision, 'STIPPLE_PRECISION_'),
-    'StippleEffect': (Effect, 'STIPPLE_EFFECT_'),
-    'StippleEffectChoice': (EffectChoice, 'STIPPLE_EFFECT_'),
-    'StippleSide': (Side, 'STIPPLE_SIDE_'),
-    'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
-    'StippleFitModel': (FitModel, 'STIPPLE_FIT_'),
-    'StippleFitQuality': (FitQuality, 'STIPPLE_FIT_'),
-    'StippleSplatQuantity': (SplatQuantity, 'STIPPLE_QUANTITY_'),
-    'StippleFitBackground': (FitBackground, 'STIPPLE_FIT_BACKGROUND_'),
-}
 
 
 class _Sized(Structure):
@@ -365,7 +165,7 @@ class StippleDecodeOptions(_Sized):
 class StippleCamera(_Sized):
     _fields_ = [('struct_size', c_uint32), ('model', c_uint32), ('width', c_uint32), ('height', c_uint32),
                 ('fx', c_double), ('fy', c_double), ('cx', c_double), ('cy', c_double), ('world_to_camera', _matrix),
-                ('near_plane', c_double), ('far_plane', c_double)]
+                ('near_plane', c_double), ('far_plane', c_double), ('field_of_view', c_double)]
 
 
 class StippleViewsOpenOptions(_Sized):
@@ -414,12 +214,24 @@ class StippleAccuracyKnobInfo(_Sized):
                 ('bound_utf8', c_char_p)]
 
 
+class StippleLens(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('blades', c_uint32), ('aperture_radius', c_double),
+                ('focus_distance', c_double), ('rotation', c_double), ('ratio', c_double)]
+
+
+class StippleShutter(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('step_count', c_uint32), ('cameras', POINTER(c_double)),
+                ('instances', POINTER(c_double)), ('curve', POINTER(c_double)), ('curve_count', c_uint64)]
+
+
 class StippleRenderOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('method', c_uint32), ('low_pass', c_uint32), ('blend_space', c_uint32),
                 ('output_colour', c_uint32), ('sh_degree_limit', c_uint32), ('with_background', c_uint32),
                 ('reserved', c_uint32), ('background', c_double * 3), ('surface_width', c_uint32),
                 ('surface_height', c_uint32), ('surface_depth', _floats), ('surface_colour', _floats),
-                ('matte_opacity', _floats), ('splat_light', _floats), ('accuracy', POINTER(StippleAccuracy))]
+                ('matte_opacity', _floats), ('splat_light', _floats), ('accuracy', POINTER(StippleAccuracy)),
+                ('lens', POINTER(StippleLens)), ('shutter', POINTER(StippleShutter)), ('samples', c_uint32),
+                ('reserved_sampling', c_uint32)]
 
 
 class StippleAccuracyMeasureOptions(_Sized):
@@ -447,7 +259,8 @@ class StippleMeshInstance(_Sized):
 
 class StippleRenderBuffers(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour', _floats), ('depth', _floats),
-                ('median_depth', _floats), ('counts', POINTER(c_uint32)), ('transmittance', _floats)]
+                ('median_depth', _floats), ('counts', POINTER(c_uint32)), ('transmittance', _floats),
+                ('normal', _floats), ('object_index', POINTER(c_uint32))]
 
 
 class StippleEffectsSurvey(_Sized):

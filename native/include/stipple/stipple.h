@@ -585,9 +585,16 @@ StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const Stippl
 
 /* ---- cameras ----------------------------------------------------------------------------------- */
 
+/* The last three see directions, not a plane: their pictures are made along rays only (STIPPLE_RENDER_RAYS,
+ * STIPPLE_RENDER_YARDSTICK), their depths are distances from the camera, near and far planes are spheres, and
+ * splats come in the order of their distances. With a the angle between ray and axis: */
 typedef enum StippleCameraModel {
   STIPPLE_CAMERA_PERSPECTIVE = 0,
-  STIPPLE_CAMERA_ORTHOGRAPHIC = 1
+  STIPPLE_CAMERA_ORTHOGRAPHIC = 1,
+  /* Longitude (x - cx) / fx to the right and latitude (cy - y) / fy upwards; at most 360 by 180 degrees. */
+  STIPPLE_CAMERA_EQUIRECTANGULAR = 2,
+  STIPPLE_CAMERA_FISHEYE_EQUIDISTANT = 3, /* a = r, r = |((x - cx) / fx, (y - cy) / fy)| */
+  STIPPLE_CAMERA_FISHEYE_EQUISOLID = 4    /* r = 2 sin(a / 2): equal areas of the picture are equal solid angles */
 } StippleCameraModel;
 
 typedef struct StippleCamera {
@@ -595,11 +602,14 @@ typedef struct StippleCamera {
   uint32_t model;   /* StippleCameraModel */
   uint32_t width;   /* pixels, 1..65536 */
   uint32_t height;
-  double fx, fy;    /* perspective: pixels; orthographic: pixels per metre */
+  double fx, fy;    /* perspective: pixels; orthographic: pixels per metre; others: pixels per radian (at the axis) */
   double cx, cy;    /* pixels, from the top left corner */
   double world_to_camera[16]; /* rigid */
   double near_plane;          /* metres */
   double far_plane;
+  /* Fisheyes: full angle, radians, up to 2 pi; pixels beyond it are empty, the background too. 0: all that the
+   * model holds, 2 pi. Others: 0. */
+  double field_of_view;
 } StippleCamera;
 
 /* Reads the cameras of transforms.json (nerfstudio, NeRF-synthetic) or a COLMAP model. path_utf8: a file, or a
@@ -832,6 +842,28 @@ typedef enum StippleRenderMethod {
   STIPPLE_RENDER_YARDSTICK = 3
 } StippleRenderMethod;
 
+/* The opening of the camera's lens, as Cycles has it: what is not in focus becomes a picture of it. */
+typedef struct StippleLens {
+  uint32_t struct_size;
+  uint32_t blades;        /* 3..64: a regular polygon with its corners on the circle; 0: round */
+  double aperture_radius; /* metres, 0 or more */
+  double focus_distance;  /* metres, as depths are: there everything is sharp */
+  double rotation;        /* of the polygon, radians, counterclockwise as the camera sees it */
+  double ratio;           /* the opening is that much narrower than high; 0: 1 */
+} StippleLens;
+
+/* What moves while the shutter is open: matrices at steps spread evenly over that time, the first at its begin,
+ * the last at its end. Between steps rotations turn evenly (slerp), what is left of the matrices goes straight.
+ * Read during the call. */
+typedef struct StippleShutter {
+  uint32_t struct_size;
+  uint32_t step_count;        /* 2..1025 */
+  const double* cameras;      /* [steps,16] world_to_camera; NULL: the camera stands still */
+  const double* instances;    /* [steps,count,16] object to world; NULL: they stand still */
+  const double* curve;        /* [curve_count] 0 or more: how far it is open, evenly over the time; NULL: evenly */
+  uint64_t curve_count;       /* 2 or more, with curve */
+} StippleShutter;
+
 typedef struct StippleRenderOptions {
   uint32_t struct_size;
   uint32_t method;          /* StippleRenderMethod */
@@ -861,6 +893,16 @@ typedef struct StippleRenderOptions {
   /* How exact the picture is, and what that costs. Read during the call. NULL: as final. Otherwise method must be
    * STIPPLE_RENDER_TILED. Not for backward passes. */
   const StippleAccuracy* accuracy;
+  /* Averages of pictures. With any of these, colours and transmittance are the mean of `samples` pictures from
+   * points of the lens, moments and places in the pixel, in scene linear light; depths and counts are those of
+   * one more picture from the middle of all. The points are those of a fixed low-discrepancy sequence: the same
+   * bits for any number of threads. A surface takes part in every picture as it is: hand it in as it is to
+   * appear, blurred. Cost: that of so many pictures; memory: 50 bytes per pixel more. */
+  const StippleLens* lens;       /* read during the call; NULL or radius 0: everything is sharp */
+  const StippleShutter* shutter; /* read during the call; NULL: nothing moves */
+  uint32_t samples;              /* 1..65536; 1: the middle of all. 0: 1 without lens and shutter, else a power of
+                                    two from 16 to 256 by how far they spread the splats */
+  uint32_t reserved_sampling;
 } StippleRenderOptions;
 void stipple_render_options_init(StippleRenderOptions* options);
 
@@ -873,6 +915,12 @@ typedef struct StippleRenderBuffers {
   float* median_depth;  /* [H,W] planar z where transmittance passes 1/2; 1e10 where it does not */
   uint32_t* counts;     /* [H,W] splats blended */
   float* transmittance; /* [H,W] share of the light from behind everything that passes, through holes too */
+  /* [H,W,3] in the world: mean of the splats' shortest axes as far as they turn to the camera, by weight, made unit
+   * again; 0 where no splat shows. Costs one more blending of the splats. */
+  float* normal;
+  /* [H,W] 1 + the instance whose splats weigh most together; 0 where none shows and where the surface weighs as
+   * much. Costs one more blending for every three instances that meet in a tile of 16 x 16 pixels. */
+  uint32_t* object_index;
 } StippleRenderBuffers;
 
 StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer);

@@ -12,6 +12,7 @@
 #include "splat/cpu/ray_forms.h"
 #include "splat/cpu/ray_lists.h"
 #include "splat/double_pixel.h"
+#include "splat/pixel_passes.h"
 #include "splat/scene.h"
 
 // Order at a pixel: a tile takes its splats by the nearest that any of its rays may meet them, some
@@ -64,14 +65,17 @@ struct Listed {
 class TileRays {
  public:
   TileRays(RayTileKernel kernel, const PlacedScene& scene, const std::vector<RayForm>& forms,
-           const RenderOptions& options, const RayOptions& rays, RenderResult& result)
+           const PassValues& pass_values, const RenderOptions& options, const RayOptions& rays,
+           RenderResult& result)
       : kernel_(kernel),
         scene_(scene),
         forms_(forms),
+        pass_values_(pass_values),
         options_(options),
         rays_(rays),
         result_(result),
         by_pixel_(rays.order == RayOrder::kResponse),
+        passes_(hasPasses(options) ? kTilePixelCount : 0),
         hits_(kTilePixelCount) {
     // Places of affine splats are those of the picture: the centre alone is between the planes.
     const bool is_affine = rays.projection == RayProjection::kAffine;
@@ -103,7 +107,10 @@ class TileRays {
     }
     for (uint32_t y = 0; y < height_; ++y) {
       for (uint32_t x = 0; x < width_; ++x) {
-        pixels_[y * kTileSide + x].write(options_, indexOf(x, y), result_);
+        const size_t pixel = y * kTileSide + x;
+        pixels_[pixel].write(options_, indexOf(x, y), result_);
+        if (passes_.empty()) continue;
+        passes_[pixel].write(options_, indexOf(x, y), pixels_[pixel].ownSurfaceWeight(), result_);
       }
     }
   }
@@ -115,6 +122,7 @@ class TileRays {
 
   void openPixels() {
     pixels_.clear();
+    for (PixelPasses& passes : passes_) passes.clear();
     open_count_ = 0;
     for (uint32_t y = 0; y < kTileSide; ++y) {
       for (uint32_t x = 0; x < kTileSide; ++x) {
@@ -232,7 +240,12 @@ class TileRays {
   /// Returns false where the pixel has ended.
   bool blend(uint32_t pixel, uint32_t splat, double depth, double alpha) {
     const RayForm& form = forms_[splat];
-    if (pixels_[pixel].add(alpha, form.colour, depth, form.is_holdout)) return true;
+    if (pixels_[pixel].add(alpha, form.colour, depth, form.is_holdout)) {
+      if (!passes_.empty() && !form.is_holdout) {
+        pass_values_.add(pixels_[pixel].weight(), splat, passes_[pixel]);
+      }
+      return true;
+    }
     open_[pixel] = 0.0f;
     --open_count_;
     return false;
@@ -281,6 +294,7 @@ class TileRays {
   RayTileKernel kernel_;
   const PlacedScene& scene_;
   const std::vector<RayForm>& forms_;
+  const PassValues& pass_values_;
   const RenderOptions& options_;
   const RayOptions& rays_;
   RenderResult& result_;
@@ -292,17 +306,21 @@ class TileRays {
   RayMetPixels met_;
   std::vector<Listed> listed_;
   std::vector<DoublePixel> pixels_;
+  std::vector<PixelPasses> passes_;  ///< empty where none is asked for
   std::vector<std::vector<Pending>> hits_;
 };
 
 struct Forms {
   std::vector<RayForm> forms;
   std::vector<RayReach> reaches;
+  PassValues pass_values;
 };
 
 template <typename Splat, typename Form, typename Reach>
-Forms formsOf(const std::vector<Splat>& splats, Form form, Reach reach) {
+Forms formsOf(const PlacedScene& scene, const RenderOptions& options,
+              const std::vector<Splat>& splats, Form form, Reach reach) {
   Forms out;
+  out.pass_values = passValues(scene, splats, options);
   out.forms.resize(splats.size());
   out.reaches.resize(splats.size());
   parallelFor(splats.size(), 1024, [&](size_t begin, size_t end) {
@@ -314,15 +332,17 @@ Forms formsOf(const std::vector<Splat>& splats, Form form, Reach reach) {
   return out;
 }
 
-Forms formsOf(const PlacedScene& scene, const RayOptions& rays) {
+Forms formsOf(const PlacedScene& scene, const RenderOptions& options, const RayOptions& rays) {
   const double least = rays.limits.least_alpha;
   if (rays.projection == RayProjection::kAffine) {
     return formsOf(
-        affineSplats(scene, least), [](const AffineSplat& splat) { return rayForm(splat); },
+        scene, options, affineSplats(scene, least),
+        [](const AffineSplat& splat) { return rayForm(splat); },
         [](const AffineSplat& splat) { return rayReach(splat); });
   }
   return formsOf(
-      raySplats(scene, least), [&](const RaySplat& splat) { return rayForm(scene.view, splat); },
+      scene, options, raySplats(scene, least),
+      [&](const RaySplat& splat) { return rayForm(scene.view, splat); },
       [&](const RaySplat& splat) { return rayReach(scene.view, splat, least); });
 }
 
@@ -336,7 +356,7 @@ RenderResult renderRayTilesWith(RayTileKernel kernel, std::span<const SplatInsta
   }
   const PlacedScene scene = placeScene(instances, camera, options);
   advance(progress, rays.progress_begin, "Placing splats");
-  const Forms forms = formsOf(scene, rays);
+  const Forms forms = formsOf(scene, options, rays);
   RenderResult result;
   sizeResult(camera, options, result);
   result.visible_count = forms.forms.size();
@@ -350,7 +370,7 @@ RenderResult renderRayTilesWith(RayTileKernel kernel, std::span<const SplatInsta
           static_cast<double>(drawn.fetch_add(end - begin)) / static_cast<double>(grid.tileCount());
       advance(progress, rays.progress_begin + done * (rays.progress_end - rays.progress_begin),
               "Following rays");
-      TileRays tile(kernel, scene, forms.forms, options, rays, result);
+      TileRays tile(kernel, scene, forms.forms, forms.pass_values, options, rays, result);
       for (size_t i = begin; i < end; ++i) {
         const size_t index = band.first_tile + i;
         tile.draw(static_cast<uint32_t>(index % grid.columns) * kTileSide,

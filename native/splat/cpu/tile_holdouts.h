@@ -12,13 +12,22 @@ enum class Paint : uint32_t {
   kStored,   ///< the colours as they are: there are no holdouts
   kColours,  ///< holdouts black
   kShares,   ///< red 1 and green the depth where a splat shows, blue 1 where it only hides
+  kNormals,  ///< normals, holdouts 0
+  kObjects,  ///< 1 where a splat is of the wanted object, one for each of red, green and blue
 };
 
-/// In and out: colour [3], kHoldoutColour where the splat is a holdout.
-void paintSplat(Paint paint, float depth, float* colour);
+struct Painter {
+  Paint paint = Paint::kStored;
+  const float* normals = nullptr;     ///< 3 by slot, of kNormals
+  const uint32_t* objects = nullptr;  ///< by slot, of kObjects
+  uint32_t wanted[3] = {0, 0, 0};
 
-/// A batch of a tile.
-void paintSplats(Paint paint, size_t count, TileSplat* splats);
+  /// In and out: colour [3], kHoldoutColour where the splat is a holdout.
+  void apply(uint32_t slot, float depth, float* colour) const;
+};
+
+/// A batch of a tile. In: slots [count].
+void paintSplats(const Painter& painter, const uint32_t* slots, size_t count, TileSplat* splats);
 
 /// Sums of w of one pixel that was blended as Paint::kShares.
 struct PixelShares {

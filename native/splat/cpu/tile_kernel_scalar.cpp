@@ -3,6 +3,7 @@
 
 #include "splat/blend.h"
 #include "splat/cpu/tile_kernel.h"
+#include "splat/effects.h"
 
 namespace stipple {
 
@@ -45,9 +46,9 @@ void blendPixel(const TileSplat& splat, float alpha, const TileKernelOptions& op
   pixels.red[i] += pixel.colour[0];
   pixels.green[i] += pixel.colour[1];
   pixels.blue[i] += pixel.colour[2];
-  if (options.with_depth) pixels.weighted_depth[i] += pixel.weighted_depth;
-  if (options.with_depth && options.with_coverage) pixels.coverage[i] += weight;
-  if (options.with_extras) {
+  if (kHasEffects && options.with_depth) pixels.weighted_depth[i] += pixel.weighted_depth;
+  if (kHasEffects && options.with_depth && options.with_coverage) pixels.coverage[i] += weight;
+  if (kHasEffects && options.with_extras) {
     if (pixel.has_median && !had_median) pixels.median_depth[i] = splat.depth;
     pixels.count[i] += 1.0f;
   }
@@ -93,7 +94,7 @@ void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions op
         const float g1 = splat.g1 + splat.l10 * column + splat.l11 * static_cast<float>(y);
         const float exponent = splat.log2_opacity - (g0 * g0 + g1 * g1);
         if (exponent <= kLog2MinAlpha - splat.doubt_low) continue;
-        if (options.with_surface && splat.depth > pixels.wall[i] &&
+        if (kHasEffects && options.with_surface && splat.depth > pixels.wall[i] &&
             !passSurface(splat, options, pixels, i, place)) {
           continue;
         }

@@ -10,6 +10,7 @@
 
 #include "splat/blend.h"
 #include "splat/cpu/exp2-inl.h"
+#include "splat/effects.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stipple {
@@ -193,7 +194,9 @@ void blendWithExtras(const TileSplat* splats, size_t count, const TileKernelOpti
 
 void blendTile(const TileSplat* splats, size_t count, TileKernelOptions options,
                TilePixels& pixels) {
-  if (options.culling != TileCulling::kAll && options.with_depth && !options.with_extras) {
+  if constexpr (!kHasEffects) {
+    blendSplats<false, false, false>(splats, count, options, pixels);
+  } else if (options.culling != TileCulling::kAll && options.with_depth && !options.with_extras) {
     if (options.culling == TileCulling::kRows) {
       blendSplats<true, false, false, false, TileCulling::kRows>(splats, count, options, pixels);
     } else {

@@ -13,6 +13,8 @@
 #include "splat/cpu/tile_lists.h"
 #include "splat/cpu/tile_surface.h"
 #include "splat/cpu/visible_splats.h"
+#include "splat/effects.h"
+#include "splat/pixel_passes.h"
 #include "splat/scene.h"
 #include "splat/surface.h"
 
@@ -28,6 +30,10 @@ namespace {
 
 constexpr size_t kBatchSize = 128;
 
+bool hasLayer(const RenderOptions& options) {
+  return kHasEffects && hasSurface(options);
+}
+
 /// A pixel of a tile that is blended as the reference blends it.
 struct DoubtfulPixel {
   uint32_t x, y;
@@ -37,8 +43,8 @@ struct DoubtfulPixel {
 
 /// Goes over the tile's splats once for all of them.
 template <bool kSurface>
-void blendInDouble(const SplatSlots& slots, const Tile& tile, Paint paint, DoubtfulPixel* pixels,
-                   size_t count) {
+void blendInDouble(const SplatSlots& slots, const Tile& tile, const Painter& painter,
+                   DoubtfulPixel* pixels, size_t count) {
   constexpr size_t kAhead = 8;
   for (size_t i = 0; i < tile.splats.size() && count > 0; ++i) {
     const size_t ahead = std::min(i + kAhead, tile.splats.size() - 1);
@@ -47,7 +53,7 @@ void blendInDouble(const SplatSlots& slots, const Tile& tile, Paint paint, Doubt
     const uint32_t slot = tile.splats[i];
     const VisibleSplat& splat = slots.splats[slot];
     float colour[3] = {splat.colour[0], splat.colour[1], splat.colour[2]};
-    paintSplat(paint, splat.depth, colour);
+    painter.apply(slot, splat.depth, colour);
     for (size_t k = 0; k < count; ++k) {
       double distance;
       if (!mayShow(splat, tile, pixels[k].x, pixels[k].y, distance)) continue;
@@ -68,7 +74,7 @@ void blendInDouble(const SplatSlots& slots, const Tile& tile, Paint paint, Doubt
 }
 
 void replaceDoubtful(const SplatSlots& slots, const Tile& tile, const RenderOptions& options,
-                     Paint paint, TilePixels& pixels) {
+                     const Painter& painter, TilePixels& pixels) {
   uint32_t any = 0;
   for (const float doubt : pixels.doubt) any |= std::bit_cast<uint32_t>(doubt);
   if (any == 0) return;
@@ -81,19 +87,19 @@ void replaceDoubtful(const SplatSlots& slots, const Tile& tile, const RenderOpti
       if (pixels.doubt[next] == 0.0f) continue;
       doubtful[count++] = {next % kTileSide, next / kTileSide, {}, {}};
     }
-    if (hasSurface(options)) {
+    if (hasLayer(options)) {
       for (size_t k = 0; k < count; ++k) {
         const size_t row = static_cast<size_t>(tile.y0 + doubtful[k].y) * options.surface.width;
         doubtful[k].surface = surfaceAt<double>(options.surface, row + tile.x0 + doubtful[k].x);
       }
-      blendInDouble<true>(slots, tile, paint, doubtful, count);
+      blendInDouble<true>(slots, tile, painter, doubtful, count);
     } else {
-      blendInDouble<false>(slots, tile, paint, doubtful, count);
+      blendInDouble<false>(slots, tile, painter, doubtful, count);
     }
     for (size_t k = 0; k < count; ++k) {
       const size_t i = static_cast<size_t>(doubtful[k].y) * kTileSide + doubtful[k].x;
       PixelBlend<double>& pixel = doubtful[k].blend;
-      if (hasSurface(options)) {
+      if (hasLayer(options)) {
         if (pixel.surface_weight < 0) pixel.addSurface(doubtful[k].surface);
         pixels.before[i] = static_cast<float>(pixel.surface_weight);
       }
@@ -146,22 +152,22 @@ void writeRow(const TilePixels& pixels, size_t first, size_t count, const Render
       colour[x * 4 + 3] = 1.0f - transmittance[x];
     }
   }
-  if (options.with_depth) {
+  if (kHasEffects && options.with_depth) {
     float* depth = &result.depth[out];
     for (size_t x = 0; x < count; ++x) depth[x] = expectedDepth(pixels, first + x);
   }
-  if (options.with_median_depth) {
+  if (kHasEffects && options.with_median_depth) {
     for (size_t x = 0; x < count; ++x) {
       const float median = pixels.median_depth[first + x];
       result.median_depth[out + x] = median == kNoMedian ? kEmptyDepth : median;
     }
   }
-  if (options.with_counts) {
+  if (kHasEffects && options.with_counts) {
     for (size_t x = 0; x < count; ++x) {
       result.counts[out + x] = static_cast<uint32_t>(pixels.count[first + x]);
     }
   }
-  if (options.with_transmittance) {
+  if (kHasEffects && options.with_transmittance) {
     std::copy_n(transmittance, count, result.transmittance.begin() + static_cast<ptrdiff_t>(out));
   }
 }
@@ -187,7 +193,7 @@ void writePixels(const Tile& tile, const TilePixels& pixels, const TilePixels* s
     writeRow(pixels, first, tile.width, options, result, out);
     if (shares) leaveOutHoldouts(*shares, first, tile.width, options, result, out);
   }
-  if (hasSurface(options)) writeWithSurface(tile, pixels, shares, options, result);
+  if (hasLayer(options)) writeWithSurface(tile, pixels, shares, options, result);
 }
 
 /// The batch that the kernel works on, for judgeAlpha.
@@ -221,13 +227,13 @@ void keepTile(size_t index, const TilePixels& pixels, KeptPicture& kept) {
 
 /// In: which sums are wanted. Out: pixels.
 void blendTile(const SplatSlots& slots, Tile tile, TileKernel kernel, const RenderOptions& options,
-               TileKernelOptions kernel_options, Paint paint, TilePixels& pixels) {
+               TileKernelOptions kernel_options, const Painter& painter, TilePixels& pixels) {
   // Scratch of this thread: 10 KiB of pixels and 8 KiB of splats, in the first-level cache.
   TileSplat batch[kBatchSize];
   clearPixels(tile, pixels);
-  if (hasSurface(options)) takeSurface(options.surface, slots.splats, tile, pixels);
+  if (hasLayer(options)) takeSurface(options.surface, slots.splats, tile, pixels);
   Judged judged{&slots, &tile, 0};
-  kernel_options.with_surface = hasSurface(options);
+  kernel_options.with_surface = hasLayer(options);
   kernel_options.surface_shows = options.surface.colour != nullptr;
   kernel_options.judge = judgeAlpha;
   kernel_options.judge_context = &judged;
@@ -235,36 +241,77 @@ void blendTile(const SplatSlots& slots, Tile tile, TileKernel kernel, const Rend
   for (size_t begin = 0; begin < tile.splats.size() && pixels.unfinished > 0; begin += kBatchSize) {
     const size_t count = std::min(kBatchSize, tile.splats.size() - begin);
     makeTileSplats(slots.splats, tile, begin, count, largest, batch);
-    paintSplats(paint, count, batch);
+    paintSplats(painter, tile.splats.data() + begin, count, batch);
     judged.begin = begin;
     kernel_options.first = static_cast<int32_t>(begin);
     const size_t behind = tile.splats.size() - begin - count + tile.listed_behind;
     kernel_options.next = {slots.splats, tile.splats.data() + begin + count, behind};
     kernel(batch, count, kernel_options, pixels);
   }
-  if (hasSurface(options)) {
+  if (hasLayer(options)) {
     endWithSurface(options.surface, tile, kernel_options.with_extras, pixels);
   }
-  replaceDoubtful(slots, tile, options, paint, pixels);
+  replaceDoubtful(slots, tile, options, painter, pixels);
 }
 
-/// Out: result and kept, where not null.
-void renderTile(const SplatSlots& slots, const Tile& tile, size_t index, TileKernel kernel,
-                const RenderOptions& options, bool has_holdouts, RenderResult* result,
-                KeptPicture* kept) {
-  TileKernelOptions wanted = {options.with_depth, options.with_median_depth || options.with_counts};
-  wanted.with_coverage = kept != nullptr;
+/// Normals and objects, each by blending the tile again.
+void renderPasses(const SplatSlots& slots, const Tile& tile, TileKernel kernel,
+                  const RenderOptions& options, const PassSplats& passes, RenderResult& result) {
   TilePixels pixels;
-  blendTile(slots, tile, kernel, options, wanted, has_holdouts ? Paint::kColours : Paint::kStored,
-            pixels);
-  if (result && has_holdouts) {
-    TilePixels shares;
-    blendTile(slots, tile, kernel, options, {false, false}, Paint::kShares, shares);
-    writePixels(tile, pixels, &shares, options, *result);
-  } else if (result) {
-    writePixels(tile, pixels, nullptr, options, *result);
+  if (options.with_normal) {
+    const Painter painter = {Paint::kNormals, passes.normals.get(), nullptr, {}};
+    blendTile(slots, tile, kernel, options, {false, false}, painter, pixels);
+    writeNormals(tile, pixels, result);
   }
-  if (kept) keepTile(index, pixels, *kept);
+  if (!options.with_objects) return;
+  const std::vector<uint32_t> objects = objectsOf(tile, passes);
+  TileObjects found;
+  clearPixels(tile, pixels);
+  for (size_t first = 0; first < objects.size(); first += 3) {
+    Painter painter = {Paint::kObjects, nullptr, passes.objects.get(), {}};
+    for (size_t c = 0; c < 3; ++c) {
+      painter.wanted[c] = first + c < objects.size() ? objects[first + c] : 0;
+    }
+    blendTile(slots, tile, kernel, options, {false, false}, painter, pixels);
+    found.take(pixels, painter.wanted);
+  }
+  // Without objects nothing was blended, and there is nothing that a surface could hide.
+  RenderOptions no_surface;
+  found.write(tile, pixels, objects.empty() ? no_surface : options, result);
+}
+
+/// What a tile is drawn into; null: not wanted.
+struct TileTargets {
+  RenderResult* result;
+  KeptPicture* kept;
+  const PassSplats* passes;
+};
+
+void renderTile(const SplatSlots& slots, const Tile& tile, size_t index, TileKernel kernel,
+                const RenderOptions& options, bool has_holdouts, const TileTargets& targets) {
+  TileKernelOptions wanted = {options.with_depth, options.with_median_depth || options.with_counts};
+  wanted.with_coverage = targets.kept != nullptr;
+  TilePixels pixels;
+  if constexpr (!kHasEffects) {
+    blendTile(slots, tile, kernel, options, {false, false}, {}, pixels);
+    writePixels(tile, pixels, nullptr, options, *targets.result);
+    return;
+  }
+  Painter painter;
+  painter.paint = has_holdouts ? Paint::kColours : Paint::kStored;
+  blendTile(slots, tile, kernel, options, wanted, painter, pixels);
+  if (targets.result && has_holdouts) {
+    TilePixels shares;
+    painter.paint = Paint::kShares;
+    blendTile(slots, tile, kernel, options, {false, false}, painter, shares);
+    writePixels(tile, pixels, &shares, options, *targets.result);
+  } else if (targets.result) {
+    writePixels(tile, pixels, nullptr, options, *targets.result);
+  }
+  if (targets.kept) keepTile(index, pixels, *targets.kept);
+  if (targets.passes) {
+    renderPasses(slots, tile, kernel, options, *targets.passes, *targets.result);
+  }
 }
 
 void prepareResult(const Camera& camera, const RenderOptions& options, RenderResult& result) {
@@ -276,15 +323,18 @@ void prepareResult(const Camera& camera, const RenderOptions& options, RenderRes
   result.median_depth.resize(options.with_median_depth ? pixel_count : 0);
   result.counts.resize(options.with_counts ? pixel_count : 0);
   result.transmittance.resize(options.with_transmittance ? pixel_count : 0);
-  result.surface_weight.resize(hasSurface(options) && options.splats_apart ? pixel_count : 0);
+  result.normal.resize(options.with_normal ? pixel_count * 3 : 0);
+  result.objects.resize(options.with_objects ? pixel_count : 0);
+  result.surface_weight.resize(hasLayer(options) && options.splats_apart ? pixel_count : 0);
 }
 
 uint64_t resultBytes(const Camera& camera, const RenderOptions& options) {
   const uint64_t pixel_count = static_cast<uint64_t>(camera.width) * camera.height;
   const uint64_t planes = 4u + (options.with_depth ? 1u : 0u) +
                           (options.with_median_depth ? 1u : 0u) + (options.with_counts ? 1u : 0u) +
-                          (options.with_transmittance ? 1u : 0u) +
-                          (hasSurface(options) && options.splats_apart ? 1u : 0u);
+                          (options.with_transmittance ? 1u : 0u) + (options.with_normal ? 3u : 0u) +
+                          (options.with_objects ? 1u : 0u) +
+                          (hasLayer(options) && options.splats_apart ? 1u : 0u);
   return pixel_count * planes * sizeof(float);
 }
 
@@ -304,7 +354,7 @@ uint64_t RenderWorkspace::bytes() const {
          (visible.filled.capacity() + visible.digits.capacity() + lists.counts.capacity()) *
              sizeof(uint32_t) +
          (lists.cursors.capacity() + lists.group.offsets.capacity()) * sizeof(uint64_t) +
-         lists.group.entries.bytes() + arrays_->kept.bytes();
+         lists.group.entries.bytes() + arrays_->kept.bytes() + arrays_->passes.bytes();
 }
 
 void RenderWorkspace::keepForBackward(bool keep) {
@@ -400,11 +450,11 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
                const Camera& camera, const RenderOptions& options, RenderWorkspace& workspace,
                RenderResult* result, KeptPicture* kept, Progress* progress) {
   static std::atomic<uint64_t> pictures{0};
-  if (kept && hasSurface(options)) {
+  if (kept && hasLayer(options)) {
     fail(ErrorCode::kUnsupported,
          "the picture has a surface; pictures that a backward pass goes on from can have none");
   }
-  auto& [scene, visible, lists, last] = workspace.arrays();
+  auto& [scene, visible, lists, last, passes] = workspace.arrays();
   last.number = 0;  // also where this fails on the way
   placeSceneUnread(instances, camera, options, scene);
   if (kept && scene.has_holdouts) {
@@ -417,7 +467,9 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
   if (result) {
     prepareResult(camera, options, *result);
     result->visible_count = visible.count;
+    findPassSplats(scene, visible, options, passes);
   }
+  const TileTargets targets = {result, kept, result && hasPasses(options) ? &passes : nullptr};
 
   const TileGrid grid(camera.width, camera.height);
   std::atomic<size_t> finished_tiles{0};
@@ -427,7 +479,7 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
         if (progress) progress->throwIfCancelled();
         Tile tile = tileOf(grid, index, group.tile(index));
         tile.listed_behind = group.listedBehind(index);
-        renderTile(visible.slots(), tile, index, kernel, options, scene.has_holdouts, result, kept);
+        renderTile(visible.slots(), tile, index, kernel, options, scene.has_holdouts, targets);
         const size_t finished = finished_tiles.fetch_add(1, std::memory_order_relaxed) + 1;
         if (finished % grid.columns == 0) {
           advance(progress, static_cast<double>(finished) / static_cast<double>(grid.tileCount()),
@@ -493,7 +545,8 @@ RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera
   const TileGrid grid(camera.width, camera.height);
   const TileListsBound lists = tileListsBound(splat_count, grid);
   RenderMemory memory;
-  memory.splat_bytes = visibleSplatsMemoryBound(splat_count);
+  memory.splat_bytes =
+      visibleSplatsMemoryBound(splat_count) + passSplatsBound(splat_count, options);
   memory.pair_bytes = lists.pair_bytes;
   memory.pixel_bytes = lists.other_bytes;
   if (keeps_for_backward) {

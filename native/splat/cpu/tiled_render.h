@@ -2,6 +2,7 @@
 
 #include "splat/cpu/tile_kernel.h"
 #include "splat/cpu/tile_lists.h"
+#include "splat/cpu/tile_passes.h"
 #include "splat/cpu/visible_splats.h"
 #include "splat/render.h"
 
@@ -36,6 +37,7 @@ struct RenderWorkspace::Arrays {
   VisibleSplats visible;
   TileListMemory lists;
   KeptPicture kept;
+  PassSplats passes;
 };
 
 /// Tells whether the clouds, of unchanged sizes, are still those that were drawn: of every position

@@ -74,7 +74,7 @@ TEST_F(BadInput, CamerasThatMakeNoPictureAreRefused) {
       {[](StippleCamera& c) { c.world_to_camera[6] = kNan; }, "camera.world_to_camera is nan"},
       {[](StippleCamera& c) { c.near_plane = c.far_plane; }, "1e-9 <= near < far is needed"},
       {[](StippleCamera& c) { c.far_plane = kNan; }, "camera.far_plane is nan"},
-      {[](StippleCamera& c) { c.model = 2; }, "camera->model is 2; 0 to 1 is allowed"}};
+      {[](StippleCamera& c) { c.model = 5; }, "camera->model is 5; 0 to 4 is allowed"}};
   const StippleInstance instance = placed(cloud_);
   for (const Case& c : cases) {
     StippleCamera camera = frontCamera();

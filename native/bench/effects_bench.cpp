@@ -1,0 +1,115 @@
+#include <numbers>
+
+#include "base/parallel.h"
+#include "bench/comparison.h"
+#include "bench/splat_scene.h"
+#include "splat/ray_render.h"
+#include "splat/sampled_render.h"
+
+// What effects cost, as ratios to the picture without them.
+
+namespace stipple::bench {
+namespace {
+
+constexpr SplatCase kCase = {"100k", 100'000, 640, 480, 1, 1.0};
+constexpr SplatCase kFew = {"10k", 10'000, 320, 160, 1, 1.0};
+
+/// Draws into memory that is there already, as engines do.
+class Drawer {
+ public:
+  explicit Drawer(const SplatCase& c) : instance_{&cloudOf(c)}, camera_(cameraOf(c)) {}
+
+  void plain(const RenderOptions& options = {}) {
+    withThreads(2, [&] { renderTiled({&instance_, 1}, camera_, options, workspace_, result_); });
+  }
+
+  void sampled(const Sampling& sampling) {
+    withThreads(2, [&] {
+      renderSampled(
+          {&instance_, 1}, camera_, {}, sampling,
+          [&](std::span<const SplatInstance> instances, const Camera& camera,
+              const RenderOptions& options, RenderResult& out, Progress* progress) {
+            renderTiled(instances, camera, options, workspace_, out, progress);
+          },
+          result_);
+    });
+  }
+
+  const SplatInstance& instance() const { return instance_; }
+
+ private:
+  SplatInstance instance_;
+  Camera camera_;
+  RenderWorkspace workspace_;
+  RenderResult result_;
+};
+
+/// One more blending for each: 2 and 2 times the plain picture at most.
+void passes(benchmark::State& state) {
+  Drawer drawer(kCase);
+  drawer.plain();
+  RenderOptions normal, objects;
+  normal.with_normal = true;
+  objects.with_objects = true;
+  compareWithAll(state, [&] { drawer.plain(); },
+                 {{"normal_to_plain", 0, [&] { drawer.plain(normal); }},
+                  {"objects_to_plain", 0, [&] { drawer.plain(objects); }}});
+}
+
+/// 16 pictures over lens and time against 16 times one.
+void lensAndShutter(benchmark::State& state) {
+  Drawer drawer(kCase);
+  drawer.plain();
+  Sampling lens;
+  lens.samples = 16;
+  lens.aperture.radius = 0.05;
+  lens.aperture.focus_distance = 3;
+  Sampling shutter;
+  shutter.samples = 16;
+  Mat4d after = Mat4d::Identity();
+  after(0, 3) = 0.1;
+  shutter.shutter.step_count = 2;
+  shutter.shutter.instances = {Mat4d::Identity(), after};
+  compareWithAll(state,
+                 [&] {
+                   for (int i = 0; i < 16; ++i) drawer.plain();
+                 },
+                 {{"lens_to_16_pictures", 0, [&] { drawer.sampled(lens); }},
+                  {"shutter_to_16_pictures", 0, [&] { drawer.sampled(shutter); }}});
+}
+
+/// Panorama and fisheye along rays against a perspective picture along rays, of as many pixels.
+void wideCameras(benchmark::State& state) {
+  const Drawer drawer(kFew);
+  const Camera flat = cameraOf(kFew);
+  const auto draw = [&](CameraModel model) {
+    Camera camera = flat;
+    camera.model = model;
+    if (model == CameraModel::kEquirectangular) {
+      camera.fx = camera.width / (2 * std::numbers::pi);
+      camera.fy = camera.height / std::numbers::pi;
+    } else if (!hasImagePlane(camera)) {
+      camera.fx = camera.fy = camera.height / std::numbers::pi;
+    }
+    withThreads(2, [&] { renderRays({&drawer.instance(), 1}, camera, {}, {}); });
+  };
+  compareWithAll(state, [&] { draw(CameraModel::kPerspective); },
+                 {{"panorama_to_perspective", 0, [&] { draw(CameraModel::kEquirectangular); }},
+                  {"fisheye_to_perspective", 0, [&] { draw(CameraModel::kFisheyeEquidistant); }}});
+}
+
+const bool registered = [] {
+  const auto add = [](const char* name, void (*run)(benchmark::State&), int iterations) {
+    benchmark::RegisterBenchmark(name, run)
+        ->UseManualTime()
+        ->Iterations(iterations)
+        ->Unit(benchmark::kMillisecond);
+  };
+  add("effects.passes.100k", passes, 7);
+  add("effects.lens_and_shutter.100k", lensAndShutter, 3);
+  add("effects.wide_cameras.10k", wideCameras, 3);
+  return true;
+}();
+
+}  // namespace
+}  // namespace stipple::bench
