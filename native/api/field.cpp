@@ -39,8 +39,9 @@ ModelParts loadField(const std::string& path) {
     auto density = std::make_shared<const OctreeDensity>(OctreeDensity::fromLevels(
         root, std::move(asset.cells), std::move(asset.log_probabilities)));
     auto field = std::make_shared<const FieldParameters>(fieldOfTensors(asset.tensors, like));
-    return {FieldSource{std::move(density), std::make_shared<const FieldDecoder>(std::move(field)),
-                        asset.jitter},
+    return {FieldSource{std::move(density),
+                        std::make_shared<const FieldDecoder>(std::move(field)),
+                        {asset.jitter, asset.nested, asset.seed}},
             std::move(notes)};
   } catch (const Error& error) {
     fail(ErrorCode::kFormat, path + ": " + error.what());
@@ -56,7 +57,9 @@ void saveField(const FieldSource& source, const ModelNotes& notes, const std::st
   asset.sh_degree = field.layout.sh_degree;
   asset.least_anchors = field.least_anchors;
   asset.most_anchors = field.most_anchors;
-  asset.jitter = source.jitter;
+  asset.jitter = source.draws.jitter;
+  asset.nested = source.draws.nested;
+  asset.seed = source.draws.seed;
   asset.colour_space = field.colour_space;
   asset.antialias = field.antialias;
   asset.tensors = tensorsOfField(field);

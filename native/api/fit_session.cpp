@@ -155,7 +155,7 @@ ModelParts FitSession::model() const {
   auto notes = std::make_shared<const ModelNotes>(ModelNotes{settings_json_, {}});
   return {
       FieldSource{std::make_shared<const OctreeDensity>(std::move(learned->density)),
-                  std::make_shared<const FieldDecoder>(std::move(learned->field)), learned->jitter},
+                  std::make_shared<const FieldDecoder>(std::move(learned->field)), learned->draws},
       std::move(notes)};
 }
 

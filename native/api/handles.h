@@ -22,6 +22,7 @@
 #include "decode/field_decoder.h"
 #include "decode/hierarchy_decoder.h"
 #include "decode/surface_model.h"
+#include "density/learned_draws.h"
 #include "density/octree_density.h"
 #include "io/asset_header.h"
 #include "io/camera_file.h"
@@ -54,7 +55,7 @@ struct ModelNotes {
 struct FieldSource {
   std::shared_ptr<const OctreeDensity> density;
   std::shared_ptr<const FieldDecoder> decoder;
-  bool jitter = true;  ///< anchors are anywhere in their leaf; else in its middle
+  LearnedDraws draws;
 };
 
 /// A source of splats: of a mesh, of an existing cloud, or learned.

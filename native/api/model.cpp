@@ -10,7 +10,6 @@
 #include "base/parallel.h"
 #include "io/asset_header.h"
 #include "io/surface_asset.h"
-#include "train/field_model.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -77,14 +76,14 @@ DecodeSettings decodeSettings(const StippleDecodeOptions* options) {
 struct Sampled {
   const OctreeDensity* density;
   const Decoder* decoder;
-  bool jitter;  ///< anchors are anywhere in their leaf; else in its middle
+  LearnedDraws draws;
 };
 Sampled sampledOf(const ModelParts& parts) {
   if (const FieldSource* field = fieldOf(parts)) {
-    return {field->density.get(), field->decoder.get(), field->jitter};
+    return {field->density.get(), field->decoder.get(), field->draws};
   }
   const auto& surface = std::get<SurfaceModel>(parts.source);
-  return {surface.density.get(), surface.decoder.get(), true};
+  return {surface.density.get(), surface.decoder.get(), {}};
 }
 
 /// Of a field: its own count of Gaussians where one is asked for, which is the default.
@@ -105,9 +104,7 @@ std::shared_ptr<const SplatCloud> decode(const ModelParts& parts, const DecodeSe
     return std::make_shared<const SplatCloud>((*hierarchy)->decode(request));
   }
   const Sampled model = sampledOf(parts);
-  const AnchorSet anchors = model.jitter
-                                ? sampleAnchors(*model.density, settings.sampling, progress)
-                                : fieldAnchors(*model.density, settings.sampling, false);
+  const AnchorSet anchors = drawLearned(*model.density, settings.sampling, model.draws, progress);
   DecodeRequest request;
   request.anchors = &anchors;
   request.gaussians_per_anchor = settings.gaussians_per_anchor;

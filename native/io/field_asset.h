@@ -13,11 +13,13 @@ namespace stipple {
 /// The stored parts of a learned field: io knows arrays, not algorithms.
 struct FieldAsset : OctreeTensors {
   int field_level = 8;         ///< of the octree that the field was made for
-  uint32_t gaussians = 8;      ///< K
+  uint32_t gaussians = 4;      ///< K
   int sh_degree = 0;           ///< 0..kMaxShDegree
   uint64_t least_anchors = 1;  ///< budgets of its training
   uint64_t most_anchors = 1;
-  bool jitter = true;  ///< anchors are anywhere in their leaf; else in its middle
+  bool jitter = true;   ///< anchors are anywhere in their leaf; else in its middle
+  bool nested = false;  ///< anchors are drawn in the progressive order; else as is asked for
+  uint64_t seed = 0;    ///< nested: of the draws that it learned with
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kMip;
   TensorTable tensors;               ///< "field.*"

@@ -40,13 +40,16 @@ struct FieldStart {
   double attributes_end;  ///< share of the iterations, from which on the density learns, too
   double network_rate;
   double logit_rate;
+  /// Share of the steps that draw the anchors that decoding will draw. They learn what they stand
+  /// for themselves, no mean over draws; the others keep other seeds good, and see all places.
+  double own_draws;
 };
-constexpr FieldStart kFromSurfaces = {0.3, 0.3, 8e-3, 1e-2};
+constexpr FieldStart kFromSurfaces = {0.3, 0.3, 8e-3, 1e-2, 0.75};
 /// A thin fog in all of the cube, whose density moves at once: opaque, or learned faster, it clears
 /// everywhere before any place can show that it is worth something.
-constexpr FieldStart kFromNothing = {0.03, 0.0, 2e-3, 5e-2};
+constexpr FieldStart kFromNothing = {0.03, 0.0, 2e-3, 5e-2, 0.5};
 
-constexpr double kGridRate = 1.5e-2;
+constexpr double kGridRate = 2.5e-2;
 constexpr double kStructureRate = 2e-2;
 constexpr double kLastRate = 0.02;
 constexpr double kWarmUpShare = 0.02;
@@ -138,11 +141,6 @@ double rateShare(const FitMoment& moment) {
   return start * (kLastRate + (1 - kLastRate) * 0.5 * (1 + std::cos(done * std::numbers::pi)));
 }
 
-void moveToCentres(AnchorSet& anchors) {
-  const float leaves = std::ldexp(1.0f, anchors.leaf_level);
-  for (float& p : anchors.positions) p = (std::floor(p * leaves) + 0.5f) / leaves;
-}
-
 class FieldModel final : public FitModel {
  public:
   FieldModel(FieldState state, const FieldStart& start, const FieldModelOptions& options)
@@ -166,8 +164,7 @@ class FieldModel final : public FitModel {
   SplatCloud splats(uint64_t budget) override {
     AnchorSamplingOptions sampling;
     sampling.count = budget == 0 ? options_.most_anchors : std::min(budget, kMaxAnchorCount);
-    sampling.seed = options_.seed;
-    const AnchorSet anchors = fieldAnchors(frozen(), sampling, options_.jitter);
+    const AnchorSet anchors = drawLearned(frozen(), sampling, draws());
     DecodeRequest request;
     request.anchors = &anchors;
     request.gaussians_per_anchor = options_.gaussians_per_anchor;
@@ -175,7 +172,7 @@ class FieldModel final : public FitModel {
   }
 
   FieldResult result() {
-    return {frozen(), std::make_shared<const FieldParameters>(*state_.field), options_.jitter};
+    return {frozen(), std::make_shared<const FieldParameters>(*state_.field), draws()};
   }
 
   std::vector<uint64_t> budgets() const override {
@@ -273,6 +270,8 @@ class FieldModel final : public FitModel {
     return report;
   }
 
+  LearnedDraws draws() const { return {options_.jitter, true, options_.seed}; }
+
   AnchorSet drawAnchors(const FitMoment& moment) const {
     const double u =
         unitDouble(keyedBits(options_.seed, RandomUse::kAnchorBudget, moment.iteration));
@@ -285,10 +284,9 @@ class FieldModel final : public FitModel {
     const double drawn = least * std::pow(kReach * static_cast<double>(most) / least, u);
     AnchorSamplingOptions sampling;
     sampling.count = std::min(most, static_cast<uint64_t>(std::llround(drawn)));
-    sampling.seed = keyedBits(options_.seed, RandomUse::kAnchorSeed, moment.iteration);
-    AnchorSet anchors = sampleAnchors(state_.density, sampling);
-    if (!options_.jitter) moveToCentres(anchors);
-    return anchors;
+    const uint64_t bits = keyedBits(options_.seed, RandomUse::kAnchorSeed, moment.iteration);
+    sampling.seed = unitDouble(mixBits(bits)) < start_.own_draws ? 0 : bits;
+    return drawLearned(state_.density, sampling, draws());
   }
 
   ImageLossValue pictureLoss(const StepView& view) {
@@ -461,13 +459,6 @@ std::optional<FieldResult> fieldResult(FitModel& model) {
   auto* field = dynamic_cast<FieldModel*>(&model);
   if (field == nullptr) return {};
   return field->result();
-}
-
-AnchorSet fieldAnchors(const OctreeDensity& density, const AnchorSamplingOptions& options,
-                       bool jitter) {
-  AnchorSet anchors = sampleAnchors(density, options);
-  if (!jitter) moveToCentres(anchors);
-  return anchors;
 }
 
 }  // namespace stipple

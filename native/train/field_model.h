@@ -10,7 +10,7 @@
 #include "data/splat_cloud.h"
 #include "data/view_source.h"
 #include "decode/field_parameters.h"
-#include "density/anchor_sampling.h"
+#include "density/learned_draws.h"
 #include "density/octree_density.h"
 #include "train/fit_model.h"
 
@@ -44,14 +44,10 @@ std::unique_ptr<FitModel> makeFieldModel(const ViewSource& views, std::span<cons
 struct FieldResult {
   OctreeDensity density;
   std::shared_ptr<const FieldParameters> field;  ///< a copy; the fit may go on
-  bool jitter = true;                            ///< FieldModelOptions::jitter
+  LearnedDraws draws;
 };
 
 /// Of a model of makeFieldModel; empty for any other.
 std::optional<FieldResult> fieldResult(FitModel& model);
-
-/// Anchors of a field at a budget, as FitModel::splats draws them.
-AnchorSet fieldAnchors(const OctreeDensity& density, const AnchorSamplingOptions& options,
-                       bool jitter);
 
 }  // namespace stipple

@@ -1,11 +1,13 @@
 #include "train/field_regularisers.h"
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "base/parallel.h"
 #include "decode/anchor_spacing.h"
 #include "decode/merge_neighbours.h"
+#include "density/anchor_cells.h"
 #include "math/vec.h"
 
 namespace stipple {
@@ -21,6 +23,14 @@ Vec3d placeOf(const AnchorSet& anchors, size_t i) {
   return Vec3d(p[0], p[1], p[2]);
 }
 
+/// Whether anchors beyond the known neighbours, which are the nearest ones, may be within a radius.
+bool reachesPastNeighbours(const AnchorSet& anchors, const FieldTape& tape, size_t i,
+                           double radius) {
+  const uint32_t farthest = tape.neighbours[i * kSpacingNeighbours + kSpacingNeighbours - 1];
+  if (farthest == kNoPlace) return false;  // all there are
+  return (placeOf(anchors, farthest) - placeOf(anchors, i)).norm() < radius;
+}
+
 }  // namespace
 
 double regularise(const FieldRegularisers& weights, const FieldParameters& field,
@@ -34,6 +44,7 @@ double regularise(const FieldRegularisers& weights, const FieldParameters& field
   std::vector<double> partial(rangeCount(count, kGrain), 0.0);
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {
     double loss = 0;
+    std::vector<std::pair<uint32_t, uint32_t>> around;
     for (size_t i = begin; i < end; ++i) {
       const double unit = static_cast<double>(tape.units[i]);
       const double to_unit = 1 / (unit * side);  // of gradients by the world
@@ -67,14 +78,26 @@ double regularise(const FieldRegularisers& weights, const FieldParameters& field
         by_length += weight;
         by_deviation -= weight * kCentred;
       }
-      for (size_t k = 0; k < kSpacingNeighbours; ++k) {
-        const uint32_t other = tape.neighbours[i * kSpacingNeighbours + k];
-        if (other == kNoPlace) break;
+      const auto visit = [&](size_t other) {
         const double distance = (placeOf(anchors, other) - anchor).norm() / unit;
-        if (deviation <= distance) continue;
+        if (deviation <= distance) return false;
         const double weight = weights.spread * per_anchor * per_anchor;
         loss += weight * (deviation - distance);
         by_deviation += weight;
+        return true;
+      };
+      if (reachesPastNeighbours(anchors, tape, i, deviation * unit)) {
+        anchorsAround(anchors, i, deviation * unit, around);
+        for (const auto& [first, last] : around) {
+          for (size_t other = first; other < last; ++other) {
+            if (other != i) visit(other);
+          }
+        }
+      } else {
+        for (size_t k = 0; k < kSpacingNeighbours; ++k) {
+          const uint32_t other = tape.neighbours[i * kSpacingNeighbours + k];
+          if (other == kNoPlace || !visit(other)) break;
+        }
       }
       if (by_deviation == 0 && by_length == 0) continue;
       for (size_t k = 0; k < gaussians; ++k) {

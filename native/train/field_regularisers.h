@@ -16,8 +16,10 @@ struct FieldRegularisers {
 
 /// Their value, and the derivative by the cloud added to `gradient`. Lengths are in the anchors'
 /// units, as DeG's are in the unit cube. In: what FieldDecoder::forward got, left and gave.
-/// Differs from DeG: distances to other anchors are looked up among the nearest ones only, where
-/// the term can be positive, not among all pairs. Cost: O(N).
+/// The spread counts all pairs of anchors, of which only those within an anchor's deviation are
+/// visited: they are looked up in the grid that the order of leaves is. In: anchors whose leaves
+/// hold their positions. Cost: O(N + pairs that count), and O(log P) for an anchor whose deviation
+/// reaches past its nearest six.
 double regularise(const FieldRegularisers& weights, const FieldParameters& field,
                   const AnchorSet& anchors, const FieldTape& tape, const SplatCloud& cloud,
                   SplatCloud& gradient);

@@ -105,6 +105,23 @@ def test_decode_gives_the_budget_times_k(scene):
     assert figures('info', scene / 'k4.ply')['count'] == 1000
 
 
+ASSETS = Path(__file__).resolve().parents[1] / 'data' / 'assets'
+
+
+def test_a_field_decodes_to_nested_budgets_whatever_the_order(scene):
+    stored = ASSETS / 'whole_field_1.0.stipple.safetensors'
+    run('decode', stored, scene / 'few.ply', '--anchors', 300)
+    assert figures('info', scene / 'few.ply')['count'] == 1200
+    run('decode', stored, scene / 'same.ply', '--anchors', 300, '--order', 'progressive')
+    assert figures('compare', scene / 'few.ply', scene / 'same.ply')['max_position'] == 0
+
+
+def test_a_field_whose_widths_do_not_fit_is_refused(scene):
+    # Arrays alone: 16 Gaussians of 15 + 3 * 8 numbers are 624.
+    message = error('decode', ASSETS / 'field_1.0.stipple.safetensors', scene / 'no.ply')
+    assert "width of the network's output of the field is 64; 624 is needed" in message
+
+
 def test_a_saved_model_decodes_to_the_same_splats(scene):
     run('decode', scene / 'cube.glb', scene / 'cube.stipple.safetensors')
     assert figures('info', scene / 'cube.stipple.safetensors')['kind'] == 'surface model'

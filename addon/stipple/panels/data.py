@@ -91,7 +91,7 @@ class STIPPLE_PT_advanced(_SplatPanel, bpy.types.Panel):
             _draw_fixed(layout, "Splats per Anchor", f"{stipple.learned_gaussians}, as learned")
         else:
             layout.prop(stipple, 'gaussians_per_anchor')
-        layout.prop(stipple, 'order')
+            layout.prop(stipple, 'order')
 
 
 def _draw_budget(self, context):

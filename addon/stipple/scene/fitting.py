@@ -136,7 +136,7 @@ class FitTask(ViewTask):
         yield _FIT_END, 'Keeping the result'
         if is_field:
             info = made.info()
-            decoding = DecodeSettings(info.most_anchors, info.gaussians_per_anchor, seed=settings.seed)
+            decoding = DecodeSettings(info.most_anchors, info.gaussians_per_anchor)  # seed 0: the fit's own draws
             self._keep(made, decoding, 'MODEL', report)
             return
         seen = made.seen()

@@ -522,9 +522,10 @@ typedef struct StippleModelInfo {
 
 typedef struct StippleDecodeOptions {
   uint32_t struct_size;
-  uint32_t order;                 /* StippleAnchorOrder, default systematic */
+  uint32_t order;                 /* StippleAnchorOrder, default systematic; of a learned field always
+                                     progressive, as it was learned */
   uint64_t anchor_count;          /* P, 1..STIPPLE_MAX_ANCHORS, default 20,000; of a hierarchy: up to its count */
-  uint64_t seed;
+  uint64_t seed;                  /* of a learned field: 0, the default, gives the draws that it knows best */
   uint32_t gaussians_per_anchor;  /* K, 1..32, default 1; of a hierarchy: 1; of a field: 1, which stands for
                                      its own count, or that */
   uint32_t reserved;

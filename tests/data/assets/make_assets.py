@@ -93,7 +93,24 @@ def field():
            'settings': '{"iterations": 700}', 'provenance': 'written by hand'}, tensors)
 
 
+def whole_field():
+    """Other than field(), whose arrays belong to no layout, one that decodes: all widths fit K, degree and levels."""
+    small = numpy.float32(1 / 64)
+    tensors = {'field.features.level3': f32(numbers(8, 8, 1)), 'field.details.level5': f32(numbers(16, 8, 2) * small),
+               'field.network.layer0.weights': f32(numbers(32, 64, 3) * small),
+               'field.network.layer0.biases': f32(numbers(64, 1, 4)[:, 0] * small)}
+    for level, (cells, rows) in enumerate(LEVELS):
+        tensors[f'octree.cells.{level}'] = u64(cells)
+        tensors[f'octree.log_p.{level}'] = f32(logarithms(rows))
+    write('whole_field_1.0.stipple.safetensors',
+          {'stipple_version': '1.0', 'kind': 'field', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
+           'frame': 'right-handed, z up, metres', 'root_cube': '[-1.5, 0.25, 2.0, 4.0]', 'levels': '2', 'field_level': '5',
+           'K': '4', 'sh_degree': '0', 'least_anchors': '100', 'most_anchors': '5000', 'jitter': 'leaf', 'draws': 'nested',
+           'seed': '77', 'settings': '{"iterations": 700}', 'provenance': 'written by hand'}, tensors)
+
+
 if __name__ == '__main__':
     surface()
     hierarchy()
     field()
+    whole_field()

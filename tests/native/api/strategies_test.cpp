@@ -130,7 +130,7 @@ TEST_F(StrategiesTest, AMemoryCapBelowOneSplatOrTheFieldIsRefused) {
   refused(STIPPLE_ERROR_MEMORY_LIMIT, "options->max_bytes is 100; one splat and the pictures");
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.max_bytes = 1000000;
-  refused(STIPPLE_ERROR_MEMORY_LIMIT, "options->max_bytes is 1000000; 4096 anchors");
+  refused(STIPPLE_ERROR_MEMORY_LIMIT, "options->max_bytes is 1000000; 8192 anchors");
 }
 
 }  // namespace

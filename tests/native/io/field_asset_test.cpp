@@ -30,6 +30,8 @@ FieldAsset smallAsset() {
   asset.least_anchors = 100;
   asset.most_anchors = 5000;
   asset.jitter = false;
+  asset.nested = true;
+  asset.seed = UINT64_MAX;
   asset.colour_space = ColourSpace::kLinear;
   asset.antialias = Antialias::kClassic;
   asset.tensors["field.features.level3"] = {{2, 3}, std::vector<float>{1, 2, 3, 4, 5, 6}};
@@ -53,6 +55,8 @@ TEST_F(FieldAssetFile, GivesEverythingBackBitForBit) {
   EXPECT_EQ(seen.least_anchors, asset.least_anchors);
   EXPECT_EQ(seen.most_anchors, asset.most_anchors);
   EXPECT_EQ(seen.jitter, asset.jitter);
+  EXPECT_EQ(seen.nested, asset.nested);
+  EXPECT_EQ(seen.seed, asset.seed);
   EXPECT_EQ(seen.colour_space, asset.colour_space);
   EXPECT_EQ(seen.antialias, asset.antialias);
   EXPECT_EQ(seen.settings_json, asset.settings_json);
@@ -122,6 +126,10 @@ TEST_F(FieldAssetFile, RefusesMetadataOutOfRange) {
               ::testing::HasSubstr("sh_degree = x"));
   EXPECT_THAT(messageWith("\"jitter\":\"none\"", "\"jitter\":\"some\""),
               ::testing::HasSubstr("'leaf' or 'none'"));
+  EXPECT_THAT(messageWith("\"draws\":\"nested\"", "\"draws\":\"nestle\""),
+              ::testing::HasSubstr("'nested' or 'any'"));
+  EXPECT_THAT(messageWith("\"seed\":\"18446744073709551615\"", "\"seed\":\"-8446744073709551615\""),
+              ::testing::HasSubstr("seed = -8446744073709551615; 0 to 18446744073709551615"));
 }
 
 }  // namespace

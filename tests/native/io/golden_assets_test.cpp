@@ -72,6 +72,7 @@ void expectField(const FieldAsset& asset) {
   EXPECT_EQ(asset.least_anchors, 100u);
   EXPECT_EQ(asset.most_anchors, 5000u);
   EXPECT_FALSE(asset.jitter);
+  EXPECT_FALSE(asset.nested);
   EXPECT_EQ(asset.colour_space, ColourSpace::kDisplay);
   EXPECT_EQ(asset.antialias, Antialias::kClassic);
   const auto expectTensor = [&](const char* name, std::vector<uint64_t> shape,
@@ -142,6 +143,24 @@ TEST_F(GoldenAssets, ReadsAFieldOfVersion1AndKeepsAllOfIt) {
   expectField(asset);
   writeFieldAsset(asset, path("again"));
   expectField(readFieldAsset(path("again")));
+}
+
+TEST_F(GoldenAssets, ReadsAFieldThatSaysHowItsAnchorsAreDrawn) {
+  FieldAsset asset = readFieldAsset(golden("whole_field_1.0"));
+  for (int time = 0; time < 2; ++time) {
+    EXPECT_EQ(asset.gaussians, 4u);
+    EXPECT_EQ(asset.sh_degree, 0);
+    EXPECT_TRUE(asset.jitter);
+    EXPECT_TRUE(asset.nested);
+    EXPECT_EQ(asset.seed, 77u);
+    EXPECT_EQ(std::get<std::vector<float>>(asset.tensors.at("field.features.level3").values),
+              numbers(8, 8, 1));
+    EXPECT_EQ(asset.tensors.at("field.details.level5").shape, (std::vector<uint64_t>{16, 8}));
+    EXPECT_EQ(asset.tensors.at("field.network.layer0.weights").shape,
+              (std::vector<uint64_t>{32, 64}));
+    writeFieldAsset(asset, path("again"));
+    asset = readFieldAsset(path("again"));
+  }
 }
 
 TEST_F(GoldenAssets, KeepsTheVersionOfANewerFileAndRefusesTheNextMajorOne) {

@@ -252,8 +252,7 @@ TEST(FieldModel, ItsResultDecodesWithoutIt) {
         std::make_shared<FieldParameters>(fieldOfTensors(tensorsOfField(*result.field), bare));
     AnchorSamplingOptions sampling;
     sampling.count = 300;
-    sampling.seed = options.seed;
-    const AnchorSet anchors = fieldAnchors(result.density, sampling, result.jitter);
+    const AnchorSet anchors = drawLearned(result.density, sampling, result.draws);
     DecodeRequest request;
     request.anchors = &anchors;
     request.gaussians_per_anchor = 4;

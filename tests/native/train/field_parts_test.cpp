@@ -1,14 +1,18 @@
 // What a fit of a field is put together from: sparse steps, regularisers, the prior.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "decode/anchor_spacing.h"
+#include "math/morton.h"
 #include "train/field_regularisers.h"
 #include "train/scene_prior.h"
 #include "train/sparse_adam.h"
@@ -60,8 +64,8 @@ struct DecodedField {
   SplatCloud cloud;
 };
 
-/// Anchors so near to each other that every regulariser counts.
-DecodedField decodedField() {
+/// Anchors so near to each other that every regulariser counts, in the order of their leaves.
+DecodedField decodedField(size_t count = 12) {
   FieldShape shape;
   shape.root = {{1, 2, 3}, 2.0};
   shape.leaf_level = 4;
@@ -71,12 +75,21 @@ DecodedField decodedField() {
   for (float& bias : decoded.field.network.layers().back().biases) bias += 3.0f * number(7);
   for (float& weight : decoded.field.network.layers().back().weights) weight *= 30.0f;
   decoded.anchors.leaf_level = 4;
-  for (uint64_t i = 0; i < 12; ++i) {
+  std::vector<std::pair<uint64_t, std::array<float, 3>>> places;
+  for (uint64_t i = 0; i < count; ++i) {
+    std::array<float, 3> place;
+    std::array<uint32_t, 3> cell;
     for (uint64_t a = 0; a < 3; ++a) {
-      decoded.anchors.positions.push_back(0.5f + 0.2f * number(3 * i + a));
+      place[a] = 0.5f + 0.2f * number(3 * i + a);
+      cell[a] = static_cast<uint32_t>(place[a] * 16.0f);
     }
+    places.emplace_back(mortonEncode(cell[0], cell[1], cell[2]), place);
+  }
+  std::sort(places.begin(), places.end());
+  for (const auto& [leaf, place] : places) {
+    for (const float p : place) decoded.anchors.positions.push_back(p);
     decoded.anchors.log_q.push_back(0);
-    decoded.anchors.leaves.push_back(i);
+    decoded.anchors.leaves.push_back(leaf);
   }
   const auto view =
       std::shared_ptr<const FieldParameters>(&decoded.field, [](const FieldParameters*) {});
@@ -121,6 +134,64 @@ TEST(FieldRegularisers, GradientsAreThoseOfDifferences) {
     }
     EXPECT_GT(largest, 1e-4);
   }
+}
+
+/// The term of spread by its definition, over all pairs, in double. Out: pairs that count.
+double spreadOfAllPairs(const DecodedField& d, size_t& pairs) {
+  const size_t count = d.anchors.size(), gaussians = d.field.layout.gaussians;
+  const auto at = [](const auto& values, size_t i, size_t a) {
+    return static_cast<double>(values[i * 3 + a]);
+  };
+  double sum = 0;
+  pairs = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const auto unit = static_cast<double>(d.tape.units[i]);
+    std::array<double, 3> mean = {};
+    double squares = 0;
+    for (size_t k = 0; k < gaussians; ++k) {
+      for (size_t a = 0; a < 3; ++a) {
+        const double offset =
+            (at(d.tape.centres, i * gaussians + k, a) - at(d.anchors.positions, i, a)) / unit;
+        mean[a] += offset / static_cast<double>(gaussians);
+        squares += offset * offset / static_cast<double>(gaussians);
+      }
+    }
+    const double deviation = std::sqrt(squares);
+    sum += std::max(0.0, std::hypot(mean[0], mean[1], mean[2]) - 0.5 * deviation);
+    for (size_t j = 0; j < count; ++j) {
+      if (j == i) continue;
+      const double distance =
+          std::hypot(at(d.anchors.positions, i, 0) - at(d.anchors.positions, j, 0),
+                     at(d.anchors.positions, i, 1) - at(d.anchors.positions, j, 1),
+                     at(d.anchors.positions, i, 2) - at(d.anchors.positions, j, 2)) /
+          unit;
+      sum += std::max(0.0, deviation - distance);
+      pairs += distance < deviation;
+    }
+  }
+  return sum / static_cast<double>(count * count);
+}
+
+TEST(FieldRegularisers, SpreadCountsAllPairs) {
+  size_t past_neighbours = 0;
+  // Spread from none of the others to most of them.
+  for (const float wider : {-2.0f, 0.0f, 0.3f, 1.0f, 3.0f}) {
+    DecodedField d = decodedField(300);
+    for (size_t n = 0; n < d.cloud.size(); ++n) {
+      for (size_t a = 0; a < 3; ++a) {
+        const float anchor = d.anchors.positions[n / d.field.layout.gaussians * 3 + a];
+        d.tape.centres[n * 3 + a] = anchor + std::exp(wider) * (d.tape.centres[n * 3 + a] - anchor);
+      }
+    }
+    SplatCloud gradient = d.cloud;
+    const double seen = regularise({0, 0, 1}, d.field, d.anchors, d.tape, d.cloud, gradient);
+    size_t pairs = 0;
+    const double wanted = spreadOfAllPairs(d, pairs);
+    // Sums of the same terms in double, in another order.
+    EXPECT_NEAR(seen, wanted, 1e-12 * wanted) << wider;
+    past_neighbours += pairs > 6 * d.anchors.size();
+  }
+  EXPECT_GE(past_neighbours, 2u);
 }
 
 std::vector<size_t> all(const ViewSource& views) {
