@@ -55,6 +55,10 @@ void validate(const Aperture& aperture) {
   if (aperture.focus_distance < 1e-6 || aperture.focus_distance > 1e15) {
     refuse("focus distance", aperture.focus_distance, "1e-6 to 1e15 m");
   }
+  // Beyond this rays lean so far that a space sheared by them counts as flat.
+  if (aperture.radius > 1e6 * aperture.focus_distance) {
+    refuse("aperture radius", aperture.radius, "at most a million times its focus distance");
+  }
   if (aperture.blades != 0 && (aperture.blades < 3 || aperture.blades > 64)) {
     refuse("number of blades", aperture.blades, "0 (round) or 3 to 64");
   }

@@ -60,11 +60,13 @@ def _layer(name, array, shape):
 class RenderTask:
     """A picture that is being made: poll, cancel or wait through `job`, then read the arrays."""
 
-    def __init__(self, job, colour, depth, transmittance=None):
+    def __init__(self, job, colour, depth, transmittance=None, normal=None, objects=None):
         self.job = job
         self.colour = colour  # [H,W,4] premultiplied, row 0 = top
         self.depth = depth    # [H,W] metres, or None
         self.transmittance = transmittance  # [H,W] of the light behind everything, or None
+        self.normal = normal    # [H,W,3] in the world, 0 where no splat shows, or None
+        self.objects = objects  # [H,W] 1 + the instance that weighs most, 0 for none, or None
 
 
 class Renderer(Handle):
@@ -89,24 +91,29 @@ class Renderer(Handle):
         return options
 
     def start(self, instances, camera, options, with_depth=True, median_depth=False, surface=None,
-              with_transmittance=False):
+              with_transmittance=False, blur=None, with_normal=False, with_objects=False):
         """Starts the picture of instances, as of instance_array; clouds must outlive the start only.
 
         median_depth: where light is half gone, instead of the mean depth of what is seen. surface: a Surface that stands
-        between the splats.
+        between the splats. blur: a Blur, lens and shutter.
         """
         shape = (camera.height, camera.width)
-        options = surface.put_into(options) if surface is not None else options
+        for layer in (surface, blur):
+            options = layer.put_into(options) if layer is not None else options
         colour = np.empty(shape + (4,), np.float32)
         depth = np.empty(shape, np.float32) if with_depth else None
         transmittance = np.empty(shape, np.float32) if with_transmittance else None
-        buffers = StippleRenderBuffers(colour=pointer_to(colour), transmittance=pointer_to(transmittance))
+        normal = np.empty(shape + (3,), np.float32) if with_normal else None
+        objects = np.empty(shape, np.uint32) if with_objects else None
+        buffers = StippleRenderBuffers(colour=pointer_to(colour), transmittance=pointer_to(transmittance),
+                                       normal=pointer_to(normal), object_index=pointer_to(objects))
         setattr(buffers, 'median_depth' if median_depth else 'depth', pointer_to(depth))
         array = instance_array(instances)
         job = Job(self.library, new_handle(self.library, 'stipple_renderer_render_start', self.pointer, array,
                                            len(instances), byref(camera), byref(options), byref(buffers)),
-                  keep=(colour, depth, transmittance, buffers, array, surface, [placed[0] for placed in instances]))
-        return RenderTask(job, colour, depth, transmittance)
+                  keep=(colour, depth, transmittance, normal, objects, buffers, array, surface,
+                        [placed[0] for placed in instances]))
+        return RenderTask(job, colour, depth, transmittance, normal, objects)
 
     def memory_bound(self, instances, camera):
         size = c_uint64()
