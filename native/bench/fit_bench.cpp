@@ -46,13 +46,14 @@ class OneView {
     view_.camera = &camera_;
     view_.target = target_.data();
     moment_.extent = 1e-3;  // so that positions stay what they are
+    moment_.view_count = kEventViews;
   }
 
   StepReport step(FitModel& model, uint64_t iteration, uint64_t iterations,
                   ViewEvaluator* views = nullptr) {
     moment_.iteration = iteration;
     moment_.iterations = iterations;
-    view_.index = iteration;
+    view_.index = iteration % kEventViews;
     return model.step(moment_, view_, views, nullptr);
   }
   const Camera& camera() const { return camera_; }
@@ -145,11 +146,11 @@ EventSettings settingsOf(const std::string& name) {
 }
 
 /// Iterations before an event in which strategies may gather what others do not.
-constexpr uint64_t kLastIterations = 10;
+constexpr uint64_t kLastIterations = 2 * kEventViews - 1;
 
 /// What an event costs beyond the iterations that it follows, from its statistics to the edited
-/// parameters, against those until the next one: the last 10 and the edit, less 10 that gather
-/// nothing more.
+/// parameters, against those until the next one: the last ones and the edit, less as many that
+/// gather nothing more.
 void densifyEvent(benchmark::State& state, const std::string& name) {
   const SplatCase& c = kEventCase;
   const EventSettings settings = settingsOf(name);

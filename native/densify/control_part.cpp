@@ -55,6 +55,29 @@ ControlMoment controlMoment(const FitMoment& moment, const EventSchedule& schedu
   return at;
 }
 
+double ViewErrors::differenceAt(size_t pixel) const {
+  double sum = 0;
+  for (size_t c = 0; c < 3; ++c) {
+    sum += std::abs(static_cast<double>(picture[pixel * 4 + c]) -
+                    static_cast<double>(target[pixel * 3 + c]));
+  }
+  return sum / 3 * (weights.empty() ? 1.0 : static_cast<double>(weights[pixel]));
+}
+
+ControlMoment momentOfEvent(const ControlMoment& moment, const EventSchedule& schedule) {
+  if (moment.standalone || moment.until_event == UINT64_MAX) return moment;
+  FitMoment event = moment;
+  event.iteration += moment.until_event;
+  return controlMoment(event, schedule);
+}
+
+bool isWindowOfViews(const ControlMoment& moment) {
+  if (moment.until_event == UINT64_MAX) return false;
+  if (moment.standalone || moment.view_count == 0) return true;
+  const uint64_t round = uint64_t{2} * moment.view_count - 1;
+  return moment.until_event < std::min(moment.interval, round);
+}
+
 const char* wordsOf(ControlRole role) {
   switch (role) {
     case ControlRole::kMultiplication:

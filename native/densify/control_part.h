@@ -46,6 +46,13 @@ struct ControlMoment : FitMoment {
 /// Standalone events are spread over the window of the schedule; the last one has progress 1.
 ControlMoment controlMoment(const FitMoment& moment, const EventSchedule& schedule);
 
+/// Where the fit stands at the event that comes next, or this one.
+ControlMoment momentOfEvent(const ControlMoment& moment, const EventSchedule& schedule);
+
+/// Whether what this iteration's view tells counts for the next event: since the one before, and
+/// within as many iterations as show every view at least once (train/view_order.h).
+bool isWindowOfViews(const ControlMoment& moment);
+
 /// What a part of density control decides. No decision has two owners.
 enum class ControlRole : uint32_t {
   kMultiplication = 1u << 0,     ///< which splats multiply

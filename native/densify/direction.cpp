@@ -69,8 +69,8 @@ class CoherenceWindow {
     table["length_sums"] = {{lengths_.size()}, lengths_};
   }
   void take(const TensorTable& table) {
-    std::vector<float> aligned = stateSums(table, "aligned_sums");
-    std::vector<float> lengths = stateSums(table, "length_sums");
+    std::vector<float> aligned = stateSums<float>(table, "aligned_sums");
+    std::vector<float> lengths = stateSums<float>(table, "length_sums");
     requireAsMany(aligned.size(), "aligned_sums", lengths.size(), "length_sums");
     aligned_ = std::move(aligned);
     lengths_ = std::move(lengths);

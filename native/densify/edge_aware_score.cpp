@@ -82,7 +82,7 @@ class EdgeAwareScore final : public ControlPart {
     table["views"] = {{views_.size()}, views_};
   }
   void take(const TensorTable& table) override {
-    std::vector<float> sums = stateSums(table, "edge_sums");
+    std::vector<float> sums = stateSums<float>(table, "edge_sums");
     views_ = stateArray<uint64_t>(table, "views");
     sums_ = std::move(sums);
   }

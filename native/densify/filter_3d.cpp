@@ -70,7 +70,8 @@ class Filter3d final : public ControlPart, private SplatFilter {
     if (is_stale_) return true;
     const uint64_t interval = std::max(EventSchedule{}.least_interval,
                                        scaleSchedule(options_.interval, moment.iterations));
-    return moment.takes_steps && !moment.is_learning && !moment.isAfter(options_.last) &&
+    return moment.takes_steps && !moment.is_learning &&
+           moment.iteration < scaleSchedule(options_.last, moment.iterations) &&
            moment.iteration % interval == 0;
   }
 

@@ -16,7 +16,7 @@ struct Filter3dOptions {
   /// Raising it smooths more.
   double variance = 0.2;
   uint64_t interval = 100;  ///< iterations of 30,000 between looks once events are over
-  uint64_t last = 29900;    ///< of 30,000: no look after this one
+  uint64_t last = 29900;    ///< of 30,000: no look from this one on
 };
 
 /// Splats are widened so that none is finer than what the views that see it can resolve, and

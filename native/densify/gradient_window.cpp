@@ -62,7 +62,7 @@ void GradientWindow::put(TensorTable& table) const {
 }
 
 void GradientWindow::take(const TensorTable& table) {
-  std::vector<float> sums = stateSums(table, "gradient_sums");
+  std::vector<float> sums = stateSums<float>(table, "gradient_sums");
   std::vector<uint32_t> counts = stateArray<uint32_t>(table, "visible_counts");
   requireAsMany(sums.size(), "gradient_sums", counts.size(), "visible_counts");
   sums_ = std::move(sums);

@@ -2,8 +2,9 @@
 // 2025: importance, tries, acceptance (equation 20 with D = 1 / (1 + lambda c)), relocation as in
 // 3D Gaussian Splatting as Markov Chain Monte Carlo. Differs: a splat is looked up where its centre
 // is in each view, and its cues are averaged over the views that have it in their picture; what no
-// view sees does not try; faint splats attract tries, as the text says; offsets are turned with
-// their splat; voxels are in units of the cameras' extent (published_unit.h); there is a hard cap.
+// view sees does not try; views that iterations before an event have drawn are not drawn again for
+// it; faint splats attract tries, as the text says; offsets are turned with their splat; voxels are
+// in units of the cameras' extent (published_unit.h); there is a hard cap.
 
 #include "densify/metropolis.h"
 
@@ -18,6 +19,7 @@
 #include "densify/published_unit.h"
 #include "densify/relocation.h"
 #include "densify/splat_footprint.h"
+#include "densify/state_arrays.h"
 #include "densify/strategies.h"
 #include "densify/voxel_counts.h"
 #include "math/quaternion.h"
@@ -50,14 +52,15 @@ struct ViewCues {
   }
 
   void add(const Camera& camera, const SplatCloud& splats, const ErrorMaps& maps) {
-    parallelFor(size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        const auto place = placeInPicture(camera, vectorOf(&splats.positions[i * 3]));
-        if (!place) continue;
-        dissimilarity[i] += static_cast<double>(maps.dissimilarity[place->pixel]);
-        difference[i] += static_cast<double>(maps.difference[place->pixel]);
-        ++view_counts[i];
-      }
+    addPixels(camera, splats.positions, [&](size_t i, size_t pixel) {
+      dissimilarity[i] += static_cast<double>(maps.dissimilarity[pixel]);
+      difference[i] += static_cast<double>(maps.difference[pixel]);
+    });
+  }
+  void add(const ViewStatistics& view) {
+    addPixels(*view.camera, view.splats.positions, [&](size_t i, size_t pixel) {
+      dissimilarity[i] += static_cast<double>(view.errors.structure[pixel]);
+      difference[i] += view.errors.differenceAt(pixel);
     });
   }
   void finish() {
@@ -67,6 +70,26 @@ struct ViewCues {
       difference[i] /= views;
     }
   }
+
+ private:
+  template <typename Add>
+  void addPixels(const Camera& camera, std::span<const float> positions, const Add& add) {
+    parallelFor(size(), kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const auto place = placeInPicture(camera, vectorOf(&positions[i * 3]));
+        if (!place) continue;
+        add(i, place->pixel);
+        ++view_counts[i];
+      }
+    });
+  }
+};
+
+/// Views of an event: next to each other, around and around.
+struct ViewBlock {
+  uint64_t first, count, views;
+  size_t at(uint64_t k) const { return static_cast<size_t>((first + k) % views); }
+  bool has(uint64_t view) const { return view < views && (view + views - first) % views < count; }
 };
 
 /// The published program's cues: maps averaged pixel by pixel, read at the world's x and y.
@@ -135,17 +158,27 @@ class MetropolisBirth final : public ControlPart {
 
   bool wantsSweep(const ControlMoment& moment) const override { return moment.is_event; }
 
-  /// A block of views, next to each other, that goes around and shrinks to one.
+  /// Views of the block that iterations draw by themselves.
+  void request(const ControlMoment& moment, StatisticRequest& request) const override {
+    if (moment.view && looks(moment, moment.view->index)) request.error_maps = true;
+  }
+  void observe(const ControlMoment& moment, const ViewStatistics& view) override {
+    if (!looks(moment, view.view) || view.errors.structure.empty()) return;
+    if (cues_.size() != view.splats.positions.size() / 3) begin(view.splats.positions.size() / 3);
+    cues_.add(view);
+    looked_at_.push_back(view.view);
+  }
+
+  /// And those that they do not.
   void sweep(const ControlMoment& moment, ViewEvaluator& views) override {
-    const uint64_t count = views.viewCount();
-    if (count == 0) return;
-    const uint64_t looked_at = annealed(moment, count);
-    const uint64_t first = moment.iteration % count * looked_at % count;
+    if (views.viewCount() == 0) return;
     const SplatCloud& splats = views.splats();
-    cues_.reset(splats.size());
+    if (cues_.size() != splats.size() || options_.as_released) begin(splats.size());
+    const ViewBlock block = blockOf(moment, views.viewCount());
     ReleasedCues released;
-    for (uint64_t k = 0; k < looked_at; ++k) {
-      const size_t view = static_cast<size_t>((first + k) % count);
+    for (uint64_t k = 0; k < block.count; ++k) {
+      const size_t view = block.at(k);
+      if (hasLookedAt(view)) continue;
       const Camera& camera = views.camera(view);
       const ErrorMaps maps =
           errorMaps(camera.width, camera.height, views.picture(view), views.target(view));
@@ -179,15 +212,49 @@ class MetropolisBirth final : public ControlPart {
     }
   }
 
-  void edited(const ControlMoment&, const SplatEdit& edit, size_t count_before) override {
-    cues_.reset(0);
+  void edited(const ControlMoment& moment, const SplatEdit& edit, size_t count_before) override {
+    if (moment.is_event || edit.keep || edit.append.size() > 0) begin(0);
     if (score_.size() == count_before) followEdit(edit, 1, 0.0f, score_);
   }
 
   /// Importance at the last event, 0..1.
   std::vector<float> scores() const override { return score_; }
 
+  void put(TensorTable& table) const override {
+    table["dissimilarity"] = {{cues_.size()}, cues_.dissimilarity};
+    table["difference"] = {{cues_.size()}, cues_.difference};
+    table["view_counts"] = {{cues_.size()}, cues_.view_counts};
+    table["views"] = {{looked_at_.size()}, looked_at_};
+  }
+  void take(const TensorTable& table) override {
+    ViewCues cues;
+    cues.dissimilarity = stateSums<double>(table, "dissimilarity");
+    cues.difference = stateSums<double>(table, "difference");
+    cues.view_counts = stateArray<uint32_t>(table, "view_counts");
+    requireAsMany(cues.dissimilarity.size(), "dissimilarity", cues.size(), "view_counts");
+    requireAsMany(cues.difference.size(), "difference", cues.size(), "view_counts");
+    looked_at_ = stateArray<uint64_t>(table, "views");
+    cues_ = std::move(cues);
+  }
+
  private:
+  void begin(size_t count) {
+    cues_.reset(count);
+    looked_at_.clear();
+  }
+  bool hasLookedAt(uint64_t view) const {
+    return std::find(looked_at_.begin(), looked_at_.end(), view) != looked_at_.end();
+  }
+  bool looks(const ControlMoment& moment, uint64_t view) const {
+    if (options_.as_released || moment.view_count == 0 || !isWindowOfViews(moment)) return false;
+    return blockOf(momentOfEvent(moment, options_.schedule), moment.view_count).has(view) &&
+           !hasLookedAt(view);
+  }
+  /// A block that goes around and shrinks to one.
+  static ViewBlock blockOf(const ControlMoment& event, uint64_t views) {
+    const uint64_t count = annealed(event, views);
+    return {event.iteration % views * count % views, count, views};
+  }
   static uint64_t annealed(const ControlMoment& moment, uint64_t count) {
     const double left = (1 - moment.progress) * static_cast<double>(count);
     return std::max<uint64_t>(1, static_cast<uint64_t>(left));
@@ -297,8 +364,9 @@ class MetropolisBirth final : public ControlPart {
   static constexpr double kFarthest = 1e30;        ///< metres
 
   MetropolisOptions options_;
-  ViewCues cues_;             ///< of the event under way
-  std::vector<float> score_;  ///< [N]
+  ViewCues cues_;                    ///< of the next event: sums, and means from its sweep on
+  std::vector<uint64_t> looked_at_;  ///< views in them
+  std::vector<float> score_;         ///< [N]
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <variant>
 #include <vector>
@@ -20,7 +21,16 @@ std::vector<T> stateArray(const TensorTable& table, const std::string& name) {
 }
 
 /// The same for sums of lengths and weights: errors also where one is negative or not finite.
-std::vector<float> stateSums(const TensorTable& table, const std::string& name);
+template <class T>
+std::vector<T> stateSums(const TensorTable& table, const std::string& name) {
+  std::vector<T> sums = stateArray<T>(table, name);
+  for (const T sum : sums) {
+    if (std::isfinite(sum) && sum >= 0) continue;  // comparing NaN would trap
+    fail(ErrorCode::kFormat, "the strategy's state has " + std::to_string(sum) + " among " + name +
+                                 "; 0 and more is allowed");
+  }
+  return sums;
+}
 
 /// Errors: kFormat where one is of another number of splats than the other.
 void requireAsMany(size_t count, const std::string& name, size_t other_count,

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <vector>
 
 namespace stipple {
@@ -24,6 +26,19 @@ enum class Statistic : uint32_t {
 
 constexpr size_t kStatisticCount = 11;
 
+/// How a picture differs from what it should look like.
+struct ViewErrors {
+  uint32_t width = 0;
+  uint32_t height = 0;
+  std::span<const float> structure;  ///< [H,W] 1 - SSIM, mean of the channels, times its weight
+  std::span<const float> picture;    ///< [H,W,4] as it is drawn
+  std::span<const float> target;     ///< [H,W,3]
+  std::span<const float> weights;    ///< [H,W] of pixels; empty: 1
+
+  /// |picture - target|, mean of the channels, times its weight.
+  double differenceAt(size_t pixel) const;
+};
+
 /// Which of them a pass shall gather; each costs time only where it is asked for. Pictures have the
 /// size of the view.
 struct StatisticRequest {
@@ -35,13 +50,19 @@ struct StatisticRequest {
   std::vector<float> contribution_weights = {};  ///< [H,W] >= 0; empty: 1
   std::vector<float> edge_weights = {};          ///< [H,W] not empty: edge weights are gathered
   std::vector<float> errors = {};                ///< [H,W] not empty: errors are gathered
-  /// Instead of `errors`: those of structure, 1 - SSIM of the picture and the view's target, mean
+  /// Instead of `errors`: what it makes of the picture that was drawn, [H,W] >= 0. It may be called
+  /// after the pass has begun and must hold all that it needs.
+  std::function<std::vector<float>(const ViewErrors&)> errors_of = {};
+  /// Instead of both: those of structure, 1 - SSIM of the picture and the view's target, mean
   /// of the channels, times what a mask says.
   bool structure_errors = false;
+  /// Pictures for ViewStatistics::errors: nothing is gathered of splats.
+  bool error_maps = false;
 
   bool any() const {
     return contributions || blending_weights || screen_gradients || absolute_screen_gradients ||
-           structure_errors || covered || !edge_weights.empty() || !errors.empty();
+           structure_errors || error_maps || covered || errors_of || !edge_weights.empty() ||
+           !errors.empty();
   }
 };
 

@@ -43,6 +43,7 @@ struct FitMoment {
   uint64_t seed = 0;            ///< of the fit; numbers are keyed by (seed, use, iteration, row)
   uint64_t max_splats = 0;      ///< hard cap of the count; 0: none
   double position_rate = 0;     ///< of Adam in this iteration, metres
+  size_t view_count = 0;        ///< that are learned from; 0: not known
   const TrainingView* view = nullptr;  ///< of this iteration; nullptr where none is under way
   std::optional<StandaloneEvent> standalone = {};  ///< there is no fit
 };
@@ -92,6 +93,14 @@ class Parameterisation {
                        RawSplats& by_raw) const = 0;
 };
 
+/// Splats as they are drawn (SplatCloud).
+struct DrawnSplats {
+  std::span<const float> positions;  ///< [N,3]
+  std::span<const float> rotations;  ///< [N,4]
+  std::span<const float> scales;     ///< [N,3]
+  std::span<const float> opacities;  ///< [N]
+};
+
 /// What one view told about the splats. Arrays live as long as the call.
 struct ViewStatistics {
   size_t view = 0;
@@ -106,6 +115,8 @@ struct ViewStatistics {
     return arrays[static_cast<size_t>(statistic)];
   }
   std::array<std::span<const float>, kStatisticCount> arrays;
+  DrawnSplats splats;
+  ViewErrors errors;  ///< where StatisticRequest::error_maps asks for them
 };
 
 /// Draws views on demand, without a step.

@@ -1,16 +1,19 @@
 // Based on: Mallick, Goel, Kerbl, Steinberger, Vicente Carrasco, De La Torre, Taming 3DGS:
 // High-Quality Radiance Fields with Limited Resources, SIGGRAPH Asia 2024, section 4, with the
 // constants of its published program. Differs: medians and spans of nothing count as 1 or 0 instead
-// of failing; edges are those of edge_weights.h; children of the same event are not removed; the
-// program's opacities above 1, after events are over, have no place in splat files and are left
-// out.
+// of failing; the views are those of the iterations before an event, whose backward pass is taken
+// anyway, and more are drawn only where those are too few; the curve ends at the last event, not
+// one interval later; edges are those of edge_weights.h; children of the same event are not
+// removed; the program's opacities above 1, after events are over, have no place in splat files and
+// are left out.
 
 #include "densify/taming.h"
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <memory>
-#include <numeric>
 #include <string>
 #include <utility>
 
@@ -36,23 +39,53 @@ struct Scores {
   std::vector<double> of;  ///< [N]
 };
 
-/// Values [N] over the median of those above 0; as they are where none is.
-void overMedian(std::vector<double>& values) {
+/// What is said of a splat, as it counts in the score.
+struct Column {
+  double weight;
+  std::function<double(size_t)> value;
+};
+
+/// Median of what is said of visible splats, of values above 0; 1 where none is.
+double medianOf(const Column& column, std::span<const uint8_t> visible) {
   std::vector<double> positive;
-  for (const double value : values) {
+  positive.reserve(visible.size());
+  for (size_t i = 0; i < visible.size(); ++i) {
+    const double value = visible[i] ? column.value(i) : 0.0;
     if (value > 0) positive.push_back(value);
   }
-  if (positive.empty()) return;
+  if (positive.empty()) return 1;
   const auto middle = positive.begin() + static_cast<ptrdiff_t>((positive.size() - 1) / 2);
   std::nth_element(positive.begin(), middle, positive.end());
-  for (double& value : values) value /= *middle;
+  return *middle;
+}
+
+/// [H,W] how much a pixel matters: its error over the span of errors, and its edge.
+std::vector<float> pixelWeights(const ViewErrors& seen, double error_weight, double edge_weight) {
+  std::vector<float> errors(seen.target.size() / 3);
+  for (size_t i = 0; i < errors.size(); ++i) {
+    float sum = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      sum += std::abs(seen.picture[i * 4 + c] - seen.target[i * 3 + c]);
+    }
+    errors[i] = sum / 3;
+  }
+  const auto [least, most] = std::minmax_element(errors.begin(), errors.end());
+  const float low = *least, span = *most - *least;
+  const std::vector<float> edges = edgeWeights(seen.width, seen.height, seen.target);
+  for (size_t i = 0; i < errors.size(); ++i) {
+    const float error = span > 0 ? (errors[i] - low) / span : 0.0f;
+    errors[i] =
+        static_cast<float>(error_weight) * error + static_cast<float>(edge_weight) * edges[i];
+  }
+  return errors;
 }
 
 /// Depth of a splat's centre, and how far it reaches in the picture, pixels; 0 behind the camera.
 struct Projection {
   double depth = 0, radius = 0;
 
-  Projection(const Camera& camera, const SplatCloud& cloud, size_t i) {
+  Projection() = default;
+  Projection(const Camera& camera, const DrawnSplats& cloud, size_t i) {
     const Mat3d turn = camera.world_to_camera.topLeftCorner<3, 3>();
     const float* p = &cloud.positions[i * 3];
     const Vec3d seen = turn * Vec3d(static_cast<double>(p[0]), static_cast<double>(p[1]),
@@ -89,23 +122,31 @@ class TamingScore final : public ControlPart {
 
   void request(const ControlMoment& moment, StatisticRequest& request) const override {
     if (moment.is_learning) request.screen_gradients = true;
+    if (moment.view && looks(moment, moment.view->index)) ask(request);
   }
   void observe(const ControlMoment& moment, const ViewStatistics& view) override {
-    if (moment.is_learning) pulls_.add(view);
+    if (!moment.is_learning) return;
+    pulls_.add(view);
+    const bool is_whole = !view.of(Statistic::kCoveredErrors).empty();
+    if (is_whole && looks(moment, view.view)) addView(view);
   }
 
   bool wantsSweep(const ControlMoment& moment) const override { return moment.is_event; }
 
   void sweep(const ControlMoment& moment, ViewEvaluator& views) override {
-    const SplatCloud& cloud = views.splats();
-    scores_->of.assign(cloud.size(), 0.0);
-    if (pulls_.size() != cloud.size()) pulls_.reset(cloud.size());
-    std::vector<uint32_t> all(views.viewCount());
-    std::iota(all.begin(), all.end(), 0u);
-    const std::vector<double> alike(all.size(), 1.0);
+    const size_t count = views.splats().size();
+    if (scores_->of.size() != count) begin(count);
+    std::vector<uint32_t> others;
+    for (uint32_t view = 0; view < views.viewCount(); ++view) {
+      if (!hasLookedAt(view)) others.push_back(view);
+    }
+    const std::vector<double> alike(others.size(), 1.0);
+    const size_t wanted = options_.view_count - std::min(options_.view_count, looked_at_.size());
+    StatisticRequest request;
+    ask(request);
     for (const uint32_t view :
-         drawWithoutReplacement(moment, RandomUse::kViewOrder, all, alike, options_.view_count)) {
-      addView(view, cloud, views);
+         drawWithoutReplacement(moment, RandomUse::kViewOrder, others, alike, wanted)) {
+      addView(views.evaluate(view, request));
     }
   }
 
@@ -130,72 +171,96 @@ class TamingScore final : public ControlPart {
                      [kMost](double score) { return static_cast<float>(std::min(score, kMost)); });
     }
     if (seen_.size() == count_before) followEdit(edit, 1, 0.0f, seen_);
-    scores_->of.clear();
+    if (moment.is_event || edit.keep || edit.append.size() > 0) begin(0);
   }
 
   std::vector<float> scores() const override { return seen_; }
-  void put(TensorTable& table) const override { pulls_.put(table); }
-  void take(const TensorTable& table) override { pulls_.take(table); }
+  void put(TensorTable& table) const override {
+    pulls_.put(table);
+    table["scores"] = {{scores_->of.size()}, scores_->of};
+    table["views"] = {{looked_at_.size()}, looked_at_};
+  }
+  void take(const TensorTable& table) override {
+    GradientWindow pulls = pulls_;
+    pulls.take(table);
+    std::vector<double> scores = stateSums<double>(table, "scores");
+    looked_at_ = stateArray<uint64_t>(table, "views");
+    scores_->of = std::move(scores);
+    pulls_ = std::move(pulls);
+  }
 
  private:
-  void addView(size_t view, const SplatCloud& cloud, ViewEvaluator& views) {
-    const std::vector<float> target = views.target(view);
-    const Camera& camera = views.camera(view);
-    StatisticRequest request;
+  void begin(size_t count) {
+    scores_->of.assign(count, 0.0);
+    looked_at_.clear();
+  }
+  bool hasLookedAt(uint64_t view) const {
+    return std::find(looked_at_.begin(), looked_at_.end(), view) != looked_at_.end();
+  }
+  /// Whether this iteration's view is one of the last before an event.
+  bool looks(const ControlMoment& moment, uint64_t view) const {
+    return moment.until_event < options_.view_count && looked_at_.size() < options_.view_count &&
+           !hasLookedAt(view);
+  }
+
+  void ask(StatisticRequest& request) const {
     request.covered = request.blending_weights = true;
-    request.errors = pixelWeights(camera, target, views.picture(view));
-    const ViewStatistics& seen = views.evaluate(view, request);
-    std::vector<double> total(cloud.size(), 0.0), values(cloud.size());
-    const auto add = [&](double weight, const auto& valueOf) {
-      parallelFor(values.size(), kGrain, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) values[i] = seen.visible[i] ? valueOf(i) : 0.0;
-      });
-      overMedian(values);
-      for (size_t i = 0; i < values.size(); ++i) total[i] += weight * values[i];
+    request.errors_of = [error_weight = options_.error_weight,
+                         edge_weight = options_.edge_weight](const ViewErrors& seen) {
+      return pixelWeights(seen, error_weight, edge_weight);
     };
+  }
+
+  void addView(const ViewStatistics& seen) {
+    const DrawnSplats& cloud = seen.splats;
+    const Camera& camera = *seen.camera;
+    const size_t count = seen.visible.size();
+    if (scores_->of.size() != count) begin(count);
+    if (pulls_.size() != count) pulls_.reset(count);
+    looked_at_.push_back(seen.view);
+    std::vector<Projection> projected(count);
+    parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        if (seen.visible[i]) projected[i] = Projection(camera, cloud, i);
+      }
+    });
     const auto statistic = [&](Statistic which) {
       return [told = seen.of(which)](size_t i) { return static_cast<double>(told[i]); };
     };
     const TamingWeights& w = options_.weights;
-    add(w.pull, [&](size_t i) { return static_cast<double>(pulls_.average(i)); });
-    add(w.opacity, [&](size_t i) { return static_cast<double>(cloud.opacities[i]); });
-    add(w.depth, [&](size_t i) { return Projection(camera, cloud, i).depth; });
-    add(w.radius, [&](size_t i) { return Projection(camera, cloud, i).radius; });
-    add(w.volume, [&](size_t i) {
-      const float* s = &cloud.scales[i * 3];
-      return static_cast<double>(s[0]) * static_cast<double>(s[1]) * static_cast<double>(s[2]);
+    const Column columns[] = {
+        {w.pull, [&](size_t i) { return static_cast<double>(pulls_.average(i)); }},
+        {w.opacity, [&](size_t i) { return static_cast<double>(cloud.opacities[i]); }},
+        {w.depth, [&](size_t i) { return projected[i].depth; }},
+        {w.radius, [&](size_t i) { return projected[i].radius; }},
+        {w.volume,
+         [&](size_t i) {
+           const float* s = &cloud.scales[i * 3];
+           return static_cast<double>(s[0]) * static_cast<double>(s[1]) * static_cast<double>(s[2]);
+         }},
+        {w.distances, statistic(Statistic::kCoveredDistances)},
+        {w.errors, statistic(Statistic::kCoveredErrors)},
+        {w.pixels, statistic(Statistic::kCoveredPixels)},
+        {w.blending, statistic(Statistic::kBlendingWeights)}};
+    double medians[std::size(columns)];
+    parallelFor(std::size(columns), 1, [&](size_t begin, size_t end) {
+      for (size_t c = begin; c < end; ++c) medians[c] = medianOf(columns[c], seen.visible);
     });
-    add(w.distances, statistic(Statistic::kCoveredDistances));
-    add(w.errors, statistic(Statistic::kCoveredErrors));
-    add(w.pixels, statistic(Statistic::kCoveredPixels));
-    add(w.blending, statistic(Statistic::kBlendingWeights));
-    for (size_t i = 0; i < total.size(); ++i) {
-      if (seen.visible[i]) scores_->of[i] += kScale * seen.loss * total[i];
-    }
-  }
-
-  /// [H,W] how much a pixel matters: its error over the span of errors, and its edge.
-  std::vector<float> pixelWeights(const Camera& camera, const std::vector<float>& target,
-                                  const std::vector<float>& picture) const {
-    std::vector<float> errors(target.size() / 3);
-    for (size_t i = 0; i < errors.size(); ++i) {
-      float sum = 0;
-      for (size_t c = 0; c < 3; ++c) sum += std::abs(picture[i * 3 + c] - target[i * 3 + c]);
-      errors[i] = sum / 3;
-    }
-    const auto [least, most] = std::minmax_element(errors.begin(), errors.end());
-    const float low = *least, span = *most - *least;
-    const std::vector<float> edges = edgeWeights(camera.width, camera.height, target);
-    for (size_t i = 0; i < errors.size(); ++i) {
-      const float error = span > 0 ? (errors[i] - low) / span : 0.0f;
-      errors[i] = static_cast<float>(options_.error_weight) * error +
-                  static_cast<float>(options_.edge_weight) * edges[i];
-    }
-    return errors;
+    parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        if (!seen.visible[i]) continue;
+        double total = 0;
+        for (size_t c = 0; c < std::size(columns); ++c) {
+          total += columns[c].weight * (columns[c].value(i) / medians[c]);
+        }
+        scores_->of[i] += kScale * seen.loss * total;
+      }
+    });
   }
 
   TamingOptions options_;
   std::shared_ptr<Scores> scores_;
+  std::vector<uint64_t> looked_at_;  ///< views in the scores
   GradientWindow pulls_;
   std::vector<float> seen_;  ///< [N] of the last event
 };

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "densify/state_arrays.h"
 #include "math/covariance.h"
 
 namespace stipple {
@@ -18,10 +19,9 @@ namespace {
 constexpr size_t kGrain = 1 << 12;
 constexpr double kWhite = 65534;
 
-Vec3d positionOf(const SplatCloud& splats, size_t row) {
-  return {static_cast<double>(splats.positions[row * 3]),
-          static_cast<double>(splats.positions[row * 3 + 1]),
-          static_cast<double>(splats.positions[row * 3 + 2])};
+Vec3d positionOf(std::span<const float> positions, size_t row) {
+  return {static_cast<double>(positions[row * 3]), static_cast<double>(positions[row * 3 + 1]),
+          static_cast<double>(positions[row * 3 + 2])};
 }
 
 uint16_t greyAt(std::span<const float> picture, size_t pixel) {
@@ -99,12 +99,12 @@ double patchSimilarity(const FootprintPatch& a, const FootprintPatch& b) {
 BestViews::BestViews(size_t splat_count)
     : views_(splat_count), weights_(splat_count), view_counts_(splat_count, 0) {}
 
-void BestViews::add(const ViewStatistics& view, const SplatCloud& splats) {
+void BestViews::add(const ViewStatistics& view) {
   const std::span<const float> weights = view.of(Statistic::kBlendingWeights);
   parallelFor(size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       if (!view.visible[i] || !(weights[i] > 0)) continue;
-      if (!placeInPicture(*view.camera, positionOf(splats, i))) continue;
+      if (!placeInPicture(*view.camera, positionOf(view.splats.positions, i))) continue;
       const uint32_t number = static_cast<uint32_t>(view.view);
       if (view_counts_[i] == 0 || weights[i] > weights_[i][0]) {
         views_[i] = {number, views_[i][0]};
@@ -116,6 +116,33 @@ void BestViews::add(const ViewStatistics& view, const SplatCloud& splats) {
       view_counts_[i] = static_cast<uint8_t>(std::min(view_counts_[i] + 1, 2));
     }
   });
+}
+
+void BestViews::put(TensorTable& table) const {
+  std::vector<uint32_t> views(size() * 2);
+  std::vector<float> weights(size() * 2);
+  for (size_t i = 0; i < size(); ++i) {
+    std::copy_n(views_[i].begin(), 2, &views[i * 2]);
+    std::copy_n(weights_[i].begin(), 2, &weights[i * 2]);
+  }
+  const std::vector<uint32_t> counts(view_counts_.begin(), view_counts_.end());
+  table["best_views"] = {{size(), 2}, views};
+  table["best_weights"] = {{size(), 2}, weights};
+  table["best_counts"] = {{size()}, counts};
+}
+
+void BestViews::take(const TensorTable& table) {
+  const std::vector<uint32_t> counts = stateArray<uint32_t>(table, "best_counts");
+  const std::vector<uint32_t> views = stateArray<uint32_t>(table, "best_views");
+  const std::vector<float> weights = stateArray<float>(table, "best_weights");
+  requireAsMany(views.size(), "best_views", counts.size() * 2, "best_counts");
+  requireAsMany(weights.size(), "best_weights", counts.size() * 2, "best_counts");
+  *this = BestViews(counts.size());
+  for (size_t i = 0; i < counts.size(); ++i) {
+    std::copy_n(&views[i * 2], 2, views_[i].begin());
+    std::copy_n(&weights[i * 2], 2, weights_[i].begin());
+    view_counts_[i] = static_cast<uint8_t>(std::min(counts[i], 2u));
+  }
 }
 
 std::vector<float> BestViews::confidences(ViewEvaluator& views) const {
@@ -139,7 +166,7 @@ std::vector<float> BestViews::confidences(ViewEvaluator& views) const {
         const size_t row = tested[k];
         const size_t which = views_[row][0] == view ? 0 : 1;
         if (views_[row][which] != view) continue;
-        const auto place = placeInPicture(camera, positionOf(splats, row));
+        const auto place = placeInPicture(camera, positionOf(splats.positions, row));
         const Mat3d axes = scaledAxes<double>(&splats.rotations[row * 4], &splats.scales[row * 3]);
         patches[k][which] = patchAt(camera, picture, *place, footprintFactor(camera, *place, axes));
       }

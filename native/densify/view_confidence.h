@@ -37,14 +37,18 @@ class BestViews {
  public:
   explicit BestViews(size_t splat_count = 0);
 
-  /// In: a view with its blending weights.
-  void add(const ViewStatistics& view, const SplatCloud& splats);
+  /// In: a view with its blending weights and the positions of as many splats.
+  void add(const ViewStatistics& view);
   size_t size() const { return view_counts_.size(); }
 
   /// [N] in 0..1: how alike the targets of its two best views are under its footprint. Splats with
   /// one view have 1, those with none 0. Loads each view that is the best or second of some splat
   /// once. Memory: 204 bytes per splat with two views.
   std::vector<float> confidences(ViewEvaluator& views) const;
+
+  /// For a checkpoint. Errors of take: kFormat.
+  void put(TensorTable& table) const;
+  void take(const TensorTable& table);
 
  private:
   std::vector<std::array<uint32_t, 2>> views_;  ///< [N] best first

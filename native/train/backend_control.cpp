@@ -26,13 +26,19 @@ std::vector<double> beginControl(RenderBackend& backend, const Strategy& strateg
 }
 
 void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment,
-                 const StepView& view) {
+                 const StepView& view, const StatisticRequest& request) {
   ViewStatistics statistics;
   statistics.view = view.index;
   statistics.width = view.camera->width;
   statistics.height = view.camera->height;
   statistics.camera = view.camera;
   backend.lendStatistics(statistics);
+  if (request.error_maps) {
+    const size_t pixels = size_t{statistics.width} * statistics.height;
+    backend.lendErrors(statistics.errors);
+    statistics.errors.target = {view.target, pixels * 3};
+    statistics.errors.weights = {view.weights, view.weights ? pixels : size_t{0}};
+  }
   strategy.observe(moment, statistics);
 }
 

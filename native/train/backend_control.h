@@ -15,9 +15,9 @@ namespace stipple {
 /// Returns: rates of the extra parameters.
 std::vector<double> beginControl(RenderBackend& backend, const Strategy& strategy);
 
-/// Shows the strategy what the last backward pass has gathered.
+/// Shows the strategy what the last backward pass has gathered. In: request: of it.
 void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment,
-                 const StepView& view);
+                 const StepView& view, const StatisticRequest& request);
 
 /// Valid until the backend's next call.
 SplatStore storeOf(const RenderBackend& backend);

@@ -30,8 +30,7 @@ enum class Stage { kSplats, kDrawn, kLoss, kGradients };
 constexpr const GradientArray* kStatistics =
     std::find_if(std::begin(kGradientArrays), std::end(kGradientArrays),
                  [](const GradientArray& array) { return array.is_statistic; });
-static_assert(std::end(kGradientArrays) - kStatistics ==
-              static_cast<ptrdiff_t>(kStatisticCount));
+static_assert(std::end(kGradientArrays) - kStatistics == static_cast<ptrdiff_t>(kStatisticCount));
 
 /// Arrays of one checkpoint, which must belong together.
 void requireLike(const RawSplats& splats, const RawSplats& others, const char* what) {
@@ -273,6 +272,17 @@ class CpuBackend final : public RenderBackend {
     for (size_t i = 0; i < kStatisticCount; ++i) {
       statistics.arrays[i] = gradients_.instances[0].*kStatistics[i].values;
     }
+    statistics.splats = {held_.splats.positions, held_.splats.rotations, cloud_.scales,
+                         cloud_.opacities};
+  }
+
+  void lendErrors(ViewErrors& errors) override {
+    requireStage(Stage::kLoss, "there are no errors; call loss first");
+    errors.width = picture_.width;
+    errors.height = picture_.height;
+    errors.structure = image_loss_.structureErrors();
+    errors.picture = picture_.colour;
+    requireCount(errors.structure.size(), picture_.colour.size() / 4, "the loss's error map");
   }
 
  private:
@@ -373,7 +383,21 @@ class CpuBackend final : public RenderBackend {
     are_kept_ = true;
   }
 
-  std::span<const float> errorsOf(const StatisticRequest& request) const {
+  std::span<const float> errorsOf(const StatisticRequest& request) {
+    if (request.errors_of) {
+      if (request.structure_errors || !request.errors.empty()) {
+        fail(ErrorCode::kInvalidArgument,
+             "errors are asked for in two ways; one of them is allowed");
+      }
+      made_errors_ = request.errors_of({picture_.width,
+                                        picture_.height,
+                                        image_loss_.structureErrors(),
+                                        picture_.colour,
+                                        target_,
+                                        {}});
+      requireCount(made_errors_.size(), picture_.colour.size() / 4, "the map of errors");
+      return made_errors_;
+    }
     if (!request.structure_errors) return request.errors;
     if (!request.errors.empty()) {
       fail(ErrorCode::kInvalidArgument,
@@ -419,6 +443,7 @@ class CpuBackend final : public RenderBackend {
   RenderResult picture_;
   ImageLoss image_loss_;
   std::span<const float> target_;       ///< of the last loss, [H,W,3]
+  std::vector<float> made_errors_;      ///< [H,W] of StatisticRequest::errors_of
   std::vector<float> colour_gradient_;  ///< [H,W,4]
   std::vector<float> residual_;         ///< [H,W,3]
   BackwardWorkspace backward_workspace_;

@@ -42,6 +42,7 @@ class CloudDensifier {
     for (uint32_t i = 0; i < origins_.size(); ++i) origins_[i] = i;
     moment_.extent = extentOfCameras(pictures_.views(), shown_);
     moment_.seed = options.seed;
+    moment_.view_count = shown_.size();
     moment_.max_splats = densifyLimit(cloud.size(), options);
   }
 
@@ -84,6 +85,8 @@ class CloudDensifier {
     view.index = index;
     view.camera = &pictures_.views().camera(shown_[index]);
     pictures_.load(shown_[index], kBlack, target_);
+    view.target = target_.colour.data();
+    view.weights = target_.weights.empty() ? nullptr : target_.weights.data();
     if (index + 1 < shown_.size()) pictures_.prefetch(shown_[index + 1]);
     const TrainingView looked_at{index, target_.width, target_.height, target_.colour};
     moment_.standalone->looks_left = shown_.size() - index;
@@ -99,10 +102,10 @@ class CloudDensifier {
     drawing.with_depth = false;
     drawing.with_background = true;
     backend_->forward(*view.camera, drawing);
-    loss_options_.with_structure_errors = request.structure_errors;
+    loss_options_.with_structure_errors = request.structure_errors || request.error_maps;
     backend_->loss(target_.colour, loss_options_, target_.weights);
     backend_->backward(request);
-    observeView(*backend_, *strategy_, moment_, view);
+    observeView(*backend_, *strategy_, moment_, view, request);
   }
 
   void change() {

@@ -83,7 +83,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     report.seconds.render = watch.lap();
 
     const StatisticRequest request = strategy_->requests(moment_);
-    loss_options_.with_structure_errors = request.structure_errors;
+    loss_options_.with_structure_errors = request.structure_errors || request.error_maps;
     const ImageLossValue value =
         backend_->loss({view.target, pixel_count * 3}, loss_options_,
                        {view.weights, view.weights ? pixel_count : size_t{0}});
@@ -93,7 +93,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     report.ssim = value.ssim;
     report.seconds.backward = watch.lap();
 
-    if (request.any()) observeView(*backend_, *strategy_, moment_, view);
+    if (request.any()) observeView(*backend_, *strategy_, moment_, view, request);
     report.seconds.edit = watch.lap();
     if (strategy_->stepGate(moment_)) {
       setRates();

@@ -134,6 +134,9 @@ class RenderBackend {
   /// All that were asked for, and which splats passed culling. Out: visible and arrays, valid until
   /// the next call; the rest of `statistics` is left alone.
   virtual void lendStatistics(ViewStatistics& statistics) = 0;
+  /// The picture that was drawn last, and its structure errors; refused where the loss was without
+  /// them. The rest of `errors` is left alone.
+  virtual void lendErrors(ViewErrors& errors) = 0;
 };
 
 /// On this processor, with native/splat, train/image_loss and train/adam.

@@ -146,6 +146,7 @@ void Trainer::step(Pace& pace) {
   moment.extent = extent_;
   moment.seed = options_.seed;
   moment.max_splats = options_.max_splats;
+  moment.view_count = split_.training.size();
   StepView view;
   view.index = order_.at(iteration_);
   const size_t source_view = split_.training[view.index];

@@ -81,7 +81,13 @@ const ViewStatistics& FitViewEvaluator::evaluate(size_t view, const StatisticReq
     input.residual_weights = request.contribution_weights;
   }
   input.edge_weights = request.edge_weights;
-  input.errors = request.structure_errors ? loss_.structureErrors() : request.errors;
+  if (request.errors_of) {
+    made_errors_ = request.errors_of({drawn_.width, drawn_.height, loss_.structureErrors(),
+                                      drawn_.colour, target_.colour, target_.weights});
+  }
+  input.errors = request.structure_errors ? loss_.structureErrors()
+                 : request.errors_of      ? std::span<const float>(made_errors_)
+                                          : std::span<const float>(request.errors);
   input.with_blending_weights = request.blending_weights;
   input.with_screen_gradients = request.screen_gradients;
   input.with_absolute_screen_gradients = request.absolute_screen_gradients;
@@ -95,6 +101,7 @@ const ViewStatistics& FitViewEvaluator::evaluate(size_t view, const StatisticReq
   statistics_.camera = &camera(view);
   statistics_.loss = value.loss;
   statistics_.visible = visible_;
+  statistics_.splats = {cloud_->positions, cloud_->rotations, cloud_->scales, cloud_->opacities};
   size_t next = 0;
   for (const GradientArray& array : kGradientArrays) {
     if (array.is_statistic) statistics_.arrays[next++] = backward_.instances[0].*array.values;

@@ -51,6 +51,7 @@ class FitViewEvaluator final : public ViewEvaluator {
   TargetPicture target_;
   std::vector<float> colour_gradient_;  ///< [H,W,4]
   std::vector<float> residual_;         ///< [H,W,3]
+  std::vector<float> made_errors_;      ///< [H,W] of StatisticRequest::errors_of
   std::vector<uint8_t> visible_;
   ViewStatistics statistics_;
 };

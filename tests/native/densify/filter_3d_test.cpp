@@ -247,6 +247,8 @@ TEST(Filter3d, LooksAgainAfterEventsAndNowAndThenLater) {
   EXPECT_FALSE(strategy->wantsSweep(at(602)));
   EXPECT_TRUE(strategy->wantsSweep(at(15100)));
   EXPECT_FALSE(strategy->wantsSweep(at(15101)));
+  EXPECT_TRUE(strategy->wantsSweep(at(29800)));
+  EXPECT_FALSE(strategy->wantsSweep(at(29900)));
   EXPECT_FALSE(strategy->wantsSweep(at(30000)));
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "densify/error_maps.h"
 #include "densify/strategy.h"
 
 // Views whose pictures and statistics a test sets.
@@ -51,19 +52,45 @@ class KnownViews final : public ViewEvaluator {
   }
   const ViewStatistics& evaluate(size_t view, const StatisticRequest&) override {
     drawn.push_back(view);
+    return observed(view);
+  }
+
+  /// What an iteration with this view shows. Valid until the next call.
+  const ViewStatistics& observed(size_t view) {
     const KnownView& known = views[view];
     statistics_ = {};
     statistics_.view = view;
     statistics_.width = known.camera.width;
     statistics_.height = known.camera.height;
     statistics_.camera = &known.camera;
+    statistics_.loss = 0.5;
     statistics_.visible = known.visible;
+    statistics_.splats = {cloud.positions, cloud.rotations, cloud.scales, cloud.opacities};
     for (size_t k = 0; k < kStatisticCount; ++k) statistics_.arrays[k] = known.statistics[k];
+    maps_ = errorMaps(known.camera.width, known.camera.height, known.picture, known.target);
+    rgba_.assign(known.picture.size() / 3 * 4, 1.0f);
+    for (size_t i = 0; i < known.picture.size(); ++i) rgba_[i / 3 * 4 + i % 3] = known.picture[i];
+    statistics_.errors = {
+        known.camera.width, known.camera.height, maps_.dissimilarity, rgba_, known.target, {}};
     return statistics_;
   }
 
  private:
+  ErrorMaps maps_;
+  std::vector<float> rgba_;
   ViewStatistics statistics_;
 };
+
+/// An iteration that learns from a view: what a strategy asks for, and then is shown.
+inline StatisticRequest iterate(Strategy& strategy, KnownViews& views, FitMoment moment,
+                                size_t view) {
+  const Camera& camera = views.views[view].camera;
+  const TrainingView learned{view, camera.width, camera.height, views.views[view].target};
+  moment.view_count = views.views.size();
+  moment.view = &learned;
+  const StatisticRequest request = strategy.requests(moment);
+  if (request.any()) strategy.observe(moment, views.observed(view));
+  return request;
+}
 
 }  // namespace stipple::testing

@@ -161,6 +161,60 @@ TEST(Metropolis, TriesAndViewsFadeOut) {
   EXPECT_FALSE(strategy->wantsSweep(publishedMoment(15000)));
 }
 
+TEST(Metropolis, ViewsThatIterationsHaveDrawnAreNotDrawnAgain) {
+  const RawSplats splats = splatsInFront(3000);
+  KnownViews views = viewsOf(splats, 8);
+  for (size_t v = 0; v < 8; ++v) {  // another thing wrong in each
+    for (size_t i = 0; i < 3000; ++i) views.views[v].picture[7919 * v + i] = 0.1f;
+  }
+  const auto drawing = makeStrategy("metropolis"), watching = makeStrategy("metropolis");
+  const auto drawn = eventOf(*drawing, publishedMoment(600), splats, views);
+  EXPECT_EQ(views.drawn.size(), 7u);
+  views.drawn.clear();
+  // A round of views before the event, the one outside its block first; then the first one again.
+  FitMoment moment = publishedMoment(592);
+  for (const size_t view : {7, 0, 1, 2, 3, 4, 5, 6, 0}) {
+    const bool counts = view < 7 && moment.iteration < 600;
+    EXPECT_EQ(iterate(*watching, views, moment, view).error_maps, counts) << view;
+    ++moment.iteration;
+  }
+  moment = publishedMoment(600);
+  moment.view_count = 8;
+  const auto watched = eventOf(*watching, moment, splats, views);
+  EXPECT_THAT(views.drawn, ::testing::IsEmpty());
+  const std::vector<float> a = drawing->seen(drawn->countAfter(3000)).score;
+  const std::vector<float> b = watching->seen(watched->countAfter(3000)).score;
+  // Differences of pictures are summed in another order: single precision.
+  for (size_t i = 0; i < 3000; ++i) EXPECT_NEAR(a[i], b[i], 1e-5);
+  // Long before an event nothing is asked for.
+  EXPECT_FALSE(iterate(*watching, views, publishedMoment(650), 0).any());
+  EXPECT_FALSE(iterate(*watching, views, publishedMoment(14990), 0).any());
+}
+
+TEST(Metropolis, GoesOnFromItsStateInTheMiddleOfItsViews) {
+  const RawSplats splats = splatsInFront(500);
+  KnownViews views = viewsOf(splats, 4);
+  const auto whole = makeStrategy("metropolis"), half = makeStrategy("metropolis");
+  for (const auto& strategy : {whole.get(), half.get()}) {
+    iterate(*strategy, views, publishedMoment(598), 1);
+    iterate(*strategy, views, publishedMoment(599), 2);
+  }
+  const auto other = makeStrategy("metropolis");
+  other->restore(half->state());
+  for (const auto& strategy : {whole.get(), other.get()}) {
+    iterate(*strategy, views, publishedMoment(600), 0);
+  }
+  FitMoment moment = publishedMoment(600);
+  moment.view_count = 4;
+  const Edited a = moved(*eventOf(*whole, moment, splats, views), splats);
+  const Edited b = moved(*eventOf(*other, moment, splats, views), splats);
+  EXPECT_TRUE(areSame(a.splats, b.splats));
+  EXPECT_EQ(whole->seen(a.splats.size()).score, other->seen(b.splats.size()).score);
+  TensorTable broken = half->state();
+  broken["metropolis_birth.view_counts"] = {{1}, std::vector<uint32_t>{1}};
+  EXPECT_THROW(makeStrategy("metropolis")->restore(broken), Error);
+}
+
 TEST(Metropolis, WhatNoViewSeesDoesNotTry) {
   RawSplats splats = splatsInFront(500);
   for (size_t i = 0; i < 250; ++i) splats.positions[i * 3 + 2] = -2;

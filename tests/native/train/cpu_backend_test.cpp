@@ -374,12 +374,19 @@ TEST(CpuBackend, LendsWhatAPassGathered) {
   const std::vector<float> wanted = target(721);
   ViewStatistics statistics;
   EXPECT_THAT(messageOf([&] { backend->lendStatistics(statistics); }), HasSubstr("backward first"));
+  EXPECT_THAT(messageOf([&] { backend->lendErrors(statistics.errors); }), HasSubstr("loss first"));
   backend->forward(camera(), overGrey());
   backend->loss(wanted, {});
   StatisticRequest request;
   request.screen_gradients = true;
   const BackwardSummary summary = backend->backward(request);
+  EXPECT_THAT(messageOf([&] { backend->lendErrors(statistics.errors); }),
+              HasSubstr("the loss's error map holds 0 values"));
   backend->lendStatistics(statistics);
+  EXPECT_TRUE(std::equal(statistics.splats.positions.begin(), statistics.splats.positions.end(),
+                         cloud.positions.begin(), cloud.positions.end()));
+  EXPECT_EQ(statistics.splats.scales.size(), 120u);
+  EXPECT_EQ(statistics.splats.opacities.size(), 40u);
   ASSERT_EQ(statistics.visible.size(), 40u);
   EXPECT_EQ(statistics.visible[5], 0);
   EXPECT_EQ(statistics.visible[7], 0);
@@ -391,6 +398,34 @@ TEST(CpuBackend, LendsWhatAPassGathered) {
   EXPECT_EQ(std::vector<float>(seen.begin(), seen.end()), expected);
   EXPECT_TRUE(statistics.of(Statistic::kAbsoluteScreenGradients).empty());
   EXPECT_TRUE(statistics.of(Statistic::kContributions).empty());
+}
+
+TEST(CpuBackend, LendsTheErrorsOfItsLastPicture) {
+  const auto backend = makeCpuBackend();
+  backend->upload(smallCloud(40, 0, 720));
+  std::vector<float> wanted = target(721);
+  ImageLossOptions options;
+  options.with_structure_errors = true;
+  backend->forward(camera(), overGrey());
+  const ImageLossValue value = backend->loss(wanted, options);
+  ViewErrors errors;
+  backend->lendErrors(errors);
+  errors.target = wanted;
+  const size_t pixels = wanted.size() / 3;
+  ASSERT_EQ(errors.structure.size(), pixels);
+  double structure = 0, difference = 0;
+  for (size_t p = 0; p < pixels; ++p) {
+    structure += static_cast<double>(errors.structure[p]) / static_cast<double>(pixels);
+    difference += errors.differenceAt(p) / static_cast<double>(pixels);
+  }
+  // Their means are those of the loss, which sums in another order.
+  EXPECT_NEAR(structure, 1 - value.ssim, 1e-6);
+  EXPECT_NEAR(difference, value.l1, 1e-6);
+  const std::vector<float> half(pixels, 0.5f);
+  errors.weights = half;
+  const double whole = errors.differenceAt(7) * 2;
+  errors.weights = {};
+  EXPECT_DOUBLE_EQ(errors.differenceAt(7), whole);
 }
 
 TEST(CpuBackend, AGroupWithoutARateStaysAsItIs) {
