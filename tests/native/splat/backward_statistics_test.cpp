@@ -196,6 +196,29 @@ TEST(BlendingWeights, AddUpToTheCoverageOfTheReference) {
   }
 }
 
+TEST(EdgeWeights, ThoseOfAllSplatsAndOfWhatPassesThemAreThoseOfThePicture) {
+  const SplatCloud cloud = smallCloud(60, 0, 232);
+  const Camera camera = smallCamera();
+  const std::vector<float> gradient(pixelCount(camera) * 4, 1.0f);
+  const std::vector<float> edges = randomWeights(pixelCount(camera), 17, 0, 1);
+  const ReferenceResult picture = reference(cloud, camera, {});
+  const SplatInstance instance{&cloud};
+  BackwardInput input;
+  input.colour_gradient = gradient;
+  input.edge_weights = edges;
+  const BackwardResult result = renderBackward({&instance, 1}, camera, {}, input);
+  double sum = 0, whole = 0;
+  for (const float score : result.instances[0].edge_weights) sum += static_cast<double>(score);
+  for (size_t p = 0; p < edges.size(); ++p) {
+    const double transmittance = 1 - picture.colour[p * 4 + 3];
+    sum += static_cast<double>(edges[p]) * transmittance;
+    whole += static_cast<double>(edges[p]);
+  }
+  // Every pixel's weight is shared between the splats and what is behind them; alpha is off by 3e-7
+  // in each, and sums of single precision by as much.
+  EXPECT_NEAR(sum, whole, 1e-6 * static_cast<double>(pixelCount(camera)));
+}
+
 TEST(ErrorContributions, SumAndLargestAgreeWithThePixelsOneByOne) {
   const SplatCloud cloud = smallCloud(15, 0, 240);
   const Camera camera = frontCamera(11, 9, 8, 3);
