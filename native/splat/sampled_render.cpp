@@ -247,6 +247,13 @@ void validateShutter(const Shutter& shutter, size_t instance_count) {
              " instances in each of its " + std::to_string(shutter.step_count) +
              " steps is allowed");
   }
+  Camera somewhere;
+  somewhere.width = somewhere.height = 1;
+  somewhere.fx = somewhere.fy = 1;
+  for (const Mat4d& matrix : shutter.camera) {
+    somewhere.world_to_camera = matrix;
+    validate(somewhere);
+  }
   for (size_t i = 0; i < shutter.instances.size(); ++i) {
     const std::string name = "instance " + std::to_string(i % instance_count) +
                              ": matrix of step " + std::to_string(i / instance_count);

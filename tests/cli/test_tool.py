@@ -187,6 +187,46 @@ def test_render_takes_sizes_and_several_files(scene):
     assert (info['width'], info['height']) == (48, 32)
 
 
+def test_render_looks_through_lenses_and_all_around(scene):
+    view = ('--camera', scene / 'transforms.json')
+    run('render', scene / 'cube.ply', *view, '-o', scene / 'sharp.exr')
+    # Cube from 2.5 to 3.5 m; in focus it stays, out of focus it does not.
+    run('render', scene / 'cube.ply', *view, '-o', scene / 'focus.exr', '--aperture', 0.02, '--focus-distance', 3,
+        '--blades', 6)
+    run('render', scene / 'cube.ply', *view, '-o', scene / 'blurred.exr', '--aperture', 0.3, '--focus-distance', 1,
+        '--blur-samples', 16, '--depth', scene / 'z.exr', '--normal', scene / 'n.exr', '--index', scene / 'i.exr')
+    near, far = (figures('compare', scene / 'sharp.exr', scene / name)['psnr'] for name in ('focus.exr', 'blurred.exr'))
+    assert near > far + 5 and far < 30
+    assert [figures('info', scene / name)['channels'] for name in ('z.exr', 'n.exr', 'i.exr')] == [1, 3, 1]
+    for model in ('equirectangular', 'fisheye-equidistant', 'fisheye-equisolid'):
+        run('render', scene / 'cube.ply', *view, '--camera-model', model, '--accuracy', 'rays', '--width', 64, '--height',
+            32, '-o', scene / 'all.exr')
+    assert figures('info', scene / 'all.exr')['width'] == 64
+    write_camera(scene / 'two.json')
+    document = json.loads((scene / 'two.json').read_text())
+    document['frames'].append({'file_path': 'b.png', 'transform_matrix': [
+        [1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 3.0], [0, 0, 0, 1]]})
+    (scene / 'two.json').write_text(json.dumps(document))
+    run('render', scene / 'cube.ply', '--camera', scene / 'two.json', '--moves-to', 1, '-o', scene / 'moving.exr')
+    assert figures('compare', scene / 'sharp.exr', scene / 'moving.exr')['psnr'] < 30
+
+
+def test_render_refuses_what_no_lens_and_no_camera_is(scene):
+    def refused(*arguments):
+        message = error('render', scene / 'cube.ply', '--camera', scene / 'transforms.json', '-o', scene / 'never.exr',
+                        *arguments)
+        assert not (scene / 'never.exr').exists()
+        return message
+
+    assert 'drawn along rays only' in refused('--camera-model', 'equirectangular')
+    assert '400 degrees; 0 to 360 is allowed' in refused('--camera-model', 'fisheye-equidistant', '--accuracy', 'rays',
+                                                         '--field-of-view', 400)
+    assert '--focus-distance' in refused('--aperture', 0.1)
+    assert '1 to 65536' in refused('--blur-samples', 0)
+    assert 'blades is 2' in refused('--aperture', 0.1, '--focus-distance', 1, '--blades', 2)
+    assert '.exr is expected' in refused('--depth', scene / 'z.png')
+
+
 def test_voxelize_writes_a_volume_with_the_bounds_of_the_splats(scene):
     run('voxelize', scene / 'cube.ply', scene / 'cube.vdb', '--resolution', 48)
     info = figures('info', scene / 'cube.vdb')

@@ -78,6 +78,29 @@ TEST_F(CameraFile, ReadsOrthographicCameras) {
   EXPECT_EQ(readOne(model).camera.fx, 0.25);
 }
 
+TEST_F(CameraFile, ReadsPanoramasAndFisheyes) {
+  const std::string size = ", \"w\": 800, \"h\": 400";
+  const Camera panorama =
+      readOne("\"camera_model\": \"EQUIRECTANGULAR\", \"fl_x\": 400" + size).camera;
+  EXPECT_EQ(panorama.model, CameraModel::kEquirectangular);
+  // The whole sphere.
+  EXPECT_DOUBLE_EQ(panorama.fx, 400 / M_PI);
+  EXPECT_DOUBLE_EQ(panorama.fy, 400 / M_PI);
+  EXPECT_EQ(panorama.cx, 400);
+  const Camera fisheye =
+      readOne("\"camera_model\": \"FISHEYE_EQUISOLID\", \"fl_x\": 150, \"field_of_view\": 3.1" +
+              size)
+          .camera;
+  EXPECT_EQ(fisheye.model, CameraModel::kFisheyeEquisolid);
+  EXPECT_EQ(fisheye.fx, 150);
+  EXPECT_EQ(fisheye.fy, 150);
+  EXPECT_EQ(fisheye.field_of_view, 3.1);
+  expectError(ErrorCode::kFormat, {"view 0", "field of view is 400", "360"}, [&] {
+    readOne("\"camera_model\": \"FISHEYE_EQUIDISTANT\", \"fl_x\": 99, \"field_of_view\": 6.981317" +
+            size);
+  });
+}
+
 TEST_F(CameraFile, TakesTheScaleOfACameraAway) {
   const auto views = read(
       "{\"camera_angle_x\": 1, \"frames\": [{\"transform_matrix\":"

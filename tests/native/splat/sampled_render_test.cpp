@@ -561,6 +561,8 @@ TEST(SampledRender, RefusesWhatNoLensOrShutterIs) {
   sampling = {};
   sampling.shutter = twoSteps(Mat4d::Identity(), Mat4d::Zero());
   EXPECT_NE(refusalOf(sampling).find("instance 0: matrix of step 1"), std::string::npos);
+  sampling.shutter = {2, {Mat4d::Identity(), Mat4d::Zero()}, {}, {}};
+  EXPECT_NE(refusalOf(sampling).find("not a rotation"), std::string::npos);
   Mat4d mirrored = Mat4d::Identity();
   mirrored(2, 2) = -1;
   sampling.shutter = twoSteps(Mat4d::Identity(), mirrored);
