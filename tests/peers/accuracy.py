@@ -1,0 +1,75 @@
+"""Renews what docs/accuracy_and_time.md says of the three scenes of blend-fixtures/, and its plots.
+
+    /usr/bin/python3 tests/peers/accuracy.py [--build build/release] [--work FOLDER]
+
+Makes splats of each scene in background Blender, measures its view by `stipple accuracy`, and writes the tables between
+the marks of the page and the plots into docs/images. Run it on a machine that does nothing else.
+"""
+import argparse
+import csv
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PAGE = ROOT / 'docs' / 'accuracy_and_time.md'
+SCENES = ('suzanne', 'instances', 'terrain')
+ANCHORS, WIDTH, HEIGHT = 200_000, 1280, 720
+
+
+def export(scene, build, work):
+    """Splats and camera of a scene, by the add-on of this working tree."""
+    if (work / f'{scene}.ply').exists():
+        return
+    addons = work / 'user' / 'scripts' / 'addons'
+    addons.mkdir(parents=True, exist_ok=True)
+    if not (addons / 'stipple').exists():
+        (addons / 'stipple').symlink_to(ROOT / 'addon' / 'stipple', target_is_directory=True)
+    environment = dict(os.environ, PATH=f"/usr/bin:{os.environ['PATH']}", PYTHONDONTWRITEBYTECODE='1',
+                       BLENDER_USER_RESOURCES=str(work / 'user'),
+                       STIPPLE_LIBRARY=str((build / 'lib' / 'libstipple.so').resolve()))
+    subprocess.run(['blender', '-b', '--factory-startup', '--addons', 'stipple', '--python-exit-code', '1', '--python',
+                    ROOT / 'blend-fixtures' / 'export_view.py', '--', ROOT / 'blend-fixtures' / f'{scene}.blend', work,
+                    str(ANCHORS), str(WIDTH), str(HEIGHT)], env=environment, check=True, stdout=subprocess.DEVNULL)
+
+
+def measure(scene, build, work):
+    """Rows of the report, as the CSV has them, and the sentence above its table."""
+    out = subprocess.run([build / 'bin' / 'stipple', 'accuracy', work / f'{scene}.ply', '--camera', work / f'{scene}.json',
+                          '-o', work / f'{scene}.csv', '-o', ROOT / 'docs' / 'images' / f'accuracy_{scene}.svg'],
+                         check=True, capture_output=True, text=True).stdout
+    return list(csv.DictReader((work / f'{scene}.csv').open())), out.splitlines()[0]
+
+
+def table(rows):
+    lines = ['| setting | ms | PSNR, dB | largest error | 99.9 % | splats | |', '|---|---|---|---|---|---|---|']
+    for row in rows:
+        estimated = ' (estimated)' if row['is_estimated'] == '1' else ''
+        front = 'best for its time' if row['on_front'] == '1' else ''
+        lines.append(f"| {row['setting']} | {float(row['seconds']) * 1e3:.3g}{estimated} | {float(row['psnr']):.1f} | "
+                     f"{float(row['largest_error']):.2g} | {float(row['error_99_9']):.2g} | {int(row['splats']):,} | {front} |")
+    return '\n'.join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--build', type=pathlib.Path, default=ROOT / 'build' / 'release')
+    parser.add_argument('--work', type=pathlib.Path)
+    options = parser.parse_args()
+    work = (options.work or pathlib.Path(tempfile.mkdtemp(prefix='stipple-accuracy-'))).resolve()
+    work.mkdir(parents=True, exist_ok=True)
+    page = PAGE.read_text()
+    for scene in SCENES:
+        export(scene, options.build, work)
+        rows, head = measure(scene, options.build, work)
+        made = f'<!-- {scene} -->\n{head}.\n\n{table(rows)}\n\n![{scene}](images/accuracy_{scene}.svg)\n<!-- end -->'
+        page, count = re.subn(rf'<!-- {scene} -->.*?<!-- end -->', lambda _: made, page, flags=re.S)
+        if count != 1:
+            sys.exit(f'{PAGE} has {count} places for {scene}; 1 is expected')
+    PAGE.write_text(page)
+
+
+main()
