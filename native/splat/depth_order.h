@@ -1,14 +1,33 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <vector>
 
 #include "base/parallel.h"
 #include "splat/scene.h"
 
 namespace stipple {
+
+/// Parts in parallel, then halves of them merged.
+inline void sortInParts(std::vector<uint64_t>& keys) {
+  constexpr size_t kParts = 8;
+  const auto at = [&](size_t part) {
+    return keys.begin() + static_cast<ptrdiff_t>(keys.size() * part / kParts);
+  };
+  parallelFor(kParts, 1, [&](size_t begin, size_t end) {
+    for (size_t part = begin; part < end; ++part) std::sort(at(part), at(part + 1));
+  });
+  for (size_t side = 1; side < kParts; side *= 2) {
+    parallelFor(kParts / (2 * side), 1, [&](size_t begin, size_t end) {
+      for (size_t pair = begin; pair < end; ++pair) {
+        const size_t first = pair * 2 * side;
+        std::inplace_merge(at(first), at(first + side), at(first + 2 * side));
+      }
+    });
+  }
+}
 
 /// What make(placed cloud, index, splat) accepts of every splat of a scene, with its index, by the
 /// rounded depth that depth(splat) tells, ties in the order of the scene. Same for any number of
@@ -32,14 +51,18 @@ std::vector<Splat> splatsInDepthOrder(const PlacedScene& scene, Make make, Depth
       splats.insert(splats.end(), range.begin(), range.end());
     }
   }
-  std::vector<uint32_t> order(splats.size());
-  std::iota(order.begin(), order.end(), uint32_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return depthKey(depth(splats[a])) < depthKey(depth(splats[b]));
+  // Depth above, place below: no two are equal, so any sort gives one order.
+  std::vector<uint64_t> order(splats.size());
+  parallelFor(order.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      order[i] = uint64_t{depthKey(depth(splats[i]))} << 32 | i;
+    }
   });
-  std::vector<Splat> sorted;
-  sorted.reserve(splats.size());
-  for (const uint32_t i : order) sorted.push_back(splats[i]);
+  sortInParts(order);
+  std::vector<Splat> sorted(splats.size());
+  parallelFor(order.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) sorted[i] = splats[static_cast<uint32_t>(order[i])];
+  });
   return sorted;
 }
 

@@ -52,6 +52,7 @@ RayForm rayForm(const View<double>& view, const RaySplat& splat) {
   const Mat3d& w = splat.whiten;
   RayForm form;
   form.opacity = splat.opacity;
+  form.log2_opacity = std::log2(splat.opacity);
   form.depth = c[2];
   form.nearest = c[2] - splat.radius;
   std::copy(splat.colour, splat.colour + 3, form.colour);
@@ -140,6 +141,7 @@ RayForm rayForm(const AffineSplat& splat) {
   form.nx = splat.slope[0];
   form.ny = splat.slope[1];
   form.opacity = f.opacity;
+  form.log2_opacity = std::log2(f.opacity);
   form.depth = splat.depth;
   form.nearest = -std::numeric_limits<double>::max();
   std::copy(splat.colour, splat.colour + 3, form.colour);

@@ -21,7 +21,7 @@ struct RayForm {
   double l00, l10, l11;   ///< with sqrt(log2(e)/2)
   double t00, t01, t02, t11, t12, t22;
   double n, nx, ny;  ///< metres, metres per pixel
-  double opacity;
+  double opacity, log2_opacity;
   double depth;    ///< view z of the centre, metres
   double nearest;  ///< no response that counts is nearer, metres
   double colour[3];

@@ -149,11 +149,10 @@ class TileRays {
     const auto squares = [rest](double a, double b) { return a * a + b * b + rest; };
     const double least_w = squares(leastSize(w0_range), leastSize(w1_range));
     const double largest_w = squares(largestSize(w0_range), largestSize(w1_range));
-    const double log2_opacity = std::log2(f.opacity);
     // Nowhere in the tile: |g| is at least this.
     const double least_g =
         leastSize(g0_range) * leastSize(g0_range) + leastSize(g1_range) * leastSize(g1_range);
-    if (least_g > (log2_opacity - log2_least_ + 1e-6) * largest_w) return;
+    if (least_g > (f.log2_opacity - log2_least_ + 1e-6) * largest_w) return;
 
     Listed out;
     out.splat = splat;
@@ -187,7 +186,7 @@ class TileRays {
       s.n = static_cast<float>(n);
       s.nx = static_cast<float>(f.nx);
       s.ny = static_cast<float>(f.ny);
-      s.log2_opacity = static_cast<float>(log2_opacity);
+      s.log2_opacity = static_cast<float>(f.log2_opacity);
       s.log2_least = static_cast<float>(log2_least_ - doubt);
     }
     listed_.push_back(out);
