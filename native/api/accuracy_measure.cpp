@@ -60,8 +60,9 @@ Knobs knobsOf(const StippleAccuracy& a) {
           {"share", shortNumber(a.budget_share)}};
 }
 
-/// Levels, and final with each of its knobs moved alone.
-std::vector<StippleAccuracy> usualAccuracies() {
+/// Levels, and final with each of its knobs moved alone. All along rays where the camera has
+/// nothing else.
+std::vector<StippleAccuracy> usualAccuracies(const Camera& camera) {
   std::vector<StippleAccuracy> list;
   for (uint32_t level = STIPPLE_ACCURACY_DRAFT; level <= STIPPLE_ACCURACY_FINAL; ++level) {
     list.push_back(levelOf(level));
@@ -87,7 +88,19 @@ std::vector<StippleAccuracy> usualAccuracies() {
     a.least_alpha = 1e-4;
   });
   add([](StippleAccuracy& a) { a.precision = STIPPLE_PRECISION_DOUBLE; });
-  return list;
+  if (hasImagePlane(camera)) return list;
+  std::vector<StippleAccuracy> along_rays;
+  for (StippleAccuracy accuracy : list) {
+    accuracy.projection = STIPPLE_PROJECTION_RAY;
+    // Rays of directions are drawn in double whatever is asked for.
+    accuracy.precision = STIPPLE_PRECISION_FLOAT;
+    const std::string name = accuracyName(accuracy);
+    const bool is_new =
+        std::none_of(along_rays.begin(), along_rays.end(),
+                     [&](const StippleAccuracy& other) { return accuracyName(other) == name; });
+    if (is_new) along_rays.push_back(accuracy);
+  }
+  return along_rays;
 }
 
 /// Blocks of pixels that are spread evenly over the picture, by the additive sequence of the
@@ -267,7 +280,7 @@ class Measuring {
 
   /// Returns whether the setting is to be timed again.
   bool measureOnce(const StippleAccuracy& accuracy) {
-    if (isSlow(renderAccuracy(accuracy)) && !comparesAll()) {
+    if (isSlow(renderAccuracy(accuracy), camera_) && !comparesAll()) {
       const double at = progress_.fraction();
       const double seconds = estimate(accuracy, at, at);
       if (seconds > kLongestShare * settings_.most_seconds) {
@@ -355,7 +368,8 @@ std::string accuracyName(const StippleAccuracy& accuracy) {
   return name;
 }
 
-MeasureSettings measureSettings(const StippleAccuracyMeasureOptions* options) {
+MeasureSettings measureSettings(const StippleAccuracyMeasureOptions* options,
+                                const Camera& camera) {
   StippleAccuracyMeasureOptions defaults;
   stipple_accuracy_measure_options_init(&defaults);
   const StippleAccuracyMeasureOptions given = completed(options, defaults, "options");
@@ -373,7 +387,7 @@ MeasureSettings measureSettings(const StippleAccuracyMeasureOptions* options) {
   settings.most_seconds = given.most_seconds;
   settings.reference_pixels = given.reference_pixels;
   if (given.setting_count == 0) {
-    settings.accuracies = usualAccuracies();
+    settings.accuracies = usualAccuracies(camera);
     return settings;
   }
   const auto* bytes =
@@ -386,6 +400,9 @@ MeasureSettings measureSettings(const StippleAccuracyMeasureOptions* options) {
       failStructSize(name.c_str(), entry->struct_size, sizeof(StippleAccuracy));
     }
     settings.accuracies.push_back(accuracyFrom(entry, name.c_str()));
+    if (settings.accuracies.back().projection == STIPPLE_PROJECTION_AFFINE) {
+      requireImagePlane(camera, (name + "->projection affine").c_str());
+    }
   }
   return settings;
 }
@@ -454,9 +471,9 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context,
     if (splatsOf(placed) == 0) {
       fail(ErrorCode::kInvalidArgument, "the instances have 0 splats; measuring needs at least 1");
     }
-    const MeasureSettings settings = measureSettings(options);
     const Camera view = cameraFrom(camera);
     validate(view);
+    const MeasureSettings settings = measureSettings(options, view);
     const RenderMemory memory = measureMemory(placed, view, drawing, settings);
     context->state->requirePictureMemory(memory.sum(), "measuring a picture of " + sizeText(view),
                                          memory.pair_bytes);

@@ -26,7 +26,7 @@ struct MeasureSettings {
 };
 
 /// In: options, or NULL. Errors: kInvalidArgument.
-MeasureSettings measureSettings(const StippleAccuracyMeasureOptions* options);
+MeasureSettings measureSettings(const StippleAccuracyMeasureOptions* options, const Camera& camera);
 
 /// Bytes that measureAccuracy allocates at most.
 RenderMemory measureMemory(const Instances& instances, const Camera& camera,

@@ -197,19 +197,26 @@ class NamePlaces {
   };
 
   void place(double x, double y, const std::string& name) {
-    const double width = 6.0 * static_cast<double>(name.size());
+    const double width = 5.6 * static_cast<double>(name.size());
+    struct Try {
+      double left, base, at;
+      TextAnchor anchor;
+    };
     // Right, left, above and below, then the same further off.
     for (double far = 0; far < 60; far += 12) {
-      const double tries[][2] = {{x + 6, y + 4 - far},         {x - 6 - width, y + 4 - far},
-                                 {x + 6, y + 4 + far},         {x - 6 - width, y + 4 + far},
-                                 {x - width / 2, y - 7 - far}, {x - width / 2, y + 15 + far}};
-      for (const auto& [left, base] : tries) {
-        const Box box = {left, base - 10, left + width, base + 2};
+      const Try tries[] = {{x + 6, y + 4 - far, x + 6, TextAnchor::kStart},
+                           {x - 6 - width, y + 4 - far, x - 6, TextAnchor::kEnd},
+                           {x + 6, y + 4 + far, x + 6, TextAnchor::kStart},
+                           {x - 6 - width, y + 4 + far, x - 6, TextAnchor::kEnd},
+                           {x - width / 2, y - 7 - far, x, TextAnchor::kMiddle},
+                           {x - width / 2, y + 15 + far, x, TextAnchor::kMiddle}};
+      for (const Try& one : tries) {
+        const Box box = {one.left, one.base - 10, one.left + width, one.base + 2};
         if (!isFree(box)) continue;
         taken_.push_back(box);
-        if (far > 0)
-          marks_.stroke({{x, y}, {std::clamp(x, left, left + width), base - 3}}, kGrid, 1);
-        marks_.text(left, base, TextAnchor::kStart, name).size = 10;
+        const double nearest = std::clamp(x, one.left, one.left + width);
+        if (far > 0) marks_.stroke({{x, y}, {nearest, one.base - 3}}, kGrid, 1);
+        marks_.text(one.at, one.base, one.anchor, name).size = 10;
         return;
       }
     }

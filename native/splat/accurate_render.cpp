@@ -196,8 +196,9 @@ bool isTiled(const RenderAccuracy& accuracy) {
          accuracy.limits.most_alpha == usual.most_alpha && accuracy.limits.ends_early;
 }
 
-bool isSlow(const RenderAccuracy& accuracy) {
-  return accuracy.samples_per_side == 1 && accuracy.precision == Precision::kDouble;
+bool isSlow(const RenderAccuracy& accuracy, const Camera& camera) {
+  return accuracy.samples_per_side == 1 &&
+         (accuracy.precision == Precision::kDouble || !hasImagePlane(camera));
 }
 
 RayOptions rayOptions(const RenderAccuracy& accuracy) {

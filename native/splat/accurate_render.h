@@ -21,7 +21,7 @@ constexpr uint32_t kMaxSamplesPerSide = 16;
 /// Whether renderTiled draws this picture; else renderRays.
 bool isTiled(const RenderAccuracy& accuracy);
 /// Whether it is renderRays, every splat near a block at each of its pixels, with one sample each.
-bool isSlow(const RenderAccuracy& accuracy);
+bool isSlow(const RenderAccuracy& accuracy, const Camera& camera);
 /// What renderRays is told then.
 RayOptions rayOptions(const RenderAccuracy& accuracy);
 

@@ -14,8 +14,8 @@ from stipple.binding.cloud import Cloud, SplatArrays
 from stipple.binding.errors import CancelledError, StippleError
 from stipple.binding.model import DecodeSettings, Model
 from stipple.binding.renderer import Renderer
-from stipple.binding.structs import (AccuracyLevel, LowPass, OutputColour, Precision, Projection, RenderMethod, Sampling,
-                                     SplatOrder, StippleAccuracy, StippleCamera)
+from stipple.binding.structs import (AccuracyLevel, CameraModel, LowPass, OutputColour, Precision, Projection,
+                                     RenderMethod, Sampling, SplatOrder, StippleAccuracy, StippleCamera)
 
 WIDTH, HEIGHT, COUNT = 40, 30, 60
 
@@ -231,6 +231,21 @@ def test_a_large_picture_is_compared_in_blocks(library, context, renderer, cloud
     assert not final.is_estimated and reference.is_estimated
     assert exact.psnr == pytest.approx(final.psnr, abs=0.01)
     assert exact.seconds > final.seconds
+
+
+def test_a_panorama_is_measured_along_rays(library, context, cloud):
+    camera = camera_of()
+    camera.model = CameraModel.EQUIRECTANGULAR
+    camera.fx = camera.fy = WIDTH / (2 * math.pi)
+    placed = [(cloud, np.eye(4))]
+    job = AccuracyMeasurement.start(context, placed, camera, repetitions=1)
+    job.wait()
+    report = job.report()
+    names = [row.name for row in report.rows]
+    assert len(set(names)) == len(names) and 'final + projection ray' in names and names[-1] == 'reference'
+    assert all(row.setting.projection == Projection.RAY for row in report.rows)
+    with pytest.raises(StippleError, match='projection affine needs a perspective or orthographic camera'):
+        AccuracyMeasurement.start(context, placed, camera, settings=[accuracy(library)])
 
 
 def test_measuring_refuses_what_it_cannot_measure(library, context, renderer, cloud):
