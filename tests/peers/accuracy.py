@@ -44,12 +44,17 @@ def measure(scene, build, work):
     return list(csv.DictReader((work / f'{scene}.csv').open())), out.splitlines()[0]
 
 
+def milliseconds(row):
+    value = float(row['seconds']) * 1e3
+    return f'{value:,.0f}' if value >= 100 else f'{value:.3g}'
+
+
 def table(rows):
     lines = ['| setting | ms | PSNR, dB | largest error | 99.9 % | splats | |', '|---|---|---|---|---|---|---|']
     for row in rows:
         estimated = ' (estimated)' if row['is_estimated'] == '1' else ''
         front = 'best for its time' if row['on_front'] == '1' else ''
-        lines.append(f"| {row['setting']} | {float(row['seconds']) * 1e3:.3g}{estimated} | {float(row['psnr']):.1f} | "
+        lines.append(f"| {row['setting']} | {milliseconds(row)}{estimated} | {float(row['psnr']):.1f} | "
                      f"{float(row['largest_error']):.2g} | {float(row['error_99_9']):.2g} | {int(row['splats']):,} | {front} |")
     return '\n'.join(lines)
 
