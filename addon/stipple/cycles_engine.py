@@ -14,7 +14,7 @@ from .binding.renderer import Renderer
 from .cycles_functions import CyclesRender, functions
 from .binding.structs import OutputColour
 from .engine import NativeWork
-from .scene import cameras, facts, instances, layers, mattes, sources, splat_data
+from .scene import cameras, facts, layers, mattes, sources, splat_data
 
 _VISIBILITY = ('visible_camera', 'visible_diffuse', 'visible_glossy', 'visible_transmission',
                'visible_volume_scatter', 'visible_shadow')
@@ -98,7 +98,7 @@ def _make_engine():
                 super().update(data, depsgraph)
                 return
             try:
-                self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
+                self._take_instances(depsgraph)
                 if self._instances:
                     facts.refuse_stereo(depsgraph.scene.render)
                     self._camera(depsgraph, None)
@@ -124,6 +124,13 @@ def _make_engine():
             layer_name = depsgraph.view_layer.name
             picture = facts.picture_facts(scene, depsgraph.view_layer)
             camera = self._camera(depsgraph, picture.border)
+            try:
+                camera_object = self._camera_object(depsgraph)
+                shutter = self._shutter(depsgraph, camera_object)
+                self._exactness = self._accuracy(depsgraph, camera_object, camera, self._instances, shutter, 0)
+            except StippleError as error:
+                self._fail(error)
+                return
             world = facts.plain_world_colour(depsgraph.scene_eval.world)
             with _without_splats(depsgraph, is_kept=scene.render.use_persistent_data):
                 super().render(depsgraph)
@@ -138,7 +145,7 @@ def _make_engine():
 
         def _camera(self, depsgraph, border):
             scene = depsgraph.scene
-            return cameras.camera_of(self.camera_override or scene.camera, scene.render, border)
+            return cameras.camera_of(self._camera_object(depsgraph), scene.render, border)
 
         def _insert_splats(self, layer_name, picture, camera, world, shadow_margin):
             result = self.get_result()
@@ -150,8 +157,9 @@ def _make_engine():
             self._say_memory(renderer, self._instances, camera)
             if self._catchers and cycles.has_shadows():
                 self._light_what_is_before_catchers(cycles, renderer, picture, camera, shadow_margin)
-            task = renderer.start(self._instances, camera, renderer.options(blend_space=picture.blend_space),
-                                  surface=cycles.surface(), with_transmittance=True)
+            options = renderer.options(blend_space=picture.blend_space, accuracy=self._exactness)
+            task = renderer.start(self._instances, camera, options, surface=cycles.surface(),
+                                  with_transmittance=True)
             self._wait(task.job)
             combined, depth = cycles.picture(task)
             version.fill_pass(passes['Combined'], combined)
@@ -159,7 +167,8 @@ def _make_engine():
 
         def _light_what_is_before_catchers(self, cycles, renderer, picture, camera, margin):
             """Takes the shadows off splats that are nearer than a catcher by more than the margin."""
-            options = renderer.options(blend_space=picture.blend_space, output_colour=OutputColour.COMPOSITED)
+            options = renderer.options(blend_space=picture.blend_space, output_colour=OutputColour.COMPOSITED,
+                                       accuracy=self._exactness)
 
             def drawn(surface):
                 task = renderer.start(self._instances, camera, options, with_depth=False, surface=surface)

@@ -12,7 +12,7 @@ from . import version
 from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
 from .binding.structs import JobState
-from .scene import cameras, facts, instances, mattes, sources
+from .scene import cameras, effects, facts, instances, mattes, motion, picture_options, quality, sources
 from .viewport import ViewPicture
 
 # How often a render looks whether it was cancelled.
@@ -50,6 +50,30 @@ class NativeWork:
         self._stats = f'{count:,} splats, at most {mebibytes:,.0f} MiB'
         self.update_memory_stats(memory_used=mebibytes, memory_peak=mebibytes)
 
+    def _take_instances(self, depsgraph):
+        """Decodes the splats of the view layer. Errors: StippleError."""
+        found = instances.gather_keyed(depsgraph, 'RENDER', self._warn)
+        self._keys = [entry[0] for entry in found]
+        self._instances = [entry[3] for entry in found]
+
+    def _camera_object(self, depsgraph):
+        """The evaluated camera of the picture. Errors: StippleError where there is none."""
+        return cameras.required(self.camera_override or depsgraph.scene.camera).evaluated_get(depsgraph)
+
+    def _shutter(self, depsgraph, camera_object):
+        """What moves while the shutter is open, or None without motion blur."""
+        if not motion.is_wanted(depsgraph.scene, depsgraph.view_layer):
+            return None
+        return motion.sample(depsgraph.scene, depsgraph, camera_object.original, self._keys, self.frame_set)
+
+    def _accuracy(self, depsgraph, camera_object, camera, placed, shutter, meshes):
+        """How exact the picture is: the render's quality, and what its effects ask for."""
+        context, scene = sources.context(), depsgraph.scene
+        seen = effects.look(context, scene, placed, camera, camera_object, shutter, meshes)
+        rows = effects.plan(context.library, scene, depsgraph.view_layer, depsgraph, seen, camera_object)
+        return quality.accuracy_of(context.library, scene.stipple.quality_render, rows,
+                                   picture_options.is_panoramic(camera))
+
     def _warn(self, message):
         self.report({'WARNING'}, message)
 
@@ -78,7 +102,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
             facts.refuse_stereo(depsgraph.scene.render)
             wanted = 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS'
             self._mattes = mattes.gather(depsgraph, wanted)
-            self._instances = instances.gather(depsgraph, 'RENDER', self._warn)
+            self._take_instances(depsgraph)
         except StippleError as error:
             self._fail(error)
 
@@ -88,10 +112,14 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
         scene = depsgraph.scene
         try:
             picture = facts.picture_facts(scene, depsgraph.view_layer)
-            camera = cameras.camera_of(self.camera_override or scene.camera, scene.render, picture.border)
+            camera_object = self._camera_object(depsgraph)
+            camera = cameras.camera_of(camera_object, scene.render, picture.border)
+            shutter = self._shutter(depsgraph, camera_object)
+            accuracy = self._accuracy(depsgraph, camera_object, camera, self._instances, shutter, len(self._mattes))
             renderer = Renderer(sources.context())
             self._say_memory(renderer, self._instances, camera)
-            options = renderer.options(blend_space=picture.blend_space, background=picture.background)
+            options = renderer.options(blend_space=picture.blend_space, background=picture.background,
+                                       accuracy=accuracy)
             task = renderer.start(self._instances, camera, options, picture.with_depth, surface=self._matte(camera))
             self._wait(task.job)
         except CancelledError:

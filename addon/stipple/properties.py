@@ -6,7 +6,9 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
                        PointerProperty, StringProperty)
 
 from . import version
-from .scene import fit_proposal, fitting, overlays, photo_cameras, sequences, strategies, sync
+from .binding.errors import StippleError
+from .scene import (effects, fit_proposal, fitting, overlays, photo_cameras, quality, sequences, sources, strategies,
+                    sync)
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
 _CHANGEABLE = {'ANIMATABLE'}
@@ -190,7 +192,54 @@ class STIPPLE_PG_overlay(bpy.types.PropertyGroup):
                         update=overlays.on_change)
 
 
+def _on_level_change(self, _context):
+    try:
+        quality.take_level(sources.context().library, self)
+    except StippleError:
+        pass  # without the library there is no picture, and the panels say so
+
+
+class STIPPLE_PG_quality(bpy.types.PropertyGroup):
+    """How exact pictures are: a level, which sets every knob, and the knobs."""
+
+    level: EnumProperty(name="Quality", description="How exact pictures are", items=quality.LEVELS, default='FINAL',
+                        options=set(), override=_OVERRIDABLE, update=_on_level_change)
+    order: EnumProperty(name="Order", description="Which splat is before which", items=quality.ORDERS, options=set(),
+                        override=_OVERRIDABLE)
+    projection: EnumProperty(name="Projection", description="How splats come into the picture", options=set(),
+                             items=quality.PROJECTIONS, override=_OVERRIDABLE)
+    antialiasing: EnumProperty(name="Anti-Aliasing", description="What happens to what is smaller than pixels",
+                               items=quality.SAMPLINGS, options=set(), override=_OVERRIDABLE)
+    samples_per_side: IntProperty(name="Samples", description="Samples along each side of a pixel", default=1, min=1,
+                                  max=16, options=set(), override=_OVERRIDABLE)
+    sh_degree_limit: IntProperty(name="Harmonics", description="Colors change with the view up to this degree",
+                                 default=4, min=0, max=4, options=set(), override=_OVERRIDABLE)
+    precision: EnumProperty(name="Precision", description="Of the numbers that are summed up", items=quality.PRECISIONS,
+                            options=set(), override=_OVERRIDABLE)
+    least_alpha: FloatProperty(name="Cut-Off", description="Splats are skipped where they cover less than this share of "
+                               "a pixel", default=1 / 255, min=1e-9, max=0.5, precision=5, options=set(),
+                               override=_OVERRIDABLE)
+    budget_share: FloatProperty(name="Share of Splats", description="Splats are merged until this share is left",
+                                default=1.0, min=0.001, max=1.0, subtype='FACTOR', options=set(), override=_OVERRIDABLE)
+
+
 class STIPPLE_PG_scene(bpy.types.PropertyGroup):
+    quality_viewport: PointerProperty(type=STIPPLE_PG_quality)
+    quality_render: PointerProperty(type=STIPPLE_PG_quality)
+    view_color: EnumProperty(
+        name="View-Dependent Color", description="Colors that change with the direction they are seen from. Auto: up to "
+        "the degree of harmonics that carries 99.9 % of the change", items=effects.CHOICES, options=set(),
+        override=_OVERRIDABLE)
+    exact_projection: EnumProperty(
+        name="Exact Projection", description="Splats are seen along the rays of the pixels instead of as flat ellipses. "
+        "Auto: where ellipses miss by more than a pixel", items=effects.CHOICES, options=set(), override=_OVERRIDABLE)
+    zoom_antialiasing: EnumProperty(
+        name="Zoom Anti-Aliasing", description="Splats smaller than pixels keep their light. Auto: where the low-pass "
+        "that they were trained with makes them twice as large", items=effects.CHOICES, options=set(),
+        override=_OVERRIDABLE)
+    blur_samples: IntProperty(
+        name="Blur Samples", description="Pictures that depth of field and motion blur are averaged from, 0 for as many "
+        "as the blur needs", default=0, min=0, soft_max=256, max=65536, options=set(), override=_OVERRIDABLE)
     splat_color: EnumProperty(
         name="Splat Color", description="Space in which splats are blended over each other",
         items=(('AS_TRAINED', "As Trained", "Blend in display space, as splats are trained and web viewers show them"),
@@ -216,7 +265,8 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         options=set(), override=_OVERRIDABLE)
 
 
-classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_fit, STIPPLE_PG_overlay, STIPPLE_PG_scene)
+classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_fit, STIPPLE_PG_overlay, STIPPLE_PG_quality,
+           STIPPLE_PG_scene)
 
 
 def register():

@@ -31,6 +31,20 @@ ENVIRONMENT_PASS = 'Environment' if VERSION >= (5, 0, 0) else 'Env'
 EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BLENDER_EEVEE'
 
 
+def panorama_settings(camera):
+    """The owner of panorama_type, fisheye_fov and others: from 4.3 at the latest the camera itself, before Cycles' part."""
+    return camera if hasattr(camera, 'panorama_type') else getattr(camera, 'cycles', None)
+
+
+def motion_blur_position(scene):
+    """'START', 'CENTER' or 'END': where a frame lies in the time that its shutter is open."""
+    for owner in (scene.render, getattr(scene, 'cycles', None)):
+        position = getattr(owner, 'motion_blur_position', None)
+        if position is not None:
+            return position
+    return 'CENTER'
+
+
 def user_folder(package):
     """The folder in Blender's user resources where this add-on may write."""
     if VERSION >= (4, 2, 0) and package.startswith('bl_ext.'):

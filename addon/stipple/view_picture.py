@@ -13,7 +13,7 @@ from .binding import cloud_edit
 from .binding.grade import GradedCloud
 from .binding.renderer import Renderer
 from .binding.structs import JobState
-from .scene import cameras, facts, instances, mattes, sources, viewed
+from .scene import cameras, effects, facts, instances, mattes, quality, sources, viewed
 
 # Coarse pictures have one pixel for this many of the region's along each side: the least, the first and the most.
 # Beyond the most, ordering the splats takes the time and not their pixels.
@@ -24,6 +24,8 @@ COARSE_SECONDS = 0.04
 PATIENCE = 0.02
 # Samples of meshes' edges along each side of a pixel of a fine picture; a coarse one has one.
 MATTE_SIDE = 2
+# Levels of quality that coarse pictures have too; others take their time.
+QUICK_LEVELS = {'DRAFT', 'PREVIEW'}
 # Seconds without a change after which a view rests.
 REST_SECONDS = 0.15
 
@@ -81,7 +83,8 @@ class ViewPicture:
         entries = [entry for entry in self._instances if viewed.shows(space, depsgraph, *entry[:2])]
         hiding = [entry for entry in self._mattes.placed if viewed.shows(space, depsgraph, *entry[:2])] if entries else []
         key = (self._version, tuple(id(entry) for entry in entries + hiding), bytes(camera), border, planes.tobytes(),
-               facts.blend_space(scene), scene.render.film_transparent)
+               facts.blend_space(scene), scene.render.film_transparent, quality.key_of(scene.stipple.quality_viewport),
+               effects.choices_of(scene))
         now = time.perf_counter()
         if key != self._key:
             self._key, self._changed = key, now
@@ -90,11 +93,11 @@ class ViewPicture:
             self._task.close()
             self._task = None
         if self._task is None and (self._shown is None or self._shown.key != key):
-            self._start(scene, camera, border, entries, hiding, planes, self._coarse)
+            self._start(scene, depsgraph, camera, border, entries, hiding, planes, self._coarse)
             self._take(PATIENCE)
         if (self._task is None and self._shown is not None and self._shown.key == key and not self._shown.is_fine
                 and now - self._changed >= REST_SECONDS):
-            self._start(scene, camera, border, entries, hiding, planes, 1)
+            self._start(scene, depsgraph, camera, border, entries, hiding, planes, 1)
         if self._task is not None or self._shown is None or not self._shown.is_fine or self._shown.key != key:
             engine.tag_redraw()
         if self._shown is not None:
@@ -105,12 +108,13 @@ class ViewPicture:
             self._task.close()
             self._task = None
 
-    def _start(self, scene, camera, border, entries, hiding, planes, coarse):
+    def _start(self, scene, depsgraph, camera, border, entries, hiding, planes, coarse):
         """Starts the picture of the border's pixels with one pixel for coarse x coarse of them."""
         if self._renderer is None:
             self._renderer = Renderer(sources.context())
         background = None if scene.render.film_transparent else facts.world_colour(scene.world)
-        options = self._renderer.options(blend_space=facts.blend_space(scene), background=background)
+        options = self._renderer.options(blend_space=facts.blend_space(scene), background=background,
+                                         accuracy=self._accuracy(scene, depsgraph, coarse))
         placed, part = self._placed(entries, planes), cameras.part_of(camera, border, coarse)
 
         def begin(surface):
@@ -119,6 +123,14 @@ class ViewPicture:
         side = MATTE_SIDE if coarse == 1 else 1
         samples = mattes.start_samples([matte for _, _, matte in hiding], part, side) if hiding else None
         self._task = _Making(begin, samples, side, self._key, border, coarse)
+
+    def _accuracy(self, scene, depsgraph, coarse):
+        """How exact a picture is. While the view turns nothing slow is done, whatever a resting one asks for."""
+        settings, library = scene.stipple.quality_viewport, self._renderer.library
+        if coarse > 1 and settings.level not in QUICK_LEVELS:
+            return None
+        rows = effects.plan(library, scene, depsgraph.view_layer, depsgraph, None)
+        return quality.accuracy_of(library, settings, rows)
 
     def _placed(self, entries, planes):
         """Instances for the renderer: what the clipping planes leave."""

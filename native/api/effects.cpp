@@ -50,7 +50,7 @@ EffectFacts factsFrom(const StippleEffectFacts& given) {
   facts.exact_projection = choice(given.exact_projection, "facts->exact_projection");
   facts.zoom_antialiasing = choice(given.zoom_antialiasing, "facts->zoom_antialiasing");
   facts.global_order = choice(given.global_order, "facts->global_order");
-  facts.camera_model = enumValue<CameraModel>(given.camera_model, STIPPLE_CAMERA_ORTHOGRAPHIC,
+  facts.camera_model = enumValue<CameraModel>(given.camera_model, STIPPLE_CAMERA_FISHEYE_EQUISOLID,
                                               "facts->camera_model");
   facts.motion_blur = flag(given.motion_blur, "facts->motion_blur");
   facts.camera_moves = flag(given.camera_moves, "facts->camera_moves");

@@ -55,7 +55,7 @@ struct EffectFacts {
   double view_share = 0.999;
   double largest_error_px = 1.0;  ///< of the affine projection; above, the exact one is on
   /// Area with the low-pass over area without; above, anti-aliasing for all zooms is on.
-  double largest_widening = 1.5;
+  double largest_widening = 2;
   /// Seconds that each takes, measured; NaN: nobody has measured.
   std::array<double, kEffectCount> seconds;
 

@@ -155,7 +155,7 @@ def made_pictures(view_picture, viewed, borders):
     found = []
     for coarse in (2, 1):
         picture._key = coarse
-        picture._start(bpy.context.scene, camera, borders, picture._instances, picture._mattes.placed, np.zeros((0, 4)),
+        picture._start(bpy.context.scene, depsgraph, camera, borders, picture._instances, picture._mattes.placed, np.zeros((0, 4)),
                        coarse)
         while picture._task.is_running():
             pass

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing only."""
 
-from . import data, fit, menus, overlay, render, sequence
+from . import data, effects, fit, menus, overlay, quality, render, sequence
 
-classes = data.classes + sequence.classes + render.classes + fit.classes + overlay.classes + menus.classes
+classes = (data.classes + sequence.classes + render.classes + quality.classes + effects.classes + fit.classes
+           + overlay.classes + menus.classes)
 
 
 def register():

@@ -110,7 +110,7 @@ def _simplify_panels():
 def _panels(base=bpy.types.Panel):
     """Blender's panels that say which engines they are for."""
     for panel in base.__subclasses__():
-        if getattr(panel, 'COMPAT_ENGINES', None) is not None and panel not in classes:
+        if getattr(panel, 'COMPAT_ENGINES', None) is not None and not panel.__name__.startswith('STIPPLE_'):
             yield panel
         yield from _panels(panel)
 

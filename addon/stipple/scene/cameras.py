@@ -21,12 +21,18 @@ def camera_of(camera_object, render, border=None):
 
     Errors: StippleError for a missing camera and for panoramic or custom ones.
     """
-    if camera_object is None or camera_object.type != 'CAMERA':
-        raise StippleError('The scene has no camera; a perspective or orthographic camera is needed to render.',
-                           Status.ERROR_INVALID_ARGUMENT)
+    required(camera_object)
     width, height = picture_size(render)
     return from_parts(camera_object.data, camera_object.matrix_world, width, height, render.pixel_aspect_x,
                       render.pixel_aspect_y, border, camera_object.name)
+
+
+def required(camera_object):
+    """The object itself. Errors: StippleError where it is none, or no camera."""
+    if camera_object is None or camera_object.type != 'CAMERA':
+        raise StippleError('The scene has no camera; a perspective or orthographic camera is needed to render.',
+                           Status.ERROR_INVALID_ARGUMENT)
+    return camera_object
 
 
 def from_parts(camera, matrix_world, width, height, aspect_x=1.0, aspect_y=1.0, border=None, name=''):

@@ -13,12 +13,17 @@ def gather(depsgraph, mode, warn=lambda message: None):
 
     mode: 'VIEWPORT' or 'RENDER', which budget. warn: called with a sentence per object that is left out.
     """
-    return [placed for _, _, placed in gather_owned(depsgraph, mode, warn)]
+    return [placed for _, _, _, placed in gather_keyed(depsgraph, mode, warn)]
 
 
 def gather_owned(depsgraph, mode, warn=lambda message: None):
     """[(owner, object, placed)], placed as gather has it, with the original object, and the original one that it is
     selected and hidden with: itself or its instancer."""
+    return [entry[1:] for entry in gather_keyed(depsgraph, mode, warn)]
+
+
+def gather_keyed(depsgraph, mode, warn=lambda message: None):
+    """The same with a key before each, which stays while it is the same instance: matrices() has it at other times."""
     clouds, found = {}, []
     share, splats = limits.share(depsgraph, mode), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
@@ -37,8 +42,24 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
         if clouds[key] is not None:
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
-            found.append((owner, original, (clouds[key], matrix, shown.holds_out(entry, depsgraph))))
+            found.append((_key_of(entry, owner, original), owner, original,
+                          (clouds[key], matrix, shown.holds_out(entry, depsgraph))))
     return found
+
+
+def matrices(depsgraph):
+    """{key: 4x4 object to world} of the splat objects at the depsgraph's present time, however they are drawn."""
+    found, splats = {}, shown.SplatObjects(depsgraph)
+    for entry in depsgraph.object_instances:
+        obj = splats.of(entry)
+        if obj is not None:
+            owner = entry.parent.original if entry.is_instance else obj.original
+            found[_key_of(entry, owner, obj.original)] = version.copy_of_evaluated_matrix(entry.matrix_world)
+    return found
+
+
+def _key_of(entry, owner, original):
+    return (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
 
 
 def _cloud_of(obj, mode, frame, most):

@@ -1107,7 +1107,7 @@ typedef struct StippleEffectFacts {
   uint64_t hiding_meshes;     /* that stand between splats */
   double view_share;          /* 0..1 of the change of colour with the view that is kept; default 0.999 */
   double largest_error_px;    /* of the affine projection before the exact one is needed; default 1 */
-  double largest_widening;    /* before anti-aliasing for all zooms is needed, >= 1; default 1.5 */
+  double largest_widening;    /* before anti-aliasing for all zooms is needed, >= 1; default 2 */
   double seconds[12];         /* [effect] measured by the caller; NaN, the default: not measured */
   const StippleEffectsSurvey* survey; /* NULL: nobody has looked; Auto then keeps what the picture might need */
 } StippleEffectFacts;

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measure what accuracy costs in the present view, and choose a setting from it."""
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..binding.accuracy import AccuracyMeasurement
+from ..binding.errors import StippleError
+from ..binding.renderer import Renderer
+from ..jobs import JobOperator
+from ..scene import fit_reports, measured_quality, quality, rendered_view, sources
+
+
+class STIPPLE_OT_accuracy_measure(JobOperator, bpy.types.Operator):
+    """Draw the present view with all settings in turns, on this machine, and compare them with the reference"""
+
+    bl_idname = 'stipple.accuracy_measure'
+    bl_label = "Measure This View"
+    bl_options = {'REGISTER'}
+
+    repetitions: IntProperty(name="Repetitions", description="Timings of each setting", default=7, min=1, max=1000)
+    most_seconds: FloatProperty(name="Time", description="No further turn of timings begins after this", default=60.0,
+                                min=0.1, subtype='TIME_ABSOLUTE', unit='TIME_ABSOLUTE')
+    filepath: StringProperty(name="Report", description="File for the report (.json, .csv or .svg); empty for none",
+                             subtype='FILE_PATH')
+
+    @classmethod
+    def poll(cls, context):
+        if context.scene.camera is None:
+            cls.poll_message_set('The scene has no camera')
+            return False
+        return True
+
+    def invoke(self, context, _event):
+        return self.run_in_window(context)
+
+    def start(self, context):
+        self._scene = context.scene
+        view = rendered_view.gather(context)
+        render = Renderer(sources.context()).options(blend_space=view.picture.blend_space,
+                                                     background=view.picture.background)
+        return AccuracyMeasurement.start(sources.context(), view.placed, view.camera, render,
+                                         repetitions=self.repetitions, most_seconds=self.most_seconds)
+
+    def finish(self, context, job):
+        report = job.report()
+        if self.filepath:
+            report.save(bpy.path.abspath(self.filepath))
+        measured_quality.keep(self._scene, report)
+        image = measured_quality.plot(self._scene)
+        if not bpy.app.background:
+            fit_reports.show_if_wanted(context, image)
+            for area in context.screen.areas:
+                area.tag_redraw()
+        front = sum(row.is_on_front for row in report.rows)
+        self.report({'INFO'}, f'{len(report.rows)} settings measured; {front} of them are the best for their time')
+
+
+class STIPPLE_OT_accuracy_choose(bpy.types.Operator):
+    bl_idname = 'stipple.accuracy_choose'
+    bl_label = "Choose Quality"
+    bl_description = "Choose a setting from what was measured, and store it for the viewport or for renders"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    column: EnumProperty(name="For", items=quality.COLUMNS, default='RENDER')
+    by: EnumProperty(name="Choose", items=(('TIME', "Best Within", "The best setting of at most so many milliseconds"),
+                                           ('QUALITY', "Cheapest Above", "The fastest setting of at least so many dB")))
+    milliseconds: FloatProperty(name="Milliseconds", default=100.0, min=0.0, soft_max=10000.0)
+    decibels: FloatProperty(name="PSNR", description="dB: from 45 on it looks identical, from 38 on it is hard to see",
+                            default=38.0, min=0.0, soft_max=100.0)
+
+    @classmethod
+    def poll(cls, context):
+        if measured_quality.of(context.scene) is None:
+            cls.poll_message_set('Nothing has been measured yet')
+            return False
+        return True
+
+    def invoke(self, context, _event):
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context):
+        report = measured_quality.of(context.scene).report
+        try:
+            if self.by == 'TIME':
+                row = report.best_within(self.milliseconds / 1000)
+            else:
+                row = report.cheapest_above(self.decibels)
+        except StippleError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        quality.store(quality.column(context.scene, self.column), row.setting)
+        self.report({'INFO'}, f'{row.name}: {1000 * row.seconds:.3g} ms, {row.psnr:.1f} dB')
+        return {'FINISHED'}
+
+
+classes = (STIPPLE_OT_accuracy_measure, STIPPLE_OT_accuracy_choose)

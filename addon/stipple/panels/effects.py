@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Render: which effects the picture has, why, and what they cost."""
+
+import bpy
+
+from ..binding.errors import StippleError
+from ..binding.structs import Effect
+from ..scene import effects, sources
+from .render import CYCLES_ENGINE, ENGINE
+
+
+def _rows(context):
+    """([EffectRow], what was looked at or None, what is wrong). Reads settings only: nothing is drawn or measured."""
+    seen = effects.look_of(context.scene)
+    problem = sources.library_problem()
+    if problem:
+        return [], None, problem
+    try:
+        return effects.plan(sources.context().library, context.scene, context.view_layer,
+                            context.view_layer.depsgraph, seen), seen, ''
+    except StippleError as error:
+        return [], seen, str(error)
+
+
+class _EffectsPanel:
+    bl_space_type = 'PROPERTIES'
+    bl_region_type = 'WINDOW'
+    bl_context = 'render'
+    bl_options = {'DEFAULT_CLOSED'}
+    COMPAT_ENGINES = {ENGINE, CYCLES_ENGINE}
+
+    @classmethod
+    def poll(cls, context):
+        return context.engine in cls.COMPAT_ENGINES
+
+
+class STIPPLE_PT_effects(_EffectsPanel, bpy.types.Panel):
+    bl_label = "Effects"
+    bl_options = set()
+
+    def draw(self, context):
+        layout = self.layout
+        rows, seen, problem = _rows(context)
+        if problem:
+            layout.label(text=problem, icon='ERROR')
+            return
+        for row in rows:
+            if row.is_on:
+                _draw_row(layout, context, row, seen)
+        line = layout.row(align=True)
+        line.operator('stipple.effects_look', icon='HIDE_OFF')
+        line.operator('stipple.effects_measure', icon='TIME')
+        if seen is not None:
+            is_old = (seen.camera_name, seen.frame) != (_camera_name(context.scene), context.scene.frame_current)
+            line = layout.row()
+            line.active = not is_old
+            line.label(text=f"Seen by {seen.camera_name} at frame {seen.frame}", icon='INFO')
+
+
+class STIPPLE_PT_effects_inactive(_EffectsPanel, bpy.types.Panel):
+    bl_label = ""
+    bl_parent_id = 'STIPPLE_PT_effects'
+
+    def draw_header(self, context):
+        count = sum(not row.is_on for row in _rows(context)[0])
+        self.layout.label(text=f"Not Needed ({count})")
+
+    def draw(self, context):
+        rows, seen, _ = _rows(context)
+        for row in rows:
+            if not row.is_on:
+                _draw_row(self.layout, context, row, seen)
+
+
+class STIPPLE_PT_effects_settings(_EffectsPanel, bpy.types.Panel):
+    bl_label = "Settings"
+    bl_parent_id = 'STIPPLE_PT_effects'
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(context.scene.stipple, 'blur_samples')
+
+
+def _draw_row(layout, context, row, seen):
+    box = layout.box().column(align=True)
+    head = box.row(align=True)
+    head.label(text=effects.NAMES[row.effect], icon='CHECKMARK' if row.is_on else 'REMOVE')
+    cost = head.row()
+    cost.alignment = 'RIGHT'
+    cost.active = seen is not None and effects.is_current(context.scene, seen)
+    cost.label(text=f"{row.seconds:+.3g} s" if row.is_measured else "\N{EN DASH}")
+    chosen_by = effects.CHOSEN_BY.get(row.effect)
+    if chosen_by is not None:
+        box.row(align=True).prop(context.scene.stipple, chosen_by, expand=True)
+    elif row.effect in effects.TABS:
+        jump = head.operator('stipple.show_setting', text="", icon='RIGHTARROW', emboss=False)
+        jump.tab = effects.TABS[row.effect]
+    draw_text(box, context, row.reason)
+
+
+def draw_text(layout, context, text):
+    """A sentence over as many lines as it needs."""
+    width = max(int(context.region.width / (7 * context.preferences.system.ui_scale)) - 4, 20)
+    line = ''
+    for word in text.split():
+        if line and len(line) + len(word) >= width:
+            _small(layout, line)
+            line = ''
+        line = f'{line} {word}' if line else word
+    _small(layout, line)
+
+
+def _small(layout, text):
+    row = layout.row()
+    row.active = False
+    row.scale_y = 0.8
+    row.label(text=text)
+
+
+def _camera_name(scene):
+    return scene.camera.name if scene.camera is not None else ''
+
+
+classes = (STIPPLE_PT_effects, STIPPLE_PT_effects_inactive, STIPPLE_PT_effects_settings)

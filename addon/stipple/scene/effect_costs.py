@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each effect of a picture takes: its time with it less that without it, for the present view."""
+
+import statistics
+import time
+
+from ..binding.renderer import Renderer
+from ..binding.structs import Effect, Projection, Sampling
+from ..jobs import Task
+from . import effects, mattes, picture_options, quality, sources
+
+# Pictures with and without, in turns; the median of the differences counts.
+REPETITIONS = 3
+
+
+def start(scene, view):
+    """A Task whose result is {Effect: seconds} of the active effects of a RenderedView. Errors: StippleError."""
+    context = sources.context()
+    settings = scene.stipple.quality_render
+    active = {row.effect for row in view.rows if row.is_on}
+    renderer = Renderer(context)
+
+    def options(left_out=None):
+        accuracy = quality.accuracy_of(context.library, settings, view.rows, picture_options.is_panoramic(view.camera))
+        if left_out == Effect.VIEW_COLOUR:
+            accuracy.sh_degree_limit = 0
+        elif left_out == Effect.EXACT_PROJECTION:
+            accuracy.projection = int(Projection.AFFINE)
+        elif left_out == Effect.ZOOM_ANTIALIASING:
+            accuracy.antialiasing = int(Sampling.AS_TRAINED)
+        background = view.picture.background
+        if left_out == Effect.TRANSPARENT_FILM:
+            background = (0.0, 0.0, 0.0)
+        return renderer.options(blend_space=view.picture.blend_space, background=background, accuracy=accuracy,
+                                **picture_options.blur(scene, None if left_out == Effect.DEPTH_OF_FIELD else view.lens,
+                                                       None if left_out == Effect.MOTION_BLUR else view.shutter))
+
+    measured = [effect for effect in effects.MEASURABLE if effect in active
+                and not (effect == Effect.EXACT_PROJECTION and picture_options.is_panoramic(view.camera))]
+    everything = options()
+    without = {effect: options(effect) for effect in measured}
+    has_meshes = Effect.MESH_OCCLUSION in active and not picture_options.is_panoramic(view.camera)
+
+    def work(task):
+        def run(chosen, left_out=None):
+            begin = time.perf_counter()
+            surface = None
+            if has_meshes and left_out != Effect.MESH_OCCLUSION:
+                surface = mattes.surface(view.meshes, view.camera, task.run)
+            passes = {name for effect, name in picture_options.PASSES.items() if effect in active and effect != left_out}
+            task.run(renderer.start(view.placed, view.camera, chosen, surface=surface,
+                                    **{name: name in passes for name in picture_options.PASSES.values()}).job)
+            return time.perf_counter() - begin
+
+        run(everything)  # clouds are merged, memory is taken
+        seconds = {}
+        for done, effect in enumerate(measured):
+            differences = []
+            for _ in range(REPETITIONS):
+                task.advance(done / len(measured), effects.NAMES[effect])
+                differences.append(run(everything) - run(without[effect], effect))
+            seconds[effect] = statistics.median(differences)
+        return seconds
+
+    return Task(work)
