@@ -7,6 +7,7 @@ Cycles is made to see another scene than the file's in the evaluated copies alon
 import contextlib
 
 import bpy
+import numpy as np
 
 from . import version
 from .binding.errors import CancelledError, StippleError
@@ -127,6 +128,10 @@ def _make_engine():
             try:
                 camera_object = self._camera_object(depsgraph)
                 shutter = self._shutter(depsgraph, camera_object)
+                self._spread = self._blur(depsgraph, camera_object, shutter)
+                self._shown_passes = self._passes(depsgraph.view_layer)
+                # Where splats show more than meshes is told by the index.
+                self._shown_passes['with_objects'] |= self._shown_passes['with_normal']
                 self._exactness = self._accuracy(depsgraph, camera_object, camera, self._instances, shutter, 0)
             except StippleError as error:
                 self._fail(error)
@@ -145,7 +150,7 @@ def _make_engine():
 
         def _camera(self, depsgraph, border):
             scene = depsgraph.scene
-            return cameras.camera_of(self._camera_object(depsgraph), scene.render, border)
+            return cameras.camera_of(self._camera_object(depsgraph).evaluated_get(depsgraph), scene.render, border)
 
         def _insert_splats(self, layer_name, picture, camera, world, shadow_margin):
             result = self.get_result()
@@ -159,11 +164,26 @@ def _make_engine():
                 self._light_what_is_before_catchers(cycles, renderer, picture, camera, shadow_margin)
             options = renderer.options(blend_space=picture.blend_space, accuracy=self._exactness)
             task = renderer.start(self._instances, camera, options, surface=cycles.surface(),
-                                  with_transmittance=True)
+                                  with_transmittance=True, blur=self._spread, **self._shown_passes)
             self._wait(task.job)
             combined, depth = cycles.picture(task)
             version.fill_pass(passes['Combined'], combined)
             version.fill_pass(passes['Depth'], depth)
+            self._put_passes(passes, picture, task)
+
+        def _put_passes(self, passes, picture, task):
+            """Normals and indices of splats where one shows more than all else; Cycles' elsewhere."""
+            if task.objects is None and task.normal is None:
+                return
+            if task.objects is not None and version.OBJECT_INDEX_PASS in passes:
+                index = passes[version.OBJECT_INDEX_PASS]
+                values = version.read_pass(index, picture.border.width, picture.border.height)[..., 0]
+                seen = task.objects[::-1]
+                version.fill_pass(index, np.where(seen > 0, self._indices[seen], values))
+            if task.normal is not None and 'Normal' in passes:
+                values = version.read_pass(passes['Normal'], picture.border.width, picture.border.height)
+                shows = (task.objects[::-1] > 0)[..., None]
+                version.fill_pass(passes['Normal'], np.where(shows, task.normal[::-1], values))
 
         def _light_what_is_before_catchers(self, cycles, renderer, picture, camera, margin):
             """Takes the shadows off splats that are nearer than a catcher by more than the margin."""
@@ -171,7 +191,8 @@ def _make_engine():
                                        accuracy=self._exactness)
 
             def drawn(surface):
-                task = renderer.start(self._instances, camera, options, with_depth=False, surface=surface)
+                task = renderer.start(self._instances, camera, options, with_depth=False, surface=surface,
+                                      blur=self._spread)
                 self._wait(task.job)
                 return task.colour[::-1]
 

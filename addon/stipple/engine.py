@@ -7,6 +7,7 @@ It decodes from the evaluated settings into native memory and never writes a dat
 import time
 
 import bpy
+import numpy as np
 
 from . import version
 from .binding.errors import CancelledError, StippleError
@@ -55,16 +56,24 @@ class NativeWork:
         found = instances.gather_keyed(depsgraph, 'RENDER', self._warn)
         self._keys = [entry[0] for entry in found]
         self._instances = [entry[3] for entry in found]
+        # By what the object index pass of the renderer has: 0 for none, then the instances.
+        self._indices = np.array([0] + [entry[2].pass_index for entry in found], np.float32)
 
     def _camera_object(self, depsgraph):
-        """The evaluated camera of the picture. Errors: StippleError where there is none."""
-        return cameras.required(self.camera_override or depsgraph.scene.camera).evaluated_get(depsgraph)
+        """The original camera object of the picture. Errors: StippleError where there is none."""
+        return cameras.required(self.camera_override or depsgraph.scene.camera).original
 
     def _shutter(self, depsgraph, camera_object):
         """What moves while the shutter is open, or None without motion blur."""
         if not motion.is_wanted(depsgraph.scene, depsgraph.view_layer):
             return None
-        return motion.sample(depsgraph.scene, depsgraph, camera_object.original, self._keys, self.frame_set)
+        return motion.sample(depsgraph.scene, depsgraph, camera_object, self._keys, self.frame_set)
+
+    def _blur(self, depsgraph, camera_object, shutter):
+        return picture_options.blur(depsgraph.scene, effects.lens_of(camera_object, depsgraph), shutter)
+
+    def _passes(self, view_layer):
+        return {'with_normal': view_layer.use_pass_normal, 'with_objects': view_layer.use_pass_object_index}
 
     def _accuracy(self, depsgraph, camera_object, camera, placed, shutter, meshes):
         """How exact the picture is: the render's quality, and what its effects ask for."""
@@ -94,6 +103,10 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
         self.register_pass(scene, renderlayer, 'Combined', 4, 'RGBA', 'COLOR')
         if renderlayer.use_pass_z:
             self.register_pass(scene, renderlayer, 'Depth', 1, 'Z', 'VALUE')
+        if renderlayer.use_pass_normal:
+            self.register_pass(scene, renderlayer, 'Normal', 3, 'XYZ', 'VECTOR')
+        if renderlayer.use_pass_object_index:
+            self.register_pass(scene, renderlayer, version.OBJECT_INDEX_PASS, 1, 'X', 'VALUE')
 
     def update(self, data=None, depsgraph=None):
         """Decodes what the view layer shows, from the evaluated settings."""
@@ -113,14 +126,16 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
         try:
             picture = facts.picture_facts(scene, depsgraph.view_layer)
             camera_object = self._camera_object(depsgraph)
-            camera = cameras.camera_of(camera_object, scene.render, picture.border)
+            camera = cameras.camera_of(camera_object.evaluated_get(depsgraph), scene.render, picture.border)
             shutter = self._shutter(depsgraph, camera_object)
             accuracy = self._accuracy(depsgraph, camera_object, camera, self._instances, shutter, len(self._mattes))
             renderer = Renderer(sources.context())
             self._say_memory(renderer, self._instances, camera)
             options = renderer.options(blend_space=picture.blend_space, background=picture.background,
                                        accuracy=accuracy)
-            task = renderer.start(self._instances, camera, options, picture.with_depth, surface=self._matte(camera))
+            task = renderer.start(self._instances, camera, options, picture.with_depth, surface=self._matte(camera),
+                                  blur=self._blur(depsgraph, camera_object, shutter),
+                                  **self._passes(depsgraph.view_layer))
             self._wait(task.job)
         except CancelledError:
             return
@@ -152,7 +167,12 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
 
     def _matte(self, camera):
         """The meshes as this camera sees them, or None for none."""
-        return mattes.surface(self._mattes, camera, self._wait) if self._mattes else None
+        if not self._mattes:
+            return None
+        if picture_options.is_panoramic(camera):
+            self._warn('Meshes hide no splats from panoramic cameras; render them with Cycles + Stipple.')
+            return None
+        return mattes.surface(self._mattes, camera, self._wait)
 
     def _deliver(self, task, picture, layer_name):
         """Hands the picture over; Blender's first row is the bottom one."""
@@ -161,6 +181,10 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
         version.fill_pass(passes['Combined'], task.colour[::-1])
         if task.depth is not None and 'Depth' in passes:
             version.fill_pass(passes['Depth'], task.depth[::-1])
+        if task.normal is not None and 'Normal' in passes:
+            version.fill_pass(passes['Normal'], task.normal[::-1])
+        if task.objects is not None and version.OBJECT_INDEX_PASS in passes:
+            version.fill_pass(passes[version.OBJECT_INDEX_PASS], self._indices[task.objects[::-1]])
         self.end_result(result)
 
 

@@ -28,6 +28,7 @@ VOXEL_SHIFT = 0.5 if VERSION < (5, 0, 0) else 0.0
 HAS_FILE_HANDLERS = VERSION >= (4, 1, 0)
 # What Cycles calls the light of the world that the camera sees.
 ENVIRONMENT_PASS = 'Environment' if VERSION >= (5, 0, 0) else 'Env'
+OBJECT_INDEX_PASS = 'Object Index' if VERSION >= (5, 0, 0) else 'IndexOB'
 EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BLENDER_EEVEE'
 
 

@@ -33,6 +33,10 @@ struct Look {
   std::array<double, kMaxShDegree + 1> mean_square = {};
 };
 
+bool isPlane(const Camera& camera) {
+  return camera.model == CameraModel::kPerspective || camera.model == CameraModel::kOrthographic;
+}
+
 /// Standard deviations at which alpha falls to 1/255.
 double rimOf(double opacity) {
   return std::sqrt(2.0 * std::log(opacity / kMinAlpha));
@@ -95,9 +99,7 @@ Look lookAt(const PlacedCloud& placed, const Camera& camera, size_t index) {
   const double opacity = placed.opacity(index);
   if (!(opacity > kMinAlpha)) return look;
   const Vec3d centre = placed.linear * rowOf(&cloud.positions[index * 3]) + placed.translation;
-  const bool is_flat =
-      camera.model == CameraModel::kPerspective || camera.model == CameraModel::kOrthographic;
-  const double depth = is_flat ? centre[2] : centre.norm();
+  const double depth = isPlane(camera) ? centre[2] : centre.norm();
   if (!(depth >= camera.near_plane && depth <= camera.far_plane)) return look;
   const Mat3d axes =
       placed.linear * scaledAxes<double>(&cloud.rotations[index * 4], &cloud.scales[index * 3]);
@@ -165,15 +167,15 @@ struct Interval {
   double high = -std::numeric_limits<double>::infinity();
 };
 
-/// View depths of all centres of a cloud.
-Interval depthsOf(const PlacedCloud& placed) {
+/// View depths of all centres of a cloud, or their distances where the camera sees no plane.
+Interval depthsOf(const PlacedCloud& placed, bool is_plane) {
   const SplatCloud& cloud = *placed.cloud;
   std::vector<Interval> parts(rangeCount(cloud.size(), kDepthGrain));
-  const Vec3d row = placed.linear.row(2).transpose();
   parallelFor(cloud.size(), kDepthGrain, [&](size_t begin, size_t end) {
     Interval& part = parts[begin / kDepthGrain];
     for (size_t i = begin; i < end; ++i) {
-      const double z = row.dot(rowOf(&cloud.positions[i * 3])) + placed.translation[2];
+      const Vec3d seen = placed.linear * rowOf(&cloud.positions[i * 3]) + placed.translation;
+      const double z = is_plane ? seen[2] : seen.norm();
       part.low = std::min(part.low, z);
       part.high = std::max(part.high, z);
     }
@@ -186,10 +188,11 @@ Interval depthsOf(const PlacedCloud& placed) {
   return all;
 }
 
-uint64_t mixedCount(const PlacedScene& scene) {
+uint64_t mixedCount(const PlacedScene& scene, const Camera& camera) {
   if (scene.clouds.size() < 2) return 0;
   std::vector<Interval> intervals;
-  for (const PlacedCloud& placed : scene.clouds) intervals.push_back(depthsOf(placed));
+  for (const PlacedCloud& placed : scene.clouds)
+    intervals.push_back(depthsOf(placed, isPlane(camera)));
   std::sort(intervals.begin(), intervals.end(),
             [](const Interval& a, const Interval& b) { return a.low < b.low; });
   // Each run of intervals that touch is mixed.
@@ -230,12 +233,12 @@ double affineFieldOfView(double error_ahead_px, double error_px) {
 }
 
 EffectsSurvey surveyEffects(std::span<const SplatInstance> instances, const Camera& camera) {
-  const PlacedScene scene = placeScene(instances, camera, {});
+  const PlacedScene scene = placeSceneForRays(instances, camera, {});
   EffectsSurvey survey;
   survey.splat_count = scene.splat_count;
   survey.object_count = scene.clouds.size();
   survey.field_of_view = fieldOfView(camera);
-  survey.mixed_count = mixedCount(scene);
+  survey.mixed_count = mixedCount(scene, camera);
   for (const PlacedCloud& placed : scene.clouds) {
     survey.sh_degree = std::max(survey.sh_degree, placed.cloud->sh_degree);
   }

@@ -59,6 +59,16 @@ def test_wide_angles_and_distance_change_the_plan(context, cloud):
     assert 'field of view 109' in rows[Effect.EXACT_PROJECTION].reason
 
 
+def test_panoramas_are_looked_at_and_follow_rays(context, cloud):
+    for model in (CameraModel.EQUIRECTANGULAR, CameraModel.FISHEYE_EQUIDISTANT):
+        view = camera(100.0)  # 115 degrees
+        view.model = int(model)
+        seen = effects.survey(context, [(cloud, np.eye(4)), (cloud, np.eye(4))], view)
+        assert (seen.seen_count, seen.mixed_count, seen.affine_error_px, seen.field_of_view) == (200, 2, 0.0, 0.0)
+        rows = effects.plan(context.library, effects.facts(context.library, seen, camera_model=int(model)))
+        assert rows[Effect.EXACT_PROJECTION].is_on and 'Panoramic' in rows[Effect.EXACT_PROJECTION].reason
+
+
 def test_bad_facts_are_refused(context):
     library = context.library
     for field, value, text in (('view_colour', 3, 'facts->view_colour is 3; 0 to 2'), ('motion_blur', 2, 'motion_blur is 2'),

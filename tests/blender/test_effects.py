@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scenes
-from shots import camera, mesh_between, prepare, splat_wall  # noqa: F401
+from shots import camera, mesh_between, prepare  # noqa: F401
 
 
 def module(stipple, name):

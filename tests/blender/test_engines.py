@@ -292,13 +292,6 @@ def test_a_render_can_be_cancelled_between_cycles_and_splats(stipple, camera, tm
     np.testing.assert_array_equal(scenes.render_pixels(tmp_path, 'after'), before)
 
 
-def test_a_panoramic_camera_is_one_error(stipple, camera, tmp_path):
-    mesh_between(stipple)
-    prepare('STIPPLE_CYCLES')
-    camera.data.type = 'PANO'
-    scenes.refuses(lambda: scenes.render_pixels(tmp_path), 'is of type PANO')
-
-
 @pytest.mark.parametrize('engine', ['STIPPLE', 'STIPPLE_CYCLES'])
 def test_stereo_pictures_are_one_error(stipple, camera, tmp_path, engine):
     mesh_between(stipple)

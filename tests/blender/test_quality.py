@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import scenes
-from shots import camera, mesh_between, prepare, splat_wall  # noqa: F401
+from shots import camera, prepare, splat_wall  # noqa: F401
 
 
 @pytest.fixture

@@ -138,11 +138,6 @@ def test_render_budget_out_of_range_is_one_error(square, tmp_path):
     scenes.refuses(lambda: scenes.render_pixels(tmp_path), 'Anchor budget is -3; allowed are 1 to 268,435,456')
 
 
-def test_panoramic_camera_is_one_error(square, tmp_path):
-    bpy.context.scene.camera.data.type = 'PANO'
-    scenes.refuses(lambda: scenes.render_pixels(tmp_path), 'is of type PANO')
-
-
 def test_edited_attributes_are_rendered_as_they_are(square, tmp_path):
     data = square.data
     collection, field = (data.vertices, 'co') if isinstance(data, bpy.types.Mesh) else (

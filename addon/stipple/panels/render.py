@@ -76,6 +76,8 @@ class STIPPLE_PT_view_layer_passes(bpy.types.Panel):
         column = layout.column(heading="Include")
         column.prop(context.view_layer, 'use_pass_combined')
         column.prop(context.view_layer, 'use_pass_z')
+        column.prop(context.view_layer, 'use_pass_normal')
+        column.prop(context.view_layer, 'use_pass_object_index')
 
 
 def _draw_max_splats(self, context):

@@ -9,6 +9,7 @@ from ctypes import c_double
 
 import numpy as np
 
+from .. import version
 from ..binding.errors import StippleError
 from ..binding.structs import CameraModel, Status, StippleCamera
 from .facts import Border, picture_size
@@ -19,7 +20,7 @@ _OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 def camera_of(camera_object, render, border=None):
     """The camera of a render, over the whole picture or a pixel border of it.
 
-    Errors: StippleError for a missing camera and for panoramic or custom ones.
+    Errors: StippleError for a missing camera and for those that have no model here.
     """
     required(camera_object)
     width, height = picture_size(render)
@@ -37,16 +38,14 @@ def required(camera_object):
 
 def from_parts(camera, matrix_world, width, height, aspect_x=1.0, aspect_y=1.0, border=None, name=''):
     """The same from a camera datablock, its matrix and a picture size in pixels."""
+    if camera.type == 'PANO':
+        return _panorama(camera, matrix_world, width, height, aspect_x, aspect_y, border, name or camera.name)
     if camera.type not in {'PERSP', 'ORTHO'}:
-        raise StippleError(f"Camera '{name or camera.name}' is of type {camera.type}; allowed are perspective and "
-                           'orthographic cameras.', Status.ERROR_UNSUPPORTED)
+        raise StippleError(f"Camera '{name or camera.name}' is of type {camera.type}; allowed are perspective, "
+                           'orthographic and panoramic cameras.', Status.ERROR_UNSUPPORTED)
     # Blender measures in units of a pixel's width: a pixel is `pixel_height` of them high.
     pixel_height = aspect_y / aspect_x
-    fit = camera.sensor_fit
-    if fit == 'AUTO':
-        fitted_side = 'HORIZONTAL' if aspect_x * width >= aspect_y * height else 'VERTICAL'
-    else:
-        fitted_side = fit
+    fit, fitted_side = camera.sensor_fit, _fitted_side(camera, aspect_x * width, aspect_y * height)
     fitted = width if fitted_side == 'HORIZONTAL' else pixel_height * height
     if camera.type == 'PERSP':
         # With the fit AUTO the sensor's width goes along whichever side is longer.
@@ -58,13 +57,65 @@ def from_parts(camera, matrix_world, width, height, aspect_x=1.0, aspect_y=1.0, 
         model = CameraModel.ORTHOGRAPHIC
     cx = 0.5 * width - camera.shift_x * fitted
     cy = 0.5 * height + camera.shift_y * fitted / pixel_height
+    return _within(border, width, height, camera, matrix_world, model=int(model), fx=focal, fy=focal / pixel_height, cx=cx,
+                   cy=cy)
+
+
+def _within(border, width, height, camera, matrix_world, cx, cy, **given):
+    """The StippleCamera of a border of a picture, or of all of it."""
     if border is None:
         border = Border(0, 0, width, height)
-    result = StippleCamera(model=int(model), width=border.width, height=border.height, fx=focal, fy=focal / pixel_height,
-                           cx=cx - border.x, cy=cy - (height - border.y - border.height),
-                           world_to_camera=(c_double * 16)(*world_to_camera(matrix_world).reshape(16)),
-                           near_plane=camera.clip_start, far_plane=camera.clip_end)
-    return result
+    return StippleCamera(width=border.width, height=border.height, cx=cx - border.x,
+                         cy=cy - (height - border.y - border.height),
+                         world_to_camera=(c_double * 16)(*world_to_camera(matrix_world).reshape(16)),
+                         near_plane=camera.clip_start, far_plane=camera.clip_end, **given)
+
+
+def _fitted_side(camera, width, height):
+    """The side of the picture that the sensor's size is of."""
+    if camera.sensor_fit == 'AUTO':
+        return 'HORIZONTAL' if width >= height else 'VERTICAL'
+    return camera.sensor_fit
+
+
+def _panorama(camera, matrix_world, width, height, aspect_x, aspect_y, border, name):
+    """Cycles' panoramas, which fill the picture whatever its proportions are."""
+    settings = version.panorama_settings(camera)
+    kind = getattr(settings, 'panorama_type', None)
+    if kind == 'EQUIRECTANGULAR':
+        across, up = (settings.longitude_max - settings.longitude_min, settings.latitude_max - settings.latitude_min)
+        if across <= 0 or up <= 0:
+            raise StippleError(f"Panoramic camera '{name}' sees {np.degrees(across):g} by {np.degrees(up):g} degrees; "
+                               'more than 0 is needed.', Status.ERROR_INVALID_ARGUMENT)
+        fx, fy = width / across, height / up
+        return _within(border, width, height, camera, matrix_world, model=int(CameraModel.EQUIRECTANGULAR), fx=fx, fy=fy,
+                       cx=-settings.longitude_min * fx, cy=settings.latitude_max * fy)
+    if kind == 'FISHEYE_EQUIDISTANT':
+        return _within(border, width, height, camera, matrix_world, model=int(CameraModel.FISHEYE_EQUIDISTANT),
+                       fx=width / settings.fisheye_fov, fy=height / settings.fisheye_fov, cx=0.5 * width, cy=0.5 * height,
+                       field_of_view=_held_angle(settings.fisheye_fov, name))
+    if kind == 'FISHEYE_EQUISOLID':
+        # Millimetres of the sensor that the picture's sides are of.
+        wide, high = aspect_x * width, aspect_y * height
+        if _fitted_side(camera, wide, high) == 'HORIZONTAL':
+            sensor = camera.sensor_width, camera.sensor_width * high / wide
+        else:
+            side = camera.sensor_height if camera.sensor_fit == 'VERTICAL' else camera.sensor_width
+            sensor = side * wide / high, side
+        return _within(border, width, height, camera, matrix_world, model=int(CameraModel.FISHEYE_EQUISOLID),
+                       fx=settings.fisheye_lens * width / sensor[0], fy=settings.fisheye_lens * height / sensor[1],
+                       cx=0.5 * width, cy=0.5 * height, field_of_view=_held_angle(settings.fisheye_fov, name))
+    raise StippleError(f"Panoramic camera '{name}' is of type {kind}; allowed are EQUIRECTANGULAR, FISHEYE_EQUIDISTANT "
+                       'and FISHEYE_EQUISOLID.', Status.ERROR_UNSUPPORTED)
+
+
+def _held_angle(angle, name):
+    """A fisheye's field of view, radians. Errors: StippleError above a full turn: nothing is there twice."""
+    # Blender keeps single precision.
+    if angle > 2 * np.pi * (1 + 1e-6):
+        raise StippleError(f"Fisheye camera '{name}' has a field of view of {np.degrees(angle):g} degrees; at most 360 are "
+                           'allowed.', Status.ERROR_INVALID_ARGUMENT)
+    return min(angle, 2 * np.pi)
 
 
 def finer_rows(camera, first, count, side):

@@ -31,9 +31,9 @@ def start(scene, view):
         background = view.picture.background
         if left_out == Effect.TRANSPARENT_FILM:
             background = (0.0, 0.0, 0.0)
-        return renderer.options(blend_space=view.picture.blend_space, background=background, accuracy=accuracy,
-                                **picture_options.blur(scene, None if left_out == Effect.DEPTH_OF_FIELD else view.lens,
-                                                       None if left_out == Effect.MOTION_BLUR else view.shutter))
+        options = renderer.options(blend_space=view.picture.blend_space, background=background, accuracy=accuracy)
+        return options, picture_options.blur(scene, None if left_out == Effect.DEPTH_OF_FIELD else view.lens,
+                                             None if left_out == Effect.MOTION_BLUR else view.shutter)
 
     measured = [effect for effect in effects.MEASURABLE if effect in active
                 and not (effect == Effect.EXACT_PROJECTION and picture_options.is_panoramic(view.camera))]
@@ -48,7 +48,7 @@ def start(scene, view):
             if has_meshes and left_out != Effect.MESH_OCCLUSION:
                 surface = mattes.surface(view.meshes, view.camera, task.run)
             passes = {name for effect, name in picture_options.PASSES.items() if effect in active and effect != left_out}
-            task.run(renderer.start(view.placed, view.camera, chosen, surface=surface,
+            task.run(renderer.start(view.placed, view.camera, chosen[0], surface=surface, blur=chosen[1],
                                     **{name: name in passes for name in picture_options.PASSES.values()}).job)
             return time.perf_counter() - begin
 

@@ -4,6 +4,7 @@
 import math
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 
 from .. import version
@@ -74,7 +75,6 @@ def times(scene, count):
 
 def _objects(keys):
     """The objects whose settings count: instancers', as their matrices are what moves."""
-    import bpy
     return [bpy.data.objects.get(key[0]) for key in keys]
 
 
