@@ -460,6 +460,10 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context,
       fail(ErrorCode::kInvalidArgument,
            "render->accuracy is set, which measuring chooses itself; it must be NULL");
     }
+    if (isSampled(drawing.sampling)) {
+      fail(ErrorCode::kInvalidArgument,
+           "render has a lens, a shutter or samples; what is measured is one sharp picture");
+    }
     if (drawing.method != STIPPLE_RENDER_TILED) {
       fail(ErrorCode::kInvalidArgument, "render->method is " + std::to_string(drawing.method) +
                                             ", which measuring chooses itself; 0 is allowed");

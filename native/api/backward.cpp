@@ -110,6 +110,10 @@ void requireDerivative(const RenderSettings& settings, const Instances& placed) 
     fail(ErrorCode::kInvalidArgument, "options->method is " + std::to_string(settings.method) +
                                           "; derivatives have 0 (tiled) only");
   }
+  if (isSampled(settings.sampling)) {
+    fail(ErrorCode::kInvalidArgument,
+         "options has a lens, a shutter or samples; derivatives are those of one sharp picture");
+  }
   if (settings.options.surface.depth || settings.splat_light) {
     fail(ErrorCode::kInvalidArgument,
          "options has a surface or a splat_light; derivatives are those of splats alone");
