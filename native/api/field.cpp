@@ -29,6 +29,7 @@ ModelParts loadField(const std::string& path) {
   const RootCube root = {asset.root_origin, asset.root_side};
   FieldParameters like;
   like.root = root;
+  like.contracted = asset.contracted;
   like.leaf_level = asset.field_level;
   like.layout = {asset.gaussians, asset.sh_degree};
   like.least_anchors = asset.least_anchors;
@@ -52,6 +53,7 @@ void saveField(const FieldSource& source, const ModelNotes& notes, const std::st
   const FieldParameters& field = source.decoder->field();
   FieldAsset asset;
   static_cast<OctreeTensors&>(asset) = octreeOf(*source.density);
+  asset.contracted = field.contracted;
   asset.field_level = field.leaf_level;
   asset.gaussians = field.layout.gaussians;
   asset.sh_degree = field.layout.sh_degree;

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "decode/anchor_spacing.h"
+#include "decode/contraction.h"
 #include "decode/merge_neighbours.h"
 
 namespace stipple {
@@ -115,13 +116,64 @@ void detailGradient(FieldTape& tape, size_t channels, float side, const SplatClo
       const float o = cloud.opacities[n];
       to[kDetailOpacity] = gradient.opacities[n] * o * (1.0f - o);
       const float scale = scaleFactor(detail[kDetailScale]);
+      const float size = tape.stretch.empty() ? side : side * tape.stretch[n];
       float by_scale = 0;
       for (size_t axis = 0; axis < 3; ++axis) {
-        by_scale += gradient.scales[n * 3 + axis] * cloud.scales[n * 3 + axis] / side;
+        by_scale += gradient.scales[n * 3 + axis] * cloud.scales[n * 3 + axis] / size;
         gradient.scales[n * 3 + axis] *= scale;
         to[kDetailOffset + axis] = tape.footprints[n] * gradient.positions[n * 3 + axis];
       }
       to[kDetailScale] = std::abs(detail[kDetailScale]) < kLargestLogScale ? by_scale : 0.0f;
+    }
+  });
+}
+
+/// Where a Gaussian would be without contraction, metres.
+Vec3d placeInRoot(const FieldParameters& field, const FieldTape& tape, size_t n) {
+  Vec3d place;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    place[static_cast<int>(axis)] =
+        field.root.origin[axis] + field.root.side * static_cast<double>(tape.centres[n * 3 + axis]);
+  }
+  return place;
+}
+
+/// From the root to the world.
+void stretch(const FieldParameters& field, FieldTape& tape, SplatCloud& cloud) {
+  const Contraction contraction(field.root);
+  tape.stretch.resize(cloud.size());
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) {
+      const Vec3d place = placeInRoot(field, tape, n);
+      tape.stretch[n] = static_cast<float>(contraction.factor(place));
+      if (tape.stretch[n] == 1.0f) continue;
+      const Vec3d world = contraction.toWorld(place);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        cloud.positions[n * 3 + axis] = static_cast<float>(world[static_cast<int>(axis)]);
+        cloud.scales[n * 3 + axis] *= tape.stretch[n];
+      }
+    }
+  });
+}
+
+void stretchBackward(const FieldParameters& field, const FieldTape& tape, const SplatCloud& cloud,
+                     SplatCloud& gradient) {
+  const Contraction contraction(field.root);
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t n = begin; n < end; ++n) {
+      if (tape.stretch[n] == 1.0f) continue;
+      Vec3d by_world;
+      double by_factor = 0;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        by_world[static_cast<int>(axis)] = static_cast<double>(gradient.positions[n * 3 + axis]);
+        by_factor += static_cast<double>(gradient.scales[n * 3 + axis]) *
+                     static_cast<double>(cloud.scales[n * 3 + axis] / tape.stretch[n]);
+        gradient.scales[n * 3 + axis] *= tape.stretch[n];
+      }
+      const Vec3d by = contraction.backward(placeInRoot(field, tape, n), by_world, by_factor);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        gradient.positions[n * 3 + axis] = static_cast<float>(by[static_cast<int>(axis)]);
+      }
     }
   });
 }
@@ -143,8 +195,8 @@ SplatCloud FieldDecoder::decode(const DecodeRequest& request) const {
 
 uint64_t FieldDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const {
   const uint64_t splat = (11 + 3 * shCoefficientCount(field_->layout.sh_degree)) * sizeof(float);
-  // Centre, place, footprint, details.
-  const uint64_t gaussian = splat + (7 + field_->details.channels()) * sizeof(float);
+  // Centre, place, footprint, stretch, details.
+  const uint64_t gaussian = splat + (8 + field_->details.channels()) * sizeof(float);
   uint64_t floats = fieldInputWidth(*field_) + 2;
   for (const LinearLayer& layer : field_->network.layers()) floats += 2 * layer.outputs;
   // The search for neighbours: places as double and float, a tree, six numbers.
@@ -191,6 +243,8 @@ void FieldDecoder::forward(const AnchorSet& anchors, FieldTape& tape, SplatCloud
       cloud.scales[i] *= static_cast<float>(field.root.side);
     }
   });
+  tape.stretch.clear();
+  if (field.contracted) stretch(field, tape, cloud);
 }
 
 void FieldDecoder::backward(const AnchorSet& anchors, FieldTape& tape, const SplatCloud& cloud,
@@ -198,6 +252,7 @@ void FieldDecoder::backward(const AnchorSet& anchors, FieldTape& tape, const Spl
   const FieldParameters& field = *field_;
   const size_t width = fieldInputWidth(field);
   const float side = static_cast<float>(field.root.side);
+  if (field.contracted) stretchBackward(field, tape, cloud, cloud_gradient);
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin * 3; i < end * 3; ++i) {
       cloud_gradient.positions[i] *= side;

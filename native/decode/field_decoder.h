@@ -20,6 +20,7 @@ struct FieldTape {
   std::vector<float> footprints;  ///< [N] of the Gaussians, unit cube
   std::vector<float> details;     ///< [N, detail channels]
   std::vector<float> centres;     ///< [N,3] of the Gaussians, unit cube
+  std::vector<float> stretch;     ///< [N] how much larger they are in the world; empty: 1
   std::vector<float> detail_gradient;
   std::vector<float> raw_gradient;
   std::vector<float> input_gradient;

@@ -60,7 +60,7 @@ void requireShape(int leaf_level, const SplatLayout& layout, uint64_t least, uin
 /// finer ones most are never read twice, and what they learn is noise.
 int finestLevel(uint64_t places, const FieldShape& shape) {
   const double level = std::ceil(0.5 * std::log2(static_cast<double>(places)));
-  return std::clamp(static_cast<int>(level), 1, shape.leaf_level);
+  return std::clamp(static_cast<int>(level) + (shape.contracted ? 1 : 0), 1, shape.leaf_level);
 }
 
 /// Levels that end with `finest`, none below 1; with as many rows as surface cells need there.
@@ -108,6 +108,7 @@ FieldParameters makeFieldParameters(const FieldShape& shape) {
                ErrorCode::kInvalidArgument);
   FieldParameters field;
   field.root = shape.root;
+  field.contracted = shape.contracted;
   field.leaf_level = shape.leaf_level;
   field.layout = shape.layout;
   field.least_anchors = shape.least_anchors;

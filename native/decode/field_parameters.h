@@ -14,7 +14,8 @@ namespace stipple {
 /// What an attribute field is made for.
 struct FieldShape {
   RootCube root;
-  int leaf_level = 8;  ///< of the anchors' octree
+  bool contracted = false;  ///< FieldParameters::contracted
+  int leaf_level = 8;       ///< of the anchors' octree
   SplatLayout layout;
   uint64_t least_anchors = 1024;  ///< budgets that it is trained for; others count as the nearest
   uint64_t most_anchors = 16384;
@@ -37,6 +38,7 @@ constexpr size_t kDetailChannels = 8;
 /// Everything that an attribute field has learned.
 struct FieldParameters {
   RootCube root;
+  bool contracted = false;  ///< the outer half of the root is all around (decode/contraction.h)
   int leaf_level = 8;
   SplatLayout layout;
   uint64_t least_anchors = 1024;

@@ -67,6 +67,7 @@ void writeFieldAsset(const FieldAsset& asset, const std::string& path) {
   file.setMetadata("least_anchors", std::to_string(asset.least_anchors));
   file.setMetadata("most_anchors", std::to_string(asset.most_anchors));
   file.setMetadata("jitter", asset.jitter ? "leaf" : "none");
+  if (asset.contracted) file.setMetadata("space", "contracted");
   if (asset.nested) {
     file.setMetadata("draws", "nested");
     file.setMetadata("seed", std::to_string(asset.seed));
@@ -92,6 +93,8 @@ FieldAsset readFieldAsset(const std::string& path) {
   // Files of fields that learned with independent draws do not have it.
   asset.nested = file.metadata().contains("draws") && isFirstText(file, "draws", "nested", "any");
   if (asset.nested) asset.seed = wholeOf(file, "seed", 0, UINT64_MAX);
+  asset.contracted =
+      file.metadata().contains("space") && isFirstText(file, "space", "contracted", "plain");
   asset.field_level = static_cast<int>(wholeOf(file, "field_level", 1, 10));
   asset.gaussians = static_cast<uint32_t>(wholeOf(file, "K", 4, 32));
   asset.sh_degree = static_cast<int>(wholeOf(file, "sh_degree", 0, kMaxShDegree));

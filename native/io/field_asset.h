@@ -17,9 +17,10 @@ struct FieldAsset : OctreeTensors {
   int sh_degree = 0;           ///< 0..kMaxShDegree
   uint64_t least_anchors = 1;  ///< budgets of its training
   uint64_t most_anchors = 1;
-  bool jitter = true;   ///< anchors are anywhere in their leaf; else in its middle
-  bool nested = false;  ///< anchors are drawn in the progressive order; else as is asked for
-  uint64_t seed = 0;    ///< nested: of the draws that it learned with
+  bool contracted = false;  ///< the outer half of the root is all around
+  bool jitter = true;       ///< anchors are anywhere in their leaf; else in its middle
+  bool nested = false;      ///< anchors are drawn in the progressive order; else as is asked for
+  uint64_t seed = 0;        ///< nested: of the draws that it learned with
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kMip;
   TensorTable tensors;               ///< "field.*"

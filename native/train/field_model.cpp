@@ -113,11 +113,17 @@ uint64_t surfaceLeaves(const LearnedDensity& density) {
   return density.levels()[level].cells.size() << quarters;
 }
 
+/// Where the inner half of the root is the scene, its leaves stay as small.
+int leafLevelOf(const ScenePrior& prior, const FieldModelOptions& options) {
+  return prior.contracted ? std::min(options.leaf_level + 1, kMaxLeafLevel) : options.leaf_level;
+}
+
 FieldState startOf(const ScenePrior& prior, const FieldModelOptions& options,
                    ColourSpace colour_space) {
   FieldShape shape;
   shape.root = prior.root;
-  shape.leaf_level = options.leaf_level;
+  shape.contracted = prior.contracted;
+  shape.leaf_level = leafLevelOf(prior, options);
   shape.layout = {options.gaussians_per_anchor, options.sh_degree};
   shape.least_anchors = options.least_anchors;
   shape.most_anchors = options.most_anchors;
@@ -126,7 +132,7 @@ FieldState startOf(const ScenePrior& prior, const FieldModelOptions& options,
   shape.seed = options.seed;
   shape.starting_opacity = howToStart(prior).opacity;
   FieldParameters checked = makeFieldParameters(shape);  // refuses options before any work
-  LearnedDensity density = startDensity(prior, options.leaf_level);
+  LearnedDensity density = startDensity(prior, shape.leaf_level);
   shape.surface_cells = std::max<uint64_t>(surfaceLeaves(density), 1 << 14);
   return startState(std::move(density), makeFieldParameters(shape));
 }
@@ -450,6 +456,7 @@ std::unique_ptr<FitModel> makeFieldModel(const ViewSource& views, std::span<cons
   requireOptions(options, training);
   ScenePriorOptions prior_options;
   prior_options.seed = options.seed;
+  prior_options.shell = options.shell;
   const ScenePrior prior = scenePrior(views, training, prior_options, progress);
   return std::make_unique<FieldModel>(startOf(prior, options, views.colourSpace()),
                                       howToStart(prior), options);

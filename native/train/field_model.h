@@ -29,6 +29,7 @@ struct FieldModelOptions {
   bool clip_gradient = true;     ///< at the 90th percentile
   bool centre_gradient = true;   ///< minus the mean
   bool jitter = true;            ///< anchors anywhere in their leaf; off: at its centre
+  bool shell = true;             ///< far backgrounds, where cameras see them (ScenePriorOptions)
   uint64_t seed = 0;
 };
 

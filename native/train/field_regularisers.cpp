@@ -1,5 +1,6 @@
 #include "train/field_regularisers.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -51,6 +52,18 @@ double regularise(const FieldRegularisers& weights, const FieldParameters& field
       const Vec3d anchor = placeOf(anchors, i);
       Vec3d mean = Vec3d::Zero();
       double squares = 0;
+      // Of what is far away lengths mean nothing; its gradients by the world are others, too.
+      const bool is_far =
+          !tape.stretch.empty() &&
+          std::any_of(&tape.stretch[i * gaussians], &tape.stretch[i * gaussians] + gaussians,
+                      [](float stretch) { return stretch != 1.0f; });
+      if (is_far) {
+        for (size_t n = i * gaussians; n < (i + 1) * gaussians; ++n) {
+          loss += per_splat * weights.opacity * (1 - static_cast<double>(cloud.opacities[n]));
+          gradient.opacities[n] -= static_cast<float>(weights.opacity * per_splat);
+        }
+        continue;
+      }
       for (size_t k = 0; k < gaussians; ++k) {
         const size_t n = i * gaussians + k;
         const float* c = &tape.centres[n * 3];

@@ -3,9 +3,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "base/random.h"
+#include "decode/contraction.h"
 #include "math/vec.h"
 #include "train/visual_hull.h"
 
@@ -21,6 +23,14 @@ constexpr double kCompact = 1.3;
 constexpr double kMargin = 0.1;
 /// Cameras that are asked whether they see a point.
 constexpr size_t kWitnesses = 100;
+/// Pictures that are asked what they show beyond the root, every so many-th pixel, and the share of
+/// them that has to.
+constexpr size_t kLooks = 4;
+constexpr size_t kPixelStep = 7;
+constexpr double kSeenBeyond = 0.05;
+/// Weight of the shell beside that of all points, and places in it.
+constexpr double kShellShare = 0.25;
+constexpr size_t kShellPlaces = 20000;
 
 bool sees(const Camera& camera, const Vec3d& point) {
   const Vec3d p = (camera.world_to_camera * point.homogeneous()).head<3>();
@@ -142,6 +152,78 @@ RootCube cubeOfPoints(const std::vector<float>& positions) {
   return cubeAround(low, high, kMargin);
 }
 
+bool holds(const RootCube& root, const Vec3d& place) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double at = place[axis] - root.origin[static_cast<size_t>(axis)];
+    if (at < 0 || at > root.side) return false;
+  }
+  return true;
+}
+
+/// Whether what is outside the root fills a part of the pictures.
+bool seesBeyond(const ViewSource& views, std::span<const size_t> training, const RootCube& root) {
+  const size_t looks = std::min(training.size(), kLooks);
+  size_t beyond = 0, asked = 0;
+  for (size_t v = 0; v < looks; ++v) {
+    const size_t view = training[v * training.size() / looks];
+    const ViewPicture picture = views.load(view);
+    if (!picture.alpha.empty()) return false;
+    if (picture.depth.empty()) return true;
+    const Camera& camera = views.camera(view);
+    const Mat4d to_world = camera.world_to_camera.inverse();
+    for (size_t i = 0; i < picture.depth.size(); i += kPixelStep) {
+      ++asked;
+      const auto depth = static_cast<double>(picture.depth[i]);
+      const bool is_known = depth > 0 && depth < camera.far_plane;
+      beyond += !is_known || !holds(root, unprojected(camera, to_world, i % picture.width,
+                                                      i / picture.width, depth));
+    }
+  }
+  return static_cast<double>(beyond) > kSeenBeyond * static_cast<double>(asked);
+}
+
+/// Makes the root the inner half of a contracted one, and sows places along rays behind it: evenly
+/// in the contracted root, as nothing is known of distances.
+void addShell(const ViewSource& views, std::span<const size_t> training, uint64_t seed,
+              ScenePrior& prior) {
+  const double inner = prior.root.side;
+  for (double& origin : prior.root.origin) origin -= 0.5 * inner;
+  prior.root.side = 2 * inner;
+  prior.contracted = true;
+  const Contraction contraction(prior.root);
+  for (size_t i = 0; i < prior.weights.size(); ++i) {
+    float* p = &prior.positions[i * 3];
+    const Vec3d place = contraction.fromWorld(Vec3d(p[0], p[1], p[2]));
+    for (int axis = 0; axis < 3; ++axis) p[axis] = static_cast<float>(place[axis]);
+  }
+  const Vec3d middle = Vec3d(prior.root.origin[0], prior.root.origin[1], prior.root.origin[2]) +
+                       Vec3d::Constant(inner);
+  const double sum = std::accumulate(prior.weights.begin(), prior.weights.end(), 0.0);
+  const double weight = kShellShare * sum / static_cast<double>(kShellPlaces);
+  for (size_t i = 0; i < kShellPlaces; ++i) {
+    const auto drawn = [&](uint64_t what) {
+      return unitDouble(
+          keyedBits(seed, RandomUse::kPriorSample, (uint64_t{1} << 63) + 4 * i + what));
+    };
+    const Camera& camera = views.camera(training[i % training.size()]);
+    const Mat4d to_world = camera.world_to_camera.inverse();
+    const auto x = static_cast<size_t>(drawn(0) * camera.width);
+    const auto y = static_cast<size_t>(drawn(1) * camera.height);
+    const Vec3d eye = unprojected(camera, to_world, x, y, 0);
+    const Vec3d along = unprojected(camera, to_world, x, y, 1) - eye;
+    // The place of the ray whose largest coordinate is r halves of the inner cube from the middle.
+    const double r = 0.5 * inner / (1 - drawn(2) * (1 - 1.0 / 32));
+    double far = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double wall = (along[axis] < 0 ? -r : r) + middle[axis] - eye[axis];
+      const double at = along[axis] == 0 ? 1e30 : wall / along[axis];
+      far = axis == 0 ? at : std::min(far, at);
+    }
+    if (far <= 0) continue;  // the camera is farther out and looks away
+    addPoint(prior, contraction.fromWorld(eye + far * along), static_cast<float>(weight));
+  }
+}
+
 /// The ball that all cameras see, about: around the place nearest to all optical axes, out to the
 /// nearest side of a picture; where cameras look away from each other, around them.
 RootCube cubeOfCameras(const ViewSource& views, std::span<const size_t> training) {
@@ -184,6 +266,9 @@ ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
   dropUnseen(views, training, prior);
   if (!prior.weights.empty()) {
     prior.root = cubeOfPoints(prior.positions);
+    if (options.shell && seesBeyond(views, training, prior.root)) {
+      addShell(views, training, options.seed, prior);
+    }
     return prior;
   }
   prior.root = cubeOfCameras(views, training);

@@ -18,11 +18,15 @@ struct ScenePrior {
   std::vector<float> weights;    ///< [N] >= 0, mean 1
   /// Cells of this level of the root are the smallest that the points tell of.
   int known_level = kMaxLeafLevel;
+  /// The root holds everything around its inner half, too (decode/contraction.h); positions are
+  /// those in the root. The shell has been sown along the rays of cameras.
+  bool contracted = false;
 };
 
 struct ScenePriorOptions {
   size_t depth_points = 300000;  ///< at most, from the depth of views where they have it
   size_t depth_views = 64;       ///< at most, that are loaded for it
+  bool shell = true;             ///< a contracted root, where cameras see beyond the plain one
   uint64_t seed = 0;
 };
 
@@ -30,6 +34,8 @@ struct ScenePriorOptions {
 /// that at least two cameras see, without the farthest 1 % on either side of each axis where those
 /// reach far out, and a tenth more. Without points or depth: points of the visual hull, where
 /// pictures have alpha; else none, and the root is around the ball that the cameras have in common.
+/// Where points are known and cameras see beyond the root (no alpha; no depth, or depth that ends
+/// outside it in a twentieth of the pixels), it is contracted: its inner half is what it would be.
 /// In: training: views of the source, at least one. Errors: those of ViewSource::load; kCancelled.
 ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
                       const ScenePriorOptions& options, Progress* progress = nullptr);

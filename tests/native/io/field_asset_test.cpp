@@ -30,6 +30,7 @@ FieldAsset smallAsset() {
   asset.least_anchors = 100;
   asset.most_anchors = 5000;
   asset.jitter = false;
+  asset.contracted = true;
   asset.nested = true;
   asset.seed = UINT64_MAX;
   asset.colour_space = ColourSpace::kLinear;
@@ -55,6 +56,7 @@ TEST_F(FieldAssetFile, GivesEverythingBackBitForBit) {
   EXPECT_EQ(seen.least_anchors, asset.least_anchors);
   EXPECT_EQ(seen.most_anchors, asset.most_anchors);
   EXPECT_EQ(seen.jitter, asset.jitter);
+  EXPECT_EQ(seen.contracted, asset.contracted);
   EXPECT_EQ(seen.nested, asset.nested);
   EXPECT_EQ(seen.seed, asset.seed);
   EXPECT_EQ(seen.colour_space, asset.colour_space);

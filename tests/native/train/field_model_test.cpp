@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -151,6 +152,49 @@ TEST(FieldModel, LearnsWhereNothingButCamerasIsKnown) {
   EXPECT_GT(heldOutPsnr(*model, *views, 1024), psnrOfNothing(*views) + 6);
   // The density has left the even one: by more than the half of a choice of eight.
   EXPECT_LT(*model->densityEntropy(), entropy - 1);
+}
+
+/// A ball before a far wall all around, 30 times as large; no alpha, points on the ball alone.
+std::shared_ptr<MemoryViewSource> ballInTheOpen() {
+  SplatCloud all = toyBall(1500);
+  const size_t near_count = all.size();
+  const SplatCloud far = toyBall(1500, 30.0f);
+  for (auto part : {&SplatCloud::positions, &SplatCloud::rotations, &SplatCloud::scales,
+                    &SplatCloud::opacities, &SplatCloud::sh}) {
+    (all.*part).insert((all.*part).end(), (far.*part).begin(), (far.*part).end());
+  }
+  const auto shown = toyViews(all, kViews, kSize, false);
+  auto views = std::make_shared<MemoryViewSource>(shown->colourSpace());
+  for (size_t v = 0; v < kViews; ++v) {
+    ViewPicture picture = shown->load(v);
+    picture.alpha.clear();
+    picture.depth.clear();
+    views->add(shown->camera(v), std::move(picture));
+  }
+  PointSet points = toyPoints(toyBall(near_count));
+  views->setPoints(points);
+  return views;
+}
+
+TEST(FieldModel, AShellHoldsWhatIsFarAway) {
+  const auto views = ballInTheOpen();
+  double psnr[2];
+  float farthest[2];
+  for (const bool shell : {false, true}) {
+    FieldModelOptions options = smallOptions();
+    options.shell = shell;
+    const auto model = makeFieldModel(*views, trainingViews(), options);
+    train(*model, *views, 1, 300, 300);
+    psnr[shell] = heldOutPsnr(*model, *views, 1024);
+    const SplatCloud cloud = model->splats(1024);
+    farthest[shell] = 0;
+    for (const float p : cloud.positions) farthest[shell] = std::max(farthest[shell], std::abs(p));
+    EXPECT_EQ(fieldResult(*model)->field->contracted, shell);
+  }
+  EXPECT_LT(farthest[0], 2.0f);
+  EXPECT_GT(farthest[1], 10.0f);
+  // 17.0 and 20.0 dB: three quarters of each picture are the wall.
+  EXPECT_GT(psnr[1], psnr[0] + 2);
 }
 
 TEST(FieldModel, GoesThroughItsStages) {

@@ -238,6 +238,7 @@ TEST(ScenePrior, TakesPointsFromDepth) {
   }
   ScenePriorOptions options;
   options.depth_points = 600;
+  options.shell = false;
   const ScenePrior prior = scenePrior(*with_depth, all(*with_depth), options);
   EXPECT_GT(prior.weights.size(), 300u);
   EXPECT_LT(prior.weights.size(), 700u);
@@ -246,6 +247,52 @@ TEST(ScenePrior, TakesPointsFromDepth) {
     // Half a picture is 3.5 * 16 / (1.4 * 32) = 1.25 wide.
     EXPECT_LT(std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]), 1.25f * 1.42f);
   }
+}
+
+/// A wall across the origin, at a distance at every pixel, before cameras at 3.5 m.
+std::shared_ptr<MemoryViewSource> wallViews(float unknown_share, bool with_alpha) {
+  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  for (size_t v = 0; v < 6; ++v) {
+    ViewPicture picture;
+    picture.width = picture.height = 32;
+    picture.colour.assign(32 * 32 * 3, 0.5f);
+    picture.depth.assign(32 * 32, 3.5f);
+    for (size_t i = 0; i < static_cast<size_t>(unknown_share * 32 * 32); ++i) {
+      picture.depth[i] = 0.0f;
+    }
+    if (with_alpha) picture.alpha.assign(32 * 32, 1.0f);
+    views->add(toyCamera(v, 6, 32), std::move(picture));
+  }
+  return views;
+}
+
+TEST(ScenePrior, HasAShellWhereCamerasSeeBeyondTheRoot) {
+  const auto seen = [](float unknown_share, bool with_alpha, bool shell) {
+    const auto views = wallViews(unknown_share, with_alpha);
+    ScenePriorOptions options;
+    options.depth_points = 3000;
+    options.shell = shell;
+    return scenePrior(*views, all(*views), options);
+  };
+  EXPECT_FALSE(seen(0.0f, false, true).contracted) << "all depth ends inside";
+  EXPECT_FALSE(seen(0.3f, true, true).contracted) << "alpha says what belongs to the scene";
+  const ScenePrior plain = seen(0.3f, false, false), shell = seen(0.3f, false, true);
+  EXPECT_FALSE(plain.contracted);
+  ASSERT_TRUE(shell.contracted);
+  EXPECT_DOUBLE_EQ(shell.root.side, 2 * plain.root.side);
+  double inside = 0, around = 0;
+  for (size_t i = 0; i < shell.weights.size(); ++i) {
+    bool is_inside = true;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const auto place = static_cast<double>(shell.positions[i * 3 + axis]);
+      EXPECT_GT(place, shell.root.origin[axis]);
+      EXPECT_LT(place, shell.root.origin[axis] + shell.root.side);
+      const double from_middle = place - shell.root.origin[axis] - 0.5 * shell.root.side;
+      is_inside = is_inside && std::abs(from_middle) <= 0.5 * plain.root.side;
+    }
+    (is_inside ? inside : around) += static_cast<double>(shell.weights[i]);
+  }
+  EXPECT_NEAR(around / inside, 0.25, 0.03);
 }
 
 /// The same pictures, over black where they have alpha.
