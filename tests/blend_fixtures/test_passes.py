@@ -1,7 +1,7 @@
 """Depth, normals and indices of splats, composited with a Cycles render in background Blender, against a stored picture.
 
 The stored picture was looked at: a yellow bar passes through both rings, before them where it is nearer; the half
-transparent ring is dark below and bright above.
+transparent ring is shaded by its normals, the other is not.
 """
 import pytest
 
@@ -28,4 +28,4 @@ def test_splats_and_meshes_are_composited_by_their_passes(pictures):
 
 @pytest.mark.parametrize('name', ['passes_over', 'passes_plain'])
 def test_without_a_pass_the_picture_is_another(pictures, name):
-    assert psnr(pictures, name) < FLOOR_DB - 5
+    assert psnr(pictures, name) < FLOOR_DB - 4

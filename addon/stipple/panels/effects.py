@@ -90,7 +90,7 @@ def _draw_row(layout, context, row, seen):
     cost = head.row()
     cost.alignment = 'RIGHT'
     cost.active = seen is not None and effects.is_current(context.scene, seen)
-    cost.label(text=f"{row.seconds:+.3g} s" if row.is_measured else "\N{EN DASH}")
+    cost.label(text=_cost(row))
     chosen_by = effects.CHOSEN_BY.get(row.effect)
     if chosen_by is not None:
         box.row(align=True).prop(context.scene.stipple, chosen_by, expand=True)
@@ -98,6 +98,12 @@ def _draw_row(layout, context, row, seen):
         jump = head.operator('stipple.show_setting', text="", icon='RIGHTARROW', emboss=False)
         jump.tab = effects.TABS[row.effect]
     draw_text(box, context, row.reason)
+
+
+def _cost(row):
+    if not row.is_measured:
+        return "\N{EN DASH}"
+    return f"+{row.seconds:.3g} s" if row.seconds > 0 else "about 0 s"
 
 
 def draw_text(layout, context, text):
