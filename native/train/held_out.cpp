@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "math/colour.h"
 #include "math/vec.h"
+#include "train/shared_volume.h"
 
 namespace stipple {
 
@@ -46,11 +47,6 @@ double psnrOf(const std::vector<float>& a, const std::vector<float>& b,
   const double total = std::accumulate(totals.begin(), totals.end(), 0.0);
   if (squares <= 0 || total <= 0) return kMostPsnr;
   return std::min(kMostPsnr, -10.0 * std::log10(squares / total));
-}
-
-Vec3d placeOf(const Camera& camera) {
-  return -camera.world_to_camera.topLeftCorner<3, 3>().transpose() *
-         camera.world_to_camera.topRightCorner<3, 1>();
 }
 
 /// Mean distance of the points from a place, metres; 0 without points.

@@ -9,6 +9,7 @@
 #include "base/random.h"
 #include "decode/contraction.h"
 #include "math/vec.h"
+#include "train/shared_volume.h"
 #include "train/visual_hull.h"
 
 namespace stipple {
@@ -32,22 +33,9 @@ constexpr double kSeenBeyond = 0.05;
 constexpr double kShellShare = 0.25;
 constexpr size_t kShellPlaces = 20000;
 
-bool sees(const Camera& camera, const Vec3d& point) {
-  const Vec3d p = (camera.world_to_camera * point.homogeneous()).head<3>();
-  if (p.z() < camera.near_plane || p.z() > camera.far_plane) return false;
-  const double depth = camera.model == CameraModel::kPerspective ? p.z() : 1.0;
-  const double x = camera.fx * p.x() / depth + camera.cx;
-  const double y = camera.fy * p.y() / depth + camera.cy;
-  return x >= 0 && y >= 0 && x < camera.width && y < camera.height;
-}
-
 /// World place of a pixel's middle at a depth.
-Vec3d unprojected(const Camera& camera, const Mat4d& camera_to_world, size_t x, size_t y,
-                  double depth) {
-  const double along = camera.model == CameraModel::kPerspective ? depth : 1.0;
-  const Vec3d p((static_cast<double>(x) + 0.5 - camera.cx) / camera.fx * along,
-                (static_cast<double>(y) + 0.5 - camera.cy) / camera.fy * along, depth);
-  return (camera_to_world * p.homogeneous()).head<3>();
+Vec3d unprojected(const Camera& camera, size_t x, size_t y, double depth) {
+  return unproject(camera, static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5, depth);
 }
 
 void addPoint(ScenePrior& prior, const Vec3d& place, float weight) {
@@ -80,7 +68,6 @@ void addDepth(const ViewSource& views, std::span<const size_t> training,
     const ViewPicture picture = views.load(view);
     if (picture.depth.empty()) return;  // the others have none either
     const Camera& camera = views.camera(view);
-    const Mat4d to_world = camera.world_to_camera.inverse();
     const size_t pixels = size_t{picture.width} * picture.height;
     const auto known = [&](size_t i) {
       return picture.depth[i] > 0 && static_cast<double>(picture.depth[i]) < camera.far_plane &&
@@ -96,7 +83,7 @@ void addDepth(const ViewSource& views, std::span<const size_t> training,
       const uint64_t key = static_cast<uint64_t>(view) << 32 | i;
       if (unitDouble(keyedBits(options.seed, RandomUse::kPriorSample, key)) >= chance) continue;
       addPoint(prior,
-               unprojected(camera, to_world, i % picture.width, i / picture.width,
+               unprojected(camera, i % picture.width, i / picture.width,
                            static_cast<double>(picture.depth[i])),
                1.0f);
     }
@@ -113,7 +100,8 @@ void dropUnseen(const ViewSource& views, std::span<const size_t> training, Scene
     const Vec3d place(p[0], p[1], p[2]);
     size_t seen = 0;
     for (size_t w = 0; w < witnesses && seen < needed; ++w) {
-      seen += sees(views.camera(training[w * training.size() / witnesses]), place) ? 1 : 0;
+      double x = 0, y = 0;
+      seen += project(views.camera(training[w * training.size() / witnesses]), place, x, y) ? 1 : 0;
     }
     if (seen >= needed) addPoint(kept, place, prior.weights[i]);
   }
@@ -170,13 +158,12 @@ bool seesBeyond(const ViewSource& views, std::span<const size_t> training, const
     if (!picture.alpha.empty()) return false;
     if (picture.depth.empty()) return true;
     const Camera& camera = views.camera(view);
-    const Mat4d to_world = camera.world_to_camera.inverse();
     for (size_t i = 0; i < picture.depth.size(); i += kPixelStep) {
       ++asked;
       const auto depth = static_cast<double>(picture.depth[i]);
       const bool is_known = depth > 0 && depth < camera.far_plane;
-      beyond += !is_known || !holds(root, unprojected(camera, to_world, i % picture.width,
-                                                      i / picture.width, depth));
+      beyond += !is_known ||
+                !holds(root, unprojected(camera, i % picture.width, i / picture.width, depth));
     }
   }
   return static_cast<double>(beyond) > kSeenBeyond * static_cast<double>(asked);
@@ -206,11 +193,10 @@ void addShell(const ViewSource& views, std::span<const size_t> training, uint64_
           keyedBits(seed, RandomUse::kPriorSample, (uint64_t{1} << 63) + 4 * i + what));
     };
     const Camera& camera = views.camera(training[i % training.size()]);
-    const Mat4d to_world = camera.world_to_camera.inverse();
     const auto x = static_cast<size_t>(drawn(0) * camera.width);
     const auto y = static_cast<size_t>(drawn(1) * camera.height);
-    const Vec3d eye = unprojected(camera, to_world, x, y, 0);
-    const Vec3d along = unprojected(camera, to_world, x, y, 1) - eye;
+    const Vec3d eye = unprojected(camera, x, y, 0);
+    const Vec3d along = unprojected(camera, x, y, 1) - eye;
     // The place of the ray whose largest coordinate is r halves of the inner cube from the middle.
     const double r = 0.5 * inner / (1 - drawn(2) * (1 - 1.0 / 32));
     double far = 0;
