@@ -1,7 +1,6 @@
 // Based on: Zeng, Wang, Ju, Guan, Frequency-Aware Density Control via Reparameterization for
 // High-Quality Rendering of 3D Gaussian Splatting, AAAI 2025, and its program (schedule, constants,
 // confidence). Differs: splats are compared with their own covariances (view_confidence.h);
-// views that iterations before an event have drawn are not drawn again for it;
 // gradients that are all 0 remove nothing by chance; there is a hard cap, under which the splats
 // with the highest gradients multiply; gradients of pictures that are not square count per half of
 // the geometric mean of their sides.
@@ -13,7 +12,6 @@
 #include <numeric>
 #include <utility>
 
-#include "base/parallel.h"
 #include "base/random.h"
 #include "densify/clone_or_split.h"
 #include "densify/density_scale.h"
@@ -26,7 +24,6 @@ namespace stipple {
 
 namespace {
 
-constexpr size_t kGrain = 1 << 14;
 constexpr double kChildShrink = 1.6;
 constexpr double kLeastRadius = 1e-7;  ///< published units: twins have no distance
 
@@ -54,31 +51,23 @@ class FrequencyControl final : public ControlPart {
   bool removesAt(const ControlMoment&) const override { return false; }
   bool wantsSweep(const ControlMoment& moment) const override { return moment.is_event; }
 
-  /// Views that iterations draw by themselves.
-  void request(const ControlMoment& moment, StatisticRequest& request) const override {
-    if (moment.view && isWindowOfViews(moment) && !hasLookedAt(moment.view->index)) ask(request);
-  }
-  void observe(const ControlMoment& moment, const ViewStatistics& view) override {
-    if (!isWindowOfViews(moment) || hasLookedAt(view.view)) return;
-    const size_t count = view.splats.positions.size() / 3;
-    if (sums_.size() != count) begin(count);
-    add(moment, view);
-  }
-
-  /// And those that they do not.
   void sweep(const ControlMoment& moment, ViewEvaluator& views) override {
-    const size_t count = views.splats().size();
-    if (sums_.size() != count) begin(count);
+    const SplatCloud& splats = views.splats();
+    std::vector<double> sums(splats.size(), 0.0), weights(splats.size(), 0.0);
+    BestViews best(removesNow(moment) ? splats.size() : 0);
     StatisticRequest request;
-    ask(request);
+    request.blending_weights = true;
+    request.absolute_screen_gradients = true;  // and their lengths
     for (size_t v = 0; v < views.viewCount(); ++v) {
-      if (!hasLookedAt(v)) add(moment, views.evaluate(v, request));
+      const ViewStatistics& view = views.evaluate(v, request);
+      addGradients(view, sums, weights);
+      if (best.size() > 0) best.add(view);
     }
-    gradients_.resize(count);
-    for (size_t i = 0; i < count; ++i) {
-      gradients_[i] = weights_[i] > 0 ? sums_[i] / weights_[i] : 0.0;
+    gradients_.resize(splats.size());
+    for (size_t i = 0; i < gradients_.size(); ++i) {
+      gradients_[i] = weights[i] > 0 ? sums[i] / weights[i] : 0.0;
     }
-    confidences_ = removesNow(moment) ? best_.confidences(views) : std::vector<float>{};
+    confidences_ = best.confidences(views);
   }
 
   void multiply(const ControlMoment& moment, const SplatStore& store, uint64_t room,
@@ -99,7 +88,6 @@ class FrequencyControl final : public ControlPart {
   void edited(const ControlMoment& moment, const SplatEdit& edit, size_t count_before) override {
     gradients_.clear();
     confidences_.clear();
-    if (moment.is_event || edit.keep || edit.append.size() > 0) begin(0);
     if (is_new_.size() != count_before) is_new_.assign(count_before, 0.0f);
     if (moment.is_event) std::fill(is_new_.begin(), is_new_.end(), 0.0f);
     followEdit(edit, 1, 1.0f, is_new_);
@@ -109,65 +97,25 @@ class FrequencyControl final : public ControlPart {
   /// Gradients of the last event, in units of the threshold.
   std::vector<float> scores() const override { return score_; }
 
-  void put(TensorTable& table) const override {
-    table["is_new"] = {{is_new_.size()}, is_new_};
-    table["gradient_sums"] = {{sums_.size()}, sums_};
-    table["weight_sums"] = {{weights_.size()}, weights_};
-    table["views"] = {{looked_at_.size()}, looked_at_};
-    best_.put(table);
-  }
-  void take(const TensorTable& table) override {
-    std::vector<float> is_new = stateArray<float>(table, "is_new");
-    std::vector<double> sums = stateSums<double>(table, "gradient_sums");
-    std::vector<double> weights = stateSums<double>(table, "weight_sums");
-    std::vector<uint64_t> views = stateArray<uint64_t>(table, "views");
-    requireAsMany(weights.size(), "weight_sums", sums.size(), "gradient_sums");
-    BestViews best;
-    best.take(table);
-    if (best.size() > 0) requireAsMany(best.size(), "best_views", sums.size(), "gradient_sums");
-    is_new_ = std::move(is_new);
-    sums_ = std::move(sums);
-    weights_ = std::move(weights);
-    looked_at_ = std::move(views);
-    best_ = std::move(best);
-  }
+  void put(TensorTable& table) const override { table["is_new"] = {{is_new_.size()}, is_new_}; }
+  void take(const TensorTable& table) override { is_new_ = stateArray<float>(table, "is_new"); }
 
  private:
   /// Every second event.
   static bool removesNow(const ControlMoment& moment) { return moment.event % 2 == 1; }
 
-  static void ask(StatisticRequest& request) {
-    request.blending_weights = true;
-    request.absolute_screen_gradients = true;  // and their lengths
-  }
-  void begin(size_t count) {
-    sums_.assign(count, 0.0);
-    weights_.assign(count, 0.0);
-    looked_at_.clear();
-    best_ = BestViews();
-  }
-  bool hasLookedAt(uint64_t view) const {
-    return std::find(looked_at_.begin(), looked_at_.end(), view) != looked_at_.end();
-  }
-
-  void add(const ControlMoment& moment, const ViewStatistics& view) {
-    if (removesNow(moment)) {
-      if (best_.size() != sums_.size()) best_ = BestViews(sums_.size());
-      best_.add(view);
-    }
+  static void addGradients(const ViewStatistics& view, std::vector<double>& sums,
+                           std::vector<double>& weights) {
     const std::span<const float> seen = view.of(Statistic::kBlendingWeights);
     const std::span<const float> norms = view.of(Statistic::kScreenGradientNorms);
     const double half =
         0.5 * std::sqrt(static_cast<double>(view.width) * static_cast<double>(view.height));
-    parallelFor(sums_.size(), kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        if (!view.visible[i]) continue;
-        const double weight = static_cast<double>(seen[i]);
-        sums_[i] += weight * half * static_cast<double>(norms[i]);
-        weights_[i] += weight;
-      }
-    });
-    looked_at_.push_back(view.view);
+    for (size_t i = 0; i < sums.size(); ++i) {
+      if (!view.visible[i]) continue;
+      const double weight = static_cast<double>(seen[i]);
+      sums[i] += weight * half * static_cast<double>(norms[i]);
+      weights[i] += weight;
+    }
   }
 
   std::vector<uint32_t> staying(const RawSplats& splats) const {
@@ -277,14 +225,10 @@ class FrequencyControl final : public ControlPart {
 
   FrequencyOptions options_;
   DensityScale scale_;
-  std::vector<double> sums_;         ///< [N] of gradients times weights, for the next event
-  std::vector<double> weights_;      ///< [N]
-  BestViews best_;                   ///< of the same views, where the next event removes
-  std::vector<uint64_t> looked_at_;  ///< these views
-  std::vector<double> gradients_;    ///< [N] of the event under way
-  std::vector<float> confidences_;   ///< [N] of the event under way, where it removes
-  std::vector<float> is_new_;        ///< [N] 1 for splats of the last event
-  std::vector<float> score_;         ///< [N]
+  std::vector<double> gradients_;   ///< [N] of the event under way
+  std::vector<float> confidences_;  ///< [N] of the event under way, where it removes
+  std::vector<float> is_new_;       ///< [N] 1 for splats of the last event
+  std::vector<float> score_;        ///< [N]
 };
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "base/parallel.h"
-#include "densify/state_arrays.h"
 #include "math/covariance.h"
 
 namespace stipple {
@@ -116,33 +115,6 @@ void BestViews::add(const ViewStatistics& view) {
       view_counts_[i] = static_cast<uint8_t>(std::min(view_counts_[i] + 1, 2));
     }
   });
-}
-
-void BestViews::put(TensorTable& table) const {
-  std::vector<uint32_t> views(size() * 2);
-  std::vector<float> weights(size() * 2);
-  for (size_t i = 0; i < size(); ++i) {
-    std::copy_n(views_[i].begin(), 2, &views[i * 2]);
-    std::copy_n(weights_[i].begin(), 2, &weights[i * 2]);
-  }
-  const std::vector<uint32_t> counts(view_counts_.begin(), view_counts_.end());
-  table["best_views"] = {{size(), 2}, views};
-  table["best_weights"] = {{size(), 2}, weights};
-  table["best_counts"] = {{size()}, counts};
-}
-
-void BestViews::take(const TensorTable& table) {
-  const std::vector<uint32_t> counts = stateArray<uint32_t>(table, "best_counts");
-  const std::vector<uint32_t> views = stateArray<uint32_t>(table, "best_views");
-  const std::vector<float> weights = stateArray<float>(table, "best_weights");
-  requireAsMany(views.size(), "best_views", counts.size() * 2, "best_counts");
-  requireAsMany(weights.size(), "best_weights", counts.size() * 2, "best_counts");
-  *this = BestViews(counts.size());
-  for (size_t i = 0; i < counts.size(); ++i) {
-    std::copy_n(&views[i * 2], 2, views_[i].begin());
-    std::copy_n(&weights[i * 2], 2, weights_[i].begin());
-    view_counts_[i] = static_cast<uint8_t>(std::min(counts[i], 2u));
-  }
 }
 
 std::vector<float> BestViews::confidences(ViewEvaluator& views) const {

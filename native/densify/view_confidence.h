@@ -46,10 +46,6 @@ class BestViews {
   /// once. Memory: 204 bytes per splat with two views.
   std::vector<float> confidences(ViewEvaluator& views) const;
 
-  /// For a checkpoint. Errors of take: kFormat.
-  void put(TensorTable& table) const;
-  void take(const TensorTable& table);
-
  private:
   std::vector<std::array<uint32_t, 2>> views_;  ///< [N] best first
   std::vector<std::array<float, 2>> weights_;   ///< [N]

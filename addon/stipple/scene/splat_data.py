@@ -8,6 +8,7 @@ with the same names. `rotation` is w,x,y,z; `radiance:base` holds the DC harmoni
 `seen:age` and `seen:contribution` are what density control saw of the splats that it made.
 """
 
+import base64
 import zlib
 
 import bmesh
@@ -137,10 +138,12 @@ def read_seen(data, kind):
 
 
 def keep_seen(data, source, seen):
-    """Keeps what was seen of all splats of a source, for when its whole budget is shown again."""
+    """Keeps what was seen of all splats of a source, for when its whole budget is shown again. As text: from Blender 4 on,
+    bytes end at the first zero."""
     for kind, name in SEEN_NAMES.items():
         if kind in seen:
-            data[f'stipple_{name}'] = np.ascontiguousarray(seen[kind], np.float32).tobytes()
+            values = np.ascontiguousarray(seen[kind], np.float32).tobytes()
+            data[f'stipple_{name}'] = base64.b64encode(zlib.compress(values, 1)).decode()
         else:
             data.pop(f'stipple_{name}', None)
     data[SEEN_SOURCE_KEY] = source
@@ -151,7 +154,10 @@ def kept_seen(data, source, count):
     found = {}
     if data.get(SEEN_SOURCE_KEY) == source:
         for kind, name in SEEN_NAMES.items():
-            values = np.frombuffer(data.get(f'stipple_{name}', b''), np.float32)
+            packed = data.get(f'stipple_{name}')
+            if packed is None:
+                continue
+            values = np.frombuffer(zlib.decompress(base64.b64decode(packed)), np.float32)
             if len(values) == count:
                 found[kind] = values
     return found

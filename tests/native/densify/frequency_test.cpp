@@ -334,46 +334,6 @@ TEST(Frequency, ChildrenOfTheLastEventAreSpared) {
   EXPECT_EQ(next.event(*unaware, publishedMoment(1500)).splats.size(), 1u);
 }
 
-TEST(Frequency, ViewsThatIterationsHaveDrawnAreNotDrawnAgain) {
-  Scene scene(300);
-  for (size_t v = 0; v < 3; ++v) {
-    KnownView& view = scene.views.views[v];
-    view.target = stripes(static_cast<int>(v));
-    for (size_t i = 0; i < 300; ++i) {
-      view.of(Statistic::kScreenGradientNorms)[i] = static_cast<float>((i * 7 + v) % 17) / 50;
-      view.of(Statistic::kBlendingWeights)[i] = static_cast<float>((i * 5 + v * 3) % 11);
-    }
-  }
-  for (const uint64_t event : {1000, 1500}) {  // the second one removes
-    const auto drawing = makeStrategy("frequency"), watching = makeStrategy("frequency");
-    const Edited drawn = scene.event(*drawing, publishedMoment(event));
-    scene.views.drawn.clear();
-    // Five iterations show each of three views at least once, however they are shuffled.
-    EXPECT_FALSE(iterate(*watching, scene.views, publishedMoment(event - 5), 0).any());
-    uint64_t iteration = event - 4;
-    for (const size_t view : {0, 0, 1, 2}) {
-      const bool is_new = iteration != event - 3;
-      EXPECT_EQ(iterate(*watching, scene.views, publishedMoment(iteration++), view).any(), is_new);
-    }
-    // A checkpoint between the last view and the event keeps what was seen.
-    const auto other = makeStrategy("frequency");
-    other->restore(watching->state());
-    for (const auto& strategy : {watching.get(), other.get()}) {
-      const Edited watched = scene.event(*strategy, publishedMoment(event));
-      EXPECT_TRUE(areSame(drawn.splats, watched.splats));
-    }
-    EXPECT_TRUE(scene.views.drawn.empty());
-    // What is left is drawn.
-    const auto late = makeStrategy("frequency");
-    iterate(*late, scene.views, publishedMoment(event), 1);
-    EXPECT_TRUE(areSame(scene.event(*late, publishedMoment(event)).splats, drawn.splats));
-    EXPECT_THAT(scene.views.drawn, ElementsAre(0, 2));
-  }
-  TensorTable broken = makeStrategy("frequency")->state();
-  broken["density_scale.weight_sums"] = {{1}, std::vector<double>{1}};
-  EXPECT_THROW(makeStrategy("frequency")->restore(broken), Error);
-}
-
 TEST(Frequency, ThinsOutByChanceWhereAllIsLearned) {
   Scene scene(200, 3, 1e-5f);
   const auto strategy = makeStrategy("frequency");
