@@ -112,7 +112,7 @@ TEST(LevelStability, EveryHardCaseStaysInTheHullAndNearDouble) {
       }
       // What every renderer promises of single precision.
       EXPECT_LT(worst, 1e-4);
-      table += " " + shortNumber(worst) + " |";
+      table.append(" ").append(shortNumber(worst)).append(" |");
     }
     table += "\n";
   }
