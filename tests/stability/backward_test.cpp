@@ -22,6 +22,7 @@ using testing::oneSplat;
 using testing::pixelCount;
 using testing::randomCloud;
 using testing::randomWeights;
+using testing::withScales;
 
 /// A splat's derivative is a sum of terms of either sign; float32 leaves 1e-5 of their sizes (alpha
 /// near 0.99 costs most), which the largest derivative of the array stands for.
@@ -84,18 +85,6 @@ void expectSoundForEveryLowPass(const SplatCloud& cloud, const Camera& camera) {
     SCOPED_TRACE(::testing::Message() << "low-pass " << static_cast<int>(low_pass));
     expectSound(cloud, camera, low_pass);
   }
-}
-
-SplatCloud withScales(size_t count, float a, float b, float c, uint32_t seed) {
-  CloudRecipe recipe;
-  recipe.count = count;
-  SplatCloud cloud = randomCloud(recipe, seed);
-  for (size_t i = 0; i < count; ++i) {
-    cloud.scales[i * 3] = a;
-    cloud.scales[i * 3 + 1] = b;
-    cloud.scales[i * 3 + 2] = c;
-  }
-  return cloud;
 }
 
 TEST(BackwardStability, Needles) {

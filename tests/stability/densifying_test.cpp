@@ -47,17 +47,9 @@ RawSplats extremeSplats() {
 struct Told {
   std::array<std::vector<float>, kStatisticCount> arrays;
   std::vector<uint8_t> visible;
-  Camera camera;
-  ViewStatistics view;
 
   Told(size_t count, uint64_t what, bool same) {
     const Kinds kinds{{0, 1e-38f, 1e-30f, 1e-12f, 1e-4f, 1, 1e4f, 1e12f}};
-    camera.width = 64;
-    camera.height = 32;
-    view.width = 64;
-    view.height = 32;
-    view.camera = &camera;
-    view.view = what;
     for (size_t k = 0; k < count; ++k) {
       visible.push_back(keyedBits(what, RandomUse::kPalette, k) % 4 > 0);
     }
@@ -67,20 +59,19 @@ struct Told {
       for (size_t k = 0; k < count * (pair ? 2 : 1); ++k) {
         arrays[s].push_back(same ? kinds.values[what % 8] : kinds.at(k, what * 16 + s));
       }
-      view.arrays[s] = arrays[s];
     }
-    view.visible = visible;
   }
 };
 
-/// What views show to a strategy that looks around: pictures of hard colours, one behind
-/// everything.
+constexpr uint64_t kViews = 8;
+
+/// What views show: pictures of hard colours, one from behind everything.
 testing::KnownViews hardViews(const RawSplats& splats, const Strategy& strategy, bool same) {
   testing::KnownViews views;
   views.cloud = activated(splats);
   if (strategy.parameterisation()) strategy.parameterisation()->activate(splats, views.cloud);
   const Kinds colours{{0, 1, 0.5f, -1, 1e6f, 1e-30f}};
-  for (uint64_t v = 0; v < 3; ++v) {
+  for (uint64_t v = 0; v < kViews; ++v) {
     testing::KnownView view = testing::plainView(testing::forwardCamera(64, 32, 50), 0.5f, 0.5f);
     if (v == 2) view.camera.world_to_camera(2, 3) = -1e18;
     for (size_t k = 0; k < view.target.size() && !same; ++k) {
@@ -112,24 +103,22 @@ void drive(const std::string& name, double extent, uint64_t cap, bool same) {
     splats.extra_lengths.push_back(extra.row_length);
   }
   splats.extras = strategy->initialExtras(splats);
-  const std::vector<float> target(64 * 32 * 3, 0.5f);
   FitMoment moment;
   moment.extent = extent;
   moment.max_splats = cap;
   moment.position_rate = 1e-3;
+  moment.view_count = kViews;
   for (const uint64_t iteration :
        {300, 591, 599, 600, 1500, 3000, 3300, 3399, 3400, 14600, 14900}) {
     if (splats.size() == 0) break;
     moment.iteration = iteration;
-    const TrainingView seen{iteration % 8, 64, 32, target};
+    testing::KnownViews views = hardViews(splats, *strategy, same);
+    const size_t view = iteration % kViews;
+    const TrainingView seen{view, 64, 32, views.views[view].target};
     moment.view = &seen;
     strategy->requests(moment);
-    const Told told(splats.size(), iteration % 8, same);
-    strategy->observe(moment, told.view);
-    if (strategy->wantsSweep(moment)) {
-      testing::KnownViews views = hardViews(splats, *strategy, same);
-      strategy->sweep(moment, views);
-    }
+    strategy->observe(moment, views.observed(view));
+    if (strategy->wantsSweep(moment)) strategy->sweep(moment, views);
     const RawSplats moments = zerosLike(splats);
     for (const auto& edit : {strategy->afterStep(moment, {splats, moments, moments}),
                              strategy->edit(moment, {splats, moments, moments})}) {

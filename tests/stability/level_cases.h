@@ -20,18 +20,6 @@ struct HardCase {
   Camera camera;
 };
 
-inline SplatCloud sizedCloud(size_t count, float a, float b, float c, uint32_t seed) {
-  CloudRecipe recipe;
-  recipe.count = count;
-  SplatCloud cloud = randomCloud(recipe, seed);
-  for (size_t i = 0; i < count; ++i) {
-    cloud.scales[i * 3] = a;
-    cloud.scales[i * 3 + 1] = b;
-    cloud.scales[i * 3 + 2] = c;
-  }
-  return cloud;
-}
-
 inline SplatCloud movedCloud(float distance) {
   SplatCloud cloud = randomCloud({}, 4);
   for (size_t i = 0; i < cloud.size(); ++i) cloud.positions[i * 3] += distance;
@@ -69,25 +57,25 @@ inline std::vector<HardCase> hardCases() {
   add(
       "needles, 1,000,000 : 1", "the inverse covariance loses the square of the ratio",
       "factors by rows made orthogonal; along rays the cross product with the centre",
-      [] { return sizedCloud(150, 1.0f, 1e-6f, 1e-6f, 1); }, front);
+      [] { return testing::withScales(150, 1.0f, 1e-6f, 1e-6f, 1); }, front);
   add(
       "discs of no thickness", "1/0 in the inverse", "no width below 1e-6 of a pixel divides",
-      [] { return sizedCloud(150, 0.2f, 0.2f, 0.0f, 2); }, front);
+      [] { return testing::withScales(150, 0.2f, 0.2f, 0.0f, 2); }, front);
   add(
       "scales near zero", "squares underflow, log of 0",
       "widths are held to 1e-6 of a pixel, or to the low-pass",
-      [] { return sizedCloud(150, 1e-30f, 1e-30f, 1e-30f, 3); }, front);
+      [] { return testing::withScales(150, 1e-30f, 1e-30f, 1e-30f, 3); }, front);
   add(
       "scales of 1e18", "squares overflow float32", "squares are double",
-      [] { return sizedCloud(20, 1e18f, 1e18f, 1e18f, 4); }, small);
+      [] { return testing::withScales(20, 1e18f, 1e18f, 1e18f, 4); }, small);
   add(
       "screen-filling", "tiles far outside the picture overflow integers",
       "boxes are cut to the picture before they are whole numbers",
-      [] { return sizedCloud(40, 50.0f, 30.0f, 40.0f, 5); }, small);
+      [] { return testing::withScales(40, 50.0f, 30.0f, 40.0f, 5); }, small);
   add(
       "sub-pixel", "nothing is hit between pixel centres",
       "the low-pass has a variance of 0.3 px^2, with or without compensation",
-      [] { return sizedCloud(300, 1e-4f, 1e-4f, 1e-4f, 6); }, front);
+      [] { return testing::withScales(300, 1e-4f, 1e-4f, 1e-4f, 6); }, front);
   add(
       "at and behind the near plane", "1/z of 0, mirrored ellipses",
       "centres before the plane are left out; along rays so are responses",

@@ -21,6 +21,7 @@ using testing::Difference;
 using testing::frontCamera;
 using testing::oneSplat;
 using testing::randomCloud;
+using testing::withScales;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -57,18 +58,6 @@ void expectSoundForEveryLowPass(const SplatCloud& cloud, const Camera& camera) {
       EXPECT_GT(picture.visible_count, 0u);
     }
   }
-}
-
-SplatCloud withScales(size_t count, float a, float b, float c, uint32_t seed) {
-  CloudRecipe recipe;
-  recipe.count = count;
-  SplatCloud cloud = randomCloud(recipe, seed);
-  for (size_t i = 0; i < count; ++i) {
-    cloud.scales[i * 3] = a;
-    cloud.scales[i * 3 + 1] = b;
-    cloud.scales[i * 3 + 2] = c;
-  }
-  return cloud;
 }
 
 TEST(RenderStability, Needles) {

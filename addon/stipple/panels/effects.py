@@ -6,7 +6,7 @@ import bpy
 from ..binding.errors import StippleError
 from ..binding.structs import Effect
 from ..scene import effects, sources
-from .render import CYCLES_ENGINE, ENGINE
+from .render import SplatRenderPanel
 
 
 def _rows(context):
@@ -22,19 +22,7 @@ def _rows(context):
         return [], seen, str(error)
 
 
-class _EffectsPanel:
-    bl_space_type = 'PROPERTIES'
-    bl_region_type = 'WINDOW'
-    bl_context = 'render'
-    bl_options = {'DEFAULT_CLOSED'}
-    COMPAT_ENGINES = {ENGINE, CYCLES_ENGINE}
-
-    @classmethod
-    def poll(cls, context):
-        return context.engine in cls.COMPAT_ENGINES
-
-
-class STIPPLE_PT_effects(_EffectsPanel, bpy.types.Panel):
+class STIPPLE_PT_effects(SplatRenderPanel, bpy.types.Panel):
     bl_label = "Effects"
     bl_options = set()
 
@@ -57,7 +45,7 @@ class STIPPLE_PT_effects(_EffectsPanel, bpy.types.Panel):
             line.label(text=f"Seen by {seen.camera_name} at frame {seen.frame}", icon='INFO')
 
 
-class STIPPLE_PT_effects_inactive(_EffectsPanel, bpy.types.Panel):
+class STIPPLE_PT_effects_inactive(SplatRenderPanel, bpy.types.Panel):
     bl_label = ""
     bl_parent_id = 'STIPPLE_PT_effects'
 
@@ -72,7 +60,7 @@ class STIPPLE_PT_effects_inactive(_EffectsPanel, bpy.types.Panel):
                 _draw_row(self.layout, context, row, seen)
 
 
-class STIPPLE_PT_effects_settings(_EffectsPanel, bpy.types.Panel):
+class STIPPLE_PT_effects_settings(SplatRenderPanel, bpy.types.Panel):
     bl_label = "Settings"
     bl_parent_id = 'STIPPLE_PT_effects'
 

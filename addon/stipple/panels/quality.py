@@ -7,22 +7,10 @@ from ..binding import accuracy as native
 from ..binding.errors import StippleError
 from ..scene import measured_quality, quality, sources
 from .effects import draw_text
-from .render import CYCLES_ENGINE, ENGINE
+from .render import SplatRenderPanel
 
 
-class _QualityPanel:
-    bl_space_type = 'PROPERTIES'
-    bl_region_type = 'WINDOW'
-    bl_context = 'render'
-    bl_options = {'DEFAULT_CLOSED'}
-    COMPAT_ENGINES = {ENGINE, CYCLES_ENGINE}
-
-    @classmethod
-    def poll(cls, context):
-        return context.engine in cls.COMPAT_ENGINES
-
-
-class STIPPLE_PT_quality(_QualityPanel, bpy.types.Panel):
+class STIPPLE_PT_quality(SplatRenderPanel, bpy.types.Panel):
     bl_label = "Quality"
     bl_options = set()
 
@@ -51,7 +39,7 @@ class STIPPLE_PT_quality(_QualityPanel, bpy.types.Panel):
         line.operator('stipple.accuracy_compare', icon='IMAGE_ALPHA')
 
 
-class STIPPLE_PT_quality_knobs(_QualityPanel, bpy.types.Panel):
+class STIPPLE_PT_quality_knobs(SplatRenderPanel, bpy.types.Panel):
     bl_label = "Single Settings"
     bl_parent_id = 'STIPPLE_PT_quality'
 
@@ -69,7 +57,7 @@ class STIPPLE_PT_quality_knobs(_QualityPanel, bpy.types.Panel):
             draw_text(box, context, knob.bound)
 
 
-class STIPPLE_PT_quality_table(_QualityPanel, bpy.types.Panel):
+class STIPPLE_PT_quality_table(SplatRenderPanel, bpy.types.Panel):
     bl_label = "Table"
     bl_parent_id = 'STIPPLE_PT_quality'
 
@@ -95,7 +83,7 @@ class STIPPLE_PT_quality_table(_QualityPanel, bpy.types.Panel):
             line.operator('stipple.accuracy_choose', text=text).by = by
 
 
-class STIPPLE_PT_quality_plot(_QualityPanel, bpy.types.Panel):
+class STIPPLE_PT_quality_plot(SplatRenderPanel, bpy.types.Panel):
     bl_label = "Plot"
     bl_parent_id = 'STIPPLE_PT_quality'
 

@@ -12,16 +12,23 @@ _EXCLUDED = {'VIEWLAYER_PT_filter', 'VIEWLAYER_PT_layer_passes', 'RENDER_PT_free
              'RENDER_PT_simplify_greasepencil', 'RENDER_PT_gpencil', 'RENDER_PT_stereoscopy'}
 
 
-class STIPPLE_PT_render_splats(bpy.types.Panel):
-    bl_label = "Gaussian Splats"
+class SplatRenderPanel:
+    """What panels of the render properties have in common."""
+
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
     bl_context = 'render'
+    bl_options = {'DEFAULT_CLOSED'}
     COMPAT_ENGINES = {ENGINE, CYCLES_ENGINE}
 
     @classmethod
     def poll(cls, context):
         return context.engine in cls.COMPAT_ENGINES
+
+
+class STIPPLE_PT_render_splats(SplatRenderPanel, bpy.types.Panel):
+    bl_label = "Gaussian Splats"
+    bl_options = set()
 
     def draw(self, context):
         layout = self.layout

@@ -16,6 +16,17 @@ struct Tile {
   size_t listed_behind = 0;  ///< slots that lie in memory right behind them: the next tile's
 };
 
+/// Calls use(pixel of the tile, pixel of the picture) for those of the tile inside the picture.
+template <typename Use>
+void forEachPixel(const Tile& tile, uint32_t width, Use use) {
+  for (uint32_t y = 0; y < tile.height; ++y) {
+    const size_t row = static_cast<size_t>(tile.y0 + y) * width + tile.x0;
+    for (uint32_t x = 0; x < tile.width; ++x) {
+      use(static_cast<size_t>(y) * kTileSide + x, row + x);
+    }
+  }
+}
+
 /// Tile `index` of the grid with its list.
 Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats);
 

@@ -7,21 +7,6 @@
 
 namespace stipple {
 
-namespace {
-
-/// Calls use(pixel of the tile, pixel of the picture) for those of the tile inside the picture.
-template <typename Use>
-void forEachPixel(const Tile& tile, uint32_t width, Use use) {
-  for (uint32_t y = 0; y < tile.height; ++y) {
-    const size_t row = static_cast<size_t>(tile.y0 + y) * width + tile.x0;
-    for (uint32_t x = 0; x < tile.width; ++x) {
-      use(static_cast<size_t>(y) * kTileSide + x, row + x);
-    }
-  }
-}
-
-}  // namespace
-
 void takeSurface(const SurfaceLayer& surface, const VisibleSplat* visible, Tile& tile,
                  TilePixels& pixels) {
   float furthest = -kNoSurface;

@@ -16,14 +16,9 @@ namespace {
 
 using testing::CloudRecipe;
 using testing::frontCamera;
+using testing::instanceOf;
 using testing::oneSplat;
 using testing::randomCloud;
-
-SplatInstance instanceOf(const SplatCloud& cloud) {
-  SplatInstance instance;
-  instance.cloud = &cloud;
-  return instance;
-}
 
 RenderOptions withPasses() {
   RenderOptions options;

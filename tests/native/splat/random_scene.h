@@ -48,6 +48,19 @@ inline SplatCloud randomCloud(const CloudRecipe& recipe, uint32_t seed) {
   return cloud;
 }
 
+/// The same cloud with scales of a, b, c metres.
+inline SplatCloud withScales(size_t count, float a, float b, float c, uint32_t seed) {
+  CloudRecipe recipe;
+  recipe.count = count;
+  SplatCloud cloud = randomCloud(recipe, seed);
+  for (size_t i = 0; i < count; ++i) {
+    cloud.scales[i * 3] = a;
+    cloud.scales[i * 3 + 1] = b;
+    cloud.scales[i * 3 + 2] = c;
+  }
+  return cloud;
+}
+
 /// Looks along +y of the world at the origin from `distance` metres: camera x = world x, y = -z.
 inline Camera frontCamera(uint32_t width, uint32_t height, double focal, double distance) {
   Camera camera;
@@ -74,6 +87,23 @@ inline SplatCloud oneSplat(float scale, float opacity, float dc = 1.0f) {
   cloud.opacities = {opacity};
   cloud.sh = {dc, dc, dc};
   return cloud;
+}
+
+/// Where the cloud stands.
+inline SplatInstance instanceOf(const SplatCloud& cloud) {
+  SplatInstance instance;
+  instance.cloud = &cloud;
+  return instance;
+}
+
+/// Options for every buffer that a picture has.
+inline RenderOptions everyBuffer(LowPass low_pass = LowPass::kNone) {
+  RenderOptions options;
+  options.low_pass = low_pass;
+  options.with_median_depth = true;
+  options.with_counts = true;
+  options.with_transmittance = true;
+  return options;
 }
 
 struct Difference {

@@ -18,24 +18,11 @@ namespace stipple {
 namespace {
 
 using testing::CloudRecipe;
+using testing::everyBuffer;
 using testing::frontCamera;
+using testing::instanceOf;
 using testing::oneSplat;
 using testing::randomCloud;
-
-SplatInstance instanceOf(const SplatCloud& cloud) {
-  SplatInstance instance;
-  instance.cloud = &cloud;
-  return instance;
-}
-
-RenderOptions plain(LowPass low_pass = LowPass::kNone) {
-  RenderOptions options;
-  options.low_pass = low_pass;
-  options.with_median_depth = true;
-  options.with_counts = true;
-  options.with_transmittance = true;
-  return options;
-}
 
 double value(const std::vector<float>& numbers, size_t i) {
   return static_cast<double>(numbers[i]);
@@ -83,9 +70,9 @@ TEST(RayRender, ARoundSplatFallsWithTheDistanceOfTheRay) {
   cloud.positions = {3, 2, 0.5f};  // camera: x 3, y -0.5, z 2
   const SplatInstance instance = instanceOf(cloud);
   const Vec3d centre(3, -0.5, 2);
-  const RenderResult picture = renderRays({&instance, 1}, camera, plain(), rayYardstick());
+  const RenderResult picture = renderRays({&instance, 1}, camera, everyBuffer(), rayYardstick());
   double affine_error = 0;
-  const ReferenceResult affine = renderReference({&instance, 1}, camera, plain());
+  const ReferenceResult affine = renderReference({&instance, 1}, camera, everyBuffer());
   for (uint32_t y = 0; y < 65; ++y) {
     for (uint32_t x = 0; x < 65; ++x) {
       const Vec3d ray((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 1);
@@ -113,8 +100,9 @@ TEST(RayRender, TilesLeaveNothingOut) {
     camera.model = model;
     for (const RayOptions& rays : {RayOptions{}, rayYardstick()}) {
       const RenderResult picture =
-          renderRays({&instance, 1}, camera, plain(LowPass::kClassic), rays);
-      const std::vector<double> all = bruteForce(instance, camera, plain(LowPass::kClassic), rays);
+          renderRays({&instance, 1}, camera, everyBuffer(LowPass::kClassic), rays);
+      const std::vector<double> all =
+          bruteForce(instance, camera, everyBuffer(LowPass::kClassic), rays);
       for (size_t i = 0; i < all.size(); ++i) {
         ASSERT_NEAR(value(picture.colour, i), all[i], 2e-7) << "value " << i;
       }
@@ -132,8 +120,8 @@ TEST(RayRender, AgreesWithTheAffinePictureOfSmallSplatsFarAway) {
     const Camera camera = frontCamera(64, 64, 1500, 50);
     RayOptions rays;
     rays.order = RayOrder::kCentre;
-    const RenderResult picture = renderRays({&instance, 1}, camera, plain(low_pass), rays);
-    const ReferenceResult affine = renderReference({&instance, 1}, camera, plain(low_pass));
+    const RenderResult picture = renderRays({&instance, 1}, camera, everyBuffer(low_pass), rays);
+    const ReferenceResult affine = renderReference({&instance, 1}, camera, everyBuffer(low_pass));
     for (size_t i = 0; i < affine.colour.size(); ++i) {
       // The affine map is off by the square of an angle of 0.03, and alphas near 1/255 may fall on
       // the other side: 4e-3 of one splat.
@@ -155,7 +143,7 @@ TEST(RayRender, SplatsThatCrossShowBothSides) {
   cloud.sh = {1.7f, -1.7f, -1.7f, -1.7f, -1.7f, 1.7f};  // red and blue
   const SplatInstance instance = instanceOf(cloud);
   const Camera camera = frontCamera(41, 41, 40, 4);
-  const RenderResult picture = renderRays({&instance, 1}, camera, plain(), RayOptions{});
+  const RenderResult picture = renderRays({&instance, 1}, camera, everyBuffer(), RayOptions{});
   const auto redness = [&](uint32_t x) {
     const size_t i = (size_t{20} * 41 + x) * 4;
     return picture.colour[i] - picture.colour[i + 2];
@@ -165,7 +153,7 @@ TEST(RayRender, SplatsThatCrossShowBothSides) {
   EXPECT_LT(redness(12) * redness(28), 0);
   RayOptions by_centre;
   by_centre.order = RayOrder::kCentre;
-  const RenderResult popping = renderRays({&instance, 1}, camera, plain(), by_centre);
+  const RenderResult popping = renderRays({&instance, 1}, camera, everyBuffer(), by_centre);
   const auto flat = [&](uint32_t x) {
     const size_t i = (size_t{20} * 41 + x) * 4;
     return popping.colour[i] - popping.colour[i + 2];
@@ -180,7 +168,7 @@ TEST(RayRender, WhitensWhatAnyMatrixMakesOfASplat) {
   SplatInstance instance = instanceOf(cloud);
   instance.object_to_world << 2, 0.5, 0, 0, 0, 1, 0.7, 0, 0.2, 0, -0.5, 0, 0, 0, 0, 1;
   const Camera camera = frontCamera(32, 32, 20, 8);
-  const PlacedScene scene = placeScene({&instance, 1}, camera, plain());
+  const PlacedScene scene = placeScene({&instance, 1}, camera, everyBuffer());
   const std::vector<RaySplat> splats = raySplats(scene, 1e-9);
   ASSERT_EQ(splats.size(), 50u);
   for (const RaySplat& splat : splats) {
@@ -201,9 +189,10 @@ TEST(RayRender, TheYardstickHasNoLimits) {
   const SplatInstance instance = instanceOf(cloud);
   const Camera camera = frontCamera(9, 9, 20, 3);
   const size_t centre = 4 * 9 + 4;
-  EXPECT_EQ(renderRays({&instance, 1}, camera, plain(), rayYardstick()).transmittance[centre], 0);
-  EXPECT_NEAR(value(renderRays({&instance, 1}, camera, plain(), {}).transmittance, centre), 0.01,
-              1e-8);
+  EXPECT_EQ(renderRays({&instance, 1}, camera, everyBuffer(), rayYardstick()).transmittance[centre],
+            0);
+  EXPECT_NEAR(value(renderRays({&instance, 1}, camera, everyBuffer(), {}).transmittance, centre),
+              0.01, 1e-8);
   // A thousand layers of alpha 0.5 hide all but 2^-1000; ended early, 1e-4 at most is left.
   cloud.resize(1000);
   for (size_t i = 0; i < 1000; ++i) {
@@ -213,9 +202,9 @@ TEST(RayRender, TheYardstickHasNoLimits) {
     cloud.opacities[i] = 0.5f;
     std::fill_n(&cloud.sh[i * 3], 3, 1.0f);
   }
-  const RenderResult yardstick = renderRays({&instance, 1}, camera, plain(), rayYardstick());
+  const RenderResult yardstick = renderRays({&instance, 1}, camera, everyBuffer(), rayYardstick());
   EXPECT_EQ(yardstick.counts[centre], 1000u);
-  EXPECT_LT(renderRays({&instance, 1}, camera, plain(), {}).counts[centre], 20u);
+  EXPECT_LT(renderRays({&instance, 1}, camera, everyBuffer(), {}).counts[centre], 20u);
 }
 
 TEST(RayRender, GivesTheSameForAnyNumberOfThreads) {
@@ -223,8 +212,8 @@ TEST(RayRender, GivesTheSameForAnyNumberOfThreads) {
   const SplatInstance instance = instanceOf(cloud);
   const Camera camera = frontCamera(150, 130, 120, 2);
   RenderResult one, two;
-  withThreads(1, [&] { one = renderRays({&instance, 1}, camera, plain(), {}); });
-  withThreads(2, [&] { two = renderRays({&instance, 1}, camera, plain(), {}); });
+  withThreads(1, [&] { one = renderRays({&instance, 1}, camera, everyBuffer(), {}); });
+  withThreads(2, [&] { two = renderRays({&instance, 1}, camera, everyBuffer(), {}); });
   EXPECT_EQ(one.colour, two.colour);
   EXPECT_EQ(one.depth, two.depth);
 }
@@ -236,10 +225,10 @@ TEST(RayRender, HoldoutsAndSurfacesHideWhatIsBehindThem) {
   instances[1].object_to_world(1, 3) = 2;
   const Camera camera = frontCamera(9, 9, 20, 3);
   const size_t centre = 4 * 9 + 4;
-  const RenderResult held = renderRays(instances, camera, plain(), {});
+  const RenderResult held = renderRays(instances, camera, everyBuffer(), {});
   // 0.9 of what is behind is hidden.
   EXPECT_NEAR(value(held.colour, centre * 4 + 3), 0.1 * 0.9, 1e-6);
-  RenderOptions options = plain();
+  RenderOptions options = everyBuffer();
   const std::vector<float> depth(81, 4.0f);
   options.surface.width = options.surface.height = 9;
   options.surface.depth = depth.data();

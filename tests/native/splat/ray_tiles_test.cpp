@@ -21,14 +21,9 @@ namespace {
 
 using testing::CloudRecipe;
 using testing::frontCamera;
+using testing::instanceOf;
 using testing::oneSplat;
 using testing::randomCloud;
-
-SplatInstance instanceOf(const SplatCloud& cloud) {
-  SplatInstance instance;
-  instance.cloud = &cloud;
-  return instance;
-}
 
 double largestDifference(const std::vector<float>& a, const std::vector<float>& b) {
   EXPECT_EQ(a.size(), b.size());

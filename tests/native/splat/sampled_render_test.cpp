@@ -20,16 +20,11 @@ namespace {
 
 using testing::CloudRecipe;
 using testing::frontCamera;
+using testing::instanceOf;
 using testing::oneSplat;
 using testing::randomCloud;
 
 constexpr double kPi = std::numbers::pi;
-
-SplatInstance instanceOf(const SplatCloud& cloud) {
-  SplatInstance instance;
-  instance.cloud = &cloud;
-  return instance;
-}
 
 RenderOptions plain() {
   RenderOptions options;

@@ -18,6 +18,8 @@ namespace stipple {
 namespace {
 
 using testing::CloudRecipe;
+using testing::everyBuffer;
+using testing::instanceOf;
 using testing::oneSplat;
 using testing::randomCloud;
 
@@ -41,21 +43,6 @@ Camera around(CameraModel model, uint32_t width, uint32_t height) {
       0, 1, 0, 0,                        //
       0, 0, 0, 1;
   return camera;
-}
-
-SplatInstance instanceOf(const SplatCloud& cloud) {
-  SplatInstance instance;
-  instance.cloud = &cloud;
-  return instance;
-}
-
-RenderOptions plain(LowPass low_pass = LowPass::kNone) {
-  RenderOptions options;
-  options.low_pass = low_pass;
-  options.with_median_depth = true;
-  options.with_counts = true;
-  options.with_transmittance = true;
-  return options;
 }
 
 double value(const std::vector<float>& numbers, size_t i) {
@@ -95,7 +82,8 @@ TEST(WideCamera, ARoundSplatFallsWithTheAngleWhereverItIs) {
       }
       const Vec3d centre = place.cast<float>().cast<double>();
       const SplatInstance instance = instanceOf(cloud);
-      const RenderResult picture = renderRays({&instance, 1}, camera, plain(), rayYardstick());
+      const RenderResult picture =
+          renderRays({&instance, 1}, camera, everyBuffer(), rayYardstick());
       double most = 0;
       for (uint32_t y = 0; y < camera.height; ++y) {
         for (uint32_t x = 0; x < camera.width; ++x) {
@@ -135,7 +123,7 @@ TEST(WideCamera, TilesLeaveNothingOut) {
       for (const RayOrder order : {RayOrder::kCentre, RayOrder::kResponse}) {
         RayOptions rays;
         rays.order = order;
-        const RenderOptions options = plain(LowPass::kClassic);
+        const RenderOptions options = everyBuffer(LowPass::kClassic);
         const RenderResult picture = renderRays({&instance, 1}, camera, options, rays);
         const PlacedScene scene = placeSceneForRays({&instance, 1}, camera, options);
         const std::vector<RaySplat> splats = raySplats(scene, rays.limits.least_alpha);
@@ -223,7 +211,7 @@ TEST(WideCamera, EveryFaceOfACubeAgreesWithAPerspectivePicture) {
     flat.world_to_camera = base.world_to_camera;
     flat.world_to_camera.topLeftCorner<3, 3>() =
         turn * Mat3d(base.world_to_camera.topLeftCorner<3, 3>());
-    const RenderResult picture = renderRays({&instance, 1}, flat, plain(), rays);
+    const RenderResult picture = renderRays({&instance, 1}, flat, everyBuffer(), rays);
     for (const CameraModel model : kWide) {
       for (uint32_t y = 0; y < kSide; ++y) {
         for (uint32_t x = 0; x < kSide; ++x) {
@@ -235,7 +223,7 @@ TEST(WideCamera, EveryFaceOfACubeAgreesWithAPerspectivePicture) {
           wide.cx += 0.5 - place[0];
           wide.cy += 0.5 - place[1];
           wide.near_plane = flat.near_plane;
-          const RenderResult pixel = renderRays({&instance, 1}, wide, plain(), rays);
+          const RenderResult pixel = renderRays({&instance, 1}, wide, everyBuffer(), rays);
           const size_t i = size_t{y} * kSide + x;
           for (size_t c = 0; c < 4; ++c) {
             // Rays of the two agree to 1e-15; colours are float32, tails of splats behind the face
@@ -258,13 +246,14 @@ TEST(WideCamera, TheSeamIsNowhere) {
   const SplatCloud cloud = randomCloud(recipe, 2);
   SplatInstance instance = instanceOf(cloud);
   const Camera camera = around(CameraModel::kEquirectangular, 80, 40);
-  const RenderResult ahead = renderRays({&instance, 1}, camera, plain(LowPass::kClassic), {});
+  const RenderResult ahead = renderRays({&instance, 1}, camera, everyBuffer(LowPass::kClassic), {});
   const uint32_t shift = 29;
   const double turn = 2 * kPi * shift / 80;
   // About the world's z: what is to the right comes to the middle.
   instance.object_to_world.topLeftCorner<2, 2>() << std::cos(turn), -std::sin(turn), std::sin(turn),
       std::cos(turn);
-  const RenderResult turned = renderRays({&instance, 1}, camera, plain(LowPass::kClassic), {});
+  const RenderResult turned =
+      renderRays({&instance, 1}, camera, everyBuffer(LowPass::kClassic), {});
   size_t moved = 0;
   for (uint32_t y = 0; y < 40; ++y) {
     for (uint32_t x = 0; x < 80; ++x) {
@@ -288,7 +277,7 @@ TEST(WideCamera, AFisheyeSeesItsFieldOfViewAndNothingElse) {
     Camera camera = around(model, 60, 60);
     camera.fx = camera.fy = model == CameraModel::kFisheyeEquisolid ? 30 : 60 / kPi;
     camera.field_of_view = 120 * kPi / 180;
-    RenderOptions options = plain();
+    RenderOptions options = everyBuffer();
     options.with_background = true;
     options.background[0] = options.background[1] = options.background[2] = 1;
     const RenderResult picture = renderRays({&instance, 1}, camera, options, {});
@@ -350,8 +339,8 @@ TEST(WideCamera, GivesTheSameForAnyNumberOfThreads) {
   const SplatInstance instance = instanceOf(cloud);
   const Camera camera = around(CameraModel::kEquirectangular, 150, 75);
   RenderResult one, two;
-  withThreads(1, [&] { one = renderRays({&instance, 1}, camera, plain(), {}); });
-  withThreads(2, [&] { two = renderRays({&instance, 1}, camera, plain(), {}); });
+  withThreads(1, [&] { one = renderRays({&instance, 1}, camera, everyBuffer(), {}); });
+  withThreads(2, [&] { two = renderRays({&instance, 1}, camera, everyBuffer(), {}); });
   EXPECT_EQ(one.colour, two.colour);
   EXPECT_EQ(one.depth, two.depth);
 }
