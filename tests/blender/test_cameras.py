@@ -96,9 +96,10 @@ def test_resolution_percentage_truncates_as_blender_does(stipple):
     assert stipple.scene.facts.picture_size(render) == (166, 50)
 
 
-def test_panoramic_camera_is_one_clear_error(stipple):
+def test_an_unknown_panorama_is_one_clear_error(stipple):
     obj = make_camera(type='PANO')
-    with pytest.raises(Exception, match=r"Camera 'camera' is of type PANO; allowed are perspective and orthographic"):
+    stipple.version.panorama_settings(obj.data).panorama_type = 'MIRRORBALL'
+    with pytest.raises(Exception, match=r"Panoramic camera 'camera' is of type MIRRORBALL; allowed are EQUIRECTANGULAR"):
         stipple.scene.cameras.camera_of(obj, set_render(64, 64))
 
 
