@@ -94,7 +94,11 @@ class Capture:
         return self._render(name, self._camera)
 
     def camera(self, camera_object):
-        """The view of one of the scene's cameras, in the scene's proportions. Errors: panoramic cameras."""
+        """The view of one of the scene's cameras, in the scene's proportions. Errors: panoramic cameras, which no fit
+        can learn from."""
+        if camera_object.data.type == 'PANO':
+            raise StippleError(f"Camera '{camera_object.name}' is of type PANO; views are taken by perspective and "
+                               'orthographic cameras.', Status.ERROR_UNSUPPORTED)
         render, (width, height) = self._scene.render, self._proportions
         share = self._settings.size / max(width, height)
         render.resolution_x = max(1, round(width * share))
