@@ -19,8 +19,8 @@ def module(name):
     return importlib.import_module(name, addon)
 
 
-def build(window):
-    """A ball; the sidebar shows the panel, in a tab that every Blender opens first."""
+def prepare_ball(quality):
+    """A selected ball of two colours alone in the scene, and settings of a quick fit."""
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
     ball = scenes.sphere(segments=24, rings=12)
@@ -28,7 +28,12 @@ def build(window):
     scenes.select(ball)
     settings = bpy.context.scene.stipple.fit
     settings.view_count, settings.view_size, settings.engine, settings.max_splats = 12, 64, 'WORKBENCH', 3000
-    settings.quality = 'BALANCED'
+    settings.quality = quality
+
+
+def build(window):
+    """A ball; the sidebar shows the panel, in a tab that every Blender opens first."""
+    prepare_ball('BALANCED')
     window.space.show_region_ui = True
     for panel in reversed(module('.panels.fit').classes):
         bpy.utils.unregister_class(panel)

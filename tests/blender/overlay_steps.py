@@ -9,21 +9,14 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import scenes  # noqa: E402
-from fit_steps import module  # noqa: E402
+from fit_steps import module, prepare_ball  # noqa: E402
 
 facts = {}
 
 
 def build(window):
     """A ball in the middle of an empty view."""
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-    ball = scenes.sphere(segments=24, rings=12)
-    scenes.image_material('Halves', scenes.half_image(), ball)
-    scenes.select(ball)
-    settings = bpy.context.scene.stipple.fit
-    settings.view_count, settings.view_size, settings.engine, settings.max_splats = 12, 64, 'WORKBENCH', 3000
-    settings.quality = 'FINE_DETAIL'
+    prepare_ball('FINE_DETAIL')
     overlay = window.space.overlay
     overlay.show_floor = overlay.show_ortho_grid = overlay.show_cursor = overlay.show_outline_selected = False
     overlay.show_axis_x = overlay.show_axis_y = overlay.show_axis_z = False
