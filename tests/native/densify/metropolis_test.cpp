@@ -165,7 +165,8 @@ TEST(Metropolis, ViewsThatIterationsHaveDrawnAreNotDrawnAgain) {
   const RawSplats splats = splatsInFront(3000);
   KnownViews views = viewsOf(splats, 8);
   for (size_t v = 0; v < 8; ++v) {  // another thing wrong in each
-    for (size_t i = 0; i < 3000; ++i) views.views[v].picture[7919 * v + i] = 0.1f;
+    std::vector<float>& picture = views.views[v].picture;
+    for (size_t i = 0; i < 3000; ++i) picture[(7919 * v + i) % picture.size()] = 0.1f;
   }
   const auto drawing = makeStrategy("metropolis"), watching = makeStrategy("metropolis");
   const auto drawn = eventOf(*drawing, publishedMoment(600), splats, views);
