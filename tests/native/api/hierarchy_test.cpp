@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <stipple/stipple.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -113,8 +114,9 @@ TEST_F(HierarchyApi, DecodesAnExistingCloudAtAnyBudget) {
   EXPECT_EQ(info.leaf_count, 200u);
   for (const uint64_t budget : {1u, 2u, 77u, 200u}) EXPECT_EQ(countAt(model, budget), budget);
 
-  const std::string path =
-      (std::filesystem::temp_directory_path() / "hierarchy_api.stipple.safetensors").string();
+  const std::string path = (std::filesystem::temp_directory_path() /
+                            ("hierarchy" + std::to_string(getpid()) + ".stipple.safetensors"))
+                               .string();
   STIPPLE_ASSERT_OK(stipple_model_save(model, path.c_str()));
   StippleModel* loaded = nullptr;
   STIPPLE_ASSERT_OK(stipple_model_load(context_, path.c_str(), &loaded));
