@@ -24,8 +24,15 @@ constexpr size_t kGrain = 1 << 14;
 class ShutterTime {
  public:
   explicit ShutterTime(const std::vector<double>& curve) : curve_(curve), sums_(1, 0.0) {
-    for (size_t i = 0; i + 1 < curve.size(); ++i) {
-      sums_.push_back(sums_.back() + 0.5 * (curve[i] + curve[i + 1]));
+    // Only what a value is to the others counts. By a power of two, which rounds nothing: squares
+    // of a faint curve would be 0.
+    double most = 0;
+    for (const double open : curve_) most = std::max(most, open);
+    int exponent = 0;
+    std::frexp(most, &exponent);
+    for (double& open : curve_) open = std::ldexp(open, -exponent);
+    for (size_t i = 0; i + 1 < curve_.size(); ++i) {
+      sums_.push_back(sums_.back() + 0.5 * (curve_[i] + curve_[i + 1]));
     }
   }
 
@@ -44,7 +51,7 @@ class ShutterTime {
   }
 
  private:
-  const std::vector<double>& curve_;
+  std::vector<double> curve_;
   std::vector<double> sums_;
 };
 
