@@ -195,6 +195,7 @@ FitSettings fitSettings(const StippleFitOptions& given) {
   model.antialias = antialias;
   model.ssim_share = given.ssim_share;
   model.seed = given.seed;
+  model.iterations = given.iterations;
   return settings;
 }
 

@@ -103,8 +103,9 @@ class ControlPart {
   virtual ControlRoles needs() const { return 0; }
 
   // ---- once, before the first iteration --------------------------------------------------------
-  /// Changes splats that a fit begins with (not those of a cloud that is densified).
-  virtual void prepare(RawSplats&) const {}
+  /// Changes splats that a fit of so many iterations begins with (not those of a cloud that is
+  /// densified).
+  virtual void prepare(RawSplats&, uint64_t /*iterations*/) const {}
   virtual void adjustRates(LearningRates&) const {}
   /// kParameterisation.
   virtual std::vector<ExtraParameter> parameters() const { return {}; }

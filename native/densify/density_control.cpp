@@ -65,8 +65,8 @@ class DensityControl final : public Strategy {
 
   const char* name() const override { return name_.c_str(); }
 
-  void prepare(RawSplats& splats) const override {
-    for (const auto& part : parts_) part->prepare(splats);
+  void prepare(RawSplats& splats, uint64_t iterations) const override {
+    for (const auto& part : parts_) part->prepare(splats, iterations);
   }
   void adjustRates(LearningRates& rates) const override {
     for (const auto& part : parts_) part->adjustRates(rates);

@@ -38,7 +38,7 @@ class FrequencyControl final : public ControlPart {
                  ControlRole::kParameterisation);
   }
 
-  void prepare(RawSplats& splats) const override {
+  void prepare(RawSplats& splats, uint64_t) const override {
     const float change = static_cast<float>(std::log(options_.start_scale));
     for (float& log_scale : splats.log_scales) log_scale += change;
   }

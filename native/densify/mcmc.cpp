@@ -3,7 +3,7 @@
 // The gate of the noise falls with opacity, as in its program; the sign of its equation 8 is a
 // misprint. Differs: lengths count in units of the cameras' extent (published_unit.h); noise that
 // could not move a splat by a millionth of its size is left out; events of short fits bring as many
-// splats as those that they stand for.
+// splats as those that they stand for, and their splats begin less small.
 
 #include "densify/mcmc.h"
 
@@ -23,6 +23,7 @@ namespace stipple {
 namespace {
 
 constexpr size_t kGrain = 1 << 12;
+constexpr double kPublishedIterations = 30000;
 
 class OpacityRelocation final : public ControlPart {
  public:
@@ -34,8 +35,11 @@ class OpacityRelocation final : public ControlPart {
                  ControlRole::kChildOpacity, ControlRole::kRecovery);
   }
 
-  void prepare(RawSplats& splats) const override {
-    const float log_change = static_cast<float>(std::log(options_.start_scale));
+  void prepare(RawSplats& splats, uint64_t iterations) const override {
+    // Splats grow back at a rate that no schedule changes: 460 steps for a tenth of their size at
+    // best. So the way back is as long a part of a short fit as of a published one.
+    const double share = std::min(1.0, static_cast<double>(iterations) / kPublishedIterations);
+    const float log_change = static_cast<float>(share * std::log(options_.start_scale));
     for (float& log_scale : splats.log_scales) log_scale += log_change;
     std::fill(splats.logits.begin(), splats.logits.end(),
               rawOpacity(static_cast<float>(options_.start_opacity)));
@@ -78,7 +82,7 @@ class SteadyGrowth final : public ControlPart {
   uint64_t limit(const ControlMoment& moment, uint64_t count) override {
     const uint64_t interval =
         std::max(schedule_.least_interval, scaleSchedule(schedule_.interval, moment.iterations));
-    const double published = static_cast<double>(interval) * 30000 /
+    const double published = static_cast<double>(interval) * kPublishedIterations /
                              static_cast<double>(std::max<uint64_t>(1, moment.iterations));
     const double stood_for = std::max(1.0, published / static_cast<double>(schedule_.interval));
     const double wanted = std::floor(static_cast<double>(count) * std::pow(1 + growth_, stood_for));

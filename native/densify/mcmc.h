@@ -10,7 +10,7 @@ class StrategySettings;
 /// Defaults: as published.
 struct McmcOptions {
   EventSchedule schedule{500, 25000, 100, 100};
-  double start_scale = 0.1;        ///< what the scales of a start are multiplied by
+  double start_scale = 0.1;        ///< what the scales of a start are multiplied by, in 30,000
   double start_opacity = 0.5;      ///< of every splat of a start
   double dead_opacity = 0.005;     ///< splats that are at most this opaque move
   double growth = 0.05;            ///< more splats per published interval

@@ -153,8 +153,9 @@ class Strategy {
   /// As users write it: "adaptive".
   virtual const char* name() const = 0;
 
-  /// Once, before the first iteration: changes what a fit begins with, and how fast it learns.
-  virtual void prepare(RawSplats&) const {}
+  /// Once, before the first iteration of so many: changes what a fit begins with, and how fast it
+  /// learns.
+  virtual void prepare(RawSplats&, uint64_t /*iterations*/) const {}
   virtual void adjustRates(LearningRates&) const {}
 
   /// Once, before the first iteration; the splats start with these, and the parameterisation stays.

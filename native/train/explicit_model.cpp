@@ -151,7 +151,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
  private:
   void prepare() {
     TrainingState state = backend_->state();
-    strategy_->prepare(state.splats);
+    strategy_->prepare(state.splats, options_.iterations);
     backend_->restore(state);
   }
 

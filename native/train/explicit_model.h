@@ -22,6 +22,7 @@ struct ExplicitModelOptions {
   Antialias antialias = Antialias::kClassic;
   double ssim_share = 0.2;
   uint64_t seed = 0;
+  uint64_t iterations = 30000;  ///< of the fit, which what it begins with may depend on
 };
 
 /// Bytes that a fit takes for each splat at its largest, about: parameters, two moments and

@@ -52,7 +52,7 @@ TEST(DensityScale, AFreshStartIsThreeQuartersOfItsDistance) {
   RawSplats splats = mixedSplats(1, 1);
   splats.log_scales = {-1, -1, -1};
   const auto strategy = makeStrategy("frequency");
-  strategy->prepare(splats);
+  strategy->prepare(splats, 30000);
   // R = 1.5 d and u = 0, as published.
   EXPECT_NEAR(std::exp(strategy->initialExtras(splats)[0][0]), 1.5 * std::exp(-1.0), 1e-6);
   EXPECT_EQ(strategy->parameters().size(), 2u);

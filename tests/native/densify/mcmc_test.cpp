@@ -22,11 +22,22 @@ using ::testing::HasSubstr;
 TEST(Mcmc, StartsSmallAndHalfOpaque) {
   RawSplats splats = mixedSplats(3, 1);
   const RawSplats before = splats;
-  makeStrategy("mcmc")->prepare(splats);
+  makeStrategy("mcmc")->prepare(splats, 30000);
   EXPECT_THAT(splats.logits, Each(0.0f));
   // ln 0.1, in float32 beside numbers of 5.
   for (size_t k = 0; k < 9; ++k) {
     EXPECT_NEAR(splats.log_scales[k], before.log_scales[k] - 2.3025851f, 1e-6f);
+  }
+}
+
+TEST(Mcmc, TheWayBackToSizeIsAsLongAPartOfAnyFit) {
+  const RawSplats before = mixedSplats(3, 1);
+  for (const auto& [iterations, change] : {std::pair{3000u, -0.2302585f}, {90000u, -2.3025851f}}) {
+    RawSplats splats = before;
+    makeStrategy("mcmc")->prepare(splats, iterations);
+    for (size_t k = 0; k < 9; ++k) {
+      EXPECT_NEAR(splats.log_scales[k], before.log_scales[k] + change, 1e-6f);
+    }
   }
 }
 
