@@ -27,7 +27,8 @@ constexpr auto kPollInterval = std::chrono::milliseconds(50);
 struct Arguments {
   std::string dataset, out, model = "explicit", quality = "balanced", background = "random", report;
   std::string strategy;
-  std::optional<int64_t> gaussians, anchors, iterations, gaussians_per_anchor, sh_degree, budget;
+  std::optional<int64_t> gaussians, start, anchors, iterations, gaussians_per_anchor, sh_degree,
+      budget;
   int64_t downscale = 1;
   int64_t holdout = 8;
   int64_t checkpoint_every = 0;
@@ -61,10 +62,14 @@ StippleFitOptions optionsOf(const Arguments& arguments, const std::string& check
   if (model == STIPPLE_FIT_FIELD && arguments.gaussians) {
     throw Failure("--gaussians belongs to --model explicit; a field takes --anchors");
   }
+  if (model == STIPPLE_FIT_FIELD && arguments.start) {
+    throw Failure("--start belongs to --model explicit; a field begins with its density");
+  }
   if (arguments.no_density_gradient && !arguments.strategy.empty()) {
     throw Failure("--no-density-gradient and --strategy say both how a field's density is learned");
   }
   if (arguments.gaussians) options.max_splats = counted(*arguments.gaussians, "--gaussians");
+  if (arguments.start) options.start_splats = counted(*arguments.start, "--start");
   if (arguments.anchors) {
     options.most_anchors = counted(*arguments.anchors, "--anchors");
     options.least_anchors = std::min(options.least_anchors, options.most_anchors);
@@ -332,6 +337,8 @@ void addFit(CLI::App& app, const Context& context) {
       ->capture_default_str();
   auto* gaussians =
       command->add_option("--gaussians", to.gaussians, "Explicit: the most splats there may be");
+  command->add_option("--start", to.start,
+                      "Explicit: splats to begin with; without it as many as points are known");
   command->add_option("--anchors", to.anchors, "Field: the largest budget that is trained")
       ->excludes(gaussians);
   command->add_option("--gaussians-per-anchor", to.gaussians_per_anchor,

@@ -45,6 +45,11 @@ def test_lists_strategies_and_parts():
     assert all(len(line.split()) > 4 for line in lines if line.startswith('  '))
 
 
+def test_begins_with_as_many_splats_as_asked(dataset, tmp_path):
+    run('fit', dataset, tmp_path / 'out.ply', '--iterations', 1, '--gaussians', 300, '--start', 70)
+    assert json.loads(run('info', tmp_path / 'out.ply', '--json').stdout)['count'] == 70
+
+
 def test_memory_holds_the_count(dataset, tmp_path):
     steps = ('--iterations', 300, '--sh-degree', 0, '--strategy', 'adaptive(threshold=1e-9)')
     free, held = (int(figures(run('fit', dataset, tmp_path / f'{name}.ply', *steps, *more).stdout)['gaussians'])
@@ -233,6 +238,8 @@ def test_one_view_is_fitted_with_a_note(copy, tmp_path):
     (('{dataset}', 'out.ply', '--strategy', 'best'), 'adaptive'),
     (('{dataset}', 'out.ply', '--anchors', 100), '--model field'),
     (('{dataset}', 'out.ply', '--model', 'field', '--gaussians', 100), '--model explicit'),
+    (('{dataset}', 'out.ply', '--model', 'field', '--start', 100), '--model explicit'),
+    (('{dataset}', 'out.ply', '--gaussians', 10, '--start', 11), 'start_splats is 11'),
     (('{dataset}', 'out.ply', '--iterations', 0), '--iterations is 0'),
     (('{dataset}', 'out.ply', '--strategy', 'learned_density'), 'explicit splats do not have'),
     (('{dataset}', 'out.ply', '--model', 'field', '--strategy', 'adaptive'), 'there is learned_density'),

@@ -5,7 +5,8 @@
     compare_strategies.py STIPPLE FOLDER DOCS [--seeds 3] [--iterations 3000] [--strategies a,b] [--scenes a,b]
         [--photos DATASET] [--table]
 
-FOLDER holds a folder with transforms.json for each scene, and results.jsonl: a line for each fit that is done.
+FOLDER holds a folder with transforms.json for each scene, and results.jsonl: a line for each fit that is done. All of them are
+written to DOCS, too; copied back as results.jsonl, a run goes on from there on another machine.
 """
 
 import argparse
@@ -25,7 +26,9 @@ MOST_SPLATS = 100000
 DOWNSCALE = 2                         # of the pictures of 464 x 256, so that three seeds fit in a night on two cores
 UNSCALED = ('adaptive', 'improved')   # also for 30,000 iterations, on the first scene
 THIRD = 3                             # of adaptive's count, which the best strategies get once more
+HALF = {'improved': 2}                # published as better with half of adaptive's count
 BEST = 5                              # so many of them, beside adaptive itself
+COMBINED = ('absolute+long_axis_split',)  # and what parts make of them: the best of eight that short runs tried
 
 
 def strategies(stipple):
@@ -92,9 +95,13 @@ def jobs(given, names, results):
                 yield {**base, 'scene': scene, 'strategy': name, 'seed': seed}
         for scene in given.scenes:
             full = results.find(scene=scene, strategy='adaptive', seed=seed, kind='full', iterations=given.iterations)
-            for name in best(results, scene, given.iterations) if full else ():
-                yield {**base, 'scene': scene, 'strategy': name, 'seed': seed, 'kind': 'third',
-                       'most': max(1, full[0]['gaussians'] // THIRD)}
+            if not full:
+                continue
+            few = {**base, 'scene': scene, 'seed': seed}
+            for name in (*best(results, scene, given.iterations), *COMBINED):
+                yield {**few, 'strategy': name, 'kind': 'third', 'most': max(1, full[0]['gaussians'] // THIRD)}
+            for name, part in HALF.items():
+                yield {**few, 'strategy': name, 'kind': 'half', 'most': max(1, full[0]['gaussians'] // part)}
     if given.unscaled:
         for name in UNSCALED:
             yield {**base, 'scene': given.scenes[0], 'strategy': name, 'seed': 0, 'iterations': 30000}
@@ -129,17 +136,21 @@ def write_page(results, given):
              f'All fits together: {sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on '
              f'{os.cpu_count()} cores, {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours by the clock; '
              f'load of the machine meanwhile {statistics.mean(row["load"] for row in results.rows):.1f}.', '',
-             '![Processor seconds and PSNR of every strategy](../images/strategies.svg)', '']
+             '![Processor seconds and PSNR of every strategy](../images/strategies.svg)', '',
+             '[Every fit, a line each](strategies_table.jsonl).', '']
     for scene in given.scenes:
         lines += [f'## {SCENES.get(scene, scene).capitalize()}', '', *table(results, scene, 'full', given.iterations), '']
-        third = table(results, scene, 'third', given.iterations)
-        if third:
-            lines += ['With at most a third of the splats that `adaptive` makes above:', '', *third, '']
+        for kind, share in (('half', 'half'), ('third', 'a third')):
+            fewer = table(results, scene, kind, given.iterations)
+            if fewer:
+                lines += [f'With at most {share} of the splats that `adaptive` makes above:', '', *fewer, '']
     unscaled = table(results, given.scenes[0], 'full', 30000)
     if unscaled:
         lines += ['## Without scaling', '', f'{SCENES[given.scenes[0]].capitalize()}, 30,000 iterations, schedules as '
                   'published:', '', *unscaled, '']
     (given.docs / 'methods' / 'strategies_table.md').write_text('\n'.join(lines))
+    (given.docs / 'methods' / 'strategies_table.jsonl').write_text(
+        ''.join(json.dumps(row) + '\n' for row in results.rows))
     full = [row for row in results.rows if row['kind'] == 'full' and row['iterations'] == given.iterations]
     (given.docs / 'images' / 'strategies.svg').write_text(plot(full, SCENES))
 
