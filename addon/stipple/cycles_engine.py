@@ -15,7 +15,7 @@ from .binding.renderer import Renderer
 from .cycles_functions import CyclesRender, functions
 from .binding.structs import OutputColour
 from .engine import NativeWork
-from .scene import cameras, facts, layers, mattes, sources, splat_data
+from .scene import cameras, effects, facts, layers, mattes, sources, splat_data
 
 _VISIBILITY = ('visible_camera', 'visible_diffuse', 'visible_glossy', 'visible_transmission',
                'visible_volume_scatter', 'visible_shadow')
@@ -132,6 +132,7 @@ def _make_engine():
                 self._shown_passes = self._passes(depsgraph.view_layer)
                 # Where splats show more than meshes is told by the index.
                 self._shown_passes['with_objects'] |= self._shown_passes['with_normal']
+                self._order = effects.object_order(scene, self._instances)
                 self._exactness = self._accuracy(depsgraph, camera_object, camera, self._instances, shutter, 0)
             except StippleError as error:
                 self._fail(error)
@@ -162,7 +163,8 @@ def _make_engine():
             self._say_memory(renderer, self._instances, camera)
             if self._catchers and cycles.has_shadows():
                 self._light_what_is_before_catchers(cycles, renderer, picture, camera, shadow_margin)
-            options = renderer.options(blend_space=picture.blend_space, accuracy=self._exactness)
+            options = renderer.options(blend_space=picture.blend_space, accuracy=self._exactness,
+                                       object_order=self._order)
             task = renderer.start(self._instances, camera, options, surface=cycles.surface(),
                                   with_transmittance=True, blur=self._spread, **self._shown_passes)
             self._wait(task.job)
@@ -188,7 +190,7 @@ def _make_engine():
         def _light_what_is_before_catchers(self, cycles, renderer, picture, camera, margin):
             """Takes the shadows off splats that are nearer than a catcher by more than the margin."""
             options = renderer.options(blend_space=picture.blend_space, output_colour=OutputColour.COMPOSITED,
-                                       accuracy=self._exactness)
+                                       accuracy=self._exactness, object_order=self._order)
 
             def drawn(surface):
                 task = renderer.start(self._instances, camera, options, with_depth=False, surface=surface,

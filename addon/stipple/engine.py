@@ -132,7 +132,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
             renderer = Renderer(sources.context())
             self._say_memory(renderer, self._instances, camera)
             options = renderer.options(blend_space=picture.blend_space, background=picture.background,
-                                       accuracy=accuracy)
+                                       accuracy=accuracy, object_order=effects.object_order(scene, self._instances))
             task = renderer.start(self._instances, camera, options, picture.with_depth, surface=self._matte(camera),
                                   blur=self._blur(depsgraph, camera_object, shutter),
                                   **self._passes(depsgraph.view_layer))

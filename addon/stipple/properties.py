@@ -237,6 +237,10 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         name="Zoom Anti-Aliasing", description="Splats smaller than pixels keep their light. Auto: where the low-pass "
         "that they were trained with makes them twice as large", items=effects.CHOICES, options=set(),
         override=_OVERRIDABLE)
+    global_order: EnumProperty(
+        name="Global Ordering", description="Splats of all objects are sorted together. Off: each object is drawn as a "
+        "whole, farther ones behind it. Auto: where objects share a range of depth", items=effects.CHOICES,
+        options=set(), override=_OVERRIDABLE)
     blur_samples: IntProperty(
         name="Blur Samples", description="Pictures that depth of field and motion blur are averaged from, 0 for as many "
         "as the blur needs", default=0, min=0, soft_max=256, max=65536, options=set(), override=_OVERRIDABLE)

@@ -189,6 +189,10 @@ StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer,
     require(job, "job");
     Instances placed = instancesFrom(instances, count);
     const RenderSettings settings = renderSettings(options, placed);
+    if (settings.options.object_order != ObjectOrder::kTogether) {
+      fail(ErrorCode::kUnsupported,
+           "options->object_order is 1, which a backward pass does not follow; 0 is allowed");
+    }
     if (settings.has_accuracy) {
       fail(ErrorCode::kInvalidArgument,
            "options->accuracy is set, which a backward pass does not follow; it must be NULL");

@@ -82,6 +82,8 @@ RenderSettings renderSettings(const StippleRenderOptions* options, const Instanc
   settings.options.low_pass = enumValue<LowPass>(given.low_pass, 3, "options->low_pass");
   settings.options.blend_space =
       enumValue<BlendSpace>(given.blend_space, 1, "options->blend_space");
+  settings.options.object_order =
+      enumValue<ObjectOrder>(given.object_order, 1, "options->object_order");
   const auto output =
       enumValue<StippleOutputColour>(given.output_colour, 1, "options->output_colour");
   settings.options.sh_degree_limit =

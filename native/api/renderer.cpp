@@ -237,6 +237,25 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
   });
 }
 
+StippleStatus stipple_renderer_sample_count(const StippleRenderer* renderer,
+                                            const StippleInstance* instances, uint64_t count,
+                                            const StippleCamera* camera,
+                                            const StippleRenderOptions* options,
+                                            uint32_t* samples) {
+  return guarded([&] {
+    require(renderer, "renderer");
+    const Instances placed = instancesFrom(instances, count);
+    const RenderSettings settings = renderSettings(options, placed);
+    const Camera view = cameraFrom(camera);
+    validate(view);
+    const Sampling& sampling = settings.sampling;
+    require(samples, "samples") = sampling.samples > 0 ? sampling.samples
+                                  : isSampled(sampling)
+                                      ? automaticSamples(placed.list, view, sampling)
+                                      : 1;
+  });
+}
+
 StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
                                             const StippleInstance* instances, uint64_t count,
                                             const StippleCamera* camera, uint64_t* bytes) {

@@ -1,4 +1,5 @@
 #include <numbers>
+#include <vector>
 
 #include "base/parallel.h"
 #include "bench/comparison.h"
@@ -98,6 +99,39 @@ void wideCameras(benchmark::State& state) {
                   {"fisheye_to_perspective", 0, [&] { draw(CameraModel::kFisheyeEquidistant); }}});
 }
 
+/// Ten copies in each other, drawn one after the other against all splats together.
+void objectOrder(benchmark::State& state) {
+  const SplatCloud& cloud = cloudOf(kCase);
+  std::vector<SplatInstance> instances(10, SplatInstance{&cloud});
+  for (size_t i = 0; i < instances.size(); ++i) {
+    instances[i].object_to_world(0, 3) = 0.1 * static_cast<double>(i);
+    instances[i].object_to_world(2, 3) = 0.05 * static_cast<double>(i);
+  }
+  const Camera camera = cameraOf(kCase);
+  RenderWorkspace workspace;
+  RenderResult result;
+  const auto draw = [&](ObjectOrder order, size_t count) {
+    RenderOptions options;
+    options.object_order = order;
+    withThreads(2, [&] {
+      renderTiled({instances.data(), count}, camera, options, workspace, result);
+    });
+  };
+  draw(ObjectOrder::kApart, instances.size());
+  compareWithAll(state, [&] { draw(ObjectOrder::kTogether, instances.size()); },
+                 {{"apart_to_together", 0, [&] { draw(ObjectOrder::kApart, instances.size()); }}});
+}
+
+/// The same of one object, which has no order to choose.
+void oneObject(benchmark::State& state) {
+  Drawer drawer(kCase);
+  drawer.plain();
+  RenderOptions apart;
+  apart.object_order = ObjectOrder::kApart;
+  compareWithAll(state, [&] { drawer.plain(); },
+                 {{"apart_to_together", 0, [&] { drawer.plain(apart); }}});
+}
+
 const bool registered = [] {
   const auto add = [](const char* name, void (*run)(benchmark::State&), int iterations) {
     benchmark::RegisterBenchmark(name, run)
@@ -108,6 +142,8 @@ const bool registered = [] {
   add("effects.passes.100k", passes, 7);
   add("effects.lens_and_shutter.100k", lensAndShutter, 3);
   add("effects.wide_cameras.10k", wideCameras, 3);
+  add("effects.object_order.10x100k", objectOrder, 7);
+  add("effects.object_order.100k", oneObject, 15);
   return true;
 }();
 

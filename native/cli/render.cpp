@@ -16,7 +16,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> in;
-  std::string out, colour, low_pass, blend = "as-trained";
+  std::string out, colour, low_pass, blend = "as-trained", objects = "together";
   std::string depth, normal, index;
   LensArguments lens;
   AccuracyArguments accuracy;
@@ -32,6 +32,7 @@ StippleRenderOptions optionsOf(const Arguments& arguments, const StippleAccuracy
   if (arguments.low_pass == "mip") options.low_pass = STIPPLE_LOW_PASS_MIP;
   if (arguments.low_pass == "none") options.low_pass = STIPPLE_LOW_PASS_NONE;
   if (arguments.blend == "scene-linear") options.blend_space = STIPPLE_BLEND_SCENE_LINEAR;
+  if (arguments.objects == "apart") options.object_order = STIPPLE_OBJECTS_APART;
   if (arguments.colour == "display") options.output_colour = STIPPLE_OUTPUT_COMPOSITED;
   if (!arguments.background.empty()) {
     options.with_background = 1;
@@ -128,6 +129,12 @@ void addRender(CLI::App& app, const Context& context) {
       ->check(CLI::IsMember({"classic", "mip", "none"}));
   command->add_option("--blend", arguments->blend, "as-trained, or scene-linear")
       ->check(CLI::IsMember({"as-trained", "scene-linear"}))
+      ->capture_default_str();
+  command
+      ->add_option("--objects", arguments->objects,
+                   "together: splats of all files by depth; apart: each file as a whole, by the "
+                   "mean depth of its splats")
+      ->check(CLI::IsMember({"together", "apart"}))
       ->capture_default_str();
   command
       ->add_option("--background", arguments->background,

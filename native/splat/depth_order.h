@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "splat/object_order.h"
 #include "splat/scene.h"
 
 namespace stipple {
@@ -30,8 +31,8 @@ inline void sortInParts(std::vector<uint64_t>& keys) {
 }
 
 /// What make(placed cloud, index, splat) accepts of every splat of a scene, with its index, by the
-/// rounded depth that depth(splat) tells, ties in the order of the scene. Same for any number of
-/// threads.
+/// rounded depth that depth(splat) tells, ties in the order of the scene; object by object where
+/// those are drawn apart. Same for any number of threads.
 template <typename Splat, typename Make, typename Depth>
 std::vector<Splat> splatsInDepthOrder(const PlacedScene& scene, Make make, Depth depth) {
   constexpr size_t kGrain = 1024;
@@ -59,6 +60,13 @@ std::vector<Splat> splatsInDepthOrder(const PlacedScene& scene, Make make, Depth
     }
   });
   sortInParts(order);
+  if (scene.objects_apart) {
+    const std::vector<uint64_t> by_depth = order;
+    const auto object_of = [&](uint64_t key) {
+      return cloudOfSplat(scene, splats[static_cast<uint32_t>(key)].index);
+    };
+    sortByObject<uint64_t>(scene, by_depth, object_of, order.data());
+  }
   std::vector<Splat> sorted(splats.size());
   parallelFor(order.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) sorted[i] = splats[static_cast<uint32_t>(order[i])];

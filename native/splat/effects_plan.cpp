@@ -205,8 +205,9 @@ EffectRow globalOrder(const EffectFacts& facts) {
   EffectRow row{Effect::kGlobalOrder};
   if (facts.global_order != EffectChoice::kAuto) {
     row.is_on = facts.global_order == EffectChoice::kOn;
-    row.reason = row.is_on ? "On by choice: splats of all objects are sorted together"
-                           : "Off by choice: each object is drawn as a whole, the nearest first";
+    row.reason = row.is_on
+                     ? "On by choice: splats of all objects are sorted together"
+                     : "Off by choice: each object is drawn as a whole, farther ones behind it";
     return row;
   }
   if (!facts.survey) {

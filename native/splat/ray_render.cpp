@@ -7,8 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "splat/affine_splats.h"
+#include "splat/object_order.h"
 #include "splat/pixel_passes.h"
 #include "splat/ray_splats.h"
 #include "splat/scene.h"
@@ -318,6 +320,13 @@ void drawAll(const PlacedScene& scene, const Camera& camera,
 
 }  // namespace
 
+void requireOrder(const PlacedScene& scene, const RayOptions& rays) {
+  if (!scene.objects_apart || rays.order == RayOrder::kCentre) return;
+  fail(ErrorCode::kUnsupported,
+       "objects are drawn one after the other, and splats in the order of every pixel; without "
+       "global ordering only the order of their centres is allowed");
+}
+
 RayOptions rayYardstick() {
   RayOptions rays;
   rays.limits.least_alpha = 1e-9;
@@ -336,6 +345,10 @@ RenderMemory rayMemory(std::span<const SplatInstance> instances, const Camera& c
   // Made range by range, gathered (which may double its room), sorted; and the order.
   memory.splat_bytes =
       splats * (4 * std::max(sizeof(RaySplat), sizeof(AffineSplat)) + 2 * sizeof(uint32_t));
+  if (options.object_order == ObjectOrder::kApart) {
+    memory.splat_bytes += splats * sizeof(uint64_t);
+    memory.other_bytes += objectSortBound(splats, instances.size());
+  }
   if (hasPasses(options)) memory.splat_bytes += splats * (sizeof(Vec3d) + sizeof(uint32_t));
   // Of each thread, splats near its block and its tile, and those that show at a pixel.
   memory.pair_bytes = splats * threadLimit() * 2 * (2 * sizeof(uint32_t) + sizeof(Hit));
@@ -349,6 +362,7 @@ RenderResult renderRays(std::span<const SplatInstance> instances, const Camera& 
     requireImagePlane(camera, "the affine projection of splats");
   }
   const PlacedScene scene = placeSceneForRays(instances, camera, options);
+  requireOrder(scene, rays);
   advance(progress, rays.progress_begin, "Placing splats");
   RenderResult result;
   sizeResult(camera, options, result);

@@ -43,6 +43,11 @@ constexpr uint32_t kRayBlockSide = 64;
 /// What is fainter than 1e-9 is skipped.
 RayOptions rayYardstick();
 
+struct PlacedScene;
+/// Errors: kUnsupported for objects that are drawn apart, where splats come by response: those of
+/// one object then belong between those of another.
+void requireOrder(const PlacedScene& scene, const RayOptions& rays);
+
 /// Draws splats along the rays of the pixels: alpha = o exp(-m^2 / 2), m the smallest Mahalanobis
 /// distance of the ray from the splat. That is what a Gaussian in space looks like in a perspective
 /// picture; the affine projection of renderTiled agrees with it for splats that are small, far away

@@ -2,6 +2,7 @@
 #include <numeric>
 
 #include "splat/double_pixel.h"
+#include "splat/object_order.h"
 #include "splat/pixel_passes.h"
 #include "splat/render.h"
 #include "splat/scene.h"
@@ -39,6 +40,14 @@ std::vector<ReferenceSplat> visibleInOrder(const PlacedScene& scene, bool with_n
   }
   std::stable_sort(splats.begin(), splats.end(),
                    [](const ReferenceSplat& a, const ReferenceSplat& b) { return a.key < b.key; });
+  if (scene.objects_apart) {
+    std::vector<size_t> object_of(scene.clouds.back().instance + 1);
+    for (size_t k = 0; k < scene.clouds.size(); ++k) object_of[scene.clouds[k].instance] = k;
+    const std::vector<ReferenceSplat> by_depth = splats;
+    sortByObject<ReferenceSplat>(
+        scene, by_depth, [&](const ReferenceSplat& splat) { return object_of[splat.object - 1]; },
+        splats.data());
+  }
   return splats;
 }
 

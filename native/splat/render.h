@@ -37,6 +37,13 @@ enum class BlendSpace : uint32_t {
   kSceneLinear = 1,  ///< linearise each display-space splat colour, then composite
 };
 
+enum class ObjectOrder : uint32_t {
+  kTogether = 0,  ///< the splats of all instances by depth
+  /// Each instance as a whole, its own splats by depth: see splat/object_order.h. Not with a
+  /// surface, and not along rays by response.
+  kApart = 1,
+};
+
 /// What something else drew, to stand at its depth between the splats: see splat/blend.h. The order
 /// is that of the splats' centres, as among the splats themselves, so a splat is before or behind
 /// as a whole. Row 0 is the top; the arrays are the caller's.
@@ -57,6 +64,7 @@ struct SurfaceLayer {
 struct RenderOptions {
   LowPass low_pass = LowPass::kFromCloud;
   BlendSpace blend_space = BlendSpace::kAsTrained;
+  ObjectOrder object_order = ObjectOrder::kTogether;
   int sh_degree_limit = kMaxShDegree;  ///< harmonics above this degree are left out
   double background[3] = {0, 0, 0};  ///< in the blending space; used under the final transmittance
   bool with_background = false;      ///< true: background is composited and alpha becomes 1

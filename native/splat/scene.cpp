@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "math/affine.h"
+#include "splat/object_order.h"
 #include "splat/surface.h"
 
 namespace stipple {
@@ -27,6 +28,11 @@ void validateOptions(const RenderOptions& options) {
       static_cast<uint32_t>(BlendSpace::kSceneLinear)) {
     fail(ErrorCode::kInvalidArgument,
          "blend_space is " + std::to_string(static_cast<uint32_t>(options.blend_space)) +
+             "; 0 or 1 is allowed");
+  }
+  if (static_cast<uint32_t>(options.object_order) > static_cast<uint32_t>(ObjectOrder::kApart)) {
+    fail(ErrorCode::kInvalidArgument,
+         "object_order is " + std::to_string(static_cast<uint32_t>(options.object_order)) +
              "; 0 or 1 is allowed");
   }
   for (const double value : options.background) requireFinite(value, "background");
@@ -106,6 +112,7 @@ void placeUnread(std::span<const SplatInstance> instances, const Camera& camera,
     fail(ErrorCode::kUnsupported, "the picture holds " + std::to_string(scene.splat_count) +
                                       " splats; at most 4294967295 can be drawn together");
   }
+  orderObjects(options, scene);
 }
 
 void checkClouds(const PlacedScene& scene) {

@@ -44,6 +44,8 @@ struct PlacedScene {
   std::vector<PlacedCloud> clouds;
   uint64_t splat_count = 0;
   bool has_holdouts = false;
+  bool objects_apart = false;       ///< instances are drawn one after the other
+  std::vector<size_t> drawn_order;  ///< then: indices into clouds, the nearest first
 };
 
 /// All three numbers of the colour of a splat that shows nothing: no colour is below 0.

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from stipple.binding import effects
+from stipple.binding.blur import Blur
 from stipple.binding.cloud import Cloud, SplatArrays
 from stipple.binding.errors import StippleError
-from stipple.binding.structs import (CameraModel, Effect, EffectChoice, StippleCamera, StippleEffectRow,
+from stipple.binding.renderer import Renderer, Surface
+from stipple.binding.structs import (CameraModel, Effect, EffectChoice, ObjectOrder, StippleCamera, StippleEffectRow,
                                      StippleEffectsSurvey)
 
 
@@ -83,3 +85,37 @@ def test_bad_facts_are_refused(context):
     rows = (StippleEffectRow * 2)(StippleEffectRow(), StippleEffectRow())
     status = library.stipple_effects_plan(ctypes.byref(given), rows, 2)
     assert status != 0 and b'capacity is 2; 12 rows' in library.stipple_last_error_message()
+
+
+def test_objects_are_drawn_together_or_apart(context):
+    random = np.random.default_rng(4)
+    cloud = Cloud.create(context, SplatArrays(random.uniform(-1, 1, (50, 3)), np.tile([1.0, 0, 0, 0], (50, 1)),
+                                              np.full((50, 3), 0.3), np.full(50, 0.9), random.uniform(-1, 1, (50, 1, 3))))
+    renderer = Renderer(context)
+
+    def picture(placed, order, **given):
+        task = renderer.start(placed, camera(), renderer.options(object_order=order), with_depth=False, **given)
+        task.job.wait()
+        return task.colour
+
+    moved = np.eye(4)
+    moved[2, 3] = 0.1
+    inside = [(cloud, np.eye(4)), (cloud, moved)]
+    assert np.abs(picture(inside, ObjectOrder.APART) - picture(inside, ObjectOrder.TOGETHER)).max() > 0.01
+    moved[2, 3] = 3.0
+    behind = [(cloud, moved), (cloud, np.eye(4))]
+    np.testing.assert_array_equal(picture(behind, ObjectOrder.APART), picture(behind, ObjectOrder.TOGETHER))
+    surface = Surface(np.full((200, 200), 4.0, np.float32))
+    with pytest.raises(StippleError, match='without global ordering no mesh can hide splats'):
+        picture(behind, ObjectOrder.APART, surface=surface)
+    with pytest.raises(StippleError, match='object_order is 2'):
+        picture(behind, 2)
+
+
+def test_the_pictures_of_an_average_are_known_before(context, cloud):
+    renderer = Renderer(context)
+    placed, options = [(cloud, np.eye(4))], renderer.options()
+    assert renderer.sample_count(placed, camera(), options, Blur()) == 1
+    assert renderer.sample_count(placed, camera(), options, Blur(0.1, 4.0, samples=7)) == 7
+    assert renderer.sample_count(placed, camera(), options, Blur(1e-4, 4.0)) == 16
+    assert renderer.sample_count(placed, camera(), options, Blur(1.0, 2.0)) == 256

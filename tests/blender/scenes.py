@@ -146,16 +146,25 @@ def colours_of(stipple, obj):
 
 def render_pixels(tmp_path, name='picture'):
     """F12 of this scene as [H,W,4] scene linear, premultiplied, row 0 = bottom."""
-    scene = bpy.context.scene
-    settings = scene.render.image_settings
+    write_exact_pictures()
+    bpy.context.scene.render.filepath = str(tmp_path / f'{name}.exr')
+    bpy.ops.render.render(write_still=True)
+    return picture_pixels(bpy.context.scene.render.filepath)
+
+
+def write_exact_pictures():
+    """From now on pictures of this scene are written as they are."""
+    settings = bpy.context.scene.render.image_settings
     if bpy.app.version >= (5, 0, 0):
         settings.media_type = 'IMAGE'
     settings.file_format = 'OPEN_EXR'
     settings.color_depth, settings.color_mode = '32', 'RGBA'
     settings.exr_codec = 'NONE'
-    scene.render.filepath = str(tmp_path / f'{name}.exr')
-    bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(scene.render.filepath, check_existing=False)
+
+
+def picture_pixels(path):
+    """[H,W,4] of a file, row 0 = bottom."""
+    image = bpy.data.images.load(str(path), check_existing=False)
     width, height = image.size
     values = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(values)

@@ -187,6 +187,17 @@ def test_render_takes_sizes_and_several_files(scene):
     assert (info['width'], info['height']) == (48, 32)
 
 
+def test_render_draws_files_apart(scene):
+    both = scene / 'cube.ply', scene / 'k4.ply', '--camera', scene / 'transforms.json'
+    run('render', *both, '-o', scene / 'together.exr')
+    run('render', *both, '-o', scene / 'apart.exr', '--objects', 'apart')
+    assert figures('compare', scene / 'together.exr', scene / 'apart.exr')['psnr'] < 60
+    message = error('render', *both, '-o', scene / 'never.exr', '--objects', 'apart', '--accuracy', 'rays')
+    assert 'only the order of their centres is allowed' in message and not (scene / 'never.exr').exists()
+    alone = scene / 'cube.ply', '--camera', scene / 'transforms.json', '--accuracy', 'rays'
+    run('render', *alone, '-o', scene / 'alone.exr', '--objects', 'apart')
+
+
 def test_render_looks_through_lenses_and_all_around(scene):
     view = ('--camera', scene / 'transforms.json')
     run('render', scene / 'cube.ply', *view, '-o', scene / 'sharp.exr')

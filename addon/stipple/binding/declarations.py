@@ -127,6 +127,8 @@ FUNCTIONS = {
     'stipple_renderer_render_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                 _to(s.StippleRenderOptions), _to(s.StippleRenderBuffers),
                                                 _out_handle]),
+    'stipple_renderer_sample_count': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
+                                                _to(s.StippleRenderOptions), POINTER(c_uint32)]),
     'stipple_renderer_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                 POINTER(c_uint64)]),
     # what accuracy costs

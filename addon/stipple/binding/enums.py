@@ -107,6 +107,11 @@ class BlendSpace(IntEnum):
     SCENE_LINEAR = 1
 
 
+class ObjectOrder(IntEnum):
+    TOGETHER = 0
+    APART = 1
+
+
 class OutputColour(IntEnum):
     SCENE_LINEAR = 0
     COMPOSITED = 1
@@ -193,6 +198,7 @@ ENUMS = {
     'StippleCameraModel': (CameraModel, 'STIPPLE_CAMERA_'),
     'StippleLowPass': (LowPass, 'STIPPLE_LOW_PASS_'),
     'StippleBlendSpace': (BlendSpace, 'STIPPLE_BLEND_'),
+    'StippleObjectOrder': (ObjectOrder, 'STIPPLE_OBJECTS_'),
     'StippleOutputColour': (OutputColour, 'STIPPLE_OUTPUT_'),
     'StippleRenderMethod': (RenderMethod, 'STIPPLE_RENDER_'),
     'StippleAccuracyLevel': (AccuracyLevel, 'STIPPLE_ACCURACY_'),

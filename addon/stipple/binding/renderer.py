@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of splats."""
 
-from ctypes import byref, c_double, c_uint64, pointer
+from ctypes import byref, c_double, c_uint32, c_uint64, pointer
 
 import numpy as np
 
 from .errors import invalid
 from .handle import Handle, contiguous, matrix16, new_handle, pointer_to
 from .job import Job
-from .structs import (BlendSpace, LowPass, OutputColour, RenderMethod, StippleInstance, StippleRenderBuffers,
-                      StippleRenderOptions)
+from .structs import (BlendSpace, LowPass, ObjectOrder, OutputColour, RenderMethod, StippleInstance,
+                      StippleRenderBuffers, StippleRenderOptions)
 
 EMPTY_DEPTH = 1e10  # metres; what Blender also writes where nothing is
 
@@ -76,13 +76,15 @@ class Renderer(Handle):
         super().__init__(context.library, new_handle(context.library, 'stipple_renderer_create', context.pointer))
 
     def options(self, blend_space=BlendSpace.AS_TRAINED, output_colour=OutputColour.SCENE_LINEAR,
-                low_pass=LowPass.FROM_CLOUD, method=RenderMethod.TILED, background=None, accuracy=None):
+                low_pass=LowPass.FROM_CLOUD, method=RenderMethod.TILED, background=None, accuracy=None,
+                object_order=ObjectOrder.TOGETHER):
         """background: three values in output_colour's space, or None for a transparent picture. accuracy: a
         StippleAccuracy, or None for final."""
         options = StippleRenderOptions()
         self.library.stipple_render_options_init(byref(options))
         options.blend_space, options.output_colour = int(blend_space), int(output_colour)
         options.low_pass, options.method = int(low_pass), int(method)
+        options.object_order = int(object_order)
         if background is not None:
             options.with_background = 1
             options.background = (c_double * 3)(*background)
@@ -114,6 +116,13 @@ class Renderer(Handle):
                   keep=(colour, depth, transmittance, normal, objects, buffers, array, surface,
                         [placed[0] for placed in instances]))
         return RenderTask(job, colour, depth, transmittance, normal, objects)
+
+    def sample_count(self, instances, camera, options, blur):
+        """How many pictures a Blur is averaged from."""
+        count, options = c_uint32(), blur.put_into(options)
+        self._check(self.library.stipple_renderer_sample_count(self.pointer, instance_array(instances), len(instances),
+                                                               byref(camera), byref(options), byref(count)))
+        return count.value
 
     def memory_bound(self, instances, camera):
         size = c_uint64()

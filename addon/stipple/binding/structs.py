@@ -5,8 +5,8 @@ from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_in
 
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, CameraModel, ColourSpace, ENUMS, Effect,
                     EffectChoice, FitBackground, FitModel, FitQuality, Frame, JobState, LowPass, MaterialColour,
-                    ModelKind, OutputColour, Precision, Projection, RenderMethod, Sampling, Side, SplatOrder,
-                    SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
+                    ModelKind, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling, Side,
+                    SplatOrder, SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
 
 ABI_VERSION = 1
 MAX_ANCHORS = 1 << 28
@@ -227,7 +227,7 @@ class StippleShutter(_Sized):
 class StippleRenderOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('method', c_uint32), ('low_pass', c_uint32), ('blend_space', c_uint32),
                 ('output_colour', c_uint32), ('sh_degree_limit', c_uint32), ('with_background', c_uint32),
-                ('reserved', c_uint32), ('background', c_double * 3), ('surface_width', c_uint32),
+                ('object_order', c_uint32), ('background', c_double * 3), ('surface_width', c_uint32),
                 ('surface_height', c_uint32), ('surface_depth', _floats), ('surface_colour', _floats),
                 ('matte_opacity', _floats), ('splat_light', _floats), ('accuracy', POINTER(StippleAccuracy)),
                 ('lens', POINTER(StippleLens)), ('shutter', POINTER(StippleShutter)), ('samples', c_uint32),

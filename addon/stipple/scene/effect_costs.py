@@ -5,7 +5,7 @@ import statistics
 import time
 
 from ..binding.renderer import Renderer
-from ..binding.structs import Effect, Projection, Sampling
+from ..binding.structs import Effect, ObjectOrder, Projection, Sampling, SplatOrder
 from ..jobs import Task
 from . import effects, mattes, picture_options, quality, sources
 
@@ -31,15 +31,24 @@ def start(scene, view):
         background = view.picture.background
         if left_out == Effect.TRANSPARENT_FILM:
             background = (0.0, 0.0, 0.0)
-        options = renderer.options(blend_space=view.picture.blend_space, background=background, accuracy=accuracy)
+        order = effects.object_order(scene, view.placed)
+        if left_out == Effect.GLOBAL_ORDER:
+            order = ObjectOrder.APART
+        options = renderer.options(blend_space=view.picture.blend_space, background=background, accuracy=accuracy,
+                                   object_order=order)
         return options, picture_options.blur(scene, None if left_out == Effect.DEPTH_OF_FIELD else view.lens,
                                              None if left_out == Effect.MOTION_BLUR else view.shutter)
 
-    measured = [effect for effect in effects.MEASURABLE if effect in active
-                and not (effect == Effect.EXACT_PROJECTION and picture_options.is_panoramic(view.camera))]
     everything = options()
+    is_panoramic = picture_options.is_panoramic(view.camera)
+    has_meshes = Effect.MESH_OCCLUSION in active and not is_panoramic
+    needed = set()  # nothing can be drawn without
+    if is_panoramic:
+        needed.add(Effect.EXACT_PROJECTION)
+    if has_meshes or everything[0].accuracy.contents.order == SplatOrder.PIXEL:
+        needed.add(Effect.GLOBAL_ORDER)
+    measured = [effect for effect in effects.MEASURABLE if effect in active - needed]
     without = {effect: options(effect) for effect in measured}
-    has_meshes = Effect.MESH_OCCLUSION in active and not picture_options.is_panoramic(view.camera)
 
     def work(task):
         def run(chosen, left_out=None):

@@ -4,7 +4,7 @@
 from dataclasses import dataclass, field
 
 from ..binding import effects as native
-from ..binding.structs import CameraModel, Effect, EffectChoice
+from ..binding.structs import CameraModel, Effect, EffectChoice, ObjectOrder
 from . import facts as facts_of, lenses, motion, quality
 
 CHOICES = (('AUTO', "Auto", "On where the picture needs it"), ('ON', "On", "Always"), ('OFF', "Off", "Never"))
@@ -16,11 +16,11 @@ NAMES = {Effect.VIEW_COLOUR: "View-Dependent Color", Effect.MOTION: "Motion", Ef
          Effect.GLOBAL_ORDER: "Global Ordering"}
 # The property of the scene's settings that chooses an effect which Blender has no switch for.
 CHOSEN_BY = {Effect.VIEW_COLOUR: 'view_color', Effect.EXACT_PROJECTION: 'exact_projection',
-             Effect.ZOOM_ANTIALIASING: 'zoom_antialiasing'}
+             Effect.ZOOM_ANTIALIASING: 'zoom_antialiasing', Effect.GLOBAL_ORDER: 'global_order'}
 # Effects whose cost is the time of a picture with them less that of one without.
 MEASURABLE = (Effect.VIEW_COLOUR, Effect.MOTION_BLUR, Effect.DEPTH_OF_FIELD, Effect.EXACT_PROJECTION,
               Effect.ZOOM_ANTIALIASING, Effect.TRANSPARENT_FILM, Effect.DEPTH_PASS, Effect.NORMAL_PASS,
-              Effect.OBJECT_INDEX_PASS, Effect.MESH_OCCLUSION)
+              Effect.OBJECT_INDEX_PASS, Effect.MESH_OCCLUSION, Effect.GLOBAL_ORDER)
 # Where the switch of the others is: the tab of the properties editor.
 TABS = {Effect.MOTION: 'RENDER', Effect.MOTION_BLUR: 'RENDER', Effect.DEPTH_OF_FIELD: 'DATA',
         Effect.TRANSPARENT_FILM: 'RENDER', Effect.DEPTH_PASS: 'VIEW_LAYER', Effect.NORMAL_PASS: 'VIEW_LAYER',
@@ -111,6 +111,13 @@ def settings_of(scene):
     """A text that is equal while a picture takes as long."""
     return repr((choices_of(scene), quality.key_of(scene.stipple.quality_render), scene.stipple.blur_samples,
                  facts_of.picture_size(scene.render), scene.render.engine))
+
+
+def object_order(scene, placed):
+    """How the instances of a picture are ordered. Where Auto is off, both orders are the same picture, and that of all
+    splats together takes no longer."""
+    apart = scene.stipple.global_order == 'OFF' and len(placed) > 1
+    return ObjectOrder.APART if apart else ObjectOrder.TOGETHER
 
 
 def choices_of(scene):

@@ -843,6 +843,16 @@ typedef enum StippleRenderMethod {
   STIPPLE_RENDER_YARDSTICK = 3
 } StippleRenderMethod;
 
+typedef enum StippleObjectOrder {
+  STIPPLE_OBJECTS_TOGETHER = 0, /* the splats of all instances are sorted together, by depth */
+  /* Each instance is drawn as a whole, its own splats by depth. Instances come by the mean depth of their splats'
+   * centres (of all, in view or not), the farthest at the back; of equal ones the first in the list is in front.
+   * Where no two share a range of depth that is the same picture. Not for backward passes, nor, with more than one
+   * instance, with a surface, order pixel, STIPPLE_RENDER_RAYS and STIPPLE_RENDER_YARDSTICK, which order single
+   * splats: STIPPLE_ERROR_UNSUPPORTED. */
+  STIPPLE_OBJECTS_APART = 1
+} StippleObjectOrder;
+
 /* The opening of the camera's lens, as Cycles has it: what is not in focus becomes a picture of it. */
 typedef struct StippleLens {
   uint32_t struct_size;
@@ -873,7 +883,7 @@ typedef struct StippleRenderOptions {
   uint32_t output_colour;   /* StippleOutputColour */
   uint32_t sh_degree_limit; /* 0..4 */
   uint32_t with_background; /* 1: composite over background, alpha becomes 1 */
-  uint32_t reserved;
+  uint32_t object_order;    /* StippleObjectOrder */
   double background[3];     /* in output_colour's space */
   /* A surface of something else, a mesh, between the splats. Splats whose centres are no deeper than it come
    * before it, then it with its own alpha, then the others: alpha 1 ends the pixel. As among splats, each is
@@ -934,6 +944,11 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer, const Sti
                                             uint64_t count, const StippleCamera* camera,
                                             const StippleRenderOptions* options,
                                             const StippleRenderBuffers* buffers, StippleJob** job);
+/* How many pictures stipple_renderer_render_start would average: samples, or what 0 stands for.
+ * Errors: INVALID_ARGUMENT, as the start's. Cost: at most 2048 splats are looked at. */
+StippleStatus stipple_renderer_sample_count(const StippleRenderer* renderer, const StippleInstance* instances,
+                                            uint64_t count, const StippleCamera* camera,
+                                            const StippleRenderOptions* options, uint32_t* samples);
 StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
                                             const StippleInstance* instances, uint64_t count,
                                             const StippleCamera* camera, uint64_t* bytes);

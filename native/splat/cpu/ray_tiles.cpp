@@ -354,6 +354,7 @@ RenderResult renderRayTilesWith(RayTileKernel kernel, std::span<const SplatInsta
     fail(ErrorCode::kInvalidArgument, "areas are given; single precision draws whole pictures");
   }
   const PlacedScene scene = placeScene(instances, camera, options);
+  requireOrder(scene, rays);
   advance(progress, rays.progress_begin, "Placing splats");
   const Forms forms = formsOf(scene, options, rays);
   RenderResult result;

@@ -14,6 +14,7 @@
 #include "splat/cpu/tile_surface.h"
 #include "splat/cpu/visible_splats.h"
 #include "splat/effects.h"
+#include "splat/object_order.h"
 #include "splat/pixel_passes.h"
 #include "splat/scene.h"
 #include "splat/surface.h"
@@ -554,6 +555,9 @@ RenderMemory renderMemory(std::span<const SplatInstance> instances, const Camera
   }
   memory.result_bytes = resultBytes(camera, options);
   memory.other_bytes = 2 * instances.size() * sizeof(PlacedCloud);
+  if (options.object_order == ObjectOrder::kApart) {
+    memory.other_bytes += objectSortBound(splat_count, instances.size());
+  }
   return memory;
 }
 

@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "splat/cpu/tiled_render.h"
+#include "splat/object_order.h"
 
 namespace stipple {
 
@@ -26,6 +27,27 @@ size_t projectRange(Projector project, const PlacedScene& scene, size_t begin, s
     begin = placed.first_index + last;
   }
   return slot;
+}
+
+/// Changes visible.order from that of depth to that of objects, in the other array of items.
+void orderByObject(const PlacedScene& scene, VisibleSplats& visible) {
+  // Slots of a range that lies within one object tell it by their numbers.
+  constexpr size_t kSeveral = SIZE_MAX;
+  std::vector<size_t> objects(visible.filled.size());
+  for (size_t range = 0; range < objects.size(); ++range) {
+    const uint64_t first = range * kRangeSplats;
+    const uint64_t last = std::min<uint64_t>(first + kRangeSplats, scene.splat_count) - 1;
+    const size_t object = cloudOfSplat(scene, first);
+    objects[range] = object == cloudOfSplat(scene, last) ? object : kSeveral;
+  }
+  const auto object_of = [&](DepthItem item) {
+    const uint32_t slot = static_cast<uint32_t>(item);
+    const size_t object = objects[slot / kRangeSplats];
+    return object != kSeveral ? object : cloudOfSplat(scene, visible.extras[slot].index);
+  };
+  DepthItem* sorted = visible.items[visible.order == visible.items[0].get() ? 1 : 0].get();
+  sortByObject<DepthItem>(scene, {visible.order, visible.count}, object_of, sorted);
+  visible.order = sorted;
 }
 
 }  // namespace
@@ -55,6 +77,7 @@ void findVisibleSplats(Projector project, const PlacedScene& scene, Progress* pr
                                kRangeSplats,
                                visible.count,
                                visible.digits.data()});
+  if (scene.objects_apart) orderByObject(scene, visible);
   TileSpan* spans = visible.items[visible.order == slots.items ? 1 : 0].get();
   const auto gather = [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();
