@@ -11,6 +11,7 @@
 #include "base/random.h"
 #include "data/view_resample.h"
 #include "train/shared_volume.h"
+#include "train/silhouette.h"
 
 // Based on: Collins, A Space-Sweep Approach to True Multi-Image Matching, CVPR 1996 (depths of a
 // pixel are judged by what other views see there); Laurentini, The Visual Hull Concept for
@@ -52,8 +53,8 @@ constexpr double kUnseenCost = 0.5;
 struct Look {
   Camera camera;
   bool has_alpha = false;
-  std::vector<float> values;   ///< [H,W,4] premultiplied colour, alpha
-  std::vector<float> weights;  ///< [H,W] or empty: 1
+  std::vector<float> values;  ///< [H,W,4] premultiplied colour, alpha
+  Silhouette silhouette;      ///< of views with alpha
   std::vector<uint32_t> neighbours;
   std::vector<uint32_t> pixels;  ///< where something is
 
@@ -73,15 +74,7 @@ struct Look {
   }
   /// Whether nothing covers the pixel and those around it.
   bool isEmpty(double x, double y) const {
-    const size_t px = static_cast<size_t>(x), py = static_cast<size_t>(y);
-    for (size_t row = py > 0 ? py - 1 : 0; row <= std::min<size_t>(py + 1, camera.height - 1);
-         ++row) {
-      for (size_t column = px > 0 ? px - 1 : 0;
-           column <= std::min<size_t>(px + 1, camera.width - 1); ++column) {
-        if (values[(row * camera.width + column) * kChannels + 3] > kEmpty) return false;
-      }
-    }
-    return true;
+    return !silhouette.showsAround(static_cast<uint32_t>(x), static_cast<uint32_t>(y));
   }
 };
 
@@ -105,13 +98,16 @@ Look lookOf(const Camera& camera, const ViewPicture& picture) {
   look.has_alpha = !picture.alpha.empty();
   const std::vector<float> colour = reduced(picture.colour, picture, look.camera, 3);
   const std::vector<float> alpha = reduced(picture.alpha, picture, look.camera, 1);
-  look.weights = reduced(picture.weights, picture, look.camera, 1);
+  const std::vector<float> weights = reduced(picture.weights, picture, look.camera, 1);
+  if (look.has_alpha) {
+    look.silhouette = Silhouette(look.camera.width, look.camera.height, alpha, weights, 1, kEmpty);
+  }
   const size_t count = size_t{look.camera.width} * look.camera.height;
   look.values.resize(count * kChannels);
   for (size_t i = 0; i < count; ++i) {
     std::copy_n(&colour[i * 3], 3, &look.values[i * kChannels]);
     // Where a mask hides the picture nobody knows whether it is empty.
-    const bool is_known = look.weights.empty() || look.weights[i] > 0;
+    const bool is_known = weights.empty() || weights[i] > 0;
     look.values[i * kChannels + 3] = look.has_alpha && is_known ? alpha[i] : 1.0f;
     if (is_known && look.values[i * kChannels + 3] > kOpaque) {
       look.pixels.push_back(static_cast<uint32_t>(i));

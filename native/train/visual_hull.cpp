@@ -14,6 +14,7 @@
 #include "base/random.h"
 #include "math/camera.h"
 #include "math/vec.h"
+#include "train/silhouette.h"
 
 namespace stipple {
 
@@ -38,52 +39,24 @@ constexpr double kTelling = 0.7;
 constexpr double kInside = 0.1;
 constexpr double kMargin = 0.05;
 
-/// Where a view shows something, as sums over rectangles.
-struct Silhouette {
+/// What a view shows.
+struct Outline {
   Camera camera;
-  uint32_t width = 0, height = 0;  ///< in blocks
-  double block = 1;                ///< pixels a side
-  std::vector<uint32_t> sums;      ///< [height + 1, width + 1]
-
-  bool shows(uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1) const {
-    const size_t stride = width + 1;
-    return sums[y1 * stride + x1] - sums[y0 * stride + x1] - sums[y1 * stride + x0] +
-               sums[y0 * stride + x0] >
-           0;
-  }
+  double block = 1;  ///< pixels of the silhouette's blocks a side
+  Silhouette silhouette;
 };
 
-Silhouette silhouetteOf(const Camera& camera, const ViewPicture& picture) {
-  Silhouette out;
-  out.camera = camera;
+Outline outlineOf(const Camera& camera, const ViewPicture& picture) {
   const uint32_t block = (std::max(picture.width, picture.height) + kMostPixels - 1) / kMostPixels;
-  out.block = block;
-  out.width = (picture.width + block - 1) / block;
-  out.height = (picture.height + block - 1) / block;
-  const size_t stride = out.width + 1;
-  out.sums.assign(stride * (out.height + 1), 0);
-  for (uint32_t y = 0; y < picture.height; ++y) {
-    for (uint32_t x = 0; x < picture.width; ++x) {
-      const size_t i = size_t{y} * picture.width + x;
-      // What a mask leaves out may be anything.
-      const bool masked = !picture.weights.empty() && picture.weights[i] <= 0;
-      if (!masked && picture.alpha[i] <= kShownAlpha) continue;
-      out.sums[(y / block + 1) * stride + x / block + 1] = 1;
-    }
-  }
-  for (uint32_t y = 0; y < out.height; ++y) {
-    for (uint32_t x = 0; x < out.width; ++x) {
-      const size_t at = (y + 1) * stride + x + 1;
-      out.sums[at] += out.sums[at - 1] + out.sums[at - stride] - out.sums[at - stride - 1];
-    }
-  }
-  return out;
+  return {camera, static_cast<double>(block),
+          Silhouette(picture.width, picture.height, picture.alpha, picture.weights, block,
+                     kShownAlpha)};
 }
 
 enum class Verdict { kUnseen, kShown, kMissed };
 
 /// What a view says of a place and its surroundings.
-Verdict judge(const Silhouette& view, const Vec3d& centre, double radius) {
+Verdict judge(const Outline& view, const Vec3d& centre, double radius) {
   const Camera& camera = view.camera;
   const Vec3d p = (camera.world_to_camera * centre.homogeneous()).head<3>();
   const bool perspective = camera.model == CameraModel::kPerspective;
@@ -92,14 +65,14 @@ Verdict judge(const Silhouette& view, const Vec3d& centre, double radius) {
   const double x = (camera.fx * p.x() / depth + camera.cx) / view.block;
   const double y = (camera.fy * p.y() / depth + camera.cy) / view.block;
   const double reach = radius / depth * std::max(camera.fx, camera.fy) / view.block;
-  const double width = view.width, height = view.height;
+  const double width = view.silhouette.width(), height = view.silhouette.height();
   // What the frame cuts may show outside it.
   if (x - reach < 0 || y - reach < 0 || x + reach >= width || y + reach >= height) {
     return Verdict::kUnseen;
   }
-  const bool shows =
-      view.shows(static_cast<uint32_t>(x - reach), static_cast<uint32_t>(y - reach),
-                 static_cast<uint32_t>(x + reach) + 1, static_cast<uint32_t>(y + reach) + 1);
+  const bool shows = view.silhouette.shows(
+      static_cast<uint32_t>(x - reach), static_cast<uint32_t>(y - reach),
+      static_cast<uint32_t>(x + reach) + 1, static_cast<uint32_t>(y + reach) + 1);
   return shows ? Verdict::kShown : Verdict::kMissed;
 }
 
@@ -135,7 +108,7 @@ struct Grid {
 };
 
 /// In: reach: half a side of what is looked at around the middle of a cell, in cells.
-Grid carve(const std::vector<Silhouette>& views, const RootCube& cube, int level, double reach) {
+Grid carve(const std::vector<Outline>& views, const RootCube& cube, int level, double reach) {
   Grid grid;
   grid.cube = cube;
   grid.side = size_t{1} << level;
@@ -149,7 +122,7 @@ Grid carve(const std::vector<Silhouette>& views, const RootCube& cube, int level
     for (size_t i = begin; i < end; ++i) {
       const Vec3d centre = grid.corner(i) + to_middle;
       size_t shown = 0, missed = 0;
-      for (const Silhouette& view : views) {
+      for (const Outline& view : views) {
         const Verdict verdict = judge(view, centre, radius);
         shown += verdict == Verdict::kShown ? 1 : 0;
         missed += verdict == Verdict::kMissed ? 1 : 0;
@@ -222,7 +195,7 @@ VisualHull visualHull(const ViewSource& views, std::span<const size_t> training,
                                           std::to_string(options.level) + "; 3 to 8 is allowed");
   }
   VisualHull hull;
-  std::vector<Silhouette> silhouettes;
+  std::vector<Outline> outlines;
   const size_t view_count = std::min(training.size(), options.view_count);
   for (size_t v = 0; v < view_count; ++v) {
     advance(progress, static_cast<double>(v) / static_cast<double>(view_count),
@@ -230,13 +203,13 @@ VisualHull visualHull(const ViewSource& views, std::span<const size_t> training,
     const size_t view = training[v * training.size() / view_count];
     const ViewPicture picture = views.load(view);
     if (picture.alpha.empty()) return hull;  // the others have none either
-    silhouettes.push_back(silhouetteOf(views.camera(view), picture));
+    outlines.push_back(outlineOf(views.camera(view), picture));
   }
-  const Grid coarse = carve(silhouettes, where, kCoarseLevel, kCoarseReach);
+  const Grid coarse = carve(outlines, where, kCoarseLevel, kCoarseReach);
   const double left = static_cast<double>(coarse.kept_count);
   if (coarse.kept_count == 0 || left > kTelling * static_cast<double>(coarse.seen_count))
     return hull;
-  const Grid fine = carve(silhouettes, cubeOfKept(coarse), options.level, kFineReach);
+  const Grid fine = carve(outlines, cubeOfKept(coarse), options.level, kFineReach);
   if (fine.kept_count > 0) addPoints(fine, options, hull);
   return hull;
 }
