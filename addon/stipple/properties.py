@@ -166,6 +166,10 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                         items=strategies.part_items, options={'ENUM_FLAG'})
     density_gradient: BoolProperty(name="Learn Density", description="Move anchors to where they help the picture "
                                    "most", default=True, options=set())
+    shell: EnumProperty(name="Background Shell", description="Room for what is far away, as a world or a landscape behind "
+                        "the objects",
+                        items=(('AUTO', "Auto", "Where views are opaque and show what is beyond all surfaces"),
+                               ('ON', "On", "Always"), ('OFF', "Off", "Never")), options=set())
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,
                       options=set())
     shown: EnumProperty(name="Show", description="What the 3D view shows until the fit is accepted; renders show the "

@@ -80,6 +80,7 @@ Pairs settingsPairs(const FitSettings& settings, const ViewSource& views) {
     add("antialias", static_cast<uint64_t>(field.antialias));
     add("density_gradient", field.density_gradient);
     add("jitter", field.jitter);
+    add("shell", static_cast<uint64_t>(field.shell));
   } else {
     const ExplicitModelOptions& model = settings.explicit_model;
     pairs.emplace_back("strategy", quoted(model.strategy));
@@ -182,6 +183,7 @@ FitSettings fitSettings(const StippleFitOptions& given) {
       field.density_gradient = true;
     }
     field.jitter = given.jitter != 0;
+    field.shell = enumValue<ShellChoice>(given.shell, 2, "options->shell");
     field.seed = given.seed;
     return settings;
   }

@@ -25,7 +25,8 @@ constexpr int kBarWidth = 24;
 constexpr auto kPollInterval = std::chrono::milliseconds(50);
 
 struct Arguments {
-  std::string dataset, out, model = "explicit", quality = "balanced", background = "random", report;
+  std::string dataset, out, model = "explicit", quality = "balanced", background = "random", report,
+                            shell = "auto";
   std::string strategy;
   std::optional<int64_t> gaussians, start, anchors, iterations, gaussians_per_anchor, sh_degree,
       budget;
@@ -87,6 +88,10 @@ StippleFitOptions optionsOf(const Arguments& arguments, const std::string& check
   options.holdout = counted32(arguments.holdout, "--holdout", 0);
   options.jitter = !arguments.no_jitter;
   options.density_gradient = !arguments.no_density_gradient;
+  options.shell = placeOf(arguments.shell, {"auto", "on", "off"});
+  if (model == STIPPLE_FIT_EXPLICIT && options.shell != STIPPLE_FIT_SHELL_AUTO) {
+    throw Failure("--shell belongs to --model field; explicit splats go as far as their points do");
+  }
   options.seed = arguments.seed;
   options.picture_bytes = bytesOfMebibytes(arguments.picture_mib);
   options.max_bytes = bytesOfMebibytes(arguments.memory_mib);
@@ -373,6 +378,12 @@ void addFit(CLI::App& app, const Context& context) {
   command->add_flag("--no-jitter", to.no_jitter, "Field: anchors at the centres of their cells");
   command->add_flag("--no-density-gradient", to.no_density_gradient,
                     "Field: the density is not learned from the pictures");
+  command
+      ->add_option(
+          "--shell", to.shell,
+          "Field: a shell for what is far away; auto: where pictures show beyond the points")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->capture_default_str();
   command->add_option("--seed", to.seed)->capture_default_str();
   command->callback([arguments, &context] { fit(context, *arguments); });
 }

@@ -20,7 +20,6 @@
 #include "splat/render_backward.h"
 #include "train/field_regularisers.h"
 #include "train/field_state.h"
-#include "train/scene_prior.h"
 #include "train/sparse_adam.h"
 
 namespace stipple {

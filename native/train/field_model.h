@@ -13,6 +13,7 @@
 #include "density/learned_draws.h"
 #include "density/octree_density.h"
 #include "train/fit_model.h"
+#include "train/scene_prior.h"
 
 namespace stipple {
 
@@ -29,7 +30,7 @@ struct FieldModelOptions {
   bool clip_gradient = true;     ///< at the 90th percentile
   bool centre_gradient = true;   ///< minus the mean
   bool jitter = true;            ///< anchors anywhere in their leaf; off: at its centre
-  bool shell = true;             ///< far backgrounds, where cameras see them (ScenePriorOptions)
+  ShellChoice shell = ShellChoice::kAuto;  ///< for what is far away
   uint64_t seed = 0;
 };
 

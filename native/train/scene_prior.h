@@ -23,10 +23,17 @@ struct ScenePrior {
   bool contracted = false;
 };
 
+/// Whether the root holds all space around the scene, too.
+enum class ShellChoice : uint32_t {
+  kAuto = 0,  ///< where surfaces are known and cameras see beyond them
+  kOn = 1,
+  kOff = 2
+};
+
 struct ScenePriorOptions {
   size_t depth_points = 300000;  ///< at most, from the depth of views where they have it
   size_t depth_views = 64;       ///< at most, that are loaded for it
-  bool shell = true;             ///< a contracted root, where cameras see beyond the plain one
+  ShellChoice shell = ShellChoice::kAuto;
   uint64_t seed = 0;
 };
 
@@ -34,8 +41,10 @@ struct ScenePriorOptions {
 /// that at least two cameras see, without the farthest 1 % on either side of each axis where those
 /// reach far out, and a tenth more. Without points or depth: points of the visual hull, where
 /// pictures have alpha; else none, and the root is around the ball that the cameras have in common.
-/// Where points are known and cameras see beyond the root (no alpha; no depth, or depth that ends
-/// outside it in a twentieth of the pixels), it is contracted: its inner half is what it would be.
+/// With a shell the root is contracted: its inner half is what it would be. Auto has one where
+/// points are known, pictures have no alpha, and cameras see beyond the root: depth is unknown or
+/// ends outside it in a twentieth of the pixels; without depth, a tenth of the cells of pictures
+/// has no point of the root, or points are too few to tell.
 /// In: training: views of the source, at least one. Errors: those of ViewSource::load; kCancelled.
 ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
                       const ScenePriorOptions& options, Progress* progress = nullptr);

@@ -12,7 +12,7 @@ from stipple.binding.errors import CancelledError, StippleError
 from stipple.binding.fit import Fit, fit_memory_bound, fit_options
 from stipple.binding.model import DecodeSettings
 from stipple.binding.strategies import check_strategy, strategies, strategy_parts
-from stipple.binding.structs import ColourSpace, FitModel, FitQuality, ModelKind, StippleCamera, Transfer
+from stipple.binding.structs import ColourSpace, FitModel, FitQuality, FitShell, ModelKind, StippleCamera, Transfer
 from stipple.binding.views import Views
 
 
@@ -85,6 +85,15 @@ def test_a_field_decodes_at_any_budget(context, views):
     info = model.info()
     assert (info.kind, info.most_anchors, info.gaussians_per_anchor) == (ModelKind.FIELD, 64, 4)
     assert model.decode(DecodeSettings(anchors=20)).info().count == 80
+
+
+@pytest.mark.parametrize('shell', FitShell)
+def test_a_field_has_a_shell_where_it_is_asked_for(context, views, shell):
+    fit = Fit.start(context, views, options(context, model=FitModel.FIELD, iterations=10, least_anchors=16,
+                                            most_anchors=256, shell=shell))
+    fit.wait()
+    farthest = np.abs(fit.result().read().positions).max()
+    assert farthest > 5 if shell == FitShell.ON else farthest < 2  # Auto: views have alpha
 
 
 def test_resumes_only_the_same_fit(context, views, tmp_path):

@@ -123,6 +123,21 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     assert data.source_kind == 'CLOUD' and data.learned_gaussians == data.learned_most == 0
 
 
+@pytest.mark.parametrize('chosen,has_shell', [
+    ({'transparent': False}, True),                    # the world behind the ball
+    ({'transparent': False, 'shell': 'OFF'}, False),
+    ({}, False),                                       # alpha tells what belongs to the scene
+    ({'transparent': False, 'rig': 'INSIDE'}, False),  # walls all around
+], ids=str)
+def test_a_field_has_a_shell_for_what_is_far_away(stipple, ball, chosen, has_shell):
+    if 'rig' in chosen:
+        ball.data.flip_normals()
+    settings(model='FIELD', view_count=4, view_size=32, max_splats=400, **chosen)
+    farthest = np.abs(stipple.scene.splat_data.read(fitted().data).positions).max()
+    # The ball has a radius of 1, which a tenth is added to; Gaussians stand around their anchors.
+    assert farthest > 5 if has_shell else farthest < 3
+
+
 @pytest.mark.parametrize('model', ['FIELD', 'EXPLICIT'])
 def test_an_asset_file_is_imported_with_its_budgets(stipple, ball, model):
     settings(model=model, view_count=4, view_size=32)

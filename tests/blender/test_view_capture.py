@@ -183,6 +183,16 @@ def test_views_leave_the_scene_as_it_was(rigs, capture):
 
 
 @pytest.mark.parametrize('engine', ENGINES)
+def test_an_opaque_film_covers_every_pixel(rigs, capture, engine):
+    ball = scenes.sphere()
+    pose = rigs.around(bpy.context.scene, depsgraph(), rigs.bounds_of([ball], depsgraph()), 1)[0]
+    settings = capture.CaptureSettings(engine=engine, size=16, samples=1, transparent=False)
+    with capture.Capture(bpy.context, [ball], settings) as views:
+        view = views.pose('a', pose)
+    assert (view.linear[..., 3] == 1).all() and view.depth[0, 0] == 0 < view.depth[8, 8]
+
+
+@pytest.mark.parametrize('engine', ENGINES)
 def test_pictures_are_not_written_to_files(rigs, capture, engine, tmp_path, monkeypatch):
     """Where the system has memory with a path."""
     if not hasattr(os, 'memfd_create'):

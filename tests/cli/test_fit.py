@@ -74,6 +74,15 @@ def test_a_field_decodes_at_any_budget(dataset, tmp_path):
     assert json.loads(run('info', tmp_path / 'small.ply', '--json').stdout)['count'] == 80
 
 
+def test_a_field_has_a_shell_where_it_is_asked_for(dataset, tmp_path):
+    farthest = {}
+    for shell in ('on', 'off'):
+        run('fit', dataset, tmp_path / f'{shell}.ply', '--model', 'field', '--iterations', 20, '--anchors', 256, '--shell', shell)
+        bounds = json.loads(run('info', tmp_path / f'{shell}.ply', '--json').stdout)
+        farthest[shell] = max(map(abs, bounds['bounds_min'] + bounds['bounds_max']))
+    assert farthest['on'] > 3 * farthest['off']
+
+
 def start(*arguments, environment=None, **options):
     return subprocess.Popen([TOOL, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                             env=environment, **options)
@@ -246,6 +255,7 @@ def test_one_view_is_fitted_with_a_note(copy, tmp_path):
     (('{dataset}', 'out.ply', '--model', 'field', '--strategy', 'learned_density', '--no-density-gradient'), 'both'),
     (('{dataset}', 'out.ply', '--memory', 0.001), 'max_bytes is 1048'),
     (('{dataset}', 'out.ply', '--sh-degree', 5), 'sh_degree is 5'),
+    (('{dataset}', 'out.ply', '--shell', 'on'), '--model field'),
     (('{dataset}', 'out.ply', '--downscale', 0), 'downscale'),
 ])
 def test_one_line_says_what_is_wrong(dataset, tmp_path, arguments, text):

@@ -3,7 +3,7 @@
 
 from enum import IntEnum
 
-from .fit_enums import FitBackground, FitModel, FitQuality, SplatQuantity
+from .fit_enums import FitBackground, FitModel, FitQuality, FitShell, SplatQuantity
 
 
 class Status(IntEnum):
@@ -214,4 +214,5 @@ ENUMS = {
     'StippleFitQuality': (FitQuality, 'STIPPLE_FIT_'),
     'StippleSplatQuantity': (SplatQuantity, 'STIPPLE_QUANTITY_'),
     'StippleFitBackground': (FitBackground, 'STIPPLE_FIT_BACKGROUND_'),
+    'StippleFitShell': (FitShell, 'STIPPLE_FIT_SHELL_'),
 }

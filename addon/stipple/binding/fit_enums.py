@@ -21,6 +21,12 @@ class FitBackground(IntEnum):
     RANDOM = 2
 
 
+class FitShell(IntEnum):
+    AUTO = 0
+    ON = 1
+    OFF = 2
+
+
 class SplatQuantity(IntEnum):
     SCORE = 0
     AGE = 1

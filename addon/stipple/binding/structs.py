@@ -4,7 +4,7 @@
 from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p, sizeof
 
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, CameraModel, ColourSpace, ENUMS, Effect,
-                    EffectChoice, FitBackground, FitModel, FitQuality, Frame, JobState, LowPass, MaterialColour,
+                    EffectChoice, FitBackground, FitModel, FitQuality, FitShell, Frame, JobState, LowPass, MaterialColour,
                     ModelKind, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling, Side,
                     SplatOrder, SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
 
@@ -349,7 +349,8 @@ class StippleFitOptions(_Sized):
                 ('antialias', c_uint32), ('background', c_uint32), ('density_gradient', c_uint32), ('jitter', c_uint32),
                 ('holdout', c_uint32), ('resume', c_uint32), ('seed', c_uint64), ('ssim_share', c_double),
                 ('picture_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
-                ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double), ('max_bytes', c_uint64)]
+                ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double), ('max_bytes', c_uint64),
+                ('shell', c_uint32), ('reserved', c_uint32)]
 
 
 class StippleFitFigures(_Sized):

@@ -66,6 +66,7 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
         layout.prop(settings, 'model')
         if settings.model == 'FIELD':
             layout.prop(settings, 'density_gradient')
+            layout.prop(settings, 'shell')
         else:
             _draw_strategy(layout, context, settings)
         layout.prop(settings, 'seed')

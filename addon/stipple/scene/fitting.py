@@ -10,7 +10,7 @@ from mathutils import Matrix
 from ..binding import cloud_edit
 from ..binding.fit import Fit, fit_options
 from ..binding.model import DecodeSettings, Model
-from ..binding.structs import FitModel, FitQuality, JobState
+from ..binding.structs import FitModel, FitQuality, FitShell, JobState
 from . import fit_proposal, fit_reports, frames, meshes, photo_cameras, sources, strategies
 from .view_task import VIEWS_END, ViewTask
 
@@ -106,6 +106,8 @@ class FitTask(ViewTask):
         chosen = {'density_gradient': int(settings.density_gradient), 'seed': settings.seed}
         if settings.model == 'EXPLICIT':
             chosen.update(max_splats=settings.max_splats, strategy=strategies.text_of(settings))
+        else:
+            chosen['shell'] = FitShell[settings.shell]
         if not settings.view_dependent:
             chosen['sh_degree'] = 0
         options = fit_options(self._native.library, FitModel[settings.model], FitQuality[settings.quality], **chosen)

@@ -194,7 +194,8 @@ class Capture:
             row, column = np.argwhere(~np.isfinite(linear).all(axis=2))[0]
             raise invalid(f"View '{name}' has a colour that is not finite at pixel ({column}, {row}); a material or light "
                           'of the scene makes it.')
-        linear[..., 3] = np.clip(linear[..., 3], 0, 1)
+        # An opaque film covers every pixel; of Workbench's half floats some say 0.9985.
+        linear[..., 3] = np.clip(linear[..., 3], 0, 1) if self._settings.transparent else 1
         depth = self._passes['Depth'][..., 0] if 'Depth' in self._passes else np.zeros(linear.shape[:2], np.float32)
         end = min(_FARTHEST, _SHARE_OF_END * camera.far_plane)
         is_known = np.isfinite(depth) & (depth > 0) & (depth < end) & (linear[..., 3] > _WHOLE)

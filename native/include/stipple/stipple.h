@@ -1414,6 +1414,14 @@ typedef enum StippleFitBackground {
   STIPPLE_FIT_BACKGROUND_RANDOM = 2 /* another colour in every step: coverage shows whatever the colours */
 } StippleFitBackground;
 
+/* Whether a field has a shell for what is far away, out to 64 times the size of the scene. */
+typedef enum StippleFitShell {
+  STIPPLE_FIT_SHELL_AUTO = 0, /* where points or depth are known, pictures are opaque, and they show what lies beyond
+                                 the points */
+  STIPPLE_FIT_SHELL_ON = 1,
+  STIPPLE_FIT_SHELL_OFF = 2
+} StippleFitShell;
+
 typedef struct StippleFitOptions {
   uint32_t struct_size;
   uint32_t model;              /* StippleFitModel, default explicit */
@@ -1448,6 +1456,8 @@ typedef struct StippleFitOptions {
   double checkpoint_seconds;   /* default 60; 0: by iterations alone */
   uint64_t max_bytes;          /* of the whole fit, about; 0, the default: none. Lowers max_splats and
                                   picture_bytes as far as it needs */
+  uint32_t shell;              /* field: StippleFitShell, default auto */
+  uint32_t reserved;
 } StippleFitOptions;
 void stipple_fit_options_init(StippleFitOptions* options);
 /* Sets model, iterations, counts, degree and antialias as a user's choice of quality asks for; the others stay.

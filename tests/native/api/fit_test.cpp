@@ -316,6 +316,25 @@ TEST_F(FitTest, AFieldIsAModelOfAnyBudget) {
   }
 }
 
+TEST_F(FitTest, AFieldHasAShellWhereItIsAskedFor) {
+  STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
+  options_.iterations = 20;
+  options_.least_anchors = 16;
+  options_.most_anchors = 256;
+  for (const uint32_t shell :
+       {STIPPLE_FIT_SHELL_AUTO, STIPPLE_FIT_SHELL_ON, STIPPLE_FIT_SHELL_OFF}) {
+    options_.shell = shell;
+    StippleJob* job = start();
+    STIPPLE_ASSERT_OK(stipple_job_wait(job));
+    const std::vector<float> numbers = result(job);
+    float farthest = 0;
+    for (size_t i = 0; i < 256 * 4 * 3; ++i) farthest = std::max(farthest, std::abs(numbers[i]));
+    // The scene is 1.5 across; its views have alpha, which tells Auto what belongs to it.
+    EXPECT_EQ(farthest > 5, shell == STIPPLE_FIT_SHELL_ON) << farthest;
+    stipple_job_free(job);
+  }
+}
+
 TEST_F(FitTest, AFieldResumesBitForBit) {
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.iterations = 60;
@@ -402,6 +421,9 @@ TEST_F(FitTest, RefusesOptionsOutOfRange) {
   options_.model = STIPPLE_FIT_FIELD;
   options_.gaussians_per_anchor = 3;
   refused("options->gaussians_per_anchor is 3; 4 to 32 is allowed");
+  options_.model = STIPPLE_FIT_FIELD;
+  options_.shell = 3;
+  refused("options->shell is 3; 0 to 2 is allowed");
   expectRefused(stipple_fit_options_preset(&options_, 0, 3), STIPPLE_ERROR_INVALID_ARGUMENT,
                 "quality is 3");
 }

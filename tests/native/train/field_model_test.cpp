@@ -182,7 +182,7 @@ TEST(FieldModel, AShellHoldsWhatIsFarAway) {
   float farthest[2];
   for (const bool shell : {false, true}) {
     FieldModelOptions options = smallOptions();
-    options.shell = shell;
+    options.shell = shell ? ShellChoice::kAuto : ShellChoice::kOff;
     const auto model = makeFieldModel(*views, trainingViews(), options);
     train(*model, *views, 1, 300, 300);
     psnr[shell] = heldOutPsnr(*model, *views, 1024);

@@ -238,7 +238,7 @@ TEST(ScenePrior, TakesPointsFromDepth) {
   }
   ScenePriorOptions options;
   options.depth_points = 600;
-  options.shell = false;
+  options.shell = ShellChoice::kOff;
   const ScenePrior prior = scenePrior(*with_depth, all(*with_depth), options);
   EXPECT_GT(prior.weights.size(), 300u);
   EXPECT_LT(prior.weights.size(), 700u);
@@ -267,16 +267,19 @@ std::shared_ptr<MemoryViewSource> wallViews(float unknown_share, bool with_alpha
 }
 
 TEST(ScenePrior, HasAShellWhereCamerasSeeBeyondTheRoot) {
-  const auto seen = [](float unknown_share, bool with_alpha, bool shell) {
+  using enum ShellChoice;
+  const auto seen = [](float unknown_share, bool with_alpha, ShellChoice shell) {
     const auto views = wallViews(unknown_share, with_alpha);
     ScenePriorOptions options;
     options.depth_points = 3000;
     options.shell = shell;
     return scenePrior(*views, all(*views), options);
   };
-  EXPECT_FALSE(seen(0.0f, false, true).contracted) << "all depth ends inside";
-  EXPECT_FALSE(seen(0.3f, true, true).contracted) << "alpha says what belongs to the scene";
-  const ScenePrior plain = seen(0.3f, false, false), shell = seen(0.3f, false, true);
+  EXPECT_FALSE(seen(0.0f, false, kAuto).contracted) << "all depth ends inside";
+  EXPECT_FALSE(seen(0.3f, true, kAuto).contracted) << "alpha says what belongs to the scene";
+  EXPECT_TRUE(seen(0.0f, false, kOn).contracted);
+  EXPECT_TRUE(seen(0.3f, true, kOn).contracted);
+  const ScenePrior plain = seen(0.3f, false, kOff), shell = seen(0.3f, false, kAuto);
   EXPECT_FALSE(plain.contracted);
   ASSERT_TRUE(shell.contracted);
   EXPECT_DOUBLE_EQ(shell.root.side, 2 * plain.root.side);
@@ -293,6 +296,56 @@ TEST(ScenePrior, HasAShellWhereCamerasSeeBeyondTheRoot) {
     (is_inside ? inside : around) += static_cast<double>(shell.weights[i]);
   }
   EXPECT_NEAR(around / inside, 0.25, 0.03);
+}
+
+/// Opaque pictures without depth, from the middle or from around it, and points.
+std::shared_ptr<MemoryViewSource> photos(const SplatCloud& points, bool from_inside) {
+  auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  for (size_t v = 0; v < 6; ++v) {
+    ViewPicture picture;
+    picture.width = picture.height = 16;
+    picture.colour.assign(16 * 16 * 3, 0.5f);
+    views->add(toyCamera(v, 6, 16, from_inside ? 0.1 : 3.5), std::move(picture));
+  }
+  views->setPoints(toyPoints(points));
+  return views;
+}
+
+TEST(ScenePrior, WithoutDepthAsksPointsWhatCamerasSee) {
+  const auto hasShell = [](const SplatCloud& points, bool from_inside, ShellChoice shell) {
+    const auto views = photos(points, from_inside);
+    ScenePriorOptions options;
+    options.shell = shell;
+    return scenePrior(*views, all(*views), options).contracted;
+  };
+  using enum ShellChoice;
+  const SplatCloud ball = toyBall(8000);
+  EXPECT_TRUE(hasShell(ball, false, kAuto)) << "there is something around the ball";
+  EXPECT_FALSE(hasShell(ball, true, kAuto)) << "walls all around";
+  EXPECT_TRUE(hasShell(ball, true, kOn));
+  EXPECT_FALSE(hasShell(ball, false, kOff));
+  // Of 8,000 points each camera shows about 260, of 800 not enough for 16 cells.
+  EXPECT_TRUE(hasShell(toyBall(800), true, kAuto)) << "too few to tell";
+  // A room without a ceiling: a quarter of the ball.
+  SplatCloud open = ball;
+  for (size_t i = 0; i < open.size(); ++i) {
+    float* p = &open.positions[i * 3];
+    if (p[2] > 0.5f) std::copy_n(&ball.positions[3 * 7999], 3, p);
+  }
+  EXPECT_TRUE(hasShell(open, true, kAuto));
+}
+
+TEST(ScenePrior, AShellIsThereWithoutPointsWhereItIsAskedFor) {
+  const auto views = toyViews(toyBall(3000, 0.5f), 40, 64, false);
+  ScenePriorOptions options;
+  const ScenePrior plain = scenePrior(*views, all(*views), options);
+  options.shell = ShellChoice::kOn;
+  const ScenePrior shell = scenePrior(*views, all(*views), options);
+  EXPECT_FALSE(plain.contracted);
+  ASSERT_TRUE(shell.contracted);
+  EXPECT_DOUBLE_EQ(shell.root.side, 2 * plain.root.side);
+  EXPECT_EQ(shell.known_level, plain.known_level + 1) << "cells of the hull stay as large";
+  EXPECT_GT(shell.weights.size(), plain.weights.size());
 }
 
 /// The same pictures, over black where they have alpha.
