@@ -1,18 +1,26 @@
 // Whole iterations of a fit of a field, with the density gradient, split by what they do: against
-// the passes of as many explicit splats, and against a field over a far larger octree.
+// the passes of as many explicit splats, against a field over a far larger octree, and against
+// those of other budgets. What its regularisers cost against looking at all pairs of anchors.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "base/parallel.h"
 #include "base/random.h"
 #include "bench/comparison.h"
 #include "data/memory_view_source.h"
+#include "decode/anchor_spacing.h"
+#include "decode/field_decoder.h"
+#include "density/learned_draws.h"
+#include "splat/cpu/tile_lists.h"
 #include "splat/render.h"
 #include "train/field_model.h"
+#include "train/field_regularisers.h"
 #include "train/render_backend.h"
 
 namespace stipple::bench {
@@ -61,6 +69,7 @@ class BallViews {
     options.least_anchors = options.most_anchors = c.anchors;
     options.gaussians_per_anchor = kGaussians;
     options.leaf_level = leaf_level;
+    options.shell = ShellChoice::kOff;
     const std::vector<size_t> training = {0};
     return makeFieldModel(views_, training, options);
   }
@@ -134,7 +143,116 @@ void steps(benchmark::State& state, const FieldCase& c) {
   state.counters["target_explicit_passes"] = 0.25;
 }
 
+/// Pairs of a splat and a tile that it reaches.
+double pairsOf(const SplatCloud& cloud, const Camera& camera) {
+  const SplatInstance instance{&cloud};
+  const PlacedScene scene = placeScene({&instance, 1}, camera, RenderOptions{});
+  const VisibleSplats visible = findVisibleSplats(scene, nullptr);
+  size_t pairs = 0;
+  forEachTileGroup(visible, TileGrid(camera.width, camera.height), nullptr,
+                   [&](const TileListGroup& group) {
+                     for (size_t t = group.first_tile; t < group.end_tile; ++t) {
+                       pairs += group.tile(t).size();
+                     }
+                   });
+  return static_cast<double>(pairs);
+}
+
+/// Steps of the same octree at budgets that double, by turns: time against pairs.
+void growth(benchmark::State& state) {
+  constexpr std::array<uint64_t, 5> kBudgets = {2048, 4096, 8192, 16384, 32768};
+  const BallViews ball(20000, 512);
+  std::vector<std::unique_ptr<FitModel>> models;
+  std::array<double, kBudgets.size()> best, pairs;
+  best.fill(1e300);
+  uint64_t iteration = 1000;
+  for (size_t b = 0; b < kBudgets.size(); ++b) {
+    models.push_back(ball.model({"", kBudgets[b], 512}, 8));
+    ball.step(*models[b], iteration);
+    pairs[b] = pairsOf(models[b]->splats(kBudgets[b]), ball.views().camera(0));
+  }
+  for (auto step : state) {
+    (void)step;
+    ++iteration;
+    double sum = 0;
+    for (size_t b = 0; b < kBudgets.size(); ++b) {
+      const double seconds = secondsOf([&] { ball.step(*models[b], iteration); });
+      best[b] = std::min(best[b], seconds);
+      sum += seconds;
+    }
+    state.SetIterationTime(sum);
+  }
+  for (size_t b = 0; b < kBudgets.size(); ++b) {
+    const std::string budget = std::to_string(kBudgets[b]);
+    state.counters["ms_" + budget] = 1e3 * best[b];
+    state.counters["kpairs_" + budget] = 1e-3 * pairs[b];
+  }
+  // Above 1: less than in proportion, as of what does not depend on the budget. Part of the work is
+  // by anchor, and their pairs grow more slowly, as smaller splats reach fewer tiles.
+  state.counters["ratio_pairs"] = (best[0] / pairs[0]) / (best.back() / pairs.back());
+  state.counters["ratio_anchors"] = 16 * best[0] / best.back();
+  state.counters["target_anchors"] = 1;
+}
+
+/// The spread of a field's Gaussians against all pairs of its anchors.
+void spread(benchmark::State& state, uint64_t anchor_count) {
+  const BallViews ball(20000, 64);
+  const auto model = ball.model({"", anchor_count, 64}, 8);
+  const FieldResult result = *fieldResult(*model);
+  AnchorSamplingOptions sampling;
+  sampling.count = anchor_count;
+  const AnchorSet anchors = drawLearned(result.density, sampling, result.draws);
+  FieldTape tape;
+  SplatCloud cloud;
+  FieldDecoder(result.field).forward(anchors, tape, cloud);
+  SplatCloud gradient = cloud;
+  double of_all = 0;
+  const auto allPairs = [&] {
+    std::vector<double> sums(anchor_count);
+    parallelFor(anchor_count, 64, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const float* a = &anchors.positions[i * 3];
+        double squares = 0;
+        for (size_t k = 0; k < kGaussians * 3; ++k) {
+          const double offset =
+              static_cast<double>(tape.centres[i * kGaussians * 3 + k] - a[k % 3]);
+          squares += offset * offset / kGaussians;
+        }
+        const auto reach = static_cast<float>(squares);
+        for (size_t j = 0; j < anchor_count; ++j) {
+          const float* b = &anchors.positions[j * 3];
+          const float x = b[0] - a[0], y = b[1] - a[1], z = b[2] - a[2];
+          const float distance = x * x + y * y + z * z;
+          if (distance < reach && j != i)
+            sums[i] += std::sqrt(squares) - std::sqrt(static_cast<double>(distance));
+        }
+      }
+    });
+    of_all = 0;
+    for (const double sum : sums) of_all += sum;
+    benchmark::DoNotOptimize(of_all);
+  };
+  double loss = 0;
+  const auto ours = [&] {
+    loss = regularise({}, *result.field, anchors, tape, cloud, gradient);
+    benchmark::DoNotOptimize(loss);
+  };
+  compare(state, "all_pairs", 100, ours, allPairs);
+}
+
 const bool registered = [] {
+  benchmark::RegisterBenchmark("train.step.field.growth_512x512", growth)
+      ->UseManualTime()
+      ->Iterations(kSteps)
+      ->Unit(benchmark::kMillisecond);
+  for (const uint64_t anchors : {4096, 16384}) {
+    benchmark::RegisterBenchmark(
+        ("train.field_regularisers." + std::to_string(anchors >> 10) + "k").c_str(), spread,
+        anchors)
+        ->UseManualTime()
+        ->Iterations(kSteps)
+        ->Unit(benchmark::kMillisecond);
+  }
   for (const FieldCase& c : kCases) {
     benchmark::RegisterBenchmark((std::string("train.step.field.") + c.name).c_str(), steps, c)
         ->UseManualTime()
