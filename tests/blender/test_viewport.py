@@ -155,8 +155,8 @@ def made_pictures(view_picture, viewed, borders):
     found = []
     for coarse in (2, 1):
         picture._key = coarse
-        picture._start(bpy.context.scene, depsgraph, camera, borders, picture._instances, picture._mattes.placed, np.zeros((0, 4)),
-                       coarse)
+        picture._start(bpy.context.scene, depsgraph, view_picture.ViewCamera(camera, borders), picture._instances,
+                       picture._mattes.placed, np.zeros((0, 4)), coarse)
         while picture._task.is_running():
             pass
         picture._task.wait()
@@ -190,6 +190,45 @@ def test_meshes_and_holdouts_hide_splats_in_rendered_views(stipple, viewed, squa
     assert hidden == 0.0 and seen > 0.9
     square.is_holdout = True
     assert max(alphas()) == 0.0
+
+
+def test_averages_of_rendered_views_are_those_of_renders(stipple, viewed, square, tmp_path, monkeypatch):
+    """Out of focus behind the edge of a mesh, which is drawn once for all averages."""
+    view_picture = importlib.import_module(f'{stipple.__name__}.view_picture')
+    facts = importlib.import_module(f'{stipple.__name__}.scene.facts')
+    monkeypatch.setattr(view_picture, '_texture', lambda pixels: pixels)
+    scene = bpy.context.scene
+    camera = scenes.camera((0, 0, 6), width=60, height=60, lens=50.0)
+    scenes.quad('before', offset=(-1.0, 0.0, 1.0))
+    dof = camera.data.dof
+    dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 0.05, 3.0
+    scene.render.engine, scene.render.film_transparent = 'STIPPLE', True
+    scene.stipple.exact_projection = scene.stipple.zoom_antialiasing = 'OFF'
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    seen = view_picture.ViewCamera(stipple.scene.cameras.camera_of(camera, scene.render, None),
+                                   facts.Border(0, 0, 60, 60), stipple.scene.lenses.lens_of(camera, depsgraph))
+    picture = view_picture.ViewPicture()
+    picture.update(depsgraph, print)
+    picture._key = 'still'
+    meshes = []
+    monkeypatch.setattr(stipple.scene.mattes, 'start_samples', lambda *given, start=stipple.scene.mattes.start_samples:
+                        meshes.append(given) or start(*given))
+    drawn = {}
+    while picture._shown is None or not picture._is_done(seen):
+        samples = 4 * picture._shown.samples if picture._shown is not None else 1
+        picture._start(scene, depsgraph, seen, picture._instances, picture._mattes.placed, np.zeros((0, 4)), 1, samples)
+        while picture._task is not None:
+            picture._take(1.0)
+        drawn[picture._shown.samples] = picture._shown.texture
+    assert list(drawn)[:3] == [1, 4, 16] and list(drawn)[-1] == picture._sample_count
+    assert len(meshes) == 1
+    for samples in (4, 16):
+        scene.stipple.blur_samples = samples
+        rendered = scenes.render_pixels(tmp_path, str(samples))[::-1]
+        # Renders have more samples of the mesh's edge.
+        assert np.abs(drawn[samples] - rendered).mean() < 0.003
+        assert np.abs(drawn[1] - rendered).mean() > 0.02
 
 
 def test_rendered_views_read_a_mesh_again_only_when_it_changes(stipple, viewed, square, monkeypatch):

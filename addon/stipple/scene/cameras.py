@@ -173,6 +173,32 @@ def view_border(context, region):
     return Border(x0, y0, min(max(int(x1), x0 + 1), region.width) - x0, min(max(int(y1), y0 + 1), region.height) - y0)
 
 
+def looked_through(context):
+    """The original camera that a 3D view looks through, or None."""
+    camera_object = context.space_data.camera
+    is_camera = context.region_data.view_perspective == 'CAMERA' and camera_object is not None
+    return camera_object if is_camera and camera_object.type == 'CAMERA' else None
+
+
+def panorama_of_view(context, region, camera_object, depsgraph):
+    """(StippleCamera, Border) of a panoramic camera that a view looks through: over the region, as the picture in the
+    camera's frame goes on, and what of the region the picture fills, or None where it lies outside.
+
+    Errors: StippleError for types that have no model here.
+    """
+    left, right, bottom, top = (round(edge) for edge in _camera_frame(context, region, camera_object))
+    # Before 5.0 panoramas are settings of Cycles', of which evaluated cameras are not told.
+    camera = from_parts(camera_object.data, camera_object.evaluated_get(depsgraph).matrix_world, max(right - left, 1),
+                        max(top - bottom, 1), name=camera_object.name)
+    camera.cx += left
+    camera.cy += region.height - top
+    camera.width, camera.height = region.width, region.height
+    border = view_border(context, region)
+    x0, x1 = max(border.x, left), min(border.x + border.width, right)
+    y0, y1 = max(border.y, bottom), min(border.y + border.height, top)
+    return camera, Border(x0, y0, x1 - x0, y1 - y0) if x0 < x1 and y0 < y1 else None
+
+
 def _camera_frame(context, region, camera_object):
     """(left, right, bottom, top) of the camera's picture in the region's pixels."""
     matrix = np.array(camera_object.matrix_world.normalized(), np.float64)
