@@ -14,7 +14,7 @@ bl_info = {
 import bpy
 
 from . import cycles_engine, engine, operators, panels, preferences, properties, viewport
-from .scene import sync
+from .scene import steady_effects, sync
 
 _classes = (preferences.classes + properties.classes + operators.classes + panels.classes + engine.classes
             + cycles_engine.classes)
@@ -26,11 +26,13 @@ def register():
     properties.register()
     panels.register()
     sync.register()
+    steady_effects.register()
     viewport.register()
 
 
 def unregister():
     viewport.unregister()
+    steady_effects.unregister()
     sync.unregister()
     panels.unregister()
     properties.unregister()

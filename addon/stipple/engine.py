@@ -13,7 +13,7 @@ from . import version
 from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
 from .binding.structs import JobState
-from .scene import cameras, effects, facts, instances, mattes, motion, picture_options, quality, sources
+from .scene import cameras, effects, facts, instances, mattes, motion, picture_options, quality, sources, steady_effects
 from .viewport import ViewPicture
 
 # How often a render looks whether it was cancelled.
@@ -80,6 +80,8 @@ class NativeWork:
         context, scene = sources.context(), depsgraph.scene
         seen = effects.look(context, scene, placed, camera, camera_object, shutter, meshes)
         rows = effects.plan(context.library, scene, depsgraph.view_layer, depsgraph, seen, camera_object)
+        if self.is_animation:
+            rows = steady_effects.kept(scene, rows)
         return quality.accuracy_of(context.library, scene.stipple.quality_render, rows,
                                    picture_options.is_panoramic(camera))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scenes
-from shots import camera, mesh_between, prepare  # noqa: F401
+from shots import camera, mesh_between, prepare, splat_wall  # noqa: F401
 
 
 def module(stipple, name):
@@ -127,6 +127,94 @@ def test_choices_change_the_picture(stipple, shot, camera, tmp_path):
     affine = scenes.render_pixels(tmp_path, 'affine')
     settings.exact_projection = 'ON'
     assert 0 < np.abs(scenes.render_pixels(tmp_path, 'rays') - affine).mean() < 0.02
+
+
+def crossing(stipple, height=0.2):
+    """A blue wall, and a green object half of which is before it, on the left, and half behind; all of the green one
+    together is a little farther away."""
+    wall = splat_wall(stipple, 'wall', 0.0, colour=(0.1, 0.1, 0.7))
+    wall.location.z = height
+    parts = []
+    for z, x in ((1.0, -0.5), (-1.0, 0.5)):
+        part = splat_wall(stipple, 'part', z, side=1.0)
+        arrays = stipple.scene.splat_data.read(part.data)
+        arrays.positions[:, 0] += x
+        parts.append(arrays)
+        bpy.data.objects.remove(part)
+    both = stipple.binding.cloud.SplatArrays(*(np.concatenate([getattr(part, name) for part in parts])
+                                               for name in ('positions', 'rotations', 'scales', 'opacities', 'sh')))
+    data = stipple.scene.splat_data.new_data('crossing')
+    stipple.scene.splat_data.write(data, both)
+    scenes.link(bpy.data.objects.new('crossing', data))
+    return wall
+
+
+@pytest.mark.parametrize('engine', ('STIPPLE', 'STIPPLE_CYCLES'))
+def test_objects_are_drawn_as_wholes_without_global_ordering(stipple, camera, tmp_path, engine):
+    module(stipple, 'scene.effects').forget()
+    wall = crossing(stipple)
+    scene = prepare(engine)
+    settings = scene.stipple
+    settings.splat_color, settings.zoom_antialiasing = 'SCENE_LINEAR', 'OFF'
+
+    def picture(choice):
+        settings.global_order = choice
+        bpy.context.view_layer.update()
+        return scenes.render_pixels(tmp_path, choice)
+
+    together, auto, apart = (picture(choice) for choice in ('ON', 'AUTO', 'OFF'))
+    np.testing.assert_array_equal(auto, together)
+    assert plan_of(stipple)['GLOBAL_ORDER'].reason.startswith('Off by choice')
+    left, right = (30, 20), (30, 40)
+    assert together[left][1] > 0.5 and together[right][2] > 0.6
+    # Drawn as wholes, the wall is before all of the other.
+    assert apart[left][2] > 0.6 and apart[right][2] > 0.6
+    wall.location.z = 3.0
+    together, auto, apart = (picture(choice) for choice in ('ON', 'AUTO', 'OFF'))
+    np.testing.assert_array_equal(apart, together)
+    np.testing.assert_array_equal(auto, together)
+    settings.global_order = 'AUTO'
+    assert plan_of(stipple)['GLOBAL_ORDER'].reason == 'No two objects share a range of depth'
+
+
+def test_without_global_ordering_meshes_cannot_hide_splats(stipple, camera, tmp_path):
+    crossing(stipple)
+    scenes.quad(size=1.0)
+    scene = prepare('STIPPLE')
+    scene.stipple.global_order = 'OFF'
+    bpy.context.view_layer.update()
+    scenes.refuses(lambda: scenes.render_pixels(tmp_path, 'refused'), 'without global ordering no mesh can hide splats')
+    scene.stipple.meshes_as_mattes = False
+    scenes.render_pixels(tmp_path, 'drawn')
+    scene.stipple.quality_render.order = 'PIXEL'
+    scenes.refuses(lambda: scenes.render_pixels(tmp_path, 'refused'), 'only the order of their centres is allowed')
+
+
+@pytest.mark.parametrize('engine', ('STIPPLE', 'STIPPLE_CYCLES'))
+def test_an_animation_keeps_what_auto_has_switched_on(stipple, camera, tmp_path, engine):
+    """Splats that are smaller than pixels in the second of three frames alone."""
+    wall = splat_wall(stipple, 'wall', 0.0, side=6.0, count=30)
+    scene = prepare(engine, samples=1)
+    scene.stipple.splat_color, scene.stipple.exact_projection = 'SCENE_LINEAR', 'OFF'
+    scenes.write_exact_pictures()
+    for frame, size in ((1, 0.25), (2, 0.05), (3, 0.22)):
+        wall.scale = (size,) * 3
+        wall.keyframe_insert('scale', frame=frame)
+    scene.frame_start, scene.frame_end = 1, 3
+
+    def frames(choice, name):
+        scene.stipple.zoom_antialiasing = choice
+        scene.render.filepath = str(tmp_path / f'{name}_')
+        bpy.ops.render.render(animation=True)
+        return [scenes.picture_pixels(tmp_path / f'{name}_000{frame}.exr') for frame in (1, 2, 3)]
+
+    on, off, auto, again = (frames(*given) for given in (('ON', 'on'), ('OFF', 'off'), ('AUTO', 'auto'), ('AUTO', 'again')))
+    assert all(np.abs(a - b).max() > 1e-3 for a, b in zip(on, off))
+    for found in (auto, again):  # each animation begins anew
+        for picture, expected in zip(found, (off[0], on[1], on[2])):
+            np.testing.assert_array_equal(picture, expected)
+    scene.frame_set(3)
+    np.testing.assert_array_equal(scenes.render_pixels(tmp_path, 'single'), off[2])
 
 
 def test_costs_are_measured_for_active_effects_alone(stipple, shot):
