@@ -45,6 +45,7 @@ StippleStatus stipple_accuracy_report_info(const StippleAccuracyReport* report,
     out.splat_count = made.splat_count;
     out.row_count = made.rows.size();
     out.cut_seconds = made.cut_seconds;
+    out.subject = static_cast<uint32_t>(made.subject);
     deliver(info, out, "info");
   });
 }
@@ -72,6 +73,7 @@ StippleStatus stipple_accuracy_report_row(const StippleAccuracyReport* report, u
     out.visible_count = from.visible_count;
     out.repetitions = from.repetitions;
     out.is_estimated = from.is_estimated ? 1 : 0;
+    out.value = from.value;
     deliver(row, out, "row");
   });
 }

@@ -1,3 +1,5 @@
+#include "api/volume.h"
+
 #include <utility>
 
 #include "api/guard.h"
@@ -10,9 +12,9 @@
 using namespace stipple;
 using namespace stipple::api;
 
-namespace {
+namespace stipple::api {
 
-VoxelizeOptions voxelizeOptions(const StippleVoxelizeOptions* options) {
+VoxelizeOptions voxelizeOptionsFrom(const StippleVoxelizeOptions* options) {
   StippleVoxelizeOptions defaults;
   stipple_voxelize_options_init(&defaults);
   const StippleVoxelizeOptions given = completed(options, defaults, "options");
@@ -25,7 +27,7 @@ VoxelizeOptions voxelizeOptions(const StippleVoxelizeOptions* options) {
   return settings;
 }
 
-}  // namespace
+}  // namespace stipple::api
 
 extern "C" {
 
@@ -48,7 +50,7 @@ StippleStatus stipple_voxelize_start(StippleContext* context, const StippleInsta
     require(context, "context");
     require(job, "job");
     Instances placed = instancesFrom(instances, count);
-    const VoxelizeOptions settings = voxelizeOptions(options);
+    const VoxelizeOptions settings = voxelizeOptionsFrom(options);
     const uint64_t limit = context->state->memory_limit_bytes;
     *job = startJob(context->state,
                     [placed = std::move(placed), settings, limit](Progress& progress) -> JobResult {
@@ -65,7 +67,7 @@ StippleStatus stipple_voxelize_memory_bound(StippleContext* context,
   return guarded([&] {
     require(context, "context");
     const Instances placed = instancesFrom(instances, count);
-    require(bytes, "bytes") = voxelizeMemoryBound(placed.list, voxelizeOptions(options));
+    require(bytes, "bytes") = voxelizeMemoryBound(placed.list, voxelizeOptionsFrom(options));
   });
 }
 

@@ -23,6 +23,22 @@ void requireRows(const AccuracyReport& report) {
     fail(ErrorCode::kInvalidArgument, "the report has no rows to choose from");
 }
 
+struct Words {
+  const char* within;  ///< what no setting does
+  const char* where;
+};
+
+Words wordsOf(AccuracySubject subject) {
+  switch (subject) {
+    case AccuracySubject::kVolume:
+      return {"voxel size fills this volume", "in this volume"};
+    case AccuracySubject::kFit:
+      return {"measurement of this fit came", "in this fit"};
+    default:
+      return {"setting draws this view", "in this view"};
+  }
+}
+
 /// The value below which a share of sorted numbers lies, between two of them in proportion.
 double quantile(const std::vector<double>& sorted, double share) {
   const double place = share * static_cast<double>(sorted.size() - 1);
@@ -63,9 +79,9 @@ size_t bestWithin(const AccuracyReport& report, double seconds) {
   }
   if (!best) {
     const AccuracyRow& least = report.rows[cheapest];
-    fail(ErrorCode::kInvalidArgument, "no setting draws this view within " + timeText(seconds) +
-                                          "; the fastest, " + least.name + ", needs " +
-                                          timeText(least.seconds));
+    fail(ErrorCode::kInvalidArgument, std::string("no ") + wordsOf(report.subject).within +
+                                          " within " + timeText(seconds) + "; the fastest, " +
+                                          least.name + ", needs " + timeText(least.seconds));
   }
   return *best;
 }
@@ -85,9 +101,9 @@ size_t cheapestAbove(const AccuracyReport& report, double psnr) {
     if (!cheapest || row.seconds < report.rows[*cheapest].seconds) cheapest = i;
   }
   if (!cheapest) {
-    fail(ErrorCode::kInvalidArgument, "no setting reaches " + numberText(psnr) +
-                                          " dB in this view; the best has " + numberText(best) +
-                                          " dB");
+    fail(ErrorCode::kInvalidArgument, "no setting reaches " + numberText(psnr) + " dB " +
+                                          wordsOf(report.subject).where + "; the best has " +
+                                          numberText(best) + " dB");
   }
   return *cheapest;
 }

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "data/accuracy_report.h"
 #include "data/fit_history.h"
 #include "io/plot.h"
 
@@ -18,6 +19,12 @@ struct FitReportHead {
 /// the iterations, the measurements, and the result by budget. Numbers that are not finite are
 /// null. Errors: kIo; kInvalidArgument where settings_json is no JSON.
 void writeFitReport(const FitReportHead& head, const FitHistory& history, const std::string& path);
+
+/// What each measurement of a written report cost and brought, in the form of a report of accuracy:
+/// seconds are those of all iterations up to it, errors those of the views that it was measured on.
+/// Errors: kIo; kFormat for a file that is no such report; kInvalidArgument for one of a fit that
+/// measured nothing.
+AccuracyReport readFitAccuracy(const std::string& path);
 
 /// The same as plots: loss, quality on held-out views, quality by budget, number of splats, time by
 /// part, entropy of the density where there is one.

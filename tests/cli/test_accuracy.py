@@ -51,6 +51,38 @@ def test_a_report_is_printed_and_written(view, tmp_path):
     assert (tmp_path / 'r.svg').read_text().startswith('<svg')
 
 
+def test_voxel_sizes_report_in_the_same_form(view, tmp_path):
+    out = run('accuracy', view[0], '--resolution', 48, '--repetitions', 2, '-o', tmp_path / 'v.json', '-o',
+              tmp_path / 'v.csv', '-o', tmp_path / 'v.svg', '--within', 1e9, '--above', 1).stdout
+    lines = out.splitlines()
+    assert 'pixels of three sides compared, 400 splats' in lines[0] and 'voxels' in lines[1]
+    report = json.loads((tmp_path / 'v.json').read_text())
+    assert report['subject'] == 'volume'
+    settings = report['settings']
+    sizes = [setting['voxel_size'] for setting in settings]
+    assert [size / sizes[-1] for size in sizes] == pytest.approx([8, 6, 4, 3, 2, 1.5, 1])
+    assert settings[-1]['psnr'] is None and settings[-1]['largest_error'] == 0, 'the finest judges itself'
+    errors = [setting['psnr'] for setting in settings[:-1]]
+    assert errors[0] < errors[2] < errors[-1] and errors[0] > 5
+    assert settings[0]['voxels'] < settings[-1]['voxels']
+    assert f'best within 1e+09 ms: {settings[-1]["name"]}' in lines
+    rows = list(csv.DictReader((tmp_path / 'v.csv').open()))
+    assert [row['setting'] for row in rows] == [setting['name'] for setting in settings]
+    assert 'milliseconds of a volume' in (tmp_path / 'v.svg').read_text()
+
+
+def test_what_is_measured_needs_what_it_needs(view, tmp_path):
+    splats, camera = view
+    out = ('-o', tmp_path / 'r.json')
+    assert '--camera is needed' in error('accuracy', splats, *out)
+    assert 'splats or --fit REPORT is needed' in error('accuracy', '--resolution', 9, *out)
+    assert '--camera measures a view' in error('accuracy', splats, '--camera', camera, '--resolution', 9, *out)
+    assert 'takes no splats' in error('accuracy', splats, '--fit', camera, *out)
+    assert 'is not the report of a fit' in error('accuracy', '--fit', camera, *out)
+    assert '--resolution is 0; 1 to 65536' in error('accuracy', splats, '--resolution', 0, *out)
+    assert 'no voxel size fills this volume within' in error('accuracy', splats, '--resolution', 9, '--within', 1e-9, *out)
+
+
 @pytest.mark.parametrize('options, text', [
     (('--samples', 0), 'samples_per_side is 0; 1 to 16 is allowed'),
     (('--degree', 5), 'sh_degree_limit is 5; 0 to 4 is allowed'),

@@ -27,6 +27,16 @@ def test_fits_splats_and_reports(dataset, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ['out.ply', 'r.json', 'r.svg']
 
 
+def test_the_report_tells_what_iterations_cost(dataset, tmp_path):
+    run('fit', dataset, tmp_path / 'out.ply', *FEW, '--report', tmp_path / 'r.json')
+    lines = run('accuracy', '--fit', tmp_path / 'r.json', '-o', tmp_path / 'cost.json', '--above', 10).stdout.splitlines()
+    report, fit = (json.loads((tmp_path / name).read_text()) for name in ('cost.json', 'r.json'))
+    assert report['subject'] == 'fit'
+    assert [row['iteration'] for row in report['settings']] == [row['iteration'] for row in fit['measures']]
+    assert report['settings'][-1]['seconds'] == pytest.approx(fit['seconds']['all'], rel=1e-4)
+    assert lines[-1].startswith('cheapest above 10 dB: iteration ')
+
+
 def test_a_model_decodes_at_any_budget(dataset, tmp_path):
     model = tmp_path / 'm.stipple.safetensors'
     run('fit', dataset, model, *FEW)

@@ -1,9 +1,9 @@
 """Renews what docs/accuracy_and_time.md says of the three scenes of blend-fixtures/, and its plots.
 
-    /usr/bin/python3 tests/peers/accuracy.py [--build build/release] [--work FOLDER]
+    /usr/bin/python3 tests/peers/accuracy.py [--build build/release] [--work FOLDER] [--only suzanne|instances|terrain|volume]
 
-Makes splats of each scene in background Blender, measures its view by `stipple accuracy`, and writes the tables between
-the marks of the page and the plots into docs/images. Run it on a machine that does nothing else.
+Makes splats of each scene in background Blender, measures its view by `stipple accuracy`, and voxel sizes of the first,
+and writes the tables between the marks of the page and the plots into docs/images. Run it on a machine that does nothing else.
 """
 import argparse
 import csv
@@ -17,6 +17,8 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'accuracy_and_time.md'
 SCENES = ('suzanne', 'instances', 'terrain')
+VOLUME = 'volume'  # of the first scene
+VOXELS = 256  # along the longest side, of the finest
 ANCHORS, WIDTH, HEIGHT = 200_000, 1280, 720
 
 
@@ -36,12 +38,14 @@ def export(scene, build, work):
                     str(ANCHORS), str(WIDTH), str(HEIGHT)], env=environment, check=True, stdout=subprocess.DEVNULL)
 
 
-def measure(scene, build, work):
+def measure(subject, build, work):
     """Rows of the report, as the CSV has them, and the sentence above its table."""
-    out = subprocess.run([build / 'bin' / 'stipple', 'accuracy', work / f'{scene}.ply', '--camera', work / f'{scene}.json',
-                          '-o', work / f'{scene}.csv', '-o', ROOT / 'docs' / 'images' / f'accuracy_{scene}.svg',
-                          '--seconds', '15'], check=True, capture_output=True, text=True).stdout
-    return list(csv.DictReader((work / f'{scene}.csv').open())), out.splitlines()[0]
+    scene = SCENES[0] if subject == VOLUME else subject
+    what = ['--resolution', str(VOXELS)] if subject == VOLUME else ['--camera', work / f'{scene}.json']
+    out = subprocess.run([build / 'bin' / 'stipple', 'accuracy', work / f'{scene}.ply', *what, '-o', work / f'{subject}.csv',
+                          '-o', ROOT / 'docs' / 'images' / f'accuracy_{subject}.svg', '--seconds', '15'], check=True,
+                         capture_output=True, text=True).stdout
+    return list(csv.DictReader((work / f'{subject}.csv').open())), out.splitlines()[0]
 
 
 def milliseconds(row):
@@ -50,12 +54,13 @@ def milliseconds(row):
 
 
 def table(rows):
-    lines = ['| setting | ms | PSNR, dB | largest error | 99.9 % | splats | |', '|---|---|---|---|---|---|---|']
+    counted = 'voxels' if 'voxels' in rows[0] else 'splats'
+    lines = [f'| setting | ms | PSNR, dB | largest error | 99.9 % | {counted} | |', '|---|---|---|---|---|---|---|']
     for row in rows:
         estimated = ' (estimated)' if row['is_estimated'] == '1' else ''
         front = 'best for its time' if row['on_front'] == '1' else ''
         lines.append(f"| {row['setting']} | {milliseconds(row)}{estimated} | {float(row['psnr']):.1f} | "
-                     f"{float(row['largest_error']):.2g} | {float(row['error_99_9']):.2g} | {int(row['splats']):,} | {front} |")
+                     f"{float(row['largest_error']):.2g} | {float(row['error_99_9']):.2g} | {int(row[counted]):,} | {front} |")
     return '\n'.join(lines)
 
 
@@ -63,17 +68,18 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--build', type=pathlib.Path, default=ROOT / 'build' / 'release')
     parser.add_argument('--work', type=pathlib.Path)
+    parser.add_argument('--only', choices=(*SCENES, VOLUME))
     options = parser.parse_args()
     work = (options.work or pathlib.Path(tempfile.mkdtemp(prefix='stipple-accuracy-'))).resolve()
     work.mkdir(parents=True, exist_ok=True)
     page = PAGE.read_text()
-    for scene in SCENES:
-        export(scene, options.build, work)
-        rows, head = measure(scene, options.build, work)
-        made = f'<!-- {scene} -->\n{head}.\n\n{table(rows)}\n\n![{scene}](images/accuracy_{scene}.svg)\n<!-- end -->'
-        page, count = re.subn(rf'<!-- {scene} -->.*?<!-- end -->', lambda _: made, page, flags=re.S)
+    for subject in (options.only,) if options.only else (*SCENES, VOLUME):
+        export(SCENES[0] if subject == VOLUME else subject, options.build, work)
+        rows, head = measure(subject, options.build, work)
+        made = f'<!-- {subject} -->\n{head}.\n\n{table(rows)}\n\n![{subject}](images/accuracy_{subject}.svg)\n<!-- end -->'
+        page, count = re.subn(rf'<!-- {subject} -->.*?<!-- end -->', lambda _: made, page, flags=re.S)
         if count != 1:
-            sys.exit(f'{PAGE} has {count} places for {scene}; 1 is expected')
+            sys.exit(f'{PAGE} has {count} places for {subject}; 1 is expected')
     PAGE.write_text(page)
 
 

@@ -131,6 +131,12 @@ class AccuracyLevel(IntEnum):
     REFERENCE = 3
 
 
+class AccuracySubject(IntEnum):
+    PICTURE = 0
+    VOLUME = 1
+    FIT = 2
+
+
 class SplatOrder(IntEnum):
     CENTRE = 0
     PIXEL = 1
@@ -202,6 +208,7 @@ ENUMS = {
     'StippleOutputColour': (OutputColour, 'STIPPLE_OUTPUT_'),
     'StippleRenderMethod': (RenderMethod, 'STIPPLE_RENDER_'),
     'StippleAccuracyLevel': (AccuracyLevel, 'STIPPLE_ACCURACY_'),
+    'StippleAccuracySubject': (AccuracySubject, 'STIPPLE_ACCURACY_OF_'),
     'StippleSplatOrder': (SplatOrder, 'STIPPLE_ORDER_'),
     'StippleProjection': (Projection, 'STIPPLE_PROJECTION_'),
     'StippleSampling': (Sampling, 'STIPPLE_SAMPLING_'),

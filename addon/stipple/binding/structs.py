@@ -242,7 +242,11 @@ class StippleAccuracyMeasureOptions(_Sized):
 class StippleAccuracyReportInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('width', c_uint32), ('height', c_uint32), ('thread_count', c_uint32),
                 ('compared_pixels', c_uint64), ('splat_count', c_uint64), ('row_count', c_uint64),
-                ('cut_seconds', c_double)]
+                ('cut_seconds', c_double), ('subject', c_uint32), ('reserved', c_uint32)]
+
+
+class StippleVolumeAccuracyOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('repetitions', c_uint32), ('most_seconds', c_double)]
 
 
 class StippleAccuracyRow(_Sized):
@@ -250,7 +254,7 @@ class StippleAccuracyRow(_Sized):
                 ('setting', StippleAccuracy), ('seconds', c_double), ('seconds_low', c_double),
                 ('seconds_high', c_double), ('psnr', c_double), ('largest_error', c_double), ('error_99_9', c_double),
                 ('splat_count', c_uint64), ('visible_count', c_uint64), ('repetitions', c_uint32),
-                ('is_estimated', c_uint32)]
+                ('is_estimated', c_uint32), ('value', c_double)]
 
 
 class StippleMeshInstance(_Sized):

@@ -955,7 +955,14 @@ StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
 
 /* ---- what accuracy costs --------------------------------------------------------------------------- */
 
-typedef struct StippleAccuracyReport StippleAccuracyReport; /* a view, measured */
+typedef struct StippleAccuracyReport StippleAccuracyReport; /* a view, a volume or a fit, measured */
+
+/* What the rows of a report are settings of. */
+typedef enum StippleAccuracySubject {
+  STIPPLE_ACCURACY_OF_PICTURE = 0, /* judged by the reference */
+  STIPPLE_ACCURACY_OF_VOLUME = 1,  /* by voxel size */
+  STIPPLE_ACCURACY_OF_FIT = 2      /* by iterations */
+} StippleAccuracySubject;
 
 typedef struct StippleAccuracyMeasureOptions {
   uint32_t struct_size;
@@ -982,6 +989,9 @@ typedef struct StippleAccuracyReportInfo {
   uint64_t splat_count;       /* of all clouds */
   uint64_t row_count;
   double cut_seconds;         /* merging clouds for budget_share: once, and in no row's time */
+  uint32_t subject;           /* StippleAccuracySubject; width and height are 0 of volumes and fits, thread_count of
+                                 fits */
+  uint32_t reserved;
 } StippleAccuracyReportInfo;
 
 typedef struct StippleAccuracyRow {
@@ -999,6 +1009,9 @@ typedef struct StippleAccuracyRow {
   uint64_t visible_count;     /* of them in view */
   uint32_t repetitions;
   uint32_t is_estimated;      /* 1: seconds follow from the compared pixels; the picture was not drawn whole */
+  double value;               /* of a volume: voxel size, metres, splat_count its voxels that are not empty; of a fit:
+                                 iterations, largest_error and error_99_9 NaN; of pictures 0. Of volumes and fits
+                                 `setting` says nothing */
 } StippleAccuracyRow;
 
 /* Draws instances [count] from a camera at every setting, and against the reference, as a job. In: render, or NULL:
@@ -1010,6 +1023,10 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context, const Stip
                                              uint64_t count, const StippleCamera* camera,
                                              const StippleRenderOptions* render,
                                              const StippleAccuracyMeasureOptions* options, StippleJob** job);
+/* What the iterations of a fit cost and brought, from the report that stipple_fit_report_save has written: a row for
+ * each measurement; nothing is fitted again. Errors: IO; FORMAT for another file; UNSUPPORTED for a newer report;
+ * INVALID_ARGUMENT where nothing was measured. */
+StippleStatus stipple_fit_accuracy_report(const char* path_utf8, StippleAccuracyReport** report);
 /* The result of a job of measuring that has ended well. */
 StippleStatus stipple_job_accuracy_report(const StippleJob* job, StippleAccuracyReport** report);
 void stipple_accuracy_report_free(StippleAccuracyReport* report);
@@ -1618,6 +1635,21 @@ StippleStatus stipple_voxelize_start(StippleContext* context, const StippleInsta
 StippleStatus stipple_voxelize_memory_bound(StippleContext* context, const StippleInstance* instances,
                                             uint64_t count, const StippleVoxelizeOptions* options,
                                             uint64_t* bytes);
+typedef struct StippleVolumeAccuracyOptions {
+  uint32_t struct_size;
+  uint32_t repetitions; /* 1..1000, default 5: timings of each voxel size, in turns */
+  double most_seconds;  /* default 60; no further turn begins after so many seconds of them */
+} StippleVolumeAccuracyOptions;
+void stipple_volume_accuracy_options_init(StippleVolumeAccuracyOptions* options);
+/* What the voxel size of a volume costs, as a job (stipple_job_accuracy_report): voxels of the size that `finest` says
+ * (NULL: its defaults), then 1.5, 2, 3, 4, 6 and 8 times as large; the finest is the last row and judges the others.
+ * Compared is how the volumes look along their three axes, blended front to back at the pixels of the finest, in
+ * display values. A cancel waits for the volume that is being filled. Errors of the start: INVALID_ARGUMENT; of the
+ * job: those of stipple_voxelize_start. Threads and determinism: errors are the same for any number of threads.
+ * Cost: about 1.5 repetitions times that of the finest. docs/accuracy_and_time.md. */
+StippleStatus stipple_volume_accuracy_start(StippleContext* context, const StippleInstance* instances,
+                                            uint64_t count, const StippleVoxelizeOptions* finest,
+                                            const StippleVolumeAccuracyOptions* options, StippleJob** job);
 void stipple_volume_free(StippleVolume* volume);
 StippleStatus stipple_volume_info(const StippleVolume* volume, StippleVolumeInfo* info);
 /* OpenVDB file with the grids `density` and `color`. */

@@ -6,6 +6,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
+#include "io/accuracy_file.h"
 #include "io/svg_plot.h"
 #include "scratch_folder.h"
 
@@ -121,6 +123,64 @@ TEST(SvgPlot, ShowsOneValueAndLogarithms) {
   const std::string svg = svgOf(sheetOf({panel}));
   EXPECT_NE(svg.find(">1000<"), std::string::npos);
   EXPECT_NE(svg.find(">0.01<"), std::string::npos);
+}
+
+TEST_F(FitReportFile, TellsWhatIterationsCostAndBrought) {
+  const FitHistory made = history(1000);
+  writeFitReport({"explicit", "adaptive", "{}"}, made, path("fit.json"));
+  const AccuracyReport report = readFitAccuracy(path("fit.json"));
+  EXPECT_EQ(report.subject, AccuracySubject::kFit);
+  ASSERT_EQ(report.rows.size(), 10u);
+  double seconds = 0;
+  for (size_t i = 0; i < 1000; ++i) {
+    const FitRecord& r = made.records[i];
+    for (const float part : {r.render_seconds, r.backward_seconds, r.field_seconds,
+                             r.optimiser_seconds, r.edit_seconds, r.other_seconds}) {
+      seconds += static_cast<double>(part);
+    }
+    if ((i + 1) % 100 != 0) continue;
+    const AccuracyRow& row = report.rows[i / 100];
+    EXPECT_EQ(row.name, "iteration " + std::to_string(i + 1));
+    EXPECT_EQ(row.value, static_cast<double>(i + 1));
+    EXPECT_NEAR(row.seconds, seconds, 1e-5 * seconds);  // six digits are written
+    EXPECT_NEAR(row.psnr, made.measures[i / 100].psnr, 1e-9);
+    EXPECT_EQ(row.splat_count, made.records[i].splat_count);
+    EXPECT_TRUE(std::isnan(row.largest_error)) << "no fit writes it down";
+    EXPECT_TRUE(row.is_on_front) << "this one only gets better";
+  }
+  EXPECT_EQ(bestWithin(report, report.rows[4].seconds * 1.001), 4u);
+  EXPECT_EQ(cheapestAbove(report, made.measures[6].psnr), 6u);
+  writeAccuracyReport(report, path("cost.json"));
+  writeAccuracyReport(report, path("cost.csv"));
+  writeAccuracyReport(report, path("cost.svg"));
+  const auto json = nlohmann::json::parse(load(path("cost.json")));
+  EXPECT_EQ(json["subject"], "fit");
+  EXPECT_EQ(json["settings"][3]["iteration"], 400);
+  EXPECT_TRUE(json["settings"][3]["largest_error"].is_null());
+  EXPECT_NE(load(path("cost.svg")).find("seconds of a fit"), std::string::npos);
+}
+
+TEST_F(FitReportFile, OtherFilesAreNoCosts) {
+  const auto refused = [&](const std::string& text, const char* why) {
+    const std::string file = store("other.json", text);
+    try {
+      readFitAccuracy(file);
+      ADD_FAILURE() << text;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
+    }
+  };
+  refused("{}", "is not the report of a fit");
+  refused("[1", "is not the report of a fit");
+  refused(R"({"stipple_fit_report": 2})", "it is of version 2; 1 is what this library reads");
+  const std::string head = R"({"stipple_fit_report": 1, "iterations": 2, "measures": )";
+  refused(head + R"([], "by_iteration": {"seconds": {"render": [1, 2]}}})", "0 measurements");
+  refused(head + R"([], "by_iteration": {"seconds": {"render": [1]}}})",
+          "1 times for 2 iterations");
+  refused(head + R"([{"iteration": 3, "psnr": 1, "gaussians": 1}],
+                 "by_iteration": {"seconds": {"render": [1, 2]}}})",
+          "it measured iteration 3 of 2");
+  EXPECT_THROW(readFitAccuracy(path("none.json")), Error);
 }
 
 }  // namespace

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <stipple/stipple.h>
+
+#include "splat/voxelize.h"
+
+namespace stipple::api {
+
+/// In: the caller's, or NULL. Errors: kInvalidArgument.
+VoxelizeOptions voxelizeOptionsFrom(const StippleVoxelizeOptions* options);
+
+}  // namespace stipple::api
