@@ -191,7 +191,8 @@ def test_render_draws_files_apart(scene):
     both = scene / 'cube.ply', scene / 'k4.ply', '--camera', scene / 'transforms.json'
     run('render', *both, '-o', scene / 'together.exr')
     run('render', *both, '-o', scene / 'apart.exr', '--objects', 'apart')
-    assert figures('compare', scene / 'together.exr', scene / 'apart.exr')['psnr'] < 60
+    # Two clouds of one surface, of one colour: the order shows a little, and only the same order draws the same bits.
+    assert figures('compare', scene / 'together.exr', scene / 'apart.exr')['max_error'] > 1e-5
     message = error('render', *both, '-o', scene / 'never.exr', '--objects', 'apart', '--accuracy', 'rays')
     assert 'only the order of their centres is allowed' in message and not (scene / 'never.exr').exists()
     alone = scene / 'cube.ply', '--camera', scene / 'transforms.json', '--accuracy', 'rays'
