@@ -144,5 +144,27 @@ TEST(EffectsStability, EqualDepthsAndTenThousandLayersAreAveragedSoundly) {
   }
 }
 
+TEST(EffectsStability, HardObjectsAreDrawnApart) {
+  const SplatCloud cloud = hardCloud(), empty;
+  // Twice at one place, nothing, a million metres away, and as large.
+  std::vector<SplatInstance> instances(5, SplatInstance{&cloud});
+  instances[2].cloud = &empty;
+  instances[3].object_to_world(1, 3) = 1e6;
+  instances[4].object_to_world.topLeftCorner<3, 3>() *= 1e6;
+  RenderOptions options = everything();
+  options.object_order = ObjectOrder::kApart;
+  RayOptions rays;
+  rays.order = RayOrder::kCentre;
+  for (const CameraModel model : {CameraModel::kPerspective, CameraModel::kOrthographic}) {
+    Camera camera = frontCamera(33, 33, 20, 2);
+    camera.model = model;
+    expectWithinTheHull(renderTiled(instances, camera, options), brightestOf(cloud));
+    expectWithinTheHull(renderRays(instances, camera, options, rays), brightestOf(cloud));
+  }
+  expectWithinTheHull(
+      renderRays(instances, around(CameraModel::kEquirectangular, 33), options, rays),
+      brightestOf(cloud));
+}
+
 }  // namespace
 }  // namespace stipple
