@@ -76,6 +76,8 @@ std::vector<StippleAccuracy> usualAccuracies(const Camera& camera) {
   add([](StippleAccuracy& a) { a.budget_share = 0.5; });
   add([](StippleAccuracy& a) { a.budget_share = 0.25; });
   add([](StippleAccuracy& a) { a.budget_share = 0.1; });
+  add([](StippleAccuracy& a) { a.least_alpha = 0.02; });
+  add([](StippleAccuracy& a) { a.least_alpha = 1e-4; });
   add([](StippleAccuracy& a) { a.order = STIPPLE_ORDER_PIXEL; });
   add([](StippleAccuracy& a) { a.projection = STIPPLE_PROJECTION_RAY; });
   add([](StippleAccuracy& a) {

@@ -219,6 +219,29 @@ void alongRays(benchmark::State& state, const SplatCase& c) {
   state.counters["ratio_double_to_rays_per_pixel"] = per_pixel * pixels / both;
 }
 
+/// A cut-off of 1e-4 against the ray tiles, which follow every splat at every pixel of its reach,
+/// and against 1/255 and a cut-off of 0.02: coarser must not be slower.
+void atCutOff(benchmark::State& state, const SplatCase& c) {
+  const SplatInstance instance{&cloudOf(c)};
+  const Camera camera = cameraOf(c);
+  const TileKernel kernel = chosenTileKernel();
+  RenderOptions fine, coarse;
+  fine.least_alpha = 1e-4;
+  coarse.least_alpha = 0.02;
+  RayOptions rays;
+  rays.order = RayOrder::kCentre;
+  rays.projection = RayProjection::kAffine;
+  rays.limits.least_alpha = fine.least_alpha;
+  draw(c, kernel, 2, fine);
+  compareWithAll(
+      state, [&] { draw(c, kernel, 2, fine); },
+      {{"usual", 0, [&] { draw(c, kernel, 2); }},
+       {"coarse", 0, [&] { draw(c, kernel, 2, coarse); }},
+       {"rays", 3, [&] {
+          withThreads(2, [&] { renderRayTiles({&instance, 1}, camera, {}, rays, nullptr); });
+        }}});
+}
+
 void add(const std::string& name, void (*run)(benchmark::State&, const SplatCase&),
          const SplatCase& c, int iterations) {
   benchmark::RegisterBenchmark(name.c_str(), run, c)
@@ -234,6 +257,7 @@ const bool registered = [] {
     add(std::string("splat.forward_avx2_") + c.name, againstNarrow, c, 2);
     add(std::string("splat.forward_scalar_") + c.name, againstScalar, c, 2);
     add(std::string("splat.rays_") + c.name, alongRays, c, 2);
+    add(std::string("splat.cut_off_") + c.name, atCutOff, c, kRepeats);
     add(std::string("splat.surface_") + c.name, withSurface, c, kRepeats);
     add(std::string("splat.holdout_") + c.name, asHoldout, c, kRepeats);
   }

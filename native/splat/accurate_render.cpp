@@ -17,6 +17,8 @@ namespace stipple {
 namespace {
 
 constexpr size_t kRowGrain = 4;
+/// Fainter ones, ten thousand at a pixel, change nothing in single precision.
+constexpr double kLeastTiledAlpha = 1e-12;
 
 void requireSamples(const RenderAccuracy& accuracy, const Camera& camera) {
   const uint64_t n = accuracy.samples_per_side;
@@ -192,7 +194,6 @@ bool isTiled(const RenderAccuracy& accuracy) {
   const BlendLimits usual;
   return accuracy.order == RayOrder::kCentre && accuracy.projection == RayProjection::kAffine &&
          accuracy.precision == Precision::kFloat &&
-         accuracy.limits.least_alpha == usual.least_alpha &&
          accuracy.limits.most_alpha == usual.most_alpha && accuracy.limits.ends_early;
 }
 
@@ -229,7 +230,9 @@ void renderAccurate(std::span<const SplatInstance> instances, const Camera& came
                    progress);
     Averaging(large, n, camera, result).run();
   } else if (isTiled(accuracy)) {
-    renderTiled(instances, camera, options, workspace, result, progress);
+    RenderOptions tiled_options = options;
+    tiled_options.least_alpha = std::max(accuracy.limits.least_alpha, kLeastTiledAlpha);
+    renderTiled(instances, camera, tiled_options, workspace, result, progress);
   } else if (accuracy.precision == Precision::kFloat && hasImagePlane(camera)) {
     result = renderRayTiles(instances, camera, options, rayOptions(accuracy), progress);
   } else {

@@ -7,7 +7,7 @@
 // The one blending equation. A splat is a Gaussian of pixel coordinates with opacity o; with
 // q = d^T C^-1 d, C its projected covariance and d the pixel centre minus the projected centre,
 //   alpha = min(0.99, o exp(-q/2)),
-// skipped below 1/255. Splats come front to back; T starts at 1:
+// skipped below 1/255, or what the picture's cut-off is. Splats come front to back; T starts at 1:
 //   colour += T alpha c,   T <- T (1 - alpha),
 // and a splat that would bring T below 1e-4 is left out and ends the pixel.
 //
@@ -49,13 +49,13 @@ T halfSquaredDistance(const Footprint<T>& footprint, T dx, T dy) {
   return T(0.5) * (g0 * g0 + g1 * g1);
 }
 
-/// Alpha of a splat at one pixel, 0 where it is skipped.
+/// Alpha of a splat at one pixel, 0 where it is skipped. In: least, what still counts.
 template <typename T>
-T splatAlpha(T opacity, T half_squared_distance) {
-  // exp(-6) is below 1/255: far pixels need no exponential (and do not underflow).
-  if (!(half_squared_distance < T(6))) return T(0);
+T splatAlpha(T opacity, T half_squared_distance, T least = T(kMinAlpha)) {
+  // exp(-6) is below 1/255: far pixels need no exponential. Below any other cut-off, 0 does.
+  if (!(half_squared_distance < (least < T(kMinAlpha) ? T(700) : T(6)))) return T(0);
   const T alpha = std::min(T(kMaxAlpha), opacity * std::exp(-half_squared_distance));
-  return alpha < T(kMinAlpha) ? T(0) : alpha;
+  return alpha < least ? T(0) : alpha;
 }
 
 /// The depth of a splat that its place between surfaces goes by.

@@ -26,6 +26,7 @@ struct View {
   T fx, fy, cx, cy;
   T width, height;
   T near_plane, far_plane;
+  T least_alpha = T(kMinAlpha);  ///< fainter splats are skipped
   // x/z and y/z in the Jacobian are held inside the picture's own frustum, widened about its middle
   // by 1.3 (so for a centred camera |x/z| <= 1.3 tan(fov/2), as splats are trained). An off-centre
   // camera has its limits about the middle of the picture, not about the optical axis.
@@ -62,7 +63,7 @@ View<T> makeView(const Camera& camera) {
 template <typename T>
 struct Projected {
   Footprint<T> footprint;
-  T half_x;  ///< pixels: |dx| of every pixel with alpha >= 1/255 is at most this
+  T half_x;  ///< pixels: |dx| of every pixel with the least alpha or more is at most this
   T half_y;
   T depth;  ///< view z of the centre, metres
 };
@@ -109,7 +110,8 @@ CovarianceFactor<T> factorise(const Eigen::Matrix<T, 2, 3>& a, T variance) {
 
 /// Projects splat (position [3] object space, rotation w,x,y,z, scales [3]) under the
 /// object-to-view matrix linear|translation. Returns false where the splat cannot show: centre
-/// outside near..far, alpha below 1/255 everywhere, outside the picture, thinner than kMinWidth.
+/// outside near..far, alpha below the least everywhere, outside the picture, thinner than
+/// kMinWidth.
 template <typename T>
 bool project(const View<T>& view, const Eigen::Matrix<T, 3, 3>& linear,
              const Eigen::Matrix<T, 3, 1>& translation, const float* position,
@@ -120,13 +122,13 @@ bool project(const View<T>& view, const Eigen::Matrix<T, 3, 3>& linear,
   std::copy(rotation, rotation + 4, splat.rotation);
   std::copy(scales, scales + 3, splat.scales);
   splat.opacity = opacity;
-  if (!(splat.opacity >= T(kMinAlpha))) return false;
+  if (!(splat.opacity >= view.least_alpha)) return false;
   T centre[3];
   placePoint(linear, translation, splat.position, centre);
   if (!(centre[2] >= view.near_plane && centre[2] <= view.far_plane)) return false;
   if (!(projectSteps(view, linear, centre, splat, low_pass, out) > T(kMinWidth))) return false;
   const Footprint<T>& f = out.footprint;
-  return f.opacity >= T(kMinAlpha) && f.mean_x + out.half_x >= T(0.5) &&
+  return f.opacity >= view.least_alpha && f.mean_x + out.half_x >= T(0.5) &&
          f.mean_x - out.half_x <= view.width - T(0.5) && f.mean_y + out.half_y >= T(0.5) &&
          f.mean_y - out.half_y <= view.height - T(0.5);
 }

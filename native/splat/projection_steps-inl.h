@@ -117,8 +117,9 @@ T projectSteps(const View<S>& view, const Eigen::Matrix<S, 3, 3>& linear, const 
   footprint.l11 = inverse_r11;
   footprint.l10 = T(0) - factor.r01 * inverse_r00 * inverse_r11;
 
-  // q/2 <= ln(255 o) is an ellipse; its half sides are sqrt(2 ln(255 o)) standard deviations.
-  const T least = T(S(kMinAlpha));
+  // q/2 <= ln(o / least) is an ellipse; its half sides are sqrt(2 ln(o / least)) standard
+  // deviations.
+  const T least = T(view.least_alpha);
   const T reach = sqrt(T(2) * log(max(footprint.opacity, least) / least));
   const T sigma_y = sqrt(factor.r01 * factor.r01 + factor.r11 * factor.r11);
   out.half_x = reach * factor.r00 + boundMargin(reach * factor.r00);

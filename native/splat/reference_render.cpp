@@ -67,7 +67,7 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
     advance(progress, static_cast<double>(y) / camera.height, "Rendering the reference");
     const double py = y + 0.5;
     // Leaving out splats beyond half_y, and below beyond half_x, cannot change the picture: their
-    // alpha there is under 1/255 and splatAlpha would skip them.
+    // alpha there is under the least and splatAlpha would skip them.
     row.clear();
     for (const ReferenceSplat& splat : splats) {
       const Projected<double>& p = splat.projected;
@@ -83,7 +83,8 @@ ReferenceResult renderReference(std::span<const SplatInstance> instances, const 
         const double dx = px - p.footprint.mean_x;
         if (std::abs(dx) > p.half_x) continue;
         const double alpha = splatAlpha(
-            p.footprint.opacity, halfSquaredDistance(p.footprint, dx, py - p.footprint.mean_y));
+            p.footprint.opacity, halfSquaredDistance(p.footprint, dx, py - p.footprint.mean_y),
+            options.least_alpha);
         if (!(alpha > 0)) continue;
         if (!pixel.add(alpha, splat->colour, p.depth, splat->is_holdout)) break;
         if (!splat->is_holdout) passes.add(pixel.weight(), splat->normal, splat->object);

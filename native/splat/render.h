@@ -67,6 +67,7 @@ struct RenderOptions {
   ObjectOrder object_order = ObjectOrder::kTogether;
   int sh_degree_limit = kMaxShDegree;  ///< harmonics above this degree are left out
   double background[3] = {0, 0, 0};  ///< in the blending space; used under the final transmittance
+  double least_alpha = 1.0 / 255.0;  ///< fainter splats are skipped at a pixel; above 0, below 1
   bool with_background = false;      ///< true: background is composited and alpha becomes 1
   bool with_depth = true;
   bool with_median_depth = false;

@@ -35,6 +35,10 @@ void validateOptions(const RenderOptions& options) {
          "object_order is " + std::to_string(static_cast<uint32_t>(options.object_order)) +
              "; 0 or 1 is allowed");
   }
+  if (!(options.least_alpha > 0 && options.least_alpha < 1)) {
+    fail(ErrorCode::kInvalidArgument, "least_alpha is " + std::to_string(options.least_alpha) +
+                                          "; a number above 0 and below 1 is allowed");
+  }
   for (const double value : options.background) requireFinite(value, "background");
 }
 
@@ -80,6 +84,7 @@ void placeUnread(std::span<const SplatInstance> instances, const Camera& camera,
   validateOptions(options);
   validateSurface(options.surface, camera);
   scene.view = makeView<double>(camera);
+  scene.view.least_alpha = options.least_alpha;
   scene.view_to_world = linearPart(camera.world_to_camera).transpose();
   scene.clouds.clear();
   scene.splat_count = 0;

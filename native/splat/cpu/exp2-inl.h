@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace stipple {
 namespace HWY_NAMESPACE {
 
-/// 2^x for x in -10..1, relative error below 3e-7: 2^f by its Taylor polynomial of degree 6 for
+/// 2^x for x in -120..1, relative error below 3e-7: 2^f by its Taylor polynomial of degree 6 for
 /// |f| <= 1/2 (remainder (f ln 2)^7/7! = 1.2e-7), then f's whole part added to the exponent.
 template <class Tag, class Vec = hwy::HWY_NAMESPACE::Vec<Tag>>
 HWY_INLINE Vec exp2Small(Tag d, Vec x) {

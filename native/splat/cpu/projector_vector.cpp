@@ -179,7 +179,7 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
     Double centre[3];
     placePoint(placed.linear, placed.translation, splat.position, centre);
     auto shows =
-        hn::And(splat.opacity >= Double(kMinAlpha),
+        hn::And(splat.opacity >= Double(view.least_alpha),
                 hn::And(centre[2] >= Double(view.near_plane), Double(view.far_plane) >= centre[2]));
     if (hn::AllFalse(d, shows)) continue;
     for (Double& value : centre) value = pick(shows, value, one);
@@ -188,7 +188,8 @@ size_t projectRows(const PlacedScene& scene, const PlacedCloud& placed, size_t b
         HWY_NAMESPACE::projectSteps(view, placed.linear, centre, splat, placed.low_pass, out);
     const Footprint<Double>& f = out.footprint;
     const Double half_pixel(0.5);
-    shows = hn::And(shows, hn::And(narrowest > Double(kMinWidth), f.opacity >= Double(kMinAlpha)));
+    shows = hn::And(shows,
+                    hn::And(narrowest > Double(kMinWidth), f.opacity >= Double(view.least_alpha)));
     shows = hn::And(shows, hn::And(f.mean_x + out.half_x >= half_pixel,
                                    Double(view.width) - half_pixel >= f.mean_x - out.half_x));
     shows = hn::And(shows, hn::And(f.mean_y + out.half_y >= half_pixel,

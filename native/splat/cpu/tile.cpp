@@ -15,7 +15,8 @@ namespace {
 /// Everything but finish_doubt and what gatherTileSplats copies. Returns the size of g and l.
 float fillTileSplat(const double (&fields)[kTileSplatFields], const Tile& tile, TileSplat& out) {
   TileSplatSteps<double> made;
-  tileSplatSteps(fields, tile.x0 + 0.5, tile.y0 + 0.5, made);
+  tileSplatSteps(fields, tile.x0 + 0.5, tile.y0 + 0.5, static_cast<double>(tile.cut_off.reach),
+                 made);
   out.g0 = static_cast<float>(made.g0);
   out.g1 = static_cast<float>(made.g1);
   out.l00 = static_cast<float>(made.l00);
@@ -29,6 +30,25 @@ float fillTileSplat(const double (&fields)[kTileSplatFields], const Tile& tile, 
 }
 
 }  // namespace
+
+float TileCutOff::medianDoubt(size_t count) const {
+  if (most_splats == 2350) return kMedianDoubt;
+  // ln 2 of ln 1e4: 177 splats of 1/255.
+  const size_t most = std::min(count, most_splats / 13);
+  return kMedianDoubt * reach + 1.2e-7f * static_cast<float>(most);
+}
+
+TileCutOff cutOffOf(double least_alpha) {
+  TileCutOff cut_off;
+  cut_off.least_alpha = least_alpha;
+  if (least_alpha == kMinAlpha) return cut_off;
+  cut_off.log2_least = static_cast<float>(std::log2(least_alpha));
+  if (least_alpha > kMinAlpha) return cut_off;
+  cut_off.reach = static_cast<float>(std::max(1.0, std::sqrt(-std::log2(least_alpha)) / 2.82));
+  cut_off.most_splats =
+      static_cast<size_t>(std::log(kMinTransmittance) / std::log1p(-least_alpha)) + 1;
+  return cut_off;
+}
 
 Tile tileOf(const TileGrid& grid, size_t index, std::span<const uint32_t> splats) {
   Tile tile;
@@ -72,7 +92,8 @@ void makeTileSplats(const VisibleSplat* visible, const Tile& tile, size_t begin,
     const size_t here = std::min(kTileSplatBatch, count - first);
     const float seen = maker(visible, tile, begin + first, here, out + first);
     largest = std::max(largest, std::min(seen, kMaxFloatReach));
-    const float doubt = finishDoubt(largest, begin + first + here);
+    const float doubt =
+        finishDoubt(largest, begin + first + here, tile.cut_off.reach, tile.cut_off.most_splats);
     for (size_t i = 0; i < here; ++i) out[first + i].finish_doubt = doubt;
   }
 }
@@ -81,7 +102,7 @@ double alphaInDouble(const SplatSlots& slots, uint32_t slot, const Tile& tile, u
                      uint32_t y) {
   double distance;
   if (!mayShow(slots.splats[slot], tile, x, y, distance)) return 0.0;
-  return splatAlpha(slots.extras[slot].opacity, distance);
+  return splatAlpha(slots.extras[slot].opacity, distance, tile.cut_off.least_alpha);
 }
 
 void clearPixels(const Tile& tile, TilePixels& pixels) {

@@ -14,6 +14,7 @@ struct Tile {
   uint32_t width, height;            ///< pixels inside the picture
   std::span<const uint32_t> splats;  ///< slots of visible splats, front to back
   size_t listed_behind = 0;  ///< slots that lie in memory right behind them: the next tile's
+  TileCutOff cut_off = {};
 };
 
 /// Calls use(pixel of the tile, pixel of the picture) for those of the tile inside the picture.
@@ -50,7 +51,7 @@ inline bool mayShow(const VisibleSplat& splat, const Tile& tile, uint32_t x, uin
                                    splat.l10,    splat.l11,    1.0};
   distance = halfSquaredDistance(shape, dx, dy);
   constexpr double kLog2e = 1.4426950408889634, kRounding = 1e-4;
-  const double log2_reach = static_cast<double>(splat.log2_opacity - kLog2MinAlpha);
+  const double log2_reach = static_cast<double>(splat.log2_opacity - tile.cut_off.log2_least);
   return distance * kLog2e <= log2_reach + kRounding;
 }
 

@@ -16,8 +16,8 @@ struct alignas(16) TileSplat {
   float g0, g1;
   float l00, l10, l11;
   /// A pixel is in doubt where the exponent lies within doubt_low below or doubt_high above the
-  /// threshold log2(1/255): there rounding could decide. doubt_high is huge for splats so thin that
-  /// float32 cannot give their alpha at all.
+  /// threshold, TileCutOff::log2_least: there rounding could decide. doubt_high is huge for splats
+  /// so thin that float32 cannot give their alpha at all.
   float doubt_low, doubt_high;
   /// Relative distance to 1e-4 within which the end of a pixel is in doubt: finishDoubt of the
   /// splats up to this one, or more.
@@ -38,8 +38,8 @@ struct TilePixels {
   /// Sum of w: 1 - transmittance, but with all its digits where little covers the pixel.
   alignas(64) float coverage[kTilePixelCount];
   alignas(64) float median_depth[kTilePixelCount];  ///< kNoMedian until it is known
-  alignas(64) float count[kTilePixelCount];         ///< at most 2,350 splats blend: exact
-  /// Smallest exponent that still blends: kLog2MinAlpha, or kFinished once nothing more may.
+  alignas(64) float count[kTilePixelCount];         ///< below 2^24: exact
+  /// kLog2MinAlpha, or kFinished once nothing more may blend.
   alignas(64) float cut[kTilePixelCount];
   /// Not 0: float32 cannot decide this pixel; it is blended again in double.
   alignas(64) float doubt[kTilePixelCount];
@@ -62,10 +62,11 @@ constexpr float kNotYet = -1.0f;
 /// most kMaxFloatReach, in one tile. Alpha is off by |g| 3.3e-7 largest + 1e-6, relative: g by 4
 /// roundings of largest, the exponent by 1e-6, 2^x by 3e-7. That moves ln T by alpha/(1 - alpha)
 /// times as much, which is r(alpha) times this splat's share of -ln T, which sums to 9.3; r |g| is
-/// at most 2.83 and r at most 21.5 (at alpha = 0.99). And each factor rounds, 1.2e-7; at most 2,350
-/// splats of 1/255 blend.
-constexpr float finishDoubt(float largest, size_t count) {
-  return 8.8e-6f * largest + 2.5e-4f + 1.2e-7f * static_cast<float>(count < 2350 ? count : 2350);
+/// at most 2.83 times TileCutOff::reach and r at most 21.5 (at alpha = 0.99). And each factor
+/// rounds, 1.2e-7; at most 2,350 splats of 1/255 blend, `most` of the picture's cut-off.
+constexpr float finishDoubt(float largest, size_t count, float reach = 1.0f, size_t most = 2350) {
+  return 8.8e-6f * reach * largest + 2.5e-4f +
+         1.2e-7f * static_cast<float>(count < most ? count : most);
 }
 /// Above this size of |g|, float32 leaves too few digits: only splats thinner than a quarter of a
 /// pixel, which LowPass::kNone alone has.
@@ -75,6 +76,21 @@ constexpr float kFinishDoubt = finishDoubt(kMaxFloatReach, 2350);
 /// Relative distance to 1/2 within which the median depth is in doubt: fewer factors (177) have
 /// rounded.
 constexpr float kMedianDoubt = 2e-4f;
+
+/// What the picture's cut-off, RenderOptions::least_alpha, is to single precision. Above 1/255 the
+/// bounds of 1/255 hold all the more.
+struct TileCutOff {
+  double least_alpha = 1.0 / 255.0;
+  float log2_least = kLog2MinAlpha;
+  /// |g| is at most this many times 2.83 where alpha is the least or more: 1 or above.
+  float reach = 1.0f;
+  size_t most_splats = 2350;  ///< that blend before a pixel ends
+
+  /// In: splats of the tile's list.
+  float medianDoubt(size_t count) const;
+};
+
+TileCutOff cutOffOf(double least_alpha);
 
 /// Alpha in double, 0 where the splat is skipped. In: context of TileKernelOptions; splat, its
 /// place in this call's list; pixel, row * kTileSide + column.
@@ -110,6 +126,8 @@ struct TileKernelOptions {
   int32_t first = 0;           ///< place of this call's first splat in the tile's list
   TileCulling culling = TileCulling::kAll;
   WantedNext next = {};
+  float log2_least = kLog2MinAlpha;   ///< as TileCutOff
+  float median_doubt = kMedianDoubt;  ///< TileCutOff::medianDoubt
 };
 
 /// Blends the splats in order into the tile; stops early once every pixel is finished.

@@ -31,7 +31,7 @@ void blendPixel(const TileSplat& splat, float alpha, const TileKernelOptions& op
   pixel.has_median = pixels.median_depth[i] != kNoMedian;
   const float next = pixel.transmittance * (1.0f - alpha);
   if (near(next, static_cast<float>(kMinTransmittance), splat.finish_doubt) ||
-      (options.with_extras && near(next, 0.5f, kMedianDoubt))) {
+      (options.with_extras && near(next, 0.5f, options.median_doubt))) {
     finishInDoubt(pixels, i, place);
     return;
   }
@@ -70,7 +70,7 @@ bool passSurface(const TileSplat& splat, const TileKernelOptions& options, TileP
   pixels.wall[i] = kNoSurface;
   const float next = pixel.transmittance;
   if (near(next, static_cast<float>(kMinTransmittance), splat.finish_doubt) ||
-      (options.with_extras && near(next, 0.5f, kMedianDoubt))) {
+      (options.with_extras && near(next, 0.5f, options.median_doubt))) {
     finishInDoubt(pixels, i, place);
     return false;
   }
@@ -93,12 +93,12 @@ void blendTileScalar(const TileSplat* splats, size_t count, TileKernelOptions op
         const float g0 = splat.g0 + splat.l00 * column;
         const float g1 = splat.g1 + splat.l10 * column + splat.l11 * static_cast<float>(y);
         const float exponent = splat.log2_opacity - (g0 * g0 + g1 * g1);
-        if (exponent <= kLog2MinAlpha - splat.doubt_low) continue;
+        if (exponent <= options.log2_least - splat.doubt_low) continue;
         if (kHasEffects && options.with_surface && splat.depth > pixels.wall[i] &&
             !passSurface(splat, options, pixels, i, place)) {
           continue;
         }
-        if (exponent >= kLog2MinAlpha + splat.doubt_high) {
+        if (exponent >= options.log2_least + splat.doubt_high) {
           const float alpha = std::min(static_cast<float>(kMaxAlpha), std::exp2(exponent));
           blendPixel(splat, alpha, options, pixels, i, place);
         } else if (options.judge) {

@@ -1,5 +1,7 @@
 #include "splat/cpu/tile_kernel.h"
 
+#include <cmath>
+
 // Lanes are pixels of one tile row. The same steps as tile_kernel_scalar.cpp with masks in place of
 // branches; products and sums are fused where the processor can, so targets differ by rounding.
 
@@ -64,7 +66,7 @@ HWY_NOINLINE hn::Mask<Tag> passSurfaces(Tag d, hn::Mask<Tag> behind, const TileS
   const Vec finish_doubt = hn::Set(d, static_cast<float>(kMinTransmittance) * splat.finish_doubt);
   auto near = hn::Lt(hn::Abs(hn::Sub(next, min_transmittance)), finish_doubt);
   if constexpr (kExtras) {
-    const Vec half = hn::Set(d, 0.5f), median_doubt = hn::Set(d, 0.5f * kMedianDoubt);
+    const Vec half = hn::Set(d, 0.5f), median_doubt = hn::Set(d, 0.5f * options.median_doubt);
     near = hn::Or(near, hn::Lt(hn::Abs(hn::Sub(next, half)), median_doubt));
     const Vec median = hn::Load(d, pixels.median_depth + i);
     const auto passes =
@@ -90,18 +92,19 @@ void blendSplats(const TileSplat* splats, size_t count, const TileKernelOptions&
   const Vec max_alpha = hn::Set(d, static_cast<float>(kMaxAlpha));
   const Vec min_transmittance = hn::Set(d, static_cast<float>(kMinTransmittance));
   const Vec half = hn::Set(d, 0.5f);
-  const Vec median_doubt = hn::Set(d, 0.5f * kMedianDoubt);
+  const Vec median_doubt = hn::Set(d, 0.5f * options.median_doubt);
   const Vec finished = hn::Set(d, kFinished);
-  // A dead lane's exponent may be -1e12; exp2Small wants at least -10.
-  const Vec lowest = hn::Set(d, -9.0f);
+  const float log2_least = options.log2_least;
+  // A dead lane's exponent may be -1e12; exp2Small wants at least -120.
+  const Vec lowest = hn::Set(d, std::floor(log2_least) - 1.0f);
 
   for (size_t s = 0; s < count && pixels.unfinished > 0; ++s) {
     const TileSplat& splat = splats[s];
     if (s < options.next.count) {
       __builtin_prefetch(&options.next.visible[options.next.slots[s]]);
     }
-    const Vec low = hn::Set(d, kLog2MinAlpha - splat.doubt_low);
-    const Vec high = hn::Set(d, kLog2MinAlpha + splat.doubt_high);
+    const Vec low = hn::Set(d, log2_least - splat.doubt_low);
+    const Vec high = hn::Set(d, log2_least + splat.doubt_high);
     const Vec finish_doubt = hn::Set(d, static_cast<float>(kMinTransmittance) * splat.finish_doubt);
     const Vec l11 = hn::Set(d, splat.l11);
     for (size_t column = 0; column < kTileSide; column += lanes) {

@@ -13,9 +13,11 @@ struct TileSplatSteps {
   T below, above;
 };
 
-/// In: fields, as TileSplatColumns; x0 and y0, centre of the tile's first pixel.
+/// In: fields, as TileSplatColumns; x0 and y0, centre of the tile's first pixel; reach, of the
+/// tile's TileCutOff.
 template <typename T>
-void tileSplatSteps(const T (&fields)[kTileSplatFields], T x0, T y0, TileSplatSteps<T>& out) {
+void tileSplatSteps(const T (&fields)[kTileSplatFields], T x0, T y0, double reach,
+                    TileSplatSteps<T>& out) {
   using std::abs;
   using std::max;
   using std::min;
@@ -30,10 +32,11 @@ void tileSplatSteps(const T (&fields)[kTileSplatFields], T x0, T y0, TileSplatSt
   out.l11 = T(kScale) * fields[4];
   out.g0 = out.l00 * dx;
   out.g1 = out.l10 * dx + out.l11 * dy;
-  // |g| <= 2.83 where alpha >= 1/255, and g is off by at most 4 roundings of its largest term.
+  // |g| <= 2.83 reach where alpha counts, and g is off by at most 4 roundings of its largest term;
+  // the exponent, |g|^2 at most, by less than one of itself.
   out.largest =
       abs(out.g0) + abs(out.g1) + (side - T(1.0)) * (abs(out.l00) + abs(out.l10) + abs(out.l11));
-  out.doubt_low = T(2e-6) * out.largest + T(4e-6);
+  out.doubt_low = T(2e-6 * reach) * out.largest + T(4e-6 * reach * reach);
   out.below = min(max(side + dy + half_y, zero), side);
   out.above = min(max(half_y - dy + T(1.0), zero), side);
 }

@@ -49,12 +49,13 @@ float makeSplats(const VisibleSplat* visible, const Tile& tile, size_t begin, si
   const Double x0(tile.x0 + 0.5), y0(tile.y0 + 0.5);
   const Double most(static_cast<double>(kMaxFloatReach)), never(static_cast<double>(kFinished));
   const auto side = hn::Set(ints, static_cast<int32_t>(kTileSide));
+  const double reach = static_cast<double>(tile.cut_off.reach);
   Double largest;
   for (size_t i = 0; i < count; i += lanes) {
     Double fields[kTileSplatFields];
     for (size_t k = 0; k < kTileSplatFields; ++k) fields[k] = Double(hn::Load(d, columns[k] + i));
     TileSplatSteps<Double> made;
-    tileSplatSteps(fields, x0, y0, made);
+    tileSplatSteps(fields, x0, y0, reach, made);
     largest = max(largest, made.largest);
     hn::StoreInterleaved4(narrowed(made.g0), narrowed(made.g1), narrowed(made.l00),
                           narrowed(made.l10), floats, first);

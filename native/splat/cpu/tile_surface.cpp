@@ -28,6 +28,7 @@ void takeSurface(const SurfaceLayer& surface, const VisibleSplat* visible, Tile&
 void endWithSurface(const SurfaceLayer& surface, const Tile& tile, bool with_extras,
                     TilePixels& pixels) {
   const bool shows = surface.colour != nullptr;
+  const float median_doubt = tile.cut_off.medianDoubt(tile.splats.size());
   forEachPixel(tile, surface.width, [&](size_t i, size_t) {
     if (pixels.before[i] >= 0.0f) return;
     PixelBlend<float> pixel;
@@ -38,7 +39,7 @@ void endWithSurface(const SurfaceLayer& surface, const Tile& tile, bool with_ext
     pixels.before[i] = pixel.surface_weight;
     pixels.transmittance[i] = pixel.transmittance;
     if (!with_extras || !shows) return;
-    if (std::abs(pixel.transmittance - 0.5f) < 0.5f * kMedianDoubt) pixels.doubt[i] = 1.0f;
+    if (std::abs(pixel.transmittance - 0.5f) < 0.5f * median_doubt) pixels.doubt[i] = 1.0f;
     if (pixel.has_median && !had_median) pixels.median_depth[i] = pixel.median_depth;
   });
 }

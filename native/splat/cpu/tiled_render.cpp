@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <functional>
+#include <string>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -21,7 +22,7 @@
 
 // Based on: Kerbl et al., 3D Gaussian Splatting, SIGGRAPH 2023 (tiles). Differs: one sort by depth
 // followed by counting by tile; and where float32 rounding could decide a threshold, double does,
-// with the same numbers as the reference: alpha = 1/255 on the spot, the end at T = 1e-4 and the
+// with the same numbers as the reference: the least alpha on the spot, the end at T = 1e-4 and the
 // median at T = 1/2 by blending the pixel again. So no threshold falls
 // differently in the two renderers and the rest differs by rounding only.
 
@@ -58,7 +59,8 @@ void blendInDouble(const SplatSlots& slots, const Tile& tile, const Painter& pai
     for (size_t k = 0; k < count; ++k) {
       double distance;
       if (!mayShow(splat, tile, pixels[k].x, pixels[k].y, distance)) continue;
-      const double alpha = splatAlpha(slots.extras[slot].opacity, distance);
+      const double alpha =
+          splatAlpha(slots.extras[slot].opacity, distance, tile.cut_off.least_alpha);
       if (alpha == 0) continue;
       if (kSurface && !pixels[k].blend.isBefore(pixels[k].surface, splat.depth)) {
         pixels[k].blend.addSurface(pixels[k].surface);
@@ -236,6 +238,8 @@ void blendTile(const SplatSlots& slots, Tile tile, TileKernel kernel, const Rend
   Judged judged{&slots, &tile, 0};
   kernel_options.with_surface = hasLayer(options);
   kernel_options.surface_shows = options.surface.colour != nullptr;
+  kernel_options.log2_least = tile.cut_off.log2_least;
+  kernel_options.median_doubt = tile.cut_off.medianDoubt(tile.splats.size());
   kernel_options.judge = judgeAlpha;
   kernel_options.judge_context = &judged;
   float largest = 0;
@@ -455,6 +459,10 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
     fail(ErrorCode::kUnsupported,
          "the picture has a surface; pictures that a backward pass goes on from can have none");
   }
+  if (kept && options.least_alpha != kMinAlpha) {
+    fail(ErrorCode::kUnsupported, "least_alpha is " + std::to_string(options.least_alpha) +
+                                      "; pictures that a backward pass goes on from have 1/255");
+  }
   auto& [scene, visible, lists, last, passes] = workspace.arrays();
   last.number = 0;  // also where this fails on the way
   placeSceneUnread(instances, camera, options, scene);
@@ -473,6 +481,7 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
   const TileTargets targets = {result, kept, result && hasPasses(options) ? &passes : nullptr};
 
   const TileGrid grid(camera.width, camera.height);
+  const TileCutOff cut_off = cutOffOf(options.least_alpha);
   std::atomic<size_t> finished_tiles{0};
   const auto render_group = [&](const TileListGroup& group) {
     const auto render_tiles = [&](size_t begin, size_t end) {
@@ -480,6 +489,7 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
         if (progress) progress->throwIfCancelled();
         Tile tile = tileOf(grid, index, group.tile(index));
         tile.listed_behind = group.listedBehind(index);
+        tile.cut_off = cut_off;
         renderTile(visible.slots(), tile, index, kernel, options, scene.has_holdouts, targets);
         const size_t finished = finished_tiles.fetch_add(1, std::memory_order_relaxed) + 1;
         if (finished % grid.columns == 0) {

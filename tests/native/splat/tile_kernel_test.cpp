@@ -68,7 +68,7 @@ TEST(TileKernel, HasTheScalarOneAndAtLeastOneVectorTarget) {
 
 TEST(TileKernel, EveryTargetBlendsAsTheScalarOne) {
   for (const float opacity_low : {0.005f, 0.3f, 0.9f}) {
-    for (const TileKernelOptions options :
+    for (const TileKernelOptions& options :
          {TileKernelOptions{false, false}, TileKernelOptions{true, false},
           TileKernelOptions{false, true}, TileKernelOptions{true, true}}) {
       const std::vector<TileSplat> splats = randomSplats(300, opacity_low, 11);
