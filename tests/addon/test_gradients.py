@@ -8,7 +8,7 @@ from stipple.binding.cloud import Cloud, SplatArrays
 from stipple.binding.errors import StippleError
 from stipple.binding.gradients import STATISTICS, backward_memory_bound, image_loss, start_backward
 from stipple.binding.renderer import Renderer
-from stipple.binding.structs import OutputColour, Status, StippleCamera
+from stipple.binding.structs import ObjectOrder, OutputColour, Status, StippleCamera
 
 WIDTH, HEIGHT, COUNT = 60, 44, 40
 
@@ -107,6 +107,9 @@ def test_bad_input_is_one_sentence(context, camera):
     assert caught.value.status == Status.ERROR_INVALID_ARGUMENT
     with pytest.raises(StippleError, match='output_colour'):
         start_backward(renderer, placed, camera, renderer.options(), ones)
+    apart = renderer.options(output_colour=OutputColour.COMPOSITED, object_order=ObjectOrder.APART)
+    with pytest.raises(StippleError, match='object_order is 1, which a backward pass does not follow'):
+        start_backward(renderer, placed, camera, apart, ones)
     task = start_backward(renderer, placed, camera, composited, np.full_like(ones, np.nan))
     with pytest.raises(StippleError, match='colour_gradient holds nan'):
         task.job.wait()
