@@ -80,6 +80,7 @@ def test_what_is_measured_needs_what_it_needs(view, tmp_path):
     assert 'takes no splats' in error('accuracy', splats, '--fit', camera, *out)
     assert 'is not the report of a fit' in error('accuracy', '--fit', camera, *out)
     assert '--resolution is 0; 1 to 65536' in error('accuracy', splats, '--resolution', 0, *out)
+    assert 'repetitions is 0; 1 to 1000' in error('accuracy', splats, '--resolution', 9, '--repetitions', 0, *out)
     assert 'no voxel size fills this volume within' in error('accuracy', splats, '--resolution', 9, '--within', 1e-9, *out)
 
 

@@ -218,6 +218,25 @@ double objectError() {
   return different / static_cast<double>(passes.exact.objects.size());
 }
 
+/// Twice at one place, nothing, a million metres away, and as large.
+double apartError() {
+  const SplatCloud cloud = randomCloud({}, 29), empty;
+  std::vector<SplatInstance> instances(5, instanceOf(cloud));
+  instances[2].cloud = &empty;
+  instances[3].object_to_world(1, 3) = 1e6;
+  instances[4].object_to_world.topLeftCorner<3, 3>() *= 1e6;
+  RenderOptions options = everything();
+  options.low_pass = LowPass::kClassic;
+  options.object_order = ObjectOrder::kApart;
+  RenderResult pictures[2];
+  for (const Precision precision : {Precision::kFloat, Precision::kDouble}) {
+    RenderResult& picture = pictures[static_cast<size_t>(precision)];
+    atPrecision(precision)(instances, frontCamera(40, 30, 30, 3), options, picture, nullptr);
+    expectWithinTheHull(picture, brightestOf(cloud));
+  }
+  return worstDifference(pictures[0].colour, pictures[1].colour);
+}
+
 SplatCloud layers() {
   SplatCloud cloud = oneSplat(1.0f, 0.9f);
   cloud.resize(10000);
@@ -303,6 +322,10 @@ std::vector<EffectCase> effectCases() {
       [] { return sampledError(shrinking()); });
   add("a shutter curve of 1e-300", "motion blur", "squares under the root underflow",
       "the curve is scaled by a power of two first", "the same curve at 1", 1e-6, faintCurveError);
+  add("two at one place, one empty, one far, one huge", "objects apart",
+      "a mean depth of 0/0, and of equal ones rounding chooses",
+      "an object without splats is not in the order; ties by place in the scene", kDouble,
+      kSingleError, apartError);
   add("needles, discs, points and balls", "normal pass",
       "the mean of nothing, or of opposites, 0/0",
       "axes in double, turned to the camera; no length, no normal", "double, by component", 1e-4,
