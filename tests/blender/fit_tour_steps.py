@@ -36,17 +36,17 @@ def state():
     return module('.scene.fitting').state
 
 
-def few_tabs(window):
-    """Leaves one tab before ours in the sidebar, which Blender itself has, and so a place to click on."""
+def few_tabs(window, opened='STIPPLE_PT_fit_advanced'):
+    """Leaves one tab before ours in the sidebar, which Blender itself has, and so a place to click on. Opens a panel of ours."""
     others = [panel for panel in bpy.types.Panel.__subclasses__()
               if getattr(panel, 'bl_space_type', '') == 'VIEW_3D' and getattr(panel, 'bl_region_type', '') == 'UI'
               and getattr(panel, 'is_registered', False) and getattr(panel, 'bl_category', '') != 'Stipple']
     for panel in sorted(others, key=lambda panel: not getattr(panel, 'bl_parent_id', '')):
         bpy.utils.unregister_class(panel)
-    advanced = module('.panels.fit').STIPPLE_PT_fit_advanced
-    bpy.utils.unregister_class(advanced)
-    advanced.bl_options = set()  # open
-    bpy.utils.register_class(advanced)
+    panel = getattr(module('.panels.fit'), opened)
+    bpy.utils.unregister_class(panel)
+    panel.bl_options = set()  # open
+    bpy.utils.register_class(panel)
     window.space.show_region_ui = True
 
 

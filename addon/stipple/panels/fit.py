@@ -85,7 +85,9 @@ class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         layout.enabled = not fitting.state.is_running
-        layout.label(text=f"Splats of '{context.object.name}', with the views above")
+        chosen = strategies.text_of(context.scene.stipple.fit)
+        _draw_text(layout, context, f"Splits, copies and removes splats of '{context.object.name}' where the views above "
+                   f"ask for it, as the strategy in Advanced says: {chosen}")
         layout.operator('stipple.splats_densify', icon='OUTLINER_DATA_POINTCLOUD')
 
 
