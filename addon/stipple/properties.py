@@ -168,7 +168,7 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                                    "most", default=True, options=set())
     shell: EnumProperty(name="Background Shell", description="Room for what is far away, as a world or a landscape behind "
                         "the objects",
-                        items=(('AUTO', "Auto", "Where views are opaque and show what is beyond all surfaces"),
+                        items=(('AUTO', "Auto", "Where views are opaque and may show what is beyond all surfaces"),
                                ('ON', "On", "Always"), ('OFF', "Off", "Never")), options=set())
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,
                       options=set())

@@ -379,9 +379,8 @@ void addFit(CLI::App& app, const Context& context) {
   command->add_flag("--no-density-gradient", to.no_density_gradient,
                     "Field: the density is not learned from the pictures");
   command
-      ->add_option(
-          "--shell", to.shell,
-          "Field: a shell for what is far away; auto: where pictures show beyond the points")
+      ->add_option("--shell", to.shell,
+                   "Field: a shell for what is far away; auto: where opaque pictures may show it")
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->capture_default_str();
   command->add_option("--seed", to.seed)->capture_default_str();

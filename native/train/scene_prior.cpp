@@ -29,14 +29,6 @@ constexpr size_t kWitnesses = 100;
 constexpr size_t kLooks = 4;
 constexpr size_t kPixelStep = 7;
 constexpr double kSeenBeyond = 0.05;
-/// Without depth, pictures are divided into cells, as many as give each so many points on the
-/// average: one in three thousand would be empty by chance if they were strewn evenly. Points
-/// cluster, so the share has to be larger than that of pixels. Points that do not make this many
-/// cells a side tell nothing.
-constexpr double kPointsPerCell = 8;
-constexpr size_t kMostCells = 16;
-constexpr size_t kLeastCells = 4;
-constexpr double kCellsBeyond = 0.1;
 /// Weight of the shell beside that of all points, and places in it.
 constexpr double kShellShare = 0.25;
 constexpr size_t kShellPlaces = 20000;
@@ -156,42 +148,8 @@ bool holds(const RootCube& root, const Vec3d& place) {
   return true;
 }
 
-/// Whether points of the root leave a part of the pictures empty, or are too few to say.
-bool pointsLeaveGaps(const ViewSource& views, std::span<const size_t> training,
-                     const ScenePrior& prior) {
-  const size_t witnesses = std::min(training.size(), kWitnesses);
-  const auto forEachShown = [&](size_t witness, const auto& visit) {
-    const Camera& camera = views.camera(training[witness * training.size() / witnesses]);
-    for (size_t i = 0; i < prior.weights.size(); ++i) {
-      const float* p = &prior.positions[i * 3];
-      const Vec3d place(p[0], p[1], p[2]);
-      double x = 0, y = 0;
-      if (!holds(prior.root, place) || !project(camera, place, x, y)) continue;
-      visit(x / camera.width, y / camera.height);
-    }
-  };
-  size_t shown = 0;
-  for (size_t w = 0; w < witnesses; ++w) forEachShown(w, [&](double, double) { ++shown; });
-  const double mean = static_cast<double>(shown) / static_cast<double>(witnesses);
-  const size_t side = std::min(static_cast<size_t>(std::sqrt(mean / kPointsPerCell)), kMostCells);
-  if (side < kLeastCells) return true;
-  const auto cellOf = [side](double share) {
-    return std::min(static_cast<size_t>(share * static_cast<double>(side)), side - 1);
-  };
-  size_t filled = 0;
-  std::vector<uint8_t> cells;
-  for (size_t w = 0; w < witnesses; ++w) {
-    cells.assign(side * side, 0);
-    forEachShown(w, [&](double x, double y) { cells[cellOf(y) * side + cellOf(x)] = 1; });
-    filled += static_cast<size_t>(std::count(cells.begin(), cells.end(), uint8_t{1}));
-  }
-  return static_cast<double>(filled) <
-         (1 - kCellsBeyond) * static_cast<double>(witnesses * side * side);
-}
-
-/// Whether what is outside the root fills a part of the pictures.
-bool seesBeyond(const ViewSource& views, std::span<const size_t> training,
-                const ScenePrior& prior) {
+/// Whether what is outside the root fills a part of the pictures, or nothing tells.
+bool seesBeyond(const ViewSource& views, std::span<const size_t> training, const RootCube& root) {
   const size_t looks = std::min(training.size(), kLooks);
   size_t beyond = 0, asked = 0;
   for (size_t v = 0; v < looks; ++v) {
@@ -204,11 +162,11 @@ bool seesBeyond(const ViewSource& views, std::span<const size_t> training,
       ++asked;
       const auto depth = static_cast<double>(picture.depth[i]);
       const bool is_known = depth > 0 && depth < camera.far_plane;
-      beyond += !is_known || !holds(prior.root, unprojected(camera, i % picture.width,
-                                                            i / picture.width, depth));
+      beyond += !is_known ||
+                !holds(root, unprojected(camera, i % picture.width, i / picture.width, depth));
     }
   }
-  if (asked == 0) return pointsLeaveGaps(views, training, prior);
+  if (asked == 0) return true;  // nothing tells, and a closed room is better with it, too
   return static_cast<double>(beyond) > kSeenBeyond * static_cast<double>(asked);
 }
 
@@ -299,7 +257,7 @@ ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
     prior.root = cubeOfPoints(prior.positions);
     const bool has_shell =
         options.shell == ShellChoice::kOn ||
-        (options.shell == ShellChoice::kAuto && seesBeyond(views, training, prior));
+        (options.shell == ShellChoice::kAuto && seesBeyond(views, training, prior.root));
     if (has_shell) addShell(views, training, options.seed, prior);
     return prior;
   }

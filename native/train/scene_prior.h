@@ -42,9 +42,8 @@ struct ScenePriorOptions {
 /// reach far out, and a tenth more. Without points or depth: points of the visual hull, where
 /// pictures have alpha; else none, and the root is around the ball that the cameras have in common.
 /// With a shell the root is contracted: its inner half is what it would be. Auto has one where
-/// points are known, pictures have no alpha, and cameras see beyond the root: depth is unknown or
-/// ends outside it in a twentieth of the pixels; without depth, a tenth of the cells of pictures
-/// has no point of the root, or points are too few to tell.
+/// points are known, pictures have no alpha, and depth is unknown or ends outside the root in a
+/// twentieth of the pixels, as it is everywhere in pictures without any.
 /// In: training: views of the source, at least one. Errors: those of ViewSource::load; kCancelled.
 ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
                       const ScenePriorOptions& options, Progress* progress = nullptr);

@@ -298,41 +298,19 @@ TEST(ScenePrior, HasAShellWhereCamerasSeeBeyondTheRoot) {
   EXPECT_NEAR(around / inside, 0.25, 0.03);
 }
 
-/// Opaque pictures without depth, from the middle or from around it, and points.
-std::shared_ptr<MemoryViewSource> photos(const SplatCloud& points, bool from_inside) {
+TEST(ScenePrior, HasAShellWhereDepthIsUnknownEverywhere) {
   auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+  const auto with_depth = wallViews(0, false);
   for (size_t v = 0; v < 6; ++v) {
-    ViewPicture picture;
-    picture.width = picture.height = 16;
-    picture.colour.assign(16 * 16 * 3, 0.5f);
-    views->add(toyCamera(v, 6, 16, from_inside ? 0.1 : 3.5), std::move(picture));
+    ViewPicture picture = with_depth->load(v);
+    picture.depth.clear();
+    views->add(with_depth->camera(v), std::move(picture));
   }
-  views->setPoints(toyPoints(points));
-  return views;
-}
-
-TEST(ScenePrior, WithoutDepthAsksPointsWhatCamerasSee) {
-  const auto hasShell = [](const SplatCloud& points, bool from_inside, ShellChoice shell) {
-    const auto views = photos(points, from_inside);
-    ScenePriorOptions options;
-    options.shell = shell;
-    return scenePrior(*views, all(*views), options).contracted;
-  };
-  using enum ShellChoice;
-  const SplatCloud ball = toyBall(8000);
-  EXPECT_TRUE(hasShell(ball, false, kAuto)) << "there is something around the ball";
-  EXPECT_FALSE(hasShell(ball, true, kAuto)) << "walls all around";
-  EXPECT_TRUE(hasShell(ball, true, kOn));
-  EXPECT_FALSE(hasShell(ball, false, kOff));
-  // Of 8,000 points each camera shows about 260, of 800 not enough for 16 cells.
-  EXPECT_TRUE(hasShell(toyBall(800), true, kAuto)) << "too few to tell";
-  // A room without a ceiling: a quarter of the ball.
-  SplatCloud open = ball;
-  for (size_t i = 0; i < open.size(); ++i) {
-    float* p = &open.positions[i * 3];
-    if (p[2] > 0.5f) std::copy_n(&ball.positions[3 * 7999], 3, p);
-  }
-  EXPECT_TRUE(hasShell(open, true, kAuto));
+  views->setPoints(toyPoints(toyBall(1000)));
+  ScenePriorOptions options;
+  EXPECT_TRUE(scenePrior(*views, all(*views), options).contracted);
+  options.shell = ShellChoice::kOff;
+  EXPECT_FALSE(scenePrior(*views, all(*views), options).contracted);
 }
 
 TEST(ScenePrior, AShellIsThereWithoutPointsWhereItIsAskedFor) {
