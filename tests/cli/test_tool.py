@@ -72,6 +72,14 @@ def scene(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope='module')
+def four_each(scene):
+    """Another cloud of the cube: four splats around each anchor."""
+    run('decode', scene / 'cube.glb', scene / 'k4.ply', '--anchors', 250, '--gaussians-per-anchor', 4,
+        '--order', 'progressive', '--seed', 3)
+    return scene / 'k4.ply'
+
+
 def test_info_describes_a_data_set(tmp_path, scene):
     (tmp_path / 'images').mkdir()
     run('render', scene / 'cube.ply', '--camera', scene / 'transforms.json', '-o', tmp_path / 'images' / 'a.png')
@@ -99,10 +107,8 @@ def test_info_describes_each_kind(scene):
     assert 'a.png' in cameras['pictures']
 
 
-def test_decode_gives_the_budget_times_k(scene):
-    run('decode', scene / 'cube.glb', scene / 'k4.ply', '--anchors', 250, '--gaussians-per-anchor', 4,
-        '--order', 'progressive', '--seed', 3)
-    assert figures('info', scene / 'k4.ply')['count'] == 1000
+def test_decode_gives_the_budget_times_k(four_each):
+    assert figures('info', four_each)['count'] == 1000
 
 
 ASSETS = Path(__file__).resolve().parents[1] / 'data' / 'assets'
@@ -180,15 +186,15 @@ def test_render_shows_a_red_cube_where_the_camera_looks(scene):
     assert figures('compare', scene / 'a.png', scene / 'moved.png')['psnr'] < 25
 
 
-def test_render_takes_sizes_and_several_files(scene):
-    run('render', scene / 'cube.ply', scene / 'k4.ply', '--camera', scene / 'transforms.json',
+def test_render_takes_sizes_and_several_files(scene, four_each):
+    run('render', scene / 'cube.ply', four_each, '--camera', scene / 'transforms.json',
         '--width', 48, '-o', scene / 'small.png', '--background', 1, 1, 1)
     info = figures('info', scene / 'small.png')
     assert (info['width'], info['height']) == (48, 32)
 
 
-def test_render_draws_files_apart(scene):
-    both = scene / 'cube.ply', scene / 'k4.ply', '--camera', scene / 'transforms.json'
+def test_render_draws_files_apart(scene, four_each):
+    both = scene / 'cube.ply', four_each, '--camera', scene / 'transforms.json'
     run('render', *both, '-o', scene / 'together.exr')
     run('render', *both, '-o', scene / 'apart.exr', '--objects', 'apart')
     # Two clouds of one surface, of one colour: the order shows a little, and only the same order draws the same bits.
