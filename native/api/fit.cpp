@@ -22,8 +22,8 @@ struct Preset {
 };
 constexpr Preset kPresets[] = {
     {500, 50000, 8192},     // fast
-    {2000, 150000, 16384},   // balanced
-    {7000, 500000, 32768},  // fine detail
+    {2000, 150000, 16384},  // balanced
+    {4000, 500000, 32768},  // fine detail
 };
 constexpr int kDegreeOfExplicit = 3;
 

@@ -19,10 +19,7 @@ constexpr size_t kGrain = 1 << 14;
 void GradientWindow::add(const ViewStatistics& view) {
   const size_t count = view.visible.size();
   if (sums_.empty()) reset(count);
-  if (sums_.size() != count) {
-    fail(ErrorCode::kInternal, "the strategy's statistics are of " + std::to_string(sums_.size()) +
-                                   " splats; the view is of " + std::to_string(count));
-  }
+  requireCount(count);
   const std::span<const float> gradients = view.of(statistic_);
   const float half_width = 0.5f * static_cast<float>(view.width);
   const float half_height = 0.5f * static_cast<float>(view.height);
@@ -37,6 +34,12 @@ void GradientWindow::add(const ViewStatistics& view) {
   };
   // By reference: a std::function of a large capture allocates.
   parallelFor(count, kGrain, std::cref(add_range));
+}
+
+void GradientWindow::requireCount(size_t count) const {
+  if (sums_.size() == count) return;
+  fail(ErrorCode::kInternal, "the strategy's statistics are of " + std::to_string(sums_.size()) +
+                                 " splats, not of " + std::to_string(count));
 }
 
 void GradientWindow::edited(const ControlMoment& moment, const SplatEdit& edit,

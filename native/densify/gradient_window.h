@@ -22,6 +22,9 @@ class GradientWindow {
   /// Errors: kInternal for another number of splats than before.
   void add(const ViewStatistics& view);
 
+  /// Errors: kInternal for another number of splats than before, as where an edit was not applied.
+  void requireCount(size_t count) const;
+
   /// Forgets everything, for this many splats from now on.
   void reset(size_t count);
 

@@ -43,6 +43,8 @@ class ScreenPull final : public ControlPart {
     if (copy_window_.size() == 0) copy_window_.reset(splats.size());
     if (split_window_ && split_window_->size() == 0) split_window_->reset(splats.size());
     const GradientWindow& split_window = split_window_ ? *split_window_ : copy_window_;
+    copy_window_.requireCount(splats.size());
+    split_window.requireCount(splats.size());
     const float small = logShareOfExtent(moment, options_.small_share);
     const bool is_late = options_.late_after > 0 && moment.isAfter(options_.late_after);
     const double share = is_late ? options_.late_share : 1.0;

@@ -48,7 +48,7 @@ def live(_window):
 
 def stop(_window):
     state = module('.scene.fitting').state
-    # Splats multiply for the first time at 200 of 7000 iterations.
+    # Splats multiply for the first time at 100 of 4000 iterations.
     if state.figures is None or not state.figures.psnr > 0 or state.figures.iteration < 420:
         return False
     assert bpy.ops.stipple.fit_stop() == {'FINISHED'}

@@ -154,6 +154,18 @@ TEST(Adaptive, WhatIsRemovedMakesRoom) {
   EXPECT_EQ(edit->append.size(), 2u);
 }
 
+TEST(Adaptive, RefusesSplatsThatItsStatisticsAreNotOf) {
+  for (const char* name : {"adaptive", "absolute"}) {
+    const auto strategy = makeStrategy(name);
+    Seen seen({1e-3f, 1e-3f});
+    strategy->observe(at(1), seen.statistics());
+    for (const size_t other : {1u, 3u}) {  // as after an edit that nobody made
+      const RawSplats splats = splatsOf(std::vector<Kind>(other, {0.005f, 0.5f}));
+      EXPECT_THROW(editAt(*strategy, at(600), splats), Error) << name << other;
+    }
+  }
+}
+
 TEST(Adaptive, LeavesSplatsAloneThatNothingPullsAt) {
   const auto edit = firstEdit({{0.005f, 0.5f}, {0.05f, 0.5f}}, {0, 0});
   ASSERT_TRUE(edit);
