@@ -181,6 +181,11 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                             options={'HIDDEN', 'SKIP_SAVE'}, get=lambda _: 100 * fitting.state.fraction)
     report: StringProperty(name="Report", description="File for the fit's figures (.json, and curves as .svg beside "
                            "it); empty for none", subtype='FILE_PATH', options=version.RELATIVE_PATH)
+    checkpoint: StringProperty(name="Checkpoint", description="File (.safetensors) that keeps the state of a fit once a "
+                               "minute while it runs, so that it can go on after a stop or a crash; empty for none",
+                               subtype='FILE_PATH', options=version.RELATIVE_PATH)
+    resume: BoolProperty(name="Go On", description="Go on from the checkpoint where there is one; else begin anew and "
+                         "replace it", default=True, options=set())
 
 
 class STIPPLE_PG_overlay(bpy.types.PropertyGroup):

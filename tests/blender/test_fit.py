@@ -218,6 +218,43 @@ def test_a_cancel_while_it_fits_keeps_the_best(ball, fitting):
     assert task.result.splats.count > 0 and fitting.state.figures.iteration < fitting.state.figures.iterations
 
 
+@pytest.mark.parametrize('model', ('EXPLICIT', 'FIELD'))
+def test_a_stopped_fit_goes_on_from_its_checkpoint(stipple, ball, fitting, tmp_path, model):
+    few = settings(model=model, view_count=6, view_size=32, max_splats=400)
+    read = stipple.scene.splat_data.read
+    whole = read(fitted().data)
+    bpy.data.objects.remove(bpy.data.objects['Sphere Fit'])
+    few.checkpoint = str(tmp_path / 'c.safetensors')
+    assert not fitting.has_checkpoint(few)
+    task = fitting.FitTask(bpy.context, [ball], few, '')
+    while fitting.state.figures is None or fitting.state.figures.iteration < 300:
+        task.poll()
+    task.cancel()
+    task.wait()
+    stopped = fitting.state.figures.iteration
+    assert stopped < fitting.state.figures.iterations and fitting.has_checkpoint(few)
+    few.seed = 1  # of another fit: refused, and kept
+    scenes.select(ball)
+    scenes.refuses(bpy.ops.stipple.splats_fit, 'seed')
+    assert fitting.has_checkpoint(few)
+    few.seed = 0
+    task = fitting.FitTask(bpy.context, [ball], few, '')
+    while fitting.state.figures is None or fitting.state.figures.iteration == 0:
+        task.poll()
+    assert fitting.state.figures.iteration >= stopped
+    task.wait()
+    went_on = task.result.splats
+    assert np.array_equal(whole.positions, went_on.positions) and np.array_equal(whole.sh, went_on.sh)
+    assert not fitting.has_checkpoint(few)  # the result is there
+
+
+def test_begins_anew_where_it_shall_not_go_on(ball, fitting, tmp_path):
+    few = settings(view_count=4, view_size=32, max_splats=400, checkpoint=str(tmp_path / 'c.safetensors'), resume=False)
+    (tmp_path / 'c.safetensors').write_bytes(b'of something else')
+    fitted()
+    assert not fitting.has_checkpoint(few)
+
+
 def test_ending_at_once_puts_the_scene_back(ball, fitting):
     scene = bpy.context.scene
     before = scene.render.engine, scene.render.resolution_x, scene.render.filepath
@@ -237,8 +274,12 @@ def test_messages(ball, stipple):
     refuses(bpy.ops.stipple.splats_fit, 'No data set is chosen')
     settings(views_from='DATASET', dataset='//nowhere')
     refuses(bpy.ops.stipple.splats_fit, 'nowhere')
+    settings(views_from='RIG', dataset='', checkpoint='/tmp/fit.blend')
+    refuses(bpy.ops.stipple.splats_fit, 'must end in .safetensors')
+    settings(checkpoint='/nowhere/c.safetensors')
+    refuses(bpy.ops.stipple.splats_fit, "no folder '/nowhere'")
     bpy.data.objects.remove(ball)
-    settings(views_from='RIG', dataset='')
+    settings(checkpoint='')
     refuses(bpy.ops.stipple.splats_fit, 'no mesh')
     assert not bpy.data.objects
 

@@ -71,6 +71,10 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
             _draw_strategy(layout, context, settings)
         layout.prop(settings, 'seed')
         layout.prop(settings, 'report')
+        layout.prop(settings, 'checkpoint')
+        row = layout.row()
+        row.active = fitting.has_checkpoint(settings)
+        row.prop(settings, 'resume')
 
 
 class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):

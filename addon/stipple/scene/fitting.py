@@ -2,12 +2,14 @@
 """A fit from the scene's settings to splats: views, surface points, the native fit, the tree that makes a slider."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ..binding import cloud_edit
+from ..binding.errors import invalid
 from ..binding.fit import Fit, fit_options
 from ..binding.model import DecodeSettings, Model
 from ..binding.structs import FitModel, FitQuality, FitShell, JobState
@@ -54,12 +56,38 @@ class Result:
     report: object      # picture of the fit's curves, [H,W,4]
 
 
+_CHECKPOINT_SUFFIX = '.safetensors'
+
+
+def _checkpoint_path(settings):
+    """Of the file that keeps a fit that runs, None where none is wanted."""
+    return Path(bpy.path.abspath(settings.checkpoint)) if settings.checkpoint else None
+
+
+def has_checkpoint(settings):
+    """Whether a fit was left that can go on."""
+    path = _checkpoint_path(settings)
+    return path is not None and path.is_file()
+
+
+def _require_checkpoint(settings):
+    """Before views are rendered for nothing, and so that no file of another kind is written over."""
+    path = _checkpoint_path(settings)
+    if path is None:
+        return
+    if path.suffix.lower() != _CHECKPOINT_SUFFIX:
+        raise invalid(f"The checkpoint '{path}' must end in {_CHECKPOINT_SUFFIX}")
+    if not path.parent.is_dir():
+        raise invalid(f"The checkpoint cannot be written: there is no folder '{path.parent}'")
+
+
 class FitTask(ViewTask):
     """cancel() while it fits ends with the best so far."""
 
     def __init__(self, context, objects, settings, path):
         if settings.model == 'EXPLICIT':
             strategies.require(strategies.text_of(settings))
+        _require_checkpoint(settings)
         super().__init__(context, objects, settings)
         self._path = path
         self._frame = self._frame_of_views()
@@ -110,7 +138,10 @@ class FitTask(ViewTask):
             chosen['shell'] = FitShell[settings.shell]
         if not settings.view_dependent:
             chosen['sh_degree'] = 0
-        options = fit_options(self._native.library, FitModel[settings.model], FitQuality[settings.quality], **chosen)
+        checkpoint = _checkpoint_path(settings)
+        resumes = settings.resume and has_checkpoint(settings)
+        options = fit_options(self._native.library, FitModel[settings.model], FitQuality[settings.quality], checkpoint,
+                              resume=int(resumes), **chosen)
         if settings.model == 'FIELD':
             most = max(1, settings.max_splats // options.gaussians_per_anchor)
             options.most_anchors = min(options.most_anchors, most)
@@ -135,17 +166,26 @@ class FitTask(ViewTask):
         finally:
             self.job = None
         state.seconds_left = 0.0
+        is_whole = state.figures.iteration == state.figures.iterations
         yield _FIT_END, 'Keeping the result'
         if is_field:
             info = made.info()
             decoding = DecodeSettings(info.most_anchors, info.gaussians_per_anchor)  # seed 0: the fit's own draws
             self._keep(made, decoding, 'MODEL', report)
+            self._forget(checkpoint if is_whole else None)
             return
         seen = made.seen()
         made = cloud_edit.merge([(made, np.eye(4))], self._frame)  # the same splats, with the label of their frame
         job = Model.from_cloud_start(self._native, made, seed=settings.seed)
         yield from self._until_done(job, _FIT_END, 1.0)
         self._keep(job.model(), DecodeSettings(made.info().count), 'TREE', report, seen)
+        self._forget(checkpoint if is_whole else None)
+
+    @staticmethod
+    def _forget(checkpoint):
+        """Of a fit whose result is kept; what is stopped early keeps it."""
+        if checkpoint is not None:
+            checkpoint.unlink(missing_ok=True)
 
     def _keep(self, model, decoding, kind, report, seen=None):
         """seen: of the splats at these settings."""
