@@ -27,6 +27,20 @@ void requireNumbers(const std::string& what, const std::vector<float>& values, s
   }
 }
 
+/// Tangents of a normal of 1e37 are infinite. Shorter ones stand where a mesh has none.
+void requireUnitNormals(const std::string& what, const std::vector<float>& normals,
+                        ErrorCode code) {
+  constexpr double kRounding = 1e-3;  // of float32, and of files that others have written
+  for (size_t i = 0; i + 2 < normals.size(); i += 3) {
+    const double length =
+        std::hypot(static_cast<double>(normals[i]), static_cast<double>(normals[i + 1]),
+                   static_cast<double>(normals[i + 2]));
+    if (length <= 1 + kRounding) continue;
+    fail(code, what + " has a length of " + std::to_string(length) + " in row " +
+                   std::to_string(i / 3) + "; 1 is the most");
+  }
+}
+
 /// Sizes that agree and numbers that are numbers, for an asset from either side.
 void validateAsset(const SurfaceAsset& asset, const std::string& name, ErrorCode code) {
   validateOctree(asset, name, code);
@@ -38,6 +52,7 @@ void validateAsset(const SurfaceAsset& asset, const std::string& name, ErrorCode
   };
   check("positions", surface.positions, 3);
   check("normals", surface.normals, 3);
+  requireUnitNormals(name + ": surface.normals", surface.normals, code);
   check("colours", surface.colours, 3);
   check("opacities", surface.opacities, 1);
   check("areas", surface.areas, 1);

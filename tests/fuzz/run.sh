@@ -2,7 +2,8 @@
 # Runs the fuzzer of every reader, or of those that are named, for so many seconds each (default 60).
 #   bash tests/fuzz/run.sh [SECONDS] [READER...]
 #   bash tests/fuzz/run.sh --build READER...          builds only, and checks that these are all readers
-#   bash tests/fuzz/run.sh --run SECONDS READER...    runs what is built
+#   bash tests/fuzz/run.sh --run SECONDS READER...    runs what is built, from the same dice every time: what it
+#                                                     finds, it finds again
 # They start from small valid files (build/fuzz/corpus, where what they discover stays) and from the
 # files that once were faults (tests/fuzz/found). What they find lies in build/fuzz/found, named after its
 # reader. Needs clang with libFuzzer (Debian: clang libclang-rt-dev), and says so where it is missing.
@@ -39,7 +40,7 @@ fuzz() {
   # Limits: a file of a few kilobytes takes no second and no gigabyte.
   STIPPLE_FUZZ_READER=$reader STIPPLE_FUZZ_FOLDER=$work ASAN_OPTIONS=detect_leaks=0 \
     build/fuzz/bin/fuzz_reader -max_total_time="$seconds" -timeout=25 -rss_limit_mb=2048 \
-    -max_len=16384 -artifact_prefix="build/fuzz/found/$reader-" -print_final_stats=1 \
+    -max_len=16384 -artifact_prefix="build/fuzz/found/$reader-" -print_final_stats=1 -seed="$seed" \
     "${from[@]}" >"$log" 2>&1 || status=1
   rm -r "$work"
   if [ $status -ne 0 ]; then tail -60 "$log"; fi
@@ -55,6 +56,7 @@ if ! command -v clang++ >/dev/null ||
   exit 0
 fi
 mode=${1:-}
+seed=0  # other dice every time
 case $mode in
   --build)
     build
@@ -65,6 +67,7 @@ case $mode in
     exit 0 ;;
   --run)
     seconds=$2
+    seed=1
     shift 2 ;;
   *)
     seconds=${1:-60}

@@ -44,6 +44,11 @@ SurfaceAsset randomAsset(size_t count, unsigned seed) {
   };
   fill(asset.surface.positions, 3);
   fill(asset.surface.normals, 3);
+  for (size_t i = 0; i < count; ++i) {
+    float* n = &asset.surface.normals[i * 3];
+    const float length = std::hypot(n[0], n[1], n[2]);
+    for (size_t axis = 0; axis < 3; ++axis) n[axis] /= length;
+  }
   fill(asset.surface.colours, 3);
   fill(asset.surface.opacities, 1);
   fill(asset.surface.areas, 1);
@@ -128,7 +133,23 @@ TEST_F(SurfaceAssetFile, RefusesPartsThatDoNotFitTogether) {
   refuse({"octree.log_p.0", "nan"}, [](SurfaceAsset& a) { a.log_probabilities[0][3] = NAN; });
   refuse({"surface.areas", "4"}, [](SurfaceAsset& a) { a.surface.areas.pop_back(); });
   refuse({"surface.normals", "row 2"}, [](SurfaceAsset& a) { a.surface.normals[6] = HUGE_VALF; });
+  // Tangents of such normals would be infinite.
+  refuse({"surface.normals", "row 1"}, [](SurfaceAsset& a) { a.surface.normals[4] = 1e37f; });
   EXPECT_EQ(fileCount(), 0u);
+}
+
+TEST_F(SurfaceAssetFile, NormalsMayBeShortButNotLong) {
+  SurfaceAsset asset = randomAsset(2, 6);
+  asset.surface.normals = {0, 0, 0, 0, 1.0005f, 0};
+  writeSurfaceAsset(asset, path("a"));
+  EXPECT_EQ(readSurfaceAsset(path("a")).surface.normals, asset.surface.normals);
+  std::string bytes = load(path("a"));
+  const float good = 1.0005f, bad = 1.5f;
+  const size_t place = bytes.find(std::string(reinterpret_cast<const char*>(&good), 4));
+  ASSERT_NE(place, std::string::npos);
+  std::memcpy(&bytes[place], &bad, 4);
+  expectError(ErrorCode::kFormat, {"surface.normals", "1.5", "row 1"},
+              [&] { readSurfaceAsset(store("b", bytes)); });
 }
 
 TEST_F(SurfaceAssetFile, SurvivesTruncationAndDamage) {
