@@ -41,6 +41,15 @@ void requireUnitNormals(const std::string& what, const std::vector<float>& norma
   }
 }
 
+void requireNoneNegative(const std::string& what, const std::vector<float>& values,
+                         ErrorCode code) {
+  for (size_t i = 0; i < values.size(); ++i) {
+    if (values[i] >= 0) continue;
+    fail(code, what + " holds " + std::to_string(values[i]) + " in row " + std::to_string(i) +
+                   "; 0 is the least");
+  }
+}
+
 /// Sizes that agree and numbers that are numbers, for an asset from either side.
 void validateAsset(const SurfaceAsset& asset, const std::string& name, ErrorCode code) {
   validateOctree(asset, name, code);
@@ -57,6 +66,8 @@ void validateAsset(const SurfaceAsset& asset, const std::string& name, ErrorCode
   check("opacities", surface.opacities, 1);
   check("areas", surface.areas, 1);
   check("weights", surface.weights, 1);
+  requireNoneNegative(name + ": surface.areas", surface.areas, code);
+  requireNoneNegative(name + ": surface.weights", surface.weights, code);
 }
 
 }  // namespace

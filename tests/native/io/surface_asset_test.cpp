@@ -53,6 +53,8 @@ SurfaceAsset randomAsset(size_t count, unsigned seed) {
   fill(asset.surface.opacities, 1);
   fill(asset.surface.areas, 1);
   fill(asset.surface.weights, 1);
+  for (float& area : asset.surface.areas) area = std::abs(area);
+  for (float& weight : asset.surface.weights) weight = std::abs(weight);
   asset.settings_json = "{\"detail\":0.5,\"name\":\"\\u00e4\"}";
   return asset;
 }
@@ -133,6 +135,8 @@ TEST_F(SurfaceAssetFile, RefusesPartsThatDoNotFitTogether) {
   refuse({"octree.log_p.0", "nan"}, [](SurfaceAsset& a) { a.log_probabilities[0][3] = NAN; });
   refuse({"surface.areas", "4"}, [](SurfaceAsset& a) { a.surface.areas.pop_back(); });
   refuse({"surface.normals", "row 2"}, [](SurfaceAsset& a) { a.surface.normals[6] = HUGE_VALF; });
+  refuse({"surface.areas", "-2", "row 3"}, [](SurfaceAsset& a) { a.surface.areas[3] = -2; });
+  refuse({"surface.weights", "row 0"}, [](SurfaceAsset& a) { a.surface.weights[0] = -1; });
   // Tangents of such normals would be infinite.
   refuse({"surface.normals", "row 1"}, [](SurfaceAsset& a) { a.surface.normals[4] = 1e37f; });
   EXPECT_EQ(fileCount(), 0u);
