@@ -28,7 +28,7 @@ UNSCALED = ('adaptive', 'improved')   # also for 30,000 iterations, on the first
 THIRD = 3                             # of adaptive's count, which the best strategies get once more
 HALF = {'improved': 2}                # published as better with half of adaptive's count
 BEST = 5                              # so many of them, beside adaptive itself
-COMBINED = ('absolute+long_axis_split',)  # and what parts make of them: the best of eight that short runs tried
+COMBINED = ('absolute+long_axis_split',)  # and what parts make of them: the best of seven that short runs tried on one scene
 
 
 def strategies(stipple):
