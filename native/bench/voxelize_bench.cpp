@@ -19,6 +19,7 @@ namespace stipple::bench {
 namespace {
 
 constexpr uint32_t kResolution = 256;
+constexpr uint32_t kCoarseResolution = 12;  // two to three bricks a side
 
 // Flat splats on a sphere of radius 1, as wide as their spacing: what a surface decoder makes.
 SplatCloud sphereCloud(size_t count) {
@@ -72,21 +73,20 @@ void floorOfValues(double values) {
       static_cast<size_t>(std::ceil(values / static_cast<double>(list.size()) / kBrickVoxelCount));
   const BrickKernel sum_brick = chosenBrickKernel();
   parallelFor(count, 4, [&](size_t begin, size_t end) {
-    std::vector<float> density(kBrickVoxelCount);
-    std::vector<float> colour(3 * kBrickVoxelCount);
+    BrickSums sums = {};
     for (size_t i = begin; i < end; ++i) {
-      sum_brick({0, 0, 0}, splats.data(), list.data(), list.size(), density.data(), colour.data());
-      benchmark::DoNotOptimize(density.data());
+      sum_brick({0, 0, 0}, splats.data(), list.data(), list.size(), sums);
+      benchmark::DoNotOptimize(sums.data());
     }
   });
 }
 
-void cloud(benchmark::State& state, size_t count, unsigned threads) {
+void cloud(benchmark::State& state, size_t count, uint32_t resolution, unsigned threads) {
   const SplatCloud splats = sphereCloud(count);
   const SplatInstance instance{&splats, Mat4d::Identity()};
   const std::span<const SplatInstance> instances(&instance, 1);
   VoxelizeOptions options;
-  options.resolution = kResolution;
+  options.resolution = resolution;
   const double size = chooseVoxelSize(instances, options);
   const double values = valueCount(prepareVoxelSplats(instances, options, size, nullptr));
   size_t bricks = 0;
@@ -100,19 +100,22 @@ void cloud(benchmark::State& state, size_t count, unsigned threads) {
 }
 
 const bool registered = [] {
-  struct Size {
+  struct Case {
     const char* name;
     size_t count;
+    uint32_t resolution;
     int repeats;
   };
-  for (const Size& size :
-       {Size{"10k", 10000, 6}, Size{"100k", 100000, 4}, Size{"1M", 1000000, 2}}) {
+  for (const Case& one :
+       {Case{"cloud.10k", 10000, kResolution, 6}, Case{"cloud.100k", 100000, kResolution, 4},
+        Case{"cloud.1M", 1000000, kResolution, 2},
+        Case{"coarse.100k", 100000, kCoarseResolution, 6}}) {
     for (const unsigned threads : {1u, 2u}) {
       const std::string name =
-          std::string("voxelize.cloud.") + size.name + (threads == 1 ? "" : ".2threads");
-      benchmark::RegisterBenchmark(name.c_str(), cloud, size.count, threads)
+          std::string("voxelize.") + one.name + (threads == 1 ? "" : ".2threads");
+      benchmark::RegisterBenchmark(name.c_str(), cloud, one.count, one.resolution, threads)
           ->UseManualTime()
-          ->Iterations(size.repeats)
+          ->Iterations(one.repeats)
           ->Unit(benchmark::kMillisecond);
     }
   }

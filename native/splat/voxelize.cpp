@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <string>
 
 #include "base/error.h"
@@ -20,10 +21,22 @@ namespace stipple {
 
 namespace {
 
-// Of one stored brick: densities, colours, coordinates, key, list offset and cursor.
+// Some of the splats of a brick. A coarse volume has few bricks with many splats each: parts of
+// them, whose bounds do not depend on the number of threads, give every thread something to do.
+struct BrickPart {
+  size_t brick;
+  uint64_t begin;
+  uint64_t end;
+};
+
+// Of one stored brick: densities, colours, coordinates, key, list offset, cursor, and a part.
 constexpr double kBytesPerBrick = kBrickVoxelCount * 4 * sizeof(float) + 2 * sizeof(BrickKey) +
-                                  sizeof(uint64_t) + sizeof(uint32_t);
-constexpr double kBytesPerPair = sizeof(uint32_t);
+                                  sizeof(uint64_t) + sizeof(uint32_t) + sizeof(BrickPart) +
+                                  sizeof(void*);
+// A list entry, and a share of the sums of a part.
+constexpr size_t kSplatsPerPart = 8192;
+constexpr double kBytesPerPair =
+    sizeof(uint32_t) + sizeof(BrickSums) / static_cast<double>(kSplatsPerPart);
 // While bricks are found, each range of splats holds a list of its own.
 constexpr double kBytesPerFoundPair = 2 * sizeof(BrickKey);
 
@@ -58,8 +71,9 @@ uint64_t splatCount(std::span<const SplatInstance> instances) {
   return count;
 }
 
+// Of the splat, whether it is kept, and its share of the counters of fillBricks.
 double splatBytes(uint64_t count) {
-  return static_cast<double>(count) * (sizeof(VoxelSplat) + 1);
+  return static_cast<double>(count) * (sizeof(VoxelSplat) + 1 + sizeof(uint32_t));
 }
 
 double tableBytes(double bricks, double pairs) {
@@ -91,6 +105,81 @@ void dropThinBricks(SparseVolume& volume, double min_density) {
   volume.colour.resize(kept * kBrickVoxelCount * 3);
 }
 
+std::vector<BrickPart> makeParts(const BrickTable& table) {
+  std::vector<BrickPart> parts;
+  for (size_t brick = 0; brick < table.keys.size(); ++brick) {
+    uint64_t begin = table.offsets[brick];
+    const uint64_t end = table.offsets[brick + 1];
+    for (; end - begin > kSplatsPerPart; begin += kSplatsPerPart) {
+      parts.push_back({brick, begin, begin + kSplatsPerPart});
+    }
+    parts.push_back({brick, begin, end});
+  }
+  return parts;
+}
+
+void storeBrick(const BrickSums& sums, float* density, float* colour) {
+  for (size_t i = 0; i < kBrickVoxelCount; ++i) {
+    const double total = sums[0][i];
+    density[i] = static_cast<float>(total);
+    for (size_t channel = 0; channel < 3; ++channel) {
+      colour[i * 3 + channel] = total > 0 ? static_cast<float>(sums[channel + 1][i] / total) : 0.0f;
+    }
+  }
+}
+
+// Fills all bricks; the sums of parts are added in their order.
+void sumBricks(const BrickTable& table, const std::vector<VoxelSplat>& splats, SparseVolume& volume,
+               Progress* progress) {
+  const std::vector<BrickPart> parts = makeParts(table);
+  const auto is_whole = [&](size_t i) {
+    return parts[i].end - parts[i].begin ==
+           table.offsets[parts[i].brick + 1] - table.offsets[parts[i].brick];
+  };
+  const auto store = [&](size_t brick, const BrickSums& sums) {
+    storeBrick(sums, &volume.density[brick * kBrickVoxelCount],
+               &volume.colour[brick * kBrickVoxelCount * 3]);
+  };
+  std::vector<std::unique_ptr<BrickSums>> partial(parts.size());
+  const BrickKernel add_splats = chosenBrickKernel();
+  const auto pair_count = static_cast<double>(table.splats.size());
+  std::atomic<uint64_t> pairs_done{0};
+  // Few parts are worth a range each; more would only be more calls.
+  const size_t grain = parts.size() < 256 ? 1 : 4;
+  parallelFor(parts.size(), grain, [&](size_t begin, size_t end) {
+    if (progress) progress->throwIfCancelled();
+    for (size_t i = begin; i < end; ++i) {
+      const BrickPart& part = parts[i];
+      BrickSums own;
+      BrickSums* sums = &own;
+      if (is_whole(i)) {
+        own = {};
+      } else {
+        partial[i] = std::make_unique<BrickSums>();
+        sums = partial[i].get();
+      }
+      add_splats(table.keys[part.brick], splats.data(), table.splats.data() + part.begin,
+                 part.end - part.begin, *sums);
+      if (is_whole(i)) store(part.brick, own);
+    }
+    const uint64_t step = parts[end - 1].end - parts[begin].begin;
+    const uint64_t done = pairs_done.fetch_add(step, std::memory_order_relaxed) + step;
+    advance(progress, 0.2 + 0.79 * static_cast<double>(done) / pair_count, "Filling bricks");
+  });
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (!partial[i]) continue;
+    BrickSums& sums = *partial[i];
+    for (; i + 1 < parts.size() && parts[i + 1].brick == parts[i].brick; ++i) {
+      for (size_t channel = 0; channel < sums.size(); ++channel) {
+        for (size_t voxel = 0; voxel < kBrickVoxelCount; ++voxel) {
+          sums[channel][voxel] += (*partial[i + 1])[channel][voxel];
+        }
+      }
+    }
+    store(parts[i].brick, sums);
+  }
+}
+
 }  // namespace
 
 SparseVolume voxelize(std::span<const SplatInstance> instances, const VoxelizeOptions& options,
@@ -120,22 +209,11 @@ SparseVolume voxelize(std::span<const SplatInstance> instances, const VoxelizeOp
   volume.bricks.resize(brick_count);
   volume.density.resize(brick_count * kBrickVoxelCount);
   volume.colour.resize(brick_count * kBrickVoxelCount * 3);
-  const BrickKernel sum_brick = chosenBrickKernel();
-  std::atomic<uint64_t> pairs_done{0};
-  parallelFor(brick_count, 4, [&](size_t begin, size_t end) {
-    if (progress) progress->throwIfCancelled();
-    for (size_t i = begin; i < end; ++i) {
-      const BrickKey& key = table.keys[i];
-      volume.bricks[i] = {key[0] * kBrickSide, key[1] * kBrickSide, key[2] * kBrickSide};
-      sum_brick(key, splats.data(), table.splats.data() + table.offsets[i],
-                table.offsets[i + 1] - table.offsets[i], &volume.density[i * kBrickVoxelCount],
-                &volume.colour[i * kBrickVoxelCount * 3]);
-    }
-    const uint64_t step = table.offsets[end] - table.offsets[begin];
-    const uint64_t done = pairs_done.fetch_add(step, std::memory_order_relaxed) + step;
-    advance(progress, 0.2 + 0.79 * static_cast<double>(done) / static_cast<double>(pair_count),
-            "Filling bricks");
-  });
+  for (size_t i = 0; i < brick_count; ++i) {
+    const BrickKey& key = table.keys[i];
+    volume.bricks[i] = {key[0] * kBrickSide, key[1] * kBrickSide, key[2] * kBrickSide};
+  }
+  sumBricks(table, splats, volume, progress);
   dropThinBricks(volume, options.min_density);
   advance(progress, 1.0, "Done");
   return volume;

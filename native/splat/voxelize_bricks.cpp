@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -180,12 +181,55 @@ std::vector<BrickKey> findBricks(std::span<const VoxelSplat> splats, uint64_t li
   return ranges == 0 ? std::vector<BrickKey>() : std::move(found[0]);
 }
 
+namespace {
+
+// Each range of splats counts and fills on its own, range by range in a brick's list: lists grow by
+// themselves, and no two threads write to one counter. Counters take 4 bytes a range and brick.
+void fillByRanges(std::span<const VoxelSplat> splats, BrickTable& table, Progress* progress) {
+  const size_t brick_count = table.keys.size();
+  const size_t ranges = rangeCount(splats.size(), kGrain);
+  std::vector<uint32_t> counts(ranges * brick_count, 0);  // [range, brick]; then places
+  const auto visit_range = [&](size_t begin, size_t end, auto&& visit) {
+    if (progress) progress->throwIfCancelled();
+    KeyCursor cursor(table.keys);
+    uint32_t* own = counts.data() + begin / kGrain * brick_count;
+    for (size_t i = begin; i < end; ++i) {
+      visitBricks(splats[i], [&](int32_t x, int32_t y, int32_t z) {
+        const size_t brick = cursor.find({x, y, z});
+        visit(i, brick, own[brick]);
+      });
+    }
+  };
+  parallelFor(splats.size(), kGrain, [&](size_t begin, size_t end) {
+    visit_range(begin, end, [](size_t, size_t, uint32_t& count) { ++count; });
+  });
+  for (size_t brick = 0; brick < brick_count; ++brick) {
+    uint32_t place = 0;  // in the brick's list; a splat is in it once, so 32 bits are enough
+    for (size_t range = 0; range < ranges; ++range) {
+      place += std::exchange(counts[range * brick_count + brick], place);
+    }
+    table.offsets[brick + 1] = table.offsets[brick] + place;
+  }
+  table.splats.resize(table.offsets[brick_count]);
+  parallelFor(splats.size(), kGrain, [&](size_t begin, size_t end) {
+    visit_range(begin, end, [&](size_t i, size_t brick, uint32_t& place) {
+      table.splats[table.offsets[brick] + place++] = static_cast<uint32_t>(i);
+    });
+  });
+}
+
+}  // namespace
+
 BrickTable fillBricks(std::span<const VoxelSplat> splats, std::vector<BrickKey> keys,
                       Progress* progress) {
   BrickTable table;
   table.keys = std::move(keys);
   const size_t brick_count = table.keys.size();
   table.offsets.assign(brick_count + 1, 0);
+  if (brick_count <= kFewBricks) {
+    fillByRanges(splats, table, progress);
+    return table;
+  }
   std::vector<std::atomic<uint32_t>> cursors(brick_count);
   parallelFor(splats.size(), kGrain, [&](size_t begin, size_t end) {
     if (progress) progress->throwIfCancelled();

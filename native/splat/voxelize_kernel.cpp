@@ -1,7 +1,6 @@
 #include "splat/voxelize_kernel.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -20,6 +19,8 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr size_t kSlice = kBrickSide * kBrickSide;
+constexpr size_t kMostLanes = 16;
+constexpr float kFar = 1e15f;  // of unit coordinates; its square stays finite
 constexpr size_t kMaxSampleCount =
     size_t{kVoxelMaxSamples[0]} * kVoxelMaxSamples[1] * kVoxelMaxSamples[2];
 // Sums of at most this many splats stay in float; float64 takes over from there.
@@ -82,6 +83,8 @@ struct Sums {
 struct Span {
   int first;
   int last;
+
+  size_t count() const { return static_cast<size_t>(last - first + 1); }
 };
 
 inline Span spanOf(double centre, double half_extent) {
@@ -90,10 +93,11 @@ inline Span spanOf(double centre, double half_extent) {
   return {static_cast<int>(low), static_cast<int>(high)};
 }
 
-// Sample positions of one voxel, as offsets in unit coordinates.
+// Sample positions of one voxel, as offsets in unit coordinates. Behind the last, up to a whole
+// vector, are places that no splat reaches.
 struct Samples {
   size_t count = 0;
-  float offset[kMaxSampleCount][3];
+  HWY_ALIGN float offset[3][kMaxSampleCount + kMostLanes];
   float reach = 0.0f;  // of the furthest one
 
   explicit Samples(const VoxelSplat& splat) {
@@ -110,78 +114,135 @@ struct Samples {
       for (int b = 0; b < splat.samples[1]; ++b) {
         const float y = (static_cast<float>(b) - 0.5f * (splat.samples[1] - 1)) * width[1];
         for (int c = 0; c < splat.samples[2]; ++c) {
-          float* to = offset[count++];
-          to[0] = x;
-          to[1] = y;
-          to[2] = (static_cast<float>(c) - 0.5f * (splat.samples[2] - 1)) * width[2];
+          offset[0][count] = x;
+          offset[1][count] = y;
+          offset[2][count] = (static_cast<float>(c) - 0.5f * (splat.samples[2] - 1)) * width[2];
+          ++count;
+        }
+      }
+    }
+    for (auto& axis : offset) std::fill_n(axis + count, kMostLanes, kFar);
+  }
+};
+
+// A splat in the coordinates of a brick. The unit coordinates of voxel 0 come from double; inside
+// the brick float is enough.
+struct PlacedSplat {
+  const VoxelSplat& splat;
+  Span spans[3];
+  float start[3];
+  float step[3][3];  // by grid axis, then unit axis
+  float reach2;
+
+  PlacedSplat(const BrickKey& brick, const VoxelSplat& of) : splat(of) {
+    const Vec3d corner(brick[0] * double{kBrickSide}, brick[1] * double{kBrickSide},
+                       brick[2] * double{kBrickSide});
+    const Vec3d centre = of.centre - corner;
+    const Vec3d base = of.to_unit * -centre;
+    for (int axis = 0; axis < 3; ++axis) {
+      spans[axis] = spanOf(centre[axis], of.half_extent[axis]);
+      start[axis] = static_cast<float>(base[axis]);
+      for (int unit = 0; unit < 3; ++unit) {
+        step[axis][unit] = static_cast<float>(of.to_unit(unit, axis));
+      }
+    }
+    reach2 = static_cast<float>(of.reach * of.reach);
+  }
+
+  bool isEmpty() const {
+    for (const Span& span : spans) {
+      if (span.last < span.first) return true;
+    }
+    return false;
+  }
+};
+
+// Extinction at unit coordinates, without the amplitude; 0 outside the reach.
+template <class D, class V>
+HWY_INLINE V extinctionAt(D d, const VoxelSplat& splat, float reach2, V u0, V u1, V u2) {
+  const auto distance2 = hn::MulAdd(u0, u0, hn::MulAdd(u1, u1, hn::Mul(u2, u2)));
+  const auto inside = hn::Le(distance2, hn::Set(d, reach2));
+  if (hn::AllFalse(d, inside)) return hn::Zero(d);
+  const auto value =
+      polylogOfExp(d, hn::MulAdd(distance2, hn::Set(d, 0.5f), hn::Set(d, splat.minus_log_opacity)));
+  return hn::IfThenElseZero(inside, value);
+}
+
+// For a splat of many samples that meets few voxels: the lanes hold samples.
+template <class D>
+void addSamples(D d, const PlacedSplat& placed, const Samples& samples, float near2, Sums& sums) {
+  const size_t lanes = hn::Lanes(d);
+  const VoxelSplat& splat = placed.splat;
+  const float amplitude = splat.amplitude / static_cast<float>(samples.count);
+  const auto& [xs, ys, zs] = placed.spans;
+  for (int x = xs.first; x <= xs.last; ++x) {
+    for (int y = ys.first; y <= ys.last; ++y) {
+      for (int z = zs.first; z <= zs.last; ++z) {
+        float middle[3];
+        float middle2 = 0.0f;
+        for (int unit = 0; unit < 3; ++unit) {
+          middle[unit] = placed.start[unit] + static_cast<float>(x) * placed.step[0][unit] +
+                         static_cast<float>(y) * placed.step[1][unit] +
+                         static_cast<float>(z) * placed.step[2][unit];
+          middle2 += middle[unit] * middle[unit];
+        }
+        if (middle2 > near2) continue;
+        auto sum = hn::Zero(d);
+        for (size_t i = 0; i < samples.count; i += lanes) {
+          const auto u0 = hn::Add(hn::Set(d, middle[0]), hn::Load(d, samples.offset[0] + i));
+          const auto u1 = hn::Add(hn::Set(d, middle[1]), hn::Load(d, samples.offset[1] + i));
+          const auto u2 = hn::Add(hn::Set(d, middle[2]), hn::Load(d, samples.offset[2] + i));
+          sum = hn::Add(sum, extinctionAt(d, splat, placed.reach2, u0, u1, u2));
+        }
+        const float sigma = hn::GetLane(hn::SumOfLanes(d, sum)) * amplitude;
+        const auto at = static_cast<size_t>((x * kBrickSide + y) * kBrickSide + z);
+        sums.value[0][at] += sigma;
+        for (size_t channel = 0; channel < 3; ++channel) {
+          sums.value[channel + 1][at] += sigma * splat.colour[channel];
         }
       }
     }
   }
-};
+}
 
+// The lanes hold voxels of a slice x, in the order y * 8 + z; begin, end: whole vectors that cover
+// the rows the splat may reach.
 template <class D>
-void addSplat(D d, const BrickKey& brick, const VoxelSplat& splat, Sums& sums) {
+void addSlices(D d, const PlacedSplat& placed, const Samples& samples, float near2, size_t begin,
+               size_t end, Sums& sums) {
   const size_t lanes = hn::Lanes(d);
-  const Vec3d corner(brick[0] * double{kBrickSide}, brick[1] * double{kBrickSide},
-                     brick[2] * double{kBrickSide});
-  const Vec3d centre = splat.centre - corner;
-  const Span xs = spanOf(centre[0], splat.half_extent[0]);
-  const Span ys = spanOf(centre[1], splat.half_extent[1]);
-  if (xs.last < xs.first || ys.last < ys.first) return;
-  // A slice x holds its voxels as y * 8 + z; whole vectors cover the rows first..last.
-  const size_t begin = static_cast<size_t>(ys.first) * kBrickSide / lanes * lanes;
-  const size_t end = static_cast<size_t>(ys.last + 1) * kBrickSide;
-
-  // The unit coordinates of voxel 0 in double; inside the brick float is enough.
-  const Vec3d base = splat.to_unit * -centre;
+  const VoxelSplat& splat = placed.splat;
   HWY_ALIGN float plane[3][kSlice];  // y and z steps of a slice
-  float start[3];
-  float step[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    start[axis] = static_cast<float>(base[axis]);
-    step[axis] = static_cast<float>(splat.to_unit(axis, 0));
-    const auto step_y = hn::Set(d, static_cast<float>(splat.to_unit(axis, 1)));
-    const auto step_z = hn::Set(d, static_cast<float>(splat.to_unit(axis, 2)));
+  for (int unit = 0; unit < 3; ++unit) {
+    const auto step_y = hn::Set(d, placed.step[1][unit]);
+    const auto step_z = hn::Set(d, placed.step[2][unit]);
     for (size_t i = begin; i < end; i += lanes) {
       hn::Store(hn::MulAdd(hn::Load(d, kSliceSteps.y + i), step_y,
                            hn::Mul(hn::Load(d, kSliceSteps.z + i), step_z)),
-                d, plane[axis] + i);
+                d, plane[unit] + i);
     }
   }
-  const Samples samples(splat);
-  const auto near = static_cast<float>(splat.reach) + samples.reach;
-
-  const auto log_term = hn::Set(d, splat.minus_log_opacity);
   const auto amplitude = hn::Set(d, splat.amplitude / static_cast<float>(samples.count));
-  const auto reach2 = hn::Set(d, static_cast<float>(splat.reach * splat.reach));
-  const auto near2 = hn::Set(d, near * near);
-  const auto half = hn::Set(d, 0.5f);
   const auto red = hn::Set(d, splat.colour[0]);
   const auto green = hn::Set(d, splat.colour[1]);
   const auto blue = hn::Set(d, splat.colour[2]);
-  for (int x = xs.first; x <= xs.last; ++x) {
+  for (int x = placed.spans[0].first; x <= placed.spans[0].last; ++x) {
     const auto fx = static_cast<float>(x);
-    const auto x0 = hn::Set(d, start[0] + fx * step[0]);
-    const auto x1 = hn::Set(d, start[1] + fx * step[1]);
-    const auto x2 = hn::Set(d, start[2] + fx * step[2]);
+    const auto x0 = hn::Set(d, placed.start[0] + fx * placed.step[0][0]);
+    const auto x1 = hn::Set(d, placed.start[1] + fx * placed.step[0][1]);
+    const auto x2 = hn::Set(d, placed.start[2] + fx * placed.step[0][2]);
     for (size_t i = begin; i < end; i += lanes) {
       const auto m0 = hn::Add(x0, hn::Load(d, plane[0] + i));
       const auto m1 = hn::Add(x1, hn::Load(d, plane[1] + i));
       const auto m2 = hn::Add(x2, hn::Load(d, plane[2] + i));
       const auto middle2 = hn::MulAdd(m0, m0, hn::MulAdd(m1, m1, hn::Mul(m2, m2)));
-      if (hn::AllFalse(d, hn::Le(middle2, near2))) continue;
+      if (hn::AllFalse(d, hn::Le(middle2, hn::Set(d, near2)))) continue;
       auto sigma = hn::Zero(d);
       for (size_t sample = 0; sample < samples.count; ++sample) {
-        const float* offset = samples.offset[sample];
-        const auto u0 = hn::Add(m0, hn::Set(d, offset[0]));
-        const auto u1 = hn::Add(m1, hn::Set(d, offset[1]));
-        const auto u2 = hn::Add(m2, hn::Set(d, offset[2]));
-        const auto distance2 = hn::MulAdd(u0, u0, hn::MulAdd(u1, u1, hn::Mul(u2, u2)));
-        const auto inside = hn::Le(distance2, reach2);
-        if (hn::AllFalse(d, inside)) continue;
-        const auto value = polylogOfExp(d, hn::MulAdd(distance2, half, log_term));
-        sigma = hn::Add(sigma, hn::IfThenElseZero(inside, value));
+        const auto u0 = hn::Add(m0, hn::Set(d, samples.offset[0][sample]));
+        const auto u1 = hn::Add(m1, hn::Set(d, samples.offset[1][sample]));
+        const auto u2 = hn::Add(m2, hn::Set(d, samples.offset[2][sample]));
+        sigma = hn::Add(sigma, extinctionAt(d, splat, placed.reach2, u0, u1, u2));
       }
       sigma = hn::Mul(sigma, amplitude);
       const size_t at = static_cast<size_t>(x) * kSlice + i;
@@ -193,11 +254,31 @@ void addSplat(D d, const BrickKey& brick, const VoxelSplat& splat, Sums& sums) {
   }
 }
 
+template <class D>
+void addSplat(D d, const BrickKey& brick, const VoxelSplat& splat, Sums& sums) {
+  const PlacedSplat placed(brick, splat);
+  if (placed.isEmpty()) return;
+  const Samples samples(splat);
+  const float near = static_cast<float>(splat.reach) + samples.reach;
+  const size_t lanes = hn::Lanes(d);
+  const auto& [xs, ys, zs] = placed.spans;
+  const size_t begin = static_cast<size_t>(ys.first) * kBrickSide / lanes * lanes;
+  const size_t end = static_cast<size_t>(ys.last + 1) * kBrickSide;
+  // Evaluations of whole vectors, either way.
+  const size_t by_slices = xs.count() * ((end - begin + lanes - 1) / lanes) * samples.count;
+  const size_t by_samples =
+      xs.count() * ys.count() * zs.count() * ((samples.count + lanes - 1) / lanes);
+  if (by_samples < by_slices) {
+    addSamples(d, placed, samples, near * near, sums);
+  } else {
+    addSlices(d, placed, samples, near * near, begin, end, sums);
+  }
+}
+
 void sumBrickLanes(const BrickKey& brick, const VoxelSplat* splats, const uint32_t* list,
-                   size_t count, float* density, float* colour) {
+                   size_t count, BrickSums& totals) {
   const hn::CappedTag<float, 16> d;
   Sums sums;
-  std::array<std::array<double, kBrickVoxelCount>, 4> totals = {};
   for (size_t begin = 0; begin < count; begin += kFlushEvery) {
     for (auto& channel : sums.value) std::fill_n(channel, kBrickVoxelCount, 0.0f);
     const size_t end = std::min(count, begin + kFlushEvery);
@@ -206,14 +287,6 @@ void sumBrickLanes(const BrickKey& brick, const VoxelSplat* splats, const uint32
       for (size_t i = 0; i < kBrickVoxelCount; ++i) {
         totals[channel][i] += static_cast<double>(sums.value[channel][i]);
       }
-    }
-  }
-  for (size_t i = 0; i < kBrickVoxelCount; ++i) {
-    const double total = totals[0][i];
-    density[i] = static_cast<float>(total);
-    for (size_t channel = 0; channel < 3; ++channel) {
-      colour[i * 3 + channel] =
-          total > 0 ? static_cast<float>(totals[channel + 1][i] / total) : 0.0f;
     }
   }
 }

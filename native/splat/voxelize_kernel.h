@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -8,11 +9,12 @@
 
 namespace stipple {
 
-/// Extinction and extinction-weighted mean colour of the voxels of one brick, summed in the order
-/// of list [count], indices into splats. Out: density [512] per metre, colour [512,3] (0 where no
-/// splat reaches).
+/// Sums of one brick's voxels: extinction per metre, then red, green and blue times extinction.
+using BrickSums = std::array<std::array<double, kBrickVoxelCount>, 4>;
+
+/// Adds the splats of list [count], indices into splats, to the sums of a brick, in this order.
 using BrickKernel = void (*)(const BrickKey& brick, const VoxelSplat* splats, const uint32_t* list,
-                             size_t count, float* density, float* colour);
+                             size_t count, BrickSums& sums);
 
 struct NamedBrickKernel {
   const char* target;  ///< "scalar", or Highway's name of an instruction set ("AVX2")
@@ -30,6 +32,6 @@ std::vector<NamedBrickKernel> brickKernels();
 
 /// The plain kernel: the formula in double.
 void sumBrickScalar(const BrickKey& brick, const VoxelSplat* splats, const uint32_t* list,
-                    size_t count, float* density, float* colour);
+                    size_t count, BrickSums& sums);
 
 }  // namespace stipple

@@ -1,4 +1,3 @@
-#include <array>
 #include <cmath>
 
 #include "splat/voxelize_kernel.h"
@@ -32,25 +31,19 @@ double meanExtinction(const VoxelSplat& splat, const Vec3d& offset) {
 }  // namespace
 
 void sumBrickScalar(const BrickKey& brick, const VoxelSplat* splats, const uint32_t* list,
-                    size_t count, float* density, float* colour) {
-  for (int voxel = 0; voxel < kBrickVoxelCount; ++voxel) {
-    const Vec3d place(brick[0] * double{kBrickSide} + voxel / 64,
-                      brick[1] * double{kBrickSide} + voxel / 8 % 8,
-                      brick[2] * double{kBrickSide} + voxel % 8);
-    double total = 0.0;
-    std::array<double, 3> light = {};
+                    size_t count, BrickSums& sums) {
+  for (size_t voxel = 0; voxel < kBrickVoxelCount; ++voxel) {
+    const auto at = static_cast<int>(voxel);
+    const Vec3d place(brick[0] * double{kBrickSide} + at / 64,
+                      brick[1] * double{kBrickSide} + at / 8 % 8,
+                      brick[2] * double{kBrickSide} + at % 8);
     for (size_t i = 0; i < count; ++i) {
       const VoxelSplat& splat = splats[list[i]];
       const double sigma = meanExtinction(splat, place - splat.centre);
-      total += sigma;
+      sums[0][voxel] += sigma;
       for (size_t channel = 0; channel < 3; ++channel) {
-        light[channel] += sigma * static_cast<double>(splat.colour[channel]);
+        sums[channel + 1][voxel] += sigma * static_cast<double>(splat.colour[channel]);
       }
-    }
-    density[voxel] = static_cast<float>(total);
-    for (size_t channel = 0; channel < 3; ++channel) {
-      colour[static_cast<size_t>(voxel) * 3 + channel] =
-          total > 0 ? static_cast<float>(light[channel] / total) : 0.0f;
     }
   }
 }

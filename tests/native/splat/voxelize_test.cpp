@@ -268,6 +268,32 @@ TEST(Voxelize, GivesTheSameBitsForAnyNumberOfThreads) {
   EXPECT_TRUE(std::is_sorted(one.bricks.begin(), one.bricks.end()));
 }
 
+TEST(Voxelize, SumsBricksOfManySplatsInParts) {
+  // Three times 6,000 splats in few bricks: lists of up to 18,000, which are cut at 8,192.
+  const SplatCloud cloud = randomCloud(6000, 9);
+  const SplatInstance instance{&cloud, Mat4d::Identity()};
+  const std::vector<SplatInstance> three(3, instance);
+  VoxelizeOptions options;
+  options.voxel_size = 0.15;
+  options.min_density = 0.0;
+  const SparseVolume single = voxelize({&instance, 1}, options);
+  SparseVolume one;
+  SparseVolume two;
+  withThreads(1, [&] { one = voxelize(three, options); });
+  withThreads(2, [&] { two = voxelize(three, options); });
+  ASSERT_EQ(one.bricks, single.bricks);
+  for (size_t i = 0; i < one.density.size(); ++i) {
+    // Sums of 64 splats in float: 64 roundings of 6e-8 at most.
+    ASSERT_NEAR(one.density[i], 3.0f * single.density[i], 4e-6f * one.density[i]) << i;
+    for (size_t channel = 0; channel < 3 && one.density[i] > 0; ++channel) {
+      ASSERT_NEAR(one.colour[i * 3 + channel], single.colour[i * 3 + channel], 1e-5f) << i;
+    }
+  }
+  EXPECT_EQ(one.bricks, two.bricks);
+  EXPECT_EQ(one.density, two.density);
+  EXPECT_EQ(one.colour, two.colour);
+}
+
 TEST(Voxelize, StopsWhenCancelled) {
   const SplatCloud cloud = randomCloud(20000, 3);
   const SplatInstance instance{&cloud, Mat4d::Identity()};
