@@ -11,6 +11,10 @@ from . import effects, mattes, picture_options, quality, sources
 
 # Pictures with and without, in turns; the median of the differences counts where it is above half their range.
 REPETITIONS = 3
+# A blurred picture's time is that of its samples: so many are drawn, the rest is counted.
+BLUR_SAMPLES = 8
+# No further turn of an effect begins after its share of this.
+MOST_SECONDS = 60.0
 
 
 def start(scene, view):
@@ -36,8 +40,14 @@ def start(scene, view):
             order = ObjectOrder.APART
         options = renderer.options(blend_space=view.picture.blend_space, background=background, accuracy=accuracy,
                                    object_order=order)
-        return options, picture_options.blur(scene, None if left_out == Effect.DEPTH_OF_FIELD else view.lens,
-                                             None if left_out == Effect.MOTION_BLUR else view.shutter)
+        blur = picture_options.blur(scene, None if left_out == Effect.DEPTH_OF_FIELD else view.lens,
+                                    None if left_out == Effect.MOTION_BLUR else view.shutter)
+        scale = 1.0
+        if blur is not None:
+            samples = renderer.sample_count(view.placed, view.camera, options, blur)
+            blur.samples = min(samples, BLUR_SAMPLES)
+            scale = samples / blur.samples
+        return options, blur, scale
 
     everything = options()
     is_panoramic = picture_options.is_panoramic(view.camera)
@@ -56,16 +66,18 @@ def start(scene, view):
             surface = None
             if has_meshes and left_out != Effect.MESH_OCCLUSION:
                 surface = mattes.surface(view.meshes, view.camera, task.run)
+            begun_picture = time.perf_counter()
             passes = {name for effect, name in picture_options.PASSES.items() if effect in active and effect != left_out}
             task.run(renderer.start(view.placed, view.camera, chosen[0], surface=surface, blur=chosen[1],
                                     **{name: name in passes for name in picture_options.PASSES.values()}).job)
-            return time.perf_counter() - begin
+            return begun_picture - begin + chosen[2] * (time.perf_counter() - begun_picture)
 
         run(everything)  # clouds are merged, memory is taken
         seconds = {}
         for done, effect in enumerate(measured):
             differences = []
-            for _ in range(REPETITIONS):
+            begin = time.perf_counter()
+            while len(differences) < REPETITIONS and time.perf_counter() - begin < MOST_SECONDS / len(measured):
                 task.advance(done / len(measured), effects.NAMES[effect])
                 differences.append(run(everything) - run(without[effect], effect))
             # What the repetitions do not agree on is the machine's, and not the effect's.
