@@ -235,6 +235,10 @@ class STIPPLE_PG_quality(bpy.types.PropertyGroup):
 class STIPPLE_PG_scene(bpy.types.PropertyGroup):
     quality_viewport: PointerProperty(type=STIPPLE_PG_quality)
     quality_render: PointerProperty(type=STIPPLE_PG_quality)
+    compare_first: EnumProperty(name="Left", description="The one half of a comparison", items=quality.SIDES,
+                                default='VIEWPORT', options=set(), override=_OVERRIDABLE)
+    compare_second: EnumProperty(name="Right", description="The other half of a comparison", items=quality.SIDES,
+                                 default='RENDER', options=set(), override=_OVERRIDABLE)
     view_color: EnumProperty(
         name="View-Dependent Color", description="Colors that change with the direction they are seen from. Auto: up to "
         "the degree of harmonics that carries 99.9 % of the change", items=effects.CHOICES, options=set(),

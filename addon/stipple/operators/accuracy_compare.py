@@ -14,7 +14,6 @@ from ..scene import fit_reports, measured_quality, quality, rendered_view, sourc
 NAME = 'Quality Comparison'
 # Errors are shown so many times as large.
 GAIN = 10.0
-SIDES = quality.COLUMNS + (('REFERENCE', "Reference", "The yardstick; it may take minutes"),)
 
 
 class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
@@ -24,8 +23,8 @@ class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
     bl_label = "Compare"
     bl_options = {'REGISTER'}
 
-    first: EnumProperty(name="Left", items=SIDES, default='VIEWPORT')
-    second: EnumProperty(name="Right", items=SIDES, default='RENDER')
+    first: EnumProperty(name="Left", items=quality.SIDES, default='VIEWPORT')
+    second: EnumProperty(name="Right", items=quality.SIDES, default='RENDER')
     show: EnumProperty(name="Show", items=(('WIPE', "Wipe", "One to the left of a line, the other to its right"),
                                            ('ERROR', "Error × 10", "How far apart they are, ten times as large")))
     wipe: FloatProperty(name="Line", description="Where the line is", default=0.5, min=0.0, max=1.0, subtype='FACTOR')

@@ -94,4 +94,25 @@ class STIPPLE_OT_accuracy_choose(bpy.types.Operator):
         return {'FINISHED'}
 
 
-classes = (STIPPLE_OT_accuracy_measure, STIPPLE_OT_accuracy_choose)
+class STIPPLE_OT_accuracy_show(bpy.types.Operator):
+    """Show the plot of what was measured, error against time, in an Image Editor"""
+
+    bl_idname = 'stipple.accuracy_show'
+    bl_label = "Show Plot"
+
+    @classmethod
+    def poll(cls, context):
+        if bpy.app.background:
+            cls.poll_message_set('There is no window to show it in')
+            return False
+        if measured_quality.plot_of(context.scene) is None:
+            cls.poll_message_set('Nothing has been measured yet')
+            return False
+        return True
+
+    def execute(self, context):
+        fit_reports.show(context, measured_quality.plot_of(context.scene))
+        return {'FINISHED'}
+
+
+classes = (STIPPLE_OT_accuracy_measure, STIPPLE_OT_accuracy_choose, STIPPLE_OT_accuracy_show)

@@ -7,6 +7,7 @@ from ..binding.errors import StippleError
 from ..binding.structs import Effect
 from ..scene import effects, sources
 from .render import SplatRenderPanel
+from .text import draw_text
 
 
 def _rows(context):
@@ -30,19 +31,19 @@ class STIPPLE_PT_effects(SplatRenderPanel, bpy.types.Panel):
         layout = self.layout
         rows, seen, problem = _rows(context)
         if problem:
-            layout.label(text=problem, icon='ERROR')
+            draw_text(layout, context, problem, 'ERROR')
             return
         for row in rows:
             if row.is_on:
                 _draw_row(layout, context, row, seen)
-        line = layout.row(align=True)
-        line.operator('stipple.effects_look', icon='HIDE_OFF')
-        line.operator('stipple.effects_measure', icon='TIME')
+        column = layout.column(align=True)
+        column.operator('stipple.effects_look', icon='HIDE_OFF')
+        column.operator('stipple.effects_measure', icon='TIME')
         if seen is not None:
             is_old = (seen.camera_name, seen.frame) != (_camera_name(context.scene), context.scene.frame_current)
             line = layout.row()
             line.active = not is_old
-            line.label(text=f"Seen by {seen.camera_name} at frame {seen.frame}", icon='INFO')
+            draw_text(line, context, f"Seen by {seen.camera_name} at frame {seen.frame}", 'INFO')
 
 
 class STIPPLE_PT_effects_inactive(SplatRenderPanel, bpy.types.Panel):
@@ -85,32 +86,13 @@ def _draw_row(layout, context, row, seen):
     elif row.effect in effects.TABS:
         jump = head.operator('stipple.show_setting', text="", icon='RIGHTARROW', emboss=False)
         jump.tab = effects.TABS[row.effect]
-    draw_text(box, context, row.reason)
+    draw_text(box, context, row.reason, is_quiet=True)
 
 
 def _cost(row):
     if not row.is_measured:
         return "\N{EN DASH}"
     return f"+{row.seconds:.3g} s" if row.seconds > 0 else "about 0 s"
-
-
-def draw_text(layout, context, text):
-    """A sentence over as many lines as it needs."""
-    width = max(int(context.region.width / (7 * context.preferences.system.ui_scale)) - 4, 20)
-    line = ''
-    for word in text.split():
-        if line and len(line) + len(word) >= width:
-            _small(layout, line)
-            line = ''
-        line = f'{line} {word}' if line else word
-    _small(layout, line)
-
-
-def _small(layout, text):
-    row = layout.row()
-    row.active = False
-    row.scale_y = 0.8
-    row.label(text=text)
 
 
 def _camera_name(scene):

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar tab of the 3D view: fitting splats to views."""
 
-import textwrap
-
 import bpy
 
 from ..operators import show_report
 from ..scene import fit_proposal, fitting, splat_data, strategies
+from .text import draw_text
 
 
 class _FitPanel:
@@ -90,8 +89,8 @@ class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):
         layout = self.layout
         layout.enabled = not fitting.state.is_running
         chosen = strategies.text_of(context.scene.stipple.fit)
-        _draw_text(layout, context, f"Splits, copies and removes splats of '{context.object.name}' where the views above "
-                   f"ask for it, as the strategy in Advanced says: {chosen}")
+        draw_text(layout, context, f"Splits, copies and removes splats of '{context.object.name}' where the views above "
+                  f"ask for it, as the strategy in Advanced says: {chosen}")
         layout.operator('stipple.splats_densify', icon='OUTLINER_DATA_POINTCLOUD')
 
 
@@ -99,7 +98,7 @@ def _draw_strategy(layout, context, settings):
     layout.prop(settings, 'strategy')
     sentence = strategies.summary(settings.strategy)
     if sentence:
-        _draw_text(layout, context, sentence)
+        draw_text(layout, context, sentence)
     column = layout.column(align=True)
     column.use_property_split = False
     for name, title, _sentence, _bit in strategies.part_items():
@@ -196,16 +195,7 @@ def _draw_rows(layout, rows):
 
 
 def _draw_problem(layout, context, problem):
-    _draw_text(layout, context, problem, 'ERROR')
-
-
-def _draw_text(layout, context, text, icon='NONE'):
-    """Whole, in as many lines as it takes."""
-    width = int(context.region.width / context.preferences.system.ui_scale / 7) - 4
-    characters = max(16, width if icon == 'NONE' else width - 4)
-    column = layout.column(align=True)
-    for i, line in enumerate(textwrap.wrap(text, characters)):
-        column.label(text=line, icon=icon if i == 0 or icon == 'NONE' else 'BLANK1')
+    draw_text(layout, context, problem, 'ERROR')
 
 
 def duration(seconds):

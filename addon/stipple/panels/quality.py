@@ -6,8 +6,8 @@ import bpy
 from ..binding import accuracy as native
 from ..binding.errors import StippleError
 from ..scene import measured_quality, quality, sources
-from .effects import draw_text
 from .render import SplatRenderPanel
+from .text import draw_text
 
 
 class STIPPLE_PT_quality(SplatRenderPanel, bpy.types.Panel):
@@ -18,7 +18,7 @@ class STIPPLE_PT_quality(SplatRenderPanel, bpy.types.Panel):
         layout = self.layout
         problem = sources.library_problem()
         if problem:
-            layout.label(text=problem, icon='ERROR')
+            draw_text(layout, context, problem, 'ERROR')
             return
         measured = measured_quality.of(context.scene)
         split = layout.row()
@@ -28,15 +28,14 @@ class STIPPLE_PT_quality(SplatRenderPanel, bpy.types.Panel):
             column.label(text=label)
             column.prop(settings, 'level', text="")
             if _is_changed(settings):
-                column.label(text="Changed by hand", icon='INFO')
-            _draw_figures(column, context.scene, name, measured)
+                column.label(text="By Hand", icon='INFO')
+            _draw_figures(column, context, name, measured)
         if measured is not None:
             line = layout.row()
             line.active = measured_quality.is_current(context.scene, measured)
-            line.label(text=f"Measured by {measured.camera_name} at frame {measured.frame}", icon='INFO')
-        line = layout.row(align=True)
-        line.operator('stipple.accuracy_measure', icon='TIME')
-        line.operator('stipple.accuracy_compare', icon='IMAGE_ALPHA')
+            draw_text(line, context, f"Measured by {measured.camera_name} at frame {measured.frame}", 'INFO')
+        layout.operator('stipple.accuracy_measure', icon='TIME')
+        _draw_compare(layout.column(align=True), context.scene.stipple)
 
 
 class STIPPLE_PT_quality_knobs(SplatRenderPanel, bpy.types.Panel):
@@ -54,7 +53,7 @@ class STIPPLE_PT_quality_knobs(SplatRenderPanel, bpy.types.Panel):
             row = box.row(align=True)
             for name, label, _ in quality.COLUMNS:
                 row.prop(quality.column(context.scene, name), knob.name, text="")
-            draw_text(box, context, knob.bound)
+            draw_text(box, context, knob.bound, is_quiet=True)
 
 
 class STIPPLE_PT_quality_table(SplatRenderPanel, bpy.types.Panel):
@@ -68,16 +67,13 @@ class STIPPLE_PT_quality_table(SplatRenderPanel, bpy.types.Panel):
             layout.label(text="Nothing has been measured yet", icon='INFO')
             return
         layout.active = measured_quality.is_current(context.scene, measured)
-        grid = layout.grid_flow(row_major=True, columns=5, align=True)
-        for title in ("Setting", "Looks", "Time", "PSNR", "99.9 % within"):
-            grid.label(text=title)
+        column = layout.column(align=True)
         for row in measured.report.rows:
-            grid.label(text=row.name, icon='KEYTYPE_KEYFRAME_VEC' if row.is_on_front else 'BLANK1')
-            grid.label(text=_verdict(row))
-            grid.label(text=_time(row))
-            grid.label(text=f"{row.psnr:.1f} dB")
-            grid.label(text=f"{row.error_99_9:.2g}")
-        layout.label(text="Marked: no other setting is as fast and as good", icon='KEYTYPE_KEYFRAME_VEC')
+            column.label(text=_sentence(row.name), icon='KEYTYPE_KEYFRAME_VEC' if row.is_on_front else 'BLANK1')
+            for text in (f"{_time(row)}, {row.psnr:.1f} dB, \N{LESS-THAN OR EQUAL TO} {row.error_99_9:.2g}", _verdict(row)):
+                _draw_quiet(column, text)
+        draw_text(layout, context, "Marked: no other setting is as fast and as good. Time, PSNR, and what 99.9 % of the "
+                  "pixels are within", 'KEYTYPE_KEYFRAME_VEC')
         line = layout.row(align=True)
         for by, text in (('TIME', "Best Within..."), ('QUALITY', "Cheapest Above...")):
             line.operator('stipple.accuracy_choose', text=text).by = by
@@ -92,20 +88,41 @@ class STIPPLE_PT_quality_plot(SplatRenderPanel, bpy.types.Panel):
         if image is None:
             self.layout.label(text="Nothing has been measured yet", icon='INFO')
             return
-        self.layout.template_icon(icon_value=image.preview_ensure().icon_id, scale=12.0)
-        self.layout.label(text=f"Image '{image.name}'", icon='IMAGE_DATA')
+        self.layout.template_icon(icon_value=image.preview_ensure().icon_id, scale=10.0)
+        self.layout.operator('stipple.accuracy_show', icon='IMAGE_DATA')
 
 
-def _draw_figures(layout, scene, name, measured):
+def _draw_compare(layout, settings):
+    layout.label(text="Compare")
+    line = layout.row(align=True)
+    for side in ('compare_first', 'compare_second'):
+        line.prop(settings, side, text="")
+    line = layout.row(align=True)
+    for show, text, icon in (('WIPE', "Wipe", 'IMAGE_ALPHA'), ('ERROR', "Error × 10", 'IMAGE_DATA')):
+        choice = line.operator('stipple.accuracy_compare', text=text, icon=icon)
+        choice.show, choice.first, choice.second = show, settings.compare_first, settings.compare_second
+
+
+def _draw_figures(layout, context, name, measured):
     """Words before numbers, or a dash."""
-    row = measured_quality.row_of(scene, measured, name) if measured is not None else None
+    row = measured_quality.row_of(context.scene, measured, name) if measured is not None else None
     column = layout.column(align=True)
     if row is None:
         column.label(text="Time: \N{EN DASH}")
         return
-    column.active = measured_quality.is_current(scene, measured)
-    column.label(text=_verdict(row).capitalize())
-    column.label(text=f"{_time(row)}, {row.psnr:.1f} dB")
+    column.active = measured_quality.is_current(context.scene, measured)
+    for text in (_sentence(_verdict(row)), f"{_time(row)}, {row.psnr:.1f} dB"):
+        draw_text(column, context, text, columns=len(quality.COLUMNS))
+
+
+def _draw_quiet(layout, text):
+    line = layout.row()
+    line.active, line.scale_y = False, 0.8
+    line.label(text=text, icon='BLANK1')
+
+
+def _sentence(text):
+    return text[:1].upper() + text[1:]
 
 
 def _verdict(row):

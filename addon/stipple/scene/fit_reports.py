@@ -52,16 +52,35 @@ def show_if_wanted(context, image):
 
 
 def show(context, image):
-    """Shows it in an Image Editor, which is opened in a window of its own where there is none."""
+    """Shows it in an Image Editor; where there is none, soon, in a window of its own."""
     found = editors(context)
-    if not found:
-        before = set(context.window_manager.windows)
+    if found:
+        _show(*found[0], image)
+        return
+    window, name = context.window, image.name
+
+    def open_window():
+        """Later: Blender never ends a modal operator that opens a window."""
+        image = bpy.data.images.get(name)
+        if image is not None and window in list(bpy.context.window_manager.windows):
+            _show(*_new_editor(window), image)
+
+    bpy.app.timers.register(open_window, first_interval=0.0)
+
+
+def _new_editor(window):
+    """(window, area) of an Image Editor in a window of its own, over the largest area of this one."""
+    before = set(bpy.context.window_manager.windows)
+    with bpy.context.temp_override(window=window, area=_largest(window)):
         bpy.ops.screen.area_dupli('INVOKE_DEFAULT')
-        window = next(w for w in context.window_manager.windows if w not in before)
-        area = max(window.screen.areas, key=lambda a: a.width * a.height)
-        area.ui_type = 'IMAGE_EDITOR'
-        found = [(window, area)]
-    _show(*found[0], image)
+    made = next(w for w in bpy.context.window_manager.windows if w not in before)
+    area = _largest(made)
+    area.ui_type = 'IMAGE_EDITOR'
+    return made, area
+
+
+def _largest(window):
+    return max(window.screen.areas, key=lambda area: area.width * area.height)
 
 
 def _show(window, area, image):

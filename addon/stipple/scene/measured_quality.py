@@ -10,6 +10,7 @@ from . import facts, quality, sources
 
 # The plot of a scene's report, as an Image: 840 units wide.
 PLOT_NAME = 'Quality Plot'
+PREVIEW_WIDTH = 480  # pixels, or up to twice as many
 PLOT_SCALE = 2.0
 _PLOT_KEY = 'stipple_plot'
 
@@ -71,8 +72,19 @@ def plot(scene):
             bpy.data.images.remove(image)
         image = bpy.data.images.new(PLOT_NAME, width, height, alpha=False)
     write(image, pixels)
+    _write_preview(image, pixels)
     image[_PLOT_KEY] = scene.name_full
     return image
+
+
+def _write_preview(image, pixels):
+    """What panels show of it. Blender draws none by itself for an Image that it has not shown yet."""
+    step = max(1, pixels.shape[1] // PREVIEW_WIDTH)
+    height, width = pixels.shape[0] // step, pixels.shape[1] // step
+    means = pixels[:height * step, :width * step].reshape(height, step, width, step, 4).mean(axis=(1, 3))
+    preview = image.preview_ensure()
+    preview.image_size = width, height
+    preview.image_pixels_float.foreach_set(np.ascontiguousarray(means[::-1], np.float32).reshape(-1))
 
 
 def write(image, pixels):

@@ -25,6 +25,8 @@ _NUMBERS = ('samples_per_side', 'sh_degree_limit', 'least_alpha', 'budget_share'
 KNOBS = tuple(_ENUMS) + _NUMBERS
 _knobs = {}
 COLUMNS = (('VIEWPORT', "Viewport", "Rendered shading of the engine Stipple"), ('RENDER', "Render", "Final pictures"))
+# What can be compared.
+SIDES = COLUMNS + (('REFERENCE', "Reference", "The yardstick; it may take minutes"),)
 
 
 def column(scene, name):
