@@ -133,7 +133,7 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                             soft_max=500, max=10000, options=set())
     view_size: IntProperty(name="Resolution", description="Pixels of the longer side of a view", default=256, min=16,
                            soft_max=1024, max=8192, options=set())
-    engine: EnumProperty(name="Render With", description="Engine that renders the views",
+    engine: EnumProperty(name="Engine", description="Engine that renders the views",
                          items=(('CYCLES', "Cycles", "Light as in the final picture"),
                                 ('EEVEE', "EEVEE", "Light as EEVEE shows it"),
                                 ('WORKBENCH', "Workbench", "Plain colors without light, quickest")), options=set())
@@ -166,7 +166,7 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                         items=strategies.part_items, options={'ENUM_FLAG'})
     density_gradient: BoolProperty(name="Learn Density", description="Move anchors to where they help the picture "
                                    "most", default=True, options=set())
-    shell: EnumProperty(name="Background Shell", description="Room for what is far away, as a world or a landscape behind "
+    shell: EnumProperty(name="Shell", description="Room for what is far away, as a world or a landscape behind "
                         "the objects",
                         items=(('AUTO', "Auto", "Where views are opaque and may show what is beyond all surfaces"),
                                ('ON', "On", "Always"), ('OFF', "Off", "Never")), options=set())

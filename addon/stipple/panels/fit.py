@@ -28,7 +28,7 @@ class STIPPLE_PT_fit(_FitPanel, bpy.types.Panel):
         column.separator()
         column.prop(settings, 'max_splats')
         column.prop(settings, 'quality')
-        column.prop(settings, 'view_dependent')
+        _draw_switch(column, settings, 'view_dependent')
         layout.separator()
         if state.is_running:
             _draw_running(layout, settings, state)
@@ -64,7 +64,7 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
         settings = context.scene.stipple.fit
         layout.prop(settings, 'model')
         if settings.model == 'FIELD':
-            layout.prop(settings, 'density_gradient')
+            _draw_switch(layout, settings, 'density_gradient')
             layout.prop(settings, 'shell')
         else:
             _draw_strategy(layout, context, settings)
@@ -73,7 +73,7 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
         layout.prop(settings, 'checkpoint')
         row = layout.row()
         row.active = fitting.has_checkpoint(settings)
-        row.prop(settings, 'resume')
+        _draw_switch(row, settings, 'resume')
 
 
 class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):
@@ -128,7 +128,14 @@ def _draw_views(layout, settings):
     layout.prop(settings, 'engine')
     if settings.engine != 'WORKBENCH':
         layout.prop(settings, 'samples')
-    layout.prop(settings, 'transparent')
+    _draw_switch(layout, settings, 'transparent')
+
+
+def _draw_switch(layout, settings, name):
+    """Over the whole width: half of a sidebar cuts its words off."""
+    row = layout.row()
+    row.use_property_split = False
+    row.prop(settings, name)
 
 
 def _draw_running(layout, settings, state):
