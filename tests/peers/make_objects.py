@@ -19,8 +19,9 @@ import bpy
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from make_photos import POINTS, give, sample_points, settings  # noqa: E402
+from make_photos import POINTS, sample_points, settings  # noqa: E402
 from make_scene import write_points  # noqa: E402
+from photo_scenes import give  # noqa: E402
 
 DISTANCE = 4.2  # metres
 ANGLE = math.radians(40)
@@ -33,7 +34,7 @@ def head():
     smooth.levels = smooth.render_levels = 2
     for polygon in made.data.polygons:
         polygon.use_smooth = True
-    give(made, 'ShaderNodeTexVoronoi', 5, (0.5, 0.08, 0.03), (0.15, 0.5, 0.8))
+    give('ShaderNodeTexVoronoi', 5, (0.5, 0.08, 0.03), (0.15, 0.5, 0.8))
 
 
 def cage():
@@ -41,9 +42,9 @@ def cage():
     made = bpy.context.object
     rods = made.modifiers.new('Rods', 'WIREFRAME')
     rods.thickness = 0.09
-    give(made, 'ShaderNodeTexNoise', 3, (0.05, 0.1, 0.5), (0.95, 0.7, 0.1))
+    give('ShaderNodeTexNoise', 3, (0.05, 0.1, 0.5), (0.95, 0.7, 0.1))
     bpy.ops.mesh.primitive_cube_add(size=0.8, rotation=(0.5, 0.3, 0.8))
-    give(bpy.context.object, 'ShaderNodeTexVoronoi', 6, (0.02, 0.2, 0.1), (0.9, 0.9, 0.6))
+    give('ShaderNodeTexVoronoi', 6, (0.02, 0.2, 0.1), (0.9, 0.9, 0.6))
 
 
 def heap():
@@ -57,7 +58,7 @@ def heap():
         else:
             bpy.ops.mesh.primitive_uv_sphere_add(radius=0.6 * size, location=place, segments=24, ring_count=12)
         shade = [dice.random() for _ in range(3)]
-        give(bpy.context.object, 'ShaderNodeTexNoise', 8, [0.3 * c for c in shade], shade)
+        give('ShaderNodeTexNoise', 8, [0.3 * c for c in shade], shade)
 
 
 def write_views(folder, given):
@@ -65,9 +66,7 @@ def write_views(folder, given):
     bpy.ops.object.light_add(type='SUN', rotation=(0.6, 0.3, 0.2))
     bpy.context.object.data.energy = 2.5
     bpy.context.object.data.angle = 0
-    scene = settings(given)
-    scene.render.film_transparent = True
-    scene.render.image_settings.color_mode = 'RGBA'
+    scene = settings(given, transparent=True)
     camera = bpy.data.objects.new('Camera', bpy.data.cameras.new('Camera'))
     scene.collection.objects.link(camera)
     scene.camera = camera
