@@ -163,6 +163,25 @@ const char* nameForBytes(const std::vector<unsigned char>& bytes) {
   return nullptr;
 }
 
+// Refuses a PNG of which a chunk says that it goes on beyond the end: its reader would ask for that
+// much memory, up to 2 GiB, before it looks.
+void requireWholeChunks(const std::vector<unsigned char>& bytes, const std::string& name) {
+  constexpr size_t kSignature = 8;
+  constexpr size_t kAround = 12;  // length, type and checksum of a chunk
+  for (size_t at = kSignature; at + kAround <= bytes.size();) {
+    size_t length = 0;
+    for (size_t i = 0; i < 4; ++i) length = length << 8 | bytes[at + i];
+    const size_t left = bytes.size() - at - kAround;
+    if (length > left) {
+      fail(ErrorCode::kFormat, name + " cannot be decoded: a part of it says that it has " +
+                                   std::to_string(length) + " bytes, and " + std::to_string(left) +
+                                   " are left");
+    }
+    if (std::memcmp(&bytes[at + 4], "IEND", 4) == 0) return;
+    at += kAround + length;
+  }
+}
+
 void write(const char* path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, const void* pixels) {
   const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(path);
   if (!output) {
@@ -198,6 +217,7 @@ DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std
   if (file_name == nullptr) {
     fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF picture");
   }
+  if (bytes[0] == 0x89) requireWholeChunks(bytes, name);
   OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
   OIIO::ImageSpec config = keepAlpha();
   // The readers look for the bytes in the configuration, not in open's own argument.

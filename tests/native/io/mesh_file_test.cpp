@@ -194,14 +194,19 @@ TEST_F(MeshFile, ReadsEmbeddedAndExternalTextures) {
     read(file.glb(
         scene("\"attributes\":{\"POSITION\":0},\"material\":0", "", rest(embedded, "}}}]"))));
   });
-  expectError(ErrorCode::kFormat, {"image 0"}, [&] {
+  const auto read_picture = [&](const std::string& bytes) {
     GlbBuilder broken;
     broken.addFloats(kTriangle, 3);
     broken.addFloats({0, 0, 1, 0, 0, 1}, 2);
-    broken.addView(picture.substr(0, 40));
+    broken.addView(bytes);
     read(broken.glb(
         scene(primitive, "", rest("\"mimeType\":\"image/png\",\"bufferView\":2", "}}}]"))));
-  });
+  };
+  expectError(ErrorCode::kFormat, {"image 0"}, [&] { read_picture(picture.substr(0, 40)); });
+  // Behind the header, a text that would be 1.9 GB long.
+  const std::string text("\x71\0\0\0tEXt", 8);
+  expectError(ErrorCode::kFormat, {"image 0", "1895825408 bytes"},
+              [&] { read_picture(picture.substr(0, 33) + text + picture.substr(33)); });
 }
 
 TEST_F(MeshFile, ChoosesTheUvSetAndTransformsIt) {
