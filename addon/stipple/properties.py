@@ -161,7 +161,7 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                                ('FIELD', "Density Field", "A density of anchors, which decodes at any budget")),
                         options=set())
     strategy: EnumProperty(name="Strategy", description="How splats are added and removed while they are fitted",
-                           items=strategies.strategy_items, default=0, options=set())
+                           items=strategies.strategy_items, default=strategies.BY_QUALITY_NUMBER, options=set())
     parts: EnumProperty(name="Parts", description="What the strategy does beside, or instead of its own way",
                         items=strategies.part_items, options={'ENUM_FLAG'})
     density_gradient: BoolProperty(name="Learn Density", description="Move anchors to where they help the picture "

@@ -19,11 +19,12 @@ struct Preset {
   uint64_t iterations;
   uint64_t max_splats;
   uint64_t most_anchors;
+  const char* strategy;  // of explicit splats; by docs/methods/fitting.md
 };
 constexpr Preset kPresets[] = {
-    {500, 50000, 8192},     // fast
-    {2000, 150000, 16384},  // balanced
-    {4000, 500000, 32768},  // fine detail
+    {500, 50000, 8192, "adaptive"},     // fast
+    {2000, 150000, 16384, "improved"},  // balanced
+    {4000, 500000, 32768, "improved"},  // fine detail
 };
 constexpr int kDegreeOfExplicit = 3;
 
@@ -88,6 +89,7 @@ void stipple_fit_options_init(StippleFitOptions* options) {
   options->picture_bytes = trainer.picture_bytes;
   options->checkpoint_seconds = 60;
   stipple_fit_options_preset(options, STIPPLE_FIT_EXPLICIT, STIPPLE_FIT_BALANCED);
+  options->strategy_utf8 = nullptr;  // so that any model can be set
 }
 
 StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t model,
@@ -99,6 +101,7 @@ StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t mo
     StippleFitOptions chosen = complete(options, "options");
     const FieldModelOptions field;
     chosen.model = model;
+    chosen.strategy_utf8 = is_field ? nullptr : preset.strategy;
     chosen.iterations = preset.iterations;
     chosen.max_splats = preset.max_splats;
     chosen.least_anchors = field.least_anchors;

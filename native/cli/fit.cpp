@@ -335,9 +335,10 @@ void addFit(CLI::App& app, const Context& context) {
       ->capture_default_str();
   command->add_option(
       "--strategy", to.strategy,
-      "How splats are added and removed: name(setting=number)+part; see --strategies");
+      "How splats are added and removed: name(setting=number)+part; see --strategies. Else as "
+      "the quality has it");
   command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts");
-  command->add_option("--quality", to.quality, "Sets iterations and counts")
+  command->add_option("--quality", to.quality, "Sets iterations, counts and strategy")
       ->check(CLI::IsMember({"fast", "balanced", "fine"}))
       ->capture_default_str();
   auto* gaussians =

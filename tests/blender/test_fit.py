@@ -290,9 +290,12 @@ def test_strategies_and_parts_are_those_of_the_library(stipple, ball, fitting):
     library = stipple.scene.sources.context().library
     assert [item[0] for item in strategies.part_items()] == [entry.name for entry in native.strategy_parts(library)]
     names = [item[0] for item in strategies.strategy_items()]
-    assert names[0] == 'adaptive' and 'learned_density' not in names
+    assert names[:2] == ['by_quality', 'adaptive'] and 'learned_density' not in names
     assert len({item[3] for item in strategies.strategy_items()}) == len(names)
 
+    for quality, name in (('FAST', 'adaptive'), ('BALANCED', 'improved'), ('FINE_DETAIL', 'improved')):
+        chosen = settings(quality=quality, strategy='by_quality')
+        assert strategies.text_of(chosen) == name and strategies.summary(chosen).startswith(f'{name.title()}: ')
     chosen = settings(strategy='improved', parts={'opacity_correction'})
     assert strategies.text_of(chosen) == 'improved+opacity_correction'
     problem = strategies.problem(strategies.text_of(chosen))

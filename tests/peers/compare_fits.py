@@ -77,7 +77,8 @@ def fit_peer(program, training, iterations, result):
 
 
 def fit_ours(program, dataset, iterations, result, *most):
-    return run(program, 'fit', dataset, result, '--iterations', iterations, '--holdout', HOLDOUT, *most)
+    return run(program, 'fit', dataset, result, '--iterations', iterations, '--holdout', HOLDOUT,
+               '--strategy', 'adaptive', *most)  # which is what the peer does
 
 
 def splat_count(path):

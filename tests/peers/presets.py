@@ -22,12 +22,12 @@ from pathlib import Path
 RULE = {'Fast': 2.0, 'Balanced': 0.5, 'Fine Detail': 0.2}  # dB a doubling, at least
 
 
-def fit(program, dataset, model, iterations, count):
+def fit(program, dataset, model, iterations, count, strategy):
     """(seconds, processor seconds, splats, PSNR) of one fit."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / 'report.json'
         out = Path(folder) / ('fit.ply' if model == 'explicit' else 'fit.stipple.safetensors')
-        most = ('--gaussians', str(count)) if model == 'explicit' else ('--anchors', str(max(1, count // 4)))
+        most = ('--gaussians', str(count), '--strategy', strategy) if model == 'explicit' else ('--anchors', str(max(1, count // 4)))
         before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
         subprocess.run([program, 'fit', dataset, out, '--model', model, '--iterations', str(iterations), '--holdout', '6',
                         '--report', report, *most], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -55,6 +55,7 @@ def main():
     parser.add_argument('--iterations', type=int, nargs='+', default=[250, 500, 1000, 2000, 4000, 8000])
     parser.add_argument('--gaussians', type=int, nargs='+', default=[15000, 30000, 60000])
     parser.add_argument('--model', choices=('explicit', 'field'), default='explicit')
+    parser.add_argument('--strategy', default='adaptive', help='of explicit splats')
     given = parser.parse_args()
     if not os.access(given.stipple, os.X_OK):
         sys.exit(f"presets.py: '{given.stipple}' is not a program.")
@@ -63,7 +64,7 @@ def main():
     means = {}
     for count in given.gaussians:
         for iterations in given.iterations:
-            rows = [fit(given.stipple, d, given.model, iterations, count) for d in given.datasets]
+            rows = [fit(given.stipple, d, given.model, iterations, count, given.strategy) for d in given.datasets]
             cells = [f'{psnr:.2f} dB, {splats:,}, {seconds:.0f} s ({busy:.0f} s)' for seconds, busy, splats, psnr in rows]
             psnr, busy = (sum(row[i] for row in rows) / len(rows) for i in (3, 1))
             means[count, iterations] = psnr

@@ -96,7 +96,7 @@ class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):
 
 def _draw_strategy(layout, context, settings):
     layout.prop(settings, 'strategy')
-    sentence = strategies.summary(settings.strategy)
+    sentence = strategies.summary(settings)
     if sentence:
         draw_text(layout, context, sentence)
     column = layout.column(align=True)

@@ -6,10 +6,13 @@ from zlib import crc32
 
 from ..binding import strategies as native
 from ..binding.errors import LibraryError, StippleError
-from ..binding.structs import FitModel
+from ..binding.fit import fit_options
+from ..binding.structs import FitModel, FitQuality
 from . import sources
 
 ADAPTIVE = 'adaptive'
+# As the preset of the quality has it; the number is that of the item in files.
+BY_QUALITY, BY_QUALITY_NUMBER = 'by_quality', 1
 # Bits under which files keep parts: never given to another one.
 _PART_BITS = {name: bit for bit, name in enumerate((
     'edge_aware_score', 'long_axis_split', 'volume_split', 'recovery_pruning', 'growth_control', 'multi_step_update',
@@ -44,8 +47,9 @@ def _title(name):
 
 @lru_cache(maxsize=2)  # Blender keeps no reference to the texts of items
 def _strategy_items(entries):
-    return tuple((entry.name, _title(entry.name), entry.summary,
-                  0 if entry.name == ADAPTIVE else crc32(entry.name.encode()) & 0x7fffffff) for entry in entries)
+    chosen = (BY_QUALITY, _title(BY_QUALITY), "The strategy that goes with the quality", BY_QUALITY_NUMBER)
+    return (chosen, *((entry.name, _title(entry.name), entry.summary,
+                       0 if entry.name == ADAPTIVE else crc32(entry.name.encode()) & 0x7fffffff) for entry in entries))
 
 
 @lru_cache(maxsize=2)
@@ -61,15 +65,30 @@ def part_items(_settings=None, _context=None):
     return _part_items(_listed()[1])
 
 
-def summary(name):
-    """One sentence on a strategy or a part."""
+def chosen(settings):
+    """The name of a fit's strategy, or of the one that goes with its quality."""
+    if settings.strategy not in ('', BY_QUALITY):
+        return settings.strategy
+    library = _library()
+    if library is None:
+        return ADAPTIVE
+    return fit_options(library, FitModel.EXPLICIT, FitQuality[settings.quality]).strategy_utf8.decode()
+
+
+def summary(settings):
+    """One sentence on a fit's strategy, which it names where the quality chooses it."""
+    name = chosen(settings)
+    return (f"{_title(name)}: " if name != settings.strategy else "") + _summary(name)
+
+
+def _summary(name):
     return next((entry.summary for entries in _listed() for entry in entries if entry.name == name), "")
 
 
 def text_of(settings):
     """A fit's strategy and its parts, as the library takes them."""
     parts = [name for name, *_ in part_items() if name in settings.parts]
-    return '+'.join([settings.strategy or ADAPTIVE] + parts)
+    return '+'.join([chosen(settings)] + parts)
 
 
 def problem(text):

@@ -1444,8 +1444,9 @@ typedef struct StippleFitOptions {
   uint32_t model;              /* StippleFitModel, default explicit */
   const char* strategy_utf8;   /* how splats are added and removed: a strategy that stipple_strategy_info lists,
                                   with its settings, and parts beside or instead of its own:
-                                  "adaptive(threshold=0.0003)+long_axis_split". NULL: "adaptive"; of a field, as
-                                  density_gradient says */
+                                  "adaptive(threshold=0.0003)+long_axis_split". NULL, the default:
+                                  "adaptive"; of a field, as density_gradient says. Presets of explicit splats set
+                                  it: "adaptive" where fast, else "improved" */
   uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
   uint64_t max_splats;         /* explicit: hard cap, 1..2^28 */
   uint64_t start_splats;       /* explicit; 0, the default: as many as points are known */

@@ -391,6 +391,18 @@ TEST_F(FitTest, RefusesViewsThatNothingCanBeLearnedFrom) {
   stipple_views_free(black);
 }
 
+TEST_F(FitTest, PresetsOfSplatsChooseAStrategyThatDefaultsDoNot) {
+  EXPECT_EQ(options_.strategy_utf8, nullptr);
+  STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_EXPLICIT, STIPPLE_FIT_FAST));
+  EXPECT_STREQ(options_.strategy_utf8, "adaptive");
+  for (const uint32_t quality : {STIPPLE_FIT_BALANCED, STIPPLE_FIT_FINE_DETAIL}) {
+    STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_EXPLICIT, quality));
+    EXPECT_STREQ(options_.strategy_utf8, "improved");
+  }
+  STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_BALANCED));
+  EXPECT_EQ(options_.strategy_utf8, nullptr);
+}
+
 TEST_F(FitTest, RefusesOptionsOutOfRange) {
   const auto refused = [&](const char* text) {
     StippleJob* job = nullptr;
