@@ -62,8 +62,15 @@ def figures(_window):
     return 'figures'
 
 
+def content():
+    """Of the Image that comparisons write, None before the first."""
+    image = bpy.data.images.get('Quality Comparison')
+    return None if image is None else hash(tuple(image.pixels))
+
+
 def compared(show):
     def step(window):
+        window.before = content()
         with window.context():
             assert bpy.ops.stipple.accuracy_compare('INVOKE_DEFAULT', show=show) == {'RUNNING_MODAL'}
     return step
@@ -73,8 +80,8 @@ def is_shown(_window):
     return 'compared' if module('.scene.fit_reports').editors(bpy.context) else False
 
 
-def settled(_window):
-    """The step's own pause is long for so small a picture."""
+def settled(window):
+    return None if content() != window.before else False
 
 
 def plotted(window):
