@@ -41,16 +41,18 @@ double stepFor(double range) {
   return 10 * decade;
 }
 
-std::vector<double> ticksOf(const Axis& axis) {
+std::vector<double> evenTicks(double low, double high) {
   std::vector<double> ticks;
-  const bool by_value = !axis.is_logarithmic;
-  if (by_value) {
-    const double step = stepFor(axis.high - axis.low);
-    for (double k = std::ceil(axis.low / step - 1e-9); k * step <= axis.high + 1e-9 * step; ++k) {
-      ticks.push_back(k * step);
-    }
-    return ticks;
+  const double step = stepFor(high - low);
+  for (double k = std::ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) {
+    ticks.push_back(k * step);
   }
+  return ticks;
+}
+
+std::vector<double> ticksOf(const Axis& axis) {
+  if (!axis.is_logarithmic) return evenTicks(axis.low, axis.high);
+  std::vector<double> ticks;
   const bool is_short = axis.high - axis.low < 2.5;
   for (double k = std::floor(axis.low); k <= axis.high; ++k) {
     for (const double factor : {1.0, 2.0, 5.0}) {
@@ -60,6 +62,8 @@ std::vector<double> ticksOf(const Axis& axis) {
       if (factor == 1.0 || is_short) ticks.push_back(value);
     }
   }
+  // Less than a doubling may lie between two of them.
+  if (ticks.size() < 2) return evenTicks(std::pow(10.0, axis.low), std::pow(10.0, axis.high));
   return ticks;
 }
 

@@ -125,6 +125,18 @@ TEST(SvgPlot, ShowsOneValueAndLogarithms) {
   EXPECT_NE(svg.find(">0.01<"), std::string::npos);
 }
 
+TEST(SvgPlot, HasTicksWhereALogarithmicAxisIsShort) {
+  PlotPanel panel{"Short", "x", "y", true, true, false, {}};
+  PlotLine line;
+  line.x = {122, 169};  // no 1, 2 or 5 times a power of ten lies between
+  line.y = {1, 100};
+  panel.lines = {line};
+  const std::string svg = svgOf(sheetOf({panel}));
+  for (const char* tick : {">130<", ">140<", ">150<", ">160<"}) {
+    EXPECT_NE(svg.find(tick), std::string::npos) << tick;
+  }
+}
+
 TEST_F(FitReportFile, TellsWhatIterationsCostAndBrought) {
   const FitHistory made = history(1000);
   writeFitReport({"explicit", "adaptive", "{}"}, made, path("fit.json"));
