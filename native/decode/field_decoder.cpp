@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "decode/anchor_spacing.h"
 #include "decode/contraction.h"
+#include "decode/field_details.h"
 #include "decode/merge_neighbours.h"
 
 namespace stipple {
@@ -27,9 +28,6 @@ constexpr double kBudgetRange = 3;
 constexpr double kSpacingRange = 3;
 /// Neighbours farther than this, in units of the spacing, count as at it.
 constexpr double kFarthest = 4;
-/// Details change sizes by no more than a factor of 150, and odds by no more than float32 holds.
-constexpr float kLargestLogScale = 5;
-constexpr float kLargestLogit = 40;
 
 /// Where the neighbours are: on which side more room is left, and which way the surface lies.
 void writeNeighbours(const AnchorSet& anchors, size_t i, float spacing, const uint32_t* neighbours,
@@ -74,58 +72,6 @@ void writeInputs(const FieldParameters& field, const AnchorSet& anchors, size_t 
     *to++ = static_cast<float>(cell / (cell + static_cast<double>(spacing)));
   }
   if (seesNeighbours(field)) writeNeighbours(anchors, i, spacing, neighbours, to);
-}
-
-float scaleFactor(float detail) {
-  return std::exp(std::clamp(detail, -kLargestLogScale, kLargestLogScale));
-}
-
-/// In and out: cloud: in the unit cube.
-void addDetails(const FieldTape& tape, size_t channels, SplatCloud& cloud) {
-  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) {
-      const float* detail = &tape.details[n * channels];
-      for (size_t c = 0; c < 3; ++c) cloud.sh[n * cloud.shStride() + c] += detail[c];
-      if (channels <= kColourChannels) continue;
-      // logistic(logit(o) + d) without the logit, which 0 and 1 have none of.
-      const float odds =
-          std::exp(std::clamp(detail[kDetailOpacity], -kLargestLogit, kLargestLogit));
-      const float o = cloud.opacities[n];
-      cloud.opacities[n] = o * odds / (1.0f - o + o * odds);
-      const float scale = scaleFactor(detail[kDetailScale]);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        cloud.scales[n * 3 + axis] *= scale;
-        cloud.positions[n * 3 + axis] += tape.footprints[n] * detail[kDetailOffset + axis];
-      }
-    }
-  });
-}
-
-/// Derivatives by the details; those by the scales become derivatives by the scales without them.
-/// Of opacities there is nothing to change: what follows takes them by their logits, which details
-/// are added to. In: side: of the root; cloud in the world, gradient by the unit cube.
-void detailGradient(FieldTape& tape, size_t channels, float side, const SplatCloud& cloud,
-                    SplatCloud& gradient) {
-  tape.detail_gradient.resize(tape.details.size());
-  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
-    for (size_t n = begin; n < end; ++n) {
-      float* to = &tape.detail_gradient[n * channels];
-      for (size_t c = 0; c < 3; ++c) to[c] = gradient.sh[n * cloud.shStride() + c];
-      if (channels <= kColourChannels) continue;
-      const float* detail = &tape.details[n * channels];
-      const float o = cloud.opacities[n];
-      to[kDetailOpacity] = gradient.opacities[n] * o * (1.0f - o);
-      const float scale = scaleFactor(detail[kDetailScale]);
-      const float size = tape.stretch.empty() ? side : side * tape.stretch[n];
-      float by_scale = 0;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        by_scale += gradient.scales[n * 3 + axis] * cloud.scales[n * 3 + axis] / size;
-        gradient.scales[n * 3 + axis] *= scale;
-        to[kDetailOffset + axis] = tape.footprints[n] * gradient.positions[n * 3 + axis];
-      }
-      to[kDetailScale] = std::abs(detail[kDetailScale]) < kLargestLogScale ? by_scale : 0.0f;
-    }
-  });
 }
 
 /// Where a Gaussian would be without contraction, metres.
@@ -231,10 +177,10 @@ void FieldDecoder::forward(const AnchorSet& anchors, FieldTape& tape, SplatCloud
   activateSplats(field.layout, {anchors.positions, tape.units}, tape.network.output().data(),
                  fieldOutputWidth(field.layout), cloud);
   tape.places.assign(cloud.positions.begin(), cloud.positions.end());
-  const size_t channels = field.details.channels();
-  tape.details.assign(cloud.size() * channels, 0.0f);
-  field.details.addSum({tape.places, tape.footprints}, tape.details.data(), channels);
-  addDetails(tape, channels, cloud);
+  const FieldDetails details = {field.details.channels(), tape.footprints, tape.stretch};
+  tape.details.assign(cloud.size() * details.channels, 0.0f);
+  field.details.addSum({tape.places, tape.footprints}, tape.details.data(), details.channels);
+  addDetails(details, tape.details, cloud);
   tape.centres.assign(cloud.positions.begin(), cloud.positions.end());
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin * 3; i < end * 3; ++i) {
@@ -259,7 +205,9 @@ void FieldDecoder::backward(const AnchorSet& anchors, FieldTape& tape, const Spl
       cloud_gradient.scales[i] *= side;
     }
   });
-  detailGradient(tape, field.details.channels(), side, cloud, cloud_gradient);
+  tape.detail_gradient.resize(tape.details.size());
+  addDetailsBackward({field.details.channels(), tape.footprints, tape.stretch}, tape.details, side,
+                     cloud, cloud_gradient, tape.detail_gradient);
   const FeaturePlaces places = {tape.places, tape.footprints};
   const size_t channels = field.details.channels();
   field.details.backwardSum(places, tape.detail_gradient.data(), channels, gradients.details);

@@ -56,10 +56,11 @@ void requireShape(int leaf_level, const SplatLayout& layout, uint64_t least, uin
   require(most <= kMaxAnchorCount, "largest budget", most, "at most 2^28");
 }
 
-/// Cells as wide as places on surfaces are apart, which cover about the cube's own six faces: of
-/// finer ones most are never read twice, and what they learn is noise.
+/// Cells half as wide as places on surfaces are apart, which cover about the cube's own six faces,
+/// so that what one place learns is not its neighbour's: of finer ones most are never read twice,
+/// and what they learn is noise.
 int finestLevel(uint64_t places, const FieldShape& shape) {
-  const double level = std::ceil(0.5 * std::log2(static_cast<double>(places)));
+  const double level = 1 + std::ceil(0.5 * std::log2(static_cast<double>(places)));
   return std::clamp(static_cast<int>(level) + (shape.contracted ? 1 : 0), 1, shape.leaf_level);
 }
 
@@ -145,8 +146,8 @@ void validate(const FieldParameters& field) {
   require("width of the network's output", field.network.outputWidth(),
           fieldOutputWidth(field.layout));
   const size_t channels = field.details.channels();
-  require("count of detail channels", channels,
-          channels == kColourChannels ? kColourChannels : kDetailChannels);
+  const bool is_earlier = channels == kColourChannels || channels == kChannelsWithoutShapes;
+  require("count of detail channels", channels, is_earlier ? channels : kDetailChannels);
 }
 
 }  // namespace stipple

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "decode/feature_grid.h"
+#include "decode/field_details.h"
 #include "decode/splat_layout.h"
 #include "density/octree_density.h"
 #include "nn/mlp.h"
@@ -26,15 +27,6 @@ struct FieldShape {
   uint64_t seed = 0;
 };
 
-/// What is read where a Gaussian is: numbers added to its first harmonic (3), the logit of its
-/// opacity and the logarithms of its scales (one for all), and an offset in units of its footprint.
-/// Fields of the first asset files have colours alone.
-constexpr size_t kColourChannels = 3;
-constexpr size_t kDetailOpacity = 3;
-constexpr size_t kDetailScale = 4;
-constexpr size_t kDetailOffset = 5;
-constexpr size_t kDetailChannels = 8;
-
 /// Everything that an attribute field has learned.
 struct FieldParameters {
   RootCube root;
@@ -46,7 +38,7 @@ struct FieldParameters {
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kMip;
   FeatureGrid features;  ///< read where an anchor is; the network's input
-  FeatureGrid details;   ///< read where a Gaussian is, [kDetailChannels], or colours alone
+  FeatureGrid details;   ///< read where a Gaussian is, [kDetailChannels] or fewer
   Mlp network;
 
   uint64_t bytes() const;

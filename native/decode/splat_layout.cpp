@@ -130,17 +130,18 @@ void activateSplatsBackward(const SplatLayout& layout, const LayoutAnchors& anch
           to[layout.colour(k) + axis] = gradient.sh[n * sh_stride + axis];
         }
         to[layout.spread(k)] = by_spread * logistic(spread_sum);
+        // Not the cloud's, which may have been turned since.
+        std::array<float, 4> stored;
         float squared = 0, along = 0;
-        const float* q = &cloud.rotations[n * 4];
         for (size_t c = 0; c < 4; ++c) {
-          const float stored =
-              kRotationShare * from[layout.rotation(k) + c] + (c == 0 ? 1.0f : 0.0f);
-          squared += stored * stored;
-          along += gradient.rotations[n * 4 + c] * q[c];
+          stored[c] = kRotationShare * from[layout.rotation(k) + c] + (c == 0 ? 1.0f : 0.0f);
+          squared += stored[c] * stored[c];
+          along += gradient.rotations[n * 4 + c] * stored[c];
         }
         const float length = std::sqrt(squared);
         for (size_t c = 0; c < 4; ++c) {
-          const float across = gradient.rotations[n * 4 + c] - along * q[c];
+          const float across =
+              gradient.rotations[n * 4 + c] - along * stored[c] / std::max(squared, 1e-12f);
           to[layout.rotation(k) + c] =
               length < kLeastLength ? 0.0f : kRotationShare * across / length;
         }

@@ -248,6 +248,95 @@ TEST(FieldDecoder, DetailsChangeWhatTheyStandFor) {
   }
 }
 
+TEST(FieldDecoder, DetailsChangeShapesAxisByAxisAndTurnThem) {
+  const SplatCloud plain = withDetail(0, 0.0f);
+  const SplatCloud coloured = withDetail(1, 0.5f);
+  const SplatCloud narrow = withDetail(kDetailScales + 1, -1.0f);
+  const SplatCloud turned = withDetail(kDetailTurn + 2, 0.5f);
+  for (size_t n = 0; n < plain.size(); ++n) {
+    const float share = (coloured.sh[n * 3 + 1] - plain.sh[n * 3 + 1]) / 0.5f;
+    EXPECT_EQ(narrow.scales[n * 3], plain.scales[n * 3]);
+    EXPECT_NEAR(narrow.scales[n * 3 + 1] / plain.scales[n * 3 + 1], std::exp(-kShapeShare * share),
+                1e-4f);
+    EXPECT_EQ(turned.scales[n * 3 + 1], plain.scales[n * 3 + 1]);
+    // (1, 0, 0, r) turns about z by twice the angle whose tangent is r.
+    const double half = std::atan(static_cast<double>(kShapeShare * 0.5f * share));
+    const float* p = &plain.rotations[n * 4];
+    const double c = std::cos(half), s = std::sin(half);
+    const auto at = [&](size_t k) { return static_cast<double>(p[k]); };
+    const double expected[] = {c * at(0) - s * at(3), c * at(1) - s * at(2), c * at(2) + s * at(1),
+                               c * at(3) + s * at(0)};
+    for (size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(static_cast<double>(turned.rotations[n * 4 + k]), expected[k], 1e-6);
+    }
+  }
+}
+
+/// A turn that details of no size make, however large they become, leaves unit quaternions and
+/// finite derivatives, which fade as a half turn is all that there is.
+TEST(FieldDecoder, LargestDetailsLeaveUnitRotationsAndFiniteDerivatives) {
+  std::vector<float> details(kDetailChannels, 0.0f);
+  SplatCloud plain;
+  plain.resize(1);
+  plain.positions.assign(3, 0.5f);
+  plain.scales.assign(3, 0.01f);
+  plain.rotations = {1, 0, 0, 0};
+  plain.opacities.assign(1, 0.5f);
+  plain.sh.assign(plain.shStride(), 0.0f);
+  const std::vector<float> footprint = {0.01f};
+  const FieldDetails how = {kDetailChannels, footprint, {}};
+  for (const float size : {1e-30f, 1.0f, 1e4f, 1e15f, -1e15f}) {
+    std::fill_n(&details[kDetailScale], kDetailChannels - kDetailScale, size);
+    std::fill_n(&details[kDetailOffset], 3, 0.0f);
+    SplatCloud cloud = plain;
+    addDetails(how, details, cloud);
+    EXPECT_NO_THROW(validate(cloud, "cloud")) << size;
+    SplatCloud gradient = cloud;
+    gradient.rotations = {1, -2, 3, -4};
+    std::vector<float> by_details(kDetailChannels);
+    addDetailsBackward(how, details, 1.0f, cloud, gradient, by_details);
+    for (const float value : by_details) EXPECT_TRUE(std::isfinite(value)) << size;
+    for (const float value : gradient.rotations) EXPECT_TRUE(std::isfinite(value)) << size;
+    if (std::abs(size) > 1e3f) {
+      EXPECT_LT(std::abs(by_details[kDetailTurn]), 1e-3f);
+    }
+  }
+}
+
+/// What files hold that were written before shapes were learned: eight numbers a corner.
+TEST(FieldDecoder, TakesFieldsWithoutShapes) {
+  FieldParameters field = livelyField(4, 0);
+  const size_t without = kChannelsWithoutShapes;
+  FieldParameters zero = field;
+  std::vector<FeatureLevel> levels = field.details.levels();
+  for (size_t l = 0; l < levels.size(); ++l) {
+    std::vector<float>& full = zero.details.levels()[l].values;
+    levels[l].values.clear();
+    for (size_t i = 0; i < full.size(); ++i) {
+      if (i % kDetailChannels < without) {
+        levels[l].values.push_back(full[i]);
+      } else {
+        full[i] = 0;
+      }
+    }
+  }
+  field.details = FeatureGrid(without, levels);
+  auto read = std::make_shared<FieldParameters>(fieldOfTensors(tensorsOfField(field), field));
+  EXPECT_TRUE(seesNeighbours(*read));
+  const AnchorSet anchors = planeAnchors(5, 4);
+  DecodeRequest request;
+  request.anchors = &anchors;
+  request.gaussians_per_anchor = 4;
+  const SplatCloud old = FieldDecoder(read).decode(request);
+  const SplatCloud now = FieldDecoder(std::make_shared<FieldParameters>(zero)).decode(request);
+  EXPECT_EQ(old.scales, now.scales);
+  EXPECT_EQ(old.positions, now.positions);
+  EXPECT_EQ(old.sh, now.sh);
+  for (size_t i = 0; i < old.rotations.size(); ++i) {
+    EXPECT_NEAR(old.rotations[i], now.rotations[i], 2e-7f) << "float32 normalises once more";
+  }
+}
+
 /// What the first asset files hold: colours alone, and a network that does not see neighbours.
 TEST(FieldDecoder, TakesFieldsWithColoursAlone) {
   FieldParameters field = livelyField(4, 0);
