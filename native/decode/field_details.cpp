@@ -1,11 +1,11 @@
 #include "decode/field_details.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
-#include <Eigen/Geometry>
-
 #include "base/parallel.h"
+#include "math/quaternion_turn.h"
 
 namespace stipple {
 
@@ -30,38 +30,9 @@ float scaleFactor(float log_scale) {
   return std::exp(std::clamp(log_scale, -kLargestLogScale, kLargestLogScale));
 }
 
-Eigen::Quaternionf quaternionOf(const float* wxyz) {
-  return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
-}
-
-void store(const Eigen::Quaternionf& q, float* wxyz) {
-  wxyz[0] = q.w();
-  wxyz[1] = q.x();
-  wxyz[2] = q.y();
-  wxyz[3] = q.z();
-}
-
-/// Its length is at least 1.
-Eigen::Quaternionf turnOf(const float* detail) {
+std::array<float, 3> turnOf(const float* detail) {
   const float* r = detail + kDetailTurn;
-  return {1.0f, kShapeShare * r[0], kShapeShare * r[1], kShapeShare * r[2]};
-}
-
-/// q = u p / |u| for the turn u and the unit quaternion p without it. In: rotation: q. In and out:
-/// by_rotation: derivatives by q, which become those by p. Out: by_turn: by the vector part of u.
-void turnBackward(const float* detail, const float* rotation, float* by_rotation, float* by_turn) {
-  const Eigen::Quaternionf turn = turnOf(detail);
-  const Eigen::Quaternionf q = quaternionOf(rotation);
-  const Eigen::Quaternionf by_q = quaternionOf(by_rotation);
-  const float length = turn.norm();
-  const Eigen::Quaternionf p((turn.conjugate() * q).coeffs() / length);
-  // Across q, as its length stays 1.
-  const Eigen::Quaternionf by_product((by_q.coeffs() - by_q.dot(q) * q.coeffs()) / length);
-  const Eigen::Quaternionf by_u = by_product * p.conjugate();
-  by_turn[0] = kShapeShare * by_u.x();
-  by_turn[1] = kShapeShare * by_u.y();
-  by_turn[2] = kShapeShare * by_u.z();
-  store(turn.conjugate() * by_product, by_rotation);
+  return {kShapeShare * r[0], kShapeShare * r[1], kShapeShare * r[2]};
 }
 
 }  // namespace
@@ -83,8 +54,7 @@ void addDetails(const FieldDetails& how, std::span<const float> details, SplatCl
         cloud.positions[n * 3 + axis] += how.footprints[n] * detail[kDetailOffset + axis];
       }
       if (!hasShapes(channels)) continue;
-      float* q = &cloud.rotations[n * 4];
-      store((turnOf(detail) * quaternionOf(q)).normalized(), q);
+      turnQuaternion(turnOf(detail).data(), &cloud.rotations[n * 4]);
     }
   });
 }
@@ -113,9 +83,11 @@ void addDetailsBackward(const FieldDetails& how, std::span<const float> details,
         by_scale *= scaleFactor(log_scale);
         to[kDetailOffset + axis] = how.footprints[n] * gradient.positions[n * 3 + axis];
       }
-      if (hasShapes(channels)) {
-        turnBackward(detail, &cloud.rotations[n * 4], &gradient.rotations[n * 4], to + kDetailTurn);
-      }
+      if (!hasShapes(channels)) continue;
+      float* by_turn = to + kDetailTurn;
+      turnQuaternionBackward(turnOf(detail).data(), &cloud.rotations[n * 4],
+                             &gradient.rotations[n * 4], by_turn);
+      for (size_t axis = 0; axis < 3; ++axis) by_turn[axis] *= kShapeShare;
     }
   });
 }
