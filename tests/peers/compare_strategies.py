@@ -113,14 +113,15 @@ def spread(values, form):
 
 
 def table(results, scene, kind, iterations):
-    lines = ['| strategy | PSNR, dB | SSIM | splats | processor seconds | peak memory, MiB |', '|---|---|---|---|---|---|']
+    lines = ['| strategy | seeds | PSNR, dB | SSIM | splats | processor seconds | peak memory, MiB |',
+             '|---|---|---|---|---|---|---|']
     rows = results.find(scene=scene, kind=kind, iterations=iterations)
     by_name = {}
     for row in rows:
         by_name.setdefault(row['strategy'], []).append(row)
     for name, found in sorted(by_name.items(), key=lambda item: -statistics.mean(row['psnr'] for row in item[1])):
         lines.append('| ' + ' | '.join((
-            f'`{name}`', spread([row['psnr'] for row in found], '{:.2f}'),
+            f'`{name}`', str(len(found)), spread([row['psnr'] for row in found], '{:.2f}'),
             spread([row['ssim'] for row in found], '{:.4f}'), f'{statistics.mean(row["gaussians"] for row in found):,.0f}',
             spread([row['processor_seconds'] for row in found], '{:.0f}'),
             f'{statistics.mean(row["megabytes"] for row in found):.0f}')) + ' |')
@@ -131,7 +132,7 @@ def write_page(results, given):
     seeds = len({row['seed'] for row in results.rows})
     lines = ['# What every strategy reaches', '',
              f'Written by `tests/peers/strategies.sh`: {given.iterations} iterations, at most {MOST_SPLATS:,} splats, '
-             f'{seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every eighth view held out, '
+             f'up to {seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every eighth view held out, '
              f'pictures of {464 // DOWNSCALE} × {256 // DOWNSCALE}.',
              f'All fits together: {sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on '
              f'{os.cpu_count()} cores, {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours by the clock; '
