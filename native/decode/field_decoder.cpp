@@ -177,7 +177,7 @@ void FieldDecoder::forward(const AnchorSet& anchors, FieldTape& tape, SplatCloud
   activateSplats(field.layout, {anchors.positions, tape.units}, tape.network.output().data(),
                  fieldOutputWidth(field.layout), cloud);
   tape.places.assign(cloud.positions.begin(), cloud.positions.end());
-  const FieldDetails details = {field.details.channels(), tape.footprints, tape.stretch};
+  const FieldDetails details = {field.details.channels(), tape.footprints, {}};
   tape.details.assign(cloud.size() * details.channels, 0.0f);
   field.details.addSum({tape.places, tape.footprints}, tape.details.data(), details.channels);
   addDetails(details, tape.details, cloud);

@@ -15,6 +15,8 @@ constexpr size_t kGrain = 512;
 /// Details change sizes by no more than a factor of 150, and odds by no more than float32 holds.
 constexpr float kLargestLogScale = 5;
 constexpr float kLargestLogit = 40;
+/// Half a turn but for 1e-6; the square of a file's largest number would leave float32.
+constexpr float kLargestTurn = 1e6f;
 
 bool hasShapes(size_t channels) {
   return channels > kChannelsWithoutShapes;
@@ -31,8 +33,11 @@ float scaleFactor(float log_scale) {
 }
 
 std::array<float, 3> turnOf(const float* detail) {
-  const float* r = detail + kDetailTurn;
-  return {kShapeShare * r[0], kShapeShare * r[1], kShapeShare * r[2]};
+  std::array<float, 3> turn;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    turn[axis] = std::clamp(kShapeShare * detail[kDetailTurn + axis], -kLargestTurn, kLargestTurn);
+  }
+  return turn;
 }
 
 }  // namespace

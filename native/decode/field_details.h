@@ -28,7 +28,7 @@ constexpr float kShapeShare = 0.3f;
 struct FieldDetails {
   size_t channels;                    ///< of each row of details
   std::span<const float> footprints;  ///< [N] of the Gaussians, unit cube
-  std::span<const float> stretch;     ///< [N] what decoding multiplied sizes by; empty: 1
+  std::span<const float> stretch;  ///< [N] of the way back: what sizes were multiplied by; empty: 1
 };
 
 /// In: details [N, channels]. In and out: cloud: N Gaussians in the unit cube.

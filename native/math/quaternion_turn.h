@@ -3,7 +3,8 @@
 namespace stipple {
 
 /// Rotates a unit quaternion w,x,y,z, in place, about the axes of the world: by twice the angle
-/// whose tangent is the length of `turn`, about its direction. Any finite turn [3] is allowed.
+/// whose tangent is the length of `turn`, about its direction. turn: [3], of a length of at most
+/// 1e18.
 void turnQuaternion(const float* turn, float* wxyz);
 
 /// In: wxyz: turned. In and out: by_rotation [4]: derivatives by it, which become those by the

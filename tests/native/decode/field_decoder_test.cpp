@@ -285,7 +285,7 @@ TEST(FieldDecoder, LargestDetailsLeaveUnitRotationsAndFiniteDerivatives) {
   plain.sh.assign(plain.shStride(), 0.0f);
   const std::vector<float> footprint = {0.01f};
   const FieldDetails how = {kDetailChannels, footprint, {}};
-  for (const float size : {1e-30f, 1.0f, 1e4f, 1e15f, -1e15f}) {
+  for (const float size : {1e-30f, 1.0f, 1e4f, 1e15f, -1e15f, 1e30f}) {
     std::fill_n(&details[kDetailScale], kDetailChannels - kDetailScale, size);
     std::fill_n(&details[kDetailOffset], 3, 0.0f);
     SplatCloud cloud = plain;

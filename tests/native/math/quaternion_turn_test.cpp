@@ -25,7 +25,7 @@ TEST(QuaternionTurn, TurnsByTwiceTheAngleWhoseTangentIsItsLength) {
   for (const float c : q) EXPECT_NEAR(c, 0.5f, 1e-7f);
 }
 
-TEST(QuaternionTurn, AnyFiniteTurnLeavesAUnitQuaternion) {
+TEST(QuaternionTurn, LargeAndSmallTurnsLeaveAUnitQuaternion) {
   for (const float size : {0.0f, 1e-30f, 1e-3f, 1.0f, 1e6f, 1e18f}) {
     Rotation q = {0.5f, -0.5f, 0.5f, 0.5f};
     turnQuaternion(Turn{size, -size, size}.data(), q.data());
