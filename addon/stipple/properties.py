@@ -166,9 +166,9 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                         items=strategies.part_items, options={'ENUM_FLAG'})
     density_gradient: BoolProperty(name="Learn Density", description="Move anchors to where they help the picture "
                                    "most", default=True, options=set())
-    shell: EnumProperty(name="Shell", description="Room for what is far away, as a world or a landscape behind "
-                        "the objects",
-                        items=(('AUTO', "Auto", "Where views are opaque and may show what is beyond all surfaces"),
+    shell: EnumProperty(name="Shell", description="Room behind the objects, for a world or a landscape, and for what "
+                        "closes the gaps of walls",
+                        items=(('AUTO', "Auto", "Where views are opaque: far out, or close behind walls that hide all else"),
                                ('ON', "On", "Always"), ('OFF', "Off", "Never")), options=set())
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,
                       options=set())

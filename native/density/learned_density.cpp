@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -22,6 +23,7 @@ constexpr size_t kGrain = 2048;
 const float kEvenLog = static_cast<float>(-std::log(8.0));
 /// Logits stay within this of each other's size: beyond it exp() of their differences is 0 anyway.
 constexpr float kLargestLogit = 60.0f;
+constexpr float kNothing = -std::numeric_limits<float>::infinity();
 
 using Eight = std::array<double, 8>;
 
@@ -217,6 +219,7 @@ void LearnedDensity::refreshAll() {
       for (size_t row = begin; row < end; ++row) refresh(static_cast<int>(l), row);
     });
   }
+  settleAll();
 }
 
 void LearnedDensity::childLogProbabilities(int level, std::span<const uint64_t> cells,
@@ -252,6 +255,7 @@ void LearnedDensity::setLogits(int level, std::span<const uint32_t> rows,
             std::clamp(values[i * 8 + k], -kLargestLogit, kLargestLogit);
       }
       refresh(level, rows[i]);
+      if (level < settled_level_) settle(level, rows[i]);
     }
   });
 }
@@ -379,6 +383,7 @@ void LearnedDensity::countDraws(const AnchorSet& anchors, DrawCounts& draws) con
 std::vector<std::vector<uint32_t>> LearnedDensity::activate(const DrawCounts& draws,
                                                             uint64_t least_draws) {
   std::vector<std::vector<uint32_t>> inserted(levels_.size());
+  bool has_new = false;
   for (size_t l = 1; l < levels_.size(); ++l) {
     LearnedLevel& level = levels_[l];
     std::vector<uint64_t> fresh;
@@ -400,48 +405,93 @@ std::vector<std::vector<uint32_t>> LearnedDensity::activate(const DrawCounts& dr
     insertZeroRows(level.prior, 8, inserted[l]);
     insertZeroRows(log_probabilities_[l], 8, inserted[l]);
     for (const uint32_t row : inserted[l]) refresh(static_cast<int>(l), row);
+    has_new = true;
   }
+  if (has_new) settleAll();
   return inserted;
 }
 
-OctreeDensity LearnedDensity::frozen() const {
+/// Which children lead down to the deepest active cells, whose children are leaves. A matter of
+/// which cells are active, not of logits: it changes with activate() alone.
+void LearnedDensity::findLiving() {
   size_t depth = levels_.size();
   while (levels_[depth - 1].cells.empty()) --depth;
-  constexpr float kNothing = -std::numeric_limits<float>::infinity();
-  std::vector<std::vector<uint64_t>> cells(depth);
-  std::vector<std::vector<float>> logs(depth);
-  // Bottom up: a cell lives where a child with mass does; children of the deepest are leaves.
-  for (size_t l = depth; l-- > 0;) {
-    const LearnedLevel& level = levels_[l];
-    for (size_t row = 0; row < level.cells.size(); ++row) {
-      Eight shares = softmax(&level.logits[row * 8]);
-      double sum = 0;
-      for (size_t k = 0; k < 8; ++k) {
-        const uint64_t child = level.cells[row] << 3 | k;
-        const bool lives = l + 1 == depth || rowOf(cells[l + 1], child) < cells[l + 1].size();
-        if (!lives || shares[k] < kUniformShare) shares[k] = 0;
-        sum += shares[k];
-      }
-      if (sum <= 0) continue;
-      cells[l].push_back(level.cells[row]);
-      for (const double share : shares) {
-        logs[l].push_back(share > 0 ? static_cast<float>(std::log(share / sum)) : kNothing);
-      }
+  settled_level_ = static_cast<int>(depth);
+  living_.assign(levels_.size(), {});
+  living_[depth - 1].assign(levels_[depth - 1].cells.size(), 0xff);
+  for (size_t l = depth - 1; l-- > 0;) {
+    const std::vector<uint64_t>& children = levels_[l + 1].cells;
+    living_[l].assign(levels_[l].cells.size(), 0);
+    RowCursor parents(levels_[l].cells);
+    for (size_t i = 0; i < children.size(); ++i) {
+      if (living_[l + 1][i] == 0) continue;
+      living_[l][parents.find(children[i] >> 3)] |= static_cast<uint8_t>(1u << (children[i] & 7));
     }
   }
+}
+
+void LearnedDensity::settle(int level, size_t row) {
+  const size_t l = static_cast<size_t>(level);
+  const uint8_t living = living_[l][row];
+  const Eight shares = softmax(&levels_[l].logits[row * 8]);
+  Eight kept{};
+  // Where only what is too small leads anywhere, it is kept.
+  for (const double least : {kUniformShare, 0.0}) {
+    for (size_t k = 0; k < 8; ++k) {
+      if ((living >> k & 1) != 0 && shares[k] >= least) kept[k] = shares[k];
+    }
+    if (std::accumulate(kept.begin(), kept.end(), 0.0) > 0) break;
+  }
+  const double sum = std::accumulate(kept.begin(), kept.end(), 0.0);
+  for (size_t k = 0; k < 8; ++k) {
+    settled_[l][row * 8 + k] = kept[k] > 0 ? static_cast<float>(std::log(kept[k] / sum)) : kNothing;
+  }
+}
+
+void LearnedDensity::settleAll() {
+  findLiving();
+  settled_.resize(levels_.size());
+  for (size_t l = 0; l < static_cast<size_t>(settled_level_); ++l) {
+    settled_[l].resize(levels_[l].logits.size());
+    parallelFor(levels_[l].cells.size(), kGrain, [&](size_t begin, size_t end) {
+      for (size_t row = begin; row < end; ++row) settle(static_cast<int>(l), row);
+    });
+  }
+}
+
+void LearnedDensity::settledLogProbabilities(int level, std::span<const uint64_t> cells,
+                                             std::span<float> out) const {
+  const size_t l = static_cast<size_t>(level);
+  parallelFor(cells.size(), kGrain, [&](size_t begin, size_t end) {
+    RowCursor cursor(levels_[l].cells);
+    for (size_t i = begin; i < end; ++i) {
+      const size_t row = cursor.find(cells[i]);
+      if (row < levels_[l].cells.size()) {
+        std::copy_n(&settled_[l][row * 8], 8, &out[i * 8]);
+      } else {
+        std::fill_n(&out[i * 8], 8, kNothing);
+      }
+    }
+  });
+}
+
+OctreeDensity LearnedDensity::frozen() const {
+  const auto depth = static_cast<size_t>(settled_level_);
+  std::vector<std::vector<uint64_t>> cells(depth);
+  std::vector<std::vector<float>> logs(depth);
+  cells[0] = levels_[0].cells;
+  logs[0] = settled_[0];
   // Top down: cells whose parent gave them up go.
   for (size_t l = 1; l < depth; ++l) {
-    std::vector<uint64_t> kept;
-    std::vector<float> kept_logs;
-    for (size_t row = 0; row < cells[l].size(); ++row) {
-      const size_t parent = rowOf(cells[l - 1], cells[l][row] >> 3);
+    RowCursor parents(cells[l - 1]);
+    for (size_t row = 0; row < levels_[l].cells.size(); ++row) {
+      const uint64_t cell = levels_[l].cells[row];
+      const size_t parent = parents.find(cell >> 3);
       if (parent == cells[l - 1].size()) continue;
-      if (logs[l - 1][parent * 8 + (cells[l][row] & 7)] == kNothing) continue;
-      kept.push_back(cells[l][row]);
-      kept_logs.insert(kept_logs.end(), &logs[l][row * 8], &logs[l][row * 8] + 8);
+      if (logs[l - 1][parent * 8 + (cell & 7)] == kNothing) continue;
+      cells[l].push_back(cell);
+      logs[l].insert(logs[l].end(), &settled_[l][row * 8], &settled_[l][row * 8] + 8);
     }
-    cells[l] = std::move(kept);
-    logs[l] = std::move(kept_logs);
   }
   return OctreeDensity::fromLevels(root_, std::move(cells), std::move(logs));
 }

@@ -96,15 +96,42 @@ class LearnedDensity final : public DensityModel {
   /// of the deepest active cells.
   OctreeDensity frozen() const;
 
+  /// What frozen() keeps of the choices in some of its cells, up to date after every change: log
+  /// probabilities, minus infinity for what it leaves out. Its leaf level is settledLevel().
+  int settledLevel() const { return settled_level_; }
+  void settledLogProbabilities(int level, std::span<const uint64_t> cells,
+                               std::span<float> out) const;
+
  private:
   void refresh(int level, size_t row);
   void refreshAll();
+  void findLiving();
+  void settle(int level, size_t row);
+  void settleAll();
   std::array<double, 8> logitGradient(int level, size_t row,
                                       const std::array<double, 8>& log_gradient) const;
 
   RootCube root_;
   std::vector<LearnedLevel> levels_;
   std::vector<std::vector<float>> log_probabilities_;  // [cells, 8] per level, of the mixture
+  int settled_level_ = 0;
+  std::vector<std::vector<uint8_t>> living_;  // [cells] per level, a bit for each child: it leads
+                                              // to leaves of the settled level
+  std::vector<std::vector<float>> settled_;   // [cells, 8] per level
+};
+
+/// A learned density as decoding will know it, which anchors can be drawn from without freezing it.
+class SettledDensity final : public DensityModel {
+ public:
+  explicit SettledDensity(const LearnedDensity& density) : density_(density) {}
+  int leafLevel() const override { return density_.settledLevel(); }
+  void childLogProbabilities(int level, std::span<const uint64_t> cells,
+                             std::span<float> out) const override {
+    density_.settledLogProbabilities(level, cells, out);
+  }
+
+ private:
+  const LearnedDensity& density_;
 };
 
 /// Inserts rows of zeros: what belongs to the cells of a level follows LearnedDensity::activate.

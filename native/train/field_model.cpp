@@ -201,7 +201,7 @@ class FieldModel final : public FitModel {
   uint64_t memoryBytes() const override {
     // Values and both moments, and the derivatives of grids, which are kept whole.
     const uint64_t field = 4 * state_.field->bytes();
-    const uint64_t density = state_.density.activeCellCount() * 8 * (5 * sizeof(float) + 1);
+    const uint64_t density = state_.density.activeCellCount() * 8 * (6 * sizeof(float) + 1);
     const uint64_t splats = cloud_.size() * (cloud_.shStride() + 11) * 3 * sizeof(float);
     const uint64_t anchors = tape_.inputs.size() * 8 * sizeof(float);
     const uint64_t pictures = colour_gradient_.size() * 3 * sizeof(float);
@@ -227,7 +227,7 @@ class FieldModel final : public FitModel {
     AnchorSet anchors;
     {
       Stopwatch watch(report.seconds.field);
-      anchors = drawAnchors(moment);
+      anchors = drawAnchors(moment, learns_density);
       FieldDecoder(state_.field).forward(anchors, tape_, cloud_);
     }
     report.splat_count = cloud_.size();
@@ -277,7 +277,9 @@ class FieldModel final : public FitModel {
 
   LearnedDraws draws() const { return {options_.jitter, true, options_.seed}; }
 
-  AnchorSet drawAnchors(const FitMoment& moment) const {
+  /// Without what the even share adds, as decoding draws: its anchors stand in empty space, large,
+  /// as they have no neighbours, and in the way of views. Only a density that learns draws them.
+  AnchorSet drawAnchors(const FitMoment& moment, bool learns_density) const {
     const double u =
         unitDouble(keyedBits(options_.seed, RandomUse::kAnchorBudget, moment.iteration));
     uint64_t most = options_.most_anchors;
@@ -290,8 +292,10 @@ class FieldModel final : public FitModel {
     AnchorSamplingOptions sampling;
     sampling.count = std::min(most, static_cast<uint64_t>(std::llround(drawn)));
     const uint64_t bits = keyedBits(options_.seed, RandomUse::kAnchorSeed, moment.iteration);
-    sampling.seed = unitDouble(mixBits(bits)) < start_.own_draws ? 0 : bits;
-    return drawLearned(state_.density, sampling, draws());
+    const bool own = unitDouble(mixBits(bits)) < start_.own_draws;
+    if (!own) sampling.seed = bits;
+    return own || !learns_density ? drawSettled(state_.density, sampling, draws())
+                                  : drawLearned(state_.density, sampling, draws());
   }
 
   ImageLossValue pictureLoss(const StepView& view) {

@@ -32,6 +32,13 @@ constexpr double kSeenBeyond = 0.05;
 /// Weight of the shell beside that of all points, and places in it.
 constexpr double kShellShare = 0.25;
 constexpr size_t kShellPlaces = 20000;
+/// How far out they go, in halves of the inner cube's side: out of doors, and behind walls that
+/// hide all else, where they only have to stand behind the gaps between splats.
+constexpr double kFarReach = 32;
+constexpr double kNearReach = 2;
+
+/// What pictures show outside the root.
+enum class Beyond { kNothing, kWalls, kFarThings };
 
 /// World place of a pixel's middle at a depth.
 Vec3d unprojected(const Camera& camera, size_t x, size_t y, double depth) {
@@ -148,14 +155,15 @@ bool holds(const RootCube& root, const Vec3d& place) {
   return true;
 }
 
-/// Whether what is outside the root fills a part of the pictures, or nothing tells.
-bool seesBeyond(const ViewSource& views, std::span<const size_t> training, const RootCube& root) {
+/// Nothing where alpha says what belongs to the scene, walls where depth ends inside the root, far
+/// things where it does not or nothing tells.
+Beyond seenBeyond(const ViewSource& views, std::span<const size_t> training, const RootCube& root) {
   const size_t looks = std::min(training.size(), kLooks);
   size_t beyond = 0, asked = 0;
   for (size_t v = 0; v < looks; ++v) {
     const size_t view = training[v * training.size() / looks];
     const ViewPicture picture = views.load(view);
-    if (!picture.alpha.empty()) return false;
+    if (!picture.alpha.empty()) return Beyond::kNothing;
     const Camera& camera = views.camera(view);
     for (size_t i = 0; i < picture.depth.size(); i += kPixelStep) {
       if (!picture.weights.empty() && picture.weights[i] <= 0) continue;
@@ -166,14 +174,15 @@ bool seesBeyond(const ViewSource& views, std::span<const size_t> training, const
                 !holds(root, unprojected(camera, i % picture.width, i / picture.width, depth));
     }
   }
-  if (asked == 0) return true;  // nothing tells, and a closed room is better with it, too
-  return static_cast<double>(beyond) > kSeenBeyond * static_cast<double>(asked);
+  const bool is_open =
+      asked == 0 || static_cast<double>(beyond) > kSeenBeyond * static_cast<double>(asked);
+  return is_open ? Beyond::kFarThings : Beyond::kWalls;
 }
 
 /// Makes the root the inner half of a contracted one, and sows places along rays behind it: evenly
-/// in the contracted root, as nothing is known of distances.
+/// in the contracted root, as nothing is known of distances, out to `reach`.
 void addShell(const ViewSource& views, std::span<const size_t> training, uint64_t seed,
-              ScenePrior& prior) {
+              double reach, ScenePrior& prior) {
   const double inner = prior.root.side;
   for (double& origin : prior.root.origin) origin -= 0.5 * inner;
   prior.root.side = 2 * inner;
@@ -201,7 +210,7 @@ void addShell(const ViewSource& views, std::span<const size_t> training, uint64_
     const Vec3d eye = unprojected(camera, x, y, 0);
     const Vec3d along = unprojected(camera, x, y, 1) - eye;
     // The place of the ray whose largest coordinate is r halves of the inner cube from the middle.
-    const double r = 0.5 * inner / (1 - drawn(2) * (1 - 1.0 / 32));
+    const double r = 0.5 * inner / (1 - drawn(2) * (1 - 1 / reach));
     double far = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const double wall = (along[axis] < 0 ? -r : r) + middle[axis] - eye[axis];
@@ -255,10 +264,11 @@ ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
   dropUnseen(views, training, prior);
   if (!prior.weights.empty()) {
     prior.root = cubeOfPoints(prior.positions);
-    const bool has_shell =
-        options.shell == ShellChoice::kOn ||
-        (options.shell == ShellChoice::kAuto && seesBeyond(views, training, prior.root));
-    if (has_shell) addShell(views, training, options.seed, prior);
+    if (options.shell == ShellChoice::kOff) return prior;
+    const Beyond beyond = seenBeyond(views, training, prior.root);
+    if (beyond == Beyond::kNothing && options.shell == ShellChoice::kAuto) return prior;
+    addShell(views, training, options.seed, beyond == Beyond::kWalls ? kNearReach : kFarReach,
+             prior);
     return prior;
   }
   prior.root = cubeOfCameras(views, training);
@@ -271,7 +281,9 @@ ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
     prior.root = cubeOfPoints(prior.positions);
     prior.known_level = hull_options.level;
   }
-  if (options.shell == ShellChoice::kOn) addShell(views, training, options.seed, prior);
+  if (options.shell == ShellChoice::kOn) {
+    addShell(views, training, options.seed, kFarReach, prior);
+  }
   return prior;
 }
 

@@ -25,7 +25,7 @@ struct ScenePrior {
 
 /// Whether the root holds all space around the scene, too.
 enum class ShellChoice : uint32_t {
-  kAuto = 0,  ///< where surfaces are known and cameras see beyond them
+  kAuto = 0,  ///< where surfaces are known and pictures are opaque
   kOn = 1,
   kOff = 2
 };
@@ -42,8 +42,8 @@ struct ScenePriorOptions {
 /// reach far out, and a tenth more. Without points or depth: points of the visual hull, where
 /// pictures have alpha; else none, and the root is around the ball that the cameras have in common.
 /// With a shell the root is contracted: its inner half is what it would be. Auto has one where
-/// points are known, pictures have no alpha, and depth is unknown or ends outside the root in a
-/// twentieth of the pixels, as it is everywhere in pictures without any.
+/// points are known and pictures have no alpha. It begins right behind the walls where depth ends
+/// inside the root in all but a twentieth of the pixels; else it reaches far out.
 /// In: training: views of the source, at least one. Errors: those of ViewSource::load; kCancelled.
 ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
                       const ScenePriorOptions& options, Progress* progress = nullptr);

@@ -123,19 +123,19 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     assert data.source_kind == 'CLOUD' and data.learned_gaussians == data.learned_most == 0
 
 
-@pytest.mark.parametrize('chosen,has_shell', [
-    ({'transparent': False}, True),                    # the world behind the ball
-    ({'transparent': False, 'shell': 'OFF'}, False),
-    ({}, False),                                       # alpha tells what belongs to the scene
-    ({'transparent': False, 'rig': 'INSIDE'}, False),  # walls all around
+@pytest.mark.parametrize('chosen,least,most', [
+    ({'transparent': False}, 5, 1e9),                         # the world behind the ball
+    ({'transparent': False, 'shell': 'OFF'}, 0, 2),
+    ({}, 0, 2),                                               # alpha tells what belongs to the scene
+    ({'transparent': False, 'rig': 'INSIDE'}, 0, 10),         # walls all around: right behind them
 ], ids=str)
-def test_a_field_has_a_shell_for_what_is_far_away(stipple, ball, chosen, has_shell):
+def test_a_field_has_a_shell_for_what_is_far_away(stipple, ball, chosen, least, most):
     if 'rig' in chosen:
         ball.data.flip_normals()
     settings(model='FIELD', view_count=4, view_size=32, max_splats=400, **chosen)
     farthest = np.abs(stipple.scene.splat_data.read(fitted().data).positions).max()
     # The ball has a radius of 1, which a tenth is added to; Gaussians stand around their anchors.
-    assert farthest > 5 if has_shell else farthest < 3
+    assert least < farthest < most
 
 
 @pytest.mark.parametrize('model', ['FIELD', 'EXPLICIT'])

@@ -1433,8 +1433,8 @@ typedef enum StippleFitBackground {
 
 /* Whether a field has a shell for what is far away, out to 64 times the size of the scene. */
 typedef enum StippleFitShell {
-  STIPPLE_FIT_SHELL_AUTO = 0, /* where points or depth are known and pictures are opaque, unless their depth ends at the
-                                 scene, as in a closed room */
+  STIPPLE_FIT_SHELL_AUTO = 0, /* where points or depth are known and pictures are opaque: close behind the walls where
+                                 depth ends at them, else far out */
   STIPPLE_FIT_SHELL_ON = 1,
   STIPPLE_FIT_SHELL_OFF = 2
 } StippleFitShell;

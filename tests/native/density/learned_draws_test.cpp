@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include "base/random.h"
+#include "density/learned_density.h"
+#include "math/morton.h"
 
 namespace stipple {
 namespace {
@@ -22,6 +25,19 @@ OctreeDensity planeDensity() {
   OctreeDensityOptions options;
   options.leaf_level = 6;
   return OctreeDensity::fromPoints(points, {}, options);
+}
+
+const RootCube kUnit = {{0, 0, 0}, 1.0};
+
+/// Positions and log densities, ascending.
+std::vector<std::array<float, 4>> places(const AnchorSet& anchors) {
+  std::vector<std::array<float, 4>> all;
+  for (size_t i = 0; i < anchors.size(); ++i) {
+    const float* p = &anchors.positions[i * 3];
+    all.push_back({p[0], p[1], p[2], anchors.log_q[i]});
+  }
+  std::sort(all.begin(), all.end());
+  return all;
 }
 
 AnchorSamplingOptions asked(uint64_t count, uint64_t seed) {
@@ -47,6 +63,40 @@ TEST(LearnedDraws, OthersAreAsTheCallerAsks) {
   const OctreeDensity density = planeDensity();
   EXPECT_EQ(drawLearned(density, asked(300, 3), {true, false, 9}).positions,
             sampleAnchors(density, asked(300, 3)).positions);
+}
+
+/// A density that knows nothing below level 3 of 6, and has moved since.
+LearnedDensity shallowDensity() {
+  LearnedDensity density(kUnit, 6, 3);
+  std::vector<float> logits(8);
+  for (size_t k = 0; k < 8; ++k) logits[k] = static_cast<float>(k) - 4.0f;
+  for (int level = 0; level < 3; ++level)
+    density.setLogits(level, std::vector<uint32_t>{0}, logits);
+  return density;
+}
+
+TEST(LearnedDraws, SettledOnesAreThoseOfTheFrozenDensity) {
+  for (const bool deep : {false, true}) {
+    LearnedDensity density = shallowDensity();
+    if (deep) {  // cells below become active, with even choices, but for one whose children lead on
+      density.activate({{{3, 0}, 100}, {{3, 1}, 100}}, 8);
+      density.activate({{{4, 8}, 100}}, 8);
+      density.activate({{{5, 65}, 100}}, 8);
+    }
+    const AnchorSet frozen = drawLearned(density.frozen(), asked(500, 3), {true, true, 9});
+    const AnchorSet settled = drawSettled(density, asked(500, 3), {true, true, 9});
+    EXPECT_EQ(frozen.leaf_level, deep ? 6 : 3);
+    EXPECT_EQ(settled.leaf_level, 6);
+    ASSERT_EQ(settled.size(), frozen.size());
+    EXPECT_TRUE(std::is_sorted(settled.leaves.begin(), settled.leaves.end()));
+    EXPECT_EQ(places(settled), places(frozen));
+    for (size_t i = 0; i < settled.size(); ++i) {
+      const auto at = mortonDecode(settled.leaves[i]);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(static_cast<float>(at[axis]), std::floor(settled.positions[i * 3 + axis] * 64));
+      }
+    }
+  }
 }
 
 TEST(LearnedDraws, StandInTheMiddleOfTheirLeavesWithoutJitter) {

@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "decode/anchor_spacing.h"
+#include "decode/contraction.h"
 #include "math/morton.h"
 #include "train/field_regularisers.h"
 #include "train/scene_prior.h"
@@ -266,7 +267,22 @@ std::shared_ptr<MemoryViewSource> wallViews(float unknown_share, bool with_alpha
   return views;
 }
 
-TEST(ScenePrior, HasAShellWhereCamerasSeeBeyondTheRoot) {
+/// Largest distance from the middle along an axis, in halves of the inner cube's side in the world.
+double reachOf(const ScenePrior& prior) {
+  const Contraction contraction(prior.root);
+  double reach = 0;
+  for (size_t i = 0; i < prior.weights.size(); ++i) {
+    const float* p = &prior.positions[i * 3];
+    const Vec3d world = contraction.toWorld(Vec3d(p[0], p[1], p[2]));
+    for (int axis = 0; axis < 3; ++axis) {
+      const double middle = prior.root.origin[static_cast<size_t>(axis)] + 0.5 * prior.root.side;
+      reach = std::max(reach, std::abs(world[axis] - middle) / (0.25 * prior.root.side));
+    }
+  }
+  return reach;
+}
+
+TEST(ScenePrior, HasAShellWherePicturesAreOpaque) {
   using enum ShellChoice;
   const auto seen = [](float unknown_share, bool with_alpha, ShellChoice shell) {
     const auto views = wallViews(unknown_share, with_alpha);
@@ -275,13 +291,17 @@ TEST(ScenePrior, HasAShellWhereCamerasSeeBeyondTheRoot) {
     options.shell = shell;
     return scenePrior(*views, all(*views), options);
   };
-  EXPECT_FALSE(seen(0.0f, false, kAuto).contracted) << "all depth ends inside";
+  // All depth ends inside: it stands right behind the walls.
+  ASSERT_TRUE(seen(0.0f, false, kAuto).contracted);
+  EXPECT_LE(reachOf(seen(0.0f, false, kAuto)), 2.001);
+  EXPECT_FALSE(seen(0.0f, false, kOff).contracted);
   EXPECT_FALSE(seen(0.3f, true, kAuto).contracted) << "alpha says what belongs to the scene";
   EXPECT_TRUE(seen(0.0f, false, kOn).contracted);
   EXPECT_TRUE(seen(0.3f, true, kOn).contracted);
   const ScenePrior plain = seen(0.3f, false, kOff), shell = seen(0.3f, false, kAuto);
   EXPECT_FALSE(plain.contracted);
   ASSERT_TRUE(shell.contracted);
+  EXPECT_GT(reachOf(shell), 20);
   EXPECT_DOUBLE_EQ(shell.root.side, 2 * plain.root.side);
   double inside = 0, around = 0;
   for (size_t i = 0; i < shell.weights.size(); ++i) {
@@ -321,6 +341,7 @@ TEST(ScenePrior, AShellIsThereWithoutPointsWhereItIsAskedFor) {
   const ScenePrior shell = scenePrior(*views, all(*views), options);
   EXPECT_FALSE(plain.contracted);
   ASSERT_TRUE(shell.contracted);
+  EXPECT_GT(reachOf(shell), 20);
   EXPECT_DOUBLE_EQ(shell.root.side, 2 * plain.root.side);
   EXPECT_EQ(shell.known_level, plain.known_level + 1) << "cells of the hull stay as large";
   EXPECT_GT(shell.weights.size(), plain.weights.size());
