@@ -127,13 +127,14 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     ({'transparent': False}, 5, 1e9),                         # the world behind the ball
     ({'transparent': False, 'shell': 'OFF'}, 0, 2),
     ({}, 0, 2),                                               # alpha tells what belongs to the scene
-    ({'transparent': False, 'rig': 'INSIDE'}, 0, 10),         # walls all around: right behind them
+    ({'transparent': False, 'rig': 'INSIDE'}, 0, 5),          # walls all around: right behind them
 ], ids=str)
 def test_a_field_has_a_shell_for_what_is_far_away(stipple, ball, chosen, least, most):
     if 'rig' in chosen:
         ball.data.flip_normals()
     settings(model='FIELD', view_count=4, view_size=32, max_splats=400, **chosen)
-    farthest = np.abs(stipple.scene.splat_data.read(fitted().data).positions).max()
+    # Not the very farthest, which chance has a part in.
+    farthest = np.quantile(np.abs(stipple.scene.splat_data.read(fitted().data).positions).max(axis=1), 0.99)
     # The ball has a radius of 1, which a tenth is added to; Gaussians stand around their anchors.
     assert least < farthest < most
 
