@@ -70,8 +70,9 @@ LearnedDensity shallowDensity() {
   LearnedDensity density(kUnit, 6, 3);
   std::vector<float> logits(8);
   for (size_t k = 0; k < 8; ++k) logits[k] = static_cast<float>(k) - 4.0f;
-  for (int level = 0; level < 3; ++level)
+  for (int level = 0; level < 3; ++level) {
     density.setLogits(level, std::vector<uint32_t>{0}, logits);
+  }
   return density;
 }
 
