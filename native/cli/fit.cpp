@@ -381,7 +381,8 @@ void addFit(CLI::App& app, const Context& context) {
                     "Field: the density is not learned from the pictures");
   command
       ->add_option("--shell", to.shell,
-                   "Field: a shell behind what is known, for what is far away; auto: where pictures are opaque")
+                   "Field: a shell behind what is known, for what is far away; auto: where "
+                   "pictures are opaque")
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->capture_default_str();
   command->add_option("--seed", to.seed)->capture_default_str();
