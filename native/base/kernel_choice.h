@@ -1,5 +1,7 @@
 #pragma once
 
+#include <hwy/highway.h>
+
 #include <cctype>
 #include <cstdlib>
 #include <string>
@@ -8,6 +10,22 @@
 #include "base/error.h"
 
 namespace stipple {
+
+/// `plain`, and what `dispatched` gives for every instruction set that is compiled and runs on this
+/// processor. It changes Highway's global choice for a moment: for tests and for
+/// STIPPLE_FORCE_TARGET.
+template <class Kernel, class Dispatched>
+std::vector<Kernel> onEveryTarget(const Kernel& plain, Dispatched dispatched) {
+  std::vector<Kernel> kernels = {plain};
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    kernels.push_back(dispatched());
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  return kernels;
+}
 
 /// The kernel to use: `best`, or the one of `all()` whose `target` the environment variable
 /// STIPPLE_FORCE_TARGET names, in upper or lower case. `all` is called only where it is set.

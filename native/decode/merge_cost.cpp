@@ -166,15 +166,8 @@ void costsOneByOne(const MergeNode* nodes, uint32_t slot, const uint32_t* others
 }  // namespace
 
 std::vector<MergeCostKernel> mergeCostKernels() {
-  std::vector<MergeCostKernel> kernels = {{"scalar", costsOneByOne}};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(namedMergeCostKernel)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return kernels;
+  return onEveryTarget(MergeCostKernel{"scalar", costsOneByOne},
+                       [] { return HWY_DYNAMIC_DISPATCH(namedMergeCostKernel)(); });
 }
 
 MergeCostKernel chosenMergeCostKernel() {

@@ -122,13 +122,10 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include <strings.h>
-
 #include <algorithm>
-#include <cstdlib>
 #include <limits>
 
-#include "io/every_target.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 
@@ -189,14 +186,7 @@ std::vector<NamedCentreSearch> centreSearches() {
 }
 
 CentreSearch chosenCentreSearch() {
-  static const CentreSearch chosen = [] {
-    if (const char* forced = std::getenv("STIPPLE_FORCE_TARGET")) {
-      for (const NamedCentreSearch& named : centreSearches()) {
-        if (strcasecmp(named.target, forced) == 0) return named.search;
-      }
-    }
-    return dispatched().search;
-  }();
+  static const CentreSearch chosen = chooseKernel(dispatched(), centreSearches).search;
   return chosen;
 }
 

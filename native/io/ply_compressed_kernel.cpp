@@ -414,7 +414,6 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 #include "base/kernel_choice.h"
-#include "io/every_target.h"
 
 namespace stipple {
 

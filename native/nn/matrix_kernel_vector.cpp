@@ -180,15 +180,8 @@ namespace stipple {
 HWY_EXPORT(namedMatrixKernel);
 
 std::vector<MatrixKernel> matrixKernels() {
-  std::vector<MatrixKernel> kernels = {scalarMatrixKernel()};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(namedMatrixKernel)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return kernels;
+  return onEveryTarget(scalarMatrixKernel(),
+                       [] { return HWY_DYNAMIC_DISPATCH(namedMatrixKernel)(); });
 }
 
 MatrixKernel chosenMatrixKernel() {

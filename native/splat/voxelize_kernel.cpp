@@ -302,51 +302,20 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include <cctype>
-#include <cstdlib>
-#include <string>
-
-#include "base/error.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 
 HWY_EXPORT(namedBrickKernel);
 
-namespace {
-
-std::string lowerCase(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
-BrickKernel chooseBrickKernel() {
-  const char* forced = std::getenv("STIPPLE_FORCE_TARGET");
-  if (!forced || !*forced) return HWY_DYNAMIC_DISPATCH(namedBrickKernel)().kernel;
-  std::string names;
-  for (const NamedBrickKernel& named : brickKernels()) {
-    if (lowerCase(named.target) == lowerCase(forced)) return named.kernel;
-    names += (names.empty() ? "" : ", ") + lowerCase(named.target);
-  }
-  fail(ErrorCode::kInvalidArgument,
-       "STIPPLE_FORCE_TARGET is \"" + std::string(forced) + "\"; this machine has " + names);
-}
-
-}  // namespace
-
 std::vector<NamedBrickKernel> brickKernels() {
-  std::vector<NamedBrickKernel> kernels = {{"scalar", sumBrickScalar}};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(namedBrickKernel)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return kernels;
+  return onEveryTarget(NamedBrickKernel{"scalar", sumBrickScalar},
+                       [] { return HWY_DYNAMIC_DISPATCH(namedBrickKernel)(); });
 }
 
 BrickKernel chosenBrickKernel() {
-  static const BrickKernel kernel = chooseBrickKernel();
+  static const BrickKernel kernel =
+      chooseKernel(HWY_DYNAMIC_DISPATCH(namedBrickKernel)(), brickKernels).kernel;
   return kernel;
 }
 

@@ -118,15 +118,7 @@ namespace stipple {
 HWY_EXPORT(namedAdamKernel);
 
 std::vector<AdamKernel> adamKernels() {
-  std::vector<AdamKernel> kernels = {scalarAdamKernel()};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(namedAdamKernel)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return kernels;
+  return onEveryTarget(scalarAdamKernel(), [] { return HWY_DYNAMIC_DISPATCH(namedAdamKernel)(); });
 }
 
 AdamKernel chosenAdamKernel() {

@@ -350,15 +350,7 @@ namespace stipple {
 HWY_EXPORT(namedLossKernel);
 
 std::vector<LossKernel> lossKernels() {
-  std::vector<LossKernel> kernels = {scalarLossKernel()};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(namedLossKernel)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  return kernels;
+  return onEveryTarget(scalarLossKernel(), [] { return HWY_DYNAMIC_DISPATCH(namedLossKernel)(); });
 }
 
 LossKernel chosenLossKernel() {

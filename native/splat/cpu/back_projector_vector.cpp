@@ -196,7 +196,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include "splat/cpu/target_choice.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 
@@ -211,12 +211,11 @@ NamedBackProjector dispatched() {
 }  // namespace
 
 std::vector<NamedBackProjector> backProjectors() {
-  return onEveryTarget<NamedBackProjector>({"scalar", takeBackScalar}, dispatched);
+  return onEveryTarget(NamedBackProjector{"scalar", takeBackScalar}, dispatched);
 }
 
 BackProjector chosenBackProjector() {
-  static const BackProjector chosen =
-      chosenTarget<NamedBackProjector>(backProjectors, dispatched).take_back;
+  static const BackProjector chosen = chooseKernel(dispatched(), backProjectors).take_back;
   return chosen;
 }
 

@@ -241,7 +241,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include "splat/cpu/target_choice.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 
@@ -256,11 +256,11 @@ NamedProjector dispatched() {
 }  // namespace
 
 std::vector<NamedProjector> projectors() {
-  return onEveryTarget<NamedProjector>({"scalar", projectScalar}, dispatched);
+  return onEveryTarget(NamedProjector{"scalar", projectScalar}, dispatched);
 }
 
 Projector chosenProjector() {
-  static const Projector chosen = chosenTarget<NamedProjector>(projectors, dispatched).project;
+  static const Projector chosen = chooseKernel(dispatched(), projectors).project;
   return chosen;
 }
 

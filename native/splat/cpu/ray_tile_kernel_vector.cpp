@@ -69,7 +69,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include "splat/cpu/target_choice.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 
@@ -84,12 +84,11 @@ NamedRayTileKernel dispatched() {
 }  // namespace
 
 std::vector<NamedRayTileKernel> rayTileKernels() {
-  return onEveryTarget<NamedRayTileKernel>({"scalar", meetTileScalar}, dispatched);
+  return onEveryTarget(NamedRayTileKernel{"scalar", meetTileScalar}, dispatched);
 }
 
 RayTileKernel chosenRayTileKernel() {
-  static const RayTileKernel chosen =
-      chosenTarget<NamedRayTileKernel>(rayTileKernels, dispatched).kernel;
+  static const RayTileKernel chosen = chooseKernel(dispatched(), rayTileKernels).kernel;
   return chosen;
 }
 

@@ -301,7 +301,7 @@ HWY_AFTER_NAMESPACE();
 
 #include <string>
 
-#include "splat/cpu/target_choice.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 
@@ -309,8 +309,8 @@ HWY_EXPORT(backwardKernel);
 
 std::vector<BackwardKernel> backwardKernels() {
   std::vector<BackwardKernel> kernels =
-      onEveryTarget<BackwardKernel>({"scalar", nullptr, takeOffTileScalar},
-                                    [] { return HWY_DYNAMIC_DISPATCH(backwardKernel)(); });
+      onEveryTarget(BackwardKernel{"scalar", nullptr, takeOffTileScalar},
+                    [] { return HWY_DYNAMIC_DISPATCH(backwardKernel)(); });
   const std::vector<NamedTileKernel> forward = tileKernels();
   for (BackwardKernel& kernel : kernels) {
     const auto same = std::find_if(forward.begin(), forward.end(), [&](const NamedTileKernel& f) {

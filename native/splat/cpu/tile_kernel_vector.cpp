@@ -223,45 +223,20 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include <cctype>
-#include <cstdlib>
-#include <string>
-
-#include "base/error.h"
-#include "splat/cpu/target_choice.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 
 HWY_EXPORT(namedKernel);
 
-namespace {
-
-std::string lowerCase(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
-TileKernel chooseTileKernel() {
-  const char* forced = std::getenv("STIPPLE_FORCE_TARGET");
-  if (!forced || !*forced) return HWY_DYNAMIC_DISPATCH(namedKernel)().kernel;
-  std::string names;
-  for (const NamedTileKernel& named : tileKernels()) {
-    if (lowerCase(named.target) == lowerCase(forced)) return named.kernel;
-    names += (names.empty() ? "" : ", ") + lowerCase(named.target);
-  }
-  fail(ErrorCode::kInvalidArgument,
-       "STIPPLE_FORCE_TARGET is \"" + std::string(forced) + "\"; this machine has " + names);
-}
-
-}  // namespace
-
 std::vector<NamedTileKernel> tileKernels() {
-  return onEveryTarget<NamedTileKernel>({"scalar", blendTileScalar},
-                                        [] { return HWY_DYNAMIC_DISPATCH(namedKernel)(); });
+  return onEveryTarget(NamedTileKernel{"scalar", blendTileScalar},
+                       [] { return HWY_DYNAMIC_DISPATCH(namedKernel)(); });
 }
 
 TileKernel chosenTileKernel() {
-  static const TileKernel kernel = chooseTileKernel();
+  static const TileKernel kernel =
+      chooseKernel(HWY_DYNAMIC_DISPATCH(namedKernel)(), tileKernels).kernel;
   return kernel;
 }
 

@@ -87,7 +87,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 
-#include "splat/cpu/target_choice.h"
+#include "base/kernel_choice.h"
 
 namespace stipple {
 
@@ -102,12 +102,11 @@ NamedTileSplatMaker dispatched() {
 }  // namespace
 
 std::vector<NamedTileSplatMaker> tileSplatMakers() {
-  return onEveryTarget<NamedTileSplatMaker>({"scalar", makeTileSplatsScalar}, dispatched);
+  return onEveryTarget(NamedTileSplatMaker{"scalar", makeTileSplatsScalar}, dispatched);
 }
 
 TileSplatMaker chosenTileSplatMaker() {
-  static const TileSplatMaker chosen =
-      chosenTarget<NamedTileSplatMaker>(tileSplatMakers, dispatched).make;
+  static const TileSplatMaker chosen = chooseKernel(dispatched(), tileSplatMakers).make;
   return chosen;
 }
 
