@@ -135,8 +135,9 @@ def write_page(results, given):
              f'up to {seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every eighth view held out, '
              f'pictures of {464 // DOWNSCALE} × {256 // DOWNSCALE}.',
              f'All fits together: {sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on '
-             f'{os.cpu_count()} cores, {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours by the clock; '
-             f'load of the machine meanwhile {statistics.mean(row["load"] for row in results.rows):.1f}.', '',
+             f'{os.cpu_count()} cores. Their clocks add up to {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours '
+             f'(mean load of the machine {statistics.mean(row["load"] for row in results.rows):.1f}: above 2 they ran side by '
+             'side).', '',
              '![Processor seconds and PSNR of every strategy](../images/strategies.svg)', '',
              '[Every fit, a line each](strategies_table.jsonl).', '']
     for scene in given.scenes:
