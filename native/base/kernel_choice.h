@@ -1,9 +1,8 @@
 #pragma once
 
-#include <hwy/highway.h>
-
 #include <cctype>
 #include <cstdlib>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,19 +10,16 @@
 
 namespace stipple {
 
-/// `plain`, and what `dispatched` gives for every instruction set that is compiled and runs on this
-/// processor. It changes Highway's global choice for a moment: for tests and for
+/// Calls `visit` once for every instruction set that is compiled and runs on this processor, while
+/// Highway dispatches to it. That is a choice of the whole process: for tests and for
 /// STIPPLE_FORCE_TARGET.
+void withEveryTarget(const std::function<void()>& visit);
+
+/// `plain`, and what `dispatched` gives for every instruction set (withEveryTarget).
 template <class Kernel, class Dispatched>
 std::vector<Kernel> onEveryTarget(const Kernel& plain, Dispatched dispatched) {
   std::vector<Kernel> kernels = {plain};
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    kernels.push_back(dispatched());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  withEveryTarget([&] { kernels.push_back(dispatched()); });
   return kernels;
 }
 
