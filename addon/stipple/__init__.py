@@ -13,8 +13,10 @@ bl_info = {
 
 import bpy
 
-from . import cycles_engine, engine, operators, panels, preferences, properties, viewport
-from .scene import steady_effects, sync
+from . import cycles_engine, engine, operators, panels, preferences, properties
+from .viewport import drawing
+from .scene.source import sync
+from .scene.view import steady_effects
 
 _classes = (preferences.classes + properties.classes + operators.classes + panels.classes + engine.classes
             + cycles_engine.classes)
@@ -27,11 +29,11 @@ def register():
     panels.register()
     sync.register()
     steady_effects.register()
-    viewport.register()
+    drawing.register()
 
 
 def unregister():
-    viewport.unregister()
+    drawing.unregister()
     steady_effects.unregister()
     sync.unregister()
     panels.unregister()

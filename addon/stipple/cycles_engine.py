@@ -15,7 +15,8 @@ from .binding.renderer import Renderer
 from .cycles_functions import CyclesRender, functions
 from .binding.structs import OutputColour
 from .engine import NativeWork
-from .scene import cameras, effects, facts, layers, mattes, sources, splat_data
+from .scene.source import sources, splat_data
+from .scene.view import cameras, effects, facts, layers, mattes
 
 _VISIBILITY = ('visible_camera', 'visible_diffuse', 'visible_glossy', 'visible_transmission',
                'visible_volume_scatter', 'visible_shadow')

@@ -13,8 +13,10 @@ from . import version
 from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
 from .binding.structs import JobState
-from .scene import cameras, effects, facts, instances, mattes, motion, picture_options, quality, sources, steady_effects
-from .viewport import ViewPicture
+from .scene import instances
+from .scene.source import sources
+from .scene.view import cameras, effects, facts, mattes, motion, picture_options, quality, steady_effects
+from .viewport.drawing import ViewPicture
 
 # How often a render looks whether it was cancelled.
 POLL_SECONDS = 0.01

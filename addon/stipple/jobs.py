@@ -11,7 +11,7 @@ import time
 
 from .binding.errors import CancelledError, StippleError
 from .binding.structs import JobState
-from .scene import sources
+from .scene.source import sources
 
 POLL_SECONDS = 0.05
 

@@ -7,8 +7,11 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
 
 from . import version
 from .binding.errors import StippleError
-from .scene import (effects, fit_proposal, fitting, overlays, photo_cameras, quality, sequences, sources, strategies,
-                    sync)
+from .scene import overlays
+from .scene.fit import fit_proposal, fitting, strategies
+from .scene.sequence import sequences
+from .scene.source import sources, sync
+from .scene.view import effects, photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
 _CHANGEABLE = {'ANIMATABLE'}

@@ -46,10 +46,10 @@ def motion_blur_position(scene):
     return 'CENTER'
 
 
-def user_folder(package):
+def user_folder():
     """The folder in Blender's user resources where this add-on may write."""
-    if VERSION >= (4, 2, 0) and package.startswith('bl_ext.'):
-        return bpy.utils.extension_path_user(package, create=True)
+    if VERSION >= (4, 2, 0) and __package__.startswith('bl_ext.'):
+        return bpy.utils.extension_path_user(__package__, create=True)
     return bpy.utils.user_resource('DATAFILES', path='stipple', create=True)
 
 

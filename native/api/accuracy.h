@@ -2,7 +2,7 @@
 
 #include <stipple/stipple.h>
 
-#include "splat/accurate_render.h"
+#include "splat/render/accurate_render.h"
 
 namespace stipple::api {
 

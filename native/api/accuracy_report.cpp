@@ -6,7 +6,7 @@
 #include "api/handles.h"
 #include "api/job.h"
 #include "api/plot.h"
-#include "io/accuracy_file.h"
+#include "io/reports/accuracy_file.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -12,8 +12,8 @@
 #include "api/job.h"
 #include "api/render_settings.h"
 #include "base/parallel.h"
-#include "splat/render_backward.h"
-#include "train/image_loss.h"
+#include "splat/render/render_backward.h"
+#include "train/optimiser/image_loss.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -9,10 +9,10 @@
 #include "api/handles.h"
 #include "api/job.h"
 #include "base/parallel.h"
-#include "data/cloud_columns.h"
-#include "data/cloud_comparison.h"
-#include "data/cloud_transform.h"
-#include "io/splat_file.h"
+#include "data/clouds/cloud_columns.h"
+#include "data/clouds/cloud_comparison.h"
+#include "data/clouds/cloud_transform.h"
+#include "io/splats/splat_file.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "decode/merge_tree.h"
+#include "decode/tree/merge_tree.h"
 
 namespace stipple::api {
 

@@ -8,7 +8,7 @@
 
 #include "api/instances.h"
 #include "base/progress.h"
-#include "decode/hierarchy_decoder.h"
+#include "decode/tree/hierarchy_decoder.h"
 
 namespace stipple::api {
 

@@ -5,11 +5,11 @@
 #include "api/instances.h"
 #include "api/job.h"
 #include "base/parallel.h"
-#include "data/cloud_selection.h"
+#include "data/clouds/cloud_selection.h"
 #include "mesh/floaters.h"
 #include "mesh/winding_number.h"
-#include "splat/cloud_merge.h"
-#include "splat/ground_plane.h"
+#include "splat/edit/cloud_merge.h"
+#include "splat/edit/ground_plane.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -3,9 +3,9 @@
 #include "api/fit.h"
 #include "api/guard.h"
 #include "api/job.h"
-#include "data/view_check.h"
+#include "data/views/view_check.h"
 #include "densify/strategies.h"
-#include "train/densify_cloud.h"
+#include "train/loop/densify_cloud.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -1,4 +1,4 @@
-#include "splat/draw_order.h"
+#include "splat/render/draw_order.h"
 
 #include <utility>
 

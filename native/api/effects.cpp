@@ -9,7 +9,7 @@
 #include "api/handles.h"
 #include "api/instances.h"
 #include "base/parallel.h"
-#include "splat/effects_plan.h"
+#include "splat/render/effects_plan.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "base/error.h"
-#include "decode/field_tensors.h"
-#include "io/field_asset.h"
+#include "decode/field/field_tensors.h"
+#include "io/assets/field_asset.h"
 
 namespace stipple::api {
 

@@ -4,7 +4,7 @@
 #include <variant>
 
 #include "api/handles.h"
-#include "io/octree_tensors.h"
+#include "io/assets/octree_tensors.h"
 
 namespace stipple::api {
 

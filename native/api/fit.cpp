@@ -7,7 +7,7 @@
 #include "api/job.h"
 #include "api/plot.h"
 #include "base/parallel.h"
-#include "io/fit_report.h"
+#include "io/reports/fit_report.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "api/handles.h"
-#include "train/explicit_model.h"
-#include "train/field_model.h"
-#include "train/trainer.h"
+#include "train/loop/explicit_model.h"
+#include "train/loop/field_model.h"
+#include "train/loop/trainer.h"
 
 namespace stipple::api {
 

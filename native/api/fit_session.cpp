@@ -5,8 +5,8 @@
 
 #include "api/fit.h"
 #include "base/error.h"
-#include "data/view_check.h"
-#include "io/checkpoint.h"
+#include "data/views/view_check.h"
+#include "io/assets/checkpoint.h"
 
 namespace stipple::api {
 

@@ -1,4 +1,4 @@
-#include "data/colour_grade.h"
+#include "data/clouds/colour_grade.h"
 
 #include <algorithm>
 

@@ -7,10 +7,10 @@
 
 #include "api/guard.h"
 #include "api/job.h"
-#include "io/hierarchy_asset.h"
-#include "train/refine.h"
-#include "train/view_rig.h"
-#include "train/visibility.h"
+#include "io/assets/hierarchy_asset.h"
+#include "train/loop/refine.h"
+#include "train/loop/view_rig.h"
+#include "train/loop/visibility.h"
 
 using namespace stipple;
 using namespace stipple::api;

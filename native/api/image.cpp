@@ -1,6 +1,6 @@
 #include "api/guard.h"
 #include "api/handles.h"
-#include "data/image_comparison.h"
+#include "data/images/image_comparison.h"
 #include "io/image_file.h"
 
 using namespace stipple;

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "splat/render.h"
+#include "splat/render/render.h"
 
 namespace stipple::api {
 

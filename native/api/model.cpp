@@ -8,8 +8,8 @@
 #include "api/hierarchy.h"
 #include "api/job.h"
 #include "base/parallel.h"
-#include "io/asset_header.h"
-#include "io/surface_asset.h"
+#include "io/assets/asset_header.h"
+#include "io/assets/surface_asset.h"
 
 using namespace stipple;
 using namespace stipple::api;

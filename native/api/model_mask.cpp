@@ -2,7 +2,7 @@
 #include "api/handles.h"
 #include "api/hierarchy.h"
 #include "base/parallel.h"
-#include "decode/masked_tree.h"
+#include "decode/tree/masked_tree.h"
 
 using namespace stipple;
 using namespace stipple::api;

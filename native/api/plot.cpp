@@ -4,7 +4,7 @@
 #include <string>
 
 #include "api/guard.h"
-#include "io/plot_picture.h"
+#include "plot/plot_picture.h"
 
 namespace stipple::api {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "io/plot.h"
+#include "plot/plot.h"
 
 namespace stipple::api {
 

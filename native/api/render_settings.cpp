@@ -5,7 +5,7 @@
 #include "api/accuracy.h"
 #include "api/guard.h"
 #include "math/colour.h"
-#include "splat/surface.h"
+#include "splat/render/surface.h"
 
 namespace stipple::api {
 

@@ -3,8 +3,8 @@
 #include <stipple/stipple.h>
 
 #include "api/instances.h"
-#include "splat/accurate_render.h"
-#include "splat/sampled_render.h"
+#include "splat/render/accurate_render.h"
+#include "splat/render/sampled_render.h"
 
 namespace stipple::api {
 

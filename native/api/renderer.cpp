@@ -9,7 +9,7 @@
 #include "api/render_settings.h"
 #include "base/parallel.h"
 #include "math/colour.h"
-#include "splat/accurate_render.h"
+#include "splat/render/accurate_render.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -7,7 +7,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "base/parallel.h"
-#include "data/splat_quantities.h"
+#include "data/clouds/splat_quantities.h"
 
 using namespace stipple;
 using namespace stipple::api;

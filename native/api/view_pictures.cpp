@@ -4,9 +4,9 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "base/parallel.h"
-#include "data/view_check.h"
-#include "data/view_colour.h"
-#include "io/dataset.h"
+#include "data/views/view_check.h"
+#include "data/views/view_colour.h"
+#include "io/views/dataset.h"
 #include "math/empty_depth.h"
 
 using namespace stipple;

@@ -3,8 +3,8 @@
 #include "api/camera.h"
 #include "api/guard.h"
 #include "api/handles.h"
-#include "data/view_resample.h"
-#include "io/camera_file.h"
+#include "data/views/view_resample.h"
+#include "io/views/camera_file.h"
 
 namespace stipple::api {
 

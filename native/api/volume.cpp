@@ -7,7 +7,7 @@
 #include "api/instances.h"
 #include "api/job.h"
 #include "io/volume_file.h"
-#include "splat/voxelize.h"
+#include "splat/voxels/voxelize.h"
 
 using namespace stipple;
 using namespace stipple::api;

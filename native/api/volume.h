@@ -2,7 +2,7 @@
 
 #include <stipple/stipple.h>
 
-#include "splat/voxelize.h"
+#include "splat/voxels/voxelize.h"
 
 namespace stipple::api {
 

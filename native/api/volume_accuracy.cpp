@@ -12,9 +12,9 @@
 #include "api/job.h"
 #include "api/volume.h"
 #include "base/parallel.h"
-#include "io/fit_report.h"
-#include "splat/volume_sides.h"
-#include "splat/voxelize.h"
+#include "io/reports/fit_report.h"
+#include "splat/voxels/volume_sides.h"
+#include "splat/voxels/voxelize.h"
 
 using namespace stipple;
 using namespace stipple::api;

@@ -9,8 +9,8 @@
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "splat/cpu/tile.h"
-#include "splat/cpu/tiled_backward.h"
+#include "splat/cpu/tiles/tile.h"
+#include "splat/cpu/tiles/tiled_backward.h"
 
 namespace stipple::bench {
 namespace {

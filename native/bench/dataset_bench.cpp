@@ -11,8 +11,8 @@
 
 #include "bench/comparison.h"
 #include "bench/oiio_read.h"
-#include "io/dataset.h"
 #include "io/image_file.h"
+#include "io/views/dataset.h"
 
 namespace stipple::bench {
 namespace {

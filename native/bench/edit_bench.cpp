@@ -10,11 +10,11 @@
 #include "bench/comparison.h"
 #include "bench/plain_file.h"
 #include "bench/splat_scene.h"
-#include "data/cloud_columns.h"
-#include "data/cloud_selection.h"
-#include "data/cloud_transform.h"
+#include "data/clouds/cloud_columns.h"
+#include "data/clouds/cloud_selection.h"
+#include "data/clouds/cloud_transform.h"
 #include "mesh/floaters.h"
-#include "splat/cloud_merge.h"
+#include "splat/edit/cloud_merge.h"
 
 namespace stipple::bench {
 

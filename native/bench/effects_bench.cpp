@@ -4,8 +4,8 @@
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "splat/ray_render.h"
-#include "splat/sampled_render.h"
+#include "splat/render/ray_render.h"
+#include "splat/render/sampled_render.h"
 
 // What effects cost, as ratios to the picture without them.
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "splat/cpu/tile_lists.h"
+#include "splat/cpu/tiles/tile_lists.h"
 
 namespace stipple::bench {
 

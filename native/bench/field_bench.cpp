@@ -13,15 +13,15 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "bench/comparison.h"
-#include "data/memory_view_source.h"
+#include "data/views/memory_view_source.h"
 #include "decode/anchor_spacing.h"
-#include "decode/field_decoder.h"
+#include "decode/field/field_decoder.h"
 #include "density/learned_draws.h"
-#include "splat/cpu/tile_lists.h"
-#include "splat/render.h"
-#include "train/field_model.h"
-#include "train/field_regularisers.h"
-#include "train/render_backend.h"
+#include "splat/cpu/tiles/tile_lists.h"
+#include "splat/render/render.h"
+#include "train/loop/field_model.h"
+#include "train/loop/render_backend.h"
+#include "train/optimiser/field_regularisers.h"
 
 namespace stipple::bench {
 namespace {

@@ -10,12 +10,12 @@
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "data/memory_view_source.h"
+#include "data/views/memory_view_source.h"
 #include "densify/strategies.h"
-#include "train/explicit_model.h"
-#include "train/picture_store.h"
-#include "train/render_backend.h"
-#include "train/view_evaluator.h"
+#include "train/loop/explicit_model.h"
+#include "train/loop/picture_store.h"
+#include "train/loop/render_backend.h"
+#include "train/loop/view_evaluator.h"
 
 namespace stipple::bench {
 namespace {

@@ -14,9 +14,9 @@
 #include "bench/comparison.h"
 #include "bench/plain_file.h"
 #include "bench/plain_unpack.h"
-#include "io/compression.h"
-#include "io/little_endian.h"
-#include "io/splat_file.h"
+#include "io/bytes/compression.h"
+#include "io/bytes/little_endian.h"
+#include "io/splats/splat_file.h"
 
 namespace stipple::bench {
 namespace {

@@ -9,10 +9,10 @@
 
 #include "base/parallel.h"
 #include "bench/comparison.h"
-#include "train/adam.h"
-#include "train/adam_kernel.h"
-#include "train/image_loss.h"
-#include "train/image_loss_kernel.h"
+#include "train/optimiser/adam.h"
+#include "train/optimiser/adam_kernel.h"
+#include "train/optimiser/image_loss.h"
+#include "train/optimiser/image_loss_kernel.h"
 
 // The loop of the floor below: built for the widest vectors, chosen when it is first called.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)

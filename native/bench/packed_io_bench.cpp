@@ -11,8 +11,8 @@
 #include "base/random.h"
 #include "bench/comparison.h"
 #include "bench/plain_file.h"
-#include "io/sog_file.h"
-#include "io/splat_file.h"
+#include "io/splats/sog_file.h"
+#include "io/splats/splat_file.h"
 #include "io/webp_image.h"
 
 namespace stipple::bench {

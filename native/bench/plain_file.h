@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 
 namespace stipple::bench {
 

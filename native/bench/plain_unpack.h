@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/plain_file.h"
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 
 namespace stipple::bench {
 

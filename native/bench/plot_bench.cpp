@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "bench/comparison.h"
-#include "data/image.h"
-#include "io/fit_report.h"
-#include "io/plot_picture.h"
+#include "data/images/image.h"
+#include "io/reports/fit_report.h"
+#include "plot/plot_picture.h"
 
 namespace stipple::bench {
 

@@ -8,9 +8,9 @@
 #include "bench/comparison.h"
 #include "bench/splat_floor.h"
 #include "bench/splat_scene.h"
-#include "splat/cpu/ray_tiles.h"
-#include "splat/cpu/tiled_render.h"
-#include "splat/ray_render.h"
+#include "splat/cpu/rays/ray_tiles.h"
+#include "splat/cpu/tiles/tiled_render.h"
+#include "splat/render/ray_render.h"
 
 namespace stipple::bench {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "base/parallel.h"
 #include "bench/exact_tiles.h"
-#include "splat/cpu/tile.h"
+#include "splat/cpu/tiles/tile.h"
 
 namespace stipple::bench {
 

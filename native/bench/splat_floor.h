@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "splat/cpu/tile_kernel.h"
-#include "splat/render.h"
+#include "splat/cpu/tiles/tile_kernel.h"
+#include "splat/render/render.h"
 
 namespace stipple::bench {
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 #include "math/camera.h"
 
 namespace stipple::bench {

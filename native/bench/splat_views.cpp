@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "data/memory_view_source.h"
-#include "splat/render.h"
+#include "data/views/memory_view_source.h"
+#include "splat/render/render.h"
 
 namespace stipple::bench {
 

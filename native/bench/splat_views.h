@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "bench/splat_scene.h"
-#include "data/view_source.h"
+#include "data/views/view_source.h"
 
 namespace stipple::bench {
 

@@ -8,8 +8,8 @@
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
 #include "bench/splat_views.h"
-#include "train/fit_model.h"
-#include "train/swept_points.h"
+#include "train/loop/fit_model.h"
+#include "train/prior/swept_points.h"
 
 namespace stipple::bench {
 namespace {

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "bench/comparison.h"
-#include "decode/surface_model.h"
+#include "decode/surface/surface_model.h"
 
 namespace stipple::bench {
 

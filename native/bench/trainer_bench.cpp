@@ -9,8 +9,8 @@
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
 #include "bench/splat_views.h"
-#include "train/explicit_model.h"
-#include "train/trainer.h"
+#include "train/loop/explicit_model.h"
+#include "train/loop/trainer.h"
 
 namespace stipple::bench {
 namespace {

@@ -7,8 +7,8 @@
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "decode/hierarchy_decoder.h"
-#include "decode/merge_neighbours.h"
+#include "decode/tree/hierarchy_decoder.h"
+#include "decode/tree/merge_neighbours.h"
 
 namespace stipple::bench {
 

@@ -9,8 +9,8 @@
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "splat/draw_order.h"
-#include "splat/scene.h"
+#include "splat/render/draw_order.h"
+#include "splat/render/scene.h"
 
 namespace stipple::bench {
 namespace {

@@ -11,9 +11,9 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "bench/comparison.h"
-#include "splat/voxelize.h"
-#include "splat/voxelize_kernel.h"
-#include "splat/voxelize_splat.h"
+#include "splat/voxels/voxelize.h"
+#include "splat/voxels/voxelize_kernel.h"
+#include "splat/voxels/voxelize_splat.h"
 
 namespace stipple::bench {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "base/parallel.h"
-#include "decode/merge_neighbours.h"
+#include "decode/tree/merge_neighbours.h"
 
 namespace stipple {
 

@@ -16,7 +16,7 @@ namespace stipple {
 std::vector<float> anchorSpacing(const AnchorSet& anchors);
 
 /// The same, with the neighbours that it found. Out: neighbours [P, kSpacingNeighbours] nearest
-/// anchors, kNoPlace (decode/merge_neighbours.h) where there are fewer.
+/// anchors, kNoPlace (decode/tree/merge_neighbours.h) where there are fewer.
 constexpr size_t kSpacingNeighbours = 6;
 std::vector<float> anchorSpacing(const AnchorSet& anchors, std::vector<uint32_t>& neighbours);
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "base/progress.h"
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 #include "density/anchor_sampling.h"
 #include "math/camera.h"
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 #include "density/octree_density.h"
 
 namespace stipple {

@@ -9,7 +9,7 @@
 
 #include "base/random.h"
 #include "data/tensor_table.h"
-#include "densify/splat_filter.h"
+#include "densify/parts/splat_filter.h"
 #include "densify/strategy.h"
 
 namespace stipple {
@@ -50,7 +50,7 @@ ControlMoment controlMoment(const FitMoment& moment, const EventSchedule& schedu
 ControlMoment momentOfEvent(const ControlMoment& moment, const EventSchedule& schedule);
 
 /// Whether what this iteration's view tells counts for the next event: since the one before, and
-/// within as many iterations as show every view at least once (train/view_order.h).
+/// within as many iterations as show every view at least once (train/loop/view_order.h).
 bool isWindowOfViews(const ControlMoment& moment);
 
 /// What a part of density control decides. No decision has two owners.

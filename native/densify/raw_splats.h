@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 
 namespace stipple {
 

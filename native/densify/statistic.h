@@ -8,7 +8,7 @@
 
 namespace stipple {
 
-/// What a backward pass gathers of each splat, beside the derivatives (splat/render_backward.h says
+/// What a backward pass gathers of each splat, beside the derivatives (splat/render/render_backward.h says
 /// what each is).
 enum class Statistic : uint32_t {
   kContributions = 0,

@@ -38,7 +38,7 @@ struct StrategyEntry {
 /// In the order in which they are shown.
 const std::vector<StrategyEntry>& strategyEntries();
 const std::vector<StrategyEntry>& partEntries();
-/// Of fields (train/field_model.h), whose density decides where splats are; makeStrategy() makes
+/// Of fields (train/loop/field_model.h), whose density decides where splats are; makeStrategy() makes
 /// none of them.
 const std::vector<StrategyEntry>& fieldStrategyEntries();
 const std::vector<std::string>& strategyNames();

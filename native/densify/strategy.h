@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "data/splat_cloud.h"
-#include "data/splat_quantities.h"
+#include "data/clouds/splat_cloud.h"
+#include "data/clouds/splat_quantities.h"
 #include "data/tensor_table.h"
 #include "densify/raw_splats.h"
 #include "densify/splat_edit.h"
@@ -27,7 +27,7 @@ struct TrainingView {
   std::span<const float> target;  ///< [H,W,3] over the background of the iteration
 };
 
-/// Density control of a cloud that is there, without steps (train/densify_cloud.h).
+/// Density control of a cloud that is there, without steps (train/loop/densify_cloud.h).
 struct StandaloneEvent {
   uint64_t index = 0;
   uint64_t count = 1;

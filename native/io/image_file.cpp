@@ -8,9 +8,9 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "io/input_file.h"
+#include "io/bytes/input_file.h"
+#include "io/bytes/output_file.h"
 #include "io/media_library.h"
-#include "io/output_file.h"
 #include "math/colour.h"
 
 namespace stipple {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "data/image.h"
+#include "data/images/image.h"
 
 namespace stipple {
 

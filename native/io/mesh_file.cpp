@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "io/input_file.h"
+#include "io/bytes/input_file.h"
 #include "io/media_library.h"
 
 namespace stipple {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "base/error.h"
-#include "io/input_file.h"
-#include "io/little_endian.h"
-#include "io/output_file.h"
+#include "io/bytes/input_file.h"
+#include "io/bytes/little_endian.h"
+#include "io/bytes/output_file.h"
 
 namespace stipple {
 

@@ -3,9 +3,9 @@
 #include <string>
 
 #include "base/error.h"
-#include "io/input_file.h"
+#include "io/bytes/input_file.h"
+#include "io/bytes/output_file.h"
 #include "io/media_library.h"
-#include "io/output_file.h"
 
 namespace stipple {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "data/polygon_surface.h"
+#include "data/meshes/polygon_surface.h"
 #include "data/sparse_volume.h"
 
 namespace stipple {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "data/tri_mesh.h"
+#include "data/meshes/tri_mesh.h"
 
 namespace stipple {
 

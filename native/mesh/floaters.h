@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 
 namespace stipple {
 

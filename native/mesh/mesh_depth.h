@@ -4,7 +4,7 @@
 #include <span>
 
 #include "base/progress.h"
-#include "data/tri_mesh.h"
+#include "data/meshes/tri_mesh.h"
 #include "math/camera.h"
 #include "math/empty_depth.h"
 #include "math/vec.h"

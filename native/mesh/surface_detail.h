@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "data/point_set.h"
+#include "data/meshes/point_set.h"
 
 namespace stipple {
 

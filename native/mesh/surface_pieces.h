@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "base/progress.h"
-#include "data/polygon_surface.h"
-#include "data/tri_mesh.h"
+#include "data/meshes/polygon_surface.h"
+#include "data/meshes/tri_mesh.h"
 
 namespace stipple {
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "base/progress.h"
-#include "data/point_set.h"
-#include "data/tri_mesh.h"
+#include "data/meshes/point_set.h"
+#include "data/meshes/tri_mesh.h"
 
 namespace stipple {
 

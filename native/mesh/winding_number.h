@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "data/tri_mesh.h"
+#include "data/meshes/tri_mesh.h"
 #include "math/vec.h"
 
 namespace stipple {

@@ -97,7 +97,7 @@ def test_frame_step_of_a_series(stipple, tmp_path, degree, monkeypatch):
 
     A view takes 1/24 s between frames to draw; the same time passes here between steps.
     """
-    sequences, native = stipple.scene.sequences, stipple.scene.sources.context()
+    sequences, native = stipple.scene.sequence.sequences, stipple.scene.source.sources.context()
     random = np.random.default_rng(1)
     arrays = make_arrays(stipple, 100_000, degree)
     for frame in range(1, SERIES_FRAMES + 1):

@@ -36,9 +36,9 @@ def psnr(error):
 
 @pytest.mark.parametrize('model', os.environ.get('STIPPLE_FIT_MODELS', 'EXPLICIT').split(','))
 def test_suzanne(stipple, tmp_path, model):
-    rigs = importlib.import_module('.scene.view_rigs', stipple.__name__)
-    capturing = importlib.import_module('.scene.view_capture', stipple.__name__)
-    fitting = importlib.import_module('.scene.fitting', stipple.__name__)
+    rigs = importlib.import_module('.scene.fit.view_rigs', stipple.__name__)
+    capturing = importlib.import_module('.scene.fit.view_capture', stipple.__name__)
+    fitting = importlib.import_module('.scene.fit.fitting', stipple.__name__)
     binding = importlib.import_module('.binding.renderer', stipple.__name__)
     structs = importlib.import_module('.binding.structs', stipple.__name__)
     obj = scenes.suzanne()
@@ -52,10 +52,10 @@ def test_suzanne(stipple, tmp_path, model):
     seconds, busy = time.perf_counter() - start, time.process_time() - busy
     figures = fitting.state.figures
     result = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
-    cloud = stipple.scene.sources.decode_data(result.data, stipple.scene.sources.decode_settings(result.data.stipple))
+    cloud = stipple.scene.source.sources.decode_data(result.data, stipple.scene.source.sources.decode_settings(result.data.stipple))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     poses = rigs.around(bpy.context.scene, depsgraph, rigs.bounds_of([obj], depsgraph), HELD_OUT, seed=5)
-    renderer = binding.Renderer(stipple.scene.sources.context())
+    renderer = binding.Renderer(stipple.scene.source.sources.context())
     black, foreground = [], []
     with capturing.Capture(bpy.context, [obj], capturing.CaptureSettings('CYCLES', 256, 256)) as capture:
         for i, pose in enumerate(poses):

@@ -136,7 +136,7 @@ def test_scan(stipple, tmp_path, millions):
     folder.mkdir(parents=True, exist_ok=True)
     cloud, blend, reduced = (str(folder / name) for name in ('scan.ply', 'scan.blend', 'budget.blend'))
     if not Path(cloud).exists():
-        stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), scan(stipple, millions * 1_000_000)).save(cloud)
+        stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), scan(stipple, millions * 1_000_000)).save(cloud)
     load = os.getloadavg()[0]
     run(folder, 'import', 'import', (blend,), cloud=cloud, blend=blend)
     run(folder, 'budget', 'budget', (reduced,), blend=blend, reduced=reduced)

@@ -68,7 +68,7 @@ def room():
 
 @pytest.mark.parametrize('scene', (outdoors, room))
 def test_shell(stipple, tmp_path, scene):
-    fitting = importlib.import_module('.scene.fitting', stipple.__name__)
+    fitting = importlib.import_module('.scene.fit.fitting', stipple.__name__)
     rig = scene()
     chosen = list(bpy.context.selected_objects)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
@@ -84,7 +84,7 @@ def test_shell(stipple, tmp_path, scene):
         assert bpy.ops.stipple.splats_fit() == {'FINISHED'}
         busy = time.process_time() - before
         obj = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
-        cloud = stipple.scene.sources.decode_data(obj.data, stipple.scene.sources.decode_settings(obj.data.stipple))
+        cloud = stipple.scene.source.sources.decode_data(obj.data, stipple.scene.source.sources.decode_settings(obj.data.stipple))
         row.append((shell, cloud))
         farthest = np.abs(cloud.read().positions).max()
         print(f'\n{scene.__name__}, shell {shell}: held out {fitting.state.figures.best_psnr:.2f} dB, splats as far as '
@@ -105,7 +105,7 @@ def save(stipple, name, objects, rig, fits):
         seen = capture.pose('seen', pose)
     linear = np.clip(seen.linear[..., :3], 0, 1)
     pictures = [np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)]
-    renderer = binding.Renderer(stipple.scene.sources.context())
+    renderer = binding.Renderer(stipple.scene.source.sources.context())
     for _shell, cloud in fits:
         task = renderer.start([(cloud, np.eye(4))], seen.camera,
                               renderer.options(output_colour=structs.OutputColour.COMPOSITED), with_depth=False)

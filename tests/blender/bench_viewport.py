@@ -34,9 +34,9 @@ def test_sorted_against_unsorted(stipple, monkeypatch, count, degree):
     import importlib
 
     import gpu
-    splats = importlib.import_module(f'{stipple.__name__}.splat_drawing')
-    shader = importlib.import_module(f'{stipple.__name__}.splat_shader')
-    target_of = importlib.import_module(f'{stipple.__name__}.view_ellipses').Target
+    splats = importlib.import_module(f'{stipple.__name__}.viewport.splat_drawing')
+    shader = importlib.import_module(f'{stipple.__name__}.viewport.splat_shader')
+    target_of = importlib.import_module(f'{stipple.__name__}.viewport.view_ellipses').Target
     arrays = ellipses_test.random_arrays(stipple, count, degree, size=0.5 / count ** 0.5)
     view_camera = ellipses_test.camera(stipple)
     view_camera.width, view_camera.height = SIZE
@@ -44,7 +44,7 @@ def test_sorted_against_unsorted(stipple, monkeypatch, count, degree):
     view_camera.cx, view_camera.cy = SIZE[0] / 2, SIZE[1] / 2
     entry = ellipses_test.shown((splats,), stipple, arrays)
     shaders = shader.Shaders()
-    view = splats.SplatView(stipple.scene.sources.context())
+    view = splats.SplatView(stipple.scene.source.sources.context())
     first = seconds_of(lambda: view.update([entry], view_camera, wait=True))
     task = {}
     texture = shader.texture

@@ -59,7 +59,7 @@ def start(window):
 
 def rendering(_window):
     """Blender draws between two views."""
-    state = module('.scene.fitting').state
+    state = module('.scene.fit.fitting').state
     if 'Rendering' not in state.stage:
         return False
     facts['said_while_rendering'] = state.stage
@@ -68,12 +68,12 @@ def rendering(_window):
 
 def previewed(window):
     """The preview is there while the fit goes on, and held-out views were measured."""
-    state = module('.scene.fitting').state
+    state = module('.scene.fit.fitting').state
     assert state.is_running, state.problem
     if 'Sphere Fit' not in bpy.data.objects or not state.figures.psnr > 20:
         return False
     # A preview is up to seconds older than the figures, and the first shows the start, which is nearly transparent.
-    shown = module('.scene.splat_data').fingerprint(bpy.data.objects['Sphere Fit'].data)
+    shown = module('.scene.source.splat_data').fingerprint(bpy.data.objects['Sphere Fit'].data)
     if previews.setdefault('when measured', shown) == shown:
         return False
     source = bpy.data.objects['Sphere']
@@ -101,7 +101,7 @@ def press(window, key):
 
 
 def ended(_window):
-    state = module('.scene.fitting').state
+    state = module('.scene.fit.fitting').state
     if state.is_running:
         return False
     facts['problem'], facts['psnr'] = state.problem, state.figures.best_psnr
@@ -110,8 +110,8 @@ def ended(_window):
 
 
 def proposed(_window):
-    facts['proposed'] = module('.scene.fit_proposal').find(bpy.context) is not None
-    facts['count'] = module('.scene.fitting').state.kept_count
+    facts['proposed'] = module('.scene.fit.fit_proposal').find(bpy.context) is not None
+    facts['count'] = module('.scene.fit.fitting').state.kept_count
     facts['nothing_replaced'] = not bpy.data.objects['Sphere'].hide_render
     return 'proposed'
 
@@ -124,7 +124,7 @@ def report(window):
 
 
 def close_report(_window):
-    reports = module('.scene.fit_reports')
+    reports = module('.scene.fit.fit_reports')
     (other, area), = reports.editors(bpy.context)
     facts['report'] = area.spaces.active.image.name
     facts['windows'] = len(bpy.context.window_manager.windows)
@@ -142,7 +142,7 @@ def discard(window):
 
 def stop(_window):
     """By the button, once there is something to keep."""
-    state = module('.scene.fitting').state
+    state = module('.scene.fit.fitting').state
     if state.figures is None or not state.figures.psnr > 0:
         return False
     assert bpy.ops.stipple.fit_stop() == {'FINISHED'}

@@ -33,7 +33,7 @@ def fit():
 
 
 def state():
-    return module('.scene.fitting').state
+    return module('.scene.fit.fitting').state
 
 
 def few_tabs(window, opened='STIPPLE_PT_fit_advanced'):
@@ -106,7 +106,7 @@ def proposal(_window):
 
 
 def report(_window):
-    image = module('.scene.fit_proposal').find(bpy.context).data.stipple.fit_report
+    image = module('.scene.fit.fit_proposal').find(bpy.context).data.stipple.fit_report
     image.filepath_raw, image.file_format = str(folder() / 'fit_report.png'), 'PNG'
     image.save()
 
@@ -148,11 +148,11 @@ def over_grey(path):
 
 
 def photographs(_window):
-    capture = module('.scene.view_capture')
+    capture = module('.scene.fit.view_capture')
     source = bpy.data.objects['Suzanne']
     source.hide_set(False)
     source.hide_render = False
-    photo_set.write(module('.scene.view_rigs'), capture, source, folder() / 'photos', PHOTO_COUNT,
+    photo_set.write(module('.scene.fit.view_rigs'), capture, source, folder() / 'photos', PHOTO_COUNT,
                     capture.CaptureSettings('CYCLES', PHOTO_SIDE, 32))
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)

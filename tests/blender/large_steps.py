@@ -133,7 +133,7 @@ def measure_views(window):
 
 def move_slider(window):
     """Moves around BUDGET: the first, which does not know yet how long a splat takes, the median, and the rest after."""
-    settings, sync = the_splats().data.stipple, sys.modules['stipple'].scene.sync
+    settings, sync = the_splats().data.stipple, sys.modules['stipple'].scene.source.sync
     moves = {'slider': [], 'slider drawn': []}
     for move in range(1, MOVES + 1):
         with measured('slider'):
@@ -144,7 +144,7 @@ def move_slider(window):
             values.append(results[name])
     results['slider begins'] = moves['slider'][0]
     results.update({name: sorted(values)[MOVES // 2] for name, values in moves.items()})
-    while sys.modules['stipple'].scene.sources.is_reading():
+    while sys.modules['stipple'].scene.source.sources.is_reading():
         time.sleep(0.05)
     with measured('slider rests'):
         sync.complete()
@@ -158,7 +158,7 @@ def look_through_the_engine(window):
     window.space.shading.type = 'RENDERED'
     with measured('rendered view'):
         draw(window)
-    view_picture = sys.modules['stipple.view_picture']
+    view_picture = sys.modules['stipple.viewport.view_picture']
     picture = next(thing for thing in gc.get_objects() if isinstance(thing, view_picture.ViewPicture))
     with measured('fine view'):
         while not (picture._shown is not None and picture._shown.is_fine):

@@ -42,12 +42,12 @@ def live(_window):
     obj = bpy.data.objects.get('Sphere Fit')
     if obj is None or 'seen:contribution' not in obj.data.attributes or len(obj.data.attributes['scale'].data) < 500:
         return False
-    facts['is_running'] = module('.scene.fitting').state.is_running
+    facts['is_running'] = module('.scene.fit.fitting').state.is_running
     return 'live'
 
 
 def stop(_window):
-    state = module('.scene.fitting').state
+    state = module('.scene.fit.fitting').state
     # Splats multiply for the first time at 100 of 4000 iterations.
     if state.figures is None or not state.figures.psnr > 0 or state.figures.iteration < 420:
         return False
@@ -55,7 +55,7 @@ def stop(_window):
 
 
 def ended(_window):
-    return None if not module('.scene.fitting').state.is_running else False
+    return None if not module('.scene.fit.fitting').state.is_running else False
 
 
 def accept(window):

@@ -55,7 +55,7 @@ def measure(window):
 
 
 def measured(window):
-    return None if module('.scene.measured_quality').of(window.window.scene) is not None else False
+    return None if module('.scene.view.measured_quality').of(window.window.scene) is not None else False
 
 
 def figures(_window):
@@ -77,7 +77,7 @@ def compared(show):
 
 
 def is_shown(_window):
-    return 'compared' if module('.scene.fit_reports').editors(bpy.context) else False
+    return 'compared' if module('.scene.fit.fit_reports').editors(bpy.context) else False
 
 
 def settled(window):
@@ -87,7 +87,7 @@ def settled(window):
 def plotted(window):
     with window.context():
         assert bpy.ops.stipple.accuracy_show() == {'FINISHED'}
-    (_, area), = module('.scene.fit_reports').editors(bpy.context)
+    (_, area), = module('.scene.fit.fit_reports').editors(bpy.context)
     facts['shown'] = area.spaces.active.image.name
     facts['windows'] = len(bpy.context.window_manager.windows)
     return 'plotted'

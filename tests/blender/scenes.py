@@ -139,7 +139,7 @@ def refuses(call, text):
 
 def colours_of(stipple, obj):
     """Scene linear colours [N,3] of splats whose harmonics are display values."""
-    arrays = stipple.scene.splat_data.read(obj.data)
+    arrays = stipple.scene.source.splat_data.read(obj.data)
     display = 0.5 + 0.28209479177387814 * arrays.sh[:, 0]
     return np.where(display <= 0.04045, display / 12.92, ((np.maximum(display, 0) + 0.055) / 1.055) ** 2.4)
 

@@ -28,7 +28,7 @@ def write(stipple, folder, frames=range(1, 11), name='swarm_{:04d}.ply', count=C
     """Writes the files; returns their folder."""
     folder.mkdir(exist_ok=True)
     for frame in frames:
-        cloud = stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), arrays_of(stipple, frame, count))
+        cloud = stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), arrays_of(stipple, frame, count))
         cloud.save(str(folder / name.format(frame)), frame=stipple.binding.structs.Frame.RFU)
     return folder
 
@@ -42,7 +42,7 @@ def load(folder, first='swarm_0001.ply', **settings):
 
 def centre(stipple, obj):
     """Where the stored splats are along x, about: the frame that is shown less 1; None for no splats."""
-    arrays = stipple.scene.splat_data.read(obj.data)
+    arrays = stipple.scene.source.splat_data.read(obj.data)
     return round(float(arrays.positions[:, 0].mean())) if arrays.count else None
 
 

@@ -26,8 +26,8 @@ def splat_wall(stipple, name, z, side=2.0, colour=SPLAT, count=60, opacity=0.98)
         positions, np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
         np.tile(np.float32([spacing, spacing, 1e-3]), (n, 1)), np.full(n, opacity, np.float32),
         np.tile(((display - 0.5) / DC).astype(np.float32), (n, 1))[:, None, :])
-    data = stipple.scene.splat_data.new_data(name)
-    stipple.scene.splat_data.write(data, arrays)
+    data = stipple.scene.source.splat_data.new_data(name)
+    stipple.scene.source.splat_data.write(data, arrays)
     return scenes.link(bpy.data.objects.new(name, data))
 
 

@@ -21,8 +21,8 @@ def noted(path, settings):
     return decode(path, settings)
 package.scene.instances.sources.decode = noted
 def stored(scene, *_):
-    obj = next(o for o in bpy.data.objects if package.scene.splat_data.is_splat_object(o))
-    print('STORED', scene.frame_current, package.scene.splat_data.count(obj.data), flush=True)
+    obj = next(o for o in bpy.data.objects if package.scene.source.splat_data.is_splat_object(o))
+    print('STORED', scene.frame_current, package.scene.source.splat_data.count(obj.data), flush=True)
 bpy.app.handlers.render_post.append(stored)
 '''
 
@@ -89,10 +89,10 @@ def test_still_in_cycles_gives_the_viewport_its_budget_back(animated, tmp_path, 
     seen = []
 
     def note(*_):
-        seen.append(stipple.scene.splat_data.count(animated.data))
+        seen.append(stipple.scene.source.splat_data.count(animated.data))
 
     bpy.app.handlers.render_post.append(note)
     bpy.ops.render.render()
     bpy.app.handlers.render_post.remove(note)
     assert seen == [1200]
-    assert stipple.scene.splat_data.count(animated.data) == 800
+    assert stipple.scene.source.splat_data.count(animated.data) == 800

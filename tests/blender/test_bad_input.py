@@ -65,7 +65,7 @@ def test_zero_area_faces_alone(unchanged):
 
 def test_zero_area_faces_among_others_are_harmless(stipple):
     obj = scenes.mesh_object('Mixed', [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0)], [(0, 1, 2), (0, 1, 3)])
-    assert stipple.scene.splat_data.count(scenes.make_splats(obj, anchors=500).data) == 500
+    assert stipple.scene.source.splat_data.count(scenes.make_splats(obj, anchors=500).data) == 500
 
 
 @pytest.mark.parametrize('value', [float('nan'), float('inf')])
@@ -138,14 +138,14 @@ def test_negative_seed_and_detail(unchanged):
 @pytest.mark.parametrize('budget', [0, -5, 2 ** 28 + 1])
 def test_slider_out_of_range_keeps_the_splats_and_says_so(stipple, budget):
     obj = scenes.make_splats(scenes.quad(), anchors=500)
-    before = stipple.scene.splat_data.read(obj.data)
+    before = stipple.scene.source.splat_data.read(obj.data)
     obj.data.stipple.anchors = budget
-    assert stipple.scene.sync.problems[obj.data.name] == (
+    assert stipple.scene.source.sync.problems[obj.data.name] == (
         f'Anchor budget is {budget:,}; allowed are 1 to 268,435,456.')
-    np.testing.assert_array_equal(stipple.scene.splat_data.read(obj.data).positions, before.positions)
+    np.testing.assert_array_equal(stipple.scene.source.splat_data.read(obj.data).positions, before.positions)
     obj.data.stipple.anchors = 600
-    assert stipple.scene.splat_data.count(obj.data) == 600
-    assert obj.data.name not in stipple.scene.sync.problems
+    assert stipple.scene.source.splat_data.count(obj.data) == 600
+    assert obj.data.name not in stipple.scene.source.sync.problems
 
 
 def test_unwritable_source_path(unchanged, tmp_path):
@@ -199,10 +199,10 @@ def test_lost_source_keeps_the_stored_splats(stipple, tmp_path):
     path = tmp_path / 'a.stipple.safetensors'
     obj = scenes.make_splats(scenes.quad(), anchors=500, source_path=str(path))
     path.unlink()
-    stipple.scene.sources.forget()
+    stipple.scene.source.sources.forget()
     obj.data.stipple.anchors = 600
-    assert 'a.stipple.safetensors' in stipple.scene.sync.problems[obj.data.name]
-    assert stipple.scene.splat_data.count(obj.data) == 500
+    assert 'a.stipple.safetensors' in stipple.scene.source.sync.problems[obj.data.name]
+    assert stipple.scene.source.splat_data.count(obj.data) == 500
 
 
 @pytest.mark.parametrize('case', ['missing', 'abi'])

@@ -32,11 +32,11 @@ def budgeted(stipple, tmp_path, arrays):
 
 
 def count(stipple, obj):
-    return stipple.scene.splat_data.count(obj.data)
+    return stipple.scene.source.splat_data.count(obj.data)
 
 
 def test_the_full_budget_is_the_file_bit_for_bit(stipple, budgeted, tmp_path):
-    native = stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(), str(tmp_path / 'in.ply')).read()
+    native = stipple.binding.cloud.Cloud.load(stipple.scene.source.sources.context(), str(tmp_path / 'in.ply')).read()
     assert budgeted.data.stipple.source_kind == 'TREE' and budgeted.data.stipple.source_count == COUNT
     assert budgeted.data.stipple.source.startswith('//stipple')
     assert_equal(read(stipple, budgeted), native)
@@ -69,7 +69,7 @@ def test_ratio_and_count(stipple, budgeted):
 def test_renders_have_their_own_budget(stipple, budgeted, tmp_path):
     settings = budgeted.data.stipple
     settings.ratio, settings.ratio_render = 0.25, 0.5
-    sources = stipple.scene.sources
+    sources = stipple.scene.source.sources
     assert sources.decode_settings(settings, 'RENDER').anchors == COUNT // 2
     for budget, expected in (('VIEWPORT', COUNT // 4), ('RENDER', COUNT // 2), ('FULL', COUNT)):
         scenes.select(budgeted)
@@ -124,7 +124,7 @@ def test_a_mask_holds_at_every_budget(stipple, tmp_path, arrays, mask_first):
         scenes.select(*chosen)
         assert getattr(bpy.ops.stipple, operator)() == {'FINISHED'}
     kept = np.count_nonzero(inside)
-    assert stipple.scene.sources.visible_count(obj.data.stipple) == kept
+    assert stipple.scene.source.sources.visible_count(obj.data.stipple) == kept
     np.testing.assert_array_equal(read(stipple, obj).positions, arrays.positions[inside])
     for ratio in (0.5, 0.1, 0.0):
         obj.data.stipple.ratio = ratio
@@ -147,7 +147,7 @@ def test_floaters_of_a_tree_are_looked_for_in_all_its_splats(stipple, tmp_path, 
     bpy.ops.stipple.add_budget()
     obj.data.stipple.ratio = 0.1
     assert bpy.ops.stipple.delete_floaters(by_size=False, by_connectivity=False) == {'FINISHED'}
-    assert stipple.scene.sources.visible_count(obj.data.stipple) == COUNT - 30
+    assert stipple.scene.source.sources.visible_count(obj.data.stipple) == COUNT - 30
     assert count(stipple, obj) == round((COUNT - 30) * 0.1)
 
 
@@ -164,7 +164,7 @@ def test_apply_keeps_the_budget(stipple, budgeted):
 
 def foreign(stipple, arrays, name='foreign'):
     """Splats by their attributes alone, as another importer leaves them."""
-    splat_data = stipple.scene.splat_data
+    splat_data = stipple.scene.source.splat_data
     data = splat_data.new_data(name)
     splat_data.write(data, arrays)
     for key in [key for key in data.keys() if key.startswith('stipple_')]:
@@ -235,7 +235,7 @@ def test_what_has_no_splats_is_refused(stipple):
 
 
 def test_a_dragged_slider_writes_what_fits_and_completes_at_rest(stipple, budgeted):
-    sync, settings = stipple.scene.sync, budgeted.data.stipple
+    sync, settings = stipple.scene.source.sync, budgeted.data.stipple
     with sync.paused():
         settings.ratio = 0.75
     slow = dict(sync._state)
@@ -256,7 +256,7 @@ def test_a_dragged_slider_writes_what_fits_and_completes_at_rest(stipple, budget
 
 def test_a_slider_does_not_wait_for_its_tree_to_be_read(stipple, budgeted, monkeypatch):
     """After a file is opened: the first move leaves the reading to the library's thread, and what it asked for follows."""
-    sync, sources = stipple.scene.sync, stipple.scene.sources
+    sync, sources = stipple.scene.source.sync, stipple.scene.source.sources
     sources.forget()
     monkeypatch.setattr(sources.Model, 'load', None)  # reading on Blender's own thread
     with sync.paused():
@@ -286,4 +286,4 @@ def test_a_missing_tree_is_reported_and_the_splats_stay(stipple, budgeted, tmp_p
         path.unlink()
     budgeted.data.stipple.ratio = 0.25
     assert count(stipple, budgeted) == COUNT // 2
-    assert 'is missing' in stipple.scene.sync.problems[budgeted.data.name]
+    assert 'is missing' in stipple.scene.source.sync.problems[budgeted.data.name]

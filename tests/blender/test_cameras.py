@@ -55,7 +55,7 @@ def test_projection_equals_blenders(stipple, kind, fit, size, aspect, shift):
     obj = make_camera(type=kind, sensor_fit=fit, sensor_width=36.0, sensor_height=20.0, lens=42.0, ortho_scale=7.0,
                       shift_x=shift[0], shift_y=shift[1])
     render = set_render(*size, *aspect)
-    camera = stipple.scene.cameras.camera_of(obj, render)
+    camera = stipple.scene.view.cameras.camera_of(obj, render)
     assert (camera.width, camera.height) == size
     np.testing.assert_allclose(project(camera, POINTS), blender_project(obj, POINTS), atol=TOLERANCE, rtol=0)
 
@@ -63,7 +63,7 @@ def test_projection_equals_blenders(stipple, kind, fit, size, aspect, shift):
 def test_a_moved_camera_does_not_pass(stipple):
     """The comparison above can fail."""
     obj = make_camera()
-    camera = stipple.scene.cameras.camera_of(obj, set_render(320, 180))
+    camera = stipple.scene.view.cameras.camera_of(obj, set_render(320, 180))
     obj.location.x += 0.01
     bpy.context.view_layer.update()
     assert np.abs(project(camera, POINTS) - blender_project(obj, POINTS)).max() > TOLERANCE
@@ -73,7 +73,7 @@ def test_scale_of_the_camera_object_changes_nothing(stipple):
     obj = make_camera()
     obj.scale = (2.0, 0.5, 3.0)
     bpy.context.view_layer.update()
-    camera = stipple.scene.cameras.camera_of(obj, set_render(320, 180))
+    camera = stipple.scene.view.cameras.camera_of(obj, set_render(320, 180))
     obj.scale = (1.0, 1.0, 1.0)
     bpy.context.view_layer.update()
     np.testing.assert_allclose(project(camera, POINTS), blender_project(obj, POINTS), atol=TOLERANCE, rtol=0)
@@ -82,9 +82,9 @@ def test_scale_of_the_camera_object_changes_nothing(stipple):
 def test_border_is_a_window_of_the_whole_picture(stipple):
     obj = make_camera(shift_x=0.1)
     render = set_render(320, 180)
-    whole = stipple.scene.cameras.camera_of(obj, render)
-    border = stipple.scene.facts.Border(40, 30, 100, 60)
-    part = stipple.scene.cameras.camera_of(obj, render, border)
+    whole = stipple.scene.view.cameras.camera_of(obj, render)
+    border = stipple.scene.view.facts.Border(40, 30, 100, 60)
+    part = stipple.scene.view.cameras.camera_of(obj, render, border)
     a, b = project(whole, POINTS), project(part, POINTS)
     np.testing.assert_allclose(b[:, 0] * 100 + 40, a[:, 0] * 320, atol=1e-9)
     np.testing.assert_allclose(b[:, 1] * 60 + 30, a[:, 1] * 180, atol=1e-9)
@@ -93,16 +93,16 @@ def test_border_is_a_window_of_the_whole_picture(stipple):
 def test_resolution_percentage_truncates_as_blender_does(stipple):
     render = set_render(333, 101)
     render.resolution_percentage = 50
-    assert stipple.scene.facts.picture_size(render) == (166, 50)
+    assert stipple.scene.view.facts.picture_size(render) == (166, 50)
 
 
 def test_an_unknown_panorama_is_one_clear_error(stipple):
     obj = make_camera(type='PANO')
     stipple.version.panorama_settings(obj.data).panorama_type = 'MIRRORBALL'
     with pytest.raises(Exception, match=r"Panoramic camera 'camera' is of type MIRRORBALL; allowed are EQUIRECTANGULAR"):
-        stipple.scene.cameras.camera_of(obj, set_render(64, 64))
+        stipple.scene.view.cameras.camera_of(obj, set_render(64, 64))
 
 
 def test_missing_camera_is_one_clear_error(stipple):
     with pytest.raises(Exception, match='has no camera'):
-        stipple.scene.cameras.camera_of(None, set_render(64, 64))
+        stipple.scene.view.cameras.camera_of(None, set_render(64, 64))

@@ -36,22 +36,22 @@ def test_a_ball_gets_more_splats_and_keeps_a_budget(stipple, ball):
     densify(ball, splats, max_splats=count + 20)
     stipple_data = splats.data.stipple
     assert stipple_data.source_kind == 'TREE' and stipple_data.source_count == count + 20
-    assert stipple.scene.splat_data.count(splats.data) == count + 20
+    assert stipple.scene.source.splat_data.count(splats.data) == count + 20
     # The old datablock is as it was: what else uses it, and undo, go on with it.
-    assert splats.data != before and stipple.scene.splat_data.count(before) == count
+    assert splats.data != before and stipple.scene.source.splat_data.count(before) == count
     stipple_data.ratio = 0.5
-    assert stipple.scene.splat_data.count(splats.data) == round(0.5 * (count + 20))
+    assert stipple.scene.source.splat_data.count(splats.data) == round(0.5 * (count + 20))
 
 
 def test_where_the_scene_stands_does_not_matter(stipple, ball):
     """Moved and enlarged together, the splats and what they stand for see the same views."""
     splats = few()
     start = splats.data
-    here = stipple.scene.splat_data.read(densify(ball, splats, max_splats=100000).data)
+    here = stipple.scene.source.splat_data.read(densify(ball, splats, max_splats=100000).data)
     for obj in (ball, splats):
         obj.scale, obj.location = (3, 3, 3), (5, -2, 1)
     splats.data = start
-    there = stipple.scene.splat_data.read(densify(ball, splats, max_splats=100000).data)
+    there = stipple.scene.source.splat_data.read(densify(ball, splats, max_splats=100000).data)
     # Pixels differ by rounding, and with them a splat at the threshold; cameras in another place would see another half.
     assert abs(here.count - there.count) <= 0.05 * here.count
     assert here.count > start.stipple.source_count
@@ -64,7 +64,7 @@ def test_undo_brings_the_splats_back(stipple, ball):
     densify(ball, splats, max_splats=count + 20)
     bpy.ops.ed.undo_push(message='after')
     bpy.ops.ed.undo()
-    assert few().data.stipple.source_count == count == stipple.scene.splat_data.count(few().data)
+    assert few().data.stipple.source_count == count == stipple.scene.source.splat_data.count(few().data)
 
 
 def test_messages(stipple, ball):
@@ -85,4 +85,4 @@ def test_messages(stipple, ball):
     bpy.context.scene.stipple.fit.views_from = 'RIG'
     bpy.data.objects.remove(ball)
     scenes.refuses(run, 'no mesh to take views of')
-    assert splats.data == data and stipple.scene.splat_data.count(data) == count
+    assert splats.data == data and stipple.scene.source.splat_data.count(data) == count

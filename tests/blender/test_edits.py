@@ -26,7 +26,7 @@ def import_arrays(stipple, tmp_path, arrays, name='in'):
 
 
 def read(stipple, obj):
-    return stipple.scene.splat_data.read(obj.data)
+    return stipple.scene.source.splat_data.read(obj.data)
 
 
 def box(location=(0, 0, 0), rotation=(0, 0, 0), size=1.0):
@@ -53,7 +53,7 @@ def test_crop_by_a_turned_box_and_back(stipple, imported):
     inside = in_box(before.positions, cube)
     assert 0 < np.count_nonzero(inside) < 500
     np.testing.assert_array_equal(read(stipple, imported).positions, before.positions[inside])
-    assert list(stipple.scene.masks.counts(imported.data)) == [500, np.count_nonzero(inside)]
+    assert list(stipple.scene.source.masks.counts(imported.data)) == [500, np.count_nonzero(inside)]
     assert bpy.ops.stipple.clear_mask() == {'FINISHED'}
     np.testing.assert_array_equal(read(stipple, imported).positions, before.positions)
     assert not bpy.ops.stipple.clear_mask.poll()
@@ -108,7 +108,7 @@ def test_floaters_are_hidden_and_reported(stipple, tmp_path):
     np.testing.assert_array_equal(left.positions, arrays.positions[10:])
     # A second run finds nothing: what is hidden does not count again.
     assert bpy.ops.stipple.delete_floaters(radius=2.0) == {'FINISHED'}
-    assert list(stipple.scene.masks.counts(obj.data)) == [1000, 990]
+    assert list(stipple.scene.source.masks.counts(obj.data)) == [1000, 990]
 
 
 def test_a_mask_survives_undo_saving_and_use_elsewhere(stipple, imported, tmp_path):
@@ -117,31 +117,31 @@ def test_a_mask_survives_undo_saving_and_use_elsewhere(stipple, imported, tmp_pa
     select(imported, cube)
     bpy.ops.stipple.crop_by_box()
     bpy.ops.ed.undo_push(message='cropped')
-    name, kept = imported.name, stipple.scene.splat_data.count(imported.data)
+    name, kept = imported.name, stipple.scene.source.splat_data.count(imported.data)
     assert kept < 500
     bpy.ops.ed.undo()
     obj = bpy.data.objects[name]
-    assert stipple.scene.splat_data.count(obj.data) == 500 and stipple.scene.masks.counts(obj.data) is None
+    assert stipple.scene.source.splat_data.count(obj.data) == 500 and stipple.scene.source.masks.counts(obj.data) is None
     bpy.ops.ed.redo()
     obj = bpy.data.objects[name]
-    assert stipple.scene.splat_data.count(obj.data) == kept
+    assert stipple.scene.source.splat_data.count(obj.data) == kept
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / 'a.blend'))
     obj = bpy.data.objects[name]
-    assert stipple.scene.splat_data.count(obj.data) == kept
+    assert stipple.scene.source.splat_data.count(obj.data) == kept
     scenes.select(obj)
     assert bpy.ops.stipple.revert_to_source() == {'FINISHED'}
-    assert stipple.scene.splat_data.count(obj.data) == kept
+    assert stipple.scene.source.splat_data.count(obj.data) == kept
     assert bpy.ops.stipple.clear_mask() == {'FINISHED'}
-    assert stipple.scene.splat_data.count(obj.data) == 500
+    assert stipple.scene.source.splat_data.count(obj.data) == 500
 
 
 def test_splats_without_a_source_get_one(stipple, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
-    data = stipple.scene.splat_data.new_data('made')
+    data = stipple.scene.source.splat_data.new_data('made')
     arrays = make_arrays(stipple, count=100, degree=0)
-    stipple.scene.splat_data.write(data, arrays)
-    obj = scenes.link(stipple.scene.splat_data.new_object('made', data))
+    stipple.scene.source.splat_data.write(data, arrays)
+    obj = scenes.link(stipple.scene.source.splat_data.new_object('made', data))
     select(obj, box(size=0.8))
     assert bpy.ops.stipple.crop_by_box() == {'FINISHED'}
     assert data.stipple.source.startswith('//stipple') and (tmp_path / 'stipple' / 'made.ply').is_file()
@@ -156,7 +156,7 @@ def test_merge_joins_the_masked_clouds_in_the_active_objects_frame(stipple, tmp_
     second.matrix_world = Matrix.Translation((0, 0, 4)) @ Matrix.Scale(-1, 4, (1, 0, 0))
     select(first, box(first.matrix_world.translation, size=1.5))
     bpy.ops.stipple.crop_by_box()
-    kept = stipple.scene.splat_data.count(first.data)
+    kept = stipple.scene.source.splat_data.count(first.data)
     scenes.select(first, second)
     m = np.linalg.inv(np.array(first.matrix_world)) @ np.array(second.matrix_world)
     assert bpy.ops.stipple.merge_splats() == {'FINISHED'}
@@ -164,7 +164,7 @@ def test_merge_joins_the_masked_clouds_in_the_active_objects_frame(stipple, tmp_
     assert both.sh.shape == (kept + 40, 9, 3)
     np.testing.assert_allclose(both.positions[kept:], b.positions @ m[:3, :3].T + m[:3, 3], atol=1e-5)
     assert 'b' not in bpy.data.objects
-    assert stipple.scene.masks.counts(first.data) is None
+    assert stipple.scene.source.masks.counts(first.data) is None
 
 
 def test_apply_moves_the_splats_and_keeps_the_mask(stipple, imported):
@@ -233,14 +233,14 @@ def test_a_click_finds_the_surface(stipple, tmp_path):
     camera = scenes.camera((0.3, 0.2, 5), width=64, height=48)
     bpy.context.view_layer.update()
     render = bpy.context.scene.render
-    native = stipple.scene.cameras.camera_of(camera, render)
-    cloud = stipple.scene.sources.cloud_from_object(obj)
-    point = stipple.scene.picking.point_of_pixel([(cloud, np.eye(4))], native, 32.0, 24.0)
+    native = stipple.scene.view.cameras.camera_of(camera, render)
+    cloud = stipple.scene.source.sources.cloud_from_object(obj)
+    point = stipple.scene.view.picking.point_of_pixel([(cloud, np.eye(4))], native, 32.0, 24.0)
     # Straight down from the camera; the layer of splats is 0.1 thick.
     np.testing.assert_allclose(point, (0.3, 0.2, 0), atol=0.05)
-    far = stipple.scene.cameras.camera_of(camera, render)
+    far = stipple.scene.view.cameras.camera_of(camera, render)
     with pytest.raises(stipple.binding.errors.StippleError, match='no solid splats'):
-        stipple.scene.picking.point_of_pixel([], far, 0.5, 0.5)
+        stipple.scene.view.picking.point_of_pixel([], far, 0.5, 0.5)
 
 
 @pytest.mark.parametrize('operator', ['crop_by_box', 'crop_by_mesh', 'delete_floaters', 'merge_splats'])
@@ -257,7 +257,7 @@ def test_nothing_else_selected(stipple, imported, operator):
 def test_an_empty_result_is_refused_and_nothing_changes(stipple, imported):
     select(imported, box((50, 0, 0)))
     scenes.refuses(bpy.ops.stipple.crop_by_box, 'at least one has to')
-    assert stipple.scene.splat_data.count(imported.data) == 500
+    assert stipple.scene.source.splat_data.count(imported.data) == 500
     flat = scenes.quad()
     select(imported, flat)
     scenes.refuses(bpy.ops.stipple.crop_by_box, "The box of 'Quad' is flat")
@@ -282,8 +282,8 @@ def test_splats_of_meshes_and_edited_ones_say_what_to_do(stipple, tmp_path):
 def test_a_missing_source_leaves_the_mask_as_it_was(stipple, imported, tmp_path):
     select(imported, box(size=0.9))
     bpy.ops.stipple.crop_by_box()
-    kept = stipple.scene.splat_data.count(imported.data)
+    kept = stipple.scene.source.splat_data.count(imported.data)
     (tmp_path / 'in.ply').unlink()
     scenes.refuses(bpy.ops.stipple.clear_mask, 'in.ply')
-    assert stipple.scene.masks.counts(imported.data)[1] == kept
-    assert stipple.scene.splat_data.count(imported.data) == kept
+    assert stipple.scene.source.masks.counts(imported.data)[1] == kept
+    assert stipple.scene.source.splat_data.count(imported.data) == kept

@@ -18,8 +18,8 @@ def module(stipple, name):
 
 def plan_of(stipple):
     """{name: row} of the open scene, as its panel shows it."""
-    effects, context = module(stipple, 'scene.effects'), bpy.context
-    rows = effects.plan(module(stipple, 'scene.sources').context().library, context.scene, context.view_layer,
+    effects, context = module(stipple, 'scene.view.effects'), bpy.context
+    rows = effects.plan(module(stipple, 'scene.source.sources').context().library, context.scene, context.view_layer,
                         context.evaluated_depsgraph_get(), effects.look_of(context.scene))
     return {row.effect.name: row for row in rows}
 
@@ -30,7 +30,7 @@ def active(stipple):
 
 @pytest.fixture
 def shot(stipple, camera):
-    module(stipple, 'scene.effects').forget()
+    module(stipple, 'scene.view.effects').forget()
     mesh_between(stipple)
     scene = prepare('STIPPLE', transparent=False)
     scene.stipple.zoom_antialiasing = 'OFF'  # these splats are smaller than pixels
@@ -79,7 +79,7 @@ def test_motion_is_found_at_sub_frames(stipple, shot, camera):
 @pytest.mark.parametrize('position, expected', [('START', [10, 10.25, 10.5]), ('CENTER', [9.75, 10, 10.25]),
                                                 ('END', [9.5, 9.75, 10])])
 def test_the_shutter_is_open_when_blender_says(stipple, shot, position, expected):
-    motion = module(stipple, 'scene.motion')
+    motion = module(stipple, 'scene.view.motion')
     owner = shot.render if hasattr(shot.render, 'motion_blur_position') else shot.cycles
     owner.motion_blur_position, shot.render.motion_blur_shutter = position, 0.5
     shot.frame_set(10)
@@ -87,7 +87,7 @@ def test_the_shutter_is_open_when_blender_says(stipple, shot, position, expected
 
 
 def test_lenses_are_blenders(stipple, shot, camera):
-    lenses = module(stipple, 'scene.lenses')
+    lenses = module(stipple, 'scene.view.lenses')
     data = camera.data
     data.type, data.lens = 'PERSP', 50.0
     dof = data.dof
@@ -108,11 +108,11 @@ def test_choices_change_the_picture(stipple, shot, camera, tmp_path):
     """Splats that are red from one side and blue from the other, smaller than pixels."""
     settings = shot.stipple
     front = bpy.data.objects['front']
-    arrays = stipple.scene.splat_data.read(front.data)
+    arrays = stipple.scene.source.splat_data.read(front.data)
     sh = np.zeros((arrays.count, 4, 3), np.float32)
     sh[:, 0], sh[:, 2, 0] = arrays.sh[:, 0], 0.8  # along z
     arrays.sh = sh
-    stipple.scene.splat_data.write(front.data, arrays)
+    stipple.scene.source.splat_data.write(front.data, arrays)
     auto = scenes.render_pixels(tmp_path, 'auto')
     assert 'carry 100.0 % of the change' in plan_of(stipple)['VIEW_COLOUR'].reason
     settings.view_color = 'OFF'
@@ -138,21 +138,21 @@ def crossing(stipple, height=0.2):
     parts = []
     for z, x in ((1.0, -0.5), (-1.0, 0.5)):
         part = splat_wall(stipple, 'part', z, side=1.0)
-        arrays = stipple.scene.splat_data.read(part.data)
+        arrays = stipple.scene.source.splat_data.read(part.data)
         arrays.positions[:, 0] += x
         parts.append(arrays)
         bpy.data.objects.remove(part)
     both = stipple.binding.cloud.SplatArrays(*(np.concatenate([getattr(part, name) for part in parts])
                                                for name in ('positions', 'rotations', 'scales', 'opacities', 'sh')))
-    data = stipple.scene.splat_data.new_data('crossing')
-    stipple.scene.splat_data.write(data, both)
+    data = stipple.scene.source.splat_data.new_data('crossing')
+    stipple.scene.source.splat_data.write(data, both)
     scenes.link(bpy.data.objects.new('crossing', data))
     return wall
 
 
 @pytest.mark.parametrize('engine', ('STIPPLE', 'STIPPLE_CYCLES'))
 def test_objects_are_drawn_as_wholes_without_global_ordering(stipple, camera, tmp_path, engine):
-    module(stipple, 'scene.effects').forget()
+    module(stipple, 'scene.view.effects').forget()
     wall = crossing(stipple)
     scene = prepare(engine)
     settings = scene.stipple
@@ -219,7 +219,7 @@ def test_an_animation_keeps_what_auto_has_switched_on(stipple, camera, tmp_path,
 
 
 def test_costs_are_measured_for_active_effects_alone(stipple, shot):
-    effects = module(stipple, 'scene.effects')
+    effects = module(stipple, 'scene.view.effects')
     bpy.context.view_layer.use_pass_z = True
     assert not any(row.is_measured for row in plan_of(stipple).values())
     assert bpy.ops.stipple.effects_measure() == {'FINISHED'}

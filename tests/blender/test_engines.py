@@ -488,7 +488,7 @@ def test_a_scene_without_meshes_draws_no_depth(stipple, camera, tmp_path, monkey
     def refuse(*_):
         raise AssertionError('depth was drawn')
 
-    monkeypatch.setattr(stipple.scene.mattes, 'surface', refuse)
+    monkeypatch.setattr(stipple.scene.view.mattes, 'surface', refuse)
     assert scenes.render_pixels(tmp_path)[30, 30, 3] > 0.98
 
 
@@ -498,8 +498,8 @@ def test_each_mesh_is_read_once(stipple, camera, tmp_path, monkeypatch):
     for i in range(20):
         copy = scenes.link(bpy.data.objects.new('copy', quad.data))
         copy.location.x = -1 + 0.1 * i
-    read, reader = [], stipple.scene.mattes.read
-    monkeypatch.setattr(stipple.scene.mattes, 'read', lambda obj: read.append(obj.name) or reader(obj))
+    read, reader = [], stipple.scene.view.mattes.read
+    monkeypatch.setattr(stipple.scene.view.mattes, 'read', lambda obj: read.append(obj.name) or reader(obj))
     prepare('STIPPLE')
     scenes.render_pixels(tmp_path)
     assert len(read) == 1

@@ -11,7 +11,7 @@ from test_splat_data import make_arrays
 
 
 def write_ply(stipple, path, arrays):
-    stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), arrays).save(str(path))
+    stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), arrays).save(str(path))
 
 
 def assert_close(a, b):
@@ -31,10 +31,10 @@ def test_round_trip(stipple, tmp_path, degree, text):
     assert bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply')) == {'FINISHED'}
     obj = bpy.context.object
     assert obj.name == 'in' and obj.data.stipple.source_kind == 'CLOUD'
-    assert_close(stipple.scene.splat_data.read(obj.data), arrays)
+    assert_close(stipple.scene.source.splat_data.read(obj.data), arrays)
     assert bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), ascii=text) == {'FINISHED'}
     assert bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'out.ply')) == {'FINISHED'}
-    assert_close(stipple.scene.splat_data.read(bpy.context.object.data), arrays)
+    assert_close(stipple.scene.source.splat_data.read(bpy.context.object.data), arrays)
 
 
 def test_transform_is_applied_on_request(stipple, tmp_path):
@@ -47,7 +47,7 @@ def test_transform_is_applied_on_request(stipple, tmp_path):
     bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'own.ply'), apply_transform=False)
     bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'world.ply'), apply_transform=True, up_axis='Z')
     load = stipple.binding.cloud.Cloud.load
-    native = stipple.scene.sources.context()
+    native = stipple.scene.source.sources.context()
     assert_close(load(native, str(tmp_path / 'own.ply')).read(), arrays)
     world = load(native, str(tmp_path / 'world.ply')).read()
     m = np.array(matrix)
@@ -68,7 +68,7 @@ def test_uneven_and_mirrored_objects_are_applied(stipple, tmp_path, scale):
     bpy.context.object.scale = scale
     bpy.context.view_layer.update()
     assert bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), up_axis='Z') == {'FINISHED'}
-    out = stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(), str(tmp_path / 'out.ply')).read()
+    out = stipple.binding.cloud.Cloud.load(stipple.scene.source.sources.context(), str(tmp_path / 'out.ply')).read()
     m = np.diag(scale).astype(float)
     for i in range(len(arrays.positions)):
         expected = m @ covariance(arrays, i) @ m.T
@@ -102,11 +102,11 @@ def test_up_axis_turns_the_object_only(stipple, tmp_path, axis, up):
     bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'), up_axis=axis)
     obj = bpy.context.object
     np.testing.assert_allclose(np.array(obj.matrix_world)[:3, :3] @ up, (0, 0, 1), atol=1e-6)
-    np.testing.assert_array_equal(stipple.scene.splat_data.read(obj.data).positions, arrays.positions)
+    np.testing.assert_array_equal(stipple.scene.source.splat_data.read(obj.data).positions, arrays.positions)
 
 
 def load(stipple, path):
-    return stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(), str(path)).read()
+    return stipple.binding.cloud.Cloud.load(stipple.scene.source.sources.context(), str(path)).read()
 
 
 @pytest.mark.parametrize('frame, up', [('UNKNOWN', (0, -1, 0)), ('RDF', (0, -1, 0)), ('RUB', (0, 1, 0)),
@@ -114,13 +114,13 @@ def load(stipple, path):
 def test_the_files_frame_decides_by_default(stipple, tmp_path, frame, up):
     arrays = make_arrays(stipple, degree=1)
     arrays.frame = stipple.binding.structs.Frame[frame]
-    stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), arrays).save(str(tmp_path / 'in.ply'),
+    stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), arrays).save(str(tmp_path / 'in.ply'),
                                                                                     frame=arrays.frame)
     bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
     obj = bpy.context.object
     np.testing.assert_allclose(np.array(obj.matrix_world)[:3, :3] @ up, (0, 0, 1), atol=1e-6)
-    assert_close(stipple.scene.splat_data.read(obj.data), arrays)
-    assert stipple.scene.splat_data.read(obj.data).frame == arrays.frame
+    assert_close(stipple.scene.source.splat_data.read(obj.data), arrays)
+    assert stipple.scene.source.splat_data.read(obj.data).frame == arrays.frame
 
 
 def test_an_export_in_the_formats_frame_comes_back_to_its_place(stipple, tmp_path):
@@ -137,7 +137,7 @@ def test_an_export_in_the_formats_frame_comes_back_to_its_place(stipple, tmp_pat
 
         def world(o):
             m = np.array(o.matrix_world)
-            return stipple.scene.splat_data.read(o.data).positions @ m[:3, :3].T + m[:3, 3]
+            return stipple.scene.source.splat_data.read(o.data).positions @ m[:3, :3].T + m[:3, 3]
         np.testing.assert_allclose(world(back), world(obj), atol=1e-5)
 
 
@@ -199,8 +199,8 @@ def test_export_of_a_selection_a_collection_and_all_that_is_visible(stipple, tmp
     a.matrix_world = c.matrix_world @ Matrix.Translation((0, 0, 5))
     scenes.select(c, a)
     both = exported(apply_transform=False)
-    np.testing.assert_array_equal(both.positions[:30], stipple.scene.splat_data.read(c.data).positions)
-    np.testing.assert_allclose(both.positions[30:], stipple.scene.splat_data.read(a.data).positions + (0, 0, 5), atol=1e-5)
+    np.testing.assert_array_equal(both.positions[:30], stipple.scene.source.splat_data.read(c.data).positions)
+    np.testing.assert_allclose(both.positions[30:], stipple.scene.source.splat_data.read(a.data).positions + (0, 0, 5), atol=1e-5)
 
 
 def test_budgets_of_an_export(stipple, tmp_path):
@@ -214,7 +214,7 @@ def test_budgets_of_an_export(stipple, tmp_path):
 def test_the_size_is_estimated_well(stipple, tmp_path):
     write_ply(stipple, tmp_path / 'in.ply', make_arrays(stipple, count=20000, degree=3))
     bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
-    exporting, formats = stipple.scene.exporting, stipple.scene.formats
+    exporting, formats = stipple.scene.source.exporting, stipple.scene.source.formats
     form = formats.of_path('x.ply')
     for degree in (0, 1, 3):
         bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), max_degree=degree)
@@ -227,7 +227,7 @@ def test_the_size_is_estimated_well(stipple, tmp_path):
 
 
 def test_dialogs_and_file_handlers_know_the_formats_of_the_library(stipple):
-    formats = stipple.scene.formats
+    formats = stipple.scene.source.formats
     known = formats.all_formats()
     assert sorted(formats.READ_ENDINGS) == sorted(e for f in known if f.can_read for e in f.endings)
     assert sorted(formats.WRITE_ENDINGS) == sorted(e for f in known if f.can_write for e in f.endings)

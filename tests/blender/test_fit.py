@@ -16,7 +16,7 @@ import scenes
 
 @pytest.fixture
 def fitting(stipple):
-    return importlib.import_module('.scene.fitting', stipple.__name__)
+    return importlib.import_module('.scene.fit.fitting', stipple.__name__)
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_a_ball_is_fitted_and_gets_a_budget(stipple, ball, fitting, tmp_path):
     assert obj.name == 'Sphere Fit' and 100 <= count <= 2000
     assert obj.data.stipple.source_kind == 'TREE' and obj.data.stipple.source.startswith('//')
     assert not ball.hide_render  # nothing is replaced
-    splats = stipple.scene.splat_data.read(obj.data)
+    splats = stipple.scene.source.splat_data.read(obj.data)
     # Nine of ten splats lie about the surface, by their opacity.
     distance = np.abs(np.linalg.norm(splats.positions, axis=1) - 1)
     weight = splats.opacities / splats.opacities.sum()
@@ -57,7 +57,7 @@ def test_a_ball_is_fitted_and_gets_a_budget(stipple, ball, fitting, tmp_path):
     assert report and (tmp_path / 'report.svg').exists()
     with_budget = obj.data.stipple
     with_budget.ratio = 0.25
-    assert stipple.scene.splat_data.count(obj.data) == round(0.25 * count)
+    assert stipple.scene.source.splat_data.count(obj.data) == round(0.25 * count)
 
 
 def test_the_report_is_an_image_that_the_file_keeps(stipple, ball, tmp_path):
@@ -84,11 +84,11 @@ def test_the_report_is_an_image_that_the_file_keeps(stipple, ball, tmp_path):
 
 def test_the_same_fit_twice_gives_the_same_splats(stipple, ball, tmp_path):
     settings(view_count=4, view_size=32)
-    first = stipple.scene.splat_data.read(fitted().data)
+    first = stipple.scene.source.splat_data.read(fitted().data)
     for obj in [o for o in bpy.data.objects if o.name.endswith(' Fit')]:
         bpy.data.objects.remove(obj)
     scenes.select(ball)
-    again = stipple.scene.splat_data.read(fitted().data)
+    again = stipple.scene.source.splat_data.read(fitted().data)
     assert np.array_equal(first.positions, again.positions) and np.array_equal(first.sh, again.sh)
 
 
@@ -99,17 +99,17 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     splats_each = data.learned_gaussians
     assert data.source_kind == 'MODEL' and splats_each >= 4 and data.learned_least < data.learned_most == data.anchors
     assert data.anchors == 10_000 // splats_each
-    assert stipple.scene.splat_data.count(obj.data) == data.anchors * splats_each
+    assert stipple.scene.source.splat_data.count(obj.data) == data.anchors * splats_each
     for anchors in (200, 700):
         data.anchors = anchors
-        assert stipple.scene.splat_data.count(obj.data) == anchors * splats_each
+        assert stipple.scene.source.splat_data.count(obj.data) == anchors * splats_each
     # Splats per anchor are learned: nothing refuses whatever the setting of other models says.
     for chosen in (1, 5, splats_each):
         data.gaussians_per_anchor = chosen
         data.order = 'PROGRESSIVE' if chosen == 5 else 'SYSTEMATIC'
         data.seed = chosen
-        assert stipple.scene.splat_data.count(obj.data) == 700 * splats_each and not stipple.scene.sync.problems
-        assert stipple.scene.sources.count_of(obj.data, 'RENDER') == 700 * splats_each
+        assert stipple.scene.source.splat_data.count(obj.data) == 700 * splats_each and not stipple.scene.source.sync.problems
+        assert stipple.scene.source.sources.count_of(obj.data, 'RENDER') == 700 * splats_each
     scenes.select(obj)
     scenes.refuses(bpy.ops.stipple.delete_floaters, 'decoded from a learned field')
     path = bpy.path.abspath(data.source)
@@ -118,7 +118,7 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     scenes.select(obj)
     assert bpy.ops.stipple.relink(filepath=moved) == {'FINISHED'} and 'moved' in data.source
     data.anchors = 300
-    assert stipple.scene.splat_data.count(obj.data) == 300 * splats_each
+    assert stipple.scene.source.splat_data.count(obj.data) == 300 * splats_each
     assert bpy.ops.stipple.use_as_new_source() == {'FINISHED'}
     assert data.source_kind == 'CLOUD' and data.learned_gaussians == data.learned_most == 0
 
@@ -134,7 +134,7 @@ def test_a_field_has_a_shell_for_what_is_far_away(stipple, ball, chosen, least, 
         ball.data.flip_normals()
     settings(model='FIELD', view_count=4, view_size=32, max_splats=400, **chosen)
     # Not the very farthest, which chance has a part in.
-    farthest = np.quantile(np.abs(stipple.scene.splat_data.read(fitted().data).positions).max(axis=1), 0.99)
+    farthest = np.quantile(np.abs(stipple.scene.source.splat_data.read(fitted().data).positions).max(axis=1), 0.99)
     # The ball has a radius of 1, which a tenth is added to; Gaussians stand around their anchors.
     assert least < farthest < most
 
@@ -143,14 +143,14 @@ def test_a_field_has_a_shell_for_what_is_far_away(stipple, ball, chosen, least, 
 def test_an_asset_file_is_imported_with_its_budgets(stipple, ball, model):
     settings(model=model, view_count=4, view_size=32)
     obj = fitted()
-    fitted_splats = stipple.scene.splat_data.read(obj.data)
+    fitted_splats = stipple.scene.source.splat_data.read(obj.data)
     path = bpy.path.abspath(obj.data.stipple.source)
     assert bpy.ops.stipple.splats_import(filepath=path) == {'FINISHED'}
     imported = bpy.context.object
     assert imported != obj and imported.name.startswith('Sphere Fit') and 'stipple' not in imported.name
     data = imported.data.stipple
     assert data.source_kind == obj.data.stipple.source_kind and data.learned_most == obj.data.stipple.learned_most
-    splats = stipple.scene.splat_data.read(imported.data)
+    splats = stipple.scene.source.splat_data.read(imported.data)
     assert np.array_equal(splats.positions, fitted_splats.positions)
     assert np.allclose(imported.matrix_world, obj.matrix_world)
     before = splats.count
@@ -158,7 +158,7 @@ def test_an_asset_file_is_imported_with_its_budgets(stipple, ball, model):
         data.anchors //= 2
     else:
         data.ratio = 0.5
-    assert stipple.scene.splat_data.count(imported.data) == before // 2
+    assert stipple.scene.source.splat_data.count(imported.data) == before // 2
 
 
 def test_scene_cameras_serve_as_views(stipple, ball):
@@ -166,16 +166,16 @@ def test_scene_cameras_serve_as_views(stipple, ball):
         angle = i * 1.2566
         scenes.camera(location=(4 * np.sin(angle), -4 * np.cos(angle), 0), rotation=(np.pi / 2, 0, angle))
     settings(views_from='CAMERAS', view_size=32)
-    assert stipple.scene.splat_data.count(fitted().data) > 0
+    assert stipple.scene.source.splat_data.count(fitted().data) > 0
 
 
 @pytest.mark.parametrize('up_axis,up', [('AUTO', (0, 0, 1)), ('-Y', (0, -1, 0))])
 def test_photographs_are_fitted_where_their_cameras_stand(stipple, ball, tmp_path, up_axis, up):
     name = stipple.__name__
-    capture = importlib.import_module('.scene.view_capture', name)
+    capture = importlib.import_module('.scene.fit.view_capture', name)
     ball.location.z = 0.5
     bpy.context.view_layer.update()
-    photo_set.write(importlib.import_module('.scene.view_rigs', name), capture, ball, tmp_path / 'photos', 12,
+    photo_set.write(importlib.import_module('.scene.fit.view_rigs', name), capture, ball, tmp_path / 'photos', 12,
                     capture.CaptureSettings('WORKBENCH', 48))
     bpy.data.objects.remove(ball)
     settings(views_from='DATASET', dataset=str(tmp_path / 'photos'), up_axis=up_axis)
@@ -184,7 +184,7 @@ def test_photographs_are_fitted_where_their_cameras_stand(stipple, ball, tmp_pat
     assert obj.name == 'photos Fit' and obj.hide_get() is False
     bpy.context.view_layer.update()
     # Half a metre up in the data set's world, wherever that points.
-    centre = obj.matrix_world @ Vector(np.median(stipple.scene.splat_data.read(obj.data).positions, axis=0).tolist())
+    centre = obj.matrix_world @ Vector(np.median(stipple.scene.source.splat_data.read(obj.data).positions, axis=0).tolist())
     assert (centre - 0.5 * (obj.matrix_world @ Vector((0, 0, 1)))).length < 0.2
     assert (obj.matrix_world @ Vector(up) - Vector((0, 0, 1))).length < 1e-5
     cameras = [other for other in bpy.data.objects if other.type == 'CAMERA']
@@ -222,7 +222,7 @@ def test_a_cancel_while_it_fits_keeps_the_best(ball, fitting):
 @pytest.mark.parametrize('model', ('EXPLICIT', 'FIELD'))
 def test_a_stopped_fit_goes_on_from_its_checkpoint(stipple, ball, fitting, tmp_path, model):
     few = settings(model=model, view_count=6, view_size=32, max_splats=400)
-    read = stipple.scene.splat_data.read
+    read = stipple.scene.source.splat_data.read
     whole = read(fitted().data)
     bpy.data.objects.remove(bpy.data.objects['Sphere Fit'])
     few.checkpoint = str(tmp_path / 'c.safetensors')
@@ -286,9 +286,9 @@ def test_messages(ball, stipple):
 
 
 def test_strategies_and_parts_are_those_of_the_library(stipple, ball, fitting):
-    strategies = importlib.import_module('.scene.strategies', stipple.__name__)
+    strategies = importlib.import_module('.scene.fit.strategies', stipple.__name__)
     native = importlib.import_module('.binding.strategies', stipple.__name__)
-    library = stipple.scene.sources.context().library
+    library = stipple.scene.source.sources.context().library
     assert [item[0] for item in strategies.part_items()] == [entry.name for entry in native.strategy_parts(library)]
     names = [item[0] for item in strategies.strategy_items()]
     assert names[:2] == ['by_quality', 'adaptive'] and 'learned_density' not in names

@@ -10,7 +10,7 @@ import scenes
 
 
 def positions(stipple, obj):
-    return stipple.scene.splat_data.read(obj.data).positions
+    return stipple.scene.source.splat_data.read(obj.data).positions
 
 
 def test_makes_exactly_the_budget_on_the_surface(stipple):
@@ -24,7 +24,7 @@ def test_makes_exactly_the_budget_on_the_surface(stipple):
 
 def test_gaussians_per_anchor_multiply(stipple):
     obj = scenes.make_splats(scenes.quad(), anchors=500, gaussians_per_anchor=3)
-    assert stipple.scene.splat_data.count(obj.data) == 1500
+    assert stipple.scene.source.splat_data.count(obj.data) == 1500
 
 
 def test_many_objects_materials_modifiers_and_instances_become_one_object(stipple):

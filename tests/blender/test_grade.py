@@ -29,7 +29,7 @@ def splats(tmp_path):
 
 def colours(stipple, obj):
     """(display colours [N,3], opacities [N]) as the attributes show them."""
-    arrays = stipple.scene.splat_data.read(obj.data)
+    arrays = stipple.scene.source.splat_data.read(obj.data)
     return arrays.sh[:, 0] * C0 + 0.5, arrays.opacities
 
 
@@ -57,7 +57,7 @@ def test_attributes_carry_the_grade_and_lose_it_again(splats, stipple):
     after, opacity_after = colours(stipple, splats)
     np.testing.assert_array_equal(after, before)
     np.testing.assert_array_equal(opacity_after, opacity)
-    assert not settings.edited and not stipple.scene.sync.is_edited(splats.data)
+    assert not settings.edited and not stipple.scene.source.sync.is_edited(splats.data)
     assert [a.name for a in splats.data.attributes if a.name.startswith('ungraded')] == []
 
 
@@ -97,10 +97,10 @@ def test_edited_splats_take_a_grade_and_stay_edited(splats, stipple):
         splats.data.vertices[0].co.x += 0.5
     else:
         splats.data.attributes['position'].data[0].vector[0] += 0.5
-    assert stipple.scene.sync.is_edited(splats.data)
+    assert stipple.scene.source.sync.is_edited(splats.data)
     splats.data.stipple.exposure = 1.0
     np.testing.assert_allclose(colours(stipple, splats)[0], brighter(before, 1.0), atol=1e-6)
-    assert stipple.scene.sync.is_edited(splats.data)
+    assert stipple.scene.source.sync.is_edited(splats.data)
     splats.data.stipple.anchors = 300  # refused: it would drop the edit
     assert splats.data.stipple.edited
     splats.data.stipple.exposure = 0.0
@@ -113,7 +113,7 @@ def test_colours_painted_over_a_grade_are_not_lost(splats, stipple):
     field = stipple.version.ATTRIBUTE_FIELDS[splats.data.attributes['radiance:base'].data_type]
     setattr(base[0], field, (0.3, 0.2, 0.1, 0.5))
     splats.data.stipple.exposure = 2.0
-    assert 'edited by hand under a grade' in stipple.scene.sync.problems[splats.data.name]
+    assert 'edited by hand under a grade' in stipple.scene.source.sync.problems[splats.data.name]
     painted, _ = colours(stipple, splats)
     np.testing.assert_allclose(painted[0], np.array((0.3, 0.2, 0.1)) * C0 + 0.5, atol=1e-6)
     scenes.select(splats)
@@ -132,7 +132,7 @@ def test_export_bakes_the_grade_by_choice(splats, stipple, tmp_path):
             path = str(tmp_path / f'{budget}{apply_grade}.ply')
             scenes.select(splats)
             bpy.ops.stipple.splats_export(filepath=path, budget=budget, apply_grade=apply_grade)
-            written = Cloud.load(stipple.scene.sources.context(), path).read()
+            written = Cloud.load(stipple.scene.source.sources.context(), path).read()
             expected = brighter(before, 1.0) if apply_grade else before
             np.testing.assert_allclose(written.sh[:, 0] * C0 + 0.5, expected, atol=2e-6)
             # PLY stores logits.
@@ -165,7 +165,7 @@ def test_undo_takes_the_grade_back(splats, stipple):
     splats.data.stipple.exposure = 1.0
     bpy.ops.ed.undo_push(message='grade')
     bpy.ops.ed.undo()
-    obj = next(o for o in bpy.data.objects if stipple.scene.splat_data.is_splat_object(o))
+    obj = next(o for o in bpy.data.objects if stipple.scene.source.splat_data.is_splat_object(o))
     assert obj.data.stipple.exposure == 0.0
     np.testing.assert_array_equal(colours(stipple, obj)[0], before)
 
@@ -224,8 +224,8 @@ import bpy, sys
 bpy.ops.preferences.addon_enable(module='stipple')
 package = sys.modules['stipple']
 def stored(scene, *_):
-    obj = next(o for o in bpy.data.objects if package.scene.splat_data.is_splat_object(o))
-    red = package.scene.splat_data.read(obj.data).sh[0, 0, 0] * 0.28209479177387814 + 0.5
+    obj = next(o for o in bpy.data.objects if package.scene.source.splat_data.is_splat_object(o))
+    red = package.scene.source.splat_data.read(obj.data).sh[0, 0, 0] * 0.28209479177387814 + 0.5
     print('RED', float(red), flush=True)
 bpy.app.handlers.render_post.append(stored)
 '''

@@ -19,7 +19,7 @@ bpy.ops.mesh.primitive_cube_add()
 assert bpy.ops.stipple.splats_from_mesh(anchors=300) == {'FINISHED'}
 module = next(m for m in bpy.context.preferences.addons.keys() if m.rpartition('.')[2] == 'stipple')
 package = sys.modules[module]
-print('INSTALLED', module, package.scene.splat_data.count(bpy.context.object.data),
+print('INSTALLED', module, package.scene.source.splat_data.count(bpy.context.object.data),
       package.binding.library.find().parent.name, flush=True)
 '''
 

@@ -45,8 +45,8 @@ def large_cloud(stipple, count=40000):
         random.uniform(-0.5, 0.5, (count, 3)).astype(np.float32), np.tile(np.float32([1, 0, 0, 0]), (count, 1)),
         np.full((count, 3), 0.01, np.float32), np.full(count, 0.5, np.float32),
         random.uniform(-0.2, 0.2, (count, 16, 3)).astype(np.float32))
-    data = stipple.scene.splat_data.new_data('large')
-    stipple.scene.splat_data.write(data, arrays)
+    data = stipple.scene.source.splat_data.new_data('large')
+    stipple.scene.source.splat_data.write(data, arrays)
     return scenes.link(bpy.data.objects.new('large', data)), count * 59 * 4
 
 
@@ -64,8 +64,8 @@ def test_objects_are_sorted_together(stipple, camera, tmp_path, engine):
     def add(name, chosen):
         arrays = stipple.binding.cloud.SplatArrays(both.positions[chosen], both.rotations[chosen], both.scales[chosen],
                                                    both.opacities[chosen], both.sh[chosen])
-        data = stipple.scene.splat_data.new_data(name)
-        stipple.scene.splat_data.write(data, arrays)
+        data = stipple.scene.source.splat_data.new_data(name)
+        stipple.scene.source.splat_data.write(data, arrays)
         return scenes.link(bpy.data.objects.new(name, data))
 
     prepare(engine)
@@ -105,7 +105,7 @@ def test_instances_of_geometry_nodes_render(stipple, camera, tmp_path, engine, a
     assert (alpha[30, [10, 30, 50]] > 0.9).all() and (alpha[30, [20, 40]] == 0).all()
     gathered = stipple.scene.instances.gather(bpy.context.evaluated_depsgraph_get(), 'RENDER')
     assert [placed[0].info().count for placed in gathered] == [4000] * 3
-    viewed = stipple.scene.viewed.gather(bpy.context.evaluated_depsgraph_get())
+    viewed = stipple.scene.view.viewed.gather(bpy.context.evaluated_depsgraph_get())
     assert [(entry.owner, entry.obj) for entry in viewed.splats] == [(points, obj)] * 3
 
 
@@ -152,8 +152,8 @@ def test_a_picture_of_200_instances_holds_no_copies(stipple, camera):
     bpy.context.scene.camera.location.z = 30
     depsgraph = bpy.context.evaluated_depsgraph_get()
     many = stipple.scene.instances.gather(depsgraph, 'RENDER')
-    view = stipple.scene.cameras.camera_of(bpy.context.scene.camera, bpy.context.scene.render, None)
-    renderer = stipple.binding.renderer.Renderer(stipple.scene.sources.context())
+    view = stipple.scene.view.cameras.camera_of(bpy.context.scene.camera, bpy.context.scene.render, None)
+    renderer = stipple.binding.renderer.Renderer(stipple.scene.source.sources.context())
     bound = renderer.memory_bound(many, view)
     assert bound < 200 * 4000 * 112 + (64 << 20)
 

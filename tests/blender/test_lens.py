@@ -27,8 +27,8 @@ def splat_ball(stipple, radius=RADIUS, colour=MESH, count=6000):
         (0.95 * radius * normals).astype(np.float32), rotations.astype(np.float32),
         np.tile(np.float32([size, size, size / 20]), (count, 1)), np.full(count, 0.98, np.float32),
         np.tile(((display - 0.5) / 0.28209479177387814).astype(np.float32), (count, 1))[:, None, :])
-    data = stipple.scene.splat_data.new_data('ball')
-    stipple.scene.splat_data.write(data, arrays)
+    data = stipple.scene.source.splat_data.new_data('ball')
+    stipple.scene.source.splat_data.write(data, arrays)
     return scenes.link(bpy.data.objects.new('ball', data))
 
 

@@ -23,7 +23,7 @@ def pair(tmp_path):
 
 def counts(stipple, objects):
     bpy.context.view_layer.update()
-    return [stipple.scene.splat_data.count(obj.data) for obj in objects]
+    return [stipple.scene.source.splat_data.count(obj.data) for obj in objects]
 
 
 def simplify(most=0, most_render=0, on=True):
@@ -129,13 +129,13 @@ def test_every_engine_follows_the_limit(stipple, pair, tmp_path, engine, monkeyp
     scene.render.engine = engine
     scene.cycles.samples, scene.cycles.use_denoising = 1, False
     seen = []
-    decode = stipple.scene.sources.decode
-    monkeypatch.setattr(stipple.scene.sources, 'decode',
+    decode = stipple.scene.source.sources.decode
+    monkeypatch.setattr(stipple.scene.source.sources, 'decode',
                         lambda data, settings: seen.append(settings.anchors) or decode(data, settings))
 
     def note(*_):
         if engine == 'CYCLES':  # it draws what is stored
-            seen.extend(stipple.scene.splat_data.count(obj.data) for obj in pair)
+            seen.extend(stipple.scene.source.splat_data.count(obj.data) for obj in pair)
 
     bpy.app.handlers.render_post.append(note)
     try:

@@ -15,7 +15,7 @@ Y00 = 0.28209479177387814
 
 @pytest.fixture
 def overlays(stipple):
-    importlib.import_module(f'{stipple.__name__}.scene.viewed')._forget()
+    importlib.import_module(f'{stipple.__name__}.scene.view.viewed')._forget()
     return importlib.import_module(f'{stipple.__name__}.scene.overlays')
 
 
@@ -30,8 +30,8 @@ def splats(stipple, name='Splats', count=4, location=(0, 0, 0), seen=None):
     arrays = stipple.binding.cloud.SplatArrays(
         positions, np.tile(np.float32([1, 0, 0, 0]), (count, 1)), sizes, np.full(count, 0.7, np.float32),
         np.zeros((count, 4, 3), np.float32), seen=seen or {})
-    data = stipple.scene.splat_data.new_data(name)
-    stipple.scene.splat_data.write(data, arrays)
+    data = stipple.scene.source.splat_data.new_data(name)
+    stipple.scene.source.splat_data.write(data, arrays)
     obj = scenes.link(bpy.data.objects.new(name, data))
     obj.location = location
     return obj
@@ -84,7 +84,7 @@ def test_the_drawn_cloud_has_the_colors_and_the_shapes(overlays, stipple):
     assert overlay.scale == overlays.Scale('AGE', 0.0, 40.0)
     cloud, info = overlay.cloud_of(entries['Splats'], depsgraph)
     assert info.count == 4 and info.sh_degree == 0
-    made, own = cloud.read(), stipple.scene.splat_data.read(obj.data)
+    made, own = cloud.read(), stipple.scene.source.splat_data.read(obj.data)
     np.testing.assert_array_equal(made.scales, own.scales)
     np.testing.assert_array_equal(made.opacities, own.opacities)
     expected = overlays.map_colours(np.array([0, 0.25, 0.5, 1]))
@@ -141,8 +141,8 @@ def test_values_follow_splats_through_a_fit_a_grade_and_density_control(overlays
         setattr(chosen, name, value)
     assert bpy.ops.stipple.splats_fit() == {'FINISHED'}
     obj = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
-    read_seen, quantity = stipple.scene.splat_data.read_seen, kinds(stipple)
-    count = stipple.scene.splat_data.count(obj.data)
+    read_seen, quantity = stipple.scene.source.splat_data.read_seen, kinds(stipple)
+    count = stipple.scene.source.splat_data.count(obj.data)
     for kind in (quantity.SCORE, quantity.AGE, quantity.CONTRIBUTION):
         values = read_seen(obj.data, kind)
         assert values.shape == (count,) and np.isfinite(values).all() and (values >= 0).all()
@@ -166,5 +166,5 @@ def test_values_follow_splats_through_a_fit_a_grade_and_density_control(overlays
 
 
 def test_a_legend_says_what_the_colors_mean(stipple):
-    legend = importlib.import_module(f'{stipple.__name__}.view_legend')
+    legend = importlib.import_module(f'{stipple.__name__}.viewport.view_legend')
     assert [legend.number(v) for v in (0, 3000, 12345.6, 0.012345, 7.0)] == ['0', '3,000', '12,346', '0.0123', '7']

@@ -18,7 +18,7 @@ MATRIX = [[0.8, -0.36, 0.48, 3.0], [0.6, 0.48, -0.64, -2.0], [0.0, 0.8, 0.6, 1.0
 def write_picture(stipple, path, value=0.25):
     path.parent.mkdir(exist_ok=True)
     image = importlib.import_module(f'{stipple.__name__}.binding.image').Image
-    image.create(stipple.scene.sources.context(), np.full((HEIGHT, WIDTH, 3), value, np.float32),
+    image.create(stipple.scene.source.sources.context(), np.full((HEIGHT, WIDTH, 3), value, np.float32),
                  stipple.binding.structs.Transfer.SRGB).save(str(path))
 
 
@@ -50,9 +50,9 @@ def test_cameras_see_what_the_data_set_says(stipple, tmp_path):
     assert scene.camera == collection.objects[0]
     assert (scene.render.resolution_x, scene.render.resolution_y) == (WIDTH, HEIGHT)
     bpy.context.view_layer.update()
-    views = stipple.binding.views.Views.load(stipple.scene.sources.context(), str(tmp_path))
+    views = stipple.binding.views.Views.load(stipple.scene.source.sources.context(), str(tmp_path))
     for i, obj in enumerate(collection.objects):
-        ours = stipple.scene.cameras.camera_of(obj, scene.render)
+        ours = stipple.scene.view.cameras.camera_of(obj, scene.render)
         # Blender keeps lens and matrix in single floats.
         np.testing.assert_allclose(project(ours, POINTS), project(views.camera(i), POINTS), atol=TOLERANCE, rtol=TOLERANCE)
         [background] = obj.data.background_images

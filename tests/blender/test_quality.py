@@ -27,8 +27,8 @@ def module(stipple, name):
 
 
 def test_the_settings_a_file_starts_with_are_those_of_final(stipple, walls):
-    quality = module(stipple, 'scene.quality')
-    library = module(stipple, 'scene.sources').context().library
+    quality = module(stipple, 'scene.view.quality')
+    library = module(stipple, 'scene.source.sources').context().library
     for settings in (walls.quality_render, walls.quality_viewport):
         assert settings.level == 'FINAL' and not quality.is_changed(library, settings)
     made = quality.accuracy_of(library, walls.quality_render)
@@ -36,8 +36,8 @@ def test_the_settings_a_file_starts_with_are_those_of_final(stipple, walls):
 
 
 def test_a_level_sets_every_setting(stipple, walls):
-    quality = module(stipple, 'scene.quality')
-    library = module(stipple, 'scene.sources').context().library
+    quality = module(stipple, 'scene.view.quality')
+    library = module(stipple, 'scene.source.sources').context().library
     walls.quality_render.level = 'DRAFT'
     assert walls.quality_render.budget_share < 1 and walls.quality_render.sh_degree_limit < 4
     walls.quality_render.order = 'PIXEL'
@@ -73,7 +73,7 @@ def test_settings_that_do_not_go_together_are_one_error(walls, tmp_path):
 
 
 def test_measuring_choosing_and_comparing(stipple, walls, tmp_path):
-    scene, measured = bpy.context.scene, module(stipple, 'scene.measured_quality')
+    scene, measured = bpy.context.scene, module(stipple, 'scene.view.measured_quality')
     assert not bpy.ops.stipple.accuracy_choose.poll()
     report = tmp_path / 'report.json'
     assert bpy.ops.stipple.accuracy_measure(repetitions=1, filepath=str(report)) == {'FINISHED'}
@@ -125,7 +125,7 @@ def test_measuring_without_splats_is_one_error(stipple, camera):
 def test_the_view_obeys_its_own_level(stipple, walls):
     """A resting picture as the viewport's column has it; a turning one is never slow."""
     view_picture = module(stipple, 'view_picture')
-    facts = module(stipple, 'scene.facts')
+    facts = module(stipple, 'scene.view.facts')
     from test_viewport import made_pictures
     whole = facts.Border(0, 0, 60, 60)
     final = made_pictures(view_picture, None, whole)

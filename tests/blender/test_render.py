@@ -124,11 +124,11 @@ def test_render_budget_is_used_and_nothing_is_written(square, tmp_path, stipple,
     monkeypatch.setattr(stipple.binding.model.Model, 'decode',
                         lambda self, settings: asked.append(settings.anchors) or decode(self, settings))
     square.data.stipple.anchors_render = 30000
-    before = stipple.scene.splat_data.fingerprint(square.data)
+    before = stipple.scene.source.splat_data.fingerprint(square.data)
     scenes.render_pixels(tmp_path)
     assert asked == [30000]
-    assert stipple.scene.splat_data.count(square.data) == 20000
-    assert stipple.scene.splat_data.fingerprint(square.data) == before
+    assert stipple.scene.source.splat_data.count(square.data) == 20000
+    assert stipple.scene.source.splat_data.fingerprint(square.data) == before
     scenes.render_pixels(tmp_path)
     assert asked == [30000]  # kept from the first picture
 
@@ -158,8 +158,8 @@ def test_scene_linear_and_as_trained_differ_only_where_splats_mix(stipple, tmp_p
         np.array([[0, 0, 1], [0, 0, 0]], np.float32), np.array([[1, 0, 0, 0]] * 2, np.float32),
         np.full((2, 3), 0.5, np.float32), np.array([0.5, 0.99], np.float32),
         np.array([[[0.5 / dc] * 3], [[-0.5 / dc] * 3]], np.float32))
-    data = stipple.scene.splat_data.new_data('two')
-    stipple.scene.splat_data.write(data, arrays)
+    data = stipple.scene.source.splat_data.new_data('two')
+    stipple.scene.source.splat_data.write(data, arrays)
     scenes.link(bpy.data.objects.new('two', data))
     scenes.camera((0, 0, 6), width=101, height=101, type='ORTHO', ortho_scale=4.0)
     scene = bpy.context.scene
@@ -177,9 +177,9 @@ def test_scene_linear_and_as_trained_differ_only_where_splats_mix(stipple, tmp_p
 def test_standard_view_is_offered_and_set(stipple):
     scene = bpy.context.scene
     scene.view_settings.view_transform = 'Filmic' if bpy.app.version < (4, 0, 0) else 'AgX'
-    assert not stipple.scene.facts.uses_standard_view(scene)
+    assert not stipple.scene.view.facts.uses_standard_view(scene)
     assert bpy.ops.stipple.use_standard_view() == {'FINISHED'}
-    assert stipple.scene.facts.uses_standard_view(scene)
+    assert stipple.scene.view.facts.uses_standard_view(scene)
 
 
 def test_cancel_half_way_leaves_no_damage(square, tmp_path, stipple, monkeypatch):
@@ -196,12 +196,12 @@ def test_cancel_half_way_leaves_no_damage(square, tmp_path, stipple, monkeypatch
     monkeypatch.setattr(stipple.engine.STIPPLE_RE_engine, '_cancelled', cancelled)
     scene = bpy.context.scene
     scene.render.resolution_percentage = 5000
-    before = stipple.scene.splat_data.fingerprint(square.data)
+    before = stipple.scene.source.splat_data.fingerprint(square.data)
     bpy.ops.render.render()
     assert len(looks) > 1
     monkeypatch.setattr(stipple.engine.STIPPLE_RE_engine, '_cancelled', kept)
     scene.render.resolution_percentage = 100
-    assert stipple.scene.splat_data.fingerprint(square.data) == before
+    assert stipple.scene.source.splat_data.fingerprint(square.data) == before
     np.testing.assert_array_equal(scenes.render_pixels(tmp_path, 'after'), reference)
 
 

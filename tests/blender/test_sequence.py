@@ -96,7 +96,7 @@ def test_timing_is_that_of_blenders_own_volumes(stipple, swarm, mode, start, off
     """Volume.grids.frame is what Blender itself computes from properties of the same names."""
     if mode == 'PING_PONG' and duration == 1:
         swarm.data.stipple.frame_duration, swarm.data.stipple.sequence_mode = 1, mode
-        assert stipple.scene.sequences.local_frame(swarm.data.stipple, 7) == 1
+        assert stipple.scene.sequence.sequences.local_frame(swarm.data.stipple, 7) == 1
         return  # Blender divides by zero here
     settings = swarm.data.stipple
     volume = bpy.data.volumes.new('volume')
@@ -112,7 +112,7 @@ def test_timing_is_that_of_blenders_own_volumes(stipple, swarm, mode, start, off
         depsgraph = bpy.context.evaluated_depsgraph_get()
         grids = obj.evaluated_get(depsgraph).data.grids
         grids.load()
-        local = stipple.scene.sequences.local_frame(settings, frame)
+        local = stipple.scene.sequence.sequences.local_frame(settings, frame)
         assert (nothing if local is None else local + offset) == grids.frame, frame
 
 
@@ -170,7 +170,7 @@ def test_several_objects_share_files(stipple, swarm, folder):
     twin = scenes.link(bpy.data.objects.new('twin', swarm.data))
     bpy.context.scene.frame_set(6)
     assert (series.centre(stipple, swarm), series.centre(stipple, twin), series.centre(stipple, other)) == (5, 5, 3)
-    read = [key[0] for key in stipple.scene.sequences._entries]
+    read = [key[0] for key in stipple.scene.sequence.sequences._entries]
     assert len(read) == len(set(read))
 
 
@@ -188,7 +188,7 @@ def test_linked_series_follow_frames(stipple, swarm, tmp_path):
 
 def test_budget_by_ratio_and_count_in_each_frame(stipple, swarm):
     settings = swarm.data.stipple
-    count = stipple.scene.splat_data.count
+    count = stipple.scene.source.splat_data.count
     settings.ratio = 0.25
     assert shown(stipple, swarm, (1, 5)) == [1, 5] and count(swarm.data) == series.COUNT // 4
     settings.anchors, settings.budget_by = 7, 'COUNT'
@@ -204,8 +204,8 @@ def test_a_plain_budget_keeps_the_same_splats_in_every_frame(stipple, swarm, fol
     kept = []
     for frame in (1, 8):
         bpy.context.scene.frame_set(frame)
-        positions = stipple.scene.splat_data.read(swarm.data).positions
-        whole = stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(),
+        positions = stipple.scene.source.splat_data.read(swarm.data).positions
+        whole = stipple.binding.cloud.Cloud.load(stipple.scene.source.sources.context(),
                                                  str(folder / f'swarm_{frame:04d}.ply')).read().positions
         kept.append([int(np.flatnonzero((whole == p).all(axis=1))[0]) for p in positions])
     assert kept[0] == kept[1] and len(set(kept[0])) == series.COUNT // 4
@@ -220,26 +220,26 @@ def test_keyframed_budget(stipple, swarm):
         bpy.context.scene.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         ratio = swarm.data.evaluated_get(depsgraph).stipple.ratio
-        assert stipple.scene.splat_data.count(swarm.data) == round(series.COUNT * ratio)
+        assert stipple.scene.source.splat_data.count(swarm.data) == round(series.COUNT * ratio)
     assert 0.1 < ratio < 0.5
 
 
 def test_prepared_budgets_are_cuts_of_a_tree_for_each_frame(stipple, swarm, folder, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
-    before = stipple.scene.splat_data.read(swarm.data)
+    before = stipple.scene.source.splat_data.read(swarm.data)
     scenes.select(swarm)
     assert bpy.ops.stipple.prepare_budgets() == {'FINISHED'}
     settings = swarm.data.stipple
     assert settings.source_kind == 'TREE' and settings.is_sequence and settings.source.startswith('//stipple')
     assert len(list((tmp_path / 'stipple' / 'swarm').iterdir())) == 10
-    assert_equal(stipple.scene.splat_data.read(swarm.data), before)  # a whole budget is the file's own splats
+    assert_equal(stipple.scene.source.splat_data.read(swarm.data), before)  # a whole budget is the file's own splats
     settings.ratio = 0.5
     assert shown(stipple, swarm, (1, 10, 4)) == [1, 10, 4]
-    assert stipple.scene.splat_data.count(swarm.data) == series.COUNT // 2
-    cut = stipple.binding.model.Model.load(stipple.scene.sources.context(), str(
+    assert stipple.scene.source.splat_data.count(swarm.data) == series.COUNT // 2
+    cut = stipple.binding.model.Model.load(stipple.scene.source.sources.context(), str(
         tmp_path / 'stipple' / 'swarm' / 'swarm_0004.stipple.safetensors')).decode(
             stipple.binding.model.DecodeSettings(series.COUNT // 2)).read()
-    assert_equal(stipple.scene.splat_data.read(swarm.data), cut)
+    assert_equal(stipple.scene.source.splat_data.read(swarm.data), cut)
     assert not bpy.ops.stipple.prepare_budgets.poll()
 
 
@@ -275,11 +275,11 @@ def test_edits_of_one_file_are_refused(stipple, swarm):
 # ---- reading ahead ------------------------------------------------------------------------------
 
 def names(stipple):
-    return [os.path.basename(key[0]) for key in stipple.scene.sequences._entries]
+    return [os.path.basename(key[0]) for key in stipple.scene.sequence.sequences._entries]
 
 
 def test_next_files_are_read_ahead_the_way_it_plays(stipple, swarm):
-    sequences = stipple.scene.sequences
+    sequences = stipple.scene.sequence.sequences
     sequences.forget()
     bpy.context.scene.frame_set(5)
     assert sorted(names(stipple)) == [f'swarm_{i:04d}.ply' for i in (5, 6, 7, 8, 9)]
@@ -292,14 +292,14 @@ def test_next_files_are_read_ahead_the_way_it_plays(stipple, swarm):
 
 
 def test_loops_read_ahead_over_their_ends(stipple, swarm):
-    stipple.scene.sequences.forget()
+    stipple.scene.sequence.sequences.forget()
     swarm.data.stipple.sequence_mode = 'REPEAT'
     bpy.context.scene.frame_set(10)
     assert {'swarm_0010.ply', 'swarm_0001.ply', 'swarm_0002.ply'} <= set(names(stipple))
 
 
 def test_cache_keeps_its_size(stipple, swarm, monkeypatch):
-    sequences = stipple.scene.sequences
+    sequences = stipple.scene.sequence.sequences
     each = series.COUNT * 14 * 4
     for limit, ahead, most in ((3 * each + 100, 4, 3), (0, 4, 1), (1 << 30, 0, 10)):
         sequences.forget()
@@ -324,12 +324,12 @@ def test_a_file_that_changes_is_read_again(stipple, swarm, folder):
 
 def test_a_broken_file_ahead_stops_nothing_before_its_frame(stipple, swarm, folder):
     (folder / 'swarm_0004.ply').write_bytes(b'ply\nbroken')
-    stipple.scene.sequences.forget()
+    stipple.scene.sequence.sequences.forget()
     assert shown(stipple, swarm, (2, 3)) == [2, 3]
     assert shown(stipple, swarm, (4,)) == [3]  # what was there stays
-    assert 'swarm_0004.ply' in stipple.scene.sync.problems[swarm.data.name]
+    assert 'swarm_0004.ply' in stipple.scene.source.sync.problems[swarm.data.name]
     assert shown(stipple, swarm, (5,)) == [5]
-    assert swarm.data.name not in stipple.scene.sync.problems
+    assert swarm.data.name not in stipple.scene.source.sync.problems
 
 
 # ---- gaps ---------------------------------------------------------------------------------------
@@ -338,14 +338,14 @@ def test_a_gap_is_said_in_the_window_and_can_be_held(stipple, swarm, folder):
     os.remove(folder / 'swarm_0005.ply')
     os.remove(folder / 'swarm_0006.ply')
     assert shown(stipple, swarm, (4, 5)) == [4, 4]
-    assert stipple.scene.sync.problems[swarm.data.name] == (
+    assert stipple.scene.source.sync.problems[swarm.data.name] == (
         f"File '{folder / 'swarm_0005.ply'}' of the series 'swarm' is missing.")
     swarm.data.stipple.missing_frames = 'HOLD'
-    assert swarm.data.name not in stipple.scene.sync.problems
+    assert swarm.data.name not in stipple.scene.source.sync.problems
     assert shown(stipple, swarm, (6, 7, 5)) == [4, 7, 4]
     os.remove(folder / 'swarm_0001.ply')
     bpy.context.scene.frame_set(1)
-    assert 'swarm_0001.ply' in stipple.scene.sync.problems[swarm.data.name]
+    assert 'swarm_0001.ply' in stipple.scene.source.sync.problems[swarm.data.name]
 
 
 # ---- renders ------------------------------------------------------------------------------------
@@ -397,7 +397,7 @@ STORED = '''
 import sys
 package = sys.modules['stipple']
 def note(scene, *_):
-    arrays = package.scene.splat_data.read(bpy.data.objects['swarm'].data)
+    arrays = package.scene.source.splat_data.read(bpy.data.objects['swarm'].data)
     print('STORED', scene.frame_current, round(float(arrays.positions[:, 0].mean())) + 1, flush=True)
 bpy.app.handlers.render_post.append(note)
 '''

@@ -19,7 +19,7 @@ def swarm(stipple, tmp_path):
 
 
 def load(stipple, path):
-    return stipple.binding.cloud.Cloud.load(stipple.scene.sources.context(), str(path)).read()
+    return stipple.binding.cloud.Cloud.load(stipple.scene.source.sources.context(), str(path)).read()
 
 
 def names(folder):
@@ -38,7 +38,7 @@ def test_a_series_becomes_a_volume_sequence(stipple, swarm, tmp_path):
     volume = bpy.data.objects['v'].data
     assert volume.is_sequence and (volume.frame_start, volume.frame_duration, volume.frame_offset,
                                    volume.sequence_mode) == (3, 4, 0, 'REPEAT')
-    native = stipple.scene.sources.context()
+    native = stipple.scene.source.sources.context()
     for i in (1, 4):
         info = stipple.binding.volume.Volume.load(native, str(out / f'v_000{i}.vdb')).info()
         assert abs(info.voxel_size - 0.1) < 1e-6
@@ -56,7 +56,7 @@ def test_voxels_have_one_size_over_all_frames(stipple, swarm, tmp_path):
     bpy.context.view_layer.update()
     assert bpy.ops.stipple.splats_to_volume(filepath=str(tmp_path / 'v.vdb'), resolution=32, frames='SERIES') == {
         'FINISHED'}
-    native = stipple.scene.sources.context()
+    native = stipple.scene.source.sources.context()
     sizes = {round(stipple.binding.volume.Volume.load(native, str(tmp_path / f'v_000{i}.vdb')).info().voxel_size, 7)
              for i in (1, 2, 3, 4)}
     longest = 2 * np.ptp(series.arrays_of(stipple, 1).positions, axis=0).max()
@@ -81,7 +81,7 @@ def test_scene_range_keeps_motion_speed_and_budget(stipple, swarm, tmp_path):
     assert [p.name for p in sorted(tmp_path.glob('v_*'))] == [f'v_000{i}.vdb' for i in range(2, 9)]
     volume = bpy.data.objects['v'].data
     assert (volume.frame_start, volume.frame_duration, volume.frame_offset) == (2, 8, 1)
-    info = stipple.binding.volume.Volume.load(stipple.scene.sources.context(), str(tmp_path / 'v_0005.vdb')).info()
+    info = stipple.binding.volume.Volume.load(stipple.scene.source.sources.context(), str(tmp_path / 'v_0005.vdb')).info()
     middle = [(a + b) / 2 for a, b in zip(info.bounds_min, info.bounds_max)]
     assert abs(middle[0] - 2) < 0.3 and abs(middle[2] - 4) < 0.3
 

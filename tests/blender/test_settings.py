@@ -14,11 +14,11 @@ def splats(tmp_path):
 
 
 def count(stipple, obj):
-    return stipple.scene.splat_data.count(obj.data)
+    return stipple.scene.source.splat_data.count(obj.data)
 
 
 def positions(stipple, obj):
-    return stipple.scene.splat_data.read(obj.data).positions
+    return stipple.scene.source.splat_data.read(obj.data).positions
 
 
 def test_slider_decodes_at_once(stipple, splats):

@@ -38,8 +38,8 @@ def make(stipple, tmp_path, kind, count=COUNT):
             assert bpy.ops.stipple.add_budget() == {'FINISHED'}
     scenes.select(obj)
     assert obj.data.stipple.source_kind == kind
-    path = stipple.scene.sources.absolute_path(obj.data.stipple.source)
-    assert stipple.scene.sources.state(obj.data) == 'FINE'
+    path = stipple.scene.source.sources.absolute_path(obj.data.stipple.source)
+    assert stipple.scene.source.sources.state(obj.data) == 'FINE'
     return obj, path
 
 
@@ -54,7 +54,7 @@ def change(path):
 
 
 def read(stipple, obj):
-    return stipple.scene.splat_data.read(obj.data)
+    return stipple.scene.source.splat_data.read(obj.data)
 
 
 class Layout:
@@ -91,7 +91,7 @@ def test_a_missing_source_is_said_and_relinked(stipple, splats, tmp_path):
     assert drawn(stipple, obj) == ['Source file is missing', 'stipple.relink', 'stipple.use_as_new_source']
     assert_equal(read(stipple, obj), before)
     assert bpy.ops.stipple.relink(filepath=moved) == {'FINISHED'}
-    assert stipple.scene.sources.absolute_path(obj.data.stipple.source) == moved and drawn(stipple, obj) == []
+    assert stipple.scene.source.sources.absolute_path(obj.data.stipple.source) == moved and drawn(stipple, obj) == []
     assert_equal(read(stipple, obj), before)
 
 
@@ -105,7 +105,7 @@ def test_a_changed_source_is_said_and_read_again(stipple, splats):
                                    'stipple.use_as_new_source']
     assert_equal(read(stipple, obj), before)
     if obj.data.stipple.source_kind == 'TREE':  # a flipped byte breaks a tree: another one takes its place
-        binding, native = stipple.binding, stipple.scene.sources.context()
+        binding, native = stipple.binding, stipple.scene.source.sources.context()
         cloud = binding.cloud.Cloud.create(native, make_arrays(stipple, COUNT, degree=0))
         job = binding.model.Model.from_cloud_start(native, cloud)
         job.wait()
@@ -125,7 +125,7 @@ def test_a_slider_does_not_mix_old_and_new_sources(stipple, tmp_path, how):
     before = read(stipple, obj)
     os.remove(path) if how == 'gone' else change(path)
     obj.data.stipple.ratio = 0.5
-    assert 'choose Relink' in stipple.scene.sync.problems[obj.data.name]
+    assert 'choose Relink' in stipple.scene.source.sync.problems[obj.data.name]
     assert_equal(read(stipple, obj), before)
 
 
@@ -145,15 +145,15 @@ def test_relink_keeps_budget_and_mask(stipple, tmp_path):
     scenes.select(obj, box(size=1.0))
     assert bpy.ops.stipple.crop_by_box() == {'FINISHED'}
     obj.data.stipple.ratio = 0.5
-    before, counts = read(stipple, obj), stipple.scene.masks.counts(obj.data)
+    before, counts = read(stipple, obj), stipple.scene.source.masks.counts(obj.data)
     assert counts[0] == COUNT > counts[1]
     os.rename(path, tmp_path / 'b.stipple.safetensors')
     scenes.select(obj)
     assert bpy.ops.stipple.relink(filepath=str(tmp_path / 'b.stipple.safetensors')) == {'FINISHED'}
-    assert stipple.scene.masks.counts(obj.data) == counts and obj.data.stipple.ratio == 0.5
+    assert stipple.scene.source.masks.counts(obj.data) == counts and obj.data.stipple.ratio == 0.5
     assert_equal(read(stipple, obj), before)
     obj.data.stipple.ratio = 1.0
-    assert stipple.scene.splat_data.count(obj.data) == counts[1]
+    assert stipple.scene.source.splat_data.count(obj.data) == counts[1]
 
 
 def test_relink_refuses_another_count_unless_told(stipple, tmp_path):
@@ -165,10 +165,10 @@ def test_relink_refuses_another_count_unless_told(stipple, tmp_path):
     write_ply(stipple, tmp_path / 'other.ply', make_arrays(stipple, 40))
     call = lambda **more: bpy.ops.stipple.relink(filepath=str(tmp_path / 'other.ply'), **more)
     scenes.refuses(call, f"has 40 splats; the source of 'in' had {COUNT}")
-    assert obj.data.stipple.source.endswith('in.ply') and stipple.scene.masks.counts(obj.data) is not None
+    assert obj.data.stipple.source.endswith('in.ply') and stipple.scene.source.masks.counts(obj.data) is not None
     assert_equal(read(stipple, obj), before)
     assert call(other_count=True) == {'FINISHED'}
-    assert stipple.scene.splat_data.count(obj.data) == 40 and stipple.scene.masks.counts(obj.data) is None
+    assert stipple.scene.source.splat_data.count(obj.data) == 40 and stipple.scene.source.masks.counts(obj.data) is None
 
 
 @pytest.mark.parametrize('content, text', [(None, 'bad.ply'), (b'ply\nbroken', 'bad.ply')])
@@ -178,14 +178,14 @@ def test_relink_to_a_file_that_cannot_be_read_changes_nothing(stipple, splats, t
     if content is not None:
         (tmp_path / 'bad.ply').write_bytes(content)
     scenes.refuses(lambda: bpy.ops.stipple.relink(filepath=str(tmp_path / 'bad.ply')), text)
-    assert stipple.scene.sources.absolute_path(obj.data.stipple.source) == path
+    assert stipple.scene.source.sources.absolute_path(obj.data.stipple.source) == path
     assert_equal(read(stipple, obj), before)
 
 
 def test_relink_refuses_a_model_of_the_other_kind(stipple, tmp_path):
     obj, _ = make(stipple, tmp_path, 'TREE')
     other = scenes.make_splats(scenes.quad(), anchors=20)
-    path = stipple.scene.sources.absolute_path(other.data.stipple.source)
+    path = stipple.scene.source.sources.absolute_path(other.data.stipple.source)
     scenes.select(obj)
     scenes.refuses(lambda: bpy.ops.stipple.relink(filepath=path), 'holds splats of a mesh')
 
@@ -204,11 +204,11 @@ def test_a_series_is_relinked_with_its_timing(stipple, tmp_path):
     obj.data.stipple.frame_start, obj.data.stipple.sequence_mode = 2, 'REPEAT'
     os.rename(tmp_path / 'swarm', tmp_path / 'moved')
     bpy.context.scene.frame_set(4)
-    assert 'swarm_0003.ply' in stipple.scene.sync.problems[obj.data.name]
+    assert 'swarm_0003.ply' in stipple.scene.source.sync.problems[obj.data.name]
     scenes.select(obj)
     scenes.refuses(lambda: bpy.ops.stipple.relink(filepath=str(tmp_path / 'none.ply')), 'has no number')
     assert bpy.ops.stipple.relink(filepath=str(tmp_path / 'moved' / 'swarm_0001.ply')) == {'FINISHED'}
-    assert obj.data.name not in stipple.scene.sync.problems and series.centre(stipple, obj) == 2
+    assert obj.data.name not in stipple.scene.source.sync.problems and series.centre(stipple, obj) == 2
     assert (obj.data.stipple.frame_start, obj.data.stipple.frame_duration) == (2, 4)
 
 
@@ -273,7 +273,7 @@ def test_a_missing_library_is_said_by_panel_and_operators(stipple, tmp_path, mon
     path.write_text('no library')
     scenes.refuses(lambda: bpy.ops.stipple.splats_import(filepath='a.ply'), 'cannot be loaded')
     assert not bpy.ops.stipple.splats_import.poll()
-    assert 'cannot be loaded' in stipple.scene.sources.library_problem()
+    assert 'cannot be loaded' in stipple.scene.source.sources.library_problem()
     monkeypatch.undo()
     assert bpy.ops.stipple.splats_import.poll() and drawn(stipple, obj) == []
 
@@ -330,11 +330,11 @@ def one_mebibyte(stipple):
 
     def limit():
         chosen.memory_limit = 1
-        stipple.scene.sources.forget()
+        stipple.scene.source.sources.forget()
 
     yield limit
     chosen.memory_limit = 0
-    stipple.scene.sources.forget()
+    stipple.scene.source.sources.forget()
 
 
 def test_work_beyond_the_memory_limit_is_refused(stipple, tmp_path, one_mebibyte, unchanged):  # noqa: F811
@@ -360,9 +360,9 @@ def test_work_beyond_the_memory_limit_is_refused(stipple, tmp_path, one_mebibyte
 def test_a_frame_of_a_series_beyond_the_memory_limit(stipple, tmp_path, one_mebibyte):
     obj = series.load(series.write(stipple, tmp_path / 'swarm', range(1, 3), count=30_000))
     one_mebibyte()
-    stipple.scene.sequences.forget()
+    stipple.scene.sequence.sequences.forget()
     bpy.context.scene.frame_set(2)
-    assert 'memory limit' in stipple.scene.sync.problems[obj.data.name]
+    assert 'memory limit' in stipple.scene.source.sync.problems[obj.data.name]
     assert series.centre(stipple, obj) == 0
 
 

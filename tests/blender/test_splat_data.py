@@ -25,7 +25,7 @@ def assert_equal(a, b):
 
 @pytest.mark.parametrize('degree', [0, 1, 2, 3, 4])
 def test_splats_come_back_bit_for_bit(stipple, degree):
-    splat_data = stipple.scene.splat_data
+    splat_data = stipple.scene.source.splat_data
     data = splat_data.new_data('splats')
     arrays = make_arrays(stipple, degree=degree)
     splat_data.write(data, arrays)
@@ -35,7 +35,7 @@ def test_splats_come_back_bit_for_bit(stipple, degree):
 @pytest.mark.parametrize('degree', [0, 3])
 def test_native_clouds_are_those_of_the_arrays(stipple, degree):
     """Attributes go into a cloud and out of it without arrays between them, evaluated ones too."""
-    splat_data, native = stipple.scene.splat_data, stipple.scene.sources.context()
+    splat_data, native = stipple.scene.source.splat_data, stipple.scene.source.sources.context()
     arrays = make_arrays(stipple, degree=degree)
     data = splat_data.new_data('splats')
     splat_data.write(data, arrays)
@@ -53,8 +53,8 @@ def test_native_clouds_are_those_of_the_arrays(stipple, degree):
 
 @pytest.mark.parametrize('count', [0, 1, 7])
 def test_attribute_values_are_blenders(stipple, count):
-    data = stipple.scene.splat_data.new_data('splats')
-    stipple.scene.splat_data.write(data, make_arrays(stipple, count=count, degree=0))
+    data = stipple.scene.source.splat_data.new_data('splats')
+    stipple.scene.source.splat_data.write(data, make_arrays(stipple, count=count, degree=0))
     for name, width in (('scale', 3), ('rotation', 4)):
         elements = data.attributes[name].data
         field = stipple.version.ATTRIBUTE_FIELDS[data.attributes[name].data_type]
@@ -64,17 +64,17 @@ def test_attribute_values_are_blenders(stipple, count):
 
 
 def test_an_attribute_of_another_kind_is_refused(stipple):
-    data = stipple.scene.splat_data.new_data('splats')
-    stipple.scene.splat_data.write(data, make_arrays(stipple, degree=0))
+    data = stipple.scene.source.splat_data.new_data('splats')
+    stipple.scene.source.splat_data.write(data, make_arrays(stipple, degree=0))
     data.attributes.remove(data.attributes['scale'])
     data.attributes.new('scale', 'FLOAT', 'POINT')
     with pytest.raises((stipple.binding.errors.StippleError, RuntimeError, TypeError)):
-        stipple.scene.splat_data.cloud(stipple.scene.sources.context(), data)
+        stipple.scene.source.splat_data.cloud(stipple.scene.source.sources.context(), data)
 
 
 def test_attributes_have_the_names_and_types_of_the_contract(stipple):
-    data = stipple.scene.splat_data.new_data('splats')
-    stipple.scene.splat_data.write(data, make_arrays(stipple, degree=1))
+    data = stipple.scene.source.splat_data.new_data('splats')
+    stipple.scene.source.splat_data.write(data, make_arrays(stipple, degree=1))
     kinds = {a.name: a.data_type for a in data.attributes if a.domain == 'POINT'}
     new = bpy.app.version >= (5, 2, 0)
     four = 'FLOAT4' if new else 'FLOAT_COLOR'
@@ -88,9 +88,9 @@ def test_attributes_have_the_names_and_types_of_the_contract(stipple):
 
 
 def test_base_holds_dc_and_opacity_in_this_order(stipple):
-    data = stipple.scene.splat_data.new_data('splats')
+    data = stipple.scene.source.splat_data.new_data('splats')
     arrays = make_arrays(stipple, count=2, degree=0)
-    stipple.scene.splat_data.write(data, arrays)
+    stipple.scene.source.splat_data.write(data, arrays)
     values = np.empty(8, np.float32)
     field = 'vector' if bpy.app.version >= (5, 2, 0) else 'color'
     data.attributes['radiance:base'].data.foreach_get(field, values)
@@ -99,7 +99,7 @@ def test_base_holds_dc_and_opacity_in_this_order(stipple):
 
 
 def test_fewer_splats_and_a_lower_degree_leave_nothing_behind(stipple):
-    splat_data = stipple.scene.splat_data
+    splat_data = stipple.scene.source.splat_data
     data = splat_data.new_data('splats')
     splat_data.write(data, make_arrays(stipple, count=50, degree=3))
     for count, degree in ((20, 1), (0, 0), (70, 2), (70, 1)):
@@ -110,7 +110,7 @@ def test_fewer_splats_and_a_lower_degree_leave_nothing_behind(stipple):
 
 
 def test_zero_scales_are_stored_as_the_smallest_scale(stipple):
-    splat_data = stipple.scene.splat_data
+    splat_data = stipple.scene.source.splat_data
     data = splat_data.new_data('splats')
     arrays = make_arrays(stipple, count=3, degree=0)
     arrays.scales[1] = 0
@@ -119,7 +119,7 @@ def test_zero_scales_are_stored_as_the_smallest_scale(stipple):
 
 
 def test_fingerprint_changes_with_every_attribute(stipple):
-    splat_data = stipple.scene.splat_data
+    splat_data = stipple.scene.source.splat_data
     data = splat_data.new_data('splats')
     arrays = make_arrays(stipple, degree=1)
     seen = set()
@@ -131,7 +131,7 @@ def test_fingerprint_changes_with_every_attribute(stipple):
 
 
 def test_save_and_reload_keep_the_splats(stipple, tmp_path):
-    splat_data = stipple.scene.splat_data
+    splat_data = stipple.scene.source.splat_data
     data = splat_data.new_data('splats')
     arrays = make_arrays(stipple)
     splat_data.write(data, arrays)
@@ -142,7 +142,7 @@ def test_save_and_reload_keep_the_splats(stipple, tmp_path):
 
 
 def test_edit_mode_is_one_clear_error(stipple):
-    splat_data = stipple.scene.splat_data
+    splat_data = stipple.scene.source.splat_data
     data = splat_data.new_data('splats')
     arrays = make_arrays(stipple, degree=0)
     splat_data.write(data, arrays)
@@ -160,7 +160,7 @@ def test_edit_mode_is_one_clear_error(stipple):
 
 @pytest.mark.parametrize('count', [50, 80])
 def test_linked_data_are_written_too(stipple, tmp_path, count):
-    splat_data = stipple.scene.splat_data
+    splat_data = stipple.scene.source.splat_data
     data = splat_data.new_data('splats')
     splat_data.write(data, make_arrays(stipple))
     data.use_fake_user = True

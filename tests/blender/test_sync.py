@@ -20,18 +20,18 @@ def splats(tmp_path):
 @pytest.fixture
 def writes(stipple, monkeypatch):
     """Counts of splats, in the order in which they were written into Blender data."""
-    found, write = [], stipple.scene.splat_data.write
+    found, write = [], stipple.scene.source.splat_data.write
 
     def note(data, arrays, *more, **named):
         found.append(arrays.count)
         write(data, arrays, *more, **named)
 
-    monkeypatch.setattr(stipple.scene.splat_data, 'write', note)
+    monkeypatch.setattr(stipple.scene.source.splat_data, 'write', note)
     return found
 
 
 def count(stipple, obj):
-    return stipple.scene.splat_data.count(obj.data)
+    return stipple.scene.source.splat_data.count(obj.data)
 
 
 def test_only_the_module_itself_calls_sync(stipple):
@@ -44,11 +44,11 @@ def test_only_the_module_itself_calls_sync(stipple):
                 name = getattr(node.func, 'attr', getattr(node.func, 'id', ''))
                 if name in {'sync', 'try_sync', 'sync_all'}:
                     callers.add(path.relative_to(root).as_posix())
-    assert callers == {'scene/sync.py'}
+    assert callers == {'scene/source/sync.py'}
 
 
 def test_the_handlers_that_call_it(stipple):
-    module = stipple.scene.sync.__name__
+    module = stipple.scene.source.sync.__name__
     ours = {name for name in dir(bpy.app.handlers) if isinstance(getattr(bpy.app.handlers, name), list)
             and any(getattr(f, '__module__', '') == module for f in getattr(bpy.app.handlers, name))}
     assert {'frame_change_post', 'render_complete', 'render_cancel', 'undo_post', 'redo_post', 'load_post'} <= ours
@@ -158,7 +158,7 @@ def test_linked_data_follow_their_animation(stipple, splats, tmp_path):
     linked = scenes.link(here.objects[0])
     for frame, expected in ((3, 300), (2, 200), (1, 100)):
         bpy.context.scene.frame_set(frame)
-        arrays = stipple.scene.splat_data.read(linked.data)
+        arrays = stipple.scene.source.splat_data.read(linked.data)
         assert arrays.count == expected and arrays.scales.min() > 0
 
 
@@ -175,15 +175,15 @@ def test_overridden_data_have_a_budget_of_their_own(stipple, splats, tmp_path):
     obj = scenes.link(linked.override_create())
     obj.data = own
     own.stipple.anchors = 120
-    assert stipple.scene.sync.problems == {}
+    assert stipple.scene.source.sync.problems == {}
     assert count(stipple, obj) == 120 and count(stipple, linked) == 300
-    arrays = stipple.scene.splat_data.read(own)
+    arrays = stipple.scene.source.splat_data.read(own)
     assert arrays.scales.min() > 0
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'b.blend'))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / 'b.blend'))
     again = next(o for o in bpy.data.objects if o.override_library is not None)
     assert again.data.stipple.anchors == 120
-    assert count(stipple, again) == 120 and stipple.scene.splat_data.read(again.data).scales.min() > 0
+    assert count(stipple, again) == 120 and stipple.scene.source.splat_data.read(again.data).scales.min() > 0
 
 
 def test_undo_restores_settings_and_splats_of_a_series(stipple, tmp_path):
@@ -200,6 +200,6 @@ def test_undo_restores_settings_and_splats_of_a_series(stipple, tmp_path):
 
 def test_a_new_file_forgets_the_problems_of_the_old(stipple, splats):
     splats.data.stipple.anchors = -1
-    assert stipple.scene.sync.problems
+    assert stipple.scene.source.sync.problems
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert stipple.scene.sync.problems == {}
+    assert stipple.scene.source.sync.problems == {}

@@ -18,12 +18,12 @@ ENGINES = ['CYCLES', 'EEVEE', 'WORKBENCH']
 
 @pytest.fixture
 def rigs(stipple):
-    return importlib.import_module('.scene.view_rigs', stipple.__name__)
+    return importlib.import_module('.scene.fit.view_rigs', stipple.__name__)
 
 
 @pytest.fixture
 def capture(stipple):
-    return importlib.import_module('.scene.view_capture', stipple.__name__)
+    return importlib.import_module('.scene.fit.view_capture', stipple.__name__)
 
 
 def depsgraph():
@@ -242,7 +242,7 @@ def test_messages(capture, stipple):
 
 
 def test_layers_of_a_broken_file(stipple, tmp_path):
-    layers = importlib.import_module('.scene.exr_layers', stipple.__name__)
+    layers = importlib.import_module('.scene.view.exr_layers', stipple.__name__)
     path = tmp_path / 'a.exr'
     for content, message in ((b'', 'not a complete'), (b'12345678', 'another kind of file'),
                              (b'\x76\x2f\x31\x01\x02\0\0\0channels\0', 'not a complete')):

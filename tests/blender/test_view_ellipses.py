@@ -22,7 +22,7 @@ PSNR = 50.0
 def drawing(stipple):
     graphics.require()
     name = stipple.__name__
-    return importlib.import_module(f'{name}.splat_drawing'), importlib.import_module(f'{name}.view_ellipses')
+    return importlib.import_module(f'{name}.viewport.splat_drawing'), importlib.import_module(f'{name}.viewport.view_ellipses')
 
 
 def random_arrays(stipple, count=4000, degree=3, size=0.03, seed=0, **flags):
@@ -49,7 +49,7 @@ def camera(stipple, model=0, distance=3.0):
 
 
 def shown(drawing, stipple, arrays, matrix=np.eye(4), key='one', **more):
-    cloud = stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), arrays)
+    cloud = stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), arrays)
     return drawing[0].ShownSplats((key,), cloud, arrays.count, arrays.antialias, np.array(matrix, np.float64), **more)
 
 
@@ -57,7 +57,7 @@ def draw(drawing, stipple, entries, view_camera, depth=None, clip_planes=(), vie
     """[H,W,4] as the card blends it, top row first."""
     splats, ellipses = drawing
     shaders = ellipses.Shaders()
-    own = view or splats.SplatView(stipple.scene.sources.context())
+    own = view or splats.SplatView(stipple.scene.source.sources.context())
     own.update(entries, view_camera, wait=view is None)
     target = ellipses.Target(WIDTH, HEIGHT)
     with_selection = any(entry.selected for entry in entries)
@@ -71,7 +71,7 @@ def draw(drawing, stipple, entries, view_camera, depth=None, clip_planes=(), vie
 
 def reference(stipple, entries, view_camera):
     """[H,W,4] display values by the native renderer."""
-    renderer = stipple.binding.renderer.Renderer(stipple.scene.sources.context())
+    renderer = stipple.binding.renderer.Renderer(stipple.scene.source.sources.context())
     options = renderer.options(output_colour=stipple.binding.structs.OutputColour.COMPOSITED)
     task = renderer.start([(entry.cloud, entry.matrix) for entry in entries], view_camera, options, with_depth=False)
     task.job.wait()
@@ -168,7 +168,7 @@ def test_what_is_hidden_goes_at_once_and_never_waits_for_a_sort(drawing, stipple
     splats = drawing[0]
     first = shown(drawing, stipple, random_arrays(stipple, 2000, degree=0, seed=8), key='first')
     second = shown(drawing, stipple, random_arrays(stipple, 2000, degree=0, seed=9), key='second')
-    view = splats.SplatView(stipple.scene.sources.context())
+    view = splats.SplatView(stipple.scene.source.sources.context())
     view_camera = camera(stipple)
     draw(drawing, stipple, [first, second], view_camera, view=view)
     assert not view.is_sorting()
@@ -195,7 +195,7 @@ def test_selected_splats_get_an_outline(drawing, stipple):
     view_camera = camera(stipple)
     splats, ellipses = drawing
     shaders = ellipses.Shaders()
-    view = splats.SplatView(stipple.scene.sources.context())
+    view = splats.SplatView(stipple.scene.source.sources.context())
     view.update([entry], view_camera, wait=True)
     target = ellipses.Target(WIDTH, HEIGHT)
     screen = gpu.types.GPUOffScreen(WIDTH, HEIGHT, format='RGBA32F')

@@ -13,14 +13,14 @@ import scenes
 
 @pytest.fixture
 def viewed(stipple):
-    module = importlib.import_module(f'{stipple.__name__}.scene.viewed')
+    module = importlib.import_module(f'{stipple.__name__}.scene.view.viewed')
     module._forget()
     return module
 
 
 @pytest.fixture
 def viewport(stipple):
-    return importlib.import_module(f'{stipple.__name__}.viewport')
+    return importlib.import_module(f'{stipple.__name__}.viewport.drawing')
 
 
 @pytest.fixture
@@ -112,7 +112,7 @@ def test_the_largest_objects_become_points_until_the_rest_is_few_enough(viewport
                          ids=('perspective', 'orthographic'))
 def test_a_border_is_a_part_of_the_whole_picture(stipple, square, kind):
     scenes.camera((0.3, 0.2, 6), width=120, height=80, **kind)
-    cameras, facts, sources = stipple.scene.cameras, stipple.scene.facts, stipple.scene.sources
+    cameras, facts, sources = stipple.scene.view.cameras, stipple.scene.view.facts, stipple.scene.source.sources
     scene = bpy.context.scene
     bpy.context.view_layer.update()
     camera = cameras.camera_of(scene.camera, scene.render)
@@ -134,7 +134,7 @@ def test_a_border_is_a_part_of_the_whole_picture(stipple, square, kind):
 
 def test_clipping_planes_leave_what_lies_below(stipple, square):
     cloud_edit = importlib.import_module(f'{stipple.__name__}.binding.cloud_edit')
-    cloud = stipple.scene.sources.cloud_from_object(square)
+    cloud = stipple.scene.source.sources.cloud_from_object(square)
     positions = cloud.positions()
     np.testing.assert_array_equal(positions, cloud.read().positions)
     kept = cloud_edit.clipped(cloud, [(1.0, 0.0, 0.0, -0.25), (0.0, 2.0, 0.0, 0.5)])
@@ -150,7 +150,7 @@ def made_pictures(view_picture, viewed, borders):
     picture = view_picture.ViewPicture()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     picture.update(depsgraph, print)
-    camera = importlib.import_module(view_picture.__name__.replace('view_picture', 'scene.cameras')).camera_of(
+    camera = importlib.import_module(view_picture.__name__.replace('view_picture', 'scene.view.cameras')).camera_of(
         bpy.context.scene.camera, bpy.context.scene.render, None)
     found = []
     for coarse in (2, 1):
@@ -166,8 +166,8 @@ def made_pictures(view_picture, viewed, borders):
 
 def test_meshes_and_holdouts_hide_splats_in_rendered_views(stipple, viewed, square):
     """A quad before the left half of splats; then holdouts alone; then nothing."""
-    view_picture = importlib.import_module(f'{stipple.__name__}.view_picture')
-    facts = importlib.import_module(f'{stipple.__name__}.scene.facts')
+    view_picture = importlib.import_module(f'{stipple.__name__}.viewport.view_picture')
+    facts = importlib.import_module(f'{stipple.__name__}.scene.view.facts')
     scene = bpy.context.scene
     scenes.camera((0, 0, 6), width=60, height=60, type='ORTHO', ortho_scale=3.0)
     quad = scenes.quad('before', offset=(-1.0, 0.0, 1.0))
@@ -194,8 +194,8 @@ def test_meshes_and_holdouts_hide_splats_in_rendered_views(stipple, viewed, squa
 
 def test_averages_of_rendered_views_are_those_of_renders(stipple, viewed, square, tmp_path, monkeypatch):
     """Out of focus behind the edge of a mesh, which is drawn once for all averages."""
-    view_picture = importlib.import_module(f'{stipple.__name__}.view_picture')
-    facts = importlib.import_module(f'{stipple.__name__}.scene.facts')
+    view_picture = importlib.import_module(f'{stipple.__name__}.viewport.view_picture')
+    facts = importlib.import_module(f'{stipple.__name__}.scene.view.facts')
     monkeypatch.setattr(view_picture, '_texture', lambda pixels: pixels)
     scene = bpy.context.scene
     camera = scenes.camera((0, 0, 6), width=60, height=60, lens=50.0)
@@ -206,13 +206,13 @@ def test_averages_of_rendered_views_are_those_of_renders(stipple, viewed, square
     scene.stipple.exact_projection = scene.stipple.zoom_antialiasing = 'OFF'
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seen = view_picture.ViewCamera(stipple.scene.cameras.camera_of(camera, scene.render, None),
-                                   facts.Border(0, 0, 60, 60), stipple.scene.lenses.lens_of(camera, depsgraph))
+    seen = view_picture.ViewCamera(stipple.scene.view.cameras.camera_of(camera, scene.render, None),
+                                   facts.Border(0, 0, 60, 60), stipple.scene.view.lenses.lens_of(camera, depsgraph))
     picture = view_picture.ViewPicture()
     picture.update(depsgraph, print)
     picture._key = 'still'
     meshes = []
-    monkeypatch.setattr(stipple.scene.mattes, 'start_samples', lambda *given, start=stipple.scene.mattes.start_samples:
+    monkeypatch.setattr(stipple.scene.view.mattes, 'start_samples', lambda *given, start=stipple.scene.view.mattes.start_samples:
                         meshes.append(given) or start(*given))
     drawn = {}
     while picture._shown is None or not picture._is_done(seen):
@@ -232,10 +232,10 @@ def test_averages_of_rendered_views_are_those_of_renders(stipple, viewed, square
 
 
 def test_rendered_views_read_a_mesh_again_only_when_it_changes(stipple, viewed, square, monkeypatch):
-    view_picture = importlib.import_module(f'{stipple.__name__}.view_picture')
+    view_picture = importlib.import_module(f'{stipple.__name__}.viewport.view_picture')
     quad = scenes.quad('before')
-    read, reader = [], stipple.scene.mattes.read
-    monkeypatch.setattr(stipple.scene.mattes, 'read', lambda obj: read.append(obj.name) or reader(obj))
+    read, reader = [], stipple.scene.view.mattes.read
+    monkeypatch.setattr(stipple.scene.view.mattes, 'read', lambda obj: read.append(obj.name) or reader(obj))
     kept = view_picture.ViewMattes()
 
     def update():

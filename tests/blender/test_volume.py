@@ -43,7 +43,7 @@ def test_object_matrix_is_in_the_volume(stipple, tmp_path):
     splats.location = (10, 0, 0)
     bpy.context.view_layer.update()
     assert bpy.ops.stipple.splats_to_volume(filepath=str(tmp_path / 'a.vdb'), voxel_size=0.1) == {'FINISHED'}
-    info = stipple.binding.volume.Volume.load(stipple.scene.sources.context(), str(tmp_path / 'a.vdb')).info()
+    info = stipple.binding.volume.Volume.load(stipple.scene.source.sources.context(), str(tmp_path / 'a.vdb')).info()
     assert abs(info.voxel_size - 0.1) < 1e-6
     assert 7 < info.bounds_min[0] < 9.1 and 10.9 < info.bounds_max[0] < 13
 

@@ -80,7 +80,7 @@ def in_a_series(window):
     stipple = sys.modules['stipple']
     for frame in range(1, 11):
         arrays = series.arrays_of(stipple, frame)
-        stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), arrays).save(str(files / f'swarm_{frame:04d}.ply'))
+        stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), arrays).save(str(files / f'swarm_{frame:04d}.ply'))
     with window.context():
         bpy.ops.stipple.splats_import(filepath=str(files / 'swarm_0001.ply'), as_sequence=True, up_axis='Z')
     bpy.context.scene.frame_set(4)

@@ -23,7 +23,7 @@ def folder():
 
 
 def view_picture():
-    kind = import_module(f'{addon().__name__}.view_picture').ViewPicture
+    kind = import_module(f'{addon().__name__}.viewport.view_picture').ViewPicture
     return next((thing for thing in gc.get_objects() if type(thing) is kind), None)
 
 
@@ -77,7 +77,7 @@ def taken(name):
     def step(window):
         if not is_settled(window):
             return False
-        cameras = addon().scene.cameras
+        cameras = addon().scene.view.cameras
         with window.context():
             edges = cameras._camera_frame(bpy.context, window.region, window.camera)
         left, right, bottom, top = (round(edge) for edge in edges)
@@ -137,7 +137,7 @@ def mirror_ball(window):
 
 
 def refused(window):
-    picture = import_module(f'{addon().__name__}.view_picture')
+    picture = import_module(f'{addon().__name__}.viewport.view_picture')
     with window.context():
         try:
             picture.view_camera(bpy.context, bpy.context.evaluated_depsgraph_get())

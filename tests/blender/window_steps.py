@@ -146,13 +146,13 @@ def broken_shader(_window):
     """A driver that refuses the shader: one message, points instead, no exception."""
     from importlib import import_module
     name = addon().__name__
-    import_module(f'{name}.splat_shader')._VERTEX = 'no shader'
-    import_module(f'{name}.viewport')._forget()
+    import_module(f'{name}.viewport.splat_shader')._VERTEX = 'no shader'
+    import_module(f'{name}.viewport.drawing')._forget()
     return 'broken_shader'
 
 
 def finish(_window):
-    viewed = addon().scene.viewed
+    viewed = addon().scene.view.viewed
     facts['problem'] = viewed.state['graphics']
     facts['off'] = viewed.state['off']
     folder = Path(sys.argv[sys.argv.index('--') + 2])
@@ -185,7 +185,7 @@ def left_edit_mode(window):
         with window.context():
             bpy.ops.object.mode_set(mode='OBJECT')
     scenes.select(window.right)
-    facts['problems'] = dict(addon().scene.sync.problems)
+    facts['problems'] = dict(addon().scene.source.sync.problems)
     return 'left_edit_mode'
 
 

@@ -16,12 +16,12 @@
 #include <utility>
 #include <vector>
 
-#include "decode/hierarchy_decoder.h"
-#include "decode/merge_tree.h"
-#include "io/dataset.h"
-#include "train/explicit_model.h"
-#include "train/field_model.h"
-#include "train/trainer.h"
+#include "decode/tree/hierarchy_decoder.h"
+#include "decode/tree/merge_tree.h"
+#include "io/views/dataset.h"
+#include "train/loop/explicit_model.h"
+#include "train/loop/field_model.h"
+#include "train/loop/trainer.h"
 
 namespace stipple {
 namespace {

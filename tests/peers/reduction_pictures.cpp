@@ -16,12 +16,12 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "decode/hierarchy_decoder.h"
-#include "io/splat_file.h"
-#include "splat/render.h"
-#include "train/refine.h"
-#include "train/view_rig.h"
-#include "train/visibility.h"
+#include "decode/tree/hierarchy_decoder.h"
+#include "io/splats/splat_file.h"
+#include "splat/render/render.h"
+#include "train/loop/refine.h"
+#include "train/loop/view_rig.h"
+#include "train/loop/visibility.h"
 
 namespace stipple {
 namespace {

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "io/camera_file.h"
 #include "io/image_file.h"
-#include "io/splat_file.h"
-#include "train/render_backend.h"
+#include "io/splats/splat_file.h"
+#include "io/views/camera_file.h"
+#include "train/loop/render_backend.h"
 
 namespace stipple {
 namespace {

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "splat/cpu/tiled_render.h"
+#include "splat/cpu/tiles/tiled_render.h"
 #include "splat/random_scene.h"
 
 // Pictures without any effect, built twice: with the library as it is, and with effects compiled
-// out (native/splat/effects.h). Prints a hash of every picture on every instruction set of this
+// out (native/splat/render/effects.h). Prints a hash of every picture on every instruction set of this
 // machine; with --seconds N, the processor time of N pictures instead.
 
 namespace stipple {

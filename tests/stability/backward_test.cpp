@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "splat/backward_cases.h"
-#include "splat/cpu/tile_kernel_backward.h"
+#include "splat/cpu/tiles/tile_kernel_backward.h"
 #include "splat/reference_backward.h"
 
 // Every hard case goes backwards with traps on and every statistic asked for, and is judged by the

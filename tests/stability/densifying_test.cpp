@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/random.h"
-#include "densify/edge_weights.h"
 #include "densify/known_views.h"
+#include "densify/quantities/edge_weights.h"
 #include "densify/strategies.h"
 
 // Strategies that are told extreme things about extreme splats, with traps on: their edits stay

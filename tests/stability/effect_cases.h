@@ -8,7 +8,7 @@
 
 #include "math/empty_depth.h"
 #include "splat/random_scene.h"
-#include "splat/ray_render.h"
+#include "splat/render/ray_render.h"
 
 namespace stipple::testing {
 

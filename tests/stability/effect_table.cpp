@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "effect_cases.h"
-#include "splat/accurate_render.h"
-#include "splat/sampled_render.h"
+#include "splat/render/accurate_render.h"
+#include "splat/render/sampled_render.h"
 #include "wide_reference.h"
 
 namespace stipple::testing {

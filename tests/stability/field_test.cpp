@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "decode/field_decoder.h"
+#include "decode/field/field_decoder.h"
 #include "density/learned_density.h"
-#include "train/field_model.h"
+#include "train/loop/field_model.h"
 #include "train/toy_views.h"
 
 namespace stipple {

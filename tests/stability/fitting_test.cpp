@@ -3,11 +3,11 @@
 #include <cmath>
 
 #include "densify/strategies.h"
-#include "train/densify_cloud.h"
-#include "train/explicit_model.h"
 #include "train/fit_scene.h"
-#include "train/picture_store.h"
-#include "train/view_evaluator.h"
+#include "train/loop/densify_cloud.h"
+#include "train/loop/explicit_model.h"
+#include "train/loop/picture_store.h"
+#include "train/loop/view_evaluator.h"
 
 // Fits of views that say little, wrong things or nothing, with traps on: every number stays finite.
 

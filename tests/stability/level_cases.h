@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 #include "math/camera.h"
 #include "splat/random_scene.h"
 

@@ -7,11 +7,11 @@
 #include <string>
 
 #include "base/error.h"
-#include "decode/hierarchy_decoder.h"
+#include "decode/tree/hierarchy_decoder.h"
 #include "level_cases.h"
 #include "page.h"
-#include "splat/accurate_render.h"
-#include "splat/cpu/ray_tiles.h"
+#include "splat/cpu/rays/ray_tiles.h"
+#include "splat/render/accurate_render.h"
 
 // Hard cases at every level and knob of accuracy, with traps on: no NaN, no alpha outside 0..1, no
 // colour outside the hull of the splats' colours, and each picture in single precision is judged

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "decode/hierarchy_decoder.h"
 #include "decode/test_clouds.h"
-#include "train/refine.h"
-#include "train/view_rig.h"
-#include "train/visibility.h"
+#include "decode/tree/hierarchy_decoder.h"
+#include "train/loop/refine.h"
+#include "train/loop/view_rig.h"
+#include "train/loop/visibility.h"
 
 // Clouds that are hard to merge and to refine, with floating-point traps on. Every parent stays in
 // the box of its leaves, harmonics included: it is their mean.

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "splat/cpu/tile_kernel.h"
+#include "splat/cpu/tiles/tile_kernel.h"
 #include "splat/random_scene.h"
 
 // Every hard case is rendered by both renderers, with traps on, and the tiled picture is judged by

@@ -6,11 +6,11 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "train/adam.h"
-#include "train/adam_kernel.h"
-#include "train/image_loss.h"
-#include "train/image_loss_kernel.h"
 #include "train/loss_reference.h"
+#include "train/optimiser/adam.h"
+#include "train/optimiser/adam_kernel.h"
+#include "train/optimiser/image_loss.h"
+#include "train/optimiser/image_loss_kernel.h"
 
 // Hard pictures and gradients with floating-point traps on, for every kernel, judged in double.
 

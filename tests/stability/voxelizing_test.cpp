@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "splat/voxelize.h"
 #include "splat/voxelize_cases.h"
-#include "splat/voxelize_polylog.h"
+#include "splat/voxels/voxelize.h"
+#include "splat/voxels/voxelize_polylog.h"
 
 // Splats that are hard to put on a grid, with traps on; the values are judged by the formula in
 // double.

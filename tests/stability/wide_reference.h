@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 #include "math/camera.h"
 
 namespace stipple::testing {

@@ -3,6 +3,7 @@
 The folders' include table is read from docs/architecture.md, so the page and the law are one.
 """
 import ast
+import collections
 import os
 import pathlib
 import re
@@ -42,6 +43,8 @@ SYSTEM_HEADERS = re.compile(r'(stdint|stddef|strings|dlfcn|unistd|fcntl|pthread|
 
 SOURCE_ENDINGS = ('.cpp', '.h', '.c', '.py', '.sh', '.cmake', 'CMakeLists.txt')
 LINE_LIMIT = 600
+FILE_LIMIT = 40  # of one folder
+MORE_FILES_ALLOWED = {'native/api'}  # until what is not marshalling has left it
 LONGER_ALLOWED = {'native/include/stipple/stipple.h'}  # one public header: it is the manual
 
 # Everything that only exists inside Blender.
@@ -184,6 +187,14 @@ def length_violations(root):
             if lines > LINE_LIMIT:
                 found.append(f'{name}: {lines} lines, at most {LINE_LIMIT} are allowed')
     return found
+
+
+def crowded_folders(root):
+    """Folders of the libraries and the add-on in which more files lie side by side than one can take in."""
+    counts = collections.Counter(os.path.dirname(name) for name in project_files(root)
+                                 if name.startswith(('native/', 'addon/')))
+    return [f'{folder}: {count} files, at most {FILE_LIMIT} are allowed' for folder, count in sorted(counts.items())
+            if count > FILE_LIMIT and folder not in MORE_FILES_ALLOWED]
 
 
 def c99_violations(header, scratch):

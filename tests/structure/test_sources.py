@@ -52,8 +52,8 @@ def test_native_targets_link_what_the_table_allows():
 
 @pytest.mark.parametrize('name, line, reason', [
     ('native/base/a.cpp', '#include "math/vec.h"', 'base may not include math'),
-    ('native/math/a.h', '#include "data/image.h"', 'math may not include data'),
-    ('native/density/a.cpp', '#include "io/splat_file.h"', 'density may not include io'),
+    ('native/math/a.h', '#include "data/images/image.h"', 'math may not include data'),
+    ('native/density/a.cpp', '#include "io/splats/splat_file.h"', 'density may not include io'),
     ('native/io/a.cpp', '#include "decode/decoder.h"', 'io may not include decode'),
     ('native/cli/a.cpp', '#include "api/handles.h"', 'cli may not include api'),
     ('native/splat/a.cpp', '#include "stipple/stipple.h"', 'splat may not include the public header'),
@@ -82,9 +82,9 @@ def test_a_format_library_outside_its_format_is_found(tmp_path):
     plant(tmp_path, {'native/io/media/volume_media.cpp': '#include <openvdb/openvdb.h>\n'})
     table = rules.include_table(TABLE)
     assert rules.include_violations(tmp_path, table) == []
-    plant(tmp_path, {'native/io/splat_file.cpp': '#include <openvdb/openvdb.h>\n'})
+    plant(tmp_path, {'native/io/splats/splat_file.cpp': '#include <openvdb/openvdb.h>\n'})
     assert rules.include_violations(tmp_path, table) == [
-        'native/io/splat_file.cpp:1: openvdb/openvdb.h: OpenVDB belongs in the files of its format']
+        'native/io/splats/splat_file.cpp:1: openvdb/openvdb.h: OpenVDB belongs in the files of its format']
 
 
 def test_a_link_against_the_table_is_found(tmp_path):
@@ -115,6 +115,15 @@ def test_a_file_that_is_too_long_is_found(tmp_path):
     plant(tmp_path, {'native/splat/long.cpp': '\n' * 601, 'native/splat/right.cpp': '\n' * 600,
                      'native/include/stipple/stipple.h': '\n' * 2000})
     assert rules.length_violations(tmp_path) == ['native/splat/long.cpp: 601 lines, at most 600 are allowed']
+
+
+def test_no_folder_is_crowded():
+    assert rules.crowded_folders(ROOT) == []
+
+
+def test_a_crowded_folder_is_found(tmp_path):
+    plant(tmp_path, {f'native/splat/file{i}.cpp': '' for i in range(41)} | {f'native/data/file{i}.cpp': '' for i in range(40)})
+    assert rules.crowded_folders(tmp_path) == ['native/splat: 41 files, at most 40 are allowed']
 
 
 def test_the_public_header_is_c99(tmp_path):

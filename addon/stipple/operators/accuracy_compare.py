@@ -9,7 +9,9 @@ from ..binding.renderer import Renderer
 from ..binding.structs import AccuracyLevel
 from ..binding import accuracy as native
 from ..jobs import JobOperator, Task
-from ..scene import fit_reports, measured_quality, quality, rendered_view, sources
+from ..scene.fit import fit_reports
+from ..scene.source import sources
+from ..scene.view import measured_quality, quality, rendered_view
 
 NAME = 'Quality Comparison'
 # Errors are shown so many times as large.

@@ -8,7 +8,9 @@ from ..binding.accuracy import AccuracyMeasurement
 from ..binding.errors import StippleError
 from ..binding.renderer import Renderer
 from ..jobs import JobOperator
-from ..scene import fit_reports, measured_quality, quality, rendered_view, sources
+from ..scene.fit import fit_reports
+from ..scene.source import sources
+from ..scene.view import measured_quality, quality, rendered_view
 
 
 class STIPPLE_OT_accuracy_measure(JobOperator, bpy.types.Operator):

@@ -6,7 +6,8 @@ from bpy.props import BoolProperty
 
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
-from ..scene import geometry, masks, sources, splat_data, sync
+from ..scene import geometry
+from ..scene.source import masks, sources, splat_data, sync
 
 
 class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):

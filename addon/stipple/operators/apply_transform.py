@@ -8,7 +8,8 @@ from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
-from ..scene import edits, frames, placement, sources, sync
+from ..scene.sequence import frames
+from ..scene.source import edits, placement, sources, sync
 
 
 class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):

@@ -8,7 +8,9 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ..binding.errors import StippleError
-from ..scene import frames, photo_cameras, sources
+from ..scene.sequence import frames
+from ..scene.source import sources
+from ..scene.view import photo_cameras
 
 
 class STIPPLE_OT_cameras_import(bpy.types.Operator, ImportHelper):

@@ -4,7 +4,7 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene import edits, masks, sources, splat_data
+from ..scene.source import edits, masks, sources, splat_data
 
 
 class STIPPLE_OT_clear_mask(JobOperator, bpy.types.Operator):

@@ -9,7 +9,8 @@ from ..binding.errors import invalid
 from ..binding.structs import Side
 from ..jobs import JobOperator
 from ..properties import SIDES
-from ..scene import edits, placement, shapes
+from ..scene import shapes
+from ..scene.source import edits, placement
 
 
 class STIPPLE_OT_crop_by_box(JobOperator, bpy.types.Operator):

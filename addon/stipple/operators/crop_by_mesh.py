@@ -7,7 +7,8 @@ from ..binding import cloud_edit
 from ..binding.structs import Side
 from ..jobs import JobOperator, Task
 from ..properties import SIDES
-from ..scene import edits, placement, shapes, sources
+from ..scene import shapes
+from ..scene.source import edits, placement, sources
 
 
 class STIPPLE_OT_crop_by_mesh(JobOperator, bpy.types.Operator):

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty
 from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene import edits
+from ..scene.source import edits
 
 
 class STIPPLE_OT_delete_floaters(JobOperator, bpy.types.Operator):

@@ -4,7 +4,8 @@
 import bpy
 
 from ..binding.errors import StippleError
-from ..scene import rendered_view, sources
+from ..scene.source import sources
+from ..scene.view import rendered_view
 
 
 class STIPPLE_OT_effects_look(bpy.types.Operator):

@@ -4,7 +4,7 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene import effect_costs, effects, rendered_view
+from ..scene.view import effect_costs, effects, rendered_view
 
 
 class STIPPLE_OT_effects_measure(JobOperator, bpy.types.Operator):

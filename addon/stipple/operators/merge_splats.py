@@ -7,7 +7,8 @@ import numpy as np
 from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene import edits, grades, masks, placement, sources, splat_data, sync
+from ..scene import grades
+from ..scene.source import edits, masks, placement, sources, splat_data, sync
 
 
 class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):

@@ -11,7 +11,8 @@ from ..binding.errors import StippleError, invalid
 from ..binding.model import Model
 from ..binding.structs import Status
 from ..jobs import JobOperator, Task
-from ..scene import numbered, sequences, sources, splat_data, sync
+from ..scene.sequence import numbered, sequences
+from ..scene.source import sources, splat_data, sync
 
 
 class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):

@@ -10,7 +10,8 @@ from ..binding.errors import StippleError, invalid
 from ..binding.model import Model
 from ..binding.structs import ModelKind
 from ..jobs import JobOperator
-from ..scene import formats, masks, numbered, sources, splat_data, sync
+from ..scene.sequence import numbered
+from ..scene.source import formats, masks, sources, splat_data, sync
 
 
 class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):

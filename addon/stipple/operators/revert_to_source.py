@@ -4,7 +4,7 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene import sources, splat_data, sync
+from ..scene.source import sources, splat_data, sync
 
 
 class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty
 
-from ..scene import sources, splat_data
+from ..scene.source import sources, splat_data
 
 
 class STIPPLE_OT_scale_budget(bpy.types.Operator):

@@ -7,7 +7,8 @@ from mathutils import Matrix
 
 from ..binding import cloud_edit
 from ..jobs import JobOperator
-from ..scene import picking, placement, sources, splat_data
+from ..scene.source import placement, sources, splat_data
+from ..scene.view import picking
 
 
 class STIPPLE_OT_set_scale(picking.PointOperator, JobOperator, bpy.types.Operator):

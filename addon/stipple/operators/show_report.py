@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..scene import fit_proposal, fit_reports
+from ..scene.fit import fit_proposal, fit_reports
 
 
 class STIPPLE_OT_show_report(bpy.types.Operator):

@@ -5,7 +5,8 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..jobs import JobOperator
-from ..scene import densifying, edits, fitting, masks, sources, splat_data, strategies, sync
+from ..scene.fit import densifying, fitting, strategies
+from ..scene.source import edits, masks, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):

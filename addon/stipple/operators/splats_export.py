@@ -11,7 +11,8 @@ from bpy_extras.io_utils import ExportHelper
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
 from ..preferences import UP_AXES
-from ..scene import exporting, formats, frames, frames_out, numbered, sources
+from ..scene.sequence import frames, frames_out, numbered
+from ..scene.source import exporting, formats, sources
 
 BUDGETS = (('VIEWPORT', "Viewport", "The splats that are shown now"),
            ('RENDER', "Render", "The splats that renders show"),

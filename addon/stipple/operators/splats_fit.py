@@ -8,7 +8,9 @@ from bpy.props import BoolProperty, StringProperty
 
 from .. import version
 from ..jobs import JobOperator
-from ..scene import fit_proposal, fit_reports, fitting, overlays, sources, splat_data, sync
+from ..scene import overlays
+from ..scene.fit import fit_proposal, fit_reports, fitting
+from ..scene.source import sources, splat_data, sync
 
 _PREVIEW_SECONDS = 1.5
 

@@ -10,7 +10,8 @@ from ..binding.model import DecodeSettings, Model
 from ..binding.structs import AnchorOrder
 from ..jobs import JobOperator
 from ..properties import COLOR_SOURCES, ORDERS
-from ..scene import meshes, sources, splat_data, sync
+from ..scene import meshes
+from ..scene.source import sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):

@@ -14,7 +14,8 @@ from ..binding.errors import StippleError
 from ..binding.model import Model
 from ..binding.structs import ModelKind
 from ..jobs import JobOperator, Task
-from ..scene import formats, frames, numbered, sequences, sources, splat_data, sync
+from ..scene.sequence import frames, numbered, sequences
+from ..scene.source import formats, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):

@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..binding.volume import Volume
 from ..jobs import JobOperator, Task
-from ..scene import placement, proxies, sources, splat_data
+from ..scene.source import placement, proxies, sources, splat_data
 
 
 class STIPPLE_OT_splats_to_mesh(JobOperator, bpy.types.Operator):

@@ -10,7 +10,9 @@ from bpy_extras.io_utils import ExportHelper
 from ..binding.errors import invalid
 from ..binding.volume import Volume
 from ..jobs import JobOperator, Task
-from ..scene import frames_out, numbered, placement, sources, splat_data, volumes
+from ..scene import volumes
+from ..scene.sequence import frames_out, numbered
+from ..scene.source import placement, sources, splat_data
 
 
 class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper):

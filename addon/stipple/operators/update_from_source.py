@@ -6,7 +6,8 @@ import bpy
 from ..binding.errors import invalid
 from ..binding.model import Model
 from ..jobs import JobOperator
-from ..scene import meshes, sources, splat_data, sync
+from ..scene import meshes
+from ..scene.source import sources, splat_data, sync
 
 
 class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):

@@ -5,7 +5,7 @@ import bpy
 
 from .. import version
 from ..jobs import JobOperator
-from ..scene import splat_data, sync
+from ..scene.source import splat_data, sync
 
 
 class STIPPLE_OT_upgrade_to_point_cloud(JobOperator, bpy.types.Operator):

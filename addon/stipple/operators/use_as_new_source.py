@@ -4,7 +4,8 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene import grades, sources, splat_data, sync
+from ..scene import grades
+from ..scene.source import sources, splat_data, sync
 
 
 class STIPPLE_OT_use_as_new_source(JobOperator, bpy.types.Operator):

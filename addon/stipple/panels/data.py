@@ -8,7 +8,9 @@ Shape Keys and all else that meshes have.
 import bpy
 
 from . import source_state
-from ..scene import exporting, geometry, masks, sources, splat_data, sync, viewed
+from ..scene import geometry
+from ..scene.source import exporting, masks, sources, splat_data, sync
+from ..scene.view import viewed
 
 
 SEPARATOR = ' \u00b7 '

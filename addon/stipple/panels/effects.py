@@ -5,7 +5,8 @@ import bpy
 
 from ..binding.errors import StippleError
 from ..binding.structs import Effect
-from ..scene import effects, sources
+from ..scene.source import sources
+from ..scene.view import effects
 from .render import SplatRenderPanel
 from .text import draw_text
 

@@ -4,7 +4,8 @@
 import bpy
 
 from ..operators import show_report
-from ..scene import fit_proposal, fitting, splat_data, strategies
+from ..scene.fit import fit_proposal, fitting, strategies
+from ..scene.source import splat_data
 from .text import draw_text
 
 

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ..scene import geometry, splat_data
+from ..scene import geometry
+from ..scene.source import splat_data
 
 
 class STIPPLE_MT_add(bpy.types.Menu):

@@ -5,7 +5,8 @@ import bpy
 
 from ..binding import accuracy as native
 from ..binding.errors import StippleError
-from ..scene import measured_quality, quality, sources
+from ..scene.source import sources
+from ..scene.view import measured_quality, quality
 from .render import SplatRenderPanel
 from .text import draw_text
 

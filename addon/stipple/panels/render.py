@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..scene import facts
+from ..scene.view import facts
 
 ENGINE = 'STIPPLE'
 CYCLES_ENGINE = 'STIPPLE_CYCLES'

@@ -6,7 +6,8 @@ import os
 import bpy
 
 from ..binding.errors import StippleError
-from ..scene import sequences, splat_data
+from ..scene.sequence import sequences
+from ..scene.source import splat_data
 
 
 class STIPPLE_PT_sequence(bpy.types.Panel):

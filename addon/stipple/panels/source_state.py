@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What keeps the splats from following their settings: no library, a source that is gone or another one."""
 
-from ..scene import masks, sources
+from ..scene.source import masks, sources
 
 
 def draw(layout, data):

@@ -6,7 +6,7 @@ import numpy as np
 from .. import version
 from ..binding import cloud_edit
 from ..binding.errors import invalid
-from . import placement, sources, splat_data
+from .source import placement, sources, splat_data
 
 _NAMES = ('scale', 'rotation', 'radiance:base')
 

@@ -11,7 +11,7 @@ from ..binding.cloud import Cloud
 from ..binding.errors import StippleError
 from ..binding.grade import GradeSettings, graded
 from ..binding.structs import Status
-from . import sources, splat_data
+from .source import sources, splat_data
 
 GRADE_KEY = 'stipple_grade'  # of the attributes as they are; none: not graded
 

@@ -5,7 +5,10 @@ import bpy
 
 from .. import version
 from ..binding.errors import StippleError
-from . import grades, limits, placement, sequences, shown, sources, splat_data, sync, viewed
+from . import grades, limits, shown
+from .sequence import sequences
+from .source import placement, sources, splat_data, sync
+from .view import viewed
 
 
 def gather(depsgraph, mode, warn=lambda message: None):

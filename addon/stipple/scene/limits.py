@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import bpy
 
 from ..binding.errors import StippleError
-from . import sequences, shown, sources, splat_data
+from . import shown
+from .sequence import sequences
+from .source import sources, splat_data
 
 # Instances of each datablock, by name, that a view layer showed when it was evaluated last.
 _seen = {}

@@ -12,7 +12,8 @@ from .. import version
 from ..binding.errors import StippleError, invalid
 from ..binding.mesh import Mesh
 from ..binding.structs import MaterialColour
-from . import bake, colour, splat_data
+from . import bake, colour
+from .source import splat_data
 
 MESH_LIKE = {'MESH', 'CURVE', 'SURFACE', 'META', 'FONT'}
 

@@ -13,7 +13,8 @@ import numpy as np
 from ..binding.cloud import Cloud
 from ..binding.errors import StippleError
 from ..binding.structs import ColourSpace, SplatQuantity
-from . import sources, splat_data, viewed
+from .source import sources, splat_data
+from .view import viewed
 
 KINDS = (('OFF', "Off", "Splats have their own colors"),
          ('SCORE', "Score", "How much each splat asked to multiply at the last event; most strategies count in "

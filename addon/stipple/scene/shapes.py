@@ -6,7 +6,8 @@ import numpy as np
 from .. import version
 from ..binding.errors import invalid
 from ..binding.mesh import Mesh
-from . import meshes, placement, splat_data
+from . import meshes
+from .source import placement, splat_data
 
 
 def cutters(context):

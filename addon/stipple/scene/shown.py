@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import splat_data
+from .source import splat_data
 
 
 def is_shown(entry):

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <vector>
 
-#include "data/tri_mesh.h"
+#include "data/meshes/tri_mesh.h"
 
 namespace stipple::media {
 

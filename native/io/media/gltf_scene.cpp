@@ -11,8 +11,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "io/input_file.h"
-#include "io/little_endian.h"
+#include "io/bytes/input_file.h"
+#include "io/bytes/little_endian.h"
 #include "io/media/gltf_accessor.h"
 #include "io/media/gltf_model.h"
 

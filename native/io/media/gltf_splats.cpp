@@ -7,12 +7,12 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "data/splat_cloud.h"
-#include "io/gltf_splat_names.h"
+#include "data/clouds/splat_cloud.h"
 #include "io/media/gltf_accessor.h"
 #include "io/media/gltf_model.h"
 #include "io/media/gltf_scene.h"
 #include "io/media/media_calls.h"
+#include "io/splats/gltf_splat_names.h"
 
 namespace stipple::media {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "data/tri_mesh.h"
+#include "data/meshes/tri_mesh.h"
 #include "io/media_table.h"
 
 namespace stipple::media {

@@ -5,12 +5,12 @@
 #include <optional>
 #include <vector>
 
-#include "splat/render_backward.h"
-#include "splat/scene.h"
+#include "splat/render/render_backward.h"
+#include "splat/render/scene.h"
 
 namespace stipple {
 
-/// Some rows of one cloud and their sums over tiles (splat/blend_backward.h).
+/// Some rows of one cloud and their sums over tiles (splat/render/blend_backward.h).
 struct SummedRows {
   const uint32_t* rows;   ///< [count] of the cloud, rising
   const uint32_t* slots;  ///< [count] where the sums of each are

@@ -3,10 +3,10 @@
 
 #include "math/affine.h"
 #include "math/spherical_harmonics_gradient.h"
-#include "splat/blend_backward.h"
 #include "splat/cpu/back_projector.h"
-#include "splat/projection_backward.h"
-#include "splat/scene_backward.h"
+#include "splat/render/blend_backward.h"
+#include "splat/render/projection_backward.h"
+#include "splat/render/scene_backward.h"
 
 namespace stipple {
 

@@ -12,11 +12,11 @@
 #include <type_traits>
 
 #include "math/affine.h"
-#include "splat/blend_backward.h"
 #include "splat/cpu/lanes-inl.h"
 #include "splat/cpu/load_geometry-inl.h"
-#include "splat/projection_backward.h"
-#include "splat/scene_backward.h"
+#include "splat/render/blend_backward.h"
+#include "splat/render/projection_backward.h"
+#include "splat/render/scene_backward.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stipple {
@@ -49,9 +49,9 @@ HWY_INLINE size_t laneCount() {
 
 #include "math/harmonic_basis-inl.h"
 #include "math/harmonic_basis_gradient-inl.h"
-#include "splat/projection_steps-inl.h"
+#include "splat/render/projection_steps-inl.h"
 // After the steps that it takes back.
-#include "splat/projection_backward_steps-inl.h"
+#include "splat/render/projection_backward_steps-inl.h"
 
 template <typename T>
 HWY_INLINE void takeFootprintBack(const View<double>& view, const Mat3d& linear, const T* centre,

@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "base/parallel.h"
-#include "splat/cpu/tile_spans.h"
+#include "splat/cpu/tiles/tile_spans.h"
 
 namespace stipple {
 

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "splat/blend_backward.h"
 #include "splat/cpu/reused_array.h"
-#include "splat/cpu/tile_lists.h"
+#include "splat/cpu/tiles/tile_lists.h"
+#include "splat/render/blend_backward.h"
 
 namespace stipple {
 

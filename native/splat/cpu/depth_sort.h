@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "splat/scene.h"
+#include "splat/render/scene.h"
 
 namespace stipple {
 

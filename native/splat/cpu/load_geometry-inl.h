@@ -10,9 +10,9 @@
 
 #include <hwy/highway.h>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 #include "splat/cpu/lanes-inl.h"
-#include "splat/projection.h"
+#include "splat/render/projection.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stipple {

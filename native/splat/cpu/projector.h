@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "splat/cpu/depth_sort.h"
-#include "splat/cpu/tile_grid.h"
-#include "splat/scene.h"
+#include "splat/cpu/tiles/tile_grid.h"
+#include "splat/render/scene.h"
 
 namespace stipple {
 

@@ -1,6 +1,6 @@
 #include "splat/cpu/projector.h"
 
-// Lanes are splats, in double: the steps of splat/projection.h on a vector type, so every lane gets
+// Lanes are splats, in double: the steps of splat/render/projection.h on a vector type, so every lane gets
 // the bits of the scalar code (no fused products). Harmonics go in float: their basis with lanes =
 // splats, their sums with lanes = colours.
 
@@ -30,13 +30,13 @@ constexpr size_t kMaxLanes = 8;
 constexpr size_t kPrefetchGroups = 6;  // of lanes: 2 to 6 KB ahead
 
 #include "math/harmonic_basis-inl.h"
-#include "splat/projection_steps-inl.h"
+#include "splat/render/projection_steps-inl.h"
 
 HWY_INLINE Double wholePart(Double value) {
   return Double(hn::Trunc(value.v));
 }
 
-#include "splat/cpu/tile_span_steps-inl.h"
+#include "splat/cpu/tiles/tile_span_steps-inl.h"
 
 using Word = hn::Rebind<uint64_t, Doubles>;
 

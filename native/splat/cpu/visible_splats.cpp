@@ -4,8 +4,8 @@
 #include <functional>
 
 #include "base/parallel.h"
-#include "splat/cpu/tiled_render.h"
-#include "splat/object_order.h"
+#include "splat/cpu/tiles/tiled_render.h"
+#include "splat/render/object_order.h"
 
 namespace stipple {
 

@@ -7,7 +7,7 @@
 #include "base/progress.h"
 #include "splat/cpu/projector.h"
 #include "splat/cpu/reused_array.h"
-#include "splat/scene.h"
+#include "splat/render/scene.h"
 
 namespace stipple {
 

@@ -1,4 +1,4 @@
-#include "data/cloud_columns.h"
+#include "data/clouds/cloud_columns.h"
 
 #include <gtest/gtest.h>
 

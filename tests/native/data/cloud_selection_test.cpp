@@ -1,4 +1,4 @@
-#include "data/cloud_selection.h"
+#include "data/clouds/cloud_selection.h"
 
 #include <gtest/gtest.h>
 

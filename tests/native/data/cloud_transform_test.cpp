@@ -1,4 +1,4 @@
-#include "data/cloud_transform.h"
+#include "data/clouds/cloud_transform.h"
 
 #include <gtest/gtest.h>
 

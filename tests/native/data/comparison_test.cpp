@@ -4,9 +4,9 @@
 #include <limits>
 
 #include "base/error.h"
-#include "data/cloud_comparison.h"
-#include "data/image_comparison.h"
-#include "data/splat_frame.h"
+#include "data/clouds/cloud_comparison.h"
+#include "data/clouds/splat_frame.h"
+#include "data/images/image_comparison.h"
 
 namespace stipple {
 namespace {

@@ -1,8 +1,8 @@
-#include "data/packed_picture.h"
+#include "data/views/packed_picture.h"
 
 #include <gtest/gtest.h>
 
-#include "data/memory_view_source.h"
+#include "data/views/memory_view_source.h"
 
 namespace stipple {
 namespace {

@@ -1,4 +1,4 @@
-#include "data/splat_colour.h"
+#include "data/clouds/splat_colour.h"
 
 #include <gtest/gtest.h>
 

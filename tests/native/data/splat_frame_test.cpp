@@ -1,4 +1,4 @@
-#include "data/splat_frame.h"
+#include "data/clouds/splat_frame.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 #include "math/quaternion.h"
 #include "math/spherical_harmonics.h"
 

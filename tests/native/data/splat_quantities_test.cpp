@@ -1,4 +1,4 @@
-#include "data/splat_quantities.h"
+#include "data/clouds/splat_quantities.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "data/tri_mesh.h"
+#include "data/meshes/tri_mesh.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "data/view_resample.h"
+#include "data/views/view_resample.h"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "base/error.h"
-#include "data/memory_view_source.h"
-#include "data/view_check.h"
+#include "data/views/memory_view_source.h"
+#include "data/views/view_check.h"
 
 namespace stipple {
 namespace {

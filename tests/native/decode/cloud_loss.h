@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 
 namespace stipple {
 

@@ -1,4 +1,4 @@
-#include "decode/contraction.h"
+#include "decode/field/contraction.h"
 
 #include <gtest/gtest.h>
 

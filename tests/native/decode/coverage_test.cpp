@@ -6,9 +6,9 @@
 #include <cstdio>
 
 #include "decode/silhouette.h"
-#include "decode/surface_model.h"
+#include "decode/surface/surface_model.h"
 #include "decode/test_meshes.h"
-#include "splat/render.h"
+#include "splat/render/render.h"
 
 namespace stipple {
 namespace {

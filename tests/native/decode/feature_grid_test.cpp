@@ -1,4 +1,4 @@
-#include "decode/feature_grid.h"
+#include "decode/field/feature_grid.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "decode/field_decoder.h"
+#include "decode/field/field_decoder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include "base/random.h"
 #include "decode/anchor_spacing.h"
 #include "decode/cloud_loss.h"
-#include "decode/field_tensors.h"
+#include "decode/field/field_tensors.h"
 
 namespace stipple {
 namespace {

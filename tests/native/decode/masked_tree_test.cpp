@@ -1,4 +1,4 @@
-#include "decode/masked_tree.h"
+#include "decode/tree/masked_tree.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "data/cloud_selection.h"
-#include "decode/hierarchy_decoder.h"
+#include "data/clouds/cloud_selection.h"
+#include "decode/tree/hierarchy_decoder.h"
 #include "splat/random_scene.h"
 
 namespace stipple {

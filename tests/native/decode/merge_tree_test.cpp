@@ -1,4 +1,4 @@
-#include "decode/merge_tree.h"
+#include "decode/tree/merge_tree.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "decode/hierarchy_decoder.h"
-#include "decode/merge_cost.h"
-#include "decode/merge_node.h"
 #include "decode/test_clouds.h"
+#include "decode/tree/hierarchy_decoder.h"
+#include "decode/tree/merge_cost.h"
+#include "decode/tree/merge_node.h"
 #include "math/covariance.h"
 
 namespace stipple {

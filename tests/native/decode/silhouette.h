@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "data/tri_mesh.h"
+#include "data/meshes/tri_mesh.h"
 #include "math/camera.h"
 #include "math/vec.h"
 

@@ -1,4 +1,4 @@
-#include "decode/surface_decoder.h"
+#include "decode/surface/surface_decoder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "decode/surface_model.h"
+#include "decode/surface/surface_model.h"
 #include "decode/test_meshes.h"
 #include "math/colour.h"
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <string>
 
-#include "data/tri_mesh.h"
+#include "data/meshes/tri_mesh.h"
 #include "math/vec.h"
 
 namespace stipple::test {

@@ -1,4 +1,4 @@
-#include "densify/absolute.h"
+#include "densify/strategies/absolute.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

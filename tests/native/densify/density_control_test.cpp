@@ -3,10 +3,10 @@
 
 #include <string>
 
-#include "densify/adaptive.h"
 #include "densify/control_part.h"
 #include "densify/control_scene.h"
 #include "densify/strategies.h"
+#include "densify/strategies/adaptive.h"
 
 namespace stipple {
 namespace {

@@ -1,4 +1,4 @@
-#include "densify/direction.h"
+#include "densify/strategies/direction.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

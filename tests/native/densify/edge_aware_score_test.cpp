@@ -1,11 +1,11 @@
-#include "densify/edge_aware_score.h"
+#include "densify/parts/edge_aware_score.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/parallel.h"
 #include "densify/control_scene.h"
-#include "densify/edge_weights.h"
+#include "densify/quantities/edge_weights.h"
 #include "densify/strategies.h"
 
 namespace stipple {

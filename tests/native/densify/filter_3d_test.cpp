@@ -1,4 +1,4 @@
-#include "densify/filter_3d.h"
+#include "densify/parts/filter_3d.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "densify/frequency.h"
+#include "densify/strategies/frequency.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,10 +9,10 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "densify/control_cases.h"
-#include "densify/density_scale.h"
 #include "densify/known_views.h"
-#include "densify/local_radius.h"
-#include "densify/view_confidence.h"
+#include "densify/parts/density_scale.h"
+#include "densify/quantities/local_radius.h"
+#include "densify/quantities/view_confidence.h"
 
 namespace stipple {
 namespace {

@@ -1,4 +1,4 @@
-#include "densify/growth_control.h"
+#include "densify/parts/growth_control.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "densify/improved.h"
+#include "densify/strategies/improved.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

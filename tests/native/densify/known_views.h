@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "densify/error_maps.h"
+#include "densify/quantities/error_maps.h"
 #include "densify/strategy.h"
 
 // Views whose pictures and statistics a test sets.

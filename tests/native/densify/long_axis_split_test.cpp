@@ -1,4 +1,4 @@
-#include "densify/long_axis_split.h"
+#include "densify/parts/long_axis_split.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <random>
 
 #include "densify/control_scene.h"
-#include "densify/opacity_forms.h"
+#include "densify/quantities/opacity_forms.h"
 #include "densify/strategies.h"
 #include "math/quaternion.h"
 

@@ -1,4 +1,4 @@
-#include "densify/mcmc.h"
+#include "densify/strategies/mcmc.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "densify/control_cases.h"
-#include "densify/relocation.h"
+#include "densify/parts/relocation.h"
 #include "math/covariance.h"
 
 namespace stipple {

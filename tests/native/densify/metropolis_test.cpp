@@ -1,4 +1,4 @@
-#include "densify/metropolis.h"
+#include "densify/strategies/metropolis.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "densify/multi_step_update.h"
+#include "densify/parts/multi_step_update.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "densify/opacity_correction.h"
+#include "densify/parts/opacity_correction.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "densify/control_scene.h"
-#include "densify/opacity_forms.h"
+#include "densify/quantities/opacity_forms.h"
 #include "densify/strategies.h"
 
 namespace stipple {

@@ -1,4 +1,4 @@
-#include "densify/recovery_pruning.h"
+#include "densify/parts/recovery_pruning.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "densify/relocation.h"
+#include "densify/parts/relocation.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "densify/revised.h"
+#include "densify/strategies/revised.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "base/parallel.h"
 #include "control_scene.h"
-#include "densify/opacity_forms.h"
+#include "densify/quantities/opacity_forms.h"
 #include "densify/strategies.h"
 
 namespace stipple {

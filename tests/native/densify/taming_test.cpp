@@ -1,4 +1,4 @@
-#include "densify/taming.h"
+#include "densify/strategies/taming.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -6,10 +6,10 @@
 
 #include "base/parallel.h"
 #include "densify/control_cases.h"
-#include "densify/error_maps.h"
 #include "densify/known_views.h"
-#include "densify/splat_footprint.h"
-#include "densify/voxel_counts.h"
+#include "densify/quantities/error_maps.h"
+#include "densify/quantities/splat_footprint.h"
+#include "densify/quantities/voxel_counts.h"
 #include "math/covariance.h"
 
 namespace stipple {

@@ -1,4 +1,4 @@
-#include "densify/volumetric.h"
+#include "densify/strategies/volumetric.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "io/sog_levels.h"
-#include "io/splat_file.h"
+#include "io/splats/sog_levels.h"
+#include "io/splats/splat_file.h"
 #include "ksplat_builder.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"

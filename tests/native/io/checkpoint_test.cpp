@@ -1,10 +1,10 @@
-#include "io/checkpoint.h"
+#include "io/assets/checkpoint.h"
 
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 
-#include "io/asset_header.h"
-#include "io/safetensors.h"
+#include "io/assets/asset_header.h"
+#include "io/bytes/safetensors.h"
 #include "scratch_folder.h"
 
 namespace stipple {

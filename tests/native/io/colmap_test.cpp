@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "io/camera_file.h"
+#include "io/views/camera_file.h"
 #include "scratch_folder.h"
 
 namespace stipple {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "byte_text.h"
-#include "io/ply_compressed.h"
-#include "io/splat_file.h"
+#include "io/splats/ply/ply_compressed.h"
+#include "io/splats/splat_file.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
 

@@ -1,4 +1,4 @@
-#include "io/compression.h"
+#include "io/bytes/compression.h"
 
 #include <gtest/gtest.h>
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "byte_text.h"
-#include "io/dataset.h"
 #include "io/image_file.h"
+#include "io/views/dataset.h"
 #include "scratch_folder.h"
 
 namespace stipple {

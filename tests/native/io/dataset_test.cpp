@@ -1,4 +1,4 @@
-#include "io/dataset.h"
+#include "io/views/dataset.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <limits>
 #include <thread>
 
-#include "data/view_check.h"
+#include "data/views/view_check.h"
 #include "dataset_scene.h"
 
 namespace stipple {

@@ -1,4 +1,4 @@
-#include "io/field_asset.h"
+#include "io/assets/field_asset.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "io/fit_report.h"
+#include "io/reports/fit_report.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "io/accuracy_file.h"
-#include "io/svg_plot.h"
+#include "io/reports/accuracy_file.h"
+#include "plot/svg_plot.h"
 #include "scratch_folder.h"
 
 namespace stipple {

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "data/cloud_transform.h"
+#include "data/clouds/cloud_transform.h"
 #include "glb_builder.h"
 #include "io/mesh_file.h"
-#include "io/splat_file.h"
+#include "io/splats/splat_file.h"
 #include "math/colour.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"

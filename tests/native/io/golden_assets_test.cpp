@@ -5,9 +5,9 @@
 #include <cmath>
 #include <string>
 
-#include "io/field_asset.h"
-#include "io/hierarchy_asset.h"
-#include "io/surface_asset.h"
+#include "io/assets/field_asset.h"
+#include "io/assets/hierarchy_asset.h"
+#include "io/assets/surface_asset.h"
 #include "scratch_folder.h"
 
 namespace stipple {

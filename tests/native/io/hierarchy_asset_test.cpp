@@ -1,4 +1,4 @@
-#include "io/hierarchy_asset.h"
+#include "io/assets/hierarchy_asset.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "io/asset_header.h"
+#include "io/assets/asset_header.h"
 #include "scratch_folder.h"
 
 namespace stipple {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "io/splat_file.h"
+#include "io/splats/splat_file.h"
 #include "ksplat_builder.h"
 #include "scratch_folder.h"
 

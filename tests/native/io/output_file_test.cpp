@@ -1,4 +1,4 @@
-#include "io/output_file.h"
+#include "io/bytes/output_file.h"
 
 #include <gtest/gtest.h>
 #include <sys/mount.h>

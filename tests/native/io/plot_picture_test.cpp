@@ -1,4 +1,4 @@
-#include "io/plot_picture.h"
+#include "plot/plot_picture.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "io/stroke_font.h"
+#include "plot/stroke_font.h"
 #include "scratch_folder.h"
 
 namespace stipple {

@@ -1,5 +1,5 @@
 // Bits of a compressed PLY to float32, on every instruction set.
-#include "io/ply_compressed_kernel.h"
+#include "io/splats/ply/ply_compressed_kernel.h"
 
 #include <gtest/gtest.h>
 

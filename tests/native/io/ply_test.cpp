@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "io/splat_file.h"
+#include "io/splats/splat_file.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
 

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <random>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 
 namespace stipple {
 

@@ -1,4 +1,4 @@
-#include "io/sog_levels.h"
+#include "io/splats/sog_levels.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "io/sog_file.h"
-#include "io/splat_file.h"
+#include "io/splats/sog_file.h"
+#include "io/splats/splat_file.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
 

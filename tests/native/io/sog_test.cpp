@@ -6,8 +6,8 @@
 #include <map>
 
 #include "base/parallel.h"
-#include "io/sog_file.h"
-#include "io/splat_file.h"
+#include "io/splats/sog_file.h"
+#include "io/splats/splat_file.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
 #include "sog_scene.h"

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "base/parallel.h"
-#include "io/splat_file.h"
+#include "io/splats/splat_file.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
 

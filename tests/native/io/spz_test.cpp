@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "byte_text.h"
-#include "data/cloud_comparison.h"
-#include "io/splat_file.h"
+#include "data/clouds/cloud_comparison.h"
+#include "io/splats/splat_file.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
 

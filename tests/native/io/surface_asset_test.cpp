@@ -1,4 +1,4 @@
-#include "io/surface_asset.h"
+#include "io/assets/surface_asset.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-#include "io/safetensors.h"
+#include "io/bytes/safetensors.h"
 #include "scratch_folder.h"
 
 namespace stipple {

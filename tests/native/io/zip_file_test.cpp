@@ -1,4 +1,4 @@
-#include "io/zip_file.h"
+#include "io/bytes/zip_file.h"
 
 #include <gtest/gtest.h>
 

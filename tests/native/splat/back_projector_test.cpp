@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "splat/backward_cases.h"
-#include "splat/blend_backward.h"
 #include "splat/projection_backward_matrices.h"
+#include "splat/render/blend_backward.h"
 
 // Derivatives of single splats: every instruction set must give the bits of the scalar code, and
 // that the numbers of the same derivation in another notation and long double.

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "splat/random_scene.h"
-#include "splat/render_backward.h"
+#include "splat/render/render_backward.h"
 
 namespace stipple::testing {
 

@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
-#include "splat/cpu/tiled_backward.h"
+#include "splat/cpu/tiles/tiled_backward.h"
 
 // Every derivative is judged by central differences of the double reference. Their step is 1e-5 of
 // the value's size: the second-order error is then about 1e-10, and rounding of the loss (1e-15 of

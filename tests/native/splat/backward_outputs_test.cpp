@@ -4,8 +4,8 @@
 
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
-#include "splat/cpu/tile_kernel_backward.h"
-#include "splat/cpu/tiled_backward.h"
+#include "splat/cpu/tiles/tile_kernel_backward.h"
+#include "splat/cpu/tiles/tiled_backward.h"
 
 // Every number that the backward pass gives, in each of its modes: the same bits for any number of
 // threads, and the same on every instruction set up to rounding.

@@ -6,8 +6,8 @@
 
 #include "base/error.h"
 #include "splat/backward_cases.h"
-#include "splat/cpu/tile_kernel_backward.h"
-#include "splat/cpu/tiled_backward.h"
+#include "splat/cpu/tiles/tile_kernel_backward.h"
+#include "splat/cpu/tiles/tiled_backward.h"
 #include "splat/reference_backward.h"
 
 // Contributions are judged by rendering the double reference again without the splat, statistics by

@@ -5,7 +5,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
-#include "splat/cpu/tiled_render.h"
+#include "splat/cpu/tiles/tiled_render.h"
 
 // Going backward from the picture that was drawn, as a step of training does.
 

@@ -1,11 +1,11 @@
-#include "splat/cloud_merge.h"
+#include "splat/edit/cloud_merge.h"
 
 #include <gtest/gtest.h>
 
 #include <string>
 
 #include "base/error.h"
-#include "data/cloud_transform.h"
+#include "data/clouds/cloud_transform.h"
 #include "splat/random_scene.h"
 
 namespace stipple {

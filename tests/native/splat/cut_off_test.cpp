@@ -4,11 +4,11 @@
 #include <limits>
 
 #include "base/error.h"
-#include "splat/accurate_render.h"
 #include "splat/cpu/projector.h"
-#include "splat/cpu/tile.h"
-#include "splat/cpu/tiled_render.h"
+#include "splat/cpu/tiles/tile.h"
+#include "splat/cpu/tiles/tiled_render.h"
 #include "splat/random_scene.h"
+#include "splat/render/accurate_render.h"
 
 // Cut-offs other than 1/255 in the tiled renderer, against the definition in double.
 

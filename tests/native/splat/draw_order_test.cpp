@@ -1,4 +1,4 @@
-#include "splat/draw_order.h"
+#include "splat/render/draw_order.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 #include "math/colour.h"
 #include "splat/cpu/visible_splats.h"
 #include "splat/random_scene.h"
-#include "splat/scene.h"
+#include "splat/render/scene.h"
 
 namespace stipple {
 namespace {

@@ -9,9 +9,9 @@
 #include "base/parallel.h"
 #include "math/covariance.h"
 #include "math/spherical_harmonics.h"
-#include "splat/effects_plan.h"
-#include "splat/effects_survey.h"
 #include "splat/random_scene.h"
+#include "splat/render/effects_plan.h"
+#include "splat/render/effects_survey.h"
 
 // What splats say about the effects that a picture needs: the affine bound against points on
 // ellipsoids, the rest against closed forms of single splats; and the plan's decisions.

@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "splat/cloud_merge.h"
 #include "splat/cpu/projector.h"
-#include "splat/cpu/tiled_render.h"
+#include "splat/cpu/tiles/tiled_render.h"
+#include "splat/edit/cloud_merge.h"
 #include "splat/random_scene.h"
-#include "splat/voxelize.h"
+#include "splat/voxels/voxelize.h"
 
 // A graded instance must look like the cloud with the grade in its harmonics.
 

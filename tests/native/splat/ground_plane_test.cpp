@@ -1,4 +1,4 @@
-#include "splat/ground_plane.h"
+#include "splat/edit/ground_plane.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "splat/cpu/tiled_render.h"
+#include "splat/cpu/tiles/tiled_render.h"
 #include "splat/random_scene.h"
 
 // Splats, and parts of surfaces, that hide what is behind them and show nothing: closed forms of

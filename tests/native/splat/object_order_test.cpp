@@ -1,4 +1,4 @@
-#include "splat/object_order.h"
+#include "splat/render/object_order.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,9 +10,9 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "splat/accurate_render.h"
-#include "splat/cpu/ray_tiles.h"
+#include "splat/cpu/rays/ray_tiles.h"
 #include "splat/random_scene.h"
+#include "splat/render/accurate_render.h"
 
 // Objects that are drawn one after the other: brute force composites the picture of each in double.
 

@@ -5,8 +5,8 @@
 
 #include "base/parallel.h"
 #include "splat/random_scene.h"
-#include "splat/ray_render.h"
-#include "splat/render.h"
+#include "splat/render/ray_render.h"
+#include "splat/render/render.h"
 
 // Normal and object passes: closed forms of one and two splats, and the tiled renderer against the
 // double reference.

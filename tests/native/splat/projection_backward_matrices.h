@@ -5,9 +5,9 @@
 
 #include "math/quaternion_gradient.h"
 #include "math/spherical_harmonics_gradient.h"
-#include "splat/projection.h"
-#include "splat/scene.h"
-#include "splat/scene_backward.h"
+#include "splat/render/projection.h"
+#include "splat/render/scene.h"
+#include "splat/render/scene_backward.h"
 
 // Projection and colours of a splat taken back with matrices, one splat at a time: what the steps
 // of splat/cpu/back_projector-inl.h must give, derived in another notation.

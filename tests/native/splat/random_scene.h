@@ -4,9 +4,9 @@
 #include <random>
 #include <vector>
 
-#include "data/splat_cloud.h"
+#include "data/clouds/splat_cloud.h"
 #include "math/camera.h"
-#include "splat/render.h"
+#include "splat/render/render.h"
 
 namespace stipple::testing {
 

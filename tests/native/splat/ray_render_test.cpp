@@ -1,4 +1,4 @@
-#include "splat/ray_render.h"
+#include "splat/render/ray_render.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "base/parallel.h"
 #include "math/covariance.h"
 #include "splat/random_scene.h"
-#include "splat/ray_splats.h"
+#include "splat/render/ray_splats.h"
 
 // Splats along rays: closed forms of one and two splats, brute force over all of them, agreement
 // with the affine projection where that is right.

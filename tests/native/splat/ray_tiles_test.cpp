@@ -1,4 +1,4 @@
-#include "splat/cpu/ray_tiles.h"
+#include "splat/cpu/rays/ray_tiles.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "splat/accurate_render.h"
 #include "splat/random_scene.h"
+#include "splat/render/accurate_render.h"
 
 // Rays in single precision, judged against the same rays in double, on every instruction set; and
 // the affine picture with its depth behind each pixel, judged against the reference.

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "splat/blend_backward.h"
 #include "splat/projection_backward_matrices.h"
-#include "splat/render_backward.h"
+#include "splat/render/blend_backward.h"
+#include "splat/render/render_backward.h"
 
 // One cloud backwards in double: no tiles, no lists, no SIMD. It judges how the tiled pass decides
 // and adds; the formulas that both share are judged by differences.

@@ -3,10 +3,10 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "data/cloud_transform.h"
+#include "data/clouds/cloud_transform.h"
 #include "math/colour.h"
-#include "splat/projection.h"
 #include "splat/random_scene.h"
+#include "splat/render/projection.h"
 
 namespace stipple {
 namespace {

@@ -1,4 +1,4 @@
-#include "splat/sampled_render.h"
+#include "splat/render/sampled_render.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/random_scene.h"
-#include "splat/ray_render.h"
-#include "splat/ray_splats.h"
+#include "splat/render/ray_render.h"
+#include "splat/render/ray_splats.h"
 
 // Depth of field and motion blur: closed forms of a point out of focus and of one that moves, brute
 // force over lens and time in double with rays of its own, and how the error falls with samples.

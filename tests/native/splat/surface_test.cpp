@@ -1,4 +1,4 @@
-#include "splat/surface.h"
+#include "splat/render/surface.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "splat/cpu/tiled_render.h"
+#include "splat/cpu/tiles/tiled_render.h"
 #include "splat/random_scene.h"
 
 // A surface among the splats: closed forms of one splat before and one behind it, then the tiled

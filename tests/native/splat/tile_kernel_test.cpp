@@ -1,4 +1,4 @@
-#include "splat/cpu/tile_kernel.h"
+#include "splat/cpu/tiles/tile_kernel.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 #include <string>
 
 #include "base/error.h"
-#include "splat/cpu/tile_kernel_backward.h"
-#include "splat/cpu/tile_splats.h"
+#include "splat/cpu/tiles/tile_kernel_backward.h"
+#include "splat/cpu/tiles/tile_splats.h"
 
 namespace stipple {
 namespace {

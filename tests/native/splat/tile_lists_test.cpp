@@ -1,4 +1,4 @@
-#include "splat/cpu/tile_lists.h"
+#include "splat/cpu/tiles/tile_lists.h"
 
 #include <gtest/gtest.h>
 

@@ -4,9 +4,9 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "splat/cpu/tiled_render.h"
-#include "splat/projection.h"
+#include "splat/cpu/tiles/tiled_render.h"
 #include "splat/random_scene.h"
+#include "splat/render/projection.h"
 
 namespace stipple {
 namespace {

@@ -1,4 +1,4 @@
-#include "splat/volume_sides.h"
+#include "splat/voxels/volume_sides.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "math/colour.h"
 #include "splat/random_scene.h"
-#include "splat/voxelize.h"
+#include "splat/voxels/voxelize.h"
 
 // Sides of volumes against closed forms, and how they fall with the voxel size.
 

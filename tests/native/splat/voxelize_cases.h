@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "splat/volume_probe.h"
-#include "splat/voxelize.h"
+#include "splat/voxels/voxelize.h"
 
 namespace stipple {
 

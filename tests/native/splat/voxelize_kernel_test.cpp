@@ -1,4 +1,4 @@
-#include "splat/voxelize_kernel.h"
+#include "splat/voxels/voxelize_kernel.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "splat/voxelize_cases.h"
-#include "splat/voxelize_splat.h"
+#include "splat/voxels/voxelize_splat.h"
 
 namespace stipple {
 namespace {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "splat/volume_probe.h"
-#include "splat/voxelize.h"
 #include "splat/voxelize_cases.h"
-#include "splat/voxelize_splat.h"
+#include "splat/voxels/voxelize.h"
+#include "splat/voxels/voxelize_splat.h"
 
 namespace stipple {
 namespace {

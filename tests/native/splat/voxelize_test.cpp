@@ -1,4 +1,4 @@
-#include "splat/voxelize.h"
+#include "splat/voxels/voxelize.h"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@
 #include "math/colour.h"
 #include "splat/volume_probe.h"
 #include "splat/voxelize_cases.h"
-#include "splat/voxelize_polylog.h"
+#include "splat/voxels/voxelize_polylog.h"
 
 namespace stipple {
 namespace {

@@ -8,8 +8,8 @@
 #include "base/parallel.h"
 #include "math/cross_product.h"
 #include "splat/random_scene.h"
-#include "splat/ray_render.h"
-#include "splat/ray_splats.h"
+#include "splat/render/ray_render.h"
+#include "splat/render/ray_splats.h"
 
 // Panoramas and fisheyes: closed forms of round splats in every direction, brute force without
 // tiles, and perspective pictures of the same directions.

@@ -1,4 +1,4 @@
-#include "train/adam.h"
+#include "train/optimiser/adam.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "train/adam_kernel.h"
 #include "train/allocation_count.h"
+#include "train/optimiser/adam_kernel.h"
 
 namespace stipple {
 namespace {

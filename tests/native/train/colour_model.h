@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "base/error.h"
-#include "data/memory_view_source.h"
-#include "train/fit_model.h"
+#include "data/views/memory_view_source.h"
+#include "train/loop/fit_model.h"
 
 namespace stipple::testing {
 

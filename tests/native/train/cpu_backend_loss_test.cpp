@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "train/backend_case.h"
-#include "train/render_backend.h"
+#include "train/loop/render_backend.h"
 
 // What the backend adds to the loss of a picture, and parameters of another kind.
 

@@ -11,7 +11,7 @@
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
 #include "train/backend_case.h"
-#include "train/render_backend.h"
+#include "train/loop/render_backend.h"
 
 namespace stipple {
 namespace {

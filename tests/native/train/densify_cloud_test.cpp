@@ -1,4 +1,4 @@
-#include "train/densify_cloud.h"
+#include "train/loop/densify_cloud.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "train/explicit_model.h"
+#include "train/loop/explicit_model.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

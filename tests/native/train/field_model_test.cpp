@@ -1,4 +1,4 @@
-#include "train/field_model.h"
+#include "train/loop/field_model.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,8 +12,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "decode/field_decoder.h"
-#include "decode/field_tensors.h"
+#include "decode/field/field_decoder.h"
+#include "decode/field/field_tensors.h"
 #include "train/toy_views.h"
 
 namespace stipple {

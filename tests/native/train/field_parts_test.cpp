@@ -12,13 +12,13 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "decode/anchor_spacing.h"
-#include "decode/contraction.h"
+#include "decode/field/contraction.h"
 #include "math/morton.h"
-#include "train/field_regularisers.h"
-#include "train/scene_prior.h"
-#include "train/sparse_adam.h"
+#include "train/optimiser/field_regularisers.h"
+#include "train/optimiser/sparse_adam.h"
+#include "train/prior/scene_prior.h"
+#include "train/prior/visual_hull.h"
 #include "train/toy_views.h"
-#include "train/visual_hull.h"
 
 namespace stipple {
 namespace {

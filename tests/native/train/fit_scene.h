@@ -5,10 +5,10 @@
 #include <memory>
 #include <vector>
 
-#include "data/memory_view_source.h"
+#include "data/views/memory_view_source.h"
 #include "splat/random_scene.h"
-#include "splat/render.h"
-#include "train/fit_model.h"
+#include "splat/render/render.h"
+#include "train/loop/fit_model.h"
 
 // A cloud that is known, seen from around: what a fit shall find.
 

@@ -1,4 +1,4 @@
-#include "train/image_loss.h"
+#include "train/optimiser/image_loss.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "train/allocation_count.h"
-#include "train/image_loss_kernel.h"
 #include "train/loss_reference.h"
+#include "train/optimiser/image_loss_kernel.h"
 
 namespace stipple {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "train/adam_kernel.h"
-#include "train/image_loss_kernel.h"
+#include "train/optimiser/adam_kernel.h"
+#include "train/optimiser/image_loss_kernel.h"
 
 namespace stipple {
 namespace {

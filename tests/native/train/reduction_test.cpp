@@ -6,14 +6,14 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "data/cloud_extent.h"
-#include "splat/projection.h"
-#include "splat/render.h"
-#include "splat/render_backward.h"
+#include "data/clouds/cloud_extent.h"
+#include "splat/render/projection.h"
+#include "splat/render/render.h"
+#include "splat/render/render_backward.h"
 #include "train/allocation_count.h"
-#include "train/refine.h"
-#include "train/view_rig.h"
-#include "train/visibility.h"
+#include "train/loop/refine.h"
+#include "train/loop/view_rig.h"
+#include "train/loop/visibility.h"
 
 namespace stipple {
 namespace {

@@ -1,4 +1,4 @@
-#include "train/silhouette.h"
+#include "train/prior/silhouette.h"
 
 #include <gtest/gtest.h>
 

@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "data/memory_view_source.h"
+#include "data/views/memory_view_source.h"
 #include "train/fit_scene.h"
-#include "train/shared_volume.h"
+#include "train/prior/shared_volume.h"
 
 // A scene that has a formula, without points and depth.
 

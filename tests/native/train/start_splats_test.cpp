@@ -1,4 +1,4 @@
-#include "train/start_splats.h"
+#include "train/prior/start_splats.h"
 
 #include <gtest/gtest.h>
 

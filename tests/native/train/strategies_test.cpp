@@ -6,11 +6,11 @@
 
 #include "base/parallel.h"
 #include "densify/strategies.h"
-#include "splat/render_backward.h"
-#include "train/explicit_model.h"
+#include "splat/render/render_backward.h"
 #include "train/fit_scene.h"
-#include "train/picture_store.h"
-#include "train/view_evaluator.h"
+#include "train/loop/explicit_model.h"
+#include "train/loop/picture_store.h"
+#include "train/loop/view_evaluator.h"
 
 namespace stipple {
 namespace {

@@ -1,4 +1,4 @@
-#include "train/swept_points.h"
+#include "train/prior/swept_points.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/random.h"
-#include "data/memory_view_source.h"
-#include "splat/render.h"
+#include "data/views/memory_view_source.h"
+#include "splat/render/render.h"
 
 namespace stipple {
 

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fits: what they are asked, the views they learn from, what they report."""

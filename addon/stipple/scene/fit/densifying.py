@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Density control of an object's splats with views of the scene or photographs."""
+
+import numpy as np
+
+from ...binding.densify import densify_start
+from ...binding.errors import invalid
+from ...binding.model import Model
+from .. import meshes
+from ..source import placement
+from .view_task import VIEWS_END, ViewTask
+
+# Share of the whole in the progress bar until the splats are there; then comes their tree.
+_SPLATS_END = 0.8
+# Of a matrix that turns, moves and scales alike: how far its axes may be from that, relative.
+_EVENNESS = 1e-4
+
+
+class DensifyTask(ViewTask):
+    """Result: (model of the tree, cloud)."""
+
+    def __init__(self, context, objects, settings, obj, cloud, chosen):
+        """chosen: options of densify_start by name."""
+        super().__init__(context, objects, settings)
+        self.colour_space = cloud.info().colour_space
+        self._cloud, self._chosen = cloud, chosen
+        self._matrix = placement.matrix_of(obj)
+        self._scale = _even_scale(self._matrix, obj.name)
+
+    def _add_points(self, _views):
+        """None: splats are there. But something must be seen."""
+        if not meshes.source_objects(self._objects):
+            raise invalid('There is no mesh to take views of; select one, show one, or choose a data set.')
+        return iter(())
+
+    def _add_view(self, views, seen, name):
+        views.add(self._placed(seen.camera), seen.linear, name=name)
+
+    def _placed(self, camera):
+        """The same picture, seen from the object's own space: its splats keep their numbers."""
+        to_camera = np.array(camera.world_to_camera).reshape(4, 4) @ self._matrix
+        to_camera[:3] /= self._scale
+        for i, value in enumerate(to_camera.ravel()):
+            camera.world_to_camera[i] = value
+        camera.near_plane /= self._scale
+        camera.far_plane /= self._scale
+        return camera
+
+    def _use(self, views):
+        self.job = densify_start(self._native, self._cloud, views, **self._chosen)
+        try:
+            yield from self._until_done(self.job, VIEWS_END, _SPLATS_END)
+            made = self.job.cloud()
+            self.job = Model.from_cloud_start(self._native, made, seed=self._chosen['seed'])
+            yield from self._until_done(self.job, _SPLATS_END, 1.0)
+            self.result = self.job.model(), made
+        finally:
+            self.job = None
+
+
+def _even_scale(matrix, name):
+    """Of a matrix that turns, moves and scales alike along all axes."""
+    linear = matrix[:3, :3]
+    scale = np.cbrt(np.linalg.det(linear))
+    if scale <= 0 or np.abs(linear @ linear.T / scale ** 2 - np.eye(3)).max() > _EVENNESS:
+        raise invalid(f"'{name}' is scaled unevenly or mirrored; choose Apply Transform first, then its splats and the "
+                      'pictures agree.')
+    return scale

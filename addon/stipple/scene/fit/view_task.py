@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Work on views of the scene, or on photographs: the views first, then what is done with them."""
+
+import time
+
+import bpy
+import numpy as np
+
+from ...binding.errors import CancelledError, StippleError, invalid
+from ...binding.model import DecodeSettings, Model
+from ...binding.structs import ColourSpace, JobState
+from ...binding.views import Views
+from .. import meshes
+from . import view_capture, view_rigs
+from ..source import sources
+from ..view import facts
+
+# Surface samples that a fit of meshes starts from and learns its density on.
+POINT_COUNT = 20_000
+_POLL_SECONDS = 0.02
+# Shares of the whole in the progress bar: until points are known, until views are.
+_POINTS_END, VIEWS_END = 0.05, 0.35
+
+
+class ViewTask:
+    """Polled like a native job, from Blender's main thread: rendering views needs Blender itself.
+
+    A task gives _use(views), a generator of (fraction, stage), and may listen to _advanced, _views_left and _ended.
+    cancel() while views are rendered ends with nothing.
+    """
+
+    colour_space = ColourSpace.DISPLAY  # of the splats that the views are for
+
+    def __init__(self, context, objects, settings):
+        self.result = None
+        self.holds_scene = True  # until the views are rendered nothing may change in Blender
+        self.job = None          # the native job of _use, while it runs
+        self._context, self._objects, self._settings = context, objects, settings
+        self._native = sources.context()
+        self._cancelled, self._error = False, None
+        self._progress = (0.0, 'Preparing')
+        self._steps = self._work()
+
+    def poll(self):
+        """(state, fraction 0..1, stage). Takes one step: a view, or a look at a native job."""
+        if self._steps is not None:
+            try:
+                self._progress = next(self._steps)
+                self._advanced(*self._progress)
+                return (JobState.RUNNING, *self._progress)
+            except StopIteration:
+                pass
+            except StippleError as error:
+                self._error = error
+            self._steps = None
+            self._ended(self._error)
+        if self._error is None:
+            return JobState.DONE, 1.0, self._progress[1]
+        ended = JobState.CANCELLED if isinstance(self._error, CancelledError) else JobState.FAILED
+        return (ended, *self._progress)
+
+    def cancel(self):
+        self._cancelled = True
+        if self.job is not None:
+            self.job.cancel()
+
+    def wait(self):
+        """Until the end; raises what went wrong."""
+        while self.poll()[0] == JobState.RUNNING:
+            if not self.holds_scene:
+                time.sleep(_POLL_SECONDS)
+        if self._error is not None:
+            raise self._error
+
+    def close(self):
+        """Ends at once, with nothing."""
+        self.cancel()
+        if self._steps is not None:
+            self._steps.close()  # puts the scene back
+            self._steps = None
+        self._ended(None)
+
+    def _use(self, views):
+        raise NotImplementedError
+
+    @property
+    def is_running(self):
+        return self._steps is not None
+
+    def _advanced(self, fraction, stage):
+        pass
+
+    def _views_left(self, seconds):
+        """Seconds until all views are rendered, 0 where it is not known."""
+
+    def _ended(self, error):
+        pass
+
+    def _add_view(self, views, seen, name):
+        # No fit looks at normals, and 100 views of 800 x 800 would keep 0.4 GiB of them.
+        views.add(seen.camera, seen.linear, depth=seen.depth, name=name)
+
+    def _work(self):
+        settings = self._settings
+        if settings.views_from == 'DATASET':
+            yield 0.0, 'Reading the data set'
+            if not settings.dataset:
+                raise invalid('No data set is chosen; a folder with COLMAP cameras or a transforms.json is needed.')
+            views = Views.open(self._native, bpy.path.abspath(settings.dataset), settings.downscale)
+        else:
+            views = Views.create(self._native, self.colour_space)
+            yield from self._add_points(views)
+            yield from self._add_views(views)
+        self._check_cancelled()
+        self.holds_scene = False
+        yield from self._use(views)
+
+    def _add_points(self, views):
+        """Samples of the meshes' surfaces: where splats can be."""
+        seen = meshes.source_objects(self._objects)
+        if not seen:
+            raise invalid('There is no mesh to fit splats to; select one, or show one.')
+        depsgraph = self._context.evaluated_depsgraph_get()
+        mesh = meshes.native_mesh(self._native, seen, depsgraph, 'MATERIAL')
+        job = Model.from_mesh_start(self._native, mesh, 0.0, self._settings.seed)
+        yield from self._until_done(job, 0.0, _POINTS_END)
+        cloud = job.model().decode(DecodeSettings(POINT_COUNT, 1, seed=self._settings.seed)).read()
+        views.set_points(cloud.positions, _linear_colours(cloud))
+
+    def _add_views(self, views):
+        settings = self._settings
+        capturing = view_capture.CaptureSettings(settings.engine, settings.view_size, settings.samples,
+                                                 settings.transparent)
+        shots = self._shots()
+        start = time.monotonic()
+        with view_capture.Capture(self._context, self._objects, capturing) as capture:
+            for i, (name, shot) in enumerate(shots):
+                share = i / len(shots)
+                self._views_left((time.monotonic() - start) * (len(shots) / i - 1) if i else 0.0)
+                yield _POINTS_END + (VIEWS_END - _POINTS_END) * share, f'Rendering view {i + 1} of {len(shots)}'
+                self._check_cancelled()
+                is_pose = isinstance(shot, view_rigs.Pose)
+                seen = capture.pose(name, shot) if is_pose else capture.camera(shot)
+                self._add_view(views, seen, name)
+
+    def _shots(self):
+        """[(name, pose or camera object)]."""
+        settings, scene = self._settings, self._context.scene
+        if settings.views_from == 'CAMERAS':
+            cameras = view_capture.scene_cameras(scene)
+            if not cameras:
+                raise invalid('The scene has no perspective or orthographic camera; add cameras, or choose a rig.')
+            return [(camera.name, camera) for camera in cameras]
+        depsgraph = self._context.evaluated_depsgraph_get()
+        bounds = view_rigs.bounds_of(self._objects, depsgraph)
+        rig = settings.rig if settings.rig != 'AUTO' else view_rigs.choose(scene, bounds, depsgraph)
+        place = view_rigs.inside if rig == 'INSIDE' else view_rigs.around
+        poses = place(scene, depsgraph, bounds, settings.view_count, settings.seed)
+        return [(f'view_{i:04d}', pose) for i, pose in enumerate(poses)]
+
+    def _until_done(self, job, start, end):
+        while True:
+            job_state, fraction, stage = job.poll()
+            if job_state != JobState.RUNNING:
+                job.wait()
+                return
+            if self._cancelled and self.holds_scene:
+                job.cancel()
+            yield start + (end - start) * fraction, stage
+
+    def _check_cancelled(self):
+        if self._cancelled:
+            raise CancelledError()
+
+
+def _linear_colours(splats):
+    """Scene linear colours [N,3] of the constant harmonics."""
+    shown = facts.display_colours(splats.sh[:, 0])
+    if splats.colour_space == ColourSpace.LINEAR:
+        return shown.astype(np.float32)
+    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4).astype(np.float32)

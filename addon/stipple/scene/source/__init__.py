@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where splats come from and go to: files, edits, attributes, and keeping them in step."""

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Edits that are stored as masks on sources: which objects can take them, and writing the result."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...binding.cloud import Cloud
+from ...binding.errors import invalid
+from . import masks, sources, splat_data, sync
+
+
+@dataclass
+class Target:
+    """A splat datablock that is being edited, with its source."""
+
+    obj: object         # one of its objects: the one whose matrix counts
+    cloud: Cloud        # the whole source, as in its file
+    mask: np.ndarray    # [N] what stayed before the edit
+
+    def on(self, cloud):
+        """The same with another source of as many splats."""
+        return Target(self.obj, cloud, self.mask)
+
+
+@dataclass
+class Outcome:
+    removed: int = 0
+    kept: int = 0
+
+    def __str__(self):
+        return f'{self.removed:,} splats hidden, {self.kept:,} stay'
+
+
+def selected_splats(context):
+    """Selected splat objects, one for each datablock, the active one first."""
+    found, active = {}, context.view_layer.objects.active
+    for obj in sorted(context.view_layer.objects.selected, key=lambda o: o != active):
+        if splat_data.is_splat_object(obj):
+            found.setdefault(obj.data.name_full, obj)
+    return list(found.values())
+
+
+def targets(objects):
+    """Each object with its source. Errors: StippleError for none, and for one that cannot take a mask."""
+    if not objects:
+        raise invalid('No splat object is selected; select at least one.')
+    for obj in objects:
+        _check(obj)
+    found = []
+    for obj in objects:
+        cloud = _source_of(obj)
+        mask = masks.read(obj.data)
+        count = cloud.info().count
+        found.append(Target(obj, cloud, np.ones(count, np.uint8) if mask is None else mask))
+        if len(found[-1].mask) != count:
+            raise invalid(f"'{obj.name}' has a mask of {len(found[-1].mask):,} splats; its source has {count:,}. Clear "
+                          'the mask first.')
+    return found
+
+
+def spread(mask, chosen):
+    """A mask of the splats that stayed under another one, as a mask of all."""
+    result = mask.copy()
+    result[mask != 0] = chosen
+    return result
+
+
+def write(edited):
+    """Stores [(target, mask)], each on top of the mask before. Returns what it came to. Undo takes it back."""
+    outcome = Outcome()
+    for target, mask in edited:
+        both = target.mask & mask
+        if not both.any():
+            raise invalid(f"No splat of '{target.obj.name}' would stay; at least one has to.")
+    for target, mask in edited:
+        data = target.obj.data
+        both = target.mask & mask
+        before, after = int(np.count_nonzero(target.mask)), int(np.count_nonzero(both))
+        outcome.removed += before - after
+        outcome.kept += after
+        masks.store(data, both)
+        show(data, target.cloud)
+    return outcome
+
+
+def show(data, cloud=None):
+    """Writes the splats of a datablock anew after its mask has changed. cloud: the whole source, where it is at hand."""
+    settings = sources.decode_settings(data.stipple)
+    if data.stipple.source_kind == 'CLOUD' and cloud is not None:
+        splats = sources.masked(cloud, data)
+    else:
+        splats = sources.decode_data(data, settings)
+    sync.write(data, splats.columns(), sync.written_key(data, settings))
+
+
+def refuse_sequence(obj):
+    """Refuses what can only be done to the splats of one file."""
+    if obj.data.stipple.is_sequence:
+        raise invalid(f"'{obj.name}' is a series of files, and this changes the splats of one; choose Use as New "
+                      'Source first, which keeps the present frame alone.')
+
+
+def _check(obj):
+    data = obj.data
+    if data.library is not None:
+        raise invalid(f"'{obj.name}' is linked from another file; make it local first.")
+    refuse_sequence(obj)
+    if data.stipple.source_kind == 'MODEL':
+        made = 'decoded from a learned field' if data.stipple.learned_gaussians else 'made from meshes'
+        raise invalid(f"'{obj.name}' is {made}, so there are no splats of a file to hide; choose Use as New Source first, "
+                      'which keeps the present ones.')
+    if data.stipple.edited or sync.is_edited(data):
+        raise invalid(f"'{obj.name}' was edited by hand; choose Use as New Source or Revert to Source first.")
+
+
+def _source_of(obj):
+    """The whole cloud of the source; splats that have none get a file of their own first."""
+    data = obj.data
+    if data.stipple.source_kind == 'NONE' or not data.stipple.source:
+        path = sources.save_cloud(sources.ungraded_cloud(obj), obj.name)
+        with sync.paused():
+            sources.attach_cloud(data, path)
+    return sources.whole_cloud(data)

@@ -1,0 +1,447 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sources of splats: the native context, models read from asset files, clouds decoded from them.
+
+Both caches are native memory, keyed by the file's identity and the settings. Nothing here writes
+Blender data.
+"""
+
+import filecmp
+import os
+import re
+import time
+import zlib
+from collections import OrderedDict
+from dataclasses import replace
+
+import bpy
+
+from ... import preferences, version
+from ...binding import cloud_edit, library
+from ...binding.cloud import Cloud
+from ...binding.context import Context
+from ...binding.errors import StippleError
+from ...binding.model import DecodeSettings, Model
+from ...binding.structs import AnchorOrder, JobState, ModelKind, Status
+from .. import meshes
+from . import masks, splat_data
+
+# Kinds of sources that give splats at any budget.
+MODEL_KINDS = ('MODEL', 'TREE')
+MODEL_SUFFIX = '.stipple.safetensors'
+_MAX_MODELS = 4
+# Splats that the viewport shows at first of a tree.
+FIRST_COUNT = 500_000
+_MAX_INT = 2**31 - 1  # of Blender's properties
+# Splats kept decoded over all cached clouds; 60 bytes each, so 1.2 GB at most.
+_MAX_CACHED_SPLATS = 20_000_000
+
+# What tells whether a file has changed: its size and this many samples, the first and the last byte among them.
+_SAMPLE_BYTES = 1 << 16
+_MAX_SAMPLES = 32
+
+_contexts = {}
+_stamps = {}
+_models = OrderedDict()
+_reading = {}  # jobs of models that were asked for, by the same keys
+_clouds = OrderedDict()
+
+
+def library_problem():
+    """Why the library cannot be used, '' where nothing is known to be wrong. Loads nothing."""
+    return library.problem(_library_path())
+
+
+def _library_path():
+    chosen = preferences.get()
+    return '' if chosen is None else bpy.path.abspath(chosen.library_path)
+
+
+def context():
+    """The native context of the current preferences. Errors: LibraryError."""
+    chosen = preferences.get()
+    path, threads, limit = _library_path(), 0, 0
+    if chosen is not None:
+        threads, limit = chosen.threads, chosen.memory_limit << 20
+    key = (str(library.find(path)), threads, limit)
+    if key not in _contexts:
+        _contexts.clear()
+        _contexts[key] = Context(library.load(path), threads, limit)
+    return _contexts[key]
+
+
+def forget():
+    """Gives all native memory back."""
+    for job in _reading.values():
+        job.close()
+    _reading.clear()
+    _clouds.clear()
+    _models.clear()
+    _contexts.clear()
+
+
+def absolute_path(source, owner=None):
+    """A source path of a datablock as the system wants it."""
+    library_of = None if owner is None else owner.library
+    override = None if owner is None else owner.override_library
+    if override is not None and override.reference.stipple.source == source:
+        library_of = override.reference.library  # a path that the override has not changed is still the library's
+    return os.path.normpath(bpy.path.abspath(source, library=library_of))
+
+
+def state(data):
+    """What is with the file that a datablock's splats come from: 'FINE', 'MISSING' or 'CHANGED' since it was read.
+    Files of a series are read when they are shown, so none of them is old."""
+    stipple = data.stipple
+    if stipple.source_kind == 'NONE' or not stipple.source or stipple.is_sequence:
+        return 'FINE'
+    found = stamp(absolute_path(stipple.source, data))
+    if not found:
+        return 'MISSING'
+    return 'CHANGED' if stipple.source_stamp not in ('', found) else 'FINE'
+
+
+def check_unchanged(data):
+    """Errors: StippleError for a source that is not there or not the one that was read."""
+    found = state(data)
+    if found != 'FINE':
+        what = 'is missing' if found == 'MISSING' else 'has changed since it was read'
+        raise StippleError(f"The source '{absolute_path(data.stipple.source, data)}' of '{data.name}' {what}; choose "
+                           'Relink, or Use as New Source to keep the splats that are stored.', Status.ERROR_IO)
+
+
+def stamp(path):
+    """A short text that changes with a file's content, '' for a file that cannot be read. Of large files it looks at
+    samples: a splat file that is written again differs everywhere."""
+    try:
+        key = _file_key(path)
+        if key not in _stamps:
+            _stamps[key] = _stamp_of(path, key[2])
+        return _stamps[key]
+    except (StippleError, OSError):
+        return ''
+
+
+def _stamp_of(path, size):
+    value, count = 0, min(-(-size // _SAMPLE_BYTES), _MAX_SAMPLES)
+    with open(path, 'rb') as file:
+        for i in range(count):
+            file.seek(i * (size - _SAMPLE_BYTES) // max(count - 1, 1) if size > _SAMPLE_BYTES else 0)
+            value = zlib.crc32(file.read(_SAMPLE_BYTES), value)
+    return f'{size}:{value:08x}'
+
+
+def model(path):
+    """The model of an asset file, read once. Errors: StippleError for a missing or broken file."""
+    key = _file_key(path)
+    known = _models.get(key)
+    if known is None:
+        job = _reading.pop(key, None)
+        if job is None:
+            known = Model.load(context(), path)
+        else:
+            job.wait()
+            known = job.model()
+        remember_model(path, known)
+    _models.move_to_end(key)
+    return known
+
+
+def is_at_hand(data, patience):
+    """Whether decoding a datablock's source would not have to read its file first. Where it would, reading begins in the
+    library's own thread, for the next call; patience: seconds that are waited for it."""
+    stipple = data.stipple
+    if stipple.source_kind not in MODEL_KINDS or stipple.is_sequence:
+        return True
+    try:
+        path = absolute_path(stipple.source, data)
+        key = _file_key(path)
+        if key in _models:
+            return True
+        if key not in _reading:
+            _reading[key] = Model.load_start(context(), path)
+    except StippleError:
+        return True  # decoding says what is wrong
+    until = time.perf_counter() + patience
+    while _is_running(_reading[key]):
+        if time.perf_counter() >= until:
+            return False
+        time.sleep(0.001)
+    return True
+
+
+def is_reading():
+    """Whether a file is being read that is_at_hand() has asked for."""
+    return any(_is_running(job) for job in _reading.values())
+
+
+def _is_running(job):
+    return job.poll()[0] == JobState.RUNNING
+
+
+def remember_model(path, loaded):
+    _keep_model(_file_key(path), loaded)
+
+
+def _keep_model(key, loaded):
+    _models[key] = loaded
+    while len(_models) > _MAX_MODELS:
+        _models.popitem(last=False)
+
+
+def model_of(data):
+    """The model of a datablock's source, without what its mask hides; masked ones are kept like others."""
+    path, hidden = absolute_path(data.stipple.source, data), masks.key(data)
+    if not hidden:
+        return model(path)
+    key = (*_file_key(path), hidden)
+    if key not in _models:
+        _keep_model(key, model(path).masked(masks.read(data)))
+    _models.move_to_end(key)
+    return _models[key]
+
+
+def decode(data, settings):
+    """The cloud of a datablock's model at these settings; kept for the next picture. Errors: StippleError, also for a
+    source that has changed."""
+    check_unchanged(data)
+    key = (_file_key(absolute_path(data.stipple.source, data)) + (masks.key(data),), settings)
+    cloud = _clouds.get(key)
+    if cloud is None:
+        cloud = model_of(data).decode(settings)
+        _clouds[key] = cloud
+        total = sum(k[1].anchors * k[1].gaussians_per_anchor for k in _clouds)
+        while total > _MAX_CACHED_SPLATS and len(_clouds) > 1:
+            (_, old), _dropped = _clouds.popitem(last=False)
+            total -= old.anchors * old.gaussians_per_anchor
+    _clouds.move_to_end(key)
+    return cloud
+
+
+def decode_data(data, settings):
+    """The cloud that a datablock's source gives at these settings, without what its mask leaves out."""
+    if data.stipple.source_kind == 'CLOUD':
+        return masked(whole_cloud(data), data)
+    return model_of(data).decode(settings)
+
+
+def whole_cloud(data):
+    """All splats of a datablock's source, masked ones too."""
+    path = absolute_path(data.stipple.source, data)
+    if data.stipple.source_kind == 'TREE':
+        return model(path).decode(DecodeSettings(data.stipple.source_count))
+    return Cloud.load(context(), path)
+
+
+def full_cloud(data):
+    """A datablock at full count: the whole source without what is hidden, splats of meshes at the render budget, and
+    what is stored where there is no source. Not graded."""
+    stipple = data.stipple
+    if stipple.source_kind == 'NONE' or stipple.edited:
+        return splat_data.ungraded_cloud(context(), data)
+    return decode_data(data, decode_settings(stipple, 'FULL' if stipple.source_kind == 'TREE' else 'RENDER'))
+
+
+def count_of(data, budget):
+    """Splats of a datablock at the budget 'RENDER' or 'FULL', without decoding."""
+    stipple = data.stipple
+    if stipple.source_kind in MODEL_KINDS and not stipple.edited:
+        settings = decode_settings(stipple, budget)
+        return settings.anchors * settings.gaussians_per_anchor
+    return splat_data.count(data)
+
+
+def masked(cloud, data):
+    """The splats of a source's whole cloud that stay. Errors: StippleError where the source has another count."""
+    mask = masks.read(data)
+    return cloud if mask is None else cloud_edit.keep(cloud, mask)
+
+
+def decode_settings(stipple, mode='VIEWPORT'):
+    """The settings of a datablock as the binding takes them; mode 'RENDER' takes the render budget."""
+    if stipple.source_kind == 'TREE':
+        return DecodeSettings(_tree_budget(stipple, mode))
+    anchors = stipple.anchors
+    if mode == 'RENDER' and stipple.anchors_render != 0:
+        anchors = stipple.anchors_render
+    return DecodeSettings(anchors, gaussians_per_anchor(stipple), AnchorOrder[stipple.order], stipple.seed)
+
+
+def gaussians_per_anchor(stipple):
+    """Of a model: what a field was learned for, else what is chosen."""
+    return stipple.learned_gaussians or stipple.gaussians_per_anchor
+
+
+def at_most(settings, most):
+    """The settings for that many splats at most, at least one anchor; most: None for as they are."""
+    if most is None:
+        return settings
+    return replace(settings, anchors=min(settings.anchors, max(1, most // settings.gaussians_per_anchor)))
+
+
+def _tree_budget(stipple, mode):
+    """Splats of a tree in a mode: 'VIEWPORT', 'RENDER' or 'FULL'; never more than there are."""
+    total = visible_count(stipple)
+    if mode == 'FULL':
+        return total
+    if stipple.budget_by == 'RATIO':
+        return max(1, round(total * (stipple.ratio_render if mode == 'RENDER' else stipple.ratio)))
+    count = stipple.anchors_render if mode == 'RENDER' and stipple.anchors_render != 0 else stipple.anchors
+    return min(count, total)
+
+
+def visible_count(stipple):
+    """Splats of a tree that are not hidden."""
+    counts = masks.counts(stipple.id_data)
+    return stipple.source_count if counts is None else counts[1]
+
+
+def cloud_from_object(obj):
+    """The cloud of an object's attributes as they are, evaluated where the object is: graded."""
+    return splat_data.cloud(context(), obj.data, obj.original.data)
+
+
+def ungraded_cloud(obj):
+    """The same without the grade of the attributes."""
+    return splat_data.ungraded_cloud(context(), obj.data, obj.original.data)
+
+
+def model_path_for(name, given=''):
+    """Where the source of a new splat object goes: the given path, beside the saved file, else the cache folder."""
+    if given:
+        return absolute_path(given)
+    file_name = re.sub(r'[^\w.\- ]', '_', name) + MODEL_SUFFIX
+    if bpy.data.filepath:
+        return os.path.join(os.path.dirname(bpy.data.filepath), 'stipple', file_name)
+    return os.path.join(cache_folder(), file_name)
+
+
+def cache_folder():
+    chosen = preferences.get()
+    if chosen is not None and chosen.cache_folder:
+        return bpy.path.abspath(chosen.cache_folder)
+    return version.user_folder()
+
+
+def save_model(built, path, overwrite=False):
+    """Writes a model and returns its path. Another file of that name stays: the new one gets a number,
+    unless it is the same to the byte. Errors: StippleError for a folder that cannot be written."""
+    return _save(built.save, path, MODEL_SUFFIX, overwrite)
+
+
+def save_cloud(cloud, name):
+    """Writes splats as a source of their own, beside the other sources; returns the path."""
+    path = model_path_for(name)[:-len(MODEL_SUFFIX)] + '.ply'
+    # In its own frame: the source is what the object shows, number by number.
+    return _save(lambda to: cloud.save(to, frame=cloud.info().frame), path, '.ply', False)
+
+
+def attach_tree(data, path, count):
+    """Notes a splat tree of this many splats as the source of a datablock; its mask stays."""
+    stipple = data.stipple
+    stipple.source = blend_path(path)
+    stipple.source_stamp = stamp(path)
+    stipple.source_kind = 'TREE'
+    stipple.source_count = count
+    note_learned(stipple, None)
+    stipple.is_sequence = False
+    stipple.source_objects.clear()
+    stipple.source_changed = stipple.edited = False
+
+
+def attach_cloud(data, path):
+    """Notes a splat file as the source of a datablock, all of it shown."""
+    stipple = data.stipple
+    stipple.source = blend_path(path)
+    stipple.source_stamp = stamp(path)
+    stipple.source_kind = 'CLOUD'
+    note_learned(stipple, None)
+    stipple.is_sequence = False
+    stipple.source_objects.clear()
+    stipple.source_changed = stipple.edited = False
+    masks.clear(data)
+
+
+def _save(write, path, suffix, overwrite):
+    folder = os.path.dirname(path)
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise StippleError(f"The folder '{folder}' cannot be made: {error.strerror}.", Status.ERROR_IO) from None
+    if overwrite or not os.path.exists(path):
+        write(path)
+        return path
+    stem = path[:-len(suffix)] if path.endswith(suffix) else os.path.splitext(path)[0]
+    fresh = f'{stem}.{os.getpid()}.new{suffix}'
+    write(fresh)
+    try:
+        for number in range(1, 1000):
+            if not os.path.exists(path):
+                os.rename(fresh, path)
+                return path
+            if filecmp.cmp(fresh, path, shallow=False):
+                return path
+            path = f'{stem}.{number:03d}{suffix}'
+    finally:
+        if os.path.exists(fresh):
+            os.remove(fresh)
+    raise StippleError(f"'{stem}' has 1,000 numbered sources already; remove some of them.", Status.ERROR_IO)
+
+
+def note_learned(stipple, info):
+    """Notes what a model was learned for. In: info, StippleModelInfo, or None for all that is not learned."""
+    is_field = info is not None and info.kind == ModelKind.FIELD
+    stipple.learned_gaussians = info.gaussians_per_anchor if is_field else 0
+    budgets = (info.least_anchors, info.most_anchors) if is_field else (0, 0)
+    stipple.learned_least, stipple.learned_most = (min(budget, _MAX_INT) for budget in budgets)
+
+
+def first_settings(info):
+    """How an asset is shown at first. In: info, StippleModelInfo."""
+    if info.kind == ModelKind.HIERARCHY:
+        return DecodeSettings(min(info.leaf_count, FIRST_COUNT))
+    if info.kind == ModelKind.FIELD:
+        return DecodeSettings(info.most_anchors, info.gaussians_per_anchor)
+    return DecodeSettings()
+
+
+def attach_asset(data, path, info):
+    """Notes an asset file as the source of a new datablock, with the budget of first_settings()."""
+    stipple, settings = data.stipple, first_settings(info)
+    if info.kind == ModelKind.HIERARCHY:
+        attach_tree(data, path, info.leaf_count)
+        stipple.ratio, stipple.ratio_render = settings.anchors / info.leaf_count, 1.0
+    else:
+        attach_model(data, path, [], info)
+        stipple.anchors = settings.anchors
+
+
+def attach_model(data, path, objects, info):
+    """Notes a model as the source of a datablock, with the meshes and settings that it was made from. In: info,
+    StippleModelInfo."""
+    stipple = data.stipple
+    note_learned(stipple, info)
+    stipple.source = blend_path(path)
+    stipple.source_stamp = stamp(path)
+    stipple.source_kind = 'MODEL'
+    stipple.source_detail_weight = stipple.detail_weight
+    stipple.source_color_from = stipple.color_from
+    stipple.is_sequence = False
+    stipple.source_objects.clear()
+    for obj in objects:
+        stipple.source_objects.add().object = obj
+    stipple.source_fingerprint = meshes.fingerprint(objects)
+    stipple.source_changed = False
+    stipple.edited = False
+
+
+def blend_path(path):
+    """A path as it is stored: relative to the .blend where that is saved and on the same root."""
+    return bpy.path.relpath(path) if bpy.data.filepath else path
+
+
+def _file_key(path):
+    try:
+        status = os.stat(path)
+    except OSError as error:
+        raise StippleError(f"The splats' source '{path}' cannot be read: {error.strerror}.", Status.ERROR_IO) from None
+    return path, status.st_mtime_ns, status.st_size

@@ -1,0 +1,164 @@
+// Based on: Zwicker, Pfister, van Baar, Gross, Surface Splatting, SIGGRAPH 2001 (a surface as
+// overlapping flat Gaussians). Patches are the Voronoi cells of the anchors among dense surface
+// samples, centred as in Lloyd's method; a splat has the moments of its patch. Differs: sheets are
+// told apart by normal and height, and sizes are balanced by the coverage at the samples.
+#include "decode/surface/surface_decoder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "decode/surface/splat_shapes.h"
+#include "decode/surface/surface_borders.h"
+#include "decode/surface/surface_index.h"
+#include "decode/surface/surface_sites.h"
+#include "math/colour.h"
+
+namespace stipple {
+
+struct SurfaceDecoder::Index {
+  SurfaceIndex samples;
+  SurfaceBorders borders;
+};
+
+namespace {
+
+/// Rounds of Lloyd's method where time permits more than one: the more regular the sites, the
+/// smaller the splats that close the surface.
+constexpr int kFewCentringRounds = 3;
+/// Samples per site that take part: enough for the middle and for the second moments of a patch,
+/// few enough for a slider.
+constexpr size_t kCentringSamples = 3;
+constexpr size_t kFewSamples = 10;
+constexpr size_t kManySamples = 4;
+
+/// Unit quaternion w, x, y, z of the rotation whose columns are a, b, c.
+/// Based on: Shepperd, Quaternion from Rotation Matrix, 1978.
+void quaternionOf(const float* a, const float* b, const float* c, float* out) {
+  const float m00 = a[0], m10 = a[1], m20 = a[2];
+  const float m01 = b[0], m11 = b[1], m21 = b[2];
+  const float m02 = c[0], m12 = c[1], m22 = c[2];
+  const float trace = m00 + m11 + m22;
+  float q[4];
+  if (trace > 0) {
+    q[0] = 1 + trace;
+    q[1] = m21 - m12;
+    q[2] = m02 - m20;
+    q[3] = m10 - m01;
+  } else if (m00 >= m11 && m00 >= m22) {
+    q[0] = m21 - m12;
+    q[1] = 1 + m00 - m11 - m22;
+    q[2] = m01 + m10;
+    q[3] = m02 + m20;
+  } else if (m11 >= m22) {
+    q[0] = m02 - m20;
+    q[1] = m01 + m10;
+    q[2] = 1 + m11 - m00 - m22;
+    q[3] = m12 + m21;
+  } else {
+    q[0] = m10 - m01;
+    q[1] = m02 + m20;
+    q[2] = m12 + m21;
+    q[3] = 1 + m22 - m00 - m11;
+  }
+  const float length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  for (size_t k = 0; k < 4; ++k) out[k] = q[k] / length;
+}
+
+void requireRequest(const DecodeRequest& request) {
+  if (!request.anchors) fail(ErrorCode::kInvalidArgument, "decode: the anchors are missing");
+  if (request.gaussians_per_anchor == 0 || request.gaussians_per_anchor > 64) {
+    fail(ErrorCode::kInvalidArgument, "decode: Gaussians per anchor is " +
+                                          std::to_string(request.gaussians_per_anchor) +
+                                          "; 1 to 64 is allowed");
+  }
+  if (request.anchors->size() * request.gaussians_per_anchor > kMaxAnchorCount) {
+    fail(ErrorCode::kInvalidArgument,
+         "decode: " + std::to_string(request.anchors->size()) + " anchors of " +
+             std::to_string(request.gaussians_per_anchor) +
+             " Gaussians are too many; 268435456 Gaussians are allowed");
+  }
+}
+
+SplatCloud cloudOf(const SurfaceIndex& index, const SurfaceSites& sites,
+                   const SplatShapes& shapes) {
+  SplatCloud cloud;
+  cloud.resize(sites.size());
+  // Most splats are about a pixel or smaller. The classic low-pass widens each of them at full
+  // opacity, which moves silhouettes outward by a pixel and gets worse with more splats; mip keeps
+  // their sum.
+  cloud.antialias = Antialias::kMip;
+  const auto side = static_cast<float>(index.root.side);
+  parallelFor(sites.size(), 1024, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const size_t out = sites.outputs[i];
+      const float* n = &shapes.normals[i * 3];
+      const float* e = &shapes.majors[i * 3];
+      const float minor[3] = {n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2],
+                              n[0] * e[1] - n[1] * e[0]};
+      quaternionOf(e, minor, n, &cloud.rotations[out * 4]);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        cloud.positions[out * 3 + axis] =
+            static_cast<float>(index.root.origin[axis] +
+                               index.root.side * static_cast<double>(shapes.centres[i * 3 + axis]));
+        cloud.scales[out * 3 + axis] = shapes.sigmas[i * 3 + axis] * side;
+        cloud.sh[out * 3 + axis] =
+            (linearToSrgb(std::max(0.0f, shapes.colours[i * 3 + axis])) - 0.5f) / kShC0;
+      }
+      cloud.opacities[out] = std::min(0.99f, shapes.opacities[i]);
+    }
+  });
+  return cloud;
+}
+
+}  // namespace
+
+SurfaceDecoder::SurfaceDecoder(std::shared_ptr<const PointSet> surface, const RootCube& root,
+                               int leaf_level)
+    : surface_(std::move(surface)) {
+  if (!surface_ || surface_->size() == 0) {
+    fail(ErrorCode::kInvalidArgument, "surface decoder: 0 surface samples; at least 1 is needed");
+  }
+  SurfaceIndex samples = makeSurfaceIndex(*surface_, root, leaf_level);
+  SurfaceBorders borders = findBorders(samples);
+  index_ = std::make_unique<const Index>(Index{std::move(samples), std::move(borders)});
+}
+
+SurfaceDecoder::~SurfaceDecoder() = default;
+
+SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
+  requireRequest(request);
+  if (request.anchors->size() == 0) return SplatCloud{};
+  const SurfaceIndex& index = index_->samples;
+  advance(request.progress, 0.0, "Decoding the surface");
+  SurfaceSites sites = projectAnchors(index, request);
+  const bool few = sites.size() <= kFewSites;
+  const int centring_rounds = few ? kFewCentringRounds : 1;
+  for (int round = 0; round < centring_rounds; ++round) {
+    centreSites(index, assignSamples(index, sites, kCentringSamples, request.progress), sites);
+    sortByCell(index, sites);
+  }
+  const SurfacePatches patches =
+      assignSamples(index, sites, few ? kFewSamples : kManySamples, request.progress);
+  advance(request.progress, 0.4, "Decoding the surface");
+  SplatShapes shapes = fitShapes(index, sites, patches);
+  findNearBorders(index_->borders, sites, shapes);
+  balanceCoverage(index, sites, patches, shapes, request.progress);
+  SplatCloud cloud = cloudOf(index, sites, shapes);
+  advance(request.progress, 1.0, "Decoding the surface");
+  return cloud;
+}
+
+uint64_t SurfaceDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const {
+  // Per splat: the cloud (56 bytes), sites (36, twice while they are sorted), shapes (112), patch
+  // bounds and cell tables (at most 96), neighbour lists (112 per cell, at most a cell per splat,
+  // twice while they are sorted), scratch of the balance (at most 64). Per sample: owner and member
+  // (8) and the coverage (16).
+  constexpr uint64_t kBytesPerSplat = 56 + 2 * 36 + 112 + 96 + 2 * 112 + 64;
+  constexpr uint64_t kBytesPerSample = 24;
+  return anchor_count * gaussians_per_anchor * kBytesPerSplat + surface_->size() * kBytesPerSample;
+}
+
+}  // namespace stipple

@@ -1,0 +1,88 @@
+#include "decode/surface/surface_index.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "math/morton.h"
+#include "mesh/cell_table.h"
+
+namespace stipple {
+
+uint64_t unitCubeCode(const float* position, int level) {
+  const float side = static_cast<float>(uint32_t{1} << level);
+  uint32_t cell[3];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    cell[axis] = static_cast<uint32_t>(std::clamp(position[axis] * side, 0.0f, side - 1.0f));
+  }
+  return mortonEncode(cell[0], cell[1], cell[2]);
+}
+
+SurfaceIndex makeSurfaceIndex(const PointSet& surface, const RootCube& root, int leaf_level) {
+  constexpr size_t kGrain = 8192;
+  constexpr double kSideCells = double{uint32_t{1} << SurfaceIndex::kCodeLevel};
+  const size_t count = surface.size();
+  SurfaceIndex index;
+  index.root = root;
+  index.leaf_level = leaf_level;
+  const auto unitPosition = [&](size_t i) {
+    std::array<float, 3> u;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      u[axis] = static_cast<float>(
+          (static_cast<double>(surface.positions[i * 3 + axis]) - root.origin[axis]) / root.side);
+    }
+    return u;
+  };
+  std::vector<uint64_t> codes(count);
+  parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      // The same arithmetic as the density's, so that a leaf with mass holds its samples here too.
+      uint32_t cell[3];
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const double x =
+            (static_cast<double>(surface.positions[i * 3 + axis]) - root.origin[axis]) *
+            (kSideCells / root.side);
+        cell[axis] = static_cast<uint32_t>(std::clamp(std::floor(x), 0.0, kSideCells - 1.0));
+      }
+      codes[i] = mortonEncode(cell[0], cell[1], cell[2]);
+    }
+  });
+  const std::vector<uint32_t> order = sortedOrder(codes, SurfaceIndex::kCodeLevel * 3);
+
+  const double area_scale = 1.0 / (root.side * root.side);
+  double weight_sum = 0;
+  for (size_t i = 0; i < count; ++i) {
+    weight_sum += static_cast<double>(surface.weights[i]);
+    index.area += static_cast<double>(surface.areas[i]) * area_scale;
+  }
+  index.codes.resize(count);
+  index.positions.resize(count * 3);
+  index.normals.resize(count * 3);
+  index.colours.resize(count * 3);
+  index.opacities.resize(count);
+  index.areas.resize(count);
+  index.spreads.resize(count);
+  parallelFor(count, kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const size_t from = order[i];
+      const std::array<float, 3> u = unitPosition(from);
+      index.codes[i] = codes[from];
+      for (size_t axis = 0; axis < 3; ++axis) {
+        index.positions[i * 3 + axis] = u[axis];
+        index.normals[i * 3 + axis] = surface.normals[from * 3 + axis];
+        index.colours[i * 3 + axis] = surface.colours[from * 3 + axis];
+      }
+      index.opacities[i] = surface.opacities[from];
+      const double area = static_cast<double>(surface.areas[from]) * area_scale;
+      const double weight = static_cast<double>(surface.weights[from]);
+      index.areas[i] = static_cast<float>(area);
+      // A place without weight gets no anchors of its own; its neighbours' splats stretch to it at
+      // most over the average spacing.
+      index.spreads[i] = static_cast<float>(weight > 0 ? area * weight_sum / weight : index.area);
+    }
+  });
+  return index;
+}
+
+}  // namespace stipple

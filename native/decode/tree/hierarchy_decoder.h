@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+
+#include "decode/decoder.h"
+#include "decode/tree/merge_tree.h"
+
+namespace stipple {
+
+/// An existing cloud at any budget: the cut of exactly P nodes of its merge tree, greatest error
+/// first. P = N gives the cloud itself, bit for bit; the cut of P + 1 replaces one node of the cut
+/// of P by its two children. Needs no anchors: DecodeRequest::budget is P, 1..N, K is 1.
+/// Order: inner nodes by number, then leaves in the order of the cloud.
+class HierarchyDecoder final : public Decoder {
+ public:
+  /// Errors: kInvalidArgument where the tree does not fit the cloud.
+  HierarchyDecoder(std::shared_ptr<const SplatCloud> leaves, std::shared_ptr<const MergeTree> tree);
+  SplatCloud decode(const DecodeRequest& request) const override;
+  DecodeCost costHint() const override { return DecodeCost::kInteractive; }
+  uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
+
+  /// Ids of the nodes of the cut (data of MergeTree), ascending. In: budget 1..N.
+  std::vector<uint32_t> cut(uint64_t budget) const;
+
+  const std::shared_ptr<const SplatCloud>& leaves() const { return leaves_; }
+  const std::shared_ptr<const MergeTree>& tree() const { return tree_; }
+
+ private:
+  std::shared_ptr<const SplatCloud> leaves_;
+  std::shared_ptr<const MergeTree> tree_;
+};
+
+}  // namespace stipple

@@ -1,0 +1,82 @@
+#include "io/bytes/input_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cctype>
+#include <cerrno>
+#include <filesystem>
+#include <system_error>
+
+#include "base/error.h"
+
+namespace stipple {
+
+namespace {
+
+std::string reason(int error) {
+  return std::generic_category().message(error);
+}
+
+}  // namespace
+
+InputFile::InputFile(const std::string& path) : path_(path) {
+  // Non-blocking, so that opening a pipe without a writer returns and is refused below.
+  descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor_ < 0) fail(ErrorCode::kIo, path + " cannot be opened: " + reason(errno));
+  struct stat status {};
+  const int failed = ::fstat(descriptor_, &status) != 0 ? errno : 0;
+  if (failed != 0 || !S_ISREG(status.st_mode)) {
+    ::close(descriptor_);
+    fail(ErrorCode::kIo, path + " cannot be read: " +
+                             (failed != 0               ? reason(failed)
+                              : S_ISDIR(status.st_mode) ? std::string("it is a folder, not a file")
+                                                        : std::string("it is not a regular file")));
+  }
+  size_ = static_cast<uint64_t>(status.st_size);
+}
+
+InputFile::~InputFile() {
+  ::close(descriptor_);
+}
+
+void InputFile::readAt(uint64_t offset, void* bytes, size_t count) const {
+  if (offset > size_ || count > size_ - offset) {
+    fail(ErrorCode::kFormat, path_ + " is truncated: bytes " + std::to_string(offset) + " to " +
+                                 std::to_string(offset + count) + " are needed, it holds " +
+                                 std::to_string(size_));
+  }
+  auto* target = static_cast<char*>(bytes);
+  while (count > 0) {
+    const ssize_t got = ::pread(descriptor_, target, count, static_cast<off_t>(offset));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) fail(ErrorCode::kIo, path_ + " cannot be read: " + reason(errno));
+    if (got == 0) {
+      fail(ErrorCode::kIo, path_ + " became shorter while it was read: byte " +
+                               std::to_string(offset) + " is gone");
+    }
+    target += got;
+    offset += static_cast<uint64_t>(got);
+    count -= static_cast<size_t>(got);
+  }
+}
+
+std::string readTextFile(const std::string& path, uint64_t limit) {
+  const InputFile file(path);
+  if (file.size() > limit) {
+    fail(ErrorCode::kFormat, path + " holds " + std::to_string(file.size()) + " bytes; at most " +
+                                 std::to_string(limit) + " are allowed");
+  }
+  std::string text(static_cast<size_t>(file.size()), '\0');
+  file.readAt(0, text.data(), text.size());
+  return text;
+}
+
+std::string lowerEnding(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending;
+}
+
+}  // namespace stipple

@@ -1,0 +1,250 @@
+#include "io/splats/splat_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <deque>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <string_view>
+#include <utility>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "data/clouds/splat_colour.h"
+#include "io/bytes/input_file.h"
+#include "io/splats/gltf_splat_names.h"
+#include "io/splats/gltf_splats.h"
+#include "io/splats/ksplat_file.h"
+#include "io/splats/ply/ply_file.h"
+#include "io/splats/sog_file.h"
+#include "io/splats/sog_levels.h"
+#include "io/splats/splat32_file.h"
+#include "io/splats/spz_file.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr size_t kGrain = 4096;
+
+std::string lowerName(const std::string& path) {
+  std::string name = std::filesystem::path(path).filename().string();
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return name;
+}
+
+std::vector<std::string> endingsOf(const SplatFormat& format) {
+  std::istringstream words(format.endings);
+  std::vector<std::string> endings;
+  for (std::string word; words >> word;) endings.push_back(word);
+  return endings;
+}
+
+/// Length of the format's ending that the file name has; 0 for none.
+size_t endingLength(const SplatFormat& format, const std::string& name) {
+  size_t longest = 0;
+  for (const std::string& ending : endingsOf(format)) {
+    if (name.size() >= ending.size() &&
+        name.compare(name.size() - ending.size(), ending.size(), ending) == 0) {
+      longest = std::max(longest, ending.size());
+    }
+  }
+  return longest;
+}
+
+SplatFileStart startOf(const std::string& path) {
+  SplatFileStart start;
+  start.path = path;
+  start.name = lowerName(path);
+  std::error_code ignored;
+  start.is_folder = std::filesystem::is_directory(path, ignored);
+  if (start.is_folder) return start;
+  const InputFile file(path);
+  start.bytes.resize(static_cast<size_t>(std::min<uint64_t>(file.size(), kSplatSniffBytes)));
+  file.readAt(0, start.bytes.data(), start.bytes.size());
+  return start;
+}
+
+/// "3DGS PLY (.ply), SPZ (.spz) and ..." of the formats that can be read (or written).
+std::string listOfFormats(bool written) {
+  std::vector<std::string> parts;
+  for (const SplatFormat& format : splatFormats()) {
+    if (written ? format.write == nullptr : format.read == nullptr) continue;
+    parts.push_back(std::string(format.title) + " (" + format.endings + ")");
+  }
+  std::string text;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (i > 0) text += i + 1 == parts.size() ? " and " : ", ";
+    text += parts[i];
+  }
+  return text;
+}
+
+/// A copy with harmonics up to a degree.
+SplatCloud copyOf(const SplatCloud& cloud, int degree) {
+  if (cloud.sh_degree <= degree) return cloud;
+  SplatCloud copy;
+  copy.sh_degree = degree;
+  copy.colour_space = cloud.colour_space;
+  copy.antialias = cloud.antialias;
+  copy.frame = cloud.frame;
+  copy.positions = cloud.positions;
+  copy.rotations = cloud.rotations;
+  copy.scales = cloud.scales;
+  copy.opacities = cloud.opacities;
+  const size_t before = cloud.shStride();
+  const size_t after = copy.shStride();
+  copy.sh.resize(cloud.size() * after);
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      std::memcpy(&copy.sh[i * after], &cloud.sh[i * before], after * sizeof(float));
+    }
+  });
+  return copy;
+}
+
+/// What a cloud needs before a format takes it.
+struct Changes {
+  int degree;  ///< of harmonics that are kept
+  Frame frame;
+  bool cuts, turns, recolours;
+
+  bool any() const { return cuts || turns || recolours; }
+};
+
+Changes changesFor(const SplatCloud& cloud, const SplatFormat& format,
+                   const SplatWriteOptions& options) {
+  Changes changes;
+  changes.degree = std::min(options.sh_degree_limit, format.max_sh_degree);
+  changes.frame = options.frame == Frame::kUnknown ? format.frame : options.frame;
+  // Without a frame, a cloud stays so where the format's own is what it counts as.
+  changes.turns = cloud.frame == Frame::kUnknown
+                      ? changes.frame != kConventionalFrame || options.frame != Frame::kUnknown
+                      : cloud.frame != changes.frame;
+  changes.recolours = cloud.colour_space == ColourSpace::kLinear && !format.holds_linear;
+  changes.cuts = cloud.sh_degree > changes.degree &&
+                 !(format.takes_any_degree && format.max_sh_degree <= options.sh_degree_limit);
+  return changes;
+}
+
+/// The cloud as a format takes it, where that differs from the cloud as it is. In: a valid cloud.
+std::optional<SplatCloud> prepared(const SplatCloud& cloud, const Changes& changes) {
+  if (!changes.any()) return std::nullopt;
+  SplatCloud copy = copyOf(cloud, changes.degree);
+  if (changes.recolours) convertColours(copy, ColourSpace::kDisplay);
+  if (changes.turns) convertFrame(copy, changes.frame);
+  return copy;
+}
+
+void checkDegreeLimit(const SplatWriteOptions& options) {
+  if (options.sh_degree_limit < 0 || options.sh_degree_limit > kMaxShDegree) {
+    fail(ErrorCode::kInvalidArgument, "the limit of the harmonic degree is " +
+                                          std::to_string(options.sh_degree_limit) +
+                                          "; 0 to 4 is allowed");
+  }
+}
+
+}  // namespace
+
+const std::vector<SplatFormat>& splatFormats() {
+  static const std::vector<SplatFormat> kFormats = {
+      {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, true, startsAsPly, readPlySplats, writePlySplats,
+       true},
+      {"compressed-ply", "compressed PLY", ".compressed.ply", 3, Frame::kRDF, true,
+       startsAsCompressedPly, readCompressedPly, writeCompressedPly, true},
+      {"spz", "SPZ", ".spz", 4, Frame::kRUB, false, startsAsSpz, readSpzSplats, writeSpzSplats},
+      {"splat", "splat records", ".splat", 0, Frame::kRDF, false, nullptr, readSplat32,
+       writeSplat32, true, true},
+      {"ksplat", "ksplat", ".ksplat", 3, Frame::kRDF, false, nullptr, readKsplat, nullptr},
+      {"gltf", "glTF with KHR_gaussian_splatting", ".glb .gltf", 3, kGltfFrame, true,
+       startsAsGltfSplats, readGltfSplats, writeGltfSplats, true},
+      {"sog_levels", "streamed SOG", "lod-meta.json", 3, Frame::kRDF, true, startsAsSogLevels,
+       readSogLevels,
+       [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
+          Progress* progress) { writeSogLevels({&cloud}, nullptr, path, {}, progress); }},
+      {"sog", "SOG", ".sog meta.json", 3, Frame::kRDF, true, startsAsSog, readSog,
+       [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
+          Progress* progress) { writeSog(cloud, path, {}, progress); }},
+  };
+  return kFormats;
+}
+
+const SplatFormat* splatFormatOfEnding(const std::string& path) {
+  const std::string name = lowerName(path);
+  const SplatFormat* best = nullptr;
+  size_t longest = 0;
+  for (const SplatFormat& format : splatFormats()) {
+    const size_t length = endingLength(format, name);
+    if (length > longest) best = &format;
+    longest = std::max(longest, length);
+  }
+  return best;
+}
+
+const SplatFormat* splatFormatOfContent(const std::string& path) {
+  const SplatFileStart start = startOf(path);
+  for (const SplatFormat& format : splatFormats()) {
+    if (format.read != nullptr && format.sniff != nullptr && format.sniff(start)) return &format;
+  }
+  // Some formats have no first bytes of their own.
+  const SplatFormat* named = start.is_folder ? nullptr : splatFormatOfEnding(path);
+  return named != nullptr && named->read != nullptr && named->sniff == nullptr ? named : nullptr;
+}
+
+SplatCloud readSplatFile(const std::string& path, Progress* progress) {
+  if (const SplatFormat* format = splatFormatOfContent(path)) return format->read(path, progress);
+  std::error_code ignored;
+  // A folder that no format knows gets the words of every reader.
+  if (std::filesystem::is_directory(path, ignored)) const InputFile file(path);
+  // A file that is named after a format and is not of it gets that reader's words.
+  const SplatFormat* named = splatFormatOfEnding(path);
+  if (named != nullptr && named->read != nullptr) return named->read(path, progress);
+  fail(ErrorCode::kFormat, path + " is not a splat file that can be read: its ending is '" +
+                               lowerEnding(path) +
+                               "' and its first bytes are those of no format; " +
+                               listOfFormats(false) + " can be read");
+}
+
+void writeSplatFile(const SplatCloud& cloud, const std::string& path,
+                    const SplatWriteOptions& options, Progress* progress) {
+  const SplatFormat* format = splatFormatOfEnding(path);
+  if (format == nullptr || format->write == nullptr) {
+    fail(ErrorCode::kUnsupported, path + " cannot be written as splats: its ending is '" +
+                                      lowerEnding(path) + "'; " + listOfFormats(true) +
+                                      " can be written");
+  }
+  checkDegreeLimit(options);
+  validateSizes(cloud, "cloud");
+  const Changes changes = changesFor(cloud, *format, options);
+  if (!format->checks_values || changes.any()) validate(cloud, "cloud");
+  const std::optional<SplatCloud> changed = prepared(cloud, changes);
+  format->write(changed ? *changed : cloud, path, options, progress);
+}
+
+void writeSplatLevels(const std::vector<const SplatCloud*>& levels, const SplatCloud* environment,
+                      const std::string& path, const SplatWriteOptions& options,
+                      Progress* progress) {
+  const SplatFormat* format = splatFormatOfEnding(path);
+  if (format == nullptr || format->name != std::string_view("sog_levels")) {
+    fail(ErrorCode::kUnsupported,
+         path + " cannot be written as levels: it is not named lod-meta.json");
+  }
+  checkDegreeLimit(options);
+  std::vector<const SplatCloud*> clouds = levels;
+  clouds.push_back(environment);
+  std::deque<SplatCloud> changed;
+  for (const SplatCloud*& cloud : clouds) {
+    if (cloud == nullptr) continue;
+    validate(*cloud, cloud == environment ? "environment" : "level");
+    if (auto copy = prepared(*cloud, changesFor(*cloud, *format, options))) {
+      cloud = &changed.emplace_back(std::move(*copy));
+    }
+  }
+  environment = clouds.back();
+  clouds.pop_back();
+  writeSogLevels(clouds, environment, path, {}, progress);
+}
+
+}  // namespace stipple

@@ -1,0 +1,463 @@
+#include <algorithm>
+#include <cstddef>
+#include <iterator>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "splat/render/render_backward.h"
+#include "train/loop/render_backend.h"
+#include "train/optimiser/splat_activation.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr size_t kGrain = 1 << 14;
+constexpr uint32_t kMaxSide = 65536;
+
+struct Target {
+  uint32_t width;
+  uint32_t height;
+  std::vector<float> pixels;  ///< [H,W,3]
+};
+
+/// What has been done since the splats changed last; each pass needs the one before it.
+enum class Stage { kSplats, kDrawn, kLoss, kGradients };
+
+/// The arrays of Statistic, in its order.
+constexpr const GradientArray* kStatistics =
+    std::find_if(std::begin(kGradientArrays), std::end(kGradientArrays),
+                 [](const GradientArray& array) { return array.is_statistic; });
+static_assert(std::end(kGradientArrays) - kStatistics == static_cast<ptrdiff_t>(kStatisticCount));
+
+/// Arrays of one checkpoint, which must belong together.
+void requireLike(const RawSplats& splats, const RawSplats& others, const char* what) {
+  SplatEdit as_edit;  // holds arrays to each other, and every number to be finite
+  as_edit.append = others;
+  validate(as_edit, splats);
+  if (others.size() != splats.size()) {
+    fail(ErrorCode::kInvalidArgument, std::string(what) + " are of " +
+                                          std::to_string(others.size()) + " splats; there are " +
+                                          std::to_string(splats.size()));
+  }
+}
+
+class CpuBackend final : public RenderBackend {
+ public:
+  CpuBackend() { workspace_.keepForBackward(true); }
+
+  const char* name() const override { return "cpu"; }
+
+  void upload(const SplatCloud& cloud) override {
+    validate(cloud, "splats");
+    RawSplats raw = rawSplats(cloud);
+    RawSplats zeros = zerosLike(raw);
+    hold({std::move(raw), zeros, std::move(zeros), {}, 0});
+  }
+
+  void restore(const TrainingState& state) override {
+    if (state.splats.sh_degree < 0 || state.splats.sh_degree > kMaxShDegree) {
+      fail(ErrorCode::kInvalidArgument,
+           "harmonic degree is " + std::to_string(state.splats.sh_degree) + "; 0 to 4 is allowed");
+    }
+    requireLike(state.splats, state.splats, "splats");
+    requireLike(state.splats, state.first_moments, "first moments");
+    requireLike(state.splats, state.second_moments, "second moments");
+    if (state.kept_gradients.size() > 0) {
+      requireLike(state.splats, state.kept_gradients, "kept gradients");
+    }
+    hold(state);
+  }
+
+  void parameterise(const Parameterisation* how) override {
+    how_ = how;
+    by_raw_ = {};
+    changed();
+  }
+
+  size_t splatCount() const override { return held_.splats.size(); }
+  SplatCloud download() const override {
+    SplatCloud cloud = activated(held_.splats);
+    if (how_) how_->activate(held_.splats, cloud);
+    return cloud;
+  }
+  const TrainingState& state() const override { return held_; }
+
+  uint64_t memoryBytes() const override {
+    uint64_t floats = picture_.colour.capacity() + colour_gradient_.capacity() +
+                      residual_.capacity() + cloud_.scales.capacity() +
+                      cloud_.opacities.capacity() + visible_.capacity() / sizeof(float);
+    for (const RawSplats* splats : {&held_.splats, &held_.first_moments, &held_.second_moments,
+                                    &held_.kept_gradients, &by_raw_}) {
+      for (size_t i = 0; i < arrayCount(*splats); ++i) {
+        floats += arrayOf(*splats, static_cast<RawArray>(i)).capacity();
+      }
+    }
+    for (const SplatGradients& gradients : gradients_.instances) {
+      for (const GradientArray& array : kGradientArrays) {
+        floats += (gradients.*array.values).capacity();
+      }
+    }
+    for (const Target& target : targets_) floats += target.pixels.capacity();
+    return floats * sizeof(float) + workspace_.bytes() + image_loss_.workspaceBytes();
+  }
+
+  uint32_t addTarget(uint32_t width, uint32_t height, std::span<const float> pixels) override {
+    const size_t needed = static_cast<size_t>(width) * height * 3;
+    if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) {
+      fail(ErrorCode::kInvalidArgument, "the target is " + std::to_string(width) + " x " +
+                                            std::to_string(height) +
+                                            " pixels; each side must be 1 to 65536");
+    }
+    requireCount(pixels.size(), needed, "the target");
+    requireFinite(pixels.data(), needed, 3, "target: pixel");
+    targets_.push_back({width, height, {pixels.begin(), pixels.end()}});
+    return static_cast<uint32_t>(targets_.size() - 1);
+  }
+
+  void forward(const Camera& camera, const RenderOptions& options, Progress* progress) override {
+    activate();
+    stage_ = Stage::kSplats;  // of a picture that fails half-way nothing may be used
+    const Lent lent(*this);
+    const SplatInstance instance{&cloud_};
+    renderTiled({&instance, 1}, camera, options, workspace_, picture_, progress);
+    stage_ = Stage::kDrawn;
+  }
+
+  ImageLossValue loss(uint32_t target, const ImageLossOptions& options,
+                      std::span<const float> weights) override {
+    requireStage(Stage::kDrawn, "a loss needs a picture; call forward first");
+    if (target >= targets_.size()) {
+      fail(ErrorCode::kInvalidArgument, "target is " + std::to_string(target) + "; there are " +
+                                            std::to_string(targets_.size()));
+    }
+    const Target& wanted = targets_[target];
+    if (wanted.width != picture_.width || wanted.height != picture_.height) {
+      fail(ErrorCode::kInvalidArgument,
+           "target " + std::to_string(target) + " is " + std::to_string(wanted.width) + " x " +
+               std::to_string(wanted.height) + " pixels; the picture is " +
+               std::to_string(picture_.width) + " x " + std::to_string(picture_.height));
+    }
+    return loss(wanted.pixels, options, weights);
+  }
+
+  ImageLossValue loss(std::span<const float> target, const ImageLossOptions& options,
+                      std::span<const float> weights) override {
+    requireStage(Stage::kDrawn, "a loss needs a picture; call forward first");
+    const size_t pixel_count = static_cast<size_t>(picture_.width) * picture_.height;
+    requireCount(target.size(), pixel_count * 3, "the target");
+    if (!weights.empty()) requireCount(weights.size(), pixel_count, "weights");
+    stage_ = Stage::kDrawn;
+    colour_gradient_.resize(pixel_count * 4);
+    const ImageLossValue value = image_loss_.evaluate(
+        picture_.width, picture_.height, {picture_.colour.data(), PixelLayout::kRgba},
+        {target.data(), PixelLayout::kRgb}, weights.empty() ? nullptr : weights.data(),
+        {colour_gradient_.data(), PixelLayout::kRgba}, options);
+    target_ = target;
+    stage_ = Stage::kLoss;
+    return value;
+  }
+
+  BackwardSummary backward(const StatisticRequest& request, Regulariser* regulariser,
+                           Progress* progress) override {
+    requireStage(Stage::kLoss, "derivatives need a loss of the picture; call loss first");
+    BackwardInput input;
+    input.colour_gradient = colour_gradient_;
+    if (request.contributions) {
+      subtractTarget();
+      input.residual = residual_;
+      input.residual_weights = request.contribution_weights;
+    }
+    input.edge_weights = request.edge_weights;
+    input.errors = errorsOf(request);
+    input.with_blending_weights = request.blending_weights;
+    input.with_screen_gradients = request.screen_gradients;
+    input.with_absolute_screen_gradients = request.absolute_screen_gradients;
+    input.with_covered = request.covered;
+    double regularisation = 0;
+    const double light = regulariser ? regulariser->transmittanceWeight() : 0;
+    if (light != 0) {
+      regularisation = light * meanTransmittance();
+      input.coverage_gradient = -light / static_cast<double>(picture_.transmittance.size());
+    }
+    stage_ = Stage::kLoss;
+    const Lent lent(*this);
+    renderBackward(workspace_, picture_, input, backward_workspace_, gradients_, UINT64_MAX,
+                   progress);
+    SplatGradients& by = gradients_.instances[0];
+    if (regulariser) regularisation += regulariser->evaluate(cloud_, spansOf(by));
+    if (how_) {
+      throughActivations(held_.splats, cloud_, *how_, by, by_raw_);
+    } else {
+      throughActivations(cloud_, by);
+    }
+    stage_ = Stage::kGradients;
+    are_kept_ = false;
+    return {gradients_.camera, gradients_.background, gradients_.visible_count, regularisation};
+  }
+
+  void step(const StepOptions& options) override {
+    requireStage(Stage::kGradients, "a step needs derivatives; call backward first");
+    // Those that were kept count, these too.
+    if (held_.kept_gradients.size() > 0) addToKept();
+    constexpr size_t kFirst = 3;  // numbers of the constant harmonic
+    groups_.clear();
+    addGroup(options, ParameterGroup::kPositions, RawArray::kPositions, 0, 3);
+    addGroup(options, ParameterGroup::kRotations, RawArray::kRotations, 0, 4);
+    addGroup(options, ParameterGroup::kLogScales, RawArray::kLogScales, 0, 3);
+    addGroup(options, ParameterGroup::kLogits, RawArray::kLogits, 0, 1);
+    addGroup(options, ParameterGroup::kShFirst, RawArray::kSh, 0, kFirst);
+    addGroup(options, ParameterGroup::kShOthers, RawArray::kSh, kFirst,
+             held_.splats.shStride() - kFirst);
+    const size_t extra_count = how_ ? held_.splats.extra_lengths.size() : 0;
+    for (size_t k = 0; k < std::min(extra_count, options.extra_rates.size()); ++k) {
+      addGroup(options.extra_rates[k], extraArray(k), 0, held_.splats.extra_lengths[k]);
+    }
+    adamStep(groups_, held_.step + 1, options.adam);
+    ++held_.step;
+    held_.kept_gradients = {};
+    changed();
+  }
+
+  void keepGradients() override {
+    requireStage(Stage::kGradients, "there are no derivatives to keep; call backward first");
+    addToKept();
+    stage_ = Stage::kSplats;
+  }
+
+  void edit(const SplatEdit& edit) override {
+    validate(edit, held_.splats);
+    std::vector<EditTarget> targets = {
+        {&held_.splats, false}, {&held_.first_moments, true}, {&held_.second_moments, true}};
+    if (held_.kept_gradients.size() > 0) targets.push_back({&held_.kept_gradients, true});
+    applyEdit(edit, targets);
+    changed();
+  }
+
+  std::vector<float> picture() const override {
+    requireStage(Stage::kDrawn, "there is no picture; call forward first");
+    return picture_.colour;
+  }
+
+  RawSplats gradients() const override {
+    requireStage(Stage::kGradients, "there are no derivatives; call backward first");
+    if (how_) return by_raw_;
+    const SplatGradients& by = gradients_.instances[0];
+    RawSplats raw = zerosLike(held_.splats);
+    raw.positions = by.positions;
+    raw.rotations = by.rotations;
+    raw.log_scales = by.scales;
+    raw.logits = by.opacities;
+    raw.sh = by.sh;
+    return raw;
+  }
+
+  std::vector<float> statistic(Statistic statistic) const override {
+    requireStage(Stage::kGradients, "there are no statistics; call backward first");
+    const GradientArray& array = kStatistics[static_cast<size_t>(statistic)];
+    const std::vector<float>& seen = gradients_.instances[0].*array.values;
+    if (seen.empty() && splatCount() > 0) {
+      fail(ErrorCode::kInvalidArgument,
+           std::string(array.name) + " were not asked for in the last backward pass");
+    }
+    return seen;
+  }
+
+  void lendStatistics(ViewStatistics& statistics) override {
+    requireStage(Stage::kGradients, "there are no statistics; call backward first");
+    visibleFlags(workspace_, visible_);
+    statistics.visible = visible_;
+    for (size_t i = 0; i < kStatisticCount; ++i) {
+      statistics.arrays[i] = gradients_.instances[0].*kStatistics[i].values;
+    }
+    statistics.splats = {held_.splats.positions, held_.splats.rotations, cloud_.scales,
+                         cloud_.opacities};
+  }
+
+  void lendErrors(ViewErrors& errors) override {
+    requireStage(Stage::kLoss, "there are no errors; call loss first");
+    errors.width = picture_.width;
+    errors.height = picture_.height;
+    errors.structure = image_loss_.structureErrors();
+    errors.picture = picture_.colour;
+    requireCount(errors.structure.size(), picture_.colour.size() / 4, "the loss's error map");
+  }
+
+ private:
+  /// Positions, rotations and harmonics are the same numbers raw and stored: while splats are
+  /// drawn, the cloud has the arrays. With a parameterisation it has arrays of its own.
+  class Lent {
+   public:
+    explicit Lent(CpuBackend& backend) : backend_(backend) {
+      if (!backend_.how_) exchange();
+    }
+    ~Lent() {
+      if (!backend_.how_) exchange();
+    }
+    Lent(const Lent&) = delete;
+    Lent& operator=(const Lent&) = delete;
+
+   private:
+    void exchange() {
+      backend_.cloud_.positions.swap(backend_.held_.splats.positions);
+      backend_.cloud_.rotations.swap(backend_.held_.splats.rotations);
+      backend_.cloud_.sh.swap(backend_.held_.splats.sh);
+    }
+    CpuBackend& backend_;
+  };
+
+  static void requireCount(size_t seen, size_t needed, const char* what) {
+    if (seen != needed) {
+      fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(seen) +
+                                            " values; " + std::to_string(needed) + " are needed");
+    }
+  }
+
+  void requireStage(Stage least, const char* message) const {
+    if (stage_ < least) fail(ErrorCode::kInvalidArgument, message);
+  }
+
+  void hold(TrainingState state) {
+    held_ = std::move(state);
+    cloud_ = {};
+    cloud_.sh_degree = held_.splats.sh_degree;
+    cloud_.colour_space = held_.splats.colour_space;
+    cloud_.antialias = held_.splats.antialias;
+    changed();
+  }
+
+  void changed() {
+    is_activated_ = false;
+    stage_ = Stage::kSplats;
+  }
+
+  void activate() {
+    if (is_activated_) return;
+    if (how_) {
+      activateAll(held_.splats, *how_, cloud_);
+    } else {
+      activateShapes(held_.splats, cloud_);
+    }
+    is_activated_ = true;
+  }
+
+  /// Derivatives by an array of the raw splats, of the last backward pass.
+  std::span<const float> lastGradient(RawArray array) const {
+    if (how_) return arrayOf(by_raw_, array);
+    const SplatGradients& by = gradients_.instances[0];
+    const std::vector<float>* const arrays[] = {&by.positions, &by.rotations, &by.scales,
+                                                &by.opacities, &by.sh};
+    return *arrays[static_cast<size_t>(array)];
+  }
+
+  void addGroup(const StepOptions& options, ParameterGroup group, RawArray array, size_t offset,
+                size_t length) {
+    addGroup(options.learning_rates[static_cast<size_t>(group)], array, offset, length);
+  }
+
+  void addGroup(double rate, RawArray array, size_t offset, size_t length) {
+    if (rate == 0 || splatCount() == 0 || length == 0) return;
+    const float* gradients = held_.kept_gradients.size() > 0
+                                 ? arrayOf(held_.kept_gradients, array).data()
+                                 : lastGradient(array).data();
+    groups_.push_back({arrayOf(held_.splats, array).data() + offset, gradients + offset,
+                       arrayOf(held_.first_moments, array).data() + offset,
+                       arrayOf(held_.second_moments, array).data() + offset, splatCount(), length,
+                       rate, rowLength(held_.splats, array)});
+  }
+
+  /// Adds the derivatives of the last backward pass to the kept ones, once.
+  void addToKept() {
+    if (are_kept_) return;
+    if (held_.kept_gradients.size() == 0) held_.kept_gradients = zerosLike(held_.splats);
+    for (size_t i = 0; i < (how_ ? arrayCount(held_.splats) : kRawArrayCount); ++i) {
+      const RawArray array = static_cast<RawArray>(i);
+      const std::span<const float> last = lastGradient(array);
+      float* sums = arrayOf(held_.kept_gradients, array).data();
+      parallelFor(last.size(), kGrain, [&](size_t begin, size_t end) {
+        for (size_t k = begin; k < end; ++k) sums[k] += last[k];
+      });
+    }
+    are_kept_ = true;
+  }
+
+  std::span<const float> errorsOf(const StatisticRequest& request) {
+    if (request.errors_of) {
+      if (request.structure_errors || !request.errors.empty()) {
+        fail(ErrorCode::kInvalidArgument,
+             "errors are asked for in two ways; one of them is allowed");
+      }
+      made_errors_ = request.errors_of({picture_.width,
+                                        picture_.height,
+                                        image_loss_.structureErrors(),
+                                        picture_.colour,
+                                        target_,
+                                        {}});
+      requireCount(made_errors_.size(), picture_.colour.size() / 4, "the map of errors");
+      return made_errors_;
+    }
+    if (!request.structure_errors) return request.errors;
+    if (!request.errors.empty()) {
+      fail(ErrorCode::kInvalidArgument,
+           "both errors and structure errors are asked for; one of them is allowed");
+    }
+    const std::span<const float> errors = image_loss_.structureErrors();
+    if (errors.empty()) {
+      fail(ErrorCode::kInvalidArgument,
+           "structure errors are asked for; the loss must be one with structure errors");
+    }
+    return errors;
+  }
+
+  double meanTransmittance() const {
+    if (picture_.transmittance.empty()) {
+      fail(ErrorCode::kInvalidArgument,
+           "the loss has the mean transmittance; the picture must be drawn with it");
+    }
+    double sum = 0;
+    for (const float value : picture_.transmittance) sum += static_cast<double>(value);
+    return sum / static_cast<double>(picture_.transmittance.size());
+  }
+
+  void subtractTarget() {
+    residual_.resize(target_.size());
+    parallelFor(target_.size() / 3, kGrain, [&](size_t begin, size_t end) {
+      for (size_t pixel = begin; pixel < end; ++pixel) {
+        for (size_t c = 0; c < 3; ++c) {
+          residual_[pixel * 3 + c] = picture_.colour[pixel * 4 + c] - target_[pixel * 3 + c];
+        }
+      }
+    });
+  }
+
+  TrainingState held_;
+  SplatCloud cloud_;  ///< stored scales and opacities; the rest only while it is drawn
+  bool is_activated_ = false;
+  const Parameterisation* how_ = nullptr;
+  std::vector<Target> targets_;
+
+  Stage stage_ = Stage::kSplats;
+  RenderWorkspace workspace_;
+  RenderResult picture_;
+  ImageLoss image_loss_;
+  std::span<const float> target_;       ///< of the last loss, [H,W,3]
+  std::vector<float> made_errors_;      ///< [H,W] of StatisticRequest::errors_of
+  std::vector<float> colour_gradient_;  ///< [H,W,4]
+  std::vector<float> residual_;         ///< [H,W,3]
+  BackwardWorkspace backward_workspace_;
+  BackwardResult gradients_;      ///< by raw scales and opacities once a pass is done without how_
+  RawSplats by_raw_;              ///< with how_
+  bool are_kept_ = false;         ///< whether the last derivatives are among the kept ones
+  std::vector<uint8_t> visible_;  ///< [N]
+  std::vector<AdamGroup> groups_;
+};
+
+}  // namespace
+
+std::unique_ptr<RenderBackend> makeCpuBackend() {
+  return std::make_unique<CpuBackend>();
+}
+
+}  // namespace stipple

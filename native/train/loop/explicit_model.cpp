@@ -1,0 +1,244 @@
+// Based on: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting for Real-Time Radiance
+// Field Rendering, SIGGRAPH 2023, sections 5 and 7.1 (rates, loss, harmonics one degree at a time).
+
+#include "train/loop/explicit_model.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "base/error.h"
+#include "densify/strategies.h"
+#include "train/loop/backend_control.h"
+#include "train/loop/render_backend.h"
+#include "train/loop/splat_tables.h"
+#include "train/prior/start_splats.h"
+
+namespace stipple {
+
+namespace {
+
+/// Iterations, of 30,000, after which harmonics get another degree.
+constexpr uint64_t kDegreeInterval = 1000;
+
+using Clock = std::chrono::steady_clock;
+
+/// Seconds since the last call.
+class Stopwatch {
+ public:
+  double lap() {
+    const Clock::time_point now = Clock::now();
+    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  Clock::time_point last_ = Clock::now();
+};
+
+uint64_t smallerLimit(uint64_t a, uint64_t b) {
+  return a == 0 || b == 0 ? std::max(a, b) : std::min(a, b);
+}
+
+void requireOptions(const ExplicitModelOptions& options) {
+  if (options.sh_degree < 0 || options.sh_degree > kMaxShDegree) {
+    fail(ErrorCode::kInvalidArgument,
+         "sh_degree is " + std::to_string(options.sh_degree) + "; 0 to 4 is allowed");
+  }
+  if (!(options.ssim_share >= 0 && options.ssim_share <= 1)) {
+    fail(ErrorCode::kInvalidArgument,
+         "ssim_share is " + std::to_string(options.ssim_share) + "; 0 to 1 is allowed");
+  }
+}
+
+class ExplicitModel final : public FitModel, private Regulariser {
+ public:
+  ExplicitModel(const SplatCloud& start, std::unique_ptr<Strategy> strategy,
+                const ExplicitModelOptions& options, bool begins)
+      : strategy_(std::move(strategy)), options_(options), backend_(makeCpuBackend()) {
+    backend_->upload(start);
+    if (begins) prepare();
+    step_options_.extra_rates = beginControl(*backend_, *strategy_);
+    strategy_->adjustRates(rates_);
+    loss_options_.ssim_share = options.ssim_share;
+  }
+
+  const char* name() const override { return "explicit"; }
+
+  StepReport step(const FitMoment& given, const StepView& view, ViewEvaluator* views,
+                  Progress* progress) override {
+    moment_ = given;
+    moment_.max_splats = smallerLimit(given.max_splats, options_.max_splats);
+    moment_.position_rate = positionRate();
+    const size_t pixel_count = size_t{view.camera->width} * view.camera->height;
+    view_under_way_ = {
+        view.index, view.camera->width, view.camera->height, {view.target, pixel_count * 3}};
+    moment_.view = &view_under_way_;
+    StepReport report;
+    report.stage = "Splats";
+    report.splat_count = backend_->splatCount();
+    transmittance_weight_ = view.is_opaque ? strategy_->transmittanceWeight(moment_) : 0.0;
+    Stopwatch watch;
+    backend_->forward(*view.camera, renderOptions(view), progress);
+    report.seconds.render = watch.lap();
+
+    const StatisticRequest request = strategy_->requests(moment_);
+    loss_options_.with_structure_errors = request.structure_errors || request.error_maps;
+    const ImageLossValue value =
+        backend_->loss({view.target, pixel_count * 3}, loss_options_,
+                       {view.weights, view.weights ? pixel_count : size_t{0}});
+    const BackwardSummary summary = backend_->backward(request, this, progress);
+    report.loss = value.loss + summary.regularisation;
+    report.l1 = value.l1;
+    report.ssim = value.ssim;
+    report.seconds.backward = watch.lap();
+
+    if (request.any()) observeView(*backend_, *strategy_, moment_, view, request);
+    report.seconds.edit = watch.lap();
+    if (strategy_->stepGate(moment_)) {
+      setRates();
+      backend_->step(step_options_);
+    } else {
+      backend_->keepGradients();
+    }
+    report.seconds.optimiser = watch.lap();
+
+    const auto apply = [this](const std::optional<SplatEdit>& edit) {
+      applyControl(*backend_, *strategy_, moment_, edit);
+    };
+    apply(strategy_->afterStep(moment_, storeOf(*backend_)));
+    if (views && strategy_->wantsSweep(moment_)) {
+      strategy_->sweep(moment_, *views);
+      if (strategy_->parameterisation()) backend_->parameterise(strategy_->parameterisation());
+    }
+    apply(strategy_->edit(moment_, storeOf(*backend_)));
+    report.seconds.edit += watch.lap();
+    return report;
+  }
+
+  SplatCloud splats(uint64_t) override { return backend_->download(); }
+  std::vector<uint64_t> budgets() const override { return {backend_->splatCount()}; }
+  SplatQuantities seen() const override { return strategy_->seen(backend_->splatCount()); }
+
+  TensorTable state() const override {
+    TensorTable table;
+    putTrainingState(backend_->state(), table);
+    putText(strategy_->name(), "strategy.name", table);
+    for (auto& [name, tensor] : strategy_->state()) {
+      table["strategy.state." + name] = std::move(tensor);
+    }
+    return table;
+  }
+
+  void restore(const TensorTable& table) override {
+    const std::string name = takeText(table, "strategy.name");
+    if (name != strategy_->name()) {
+      fail(ErrorCode::kFormat, "the checkpoint is of strategy '" + name + "'; this fit has '" +
+                                   strategy_->name() + "'");
+    }
+    const TrainingState before = backend_->state();
+    backend_->restore(takeTrainingState(table, before.splats));
+    try {
+      strategy_->restore(takePart(table, "strategy.state."));
+    } catch (...) {
+      backend_->restore(before);
+      throw;
+    }
+  }
+
+  uint64_t memoryBytes() const override { return backend_->memoryBytes(); }
+
+ private:
+  void prepare() {
+    TrainingState state = backend_->state();
+    strategy_->prepare(state.splats, options_.iterations);
+    backend_->restore(state);
+  }
+
+  RenderOptions renderOptions(const StepView& view) const {
+    RenderOptions options;
+    options.with_depth = false;
+    options.with_background = true;
+    options.with_transmittance = transmittance_weight_ != 0;
+    std::copy_n(view.background, 3, options.background);
+    const uint64_t degree = moment_.iteration / scaleSchedule(kDegreeInterval, moment_.iterations);
+    options.sh_degree_limit =
+        static_cast<int>(std::min<uint64_t>(degree, static_cast<uint64_t>(kMaxShDegree)));
+    return options;
+  }
+
+  double positionRate() const {
+    const double progress =
+        std::min(1.0, static_cast<double>(moment_.iteration) /
+                          static_cast<double>(std::max<uint64_t>(1, moment_.iterations)));
+    return rates_.first_position *
+           std::pow(rates_.last_position / rates_.first_position, progress) *
+           std::max(moment_.extent, 0.0);
+  }
+
+  void setRates() {
+    const auto set = [&](ParameterGroup group, double rate) {
+      step_options_.learning_rates[static_cast<size_t>(group)] = std::min(rate, kMaxLearningRate);
+    };
+    set(ParameterGroup::kPositions, moment_.position_rate);
+    set(ParameterGroup::kRotations, rates_.rotation);
+    set(ParameterGroup::kLogScales, rates_.log_scale);
+    set(ParameterGroup::kLogits, rates_.logit);
+    set(ParameterGroup::kShFirst, rates_.colour);
+    set(ParameterGroup::kShOthers, rates_.higher_colour);
+  }
+
+  /// The strategy's part of the loss, called by the backend.
+  double evaluate(const SplatCloud& cloud, const CloudGradient& gradient) override {
+    return strategy_->loss(moment_, cloud, gradient);
+  }
+
+  double transmittanceWeight() const override { return transmittance_weight_; }
+
+  std::unique_ptr<Strategy> strategy_;  ///< outlives the backend, which draws by its activations
+  ExplicitModelOptions options_;
+  std::unique_ptr<RenderBackend> backend_;
+  LearningRates rates_;
+  ImageLossOptions loss_options_;
+  StepOptions step_options_;
+  FitMoment moment_;  ///< of the step under way
+  TrainingView view_under_way_;
+  double transmittance_weight_ = 0;  ///< of the step under way
+};
+
+}  // namespace
+
+uint64_t bytesPerSplat(int sh_degree) {
+  constexpr uint64_t kOthers = 11;      // place, turn, size, opacity
+  constexpr uint64_t kOfDrawing = 250;  // with statistics
+  const uint64_t row = (kOthers + shCoefficientCount(sh_degree) * 3) * sizeof(float);
+  return row * 13 + kOfDrawing;
+}
+
+std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
+                                            std::span<const size_t> training,
+                                            const ExplicitModelOptions& options,
+                                            Progress* progress) {
+  requireOptions(options);
+  if (training.empty()) {
+    fail(ErrorCode::kInvalidArgument, "there are no views to learn from; at least one is needed");
+  }
+  std::unique_ptr<Strategy> strategy = makeStrategy(options.strategy);
+  StartOptions start;
+  start.count = options.start_splats;
+  start.max_count = options.max_splats;
+  start.sh_degree = options.sh_degree;
+  start.antialias = options.antialias;
+  start.seed = options.seed;
+  return std::make_unique<ExplicitModel>(startSplats(views, training, start, progress),
+                                         std::move(strategy), options, true);
+}
+
+std::unique_ptr<FitModel> makeExplicitModel(const SplatCloud& start,
+                                            std::unique_ptr<Strategy> strategy,
+                                            const ExplicitModelOptions& options) {
+  requireOptions(options);
+  return std::make_unique<ExplicitModel>(start, std::move(strategy), options, false);
+}
+
+}  // namespace stipple

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "base/progress.h"
+#include "data/clouds/splat_cloud.h"
+#include "data/views/view_source.h"
+#include "densify/strategy.h"
+#include "train/loop/fit_model.h"
+
+namespace stipple {
+
+struct ExplicitModelOptions {
+  std::string strategy = "adaptive";  ///< how splats are added and removed
+  uint64_t start_splats = 0;          ///< of the start; 0: as many as the prior has points
+  uint64_t max_splats = 0;            ///< hard cap; 0: none
+  int sh_degree = 3;                  ///< 0..4; 0 without view-dependent colour
+  Antialias antialias = Antialias::kClassic;
+  double ssim_share = 0.2;
+  uint64_t seed = 0;
+  uint64_t iterations = 30000;  ///< of the fit, which what it begins with may depend on
+};
+
+/// Bytes that a fit takes for each splat at its largest, about: parameters, two moments and
+/// derivatives, the first three once more as the best state and once more in a checkpoint, what
+/// drawing keeps, and a quarter of spare room where arrays grow.
+uint64_t bytesPerSplat(int sh_degree);
+
+/// Splats with parameters of their own, started from what the views know of surfaces: their points,
+/// else their depth, else the volume that the cameras share (start_splats.h).
+/// In: training: the views that may be looked at. Source of constants: Kerbl, Kopanas, Leimkuehler,
+/// Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023.
+/// Errors: kInvalidArgument for no views, options out of range, an unknown strategy (says which
+/// there are).
+std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
+                                            std::span<const size_t> training,
+                                            const ExplicitModelOptions& options,
+                                            Progress* progress = nullptr);
+
+/// The same from splats that are there, with a strategy of the caller's; of options, seed and
+/// start_splats count for nothing.
+std::unique_ptr<FitModel> makeExplicitModel(const SplatCloud& start,
+                                            std::unique_ptr<Strategy> strategy,
+                                            const ExplicitModelOptions& options);
+
+}  // namespace stipple

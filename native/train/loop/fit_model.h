@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "data/clouds/splat_cloud.h"
+#include "data/tensor_table.h"
+#include "data/views/view_source.h"
+#include "densify/strategy.h"
+#include "train/optimiser/image_loss.h"
+
+namespace stipple {
+
+/// Where the seconds of one iteration went.
+struct StepSeconds {
+  double render = 0;
+  double backward = 0;  ///< with the loss
+  double field = 0;     ///< network and density, both ways; 0 of explicit splats
+  double optimiser = 0;
+  double edit = 0;  ///< density control
+
+  StepSeconds& operator+=(const StepSeconds& other);
+};
+
+struct StepReport {
+  double loss = 0;
+  double l1 = 0;
+  double ssim = 1;
+  uint64_t splat_count = 0;  ///< drawn in this step
+  StepSeconds seconds;
+  const char* stage = "";  ///< for the progress bar: "Density", "Attributes", "Joint", "Splats"
+};
+
+/// A view of the step: its picture is composited over the background already.
+struct StepView {
+  size_t index = 0;  ///< among the views that are learned from, as ViewEvaluator counts them
+  const Camera* camera = nullptr;
+  const float* target = nullptr;   ///< [H,W,3] in the compositing space
+  const float* weights = nullptr;  ///< [H,W] or null: 1
+  bool is_opaque = true;           ///< the view has no alpha: all of it is meant to be covered
+  double background[3] = {0, 0, 0};
+};
+
+/// What is trained: explicit splats, or the field of a learned density. The trainer chooses views,
+/// keeps time, measures and saves; a model takes steps.
+/// Determinism: the same calls give the same bits, for any number of threads.
+class FitModel {
+ public:
+  virtual ~FitModel() = default;
+
+  /// "explicit" or "field".
+  virtual const char* name() const = 0;
+
+  /// One iteration. views draws other views for strategies that sweep.
+  virtual StepReport step(const FitMoment& moment, const StepView& view, ViewEvaluator* views,
+                          Progress* progress) = 0;
+
+  /// The splats at a budget (of a field: its anchors); 0: all that there are, or the largest budget
+  /// that was trained. A model
+  /// of one size gives that, whatever is asked.
+  virtual SplatCloud splats(uint64_t budget) = 0;
+  /// Budgets at which held-out views are worth measuring, ascending; one for a model of one size.
+  virtual std::vector<uint64_t> budgets() const = 0;
+  /// Scores and ages of splats(0), where density control has any.
+  virtual SplatQuantities seen() const { return {}; }
+  /// Entropy of the density, nats; not of models without one.
+  virtual std::optional<double> densityEntropy() const { return {}; }
+
+  /// Everything that goes on from here, bit for bit, needs. Errors of restore: kFormat.
+  virtual TensorTable state() const = 0;
+  virtual void restore(const TensorTable& state) = 0;
+  virtual uint64_t memoryBytes() const = 0;  ///< held now, about
+};
+
+}  // namespace stipple

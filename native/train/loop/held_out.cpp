@@ -1,0 +1,136 @@
+#include "train/loop/held_out.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include "base/parallel.h"
+#include "math/colour.h"
+#include "math/vec.h"
+#include "train/prior/shared_volume.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr size_t kGrain = 1 << 14;
+/// dB given to a picture without any error: more than 8-bit pictures can tell apart.
+constexpr double kMostPsnr = 100.0;
+/// Alpha from which a pixel belongs to the foreground: half of the least that 8 bits hold.
+constexpr float kForegroundAlpha = 0.5f / 255.0f;
+
+float shown(float value, ColourSpace space) {
+  const float held = std::clamp(value, 0.0f, 1.0f);
+  return space == ColourSpace::kLinear ? std::clamp(linearToSrgb(held), 0.0f, 1.0f) : held;
+}
+
+/// dB of the weighted mean of squares; 0 weights: nothing is wrong.
+double psnrOf(const std::vector<float>& a, const std::vector<float>& b,
+              const std::vector<float>& weights) {
+  const size_t pixel_count = a.size() / 3;
+  std::vector<double> sums(rangeCount(pixel_count, kGrain)), totals(sums.size());
+  parallelFor(pixel_count, kGrain, [&](size_t begin, size_t end) {
+    double sum = 0, total = 0;
+    for (size_t i = begin; i < end; ++i) {
+      const double weight = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
+      for (size_t c = 0; c < 3; ++c) {
+        const double error = static_cast<double>(a[i * 3 + c]) - static_cast<double>(b[i * 3 + c]);
+        sum += weight * error * error;
+      }
+      total += 3 * weight;
+    }
+    sums[begin / kGrain] = sum;
+    totals[begin / kGrain] = total;
+  });
+  const double squares = std::accumulate(sums.begin(), sums.end(), 0.0);
+  const double total = std::accumulate(totals.begin(), totals.end(), 0.0);
+  if (squares <= 0 || total <= 0) return kMostPsnr;
+  return std::min(kMostPsnr, -10.0 * std::log10(squares / total));
+}
+
+/// Mean distance of the points from a place, metres; 0 without points.
+double meanDistance(const PointSet& points, const Vec3d& place) {
+  double sum = 0;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const float* p = &points.positions[i * 3];
+    sum += (Vec3f(p[0], p[1], p[2]).cast<double>() - place).norm();
+  }
+  return points.size() == 0 ? 0 : sum / static_cast<double>(points.size());
+}
+
+}  // namespace
+
+FitViews splitViews(const ViewSource& views, uint64_t every) {
+  std::vector<std::string> names(views.count());
+  for (size_t i = 0; i < names.size(); ++i) names[i] = views.name(i);
+  std::vector<size_t> order(names.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return names[a] < names[b]; });
+  FitViews split;
+  const bool holds_out = every > 1 && order.size() >= every;
+  for (size_t i = 0; i < order.size(); ++i) {
+    (holds_out && i % every == 0 ? split.held_out : split.training).push_back(order[i]);
+  }
+  return split;
+}
+
+double extentOfCameras(const ViewSource& views, std::span<const size_t> chosen) {
+  Vec3d mean = Vec3d::Zero();
+  for (const size_t view : chosen) mean += placeOf(views.camera(view));
+  mean /= static_cast<double>(chosen.size());
+  double largest = 0;
+  for (const size_t view : chosen) {
+    largest = std::max(largest, (placeOf(views.camera(view)) - mean).norm());
+  }
+  const double distance = meanDistance(views.points(), mean);
+  // Rounding alone spreads cameras of one place by less than this.
+  if (largest > 1e-9 * std::max(distance, mean.norm())) return 1.1 * largest;
+  return distance > 0 ? distance : 1.0;
+}
+
+FitMeasure ViewMeasure::measure(const SplatCloud& cloud, PictureStore& pictures,
+                                std::span<const size_t> chosen, const double background[3]) {
+  FitMeasure sum;
+  sum.splat_count = cloud.size();
+  RenderOptions options;
+  options.with_depth = false;
+  options.with_background = true;
+  std::copy_n(background, 3, options.background);
+  const SplatInstance instance{&cloud};
+  const ColourSpace space = pictures.views().colourSpace();
+  for (size_t k = 0; k < chosen.size(); ++k) {
+    pictures.load(chosen[k], background, target_);
+    if (k + 1 < chosen.size()) pictures.prefetch(chosen[k + 1]);
+    renderTiled({&instance, 1}, pictures.views().camera(chosen[k]), options, workspace_, drawn_);
+    seen_.resize(target_.colour.size());
+    foreground_ = target_.alpha;
+    parallelFor(seen_.size() / 3, kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        for (size_t c = 0; c < 3; ++c) {
+          seen_[i * 3 + c] = shown(drawn_.colour[i * 4 + c], space);
+          target_.colour[i * 3 + c] = shown(target_.colour[i * 3 + c], space);
+        }
+        if (foreground_.empty()) continue;
+        const float weight = target_.weights.empty() ? 1.0f : target_.weights[i];
+        foreground_[i] = foreground_[i] > kForegroundAlpha ? weight : 0.0f;
+      }
+    });
+    const double psnr = psnrOf(seen_, target_.colour, target_.weights);
+    sum.psnr += psnr;
+    sum.foreground_psnr += foreground_.empty() ? psnr : psnrOf(seen_, target_.colour, foreground_);
+    sum.ssim += loss_
+                    .evaluate(target_.width, target_.height, {seen_.data(), PixelLayout::kRgb},
+                              {target_.colour.data(), PixelLayout::kRgb},
+                              target_.weights.empty() ? nullptr : target_.weights.data(), {})
+                    .ssim;
+  }
+  const double count = static_cast<double>(chosen.size());
+  sum.psnr /= count;
+  sum.foreground_psnr /= count;
+  sum.ssim /= count;
+  return sum;
+}
+
+}  // namespace stipple

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "data/clouds/splat_cloud.h"
+#include "data/fit_history.h"
+#include "data/views/view_source.h"
+#include "splat/render/render.h"
+#include "train/loop/picture_store.h"
+#include "train/optimiser/image_loss.h"
+
+namespace stipple {
+
+/// Which views a fit learns from, and which it is measured on.
+struct FitViews {
+  std::vector<size_t> training;  ///< ascending names
+  std::vector<size_t> held_out;  ///< the same
+};
+
+/// Every `every`-th view by name is held out, the first one too, as published results do it.
+/// In: every: 0: none. Where there are fewer than `every` views, none is held out.
+FitViews splitViews(const ViewSource& views, uint64_t every);
+
+/// 1.1 times the largest distance of a camera from the mean of all, metres: the unit of published
+/// learning rates of positions. Cameras of one place: their mean distance to the known points, and
+/// 1 where there are none. In: chosen: at least one.
+double extentOfCameras(const ViewSource& views, std::span<const size_t> chosen);
+
+/// Compares drawings of splats with views.
+class ViewMeasure {
+ public:
+  /// Mean PSNR and SSIM over views. Colours are held to 0..1 and compared in display space; SSIM as
+  /// image_loss.h has it. Views with alpha stand over `background`. Pixels that a mask leaves out
+  /// count for nothing.
+  /// In: chosen: views of the store, at least one. Out: iteration, budget, entropy are left alone.
+  FitMeasure measure(const SplatCloud& cloud, PictureStore& pictures,
+                     std::span<const size_t> chosen, const double background[3]);
+
+ private:
+  RenderWorkspace workspace_;
+  RenderResult drawn_;
+  ImageLoss loss_;
+  TargetPicture target_;
+  std::vector<float> seen_;        ///< [H,W,3]
+  std::vector<float> foreground_;  ///< [H,W]
+};
+
+}  // namespace stipple

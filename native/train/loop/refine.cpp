@@ -1,0 +1,194 @@
+#include "train/loop/refine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/error.h"
+#include "data/clouds/cloud_extent.h"
+#include "splat/render/render_backward.h"
+#include "train/loop/render_backend.h"
+#include "train/loop/view_order.h"
+#include "train/optimiser/adam.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr uint32_t kMaxIterations = 1000000;
+
+/// Rates at the start; they fall to kLastRate of it along a half cosine, so that the last steps
+/// settle. Positions: in units of a typical splat of the start.
+constexpr double kPositionRate = 0.05;
+constexpr double kRotationRate = 5e-3;
+constexpr double kLogScaleRate = 1e-2;
+constexpr double kLogitRate = 3e-2;
+constexpr double kColourRate = 1e-2;
+constexpr double kHigherColourRate = 5e-4;
+constexpr double kLastRate = 0.1;
+/// A step of Adam has the size of the rate, whatever the gradient: near the goal it must be small.
+/// Rates are whole where the start is off by this mean L1, and fall in proportion below it.
+constexpr double kErrorOfFullRates = 4e-3;
+constexpr double kLeastShare = 0.02;
+/// Few steps: the second moment must follow within tens of them.
+constexpr double kBeta2 = 0.99;
+
+void validateInput(const SplatCloud& start, const SplatCloud& full, const RefineOptions& options) {
+  validate(start, "cloud");
+  validate(full, "full cloud");
+  if (start.size() == 0 || full.size() == 0) {
+    fail(ErrorCode::kInvalidArgument, "refining needs splats; the clouds have " +
+                                          std::to_string(start.size()) + " and " +
+                                          std::to_string(full.size()));
+  }
+  if (start.colour_space != full.colour_space) {
+    fail(ErrorCode::kInvalidArgument, "the cloud and the full cloud have different colour spaces");
+  }
+  if (options.iterations > kMaxIterations) {
+    fail(ErrorCode::kInvalidArgument, "iterations is " + std::to_string(options.iterations) +
+                                          "; at most " + std::to_string(kMaxIterations) +
+                                          " is allowed");
+  }
+}
+
+/// Median of the middle axis: the size of a splat as it is mostly seen, metres.
+double typicalSize(const SplatCloud& cloud) {
+  std::vector<float> sizes(cloud.size());
+  for (size_t i = 0; i < sizes.size(); ++i) {
+    const float* s = &cloud.scales[i * 3];
+    sizes[i] = std::max(std::min(s[0], s[1]), std::min(std::max(s[0], s[1]), s[2]));
+  }
+  const auto middle = sizes.begin() + static_cast<long>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return static_cast<double>(*middle);
+}
+
+StepOptions stepOptions(double size, double share, double progress) {
+  const double fall =
+      kLastRate + (1 - kLastRate) * 0.5 * (1 + std::cos(progress * 3.141592653589793));
+  StepOptions step;
+  step.adam.beta2 = kBeta2;
+  const auto set = [&](ParameterGroup group, double rate) {
+    // Splats of many kilometres take smaller steps than their size asks for.
+    step.learning_rates[static_cast<size_t>(group)] =
+        std::min(rate * share * fall, kMaxLearningRate);
+  };
+  set(ParameterGroup::kPositions, kPositionRate * size);
+  set(ParameterGroup::kRotations, kRotationRate);
+  set(ParameterGroup::kLogScales, kLogScaleRate);
+  set(ParameterGroup::kLogits, kLogitRate);
+  set(ParameterGroup::kShFirst, kColourRate);
+  set(ParameterGroup::kShOthers, kHigherColourRate);
+  return step;
+}
+
+/// Every second view stands before white: then coverage shows where colours are dark, too.
+RenderOptions renderOptions(size_t view) {
+  RenderOptions options;
+  options.with_depth = false;
+  options.with_background = true;
+  std::fill_n(options.background, 3, view % 2 == 0 ? 0.0 : 1.0);
+  return options;
+}
+
+void addTargets(const SplatCloud& full, const std::vector<Camera>& views, RenderBackend& backend,
+                Progress* progress) {
+  const SplatInstance instance{&full};
+  RenderWorkspace workspace;
+  RenderResult picture;
+  std::vector<float> pixels;
+  for (size_t v = 0; v < views.size(); ++v) {
+    advance(progress, 0.2 * static_cast<double>(v) / static_cast<double>(views.size()),
+            "Drawing all splats");
+    renderTiled({&instance, 1}, views[v], renderOptions(v), workspace, picture);
+    const size_t count = picture.colour.size() / 4;
+    pixels.resize(count * 3);
+    for (size_t i = 0; i < count; ++i) {
+      std::copy_n(&picture.colour[i * 4], 3, &pixels[i * 3]);
+    }
+    backend.addTarget(views[v].width, views[v].height, pixels);
+  }
+}
+
+/// What the start lacks: mean L1 loss of a few views.
+double startingError(const std::vector<Camera>& views, const ImageLossOptions& loss,
+                     RenderBackend& backend) {
+  const size_t count = std::min<size_t>(views.size(), 4);
+  double sum = 0;
+  for (size_t v = 0; v < count; ++v) {
+    backend.forward(views[v], renderOptions(v));
+    sum += backend.loss(static_cast<uint32_t>(v), loss).l1;
+  }
+  return sum / static_cast<double>(count);
+}
+
+/// As large as a view, anywhere: bounds of memory do not look at places.
+Camera cameraOfSize(uint32_t size) {
+  Camera camera;
+  camera.width = camera.height = size;
+  camera.fx = camera.fy = size;
+  return camera;
+}
+
+/// Bytes that the loss works with: half a megabyte per thread, and two sums per row of a tile.
+uint64_t lossBytes(uint64_t pixel_count) {
+  const uint64_t threads = std::max(1u, std::thread::hardware_concurrency());
+  return threads * (uint64_t{1} << 20) + pixel_count * sizeof(double);
+}
+
+}  // namespace
+
+uint64_t refineMemoryBound(const SplatCloud& start, const SplatCloud& full,
+                           const RefineOptions& options) {
+  validateInput(start, full, options);
+  const uint64_t pixel_count = uint64_t{options.view_size} * options.view_size;
+  const Camera camera = cameraOfSize(options.view_size);
+  const SplatInstance whole{&full};
+  const SplatInstance cut{&start};
+  // The drawing of the targets is over when the steps begin, the targets stay.
+  const uint64_t drawing = renderMemoryBound({&whole, 1}, camera, renderOptions(0));
+  const uint64_t picture = pixel_count * (4 * sizeof(float));
+  const uint64_t pass = backwardMemoryBound({&cut, 1}, camera, renderOptions(0), {});
+  // Raw splats, their zeros and both moments, the cloud that is drawn and that is handed back.
+  const uint64_t row = sizeof(float) * (11 + start.shStride());
+  const uint64_t steps = 2 * picture + pass + 6 * row * start.size() + lossBytes(pixel_count);
+  return (options.view_count + uint64_t{1}) * pixel_count * (3 * sizeof(float)) +
+         std::max(drawing, steps) + (uint64_t{1} << 20);
+}
+
+SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
+                       const RefineOptions& options, Progress* progress) {
+  validateInput(start, full, options);
+  if (options.iterations == 0) return start;
+  ViewRigOptions rig;
+  rig.rig = options.rig;
+  rig.count = options.view_count;
+  rig.size = options.view_size;
+  rig.seed = options.seed;
+  const std::vector<Camera> views = viewsOfCloud(full, rig);
+  const std::unique_ptr<RenderBackend> backend = makeCpuBackend();
+  backend->upload(start);
+  addTargets(full, views, *backend, progress);
+  ImageLossOptions loss;
+  loss.ssim_share = options.ssim_share;
+  const double size = typicalSize(start);
+  const double share =
+      std::clamp(startingError(views, loss, *backend) / kErrorOfFullRates, kLeastShare, 1.0);
+  ViewOrder order(views.size(), options.seed);
+  for (uint32_t i = 0; i < options.iterations; ++i) {
+    const double done = static_cast<double>(i) / options.iterations;
+    advance(progress, 0.2 + 0.8 * done, "Refining splats");
+    const size_t view = order.at(i);
+    backend->forward(views[view], renderOptions(view));
+    backend->loss(static_cast<uint32_t>(view), loss);
+    backend->backward({});
+    backend->step(stepOptions(size, share, done));
+  }
+  SplatCloud refined = backend->download();
+  refined.frame = start.frame;
+  return refined;
+}
+
+}  // namespace stipple

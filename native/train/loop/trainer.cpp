@@ -1,0 +1,349 @@
+#include "train/loop/trainer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <numeric>
+
+#include "base/error.h"
+#include "base/random.h"
+#include "train/loop/contributions.h"
+#include "train/loop/fit_state.h"
+
+namespace stipple {
+
+namespace {
+
+/// Views of a measurement while a fit runs, and of the one at its end: enough for a mean that means
+/// something, few enough to take no time beside the steps.
+constexpr size_t kMeasuredViews = 8;
+constexpr size_t kFinallyMeasuredViews = 200;
+// Of previews, that contributions are measured over.
+constexpr size_t kPreviewedViews = 8;
+constexpr uint64_t kMeasuresPerFit = 20;
+constexpr uint64_t kLeastMeasureInterval = 100;
+/// Iterations whose loss and time are averaged for the figures.
+constexpr size_t kRecentIterations = 50;
+constexpr uint64_t kEstimateSteps = 20;
+/// Of those, the first ones allocate and load; they are left out of the estimate.
+constexpr uint64_t kWarmUpSteps = 5;
+
+using Clock = std::chrono::steady_clock;
+
+double secondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// At most `count` of them, evenly.
+std::vector<size_t> someOf(const std::vector<size_t>& views, size_t count) {
+  const size_t chosen = std::min(views.size(), count);
+  std::vector<size_t> some(chosen);
+  for (size_t i = 0; i < chosen; ++i) some[i] = views[i * views.size() / chosen];
+  return some;
+}
+
+const std::vector<size_t>& viewsToMeasure(const FitViews& split) {
+  return split.held_out.empty() ? split.training : split.held_out;
+}
+
+FitRecord recordOf(const StepReport& report, double seconds) {
+  const StepSeconds& part = report.seconds;
+  const double named = part.render + part.backward + part.field + part.optimiser + part.edit;
+  FitRecord record;
+  record.loss = static_cast<float>(report.loss);
+  record.l1 = static_cast<float>(report.l1);
+  record.ssim = static_cast<float>(report.ssim);
+  record.splat_count = static_cast<uint32_t>(report.splat_count);
+  record.render_seconds = static_cast<float>(part.render);
+  record.backward_seconds = static_cast<float>(part.backward);
+  record.field_seconds = static_cast<float>(part.field);
+  record.optimiser_seconds = static_cast<float>(part.optimiser);
+  record.edit_seconds = static_cast<float>(part.edit);
+  record.other_seconds = static_cast<float>(std::max(0.0, seconds - named));
+  return record;
+}
+
+void requireOptions(const TrainerOptions& options) {
+  if (options.iterations < 1 || options.iterations > kMaxFitIterations) {
+    fail(ErrorCode::kInvalidArgument, "iterations is " + std::to_string(options.iterations) +
+                                          "; 1 to " + std::to_string(kMaxFitIterations) +
+                                          " is allowed");
+  }
+  if (!(options.checkpoint_seconds >= 0) || !std::isfinite(options.checkpoint_seconds)) {
+    fail(ErrorCode::kInvalidArgument, "checkpoint_seconds is " +
+                                          std::to_string(options.checkpoint_seconds) +
+                                          "; 0 or more is allowed");
+  }
+}
+
+}  // namespace
+
+/// Clocks of one run; nothing of it reaches a result.
+struct Trainer::Pace {
+  Clock::time_point start = Clock::now();
+  Clock::time_point saved = Clock::now();
+  uint64_t first_iteration = 0;
+  std::vector<double> step_seconds;  ///< of this run
+  std::optional<double> estimated_seconds;
+  std::optional<uint64_t> estimated_bytes;
+
+  double recent() const {
+    const size_t count = std::min(step_seconds.size(), kRecentIterations);
+    if (count == 0) return 0;
+    return std::accumulate(step_seconds.end() - static_cast<long>(count), step_seconds.end(), 0.0) /
+           static_cast<double>(count);
+  }
+};
+
+Trainer::Trainer(std::shared_ptr<const ViewSource> views, FitViews split,
+                 std::unique_ptr<FitModel> model, const TrainerOptions& options)
+    : options_(options),
+      pictures_(std::move(views), options.picture_bytes),
+      split_(std::move(split)),
+      measured_(someOf(viewsToMeasure(split_), kMeasuredViews)),
+      model_(std::move(model)),
+      extent_(1.0),
+      order_(split_.training.size(), options.seed) {
+  requireOptions(options);
+  if (split_.training.empty()) {
+    fail(ErrorCode::kInvalidArgument, "there are no views to learn from; at least one is needed");
+  }
+  extent_ = extentOfCameras(pictures_.views(), split_.training);
+  double background[3];
+  backgroundOf(0, background);
+  evaluator_ = std::make_unique<FitViewEvaluator>([this] { return model_->splats(0); }, pictures_,
+                                                  split_.training, background, options.ssim_share);
+  history_.measured_on_held_out = !split_.held_out.empty();
+  history_.training_view_count = split_.training.size();
+}
+
+Trainer::~Trainer() = default;
+
+uint64_t Trainer::measureInterval() const {
+  if (options_.measure_interval > 0) return options_.measure_interval;
+  return std::max(kLeastMeasureInterval, options_.iterations / kMeasuresPerFit);
+}
+
+bool Trainer::measureIsDue() const {
+  return iteration_ % measureInterval() == 0 || iteration_ == options_.iterations;
+}
+
+void Trainer::backgroundOf(uint64_t iteration, double background[3]) const {
+  for (uint64_t c = 0; c < 3; ++c) {
+    background[c] = options_.background == BackgroundPolicy::kWhite ? 1.0 : 0.0;
+    if (options_.background != BackgroundPolicy::kRandom || iteration == 0) continue;
+    background[c] = unitDouble(keyedBits(options_.seed, RandomUse::kBackground, iteration * 3 + c));
+  }
+}
+
+void Trainer::step(Pace& pace) {
+  const Clock::time_point start = Clock::now();
+  FitMoment moment;
+  moment.iteration = iteration_ + 1;
+  moment.iterations = options_.iterations;
+  moment.extent = extent_;
+  moment.seed = options_.seed;
+  moment.max_splats = options_.max_splats;
+  moment.view_count = split_.training.size();
+  StepView view;
+  view.index = order_.at(iteration_);
+  const size_t source_view = split_.training[view.index];
+  view.camera = &pictures_.views().camera(source_view);
+  backgroundOf(moment.iteration, view.background);
+  pictures_.load(source_view, view.background, target_);
+  if (target_.alpha.empty()) backgroundOf(0, view.background);
+  if (moment.iteration < options_.iterations) {
+    pictures_.prefetch(split_.training[order_.at(moment.iteration)]);
+  }
+  view.target = target_.colour.data();
+  view.weights = target_.weights.empty() ? nullptr : target_.weights.data();
+  view.is_opaque = target_.alpha.empty();
+  evaluator_->forgetSplats();
+  // A step is never left half-way: what was cancelled must go on bit for bit.
+  const StepReport report = model_->step(moment, view, evaluator_.get(), nullptr);
+  stage_ = report.stage;
+  ++iteration_;
+  const double seconds = secondsSince(start);
+  history_.records.push_back(recordOf(report, seconds));
+  pace.step_seconds.push_back(seconds);
+}
+
+void Trainer::measure() {
+  double background[3];
+  backgroundOf(0, background);
+  FitMeasure measure = measure_.measure(model_->splats(0), pictures_, measured_, background);
+  measure.iteration = iteration_;
+  measure.density_entropy =
+      model_->densityEntropy().value_or(std::numeric_limits<double>::quiet_NaN());
+  double best = -std::numeric_limits<double>::infinity();
+  for (const FitMeasure& earlier : history_.measures) best = std::max(best, earlier.psnr);
+  history_.measures.push_back(measure);
+  if (measure.psnr < best) return;
+  history_.best_iteration = iteration_;
+  best_.reset();
+}
+
+void Trainer::keepBest() {
+  if (!best_) return;
+  model_->restore(*best_);
+  best_.reset();
+}
+
+void Trainer::measureBudgets() {
+  const std::vector<size_t> views = someOf(viewsToMeasure(split_), kFinallyMeasuredViews);
+  history_.measured_view_count = views.size();
+  history_.by_budget.clear();
+  double background[3];
+  backgroundOf(0, background);
+  for (const uint64_t budget : model_->budgets()) {
+    FitMeasure measure = measure_.measure(model_->splats(budget), pictures_, views, background);
+    measure.iteration = history_.best_iteration;
+    measure.budget = budget;
+    measure.density_entropy =
+        model_->densityEntropy().value_or(std::numeric_limits<double>::quiet_NaN());
+    history_.by_budget.push_back(measure);
+  }
+}
+
+/// In: most_views, of those that contributions are measured over; 0: they are not.
+SplatQuantities Trainer::look(size_t most_views) {
+  SplatQuantities quantities = model_->seen();
+  if (most_views > 0) {
+    evaluator_->forgetSplats();
+    quantities.contribution = meanContributions(*evaluator_, most_views);
+  }
+  return quantities;
+}
+
+void Trainer::save(FitObserver& observer, Pace& pace) {
+  try {
+    observer.save(state());
+  } catch (const Error& error) {
+    observer.note(std::string("the checkpoint is not saved: ") + error.what());
+  }
+  pace.saved = Clock::now();
+}
+
+void Trainer::report(FitObserver& observer, const Pace& pace) const {
+  FitFigures figures;
+  figures.iteration = iteration_;
+  figures.iterations = options_.iterations;
+  figures.stage = stage_;
+  if (!history_.records.empty()) {
+    const size_t count = std::min(history_.records.size(), kRecentIterations);
+    for (size_t i = history_.records.size() - count; i < history_.records.size(); ++i) {
+      figures.loss += static_cast<double>(history_.records[i].loss) / static_cast<double>(count);
+    }
+    figures.splat_count = history_.records.back().splat_count;
+  }
+  for (const FitMeasure& measure : history_.measures) {
+    figures.psnr = measure.psnr;
+    if (measure.iteration == history_.best_iteration) figures.best_psnr = measure.psnr;
+  }
+  figures.best_iteration = history_.best_iteration;
+  figures.seconds = secondsSince(pace.start);
+  figures.seconds_left = pace.recent() * static_cast<double>(options_.iterations - iteration_);
+  figures.estimated_seconds = pace.estimated_seconds;
+  figures.estimated_bytes = pace.estimated_bytes;
+  observer.figures(figures);
+}
+
+FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
+  Pace pace;
+  pace.first_iteration = iteration_;
+  std::exception_ptr error;
+  FitEnd end = FitEnd::kWhole;
+  while (iteration_ < options_.iterations) {
+    if (progress && progress->cancelled()) {
+      end = FitEnd::kStopped;
+      break;
+    }
+    // The best is kept before it is trained any further.
+    if (!best_ && history_.best_iteration == iteration_ && iteration_ > 0) best_ = model_->state();
+    try {
+      step(pace);
+    } catch (...) {
+      error = std::current_exception();
+      break;
+    }
+    if (measureIsDue()) measure();
+    const uint64_t taken = iteration_ - pace.first_iteration;
+    if (taken == kEstimateSteps) {
+      const double mean =
+          std::accumulate(pace.step_seconds.begin() + kWarmUpSteps, pace.step_seconds.end(), 0.0) /
+          static_cast<double>(kEstimateSteps - kWarmUpSteps);
+      pace.estimated_seconds =
+          secondsSince(pace.start) + mean * static_cast<double>(options_.iterations - iteration_);
+      pace.estimated_bytes = memoryBytes();
+    }
+    const bool interval_is_over =
+        options_.checkpoint_interval > 0 && iteration_ % options_.checkpoint_interval == 0;
+    const bool time_is_over =
+        options_.checkpoint_seconds > 0 && secondsSince(pace.saved) >= options_.checkpoint_seconds;
+    if (interval_is_over || time_is_over) save(observer, pace);
+    if (observer.wantsPreview()) {
+      const size_t views = observer.wantsContributions() ? kPreviewedViews : 0;
+      observer.preview(model_->splats(0), look(views));
+    }
+    report(observer, pace);
+    if (progress && !progress->cancelled()) {
+      progress->advance(static_cast<double>(iteration_) / static_cast<double>(options_.iterations),
+                        stage_);
+    }
+  }
+  const bool saves = options_.checkpoint_interval > 0 || options_.checkpoint_seconds > 0;
+  if (!error && saves) save(observer, pace);
+  try {
+    // What was trained since the last measurement may be the best; after a failed step, or with
+    // views that cannot be read, nobody knows.
+    if (!error && iteration_ > 0 &&
+        (history_.measures.empty() || history_.measures.back().iteration != iteration_)) {
+      measure();
+    }
+    keepBest();
+    if (!error && iteration_ > 0) {
+      measureBudgets();
+      seen_ = look(kContributionViews);
+    }
+  } catch (...) {
+    if (!error) error = std::current_exception();
+    keepBest();
+  }
+  report(observer, pace);
+  if (error) std::rethrow_exception(error);
+  return end;
+}
+
+TensorTable Trainer::state() const {
+  TensorTable table = model_->state();
+  addFitState(table, iteration_, history_);
+  if (best_) addBest(table, *best_);
+  return table;
+}
+
+void Trainer::restore(const TensorTable& state) {
+  FitHistory history = history_;
+  const uint64_t iteration = takeFitState(state, history);
+  if (iteration > options_.iterations) {
+    fail(ErrorCode::kFormat, "the checkpoint is of iteration " + std::to_string(iteration) +
+                                 "; the fit has " + std::to_string(options_.iterations));
+  }
+  std::optional<TensorTable> best = takeBest(state);
+  if (best.has_value() != (history.best_iteration != iteration && history.best_iteration > 0)) {
+    fail(ErrorCode::kFormat, "the checkpoint lacks the best state of its fit");
+  }
+  model_->restore(modelState(state));
+  iteration_ = iteration;
+  history_ = std::move(history);
+  best_ = std::move(best);
+}
+
+uint64_t Trainer::memoryBytes() const {
+  // The model, the best of it, and once more while a checkpoint is written.
+  return 3 * model_->memoryBytes() + pictures_.bytes() +
+         history_.records.capacity() * sizeof(FitRecord);
+}
+
+}  // namespace stipple

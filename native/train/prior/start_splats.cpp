@@ -1,0 +1,231 @@
+#include "train/prior/start_splats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/random.h"
+#include "decode/tree/merge_neighbours.h"
+#include "math/colour.h"
+#include "train/prior/shared_volume.h"
+#include "train/prior/start_points.h"
+#include "train/prior/swept_points.h"
+
+// Based on: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023 (sizes
+// from three neighbours, opacity 0.1). Differs: depth, the pictures and the cameras' volume serve
+// where there are no points.
+
+namespace stipple {
+
+namespace {
+
+constexpr float kStartOpacity = 0.1f;
+constexpr size_t kNeighbours = 3;
+constexpr double kLeastSquaredSize = 1e-7;  ///< m^2
+/// Of the distance to the nearest camera: the size of a point without any neighbour.
+constexpr double kLonelyShare = 0.01;
+constexpr size_t kDepthPictures = 64;
+constexpr size_t kVolumeCameras = 64;
+/// One of so many pixels must find a surface.
+constexpr uint64_t kLeastSwept = 4;
+constexpr float kOpaque = 0.5f;
+constexpr size_t kGrain = 1024;
+
+/// A number that is limited where there is a limit.
+uint64_t capped(uint64_t count, uint64_t limit) {
+  return limit == 0 ? count : std::min(count, limit);
+}
+
+/// `count` of the points, in their order, each with a chance in proportion to its weight; all of
+/// weight 0 only where others do not suffice. Source: Efraimidis, Spirakis, Weighted Random
+/// Sampling with a Reservoir, Information Processing Letters 2006.
+std::vector<size_t> choosePoints(const PointSet& points, size_t count, uint64_t seed) {
+  std::vector<size_t> chosen(points.size());
+  std::iota(chosen.begin(), chosen.end(), size_t{0});
+  if (count >= chosen.size()) return chosen;
+  std::vector<double> keys(points.size());
+  for (size_t i = 0; i < keys.size(); ++i) {
+    const double wait = -std::log1p(-unitDouble(keyedBits(seed, RandomUse::kStartChoice, i)));
+    const double weight = points.weights.empty() ? 1.0 : static_cast<double>(points.weights[i]);
+    // 1e-30: any key of a positive weight is below any other.
+    keys[i] = wait / std::max(weight, 1e-30);
+  }
+  const auto middle = chosen.begin() + static_cast<std::ptrdiff_t>(count);
+  std::nth_element(chosen.begin(), middle, chosen.end(), [&](size_t a, size_t b) {
+    return keys[a] != keys[b] ? keys[a] < keys[b] : a < b;
+  });
+  chosen.resize(count);
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+StartPoints fromPoints(const ViewSource& views, const StartOptions& options) {
+  const PointSet& points = views.points();
+  const uint64_t wanted = options.count > 0 ? options.count : points.size();
+  const bool is_display = views.colourSpace() == ColourSpace::kDisplay;
+  StartPoints start;
+  for (const size_t i : choosePoints(points, capped(wanted, options.max_count), options.seed)) {
+    float colour[3];
+    for (size_t c = 0; c < 3; ++c) {
+      const float linear = points.colours[i * 3 + c];
+      colour[c] = is_display ? linearToSrgb(linear) : linear;
+    }
+    start.positions.insert(start.positions.end(), &points.positions[i * 3],
+                           &points.positions[i * 3] + 3);
+    start.colours.insert(start.colours.end(), colour, colour + 3);
+  }
+  return start;
+}
+
+/// Pixels of the picture where something is, in rows.
+std::vector<uint32_t> seenPixels(const ViewPicture& picture) {
+  std::vector<uint32_t> pixels;
+  for (uint32_t i = 0; i < picture.depth.size(); ++i) {
+    if (picture.depth[i] <= 0) continue;
+    if (!picture.alpha.empty() && picture.alpha[i] < kOpaque) continue;
+    if (!picture.weights.empty() && picture.weights[i] <= 0) continue;
+    pixels.push_back(i);
+  }
+  return pixels;
+}
+
+/// One pixel of each of as many runs as are wanted.
+StartPoints fromDepth(const ViewSource& views, std::span<const size_t> training,
+                      const StartOptions& options, Progress* progress) {
+  const size_t picture_count = std::min(training.size(), kDepthPictures);
+  const uint64_t wanted =
+      capped(options.count > 0 ? options.count : kStartSplatsOfDepth, options.max_count);
+  StartPoints start;
+  for (size_t p = 0; p < picture_count; ++p) {
+    advance(progress, static_cast<double>(p) / static_cast<double>(picture_count),
+            "Looking for surfaces");
+    const size_t view = training[p * training.size() / picture_count];
+    const ViewPicture picture = views.load(view);
+    const std::vector<uint32_t> pixels = seenPixels(picture);
+    const size_t quota = (p + 1) * wanted / picture_count - p * wanted / picture_count;
+    const size_t count = std::min(pixels.size(), quota);
+    for (size_t k = 0; k < count; ++k) {
+      const uint64_t key = view * uint64_t{1} << 32 | k;
+      const double inside = unitDouble(keyedBits(options.seed, RandomUse::kStartChoice, key));
+      const double place = (static_cast<double>(k) + inside) * static_cast<double>(pixels.size()) /
+                           static_cast<double>(count);
+      const uint32_t pixel = pixels[std::min(static_cast<size_t>(place), pixels.size() - 1)];
+      const float alpha = picture.alpha.empty() ? 1.0f : picture.alpha[pixel];
+      float colour[3];
+      for (size_t c = 0; c < 3; ++c) colour[c] = picture.colour[pixel * 3 + c] / alpha;
+      start.add(unproject(views.camera(view), pixel % picture.width + 0.5,
+                          pixel / picture.width + 0.5, static_cast<double>(picture.depth[pixel])),
+                colour);
+    }
+  }
+  return start;
+}
+
+StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training,
+                       const StartOptions& options) {
+  std::vector<Camera> cameras;
+  const size_t camera_count = std::min(training.size(), kVolumeCameras);
+  for (size_t i = 0; i < camera_count; ++i) {
+    cameras.push_back(views.camera(training[i * training.size() / camera_count]));
+  }
+  const SharedVolume ball = sharedVolume(cameras);
+  const uint64_t wanted =
+      capped(options.count > 0 ? options.count : kStartSplatsOfPictures, options.max_count);
+  constexpr float kGrey[3] = {0.5f, 0.5f, 0.5f};
+  /// A ball fills 0.52 of its cube; most of it is seen.
+  constexpr uint64_t kTriesPerPoint = 16;
+  StartPoints start;
+  for (uint64_t i = 0; i < wanted * kTriesPerPoint && start.size() < wanted; ++i) {
+    Vec3d place;
+    for (int k = 0; k < 3; ++k) {
+      const uint64_t key = i * 3 + static_cast<uint64_t>(k);
+      place[k] = 2 * unitDouble(keyedBits(options.seed, RandomUse::kStartPoint, key)) - 1;
+    }
+    if (place.squaredNorm() > 1) continue;
+    const Vec3d point = ball.centre + ball.radius * place;
+    size_t seen = 0;
+    double x = 0, y = 0;
+    for (const Camera& camera : cameras) seen += project(camera, point, x, y);
+    // Few of so many tries are inside: then any place in the ball will do.
+    if (seen >= ball.least_views || i >= wanted * kTriesPerPoint / 2) start.add(point, kGrey);
+  }
+  return start;
+}
+
+/// Metres, from the nearest neighbours.
+std::vector<float> sizesOf(const StartPoints& points, const std::vector<Camera>& cameras) {
+  const std::vector<double> places(points.positions.begin(), points.positions.end());
+  const std::vector<uint32_t> rows = nearestNeighbours(places, kNeighbours);
+  std::vector<float> sizes(points.size());
+  parallelFor(sizes.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      const Eigen::Map<const Vec3d> place(&places[i * 3]);
+      double sum = 0;
+      size_t count = 0;
+      for (size_t k = 0; k < kNeighbours; ++k) {
+        const uint32_t other = rows[i * kNeighbours + k];
+        if (other == kNoPlace) break;
+        sum += (Eigen::Map<const Vec3d>(&places[size_t{other} * 3]) - place).squaredNorm();
+        ++count;
+      }
+      if (count == 0) {
+        double nearest = 1e30;
+        for (const Camera& camera : cameras) {
+          nearest = std::min(nearest, (placeOf(camera) - place).norm());
+        }
+        sum = std::pow(kLonelyShare * nearest, 2);
+        count = 1;
+      }
+      const double squared = std::max(sum / static_cast<double>(count), kLeastSquaredSize);
+      sizes[i] = static_cast<float>(std::min(std::sqrt(squared), 1e18));
+    }
+  });
+  return sizes;
+}
+
+SplatCloud splatsAt(const StartPoints& points, const ViewSource& views,
+                    std::span<const size_t> training, const StartOptions& options) {
+  std::vector<Camera> cameras;
+  for (const size_t view : training) cameras.push_back(views.camera(view));
+  const std::vector<float> sizes = sizesOf(points, cameras);
+  SplatCloud cloud;
+  cloud.sh_degree = options.sh_degree;
+  cloud.colour_space = views.colourSpace();
+  cloud.antialias = options.antialias;
+  cloud.resize(points.size());
+  std::copy(points.positions.begin(), points.positions.end(), cloud.positions.begin());
+  std::fill(cloud.opacities.begin(), cloud.opacities.end(), kStartOpacity);
+  std::fill(cloud.sh.begin(), cloud.sh.end(), 0.0f);
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    cloud.rotations[i * 4] = 1;
+    std::fill_n(&cloud.scales[i * 3], 3, sizes[i]);
+    for (size_t c = 0; c < 3; ++c) {
+      cloud.sh[i * cloud.shStride() + c] = (points.colours[i * 3 + c] - 0.5f) / kShC0;
+    }
+  }
+  return cloud;
+}
+
+}  // namespace
+
+SplatCloud startSplats(const ViewSource& views, std::span<const size_t> training,
+                       const StartOptions& options, Progress* progress) {
+  StartPoints points;
+  if (views.points().size() > 0) {
+    points = fromPoints(views, options);
+  } else {
+    points = fromDepth(views, training, options, progress);
+    if (points.size() == 0) {
+      const uint64_t wanted =
+          capped(options.count > 0 ? options.count : kStartSplatsOfPictures, options.max_count);
+      points = sweptPoints(views, training, wanted, options.seed, progress);
+      // Silhouettes that contradict each other leave nothing standing.
+      if (points.size() < wanted / kLeastSwept) points = fromVolume(views, training, options);
+    }
+  }
+  return splatsAt(points, views, training, options);
+}
+
+}  // namespace stipple

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/progress.h"
+#include "data/views/view_source.h"
+#include "train/prior/start_points.h"
+
+namespace stipple {
+
+/// Places on surfaces, found by what pictures have in common, where nothing else tells of them. A
+/// pixel is followed along its ray; of the depths that no view sees through (visual hull, where
+/// pictures have alpha), the one stands at which the neighbouring views look most alike.
+/// Returns: at most `count` places with the colours of their pixels. Where pictures show nothing
+/// to tell depths apart, and of a view alone, any depth in the cameras' volume will do.
+/// In: training: the views that may be looked at, at least one. Same result for any number of
+/// threads. Cost: O(count); loads at most 64 pictures, and keeps them at 256 pixels a side.
+/// Errors: those of ViewSource::load. Source: Collins, A Space-Sweep Approach to True Multi-Image
+/// Matching, CVPR 1996; Laurentini, The Visual Hull Concept, PAMI 1994.
+StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> training, uint64_t count,
+                        uint64_t seed, Progress* progress = nullptr);
+
+}  // namespace stipple
