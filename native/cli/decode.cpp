@@ -138,8 +138,7 @@ void decode(const Context& context, const Arguments& arguments) {
   Report report;
   report.add("anchors", options.anchor_count);
   report.add("gaussians", info.count);
-  report.add("seconds",
-             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  report.add("seconds", secondsSince(start));
   report.print(false);
 }
 

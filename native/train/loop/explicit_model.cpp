@@ -4,11 +4,11 @@
 #include "train/loop/explicit_model.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "densify/strategies.h"
 #include "train/loop/backend_control.h"
 #include "train/loop/render_backend.h"
@@ -21,20 +21,6 @@ namespace {
 
 /// Iterations, of 30,000, after which harmonics get another degree.
 constexpr uint64_t kDegreeInterval = 1000;
-
-using Clock = std::chrono::steady_clock;
-
-/// Seconds since the last call.
-class Stopwatch {
- public:
-  double lap() {
-    const Clock::time_point now = Clock::now();
-    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
-  }
-
- private:
-  Clock::time_point last_ = Clock::now();
-};
 
 uint64_t smallerLimit(uint64_t a, uint64_t b) {
   return a == 0 || b == 0 ? std::max(a, b) : std::min(a, b);

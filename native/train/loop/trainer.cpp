@@ -1,7 +1,6 @@
 #include "train/loop/trainer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -9,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "base/stopwatch.h"
 #include "train/loop/contributions.h"
 #include "train/loop/fit_state.h"
 
@@ -29,12 +29,6 @@ constexpr size_t kRecentIterations = 50;
 constexpr uint64_t kEstimateSteps = 20;
 /// Of those, the first ones allocate and load; they are left out of the estimate.
 constexpr uint64_t kWarmUpSteps = 5;
-
-using Clock = std::chrono::steady_clock;
-
-double secondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// At most `count` of them, evenly.
 std::vector<size_t> someOf(const std::vector<size_t>& views, size_t count) {
@@ -82,8 +76,8 @@ void requireOptions(const TrainerOptions& options) {
 
 /// Clocks of one run; nothing of it reaches a result.
 struct Trainer::Pace {
-  Clock::time_point start = Clock::now();
-  Clock::time_point saved = Clock::now();
+  Stopwatch begun;
+  Stopwatch saved;  ///< since the last checkpoint
   uint64_t first_iteration = 0;
   std::vector<double> step_seconds;  ///< of this run
   std::optional<double> estimated_seconds;
@@ -139,7 +133,7 @@ void Trainer::backgroundOf(uint64_t iteration, double background[3]) const {
 }
 
 void Trainer::step(Pace& pace) {
-  const Clock::time_point start = Clock::now();
+  const Stopwatch watch;
   FitMoment moment;
   moment.iteration = iteration_ + 1;
   moment.iterations = options_.iterations;
@@ -165,7 +159,7 @@ void Trainer::step(Pace& pace) {
   const StepReport report = model_->step(moment, view, evaluator_.get(), nullptr);
   stage_ = report.stage;
   ++iteration_;
-  const double seconds = secondsSince(start);
+  const double seconds = watch.seconds();
   history_.records.push_back(recordOf(report, seconds));
   pace.step_seconds.push_back(seconds);
 }
@@ -223,7 +217,7 @@ void Trainer::save(FitObserver& observer, Pace& pace) {
   } catch (const Error& error) {
     observer.note(std::string("the checkpoint is not saved: ") + error.what());
   }
-  pace.saved = Clock::now();
+  pace.saved = Stopwatch();
 }
 
 void Trainer::report(FitObserver& observer, const Pace& pace) const {
@@ -243,7 +237,7 @@ void Trainer::report(FitObserver& observer, const Pace& pace) const {
     if (measure.iteration == history_.best_iteration) figures.best_psnr = measure.psnr;
   }
   figures.best_iteration = history_.best_iteration;
-  figures.seconds = secondsSince(pace.start);
+  figures.seconds = pace.begun.seconds();
   figures.seconds_left = pace.recent() * static_cast<double>(options_.iterations - iteration_);
   figures.estimated_seconds = pace.estimated_seconds;
   figures.estimated_bytes = pace.estimated_bytes;
@@ -275,13 +269,13 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
           std::accumulate(pace.step_seconds.begin() + kWarmUpSteps, pace.step_seconds.end(), 0.0) /
           static_cast<double>(kEstimateSteps - kWarmUpSteps);
       pace.estimated_seconds =
-          secondsSince(pace.start) + mean * static_cast<double>(options_.iterations - iteration_);
+          pace.begun.seconds() + mean * static_cast<double>(options_.iterations - iteration_);
       pace.estimated_bytes = memoryBytes();
     }
     const bool interval_is_over =
         options_.checkpoint_interval > 0 && iteration_ % options_.checkpoint_interval == 0;
     const bool time_is_over =
-        options_.checkpoint_seconds > 0 && secondsSince(pace.saved) >= options_.checkpoint_seconds;
+        options_.checkpoint_seconds > 0 && pace.saved.seconds() >= options_.checkpoint_seconds;
     if (interval_is_over || time_is_over) save(observer, pace);
     if (observer.wantsPreview()) {
       const size_t views = observer.wantsContributions() ? kPreviewedViews : 0;
