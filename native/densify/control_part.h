@@ -70,6 +70,8 @@ enum class ControlRole : uint32_t {
   kFilter = 1u << 12,            ///< what is done to splats after that, before they are drawn
   kSecondSplit = 1u << 13,       ///< which splats are split after that, children too
 };
+/// Roles are bits 0 to this, without a gap.
+constexpr uint32_t kControlRoleCount = 14;
 using ControlRoles = uint32_t;
 constexpr ControlRoles roles(ControlRole role) {
   return static_cast<ControlRoles>(role);
