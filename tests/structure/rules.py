@@ -27,6 +27,7 @@ THIRD_PARTY = {
     'zlib': r'zlib\.h|zconf\.h',
     'zstd': r'(zstd|zdict)(_errors)?\.h',
     'CLI11': r'CLI/',
+    'stb': r'stb/',
     'Google Benchmark': r'benchmark/',
 }
 # A format's library is known to the files of that format only (benchmarks may measure against some).
