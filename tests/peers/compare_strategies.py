@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits data sets with every strategy, keeps what came out, and writes the table and plot of docs/methods/densification.md.
+"""Fits data sets with every strategy, keeps what came out, and writes docs/results/strategies.md, its lines and its plot.
 
     compare_strategies.py STIPPLE FOLDER DOCS [--seeds 3] [--iterations 3000] [--strategies a,b] [--scenes a,b]
         [--photos DATASET] [--table]
@@ -15,6 +15,7 @@ import os
 import statistics
 import subprocess
 import sys
+import textwrap
 import time
 from pathlib import Path
 
@@ -130,16 +131,15 @@ def table(results, scene, kind, iterations):
 
 def write_page(results, given):
     seeds = len({row['seed'] for row in results.rows})
-    lines = ['# What every strategy reaches', '',
-             f'Written by `tests/peers/strategies.sh`: {given.iterations} iterations, at most {MOST_SPLATS:,} splats, '
-             f'up to {seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every eighth view held out, '
-             f'pictures of {464 // DOWNSCALE} × {256 // DOWNSCALE}.',
-             f'All fits together: {sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on '
-             f'{os.cpu_count()} cores. Their clocks add up to {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours '
-             f'(mean load of the machine {statistics.mean(row["load"] for row in results.rows):.1f}: above 2 they ran side by '
-             'side).', '',
+    head = (f'`bash tests/peers/strategies.sh` writes this page: fits of {given.iterations:,} iterations with at most '
+            f'{MOST_SPLATS:,} splats, up to {seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every '
+            f'eighth view held out, images of {464 // DOWNSCALE} × {256 // DOWNSCALE}. All fits together took '
+            f'{sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on {os.cpu_count()} cores. '
+            f'Their clocks add up to {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours; the mean load of the '
+            f'machine was {statistics.mean(row["load"] for row in results.rows):.1f}, and above 2 fits ran side by side.')
+    lines = ['# What every strategy reaches', '', *textwrap.wrap(head, 120), '',
              '![Processor seconds and PSNR of every strategy](../images/strategies.svg)', '',
-             '[Every fit, a line each](strategies_table.jsonl).', '']
+             '[What these figures say](densification.md). [Every fit, a line each](strategies.jsonl).', '']
     for scene in given.scenes:
         lines += [f'## {SCENES.get(scene, scene).capitalize()}', '', *table(results, scene, 'full', given.iterations), '']
         for kind, share in (('half', 'half'), ('third', 'a third')):
@@ -150,8 +150,8 @@ def write_page(results, given):
     if unscaled:
         lines += ['## Without scaling', '', f'{SCENES[given.scenes[0]].capitalize()}, 30,000 iterations, schedules as '
                   'published:', '', *unscaled, '']
-    (given.docs / 'methods' / 'strategies_table.md').write_text('\n'.join(lines))
-    (given.docs / 'methods' / 'strategies_table.jsonl').write_text(
+    (given.docs / 'results' / 'strategies.md').write_text('\n'.join(lines))
+    (given.docs / 'results' / 'strategies.jsonl').write_text(
         ''.join(json.dumps(row) + '\n' for row in results.rows))
     full = [row for row in results.rows if row['kind'] == 'full' and row['iterations'] == given.iterations]
     (given.docs / 'images' / 'strategies.svg').write_text(plot(full, SCENES))
