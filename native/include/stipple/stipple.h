@@ -1528,7 +1528,7 @@ StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud);
 /* Whether previews tell what each splat contributes (stipple_cloud_quantity): 1, or 0, as a fit begins. It then draws
  * 8 views for every preview; steps are the same either way. */
 StippleStatus stipple_fit_watch_contributions(StippleJob* job, uint32_t watched);
-/* The result of a job that has ended, however it ended: the state that did best on held-out views, decoded at a
+/* The result of a job that has ended, however it ended: the state that did best on views it learned from, decoded at a
  * budget (anchors of a field; 0: the largest; explicit splats have one size). INVALID_ARGUMENT where no step was
  * taken. */
 StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud);

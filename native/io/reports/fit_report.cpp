@@ -44,7 +44,8 @@ Json row(const FitMeasure& measure) {
           {"psnr", number(measure.psnr)},
           {"foreground_psnr", number(measure.foreground_psnr)},
           {"ssim", number(measure.ssim)},
-          {"density_entropy", number(measure.density_entropy)}};
+          {"density_entropy", number(measure.density_entropy)},
+          {"training_psnr", number(measure.training_psnr)}};
 }
 
 Json rows(const std::vector<FitMeasure>& measures) {
