@@ -16,6 +16,7 @@
 #include "data/clouds/splat_cloud.h"
 #include "data/clouds/splat_quantities.h"
 #include "data/images/image.h"
+#include "data/images/image_channel.h"
 #include "data/meshes/tri_mesh.h"
 #include "data/sparse_volume.h"
 #include "data/views/memory_view_source.h"
@@ -161,6 +162,11 @@ struct StippleVolume {
 struct StippleImage {
   stipple::api::Context context;
   std::shared_ptr<const stipple::Image> image;
+};
+
+struct StippleImageChannels {
+  stipple::api::Context context;
+  std::shared_ptr<const std::vector<stipple::ImageChannel>> channels;
 };
 
 struct StippleAccuracyReport {

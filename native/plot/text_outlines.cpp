@@ -52,15 +52,15 @@ int advanceOf(const stbtt_fontinfo& font, int glyph, int next) {
   return advance + (next < 0 ? 0 : stbtt_GetGlyphKernAdvance(&font, glyph, next));
 }
 
-/// A glyph's outline, whose corners and control points are turned where text runs upwards.
+/// A glyph's outline, whose corners and control points are rotated where text runs upwards.
 class Outline {
  public:
   Outline(const stbtt_fontinfo& font, int glyph, bool is_upright) : font_(font) {
     count_ = stbtt_GetGlyphShape(&font_, glyph, &points_);
     if (is_upright) return;
     for (int i = 0; i < count_; ++i) {
-      turn(points_[i].x, points_[i].y);
-      turn(points_[i].cx, points_[i].cy);
+      rotate(points_[i].x, points_[i].y);
+      rotate(points_[i].cx, points_[i].cy);
     }
   }
   ~Outline() { stbtt_FreeShape(&font_, points_); }
@@ -104,7 +104,7 @@ class Outline {
   }
 
  private:
-  static void turn(stbtt_vertex_type& x, stbtt_vertex_type& y) {
+  static void rotate(stbtt_vertex_type& x, stbtt_vertex_type& y) {
     const stbtt_vertex_type along = x;
     x = static_cast<stbtt_vertex_type>(-y);
     y = along;

@@ -229,6 +229,11 @@ FUNCTIONS = {
     'stipple_image_read': (_status, [_handle, _floats, c_uint64]),
     'stipple_image_save': (_status, [_handle, _path, c_uint32]),
     'stipple_image_compare': (_status, [_handle, _handle, _to(s.StippleImageComparison)]),
+    'stipple_image_channels_load': (_status, [_handle, _path, _out_handle]),
+    'stipple_image_channels_free': (None, [_handle]),
+    'stipple_image_channels_count': (c_uint64, [_handle]),
+    'stipple_image_channels_info': (_status, [_handle, c_uint64, _to(s.StippleImageChannelInfo)]),
+    'stipple_image_channels_read': (_status, [_handle, c_uint64, _floats, c_uint64]),
 }
 
 

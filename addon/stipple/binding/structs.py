@@ -401,4 +401,9 @@ class StippleImageComparison(_Sized):
                 ('max_error', c_double), ('mean_error', c_double)]
 
 
+class StippleImageChannelInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('width', c_uint32), ('height', c_uint32), ('reserved', c_uint32),
+                ('name_utf8', c_char_p)]
+
+
 STRUCTS = {cls.__name__: cls for cls in _Sized.__subclasses__()}

@@ -70,6 +70,7 @@ typedef struct StippleViews StippleViews;       /* cameras, and what they have s
 typedef struct StippleRenderer StippleRenderer;
 typedef struct StippleVolume StippleVolume;     /* sparse voxels */
 typedef struct StippleImage StippleImage;
+typedef struct StippleImageChannels StippleImageChannels; /* named channels of an EXR file */
 typedef struct StippleJob StippleJob;           /* long work in the background */
 
 /* ---- context ----------------------------------------------------------------------------------- */
@@ -423,7 +424,8 @@ typedef struct StippleMeshTopology {
 } StippleMeshTopology;
 /* Cost: O(T log T). */
 StippleStatus stipple_mesh_topology(const StippleMesh* mesh, StippleMeshTopology* topology);
-/* Writes positions and triangles by the ending: .ply, or .glb (Z up becomes Y up). */
+/* Writes positions and triangles by the ending: .ply, or .glb (Z up becomes Y up; STIPPLE_ERROR_UNAVAILABLE without
+ * libstipple_media.so). */
 StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8);
 
 /* ---- density and anchors ----------------------------------------------------------------------- */
@@ -1717,6 +1719,30 @@ StippleStatus stipple_image_save(const StippleImage* image, const char* path_utf
 /* Same size and channels; compared in display space. */
 StippleStatus stipple_image_compare(const StippleImage* a, const StippleImage* b,
                                     StippleImageComparison* result);
+
+typedef struct StippleImageChannelInfo {
+  uint32_t struct_size;
+  uint32_t width;
+  uint32_t height;
+  uint32_t reserved;
+  const char* name_utf8; /* "ViewLayer.Depth.Z"; lives as long as the channels */
+} StippleImageChannelInfo;
+
+/* Reads all channels of an OpenEXR file as float32: half, float and integer channels, of any compression, scan
+ * lines and tiles, one part or several. A name has its layer in front; where a part leaves that out of its channels,
+ * it is the part's name. Integers keep their value as near as float32 does. What lies outside the data window is 0.
+ * Errors: STIPPLE_ERROR_FORMAT for another kind of file and one that is cut off; STIPPLE_ERROR_UNSUPPORTED for deep
+ * pixels; STIPPLE_ERROR_MEMORY_LIMIT, before anything is allocated, where the values would take more than the
+ * context allows or than 4 GiB; STIPPLE_ERROR_UNAVAILABLE without libstipple_media.so. */
+StippleStatus stipple_image_channels_load(StippleContext* context, const char* path_utf8,
+                                          StippleImageChannels** channels);
+void stipple_image_channels_free(StippleImageChannels* channels);
+uint64_t stipple_image_channels_count(const StippleImageChannels* channels); /* 0 for NULL */
+StippleStatus stipple_image_channels_info(const StippleImageChannels* channels, uint64_t index,
+                                          StippleImageChannelInfo* info);
+/* values [height,width], row 0 = top. capacity: floats that values has room for. */
+StippleStatus stipple_image_channels_read(const StippleImageChannels* channels, uint64_t index, float* values,
+                                          uint64_t capacity);
 
 #ifdef __cplusplus
 }
