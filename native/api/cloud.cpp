@@ -117,6 +117,15 @@ SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options) {
   return write;
 }
 
+const SplatFormat& formatAt(uint64_t index) {
+  if (index >= splatFormats().size()) {
+    fail(ErrorCode::kInvalidArgument, "index is " + std::to_string(index) + "; 0 to " +
+                                          std::to_string(splatFormats().size() - 1) +
+                                          " is allowed");
+  }
+  return splatFormats()[static_cast<size_t>(index)];
+}
+
 std::shared_ptr<const SplatCloud> loaded(const ContextState& context, const std::string& path,
                                          Progress* progress) {
   auto cloud = std::make_shared<const SplatCloud>(readSplatFile(path, progress));
@@ -275,12 +284,7 @@ StippleStatus stipple_format_of_file(const char* path_utf8, uint64_t* index) {
 
 StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
   return guarded([&] {
-    if (index >= splatFormats().size()) {
-      fail(ErrorCode::kInvalidArgument, "index is " + std::to_string(index) + "; 0 to " +
-                                            std::to_string(splatFormats().size() - 1) +
-                                            " is allowed");
-    }
-    const SplatFormat& format = splatFormats()[static_cast<size_t>(index)];
+    const SplatFormat& format = formatAt(index);
     StippleFormatInfo out = {};
     out.can_read = format.read != nullptr ? 1 : 0;
     out.can_write = format.write != nullptr ? 1 : 0;
@@ -289,7 +293,20 @@ StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
     out.name = format.name;
     out.title = format.title;
     out.endings = format.endings;
+    out.keeps_frame = format.keeps.frame ? 1 : 0;
+    out.keeps_colour_space = format.keeps.colour_space ? 1 : 0;
+    out.keeps_antialias = format.keeps.antialias ? 1 : 0;
     deliver(info, out, "info");
+  });
+}
+
+StippleStatus stipple_format_estimate(uint64_t index, uint64_t count, uint32_t sh_degree,
+                                      const StippleCloudSaveOptions* options, uint64_t* bytes) {
+  return guarded([&] {
+    const int degree =
+        enumValue<int>(sh_degree, static_cast<uint32_t>(kMaxShDegree), "sh_degree");
+    require(bytes, "bytes") =
+        estimatedFileBytes(formatAt(index), count, degree, writeOptions(options));
   });
 }
 

@@ -215,25 +215,28 @@ def test_the_size_is_estimated_well(stipple, tmp_path):
     write_ply(stipple, tmp_path / 'in.ply', make_arrays(stipple, count=20000, degree=3))
     bpy.ops.stipple.splats_import(filepath=str(tmp_path / 'in.ply'))
     exporting, formats = stipple.scene.source.exporting, stipple.scene.source.formats
-    form = formats.of_path('x.ply')
-    for degree in (0, 1, 3):
-        bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.ply'), max_degree=degree)
-        size = (tmp_path / 'out.ply').stat().st_size
-        assert abs(formats.estimated_bytes(form, 20000, degree) - size) < 0.01 * size + 2000
+    # The estimate is the library's (tests/native/io); here it reaches the dialog, of the format that is written.
+    for name, degree in (('out.ply', 3), ('out.ply', 1), ('out.compressed.ply', 3), ('out.splat', 3)):
+        bpy.ops.stipple.splats_export(filepath=str(tmp_path / name), max_degree=degree)
+        size = (tmp_path / name).stat().st_size
+        assert abs(formats.estimated_bytes(formats.of_path(name), 20000, 3, sh_degree_limit=degree) - size) < 0.01 * size
 
     class Settings:
-        collection, use_selection, budget, max_degree, filepath = '', True, 'VIEWPORT', 3, 'x.ply'
+        collection, use_selection, budget, max_degree, filepath, ascii = '', True, 'VIEWPORT', 3, 'x.ply', False
     assert exporting.size_label(bpy.context, Settings) == '20,000 splats, about 5.0 MB'
+    Settings.filepath = 'x.compressed.ply'
+    assert exporting.size_label(bpy.context, Settings) == '20,000 splats, about 1.2 MB'
 
 
 def test_dialogs_and_file_handlers_know_the_formats_of_the_library(stipple):
     formats = stipple.scene.source.formats
     known = formats.all_formats()
-    assert sorted(formats.READ_ENDINGS) == sorted(e for f in known if f.can_read for e in f.endings)
-    assert sorted(formats.WRITE_ENDINGS) == sorted(e for f in known if f.can_write for e in f.endings)
+    assert {'.ply', '.ksplat', 'meta.json'} <= set(formats.read_endings())
+    assert set(formats.read_endings()) - set(formats.write_endings()) == {'.ksplat'}
+    # What can be dropped is known before the library is.
+    assert sorted(formats.DROPPED_ENDINGS) == sorted(e for e in formats.read_endings() if e.startswith('.'))
     assert formats.of_path('/a/B.PLY').name == 'ply' and formats.of_path('a.txt') is None
     handler = getattr(bpy.types, 'STIPPLE_FH_splats', None)
     assert (handler is not None) == (bpy.app.version >= (4, 1, 0))
     if handler is not None:
-        assert set(handler.bl_file_extensions.split(';')) == {'.safetensors'} | {
-            e for e in formats.READ_ENDINGS if e[0] == '.'}
+        assert set(handler.bl_file_extensions.split(';')) == {'.safetensors', *formats.DROPPED_ENDINGS}

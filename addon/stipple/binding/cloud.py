@@ -20,6 +20,17 @@ _REST_WIDTH = 3
 SAVE_OPTIONS = ('ascii', 'sh_degree_limit', 'format_version', 'frame')
 
 
+def save_options(library, **options_given):
+    """StippleCloudSaveOptions with some of its fields, such as ascii=1. Errors: StippleError for one that is unknown."""
+    options = StippleCloudSaveOptions()
+    library.stipple_cloud_save_options_init(byref(options))
+    for name, value in options_given.items():
+        if name not in SAVE_OPTIONS:
+            raise invalid(f'Save option {name} is unknown; {", ".join(SAVE_OPTIONS)} are allowed.')
+        setattr(options, name, int(value))
+    return options
+
+
 @dataclass
 class SplatArrays:
     """Splats as arrays, float32; conventions of stipple.h."""
@@ -192,12 +203,7 @@ class Cloud(Handle):
 
     def save(self, path, **options_given):
         """Writes by the ending; options_given: fields of StippleCloudSaveOptions, such as ascii=1."""
-        options = StippleCloudSaveOptions()
-        self.library.stipple_cloud_save_options_init(byref(options))
-        for name, value in options_given.items():
-            if name not in SAVE_OPTIONS:
-                raise invalid(f'Save option {name} is unknown; {", ".join(SAVE_OPTIONS)} are allowed.')
-            setattr(options, name, int(value))
+        options = save_options(self.library, **options_given)
         self._check(self.library.stipple_cloud_save(self.pointer, path_bytes(path), byref(options)))
 
     def transformed(self, matrix):

@@ -53,6 +53,8 @@ FUNCTIONS = {
                                              _to(s.StippleCloudSaveOptions)]),
     'stipple_format_count': (_status, [POINTER(c_uint64)]),
     'stipple_format_info': (_status, [c_uint64, _to(s.StippleFormatInfo)]),
+    'stipple_format_estimate': (_status, [c_uint64, c_uint64, c_uint32, _to(s.StippleCloudSaveOptions),
+                                          POINTER(c_uint64)]),
     'stipple_format_of_file': (_status, [_path, POINTER(c_uint64)]),
     'stipple_cloud_transform': (_status, [_handle, _matrix, _out_handle]),
     'stipple_grade_settings_init': (None, [_to(s.StippleGradeSettings)]),

@@ -73,7 +73,8 @@ class StippleCloudSaveOptions(_Sized):
 class StippleFormatInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('can_read', c_uint32), ('can_write', c_uint32),
                 ('max_sh_degree', c_uint32), ('frame', c_uint32), ('reserved', c_uint32),
-                ('name', c_char_p), ('title', c_char_p), ('endings', c_char_p)]
+                ('name', c_char_p), ('title', c_char_p), ('endings', c_char_p), ('keeps_frame', c_uint32),
+                ('keeps_colour_space', c_uint32), ('keeps_antialias', c_uint32), ('reserved_keeps', c_uint32)]
 
 
 class StippleCloudComparison(_Sized):

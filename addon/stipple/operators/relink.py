@@ -22,8 +22,8 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
     bl_label = "Relink Source"
     bl_options = {'REGISTER', 'UNDO'}
 
-    filename_ext = formats.READ_ENDINGS[0]
-    filter_glob: StringProperty(default=formats.glob((*formats.READ_ENDINGS, sources.MODEL_SUFFIX)), options={'HIDDEN'})
+    filename_ext = formats.USUAL_ENDING
+    filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
     other_count: BoolProperty(name="Accept Another Count", description="Take a file of another number of splats, too; a "
                               "mask, which says for each splat whether it is hidden, is cleared then", default=False)
 
@@ -44,6 +44,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
         if self.again:
             return self.run_in_window(context)
         self._asked = True
+        self.filter_glob = formats.glob((*formats.read_endings(), sources.MODEL_SUFFIX))
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context):

@@ -26,9 +26,9 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     bl_label = "Export Splats"
     bl_options = {'REGISTER', 'PRESET'}
 
-    filename_ext = formats.WRITE_ENDINGS[0]
+    filename_ext = formats.USUAL_ENDING
     check_extension = None  # several endings are right
-    filter_glob: StringProperty(default=formats.glob(formats.WRITE_ENDINGS), options={'HIDDEN'})
+    filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
     collection: StringProperty(name="Collection", description="Export the splats of this collection", default="",
                                options={'HIDDEN'})
     use_selection: BoolProperty(name="Selected Only", description="Export selected splats only, instead of all that are "
@@ -52,6 +52,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     def invoke(self, context, event):
         if not self.filepath:
             self.filepath = exporting.default_name(context) + self.filename_ext
+        self.filter_glob = formats.glob(formats.write_endings())
         return ExportHelper.invoke(self, context, event)
 
     def execute(self, context):
@@ -65,7 +66,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         form = formats.of_path(path)
         if form is None or not form.can_write:
             raise invalid(f"'{path}' has an ending that is no splat format to write; allowed are "
-                          f"{', '.join(formats.WRITE_ENDINGS)}.")
+                          f"{', '.join(formats.write_endings())}.")
         objects = exporting.chosen(context, self.collection, self.use_selection)
         options = {'ascii': self.ascii, 'sh_degree_limit': self.max_degree}
         if self.apply_transform and self.up_axis != 'AUTO':

@@ -25,8 +25,8 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
     bl_label = "Import Splats"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
-    filename_ext = formats.READ_ENDINGS[0]
-    filter_glob: StringProperty(default=formats.glob((*formats.READ_ENDINGS, sources.MODEL_SUFFIX)), options={'HIDDEN'})
+    filename_ext = formats.USUAL_ENDING
+    filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
     up_axis: EnumProperty(name="Up Axis", description="Which way is up in the files; objects are turned, their data stay "
@@ -42,6 +42,7 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
         if self.directory and self.files:  # dropped into a window
             return self.run_in_window(context)
         self._asked = True
+        self.filter_glob = formats.glob((*formats.read_endings(), sources.MODEL_SUFFIX))
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context):
@@ -145,8 +146,7 @@ if version.HAS_FILE_HANDLERS:
         bl_label = "Gaussian Splats"
         bl_import_operator = 'stipple.splats_import'
         bl_export_operator = 'stipple.splats_export'
-        bl_file_extensions = ';'.join(ending for ending in (*formats.READ_ENDINGS, '.safetensors')
-                                      if ending.startswith('.'))
+        bl_file_extensions = ';'.join((*formats.DROPPED_ENDINGS, '.safetensors'))
 
         @classmethod
         def poll_drop(cls, context):

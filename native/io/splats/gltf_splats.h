@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "base/progress.h"
@@ -20,5 +21,6 @@ SplatCloud readGltfSplats(const std::string& path, Progress* progress);
 /// linear colours.
 void writeGltfSplats(const SplatCloud& cloud, const std::string& path,
                      const SplatWriteOptions& options, Progress* progress);
+double estimateGltfSplats(uint64_t count, int degree, const SplatWriteOptions& options);
 
 }  // namespace stipple

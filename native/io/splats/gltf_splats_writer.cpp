@@ -317,4 +317,13 @@ void writeGltfSplats(const SplatCloud& cloud, const std::string& path, const Spl
   Writer(cloud, path, progress).write();
 }
 
+double estimateGltfSplats(uint64_t count, int degree, const SplatWriteOptions&) {
+  constexpr double kJsonBytes = 2000;
+  // Position, rotation, scale, opacity and colour of degree 0, and four 16-bit numbers of the points'
+  // linear colours: what renderers show that do not know splats.
+  constexpr double kPlainBytes = (3 + 4 + 3 + 1 + 3) * sizeof(float) + 4 * sizeof(uint16_t);
+  return kJsonBytes +
+         static_cast<double>(count) * (kPlainBytes + higherHarmonics(degree) * sizeof(float));
+}
+
 }  // namespace stipple

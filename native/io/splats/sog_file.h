@@ -41,4 +41,8 @@ std::vector<SogPart> encodeSog(const SplatCloud& cloud, const SogOptions& option
 void writeSog(const SplatCloud& cloud, const std::string& path, const SogOptions& options,
               Progress* progress);
 
+/// About how many bytes that is, of one scene or of its one level; images are packed, so scenes
+/// differ.
+double estimateSog(uint64_t count, int degree, const SplatWriteOptions& options);
+
 }  // namespace stipple

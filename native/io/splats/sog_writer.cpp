@@ -358,4 +358,16 @@ void writeSog(const SplatCloud& cloud, const std::string& path, const SogOptions
   advance(progress, 1.0, kStage);
 }
 
+double estimateSog(uint64_t count, int degree, const SplatWriteOptions&) {
+  constexpr double kMetaBytes = 9000;     // codebooks as text, most of it
+  constexpr double kPlainBytes = 13.5;    // of a splat, after packing
+  constexpr double kLabelBytes = 2;       // which vector of the palette
+  constexpr double kPaletteBytes = 0.95;  // of a number of a palette's vector, after packing
+  const double splats = static_cast<double>(count);
+  const double plain = kMetaBytes + kPlainBytes * splats;
+  if (degree == 0) return plain;
+  const double palette = static_cast<double>(paletteLimit(count)) * higherHarmonics(degree);
+  return plain + kLabelBytes * splats + kPaletteBytes * palette;
+}
+
 }  // namespace stipple

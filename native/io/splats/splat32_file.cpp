@@ -109,4 +109,8 @@ void writeSplat32(const SplatCloud& cloud, const std::string& path, const SplatW
   file.commit();
 }
 
+double estimateSplat32(uint64_t count, int, const SplatWriteOptions&) {
+  return static_cast<double>(count * kRecordBytes);
+}
+
 }  // namespace stipple

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "base/progress.h"
@@ -14,5 +15,6 @@ SplatCloud readSplat32(const std::string& path, Progress* progress);
 /// Writes .splat. A file without records is none, so an empty cloud is refused.
 void writeSplat32(const SplatCloud& cloud, const std::string& path,
                   const SplatWriteOptions& options, Progress* progress);
+double estimateSplat32(uint64_t count, int degree, const SplatWriteOptions& options);
 
 }  // namespace stipple

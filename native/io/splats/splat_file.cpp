@@ -1,12 +1,10 @@
 #include "io/splats/splat_file.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cstring>
 #include <deque>
 #include <filesystem>
 #include <optional>
-#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -14,58 +12,13 @@
 #include "base/parallel.h"
 #include "data/clouds/splat_colour.h"
 #include "io/bytes/input_file.h"
-#include "io/splats/gltf_splat_names.h"
-#include "io/splats/gltf_splats.h"
-#include "io/splats/ksplat_file.h"
-#include "io/splats/ply/ply_file.h"
-#include "io/splats/sog_file.h"
 #include "io/splats/sog_levels.h"
-#include "io/splats/splat32_file.h"
-#include "io/splats/spz_file.h"
 
 namespace stipple {
 
 namespace {
 
 constexpr size_t kGrain = 4096;
-
-std::string lowerName(const std::string& path) {
-  std::string name = std::filesystem::path(path).filename().string();
-  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return name;
-}
-
-std::vector<std::string> endingsOf(const SplatFormat& format) {
-  std::istringstream words(format.endings);
-  std::vector<std::string> endings;
-  for (std::string word; words >> word;) endings.push_back(word);
-  return endings;
-}
-
-/// Length of the format's ending that the file name has; 0 for none.
-size_t endingLength(const SplatFormat& format, const std::string& name) {
-  size_t longest = 0;
-  for (const std::string& ending : endingsOf(format)) {
-    if (name.size() >= ending.size() &&
-        name.compare(name.size() - ending.size(), ending.size(), ending) == 0) {
-      longest = std::max(longest, ending.size());
-    }
-  }
-  return longest;
-}
-
-SplatFileStart startOf(const std::string& path) {
-  SplatFileStart start;
-  start.path = path;
-  start.name = lowerName(path);
-  std::error_code ignored;
-  start.is_folder = std::filesystem::is_directory(path, ignored);
-  if (start.is_folder) return start;
-  const InputFile file(path);
-  start.bytes.resize(static_cast<size_t>(std::min<uint64_t>(file.size(), kSplatSniffBytes)));
-  file.readAt(0, start.bytes.data(), start.bytes.size());
-  return start;
-}
 
 /// "3DGS PLY (.ply), SPZ (.spz) and ..." of the formats that can be read (or written).
 std::string listOfFormats(bool written) {
@@ -123,7 +76,7 @@ Changes changesFor(const SplatCloud& cloud, const SplatFormat& format,
   changes.turns = cloud.frame == Frame::kUnknown
                       ? changes.frame != kConventionalFrame || options.frame != Frame::kUnknown
                       : cloud.frame != changes.frame;
-  changes.recolours = cloud.colour_space == ColourSpace::kLinear && !format.holds_linear;
+  changes.recolours = cloud.colour_space == ColourSpace::kLinear && !format.keeps.colour_space;
   changes.cuts = cloud.sh_degree > changes.degree &&
                  !(format.takes_any_degree && format.max_sh_degree <= options.sh_degree_limit);
   return changes;
@@ -147,51 +100,6 @@ void checkDegreeLimit(const SplatWriteOptions& options) {
 }
 
 }  // namespace
-
-const std::vector<SplatFormat>& splatFormats() {
-  static const std::vector<SplatFormat> kFormats = {
-      {"ply", "3DGS PLY", ".ply", 4, Frame::kRDF, true, startsAsPly, readPlySplats, writePlySplats,
-       true},
-      {"compressed-ply", "compressed PLY", ".compressed.ply", 3, Frame::kRDF, true,
-       startsAsCompressedPly, readCompressedPly, writeCompressedPly, true},
-      {"spz", "SPZ", ".spz", 4, Frame::kRUB, false, startsAsSpz, readSpzSplats, writeSpzSplats},
-      {"splat", "splat records", ".splat", 0, Frame::kRDF, false, nullptr, readSplat32,
-       writeSplat32, true, true},
-      {"ksplat", "ksplat", ".ksplat", 3, Frame::kRDF, false, nullptr, readKsplat, nullptr},
-      {"gltf", "glTF with KHR_gaussian_splatting", ".glb .gltf", 3, kGltfFrame, true,
-       startsAsGltfSplats, readGltfSplats, writeGltfSplats, true},
-      {"sog_levels", "streamed SOG", "lod-meta.json", 3, Frame::kRDF, true, startsAsSogLevels,
-       readSogLevels,
-       [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
-          Progress* progress) { writeSogLevels({&cloud}, nullptr, path, {}, progress); }},
-      {"sog", "SOG", ".sog meta.json", 3, Frame::kRDF, true, startsAsSog, readSog,
-       [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
-          Progress* progress) { writeSog(cloud, path, {}, progress); }},
-  };
-  return kFormats;
-}
-
-const SplatFormat* splatFormatOfEnding(const std::string& path) {
-  const std::string name = lowerName(path);
-  const SplatFormat* best = nullptr;
-  size_t longest = 0;
-  for (const SplatFormat& format : splatFormats()) {
-    const size_t length = endingLength(format, name);
-    if (length > longest) best = &format;
-    longest = std::max(longest, length);
-  }
-  return best;
-}
-
-const SplatFormat* splatFormatOfContent(const std::string& path) {
-  const SplatFileStart start = startOf(path);
-  for (const SplatFormat& format : splatFormats()) {
-    if (format.read != nullptr && format.sniff != nullptr && format.sniff(start)) return &format;
-  }
-  // Some formats have no first bytes of their own.
-  const SplatFormat* named = start.is_folder ? nullptr : splatFormatOfEnding(path);
-  return named != nullptr && named->read != nullptr && named->sniff == nullptr ? named : nullptr;
-}
 
 SplatCloud readSplatFile(const std::string& path, Progress* progress) {
   if (const SplatFormat* format = splatFormatOfContent(path)) return format->read(path, progress);

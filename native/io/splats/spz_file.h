@@ -24,6 +24,9 @@ SplatCloud readSpzBytes(ByteVector bytes, const std::string& what, Progress* pro
 void writeSpzSplats(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress);
 
+/// About how many bytes that is; the streams are packed, so scenes differ.
+double estimateSpzSplats(uint64_t count, int degree, const SplatWriteOptions& options);
+
 // The layout, shared by reader and writer; docs/formats.md has it in words.
 constexpr uint32_t kSpzMagic = 0x5053474e;  // "NGSP"
 constexpr uint32_t kSpzNewestVersion = 4;

@@ -189,4 +189,12 @@ void writeSpzSplats(const SplatCloud& cloud, const std::string& path,
   file.commit();
 }
 
+double estimateSpzSplats(uint64_t count, int degree, const SplatWriteOptions& options) {
+  // Most of a splat is noise to the packer; a harmonic is a byte of which five bits (of degree 1)
+  // or four are set.
+  constexpr double kPlainBytes = 16.5;
+  const double harmonic_bytes = options.version == 3 ? 0.48 : 0.43;
+  return 200 + static_cast<double>(count) * (kPlainBytes + harmonic_bytes * higherHarmonics(degree));
+}
+
 }  // namespace stipple

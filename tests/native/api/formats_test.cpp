@@ -56,6 +56,35 @@ TEST_F(Formats, AreToldByContent) {
   stipple_cloud_free(cloud);
 }
 
+TEST_F(Formats, SayWhatTheyKeepAndHowLargeFilesWillBe) {
+  uint64_t count = 0;
+  STIPPLE_ASSERT_OK(stipple_format_count(&count));
+  for (uint64_t i = 0; i < count; ++i) {
+    auto info = sized<StippleFormatInfo>();
+    STIPPLE_ASSERT_OK(stipple_format_info(i, &info));
+    uint64_t bytes = 1;
+    StippleCloudSaveOptions options;
+    stipple_cloud_save_options_init(&options);
+    STIPPLE_ASSERT_OK(stipple_format_estimate(i, 1000, 3, &options, &bytes));
+    EXPECT_EQ(bytes > 0, info.can_write == 1) << info.name;
+    if (std::string(info.name) == "splat") {
+      EXPECT_EQ(bytes, 32000u);
+      EXPECT_EQ(info.keeps_frame + info.keeps_colour_space + info.keeps_antialias, 0u);
+    }
+    if (std::string(info.name) == "ply") {
+      EXPECT_EQ(info.keeps_frame + info.keeps_colour_space + info.keeps_antialias, 3u);
+      uint64_t plain = 0;
+      options.sh_degree_limit = 0;
+      STIPPLE_ASSERT_OK(stipple_format_estimate(i, 1000, 3, &options, &plain));
+      EXPECT_LT(plain, bytes / 3);
+    }
+  }
+  uint64_t bytes = 0;
+  EXPECT_EQ(stipple_format_estimate(count, 1, 0, nullptr, &bytes), STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(stipple_format_estimate(0, 1, 5, nullptr, &bytes), STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(stipple_format_estimate(0, 1, 0, nullptr, nullptr), STIPPLE_ERROR_INVALID_ARGUMENT);
+}
+
 TEST_F(Formats, LevelsAreSavedAndTheFinestIsRead) {
   StippleCloud* fine = oneSplat(1, 0, 0);
   StippleCloud* coarse = oneSplat(0, 1, 0);

@@ -62,7 +62,7 @@ def parse(path):
 
 def split_ending(path):
     """(path without its ending, ending): the longest ending of a splat format, else the part after the last dot."""
-    fits = [e for e in (*formats.READ_ENDINGS, MODEL_SUFFIX) if path.lower().endswith(e)]
+    fits = [e for e in (*formats.read_endings(), MODEL_SUFFIX) if path.lower().endswith(e)]
     length = max(map(len, fits), default=len(os.path.splitext(path)[1]))
     return path[:len(path) - length], path[len(path) - length:]
 

@@ -106,13 +106,14 @@ def size_label(context, operator):
         objects = chosen(context, operator.collection, operator.use_selection)
     except StippleError as error:
         return str(error)
-    form = formats.of_path(operator.filepath) or formats.of_path('a' + formats.WRITE_ENDINGS[0])
+    form = formats.of_path(operator.filepath) or formats.of_path('a' + formats.USUAL_ENDING)
     total = size = 0
     for obj in objects:
         count = _count(obj.data, operator.budget)
         total += count
         if form is not None:
-            size += formats.estimated_bytes(form, count, min(splat_data.degree(obj.data), operator.max_degree))
+            size += formats.estimated_bytes(form, count, splat_data.degree(obj.data), ascii=operator.ascii,
+                                            sh_degree_limit=operator.max_degree)
     return f'{total:,} splats, about {megabytes(size)}'
 
 

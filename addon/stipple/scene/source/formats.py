@@ -1,19 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Splat file formats for file dialogs: which endings there are, and what a splat takes in each."""
+"""Splat file formats for file dialogs, as the library lists them."""
 
+from ...binding import formats as native
 from ...binding.errors import LibraryError
-from ...binding.formats import splat_formats
 from . import sources
 
-# Bytes that one splat of degree 0 and each further coefficient (three numbers) take, about, where packing and
-# entropy coding leave it to the data.
-_BYTES = {'ply': (68, 12), 'compressed_ply': (16, 3), 'spz': (16, 2), 'splat': (32, 0), 'sog': (12, 0.5),
-          'sog_levels': (12, 0.5), 'gltf': (56, 12)}
-# Registering loads no library, so file handlers and dialogs have these; a test compares them with the library's.
-READ_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog', 'meta.json',
-                 'lod-meta.json')
-WRITE_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.glb', '.gltf', '.sog', 'meta.json',
-                  'lod-meta.json')
+# Blender asks which files may be dropped into its windows while it registers, before any library is loaded; a test
+# compares these with the library's.
+DROPPED_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog')
+# Of dialogs, until a name is typed.
+USUAL_ENDING = '.ply'
 _known = {}
 
 
@@ -24,8 +20,17 @@ def all_formats():
     except LibraryError:
         return []
     if library not in _known:
-        _known[library] = splat_formats(library)
+        _known[library] = native.splat_formats(library)
     return _known[library]
+
+
+def read_endings():
+    """Of file names that can be read, in lower case."""
+    return [ending for form in all_formats() if form.can_read for ending in form.endings]
+
+
+def write_endings():
+    return [ending for form in all_formats() if form.can_write for ending in form.endings]
 
 
 def of_path(path):
@@ -39,8 +44,6 @@ def glob(endings):
     return ';'.join('*' + ending for ending in endings)
 
 
-def estimated_bytes(form, count, degree):
-    """About how large a file of this many splats is."""
-    base, each = _BYTES.get(form.name, _BYTES['ply'])
-    degree = min(degree, form.max_sh_degree)
-    return count * (base + each * ((degree + 1) ** 2 - 1))
+def estimated_bytes(form, count, degree, **options):
+    """About how large a file of this many splats is; options as Cloud.save has them."""
+    return native.estimated_bytes(sources.context().library, form, count, degree, **options)

@@ -222,4 +222,12 @@ void writeCompressedPly(const SplatCloud& cloud, const std::string& path, const 
   file.commit();
 }
 
+double estimateCompressedPly(uint64_t count, int degree, const SplatWriteOptions&) {
+  constexpr double kHeaderBytes = 1000;
+  const uint64_t chunks = (count + kPlyChunkSplats - 1) / kPlyChunkSplats;
+  const double row = kPackedProperties.size() * sizeof(uint32_t) + higherHarmonics(degree);
+  return kHeaderBytes + static_cast<double>(chunks * sizeof(PlyChunkRange)) +
+         static_cast<double>(count) * row;
+}
+
 }  // namespace stipple

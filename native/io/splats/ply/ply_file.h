@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "base/progress.h"
@@ -21,12 +22,17 @@ SplatCloud readPlySplats(const std::string& path, Progress* progress);
 void writePlySplats(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress);
 
+/// About how many bytes that is, of numbers and text alike.
+double estimatePlySplats(uint64_t count, int degree, const SplatWriteOptions& options);
+
 /// Reads a compressed PLY as PlayCanvas has it: chunks of 256 splats, harmonics to degree 3.
 SplatCloud readCompressedPly(const std::string& path, Progress* progress);
 
 /// Writes a compressed PLY; the splats are put in Morton order.
 void writeCompressedPly(const SplatCloud& cloud, const std::string& path,
                         const SplatWriteOptions& options, Progress* progress);
+
+double estimateCompressedPly(uint64_t count, int degree, const SplatWriteOptions& options);
 
 /// Names of the colour spaces in files that carry one.
 constexpr char kColourSpaceDisplay[] = "srgb_rec709_display";

@@ -175,4 +175,17 @@ void writePlySplats(const SplatCloud& cloud, const std::string& path,
   file.commit();
 }
 
+double estimatePlySplats(uint64_t count, int degree, const SplatWriteOptions& options) {
+  constexpr double kPlainNumbers = 14;  // of a splat of degree 0, beside the normals
+  constexpr double kTextBytes = 11;     // of float32 as its shortest text and a blank, in scenes
+  constexpr double kZeroBytes = 2;
+  const double numbers = kPlainNumbers + higherHarmonics(degree);
+  const double row = options.ascii
+                         ? numbers * kTextBytes + kNormalCount * kZeroBytes
+                         : (numbers + static_cast<double>(kNormalCount)) * sizeof(float);
+  constexpr double kHeaderBytes = 500;
+  constexpr double kPropertyBytes = 24;
+  return kHeaderBytes + kPropertyBytes * higherHarmonics(degree) + static_cast<double>(count) * row;
+}
+
 }  // namespace stipple
