@@ -95,6 +95,7 @@ FUNCTIONS = {
     'stipple_model_save': (_status, [_handle, _path]),
     'stipple_model_free': (None, [_handle]),
     'stipple_model_info': (_status, [_handle, _to(s.StippleModelInfo)]),
+    'stipple_model_settings': (_status, [_handle, _to(s.StippleModelSettings)]),
     'stipple_model_density': (_status, [_handle, _out_handle]),
     'stipple_model_decode': (_status, [_handle, _to(s.StippleDecodeOptions), _out_handle]),
     'stipple_model_decode_start': (_status, [_handle, _to(s.StippleDecodeOptions), _out_handle]),
