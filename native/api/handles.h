@@ -13,6 +13,7 @@
 
 #include "api/cloud_cuts.h"
 #include "data/accuracy_report.h"
+#include "data/clouds/seen_cloud.h"
 #include "data/clouds/splat_cloud.h"
 #include "data/clouds/splat_quantities.h"
 #include "data/images/image.h"
@@ -62,17 +63,6 @@ struct FieldSource {
 struct ModelParts {
   std::variant<SurfaceModel, std::shared_ptr<const HierarchyDecoder>, FieldSource> source;
   std::shared_ptr<const ModelNotes> notes = {};  ///< null where it was not loaded
-};
-
-/// Splats, and what density control saw of them.
-struct SeenCloud {
-  SeenCloud() = default;
-  SeenCloud(SplatCloud splats, SplatQuantities quantities)
-      : cloud(std::make_shared<const SplatCloud>(std::move(splats))),
-        seen(std::make_shared<const SplatQuantities>(std::move(quantities))) {}
-
-  std::shared_ptr<const SplatCloud> cloud;
-  std::shared_ptr<const SplatQuantities> seen;
 };
 
 /// What is known of a view beside its camera; texts are handed out as they lie here.
