@@ -12,6 +12,7 @@
 
 #include "api/cloud_cuts.h"
 #include "data/accuracy_report.h"
+#include "data/clouds/seen_cloud.h"
 #include "data/clouds/splat_cloud.h"
 #include "data/clouds/splat_quantities.h"
 #include "data/images/image.h"
@@ -40,17 +41,6 @@ struct ContextState {
   void requirePictureMemory(uint64_t bytes, const std::string& what, uint64_t pair_bytes) const;
 };
 using Context = std::shared_ptr<const ContextState>;
-
-/// Splats, and what density control saw of them.
-struct SeenCloud {
-  SeenCloud() = default;
-  SeenCloud(SplatCloud splats, SplatQuantities quantities)
-      : cloud(std::make_shared<const SplatCloud>(std::move(splats))),
-        seen(std::make_shared<const SplatQuantities>(std::move(quantities))) {}
-
-  std::shared_ptr<const SplatCloud> cloud;
-  std::shared_ptr<const SplatQuantities> seen;
-};
 
 /// What is known of a view beside its camera; texts are handed out as they lie here.
 struct ViewNote {

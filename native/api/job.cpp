@@ -99,7 +99,7 @@ StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud) {
   return guarded([&] {
     {
       std::lock_guard<std::mutex> lock(require(job, "job").mutex);
-      if (const auto* made = std::get_if<SeenCloud>(&job->result)) {
+      if (const auto* made = std::get_if<stipple::SeenCloud>(&job->result)) {
         require(cloud, "cloud") = new StippleCloud{job->context, made->cloud, made->seen};
         return;
       }

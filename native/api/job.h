@@ -14,6 +14,12 @@
 #include "api/handles.h"
 #include "base/progress.h"
 
+namespace stipple {
+
+class FitSession;
+
+}  // namespace stipple
+
 namespace stipple::api {
 
 /// What a job leaves: nothing (it filled the caller's buffers), a model, a cloud, what density
@@ -26,8 +32,6 @@ using JobResult = std::variant<std::monostate, std::shared_ptr<const SplatModel>
 /// all that it uses, apart from the caller's buffers.
 using JobWork = std::function<JobResult(Progress&)>;
 
-class FitSession;
-
 /// In: fit, for a job of fitting: what can be asked while it runs and after any end of it.
 StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit = nullptr);
 
@@ -38,7 +42,7 @@ struct StippleJob {
 
   stipple::api::Context context;
   stipple::Progress progress;
-  std::shared_ptr<stipple::api::FitSession> fit;  ///< null of other jobs
+  std::shared_ptr<stipple::FitSession> fit;  ///< null of other jobs
   std::thread thread;
 
   mutable std::mutex mutex;  ///< of what follows

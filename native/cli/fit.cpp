@@ -12,6 +12,7 @@
 
 #include "cli/commands.h"
 #include "cli/dataset.h"
+#include "cli/fit_flags.h"
 #include "cli/formats.h"
 #include "cli/hierarchy.h"
 #include "cli/numbers.h"
@@ -25,81 +26,11 @@ constexpr int kBarWidth = 24;
 constexpr auto kPollInterval = std::chrono::milliseconds(50);
 
 struct Arguments {
-  std::string dataset, out, model = "explicit", quality = "balanced", background = "random", report,
-                            shell = "auto";
-  std::string strategy;
-  std::optional<int64_t> gaussians, start, anchors, iterations, gaussians_per_anchor, sh_degree,
-      budget;
+  FitFlags flags;
+  std::string dataset, out, report;
+  std::optional<int64_t> budget;
   int64_t downscale = 1;
-  int64_t holdout = 8;
-  int64_t checkpoint_every = 0;
-  uint64_t seed = 0;
-  double picture_mib = 1024;
-  double memory_mib = 0;
-  bool resume = false, no_jitter = false, no_density_gradient = false;
 };
-
-/// Of one name in a list, its place.
-uint32_t placeOf(const std::string& name, std::initializer_list<const char*> names) {
-  uint32_t place = 0;
-  for (const char* each : names) {
-    if (name == each) return place;
-    ++place;
-  }
-  throw Failure("'" + name + "' is not known");  // CLI11 has checked it
-}
-
-StippleFitOptions optionsOf(const Arguments& arguments, const std::string& checkpoint) {
-  StippleFitOptions options;
-  stipple_fit_options_init(&options);
-  const uint32_t model = placeOf(arguments.model, {"explicit", "field"});
-  check(stipple_fit_options_preset(&options, model,
-                                   placeOf(arguments.quality, {"fast", "balanced", "fine"})));
-  if (model == STIPPLE_FIT_EXPLICIT && (arguments.anchors || arguments.gaussians_per_anchor)) {
-    throw Failure(
-        "--anchors and --gaussians-per-anchor belong to --model field; explicit splats take "
-        "--gaussians");
-  }
-  if (model == STIPPLE_FIT_FIELD && arguments.gaussians) {
-    throw Failure("--gaussians belongs to --model explicit; a field takes --anchors");
-  }
-  if (model == STIPPLE_FIT_FIELD && arguments.start) {
-    throw Failure("--start belongs to --model explicit; a field begins with its density");
-  }
-  if (arguments.no_density_gradient && !arguments.strategy.empty()) {
-    throw Failure("--no-density-gradient and --strategy say both how a field's density is learned");
-  }
-  if (arguments.gaussians) options.max_splats = counted(*arguments.gaussians, "--gaussians");
-  if (arguments.start) options.start_splats = counted(*arguments.start, "--start");
-  if (arguments.anchors) {
-    options.most_anchors = counted(*arguments.anchors, "--anchors");
-    options.least_anchors = std::min(options.least_anchors, options.most_anchors);
-  }
-  if (arguments.gaussians_per_anchor) {
-    options.gaussians_per_anchor =
-        counted32(*arguments.gaussians_per_anchor, "--gaussians-per-anchor");
-  }
-  if (arguments.iterations) options.iterations = counted(*arguments.iterations, "--iterations");
-  if (arguments.sh_degree) {
-    options.sh_degree = counted32(*arguments.sh_degree, "--sh-degree", 0);
-  }
-  if (!arguments.strategy.empty()) options.strategy_utf8 = arguments.strategy.c_str();
-  options.background = placeOf(arguments.background, {"black", "white", "random"});
-  options.holdout = counted32(arguments.holdout, "--holdout", 0);
-  options.jitter = !arguments.no_jitter;
-  options.density_gradient = !arguments.no_density_gradient;
-  options.shell = placeOf(arguments.shell, {"auto", "on", "off"});
-  if (model == STIPPLE_FIT_EXPLICIT && options.shell != STIPPLE_FIT_SHELL_AUTO) {
-    throw Failure("--shell belongs to --model field; explicit splats go as far as their points do");
-  }
-  options.seed = arguments.seed;
-  options.picture_bytes = bytesOfMebibytes(arguments.picture_mib);
-  options.max_bytes = bytesOfMebibytes(arguments.memory_mib);
-  options.checkpoint_path_utf8 = checkpoint.c_str();
-  options.checkpoint_interval = counted(arguments.checkpoint_every, "--checkpoint-every", 0);
-  options.resume = arguments.resume;
-  return options;
-}
 
 /// "name   summary" of all strategies, then of the parts.
 void printStrategies() {
@@ -221,26 +152,34 @@ bool watch(const Job& job) {
   return true;
 }
 
-void save(const Context& context, const Job& job, const Arguments& arguments, uint32_t model) {
-  const bool is_asset = !hasSplatEnding(arguments.out);
-  if (model == STIPPLE_FIT_FIELD && is_asset) {
+/// What becomes of a fit that has ended.
+struct Result {
+  std::string out;
+  uint64_t budget;  ///< 0: the largest
+  uint32_t model;   ///< StippleFitModel
+  uint64_t seed;
+};
+
+void save(const Context& context, const Job& job, const Result& result) {
+  const bool is_asset = !hasSplatEnding(result.out);
+  if (result.model == STIPPLE_FIT_FIELD && is_asset) {
     const auto field = make<Model>(stipple_fit_model, job.get());
-    check(stipple_model_save(field.get(), arguments.out.c_str()));
+    check(stipple_model_save(field.get(), result.out.c_str()));
     return;
   }
-  const uint64_t budget = arguments.budget ? counted(*arguments.budget, "--budget") : 0;
-  auto cloud = make<Cloud>(stipple_fit_cloud, job.get(), budget);
+  auto cloud = make<Cloud>(stipple_fit_cloud, job.get(), result.budget);
   auto info = sized<StippleCloudInfo>();
   check(stipple_cloud_info(cloud.get(), &info));
-  if (model == STIPPLE_FIT_EXPLICIT && (is_asset || (budget > 0 && budget < info.count))) {
-    const Model tree = hierarchyOf(context, cloud, arguments.seed);
+  const bool is_cut = result.budget > 0 && result.budget < info.count;
+  if (result.model == STIPPLE_FIT_EXPLICIT && (is_asset || is_cut)) {
+    const Model tree = hierarchyOf(context, cloud, result.seed);
     if (is_asset) {
-      check(stipple_model_save(tree.get(), arguments.out.c_str()));
+      check(stipple_model_save(tree.get(), result.out.c_str()));
       return;
     }
-    cloud = cutOf(tree, budget);
+    cloud = cutOf(tree, result.budget);
   }
-  check(stipple_cloud_save(cloud.get(), arguments.out.c_str(), nullptr));
+  check(stipple_cloud_save(cloud.get(), result.out.c_str(), nullptr));
 }
 
 /// Told before hours of work, not after them.
@@ -256,18 +195,17 @@ void requireFolder(const std::string& path) {
 }
 
 /// A result that cannot be written where it was wanted (a full disk) goes where temporary files go.
-void saveSomewhere(const Context& context, const Job& job, const Arguments& arguments,
-                   uint32_t model) {
+void saveSomewhere(const Context& context, const Job& job, const Result& result) {
   try {
-    save(context, job, arguments, model);
+    save(context, job, result);
   } catch (const Failure& failure) {
-    Arguments elsewhere = arguments;
-    const std::string name = std::filesystem::path(arguments.out).filename().string();
+    Result elsewhere = result;
+    const std::string name = std::filesystem::path(result.out).filename().string();
     elsewhere.out = (std::filesystem::temp_directory_path() /
                      ("stipple-" + std::to_string(getpid()) + "-" + name))
                         .string();
     try {
-      save(context, job, elsewhere, model);
+      save(context, job, elsewhere);
     } catch (const Failure&) {
       throw failure;
     }
@@ -275,38 +213,24 @@ void saveSomewhere(const Context& context, const Job& job, const Arguments& argu
   }
 }
 
-void fit(const Context& context, const Arguments& arguments) {
-  const bool is_asset = !hasSplatEnding(arguments.out);
-  if (is_asset && fileKind(arguments.out) != FileKind::kModel) {
+void requirePlaces(const Arguments& arguments, const std::string& checkpoint, bool resumes) {
+  if (!hasSplatEnding(arguments.out) && fileKind(arguments.out) != FileKind::kModel) {
     throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
                   " or .stipple.safetensors is expected");
   }
   requireFolder(arguments.out);
   if (!arguments.report.empty()) requireFolder(arguments.report);
-  const std::string checkpoint = arguments.out + ".checkpoint.safetensors";
   const bool is_left = std::filesystem::exists(checkpoint);
-  if (is_left && !arguments.resume) {
+  if (is_left && !resumes) {
     throw Failure("'" + checkpoint +
                   "' is left from a fit that was stopped; go on with --resume, or remove it");
   }
-  if (!is_left && arguments.resume) {
+  if (!is_left && resumes) {
     throw Failure("--resume needs '" + checkpoint + "', which is not there");
   }
-  const StippleFitOptions options = optionsOf(arguments, checkpoint);
-  const Views views = openViews(context, arguments.dataset, arguments.downscale);
-  const auto job =
-      make<Job>(stipple_fit_start, context.get(), const_cast<const StippleViews*>(views.get()),
-                const_cast<const StippleFitOptions*>(&options));
-  const bool is_whole = watch(job);
-  saveSomewhere(context, job, arguments, options.model);
-  if (!arguments.report.empty()) {
-    check(stipple_fit_report_save(job.get(), arguments.report.c_str()));
-  }
-  if (is_whole) std::filesystem::remove(checkpoint);
-  if (!is_whole) {
-    std::fprintf(stderr, "stipple: stopped; the best so far is in '%s', --resume goes on\n",
-                 arguments.out.c_str());
-  }
+}
+
+void printFigures(const Job& job) {
   auto figures = sized<StippleFitFigures>();
   check(stipple_fit_figures(job.get(), &figures));
   Report report;
@@ -318,74 +242,49 @@ void fit(const Context& context, const Arguments& arguments) {
   report.print(false);
 }
 
+void fit(const Context& context, const Arguments& arguments) {
+  const std::string checkpoint = arguments.out + ".checkpoint.safetensors";
+  const StippleFitOptions options = arguments.flags.options(checkpoint);
+  requirePlaces(arguments, checkpoint, options.resume != 0);
+  const uint64_t budget = arguments.budget ? counted(*arguments.budget, "--budget") : 0;
+  const Views views = openViews(context, arguments.dataset, arguments.downscale);
+  const auto job =
+      make<Job>(stipple_fit_start, context.get(), const_cast<const StippleViews*>(views.get()),
+                const_cast<const StippleFitOptions*>(&options));
+  const bool is_whole = watch(job);
+  saveSomewhere(context, job, {arguments.out, budget, options.model, options.seed});
+  if (!arguments.report.empty()) {
+    check(stipple_fit_report_save(job.get(), arguments.report.c_str()));
+  }
+  if (is_whole) {
+    std::filesystem::remove(checkpoint);
+  } else {
+    std::fprintf(stderr, "stipple: stopped; the best so far is in '%s', --resume goes on\n",
+                 arguments.out.c_str());
+  }
+  printFigures(job);
+}
+
 }  // namespace
 
 void addFit(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   Arguments& to = *arguments;
-  CLI::App* command = app.add_subcommand("fit", "Splats from pictures with cameras");
+  CLI::App* command = app.add_subcommand("fit", "Fits splats to images with cameras.");
   command
       ->add_option("dataset", to.dataset,
-                   "COLMAP folder, or transforms.json or its folder, with the pictures")
+                   "A COLMAP folder, or transforms.json or its folder, with the images.")
       ->required();
-  command->add_option("out", to.out, "Splats (.ply and others), or a model (.stipple.safetensors)")
+  command->add_option("out", to.out, "Splats (.ply and others), or a model (.stipple.safetensors).")
       ->required();
-  command->add_option("--model", to.model, "explicit, or field (a learned density)")
-      ->check(CLI::IsMember({"explicit", "field"}))
+  to.flags.addTo(*command);
+  command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts.");
+  command->add_option("--downscale", to.downscale, "Images are made smaller by this factor.")
       ->capture_default_str();
-  command->add_option(
-      "--strategy", to.strategy,
-      "How splats are added and removed: name(setting=number)+part; see --strategies. Else as "
-      "the quality has it");
-  command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts");
-  command->add_option("--quality", to.quality, "Sets iterations, counts and strategy")
-      ->check(CLI::IsMember({"fast", "balanced", "fine"}))
-      ->capture_default_str();
-  auto* gaussians =
-      command->add_option("--gaussians", to.gaussians, "Explicit: the most splats there may be");
-  command->add_option("--start", to.start,
-                      "Explicit: splats to begin with; without it as many as points are known");
-  command->add_option("--anchors", to.anchors, "Field: the largest budget that is trained")
-      ->excludes(gaussians);
-  command->add_option("--gaussians-per-anchor", to.gaussians_per_anchor,
-                      "Field: 4, the default, to 32");
-  command->add_option("--iterations", to.iterations, "Steps, one view each");
-  command->add_option("--sh-degree", to.sh_degree, "0 (colour without view) to 4");
-  command->add_option("--downscale", to.downscale, "Pictures are made smaller by this factor")
-      ->capture_default_str();
-  command
-      ->add_option("--holdout", to.holdout,
-                   "Every so many-th picture is measured and not learned from; 0: none")
-      ->capture_default_str();
-  command->add_option("--background", to.background, "Behind transparent pictures")
-      ->check(CLI::IsMember({"black", "white", "random"}))
-      ->capture_default_str();
-  command->add_option("--budget", to.budget, "Splats (field: anchors) that go into a splat file");
-  command
-      ->add_option("--picture-memory", to.picture_mib,
-                   "MiB of pictures kept; others are read again whenever they are wanted")
-      ->capture_default_str();
-  command
-      ->add_option("--memory", to.memory_mib,
-                   "MiB of the whole fit, about: fewer splats and pictures are kept; 0: any number")
-      ->check(CLI::NonNegativeNumber);
+  command->add_option("--budget", to.budget,
+                      "This number of splats (of a field, anchors) goes into a splat file.");
   command->add_option("--report", to.report,
-                      "JSON of the whole fit; curves go beside it with the ending .svg");
-  command
-      ->add_option("--checkpoint-every", to.checkpoint_every,
-                   "Saves what --resume needs after so many steps, beside once a minute")
-      ->capture_default_str();
-  command->add_flag("--resume", to.resume, "Goes on from where the same command was stopped");
-  command->add_flag("--no-jitter", to.no_jitter, "Field: anchors at the centres of their cells");
-  command->add_flag("--no-density-gradient", to.no_density_gradient,
-                    "Field: the density is not learned from the pictures");
-  command
-      ->add_option("--shell", to.shell,
-                   "Field: a shell behind what is known, for what is far away; auto: where "
-                   "pictures are opaque")
-      ->check(CLI::IsMember({"auto", "on", "off"}))
-      ->capture_default_str();
-  command->add_option("--seed", to.seed)->capture_default_str();
+                      "The story of the fit goes here as JSON, and its curves beside it as .svg.");
   command->callback([arguments, &context] { fit(context, *arguments); });
 }
 

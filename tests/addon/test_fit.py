@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from stipple.binding.errors import CancelledError, StippleError
-from stipple.binding.fit import Fit, fit_memory_bound, fit_options
+from stipple.binding.fit import Fit, fit_memory_bound, fit_option_table, fit_options
 from stipple.binding.model import DecodeSettings
 from stipple.binding.strategies import check_strategy, strategies, strategy_parts
-from stipple.binding.structs import BudgetUnit, ColourSpace, FitModel, FitQuality, FitShell, StippleCamera, Transfer
+from stipple.binding.structs import (MAX_ANCHORS, BudgetUnit, ColourSpace, FitModel, FitOptionKind, FitQuality, FitShell,
+                                     StippleCamera, StippleFitOptions, Transfer)
 from stipple.binding.views import Views
 
 
@@ -116,6 +117,36 @@ def test_presets_grow_with_quality(context):
     assert chosen[0].max_splats < chosen[2].max_splats
     assert chosen[3].model == FitModel.FIELD
     assert chosen[3].most_anchors < chosen[5].most_anchors
+
+
+def test_every_field_is_an_option_and_every_option_a_field(context):
+    fields = [name.removesuffix('_utf8') for name, _ in StippleFitOptions._fields_ if name not in ('struct_size', 'reserved')]
+    table = fit_option_table(context.library)
+    assert sorted(option.name for option in table) == sorted(fields)
+
+
+def test_defaults_and_presets_are_those_of_the_table(context):
+    table = fit_option_table(context.library)
+    assert next(option for option in table if option.name == 'most_anchors').maximum == MAX_ANCHORS
+
+    def text(option, value):
+        if option.kind == FitOptionKind.CHOICE:
+            return option.choices[value]
+        if option.kind == FitOptionKind.BYTES and value:
+            return f'{value >> 30}GiB'
+        if option.kind == FitOptionKind.TEXT:
+            return (value or b'').decode()
+        return f'{value:g}' if option.kind == FitOptionKind.NUMBER else str(value)
+
+    for model in FitModel:
+        for quality in FitQuality:
+            made = fit_options(context.library, model, quality)
+            for option in table:
+                field = 'strategy_utf8' if option.name == 'strategy' else option.name
+                if field == 'checkpoint_path' or option.name == 'model':
+                    continue
+                wanted = option.presets[model][quality]
+                assert text(option, getattr(made, field)) == (option.default if wanted is None else wanted), option.name
 
 
 def test_unknown_names_are_errors(context, views):

@@ -55,6 +55,32 @@ def test_lists_strategies_and_parts():
     assert all(len(line.split()) > 4 for line in lines if line.startswith('  '))
 
 
+def test_every_option_of_the_library_is_a_flag_with_a_help():
+    lines = run('fit', '--help').stdout
+    for name in ('model', 'strategy', 'start-splats,--start', 'max-splats,--gaussians', 'least-anchors', 'most-anchors,--anchors',
+                 'gaussians-per-anchor', 'sh-degree', 'antialias', 'density-gradient,--no-density-gradient', 'jitter,--no-jitter',
+                 'shell', 'iterations', 'background', 'holdout', 'seed', 'ssim-share', 'measure-interval', 'picture-bytes',
+                 'max-bytes', 'checkpoint-interval,--checkpoint-every', 'checkpoint-seconds', 'resume'):
+        assert f'  --{name}' in lines, name
+    assert 'checkpoint-path' not in lines  # the tool says where it lies
+    assert 'Default: 500 (fast), 2000 (balanced), 4000 (fine). Range: 1 to 10000000.' in lines
+
+
+@pytest.mark.parametrize('former, present', [
+    (('--gaussians', 200), ('--max-splats', 200)), (('--start', 50), ('--start-splats', 50)),
+    (('--checkpoint-every', 5), ('--checkpoint-interval', 5)), (('--picture-memory', 1), ('--picture-bytes', '1MiB')),
+    (('--memory', 1), ('--max-bytes', '1024KiB')),
+    (('--model', 'field', '--anchors', 32, '--no-jitter'), ('--model', 'field', '--most-anchors', 32, '--no-jitter'))],
+    ids=lambda flags: flags[-2])
+def test_flags_are_understood_by_what_they_were_called(dataset, tmp_path, former, present):
+    for name, flags in (('former', former), ('present', present)):
+        run('fit', dataset, tmp_path / f'{name}.ply', '--iterations', 20, '--sh-degree', 0, '--report', tmp_path / f'{name}.json',
+            *flags)
+    assert (tmp_path / 'former.ply').read_bytes() == (tmp_path / 'present.ply').read_bytes()
+    settings = [json.loads((tmp_path / f'{name}.json').read_text())['settings'] for name in ('former', 'present')]
+    assert settings[0] == settings[1]
+
+
 def test_begins_with_as_many_splats_as_asked(dataset, tmp_path):
     run('fit', dataset, tmp_path / 'out.ply', '--iterations', 1, '--gaussians', 300, '--start', 70)
     assert json.loads(run('info', tmp_path / 'out.ply', '--json').stdout)['count'] == 70
@@ -264,8 +290,12 @@ def test_one_view_is_fitted_with_a_note(copy, tmp_path):
     (('{dataset}', 'out.ply', '--model', 'field', '--strategy', 'adaptive'), 'there is learned_density'),
     (('{dataset}', 'out.ply', '--model', 'field', '--strategy', 'learned_density', '--no-density-gradient'), 'both'),
     (('{dataset}', 'out.ply', '--memory', 0.001), 'max_bytes is 1048'),
-    (('{dataset}', 'out.ply', '--sh-degree', 5), 'sh_degree is 5'),
+    (('{dataset}', 'out.ply', '--sh-degree', 5), '--sh-degree is 5; 0 to 4 is allowed'),
     (('{dataset}', 'out.ply', '--shell', 'on'), '--model field'),
+    (('{dataset}', 'out.ply', '--no-jitter'), '--model field'),
+    (('{dataset}', 'out.ply', '--iterations', 'many'), '--iterations is many; 1 to 10000000 is allowed'),
+    (('{dataset}', 'out.ply', '--max-bytes', '1TiB'), '--max-bytes is 1TiB'),
+    (('{dataset}', 'out.ply', '--ssim-share', 2), '--ssim-share is 2; 0 to 1 is allowed'),
     (('{dataset}', 'out.ply', '--downscale', 0), 'downscale'),
 ])
 def test_one_line_says_what_is_wrong(dataset, tmp_path, arguments, text):

@@ -192,6 +192,9 @@ FUNCTIONS = {
     # fitting splats to views
     'stipple_fit_options_init': (None, [_to(s.StippleFitOptions)]),
     'stipple_fit_options_preset': (_status, [_to(s.StippleFitOptions), c_uint32, c_uint32]),
+    'stipple_fit_options_set': (_status, [_to(s.StippleFitOptions), c_char_p, c_char_p]),
+    'stipple_fit_option_count': (_status, [POINTER(c_uint64)]),
+    'stipple_fit_option_info': (_status, [c_uint64, _to(s.StippleFitOptionInfo)]),
     'stipple_fit_start': (_status, [_handle, _handle, _to(s.StippleFitOptions), _out_handle]),
     'stipple_fit_memory_bound': (_status, [_handle, _to(s.StippleFitOptions), POINTER(c_uint64)]),
     'stipple_fit_figures': (_status, [_handle, _to(s.StippleFitFigures)]),

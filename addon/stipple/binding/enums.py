@@ -3,7 +3,7 @@
 
 from enum import IntEnum
 
-from .fit_enums import FitBackground, FitModel, FitQuality, FitShell, SplatQuantity
+from .fit_enums import FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, SplatQuantity
 
 
 class Status(IntEnum):
@@ -221,4 +221,5 @@ ENUMS = {
     'StippleSplatQuantity': (SplatQuantity, 'STIPPLE_QUANTITY_'),
     'StippleFitBackground': (FitBackground, 'STIPPLE_FIT_BACKGROUND_'),
     'StippleFitShell': (FitShell, 'STIPPLE_FIT_SHELL_'),
+    'StippleFitOptionKind': (FitOptionKind, 'STIPPLE_FIT_OPTION_'),
 }

@@ -2,6 +2,7 @@
 """Fitting splats to views."""
 
 from ctypes import byref, c_char_p, c_uint32, c_uint64, c_void_p
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from .errors import check
 from .handle import new_handle, path_bytes, pointer_to
 from .job import Job
 from .model import Model
-from .structs import FitModel, FitQuality, StippleFitFigures, StippleFitOptions
+from .structs import (FitModel, FitOptionKind, FitQuality, StippleFitFigures, StippleFitOptionInfo,
+                      StippleFitOptions)
 
 
 def fit_options(library, model=FitModel.EXPLICIT, quality=FitQuality.BALANCED, checkpoint_path=None, strategy=None,
@@ -28,6 +30,47 @@ def fit_options(library, model=FitModel.EXPLICIT, quality=FitQuality.BALANCED, c
             raise TypeError(f"fit_options() has no option '{name}'")
         setattr(options, name, value)
     return options
+
+
+@dataclass(frozen=True)
+class FitOption:
+    """A field of StippleFitOptions as the library tells it."""
+
+    name: str             # of the field, without _utf8
+    kind: FitOptionKind
+    help: str             # one sentence
+    models: tuple         # of FitModel: whom it concerns
+    fixed_models: tuple   # of FitModel: a fit that goes on needs it as it was
+    choices: tuple        # words of a choice, from 0 on
+    minimum: float
+    maximum: float
+    default: str
+    presets: tuple        # texts by model and quality, None where the preset leaves it alone
+    former_name: str
+
+
+def fit_option_table(library):
+    """Every option of a fit, in the order in which settings have them."""
+    count = c_uint64()
+    check(library, library.stipple_fit_option_count(byref(count)))
+    return [_fit_option(library, index) for index in range(count.value)]
+
+
+def _fit_option(library, index):
+    info = StippleFitOptionInfo()
+    check(library, library.stipple_fit_option_info(index, byref(info)))
+    choices = info.choices_utf8.decode()
+    presets = [None if text is None else text.decode() for text in info.presets_utf8]
+    qualities = len(FitQuality)
+    return FitOption(info.name_utf8.decode(), FitOptionKind(info.kind), info.help_utf8.decode(), _models_of(info.models),
+                     _models_of(info.fixed_models), tuple(choices.split(',')) if choices else (), info.minimum,
+                     info.maximum, info.default_utf8.decode(),
+                     tuple(tuple(presets[qualities * model:qualities * (model + 1)]) for model in FitModel),
+                     info.former_name_utf8.decode())
+
+
+def _models_of(bits):
+    return tuple(model for model in FitModel if bits >> model & 1)
 
 
 def fit_memory_bound(views, options):

@@ -27,6 +27,15 @@ class FitShell(IntEnum):
     OFF = 2
 
 
+class FitOptionKind(IntEnum):
+    COUNT = 0
+    NUMBER = 1
+    BYTES = 2
+    SWITCH = 3
+    CHOICE = 4
+    TEXT = 5
+
+
 class SplatQuantity(IntEnum):
     SCORE = 0
     AGE = 1

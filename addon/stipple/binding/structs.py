@@ -4,8 +4,8 @@
 from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p, sizeof
 
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, BudgetUnit, CameraModel, ColourSpace, ENUMS,
-                    Effect, EffectChoice, FitBackground, FitModel, FitQuality, FitShell, Frame, JobState, LowPass,
-                    MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling, Side,
+                    Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, Frame, JobState,
+                    LowPass, MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling, Side,
                     SplatOrder, SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
 
 ABI_VERSION = 1
@@ -365,6 +365,13 @@ class StippleFitOptions(_Sized):
                 ('picture_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
                 ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double), ('max_bytes', c_uint64),
                 ('shell', c_uint32), ('reserved', c_uint32)]
+
+
+class StippleFitOptionInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('kind', c_uint32), ('models', c_uint32), ('fixed_models', c_uint32),
+                ('name_utf8', c_char_p), ('help_utf8', c_char_p), ('choices_utf8', c_char_p), ('minimum', c_double),
+                ('maximum', c_double), ('default_utf8', c_char_p), ('presets_utf8', c_char_p * 6),
+                ('former_name_utf8', c_char_p), ('former_unit', c_double)]
 
 
 class StippleFitFigures(_Sized):

@@ -1529,6 +1529,45 @@ void stipple_fit_options_init(StippleFitOptions* options);
  * In: options->struct_size set. docs/methods/fitting.md has what each costs. */
 StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t model, uint32_t quality);
 
+/* Sets an option by its name and a text, as a flag of the tool and a file of settings have them: "iterations" and
+ * "500", "background" and "white" (or "2"), "picture_bytes" and "512MiB". A text that is kept as such (strategy,
+ * checkpoint_path) stays the caller's and must live as long as the options are used; "" is none.
+ * In: options->struct_size set; name_utf8: a name of stipple_fit_option_info, or what the option was formerly called;
+ * - counts as _, and -- in front as nothing. Errors: INVALID_ARGUMENT for another name, and for a value out of range
+ * (says which is allowed, with the name as it was given). */
+StippleStatus stipple_fit_options_set(StippleFitOptions* options, const char* name_utf8, const char* value_utf8);
+
+/* What an option of a fit holds. */
+typedef enum StippleFitOptionKind {
+  STIPPLE_FIT_OPTION_COUNT = 0,  /* a whole number */
+  STIPPLE_FIT_OPTION_NUMBER = 1, /* any number */
+  STIPPLE_FIT_OPTION_BYTES = 2,  /* a whole number; texts may end in KiB, MiB or GiB */
+  STIPPLE_FIT_OPTION_SWITCH = 3, /* 0 or 1 */
+  STIPPLE_FIT_OPTION_CHOICE = 4, /* the place of a word in a list, from 0 on */
+  STIPPLE_FIT_OPTION_TEXT = 5
+} StippleFitOptionKind;
+
+/* An option of a fit: a field of StippleFitOptions. The texts live as long as the library. */
+typedef struct StippleFitOptionInfo {
+  uint32_t struct_size;
+  uint32_t kind;               /* StippleFitOptionKind */
+  uint32_t models;             /* bits 1 << StippleFitModel: whom it concerns; other models ignore it */
+  uint32_t fixed_models;       /* bits: a fit of this model that goes on needs it as it was */
+  const char* name_utf8;       /* of the field, without _utf8 */
+  const char* help_utf8;       /* one sentence */
+  const char* choices_utf8;    /* of a choice: its words, with commas between; else empty */
+  double minimum;              /* of numbers; infinity: no limit */
+  double maximum;
+  const char* default_utf8;    /* as stipple_fit_options_set takes it */
+  const char* presets_utf8[6]; /* what stipple_fit_options_preset sets: [3 * StippleFitModel + StippleFitQuality];
+                                  NULL: it is left alone */
+  const char* former_name_utf8; /* what it was formerly called; empty: nothing else */
+  double former_unit;          /* how much 1 was under that name */
+} StippleFitOptionInfo;
+StippleStatus stipple_fit_option_count(uint64_t* count);
+/* index 0..count-1, in the order in which settings have them. */
+StippleStatus stipple_fit_option_info(uint64_t index, StippleFitOptionInfo* info);
+
 typedef struct StippleFitFigures {
   uint32_t struct_size;
   uint32_t measured_on_training; /* 1: too few views to hold any out */

@@ -426,18 +426,55 @@ TEST_F(FitTest, RefusesOptionsOutOfRange) {
   options_.checkpoint_seconds = -1;
   refused("options->checkpoint_seconds is -1");
   options_.resume = 1;
-  refused("checkpoint_path_utf8 is NULL");
+  refused("no checkpoint_path is given");
   options_.model = STIPPLE_FIT_FIELD;
   options_.least_anchors = options_.most_anchors + 1;
-  refused("options->most_anchors is");
+  refused("options->least_anchors is");
   options_.model = STIPPLE_FIT_FIELD;
   options_.gaussians_per_anchor = 3;
   refused("options->gaussians_per_anchor is 3; 4 to 32 is allowed");
   options_.model = STIPPLE_FIT_FIELD;
   options_.shell = 3;
-  refused("options->shell is 3; 0 to 2 is allowed");
+  refused("options->shell is 3; auto (0), on (1) or off (2) is allowed");
   expectRefused(stipple_fit_options_preset(&options_, 0, 3), STIPPLE_ERROR_INVALID_ARGUMENT,
                 "quality is 3");
+}
+
+TEST_F(FitTest, SetsOptionsByTheirNames) {
+  const auto set = [&](const char* name, const char* value) {
+    return stipple_fit_options_set(&options_, name, value);
+  };
+  STIPPLE_EXPECT_OK(set("iterations", "77"));
+  STIPPLE_EXPECT_OK(set("--max-splats", "88"));
+  STIPPLE_EXPECT_OK(set("background", "white"));
+  STIPPLE_EXPECT_OK(set("picture_bytes", "1.5MiB"));
+  STIPPLE_EXPECT_OK(set("ssim_share", "0.25"));
+  const std::string strategy = "mcmc";
+  STIPPLE_EXPECT_OK(set("strategy", strategy.c_str()));
+  EXPECT_EQ(options_.iterations, 77u);
+  EXPECT_EQ(options_.max_splats, 88u);
+  EXPECT_EQ(options_.background, uint32_t{STIPPLE_FIT_BACKGROUND_WHITE});
+  EXPECT_EQ(options_.picture_bytes, 3u << 19);
+  EXPECT_EQ(options_.ssim_share, 0.25);
+  EXPECT_EQ(options_.strategy_utf8, strategy.c_str());
+  STIPPLE_EXPECT_OK(set("strategy", ""));
+  EXPECT_EQ(options_.strategy_utf8, nullptr);
+  expectRefused(set("--sh-degree", "5"), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "--sh-degree is 5; 0 to 4 is allowed");
+  expectRefused(set("iteration", "5"), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "'iteration' is no option of a fit");
+  EXPECT_EQ(options_.sh_degree, 0u);
+}
+
+TEST_F(FitTest, TellsEveryOption) {
+  uint64_t count = 0;
+  STIPPLE_ASSERT_OK(stipple_fit_option_count(&count));
+  auto info = sized<StippleFitOptionInfo>();
+  STIPPLE_ASSERT_OK(stipple_fit_option_info(0, &info));
+  EXPECT_STREQ(info.name_utf8, "model");
+  EXPECT_STREQ(info.choices_utf8, "explicit,field");
+  EXPECT_EQ(info.kind, uint32_t{STIPPLE_FIT_OPTION_CHOICE});
+  expectRefused(stipple_fit_option_info(count, &info), STIPPLE_ERROR_INVALID_ARGUMENT, "index is");
 }
 
 TEST_F(FitTest, RefusesMoreMemoryThanItsLimit) {

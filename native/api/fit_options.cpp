@@ -1,0 +1,202 @@
+#include "api/fit_options.h"
+
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "api/guard.h"
+#include "fit/fit_option_table.h"
+
+using namespace stipple;
+using namespace stipple::api;
+
+namespace {
+
+/// A field of StippleFitOptions, and the same option here.
+struct FieldPair {
+  const char* name;
+  void (*take)(const StippleFitOptions&, FitOptions&);
+  /// Texts are left alone: they belong to the caller.
+  void (*give)(const FitOptions&, StippleFitOptions&);
+  /// Of texts alone.
+  void (*point)(StippleFitOptions&, const char*);
+};
+
+template <auto kField, auto kMember>
+constexpr FieldPair pairOf(const char* name) {
+  using Field = std::remove_cvref_t<decltype(std::declval<StippleFitOptions>().*kField)>;
+  using Member = std::remove_cvref_t<decltype(std::declval<FitOptions>().*kMember)>;
+  if constexpr (std::is_same_v<Field, const char*>) {
+    return {name,
+            [](const StippleFitOptions& from, FitOptions& to) {
+              to.*kMember = from.*kField ? from.*kField : "";
+            },
+            nullptr,
+            [](StippleFitOptions& to, const char* text) { to.*kField = *text ? text : nullptr; }};
+  } else {
+    return {name,
+            [](const StippleFitOptions& from, FitOptions& to) {
+              to.*kMember = static_cast<Member>(from.*kField);
+            },
+            [](const FitOptions& from, StippleFitOptions& to) {
+              to.*kField = static_cast<Field>(from.*kMember);
+            },
+            nullptr};
+  }
+}
+
+using C = StippleFitOptions;
+using O = FitOptions;
+
+constexpr FieldPair kFields[] = {
+    pairOf<&C::model, &O::model>("model"),
+    pairOf<&C::strategy_utf8, &O::strategy>("strategy"),
+    pairOf<&C::iterations, &O::iterations>("iterations"),
+    pairOf<&C::max_splats, &O::max_splats>("max_splats"),
+    pairOf<&C::start_splats, &O::start_splats>("start_splats"),
+    pairOf<&C::least_anchors, &O::least_anchors>("least_anchors"),
+    pairOf<&C::most_anchors, &O::most_anchors>("most_anchors"),
+    pairOf<&C::gaussians_per_anchor, &O::gaussians_per_anchor>("gaussians_per_anchor"),
+    pairOf<&C::sh_degree, &O::sh_degree>("sh_degree"),
+    pairOf<&C::antialias, &O::antialias>("antialias"),
+    pairOf<&C::background, &O::background>("background"),
+    pairOf<&C::density_gradient, &O::density_gradient>("density_gradient"),
+    pairOf<&C::jitter, &O::jitter>("jitter"),
+    pairOf<&C::shell, &O::shell>("shell"),
+    pairOf<&C::holdout, &O::holdout>("holdout"),
+    pairOf<&C::seed, &O::seed>("seed"),
+    pairOf<&C::ssim_share, &O::ssim_share>("ssim_share"),
+    pairOf<&C::measure_interval, &O::measure_interval>("measure_interval"),
+    pairOf<&C::picture_bytes, &O::picture_bytes>("picture_bytes"),
+    pairOf<&C::max_bytes, &O::max_bytes>("max_bytes"),
+    pairOf<&C::checkpoint_path_utf8, &O::checkpoint_path>("checkpoint_path"),
+    pairOf<&C::checkpoint_interval, &O::checkpoint_interval>("checkpoint_interval"),
+    pairOf<&C::checkpoint_seconds, &O::checkpoint_seconds>("checkpoint_seconds"),
+    pairOf<&C::resume, &O::resume>("resume"),
+};
+
+FitOptions taken(const StippleFitOptions& given) {
+  FitOptions options;
+  for (const FieldPair& field : kFields) field.take(given, options);
+  return options;
+}
+
+/// Everything but the texts.
+void give(const FitOptions& options, StippleFitOptions& out) {
+  for (const FieldPair& field : kFields) {
+    if (field.give) field.give(options, out);
+  }
+}
+
+void pointText(StippleFitOptions& options, const FitOption& option, const char* text) {
+  for (const FieldPair& field : kFields) {
+    if (field.point && std::strcmp(field.name, option.name) == 0) field.point(options, text);
+  }
+}
+
+/// What stays alive of a table whose values are made.
+struct DefaultTexts {
+  std::vector<std::string> texts;
+  DefaultTexts() {
+    const FitOptions defaults = defaultFitOptions();
+    for (const FitOption& option : fitOptionTable()) {
+      texts.push_back(fitValueText(option, option.member.get(defaults)));
+    }
+  }
+};
+
+const char* defaultText(size_t index) {
+  static const DefaultTexts kDefaults;
+  return kDefaults.texts[index].c_str();
+}
+
+StippleFitOptionInfo infoOf(size_t index) {
+  const FitOption& option = fitOptionTable()[index];
+  StippleFitOptionInfo info = {};
+  info.kind = static_cast<uint32_t>(option.kind);
+  info.models = option.models;
+  info.fixed_models = option.stored_of;
+  info.name_utf8 = option.name;
+  info.help_utf8 = option.help;
+  info.choices_utf8 = option.choices;
+  info.minimum = option.minimum;
+  info.maximum = option.maximum;
+  info.default_utf8 = defaultText(index);
+  std::memcpy(info.presets_utf8, option.presets, sizeof(info.presets_utf8));
+  info.former_name_utf8 = option.former_name;
+  info.former_unit = option.former_unit;
+  return info;
+}
+
+}  // namespace
+
+namespace stipple::api {
+
+FitOptions fitOptionsFrom(const StippleFitOptions* options) {
+  StippleFitOptions defaults;
+  stipple_fit_options_init(&defaults);
+  return taken(completed(options, defaults, "options"));
+}
+
+}  // namespace stipple::api
+
+extern "C" {
+
+void stipple_fit_options_init(StippleFitOptions* options) {
+  if (!options) return;
+  *options = {};
+  options->struct_size = sizeof(StippleFitOptions);
+  give(defaultFitOptions(), *options);
+}
+
+StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t model,
+                                         uint32_t quality) {
+  return guarded([&] {
+    const auto kind = enumValue<FitKind>(model, kFitKindCount - 1, "model");
+    const auto wanted = enumValue<FitQuality>(quality, kFitQualityCount - 1, "quality");
+    StippleFitOptions chosen = complete(options, "options");
+    FitOptions changed = taken(chosen);
+    applyPreset(changed, kind, wanted);
+    give(changed, chosen);
+    for (const FitOption& option : fitOptionTable()) {
+      const char* text = option.presets[model][quality];
+      if (text) pointText(chosen, option, text);
+    }
+    deliver(options, chosen, "options");
+  });
+}
+
+StippleStatus stipple_fit_options_set(StippleFitOptions* options, const char* name_utf8,
+                                      const char* value_utf8) {
+  return guarded([&] {
+    StippleFitOptions chosen = complete(options, "options");
+    const std::string name = &require(name_utf8, "name_utf8");
+    require(value_utf8, "value_utf8");
+    double unit = 1;
+    const FitOption* option = findFitOption(name, &unit);
+    if (!option) fail(ErrorCode::kInvalidArgument, "'" + name + "' is no option of a fit");
+    FitOptions changed = taken(chosen);
+    option->member.set(changed, fitValueFrom(*option, value_utf8, name, unit));
+    give(changed, chosen);
+    if (option->kind == FitOptionKind::kText) pointText(chosen, *option, value_utf8);
+    deliver(options, chosen, "options");
+  });
+}
+
+StippleStatus stipple_fit_option_count(uint64_t* count) {
+  return guarded([&] { require(count, "count") = fitOptionTable().size(); });
+}
+
+StippleStatus stipple_fit_option_info(uint64_t index, StippleFitOptionInfo* info) {
+  return guarded([&] {
+    const size_t count = fitOptionTable().size();
+    if (index >= count) {
+      fail(ErrorCode::kInvalidArgument, "index is " + std::to_string(index) + "; 0 to " +
+                                            std::to_string(count - 1) + " is allowed");
+    }
+    deliver(info, infoOf(index), "info");
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "fit/fit_options.h"
+
+namespace stipple {
+
+enum class FitOptionKind : uint32_t {
+  kCount = 0,   ///< a whole number
+  kNumber = 1,  ///< any number
+  kBytes = 2,   ///< a whole number; texts may end in KiB, MiB or GiB
+  kSwitch = 3,  ///< 0 or 1
+  kChoice = 4,  ///< the place of a word in a list
+  kText = 5,
+};
+
+/// Switches, choices, counts and bytes are whole numbers.
+using FitValue = std::variant<uint64_t, double, std::string>;
+
+/// Bits of a set of models.
+constexpr uint32_t kOfExplicit = 1u << static_cast<uint32_t>(FitKind::kExplicit);
+constexpr uint32_t kOfField = 1u << static_cast<uint32_t>(FitKind::kField);
+constexpr uint32_t kOfEveryModel = kOfExplicit | kOfField;
+constexpr uint32_t kOfNoModel = 0;
+
+/// How an option lies in FitOptions.
+struct FitMember {
+  FitValue (*get)(const FitOptions&) = nullptr;
+  void (*set)(FitOptions&, const FitValue&) = nullptr;
+};
+
+/// An option of a fit: the one place that says what it is. Checks, presets, the settings of
+/// checkpoints and reports, what a resumed fit must share, the flags and help of the tool and
+/// stipple_fit_option_info are made from it.
+struct FitOption {
+  /// In settings and in StippleFitOptions; the tool has it with - for _.
+  const char* name;
+  FitOptionKind kind;
+  FitMember member;
+  const char* help;                 ///< one sentence
+  uint32_t models = kOfEveryModel;  ///< bits: whom it concerns; others ignore it
+  /// Bits: in whose settings it stands. A fit that goes on needs it as it was there; elsewhere it
+  /// may change.
+  uint32_t stored_of = kOfEveryModel;
+  double minimum = 0;
+  double maximum = std::numeric_limits<double>::infinity();
+  /// Another count that this one may not exceed, where there is one.
+  uint64_t FitOptions::*not_above = nullptr;
+  const char* choices = "";  ///< of a choice: its words, with commas between
+  /// Of a choice: settings have its word, where others have its number.
+  bool is_stored_as_word = false;
+  /// As texts; null: the preset leaves it as it is.
+  const char* presets[kFitKindCount][kFitQualityCount] = {};
+  /// What it was once called, and how much 1 was then; settings and flags may still say so.
+  const char* former_name = "";
+  double former_unit = 1;
+};
+
+/// All options, in the order in which settings have them.
+std::span<const FitOption> fitOptionTable();
+
+/// The option of this name, or null. Accepts former names, - for _, and -- in front, as flags
+/// have them. Out: unit, 1, or how much 1 of the former name is.
+const FitOption* findFitOption(std::string_view name, double* unit = nullptr);
+
+/// "fast, balanced, fine" and so on: in what presets are chosen.
+const char* fitQualityNames();
+
+/// The value as a user writes it: a word of a choice, "1GiB", 0.2.
+std::string fitValueText(const FitOption& option, const FitValue& value);
+
+/// What requireFitOptions() allows, for a message or a help: "1 to 10000000".
+std::string fitRangeText(const FitOption& option);
+
+/// Reads a value as a user writes it. In: name, of the option in messages; unit, of former names.
+/// Errors: kInvalidArgument for what is no such value or out of range.
+FitValue fitValueFrom(const FitOption& option, std::string_view text, const std::string& name,
+                      double unit = 1);
+
+/// Refuses a value out of the option's own range: "NAME is 0; 1 to 10000000 is allowed".
+void requireInRange(const FitOption& option, const FitValue& value, const std::string& name);
+
+}  // namespace stipple

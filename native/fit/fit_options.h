@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "data/clouds/splat_cloud.h"
+#include "train/loop/field_model.h"
+#include "train/loop/trainer.h"
+#include "train/prior/scene_prior.h"
+
+namespace stipple {
+
+/// What a fit makes.
+enum class FitKind : uint32_t {
+  kExplicit = 0,  ///< splats with parameters of their own
+  kField = 1,     ///< a learned density and a field of attributes
+};
+constexpr uint32_t kFitKindCount = 2;
+
+/// A user's choice of quality, as presets have it.
+enum class FitQuality : uint32_t { kFast = 0, kBalanced = 1, kFineDetail = 2 };
+constexpr uint32_t kFitQualityCount = 3;
+
+/// What a caller chooses for a fit. What each option means, its range and its name stand in the
+/// table of fit_option_table.h; what is 0 here is set by presets. defaultFitOptions() has values
+/// that fit.
+struct FitOptions {
+  FitKind model = FitKind::kExplicit;
+  std::string strategy;  ///< empty: "adaptive"; of a field as density_gradient says
+  uint64_t iterations = 0;
+  uint64_t max_splats = 0;
+  uint64_t start_splats = 0;  ///< 0: as many as points are known
+  uint64_t least_anchors = 0;
+  uint64_t most_anchors = 0;
+  uint32_t gaussians_per_anchor = 0;
+  uint32_t sh_degree = 0;
+  Antialias antialias = Antialias::kClassic;
+  BackgroundPolicy background = TrainerOptions().background;
+  bool density_gradient = FieldModelOptions().density_gradient;
+  bool jitter = FieldModelOptions().jitter;
+  ShellChoice shell = FieldModelOptions().shell;
+  uint32_t holdout = 8;
+  uint64_t seed = 0;
+  double ssim_share = TrainerOptions().ssim_share;
+  uint64_t measure_interval = 0;  ///< 0: a twentieth of the fit, at least 100
+  uint64_t picture_bytes = TrainerOptions().picture_bytes;
+  uint64_t max_bytes = 0;       ///< 0: no limit
+  std::string checkpoint_path;  ///< empty: no checkpoints
+  uint64_t checkpoint_interval = 0;
+  double checkpoint_seconds = 60;
+  bool resume = false;
+};
+
+/// Balanced explicit splats, without a strategy, so that any model can be set.
+FitOptions defaultFitOptions();
+
+/// Sets what the table has a value for at this model and quality; the other options stay.
+void applyPreset(FitOptions& options, FitKind model, FitQuality quality);
+
+/// Errors: kInvalidArgument with the name of the first option that is out of its range, of the
+/// strategy that is not there, and of a path that is missing. Options that do not concern the model
+/// may have any value.
+void requireFitOptions(const FitOptions& options);
+
+/// The same options with everything that follows from others written out: the strategy of explicit
+/// splats, and density_gradient of a field whose strategy is named.
+FitOptions resolved(FitOptions options);
+
+}  // namespace stipple

@@ -1,0 +1,216 @@
+#include "fit/fit_session.h"
+
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "base/error.h"
+#include "data/views/view_check.h"
+#include "fit/fit_memory.h"
+#include "fit/fit_settings.h"
+#include "fit/fit_views.h"
+#include "io/assets/checkpoint.h"
+#include "io/reports/fit_report.h"
+#include "model/field_splats.h"
+#include "train/loop/explicit_model.h"
+#include "train/loop/field_model.h"
+
+namespace stipple {
+
+namespace {
+
+TrainerOptions trainerOptions(const FitOptions& options) {
+  TrainerOptions trainer;
+  trainer.iterations = options.iterations;
+  trainer.background = options.background;
+  trainer.seed = options.seed;
+  trainer.max_splats = options.model == FitKind::kExplicit ? options.max_splats : 0;
+  trainer.picture_bytes = options.picture_bytes;
+  trainer.ssim_share = options.ssim_share;
+  trainer.measure_interval = options.measure_interval;
+  if (options.checkpoint_path.empty()) return trainer;
+  trainer.checkpoint_interval = options.checkpoint_interval;
+  trainer.checkpoint_seconds = options.checkpoint_seconds;
+  return trainer;
+}
+
+FieldModelOptions fieldOptions(const FitOptions& options) {
+  FieldModelOptions field;
+  field.least_anchors = options.least_anchors;
+  field.most_anchors = options.most_anchors;
+  field.gaussians_per_anchor = options.gaussians_per_anchor;
+  field.sh_degree = static_cast<int>(options.sh_degree);
+  field.antialias = options.antialias;
+  field.ssim_share = options.ssim_share;
+  field.density_gradient = options.density_gradient;
+  field.jitter = options.jitter;
+  field.shell = options.shell;
+  field.seed = options.seed;
+  return field;
+}
+
+ExplicitModelOptions explicitOptions(const FitOptions& options) {
+  ExplicitModelOptions model;
+  model.strategy = options.strategy;
+  model.start_splats = options.start_splats;
+  model.max_splats = options.max_splats;
+  model.sh_degree = static_cast<int>(options.sh_degree);
+  model.antialias = options.antialias;
+  model.ssim_share = options.ssim_share;
+  model.seed = options.seed;
+  model.iterations = options.iterations;
+  return model;
+}
+
+std::unique_ptr<FitModel> makeModel(const ViewSource& views, const FitViews& split,
+                                    const FitOptions& options, Progress* progress) {
+  if (options.model == FitKind::kField) {
+    return makeFieldModel(views, split.training, fieldOptions(options), progress);
+  }
+  return makeExplicitModel(views, split.training, explicitOptions(options), progress);
+}
+
+FitOptions preparedOptions(const FitOptions& options, const ViewSource& views) {
+  requireFitOptions(options);
+  FitOptions held = resolved(options);
+  holdToMemory(held, views);
+  return held;
+}
+
+}  // namespace
+
+FitSession::FitSession(std::shared_ptr<const ViewSource> views, const FitOptions& options)
+    : views_(std::move(views)),
+      options_(preparedOptions(options, *views_)),
+      split_(splitAsTold(*views_, options_.holdout)) {
+  figures_.iterations = options_.iterations;
+}
+
+uint64_t FitSession::memoryBound() const {
+  return fitMemoryBound(options_, *views_);
+}
+
+std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
+  const FitSettings settings = settingsOf(options_, *views_);
+  settings_json_ = stipple::settingsJson(settings);
+  // A checkpoint that does not fit is told before anything is loaded.
+  std::optional<Checkpoint> checkpoint;
+  if (options_.resume) {
+    checkpoint = readCheckpoint(options_.checkpoint_path);
+    requireSameSettings(checkpoint->settings_json, settings, options_.checkpoint_path);
+  }
+  for (const std::string& warning : checkViews(*views_, {}, &progress)) note(warning);
+  auto trainer = std::make_unique<Trainer>(
+      views_, split_, makeModel(*views_, split_, options_, &progress), trainerOptions(options_));
+  if (!checkpoint) return trainer;
+  try {
+    trainer->restore(checkpoint->tensors);
+  } catch (const Error& error) {
+    fail(error.code(), options_.checkpoint_path + ": " + error.what());
+  }
+  return trainer;
+}
+
+void FitSession::run(Progress& progress) {
+  trainer_ = prepared(progress);
+  const auto ends = [this] {
+    std::lock_guard<std::mutex> lock(mutex_);
+    has_ended_ = true;
+  };
+  try {
+    trainer_->run(*this, &progress);
+  } catch (...) {
+    ends();
+    throw;
+  }
+  ends();
+}
+
+FitStatus FitSession::status() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return {figures_, stage_, split_.held_out.empty(), notes_.size(), preview_iteration_};
+}
+
+const char* FitSession::noteAt(uint64_t index) const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (index >= notes_.size()) {
+    fail(ErrorCode::kInvalidArgument, "note " + std::to_string(index) +
+                                          " was asked for; there are " +
+                                          std::to_string(notes_.size()) + ", counted from 0");
+  }
+  return notes_[index].c_str();
+}
+
+SeenCloud FitSession::takePreview() {
+  preview_is_wanted_ = true;
+  std::lock_guard<std::mutex> lock(mutex_);
+  return preview_;
+}
+
+Trainer& FitSession::ended() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!has_ended_ || !trainer_ || trainer_->iteration() == 0) {
+    fail(ErrorCode::kInvalidArgument,
+         "the fit has no result: it has not ended, or ended before its first step");
+  }
+  return *trainer_;
+}
+
+SeenCloud FitSession::decode(uint64_t budget) const {
+  Trainer& trainer = ended();
+  std::lock_guard<std::mutex> lock(decode_mutex_);
+  SplatCloud cloud = trainer.model().splats(budget);
+  return SeenCloud(std::move(cloud), trainer.seen());
+}
+
+std::shared_ptr<const SplatModel> FitSession::model() const {
+  FitModel& model = ended().model();
+  std::optional<FieldResult> learned = fieldResult(model);
+  if (!learned) {
+    fail(ErrorCode::kUnsupported, std::string("the ") + model.name() +
+                                      " model has no field; its splats can be made a hierarchy");
+  }
+  return makeFieldSplats(std::make_shared<const OctreeDensity>(std::move(learned->density)),
+                         std::move(learned->field), learned->draws, {settings_json_, {}});
+}
+
+void FitSession::saveReport(const std::string& path) const {
+  FitReportHead head;
+  head.model = ended().model().name();
+  if (options_.model == FitKind::kExplicit) head.strategy = options_.strategy;
+  head.settings_json = settings_json_;
+  writeFitReport(head, history(), path);
+  writeFitPlots(history(), std::filesystem::path(path).replace_extension(".svg").string());
+}
+
+void FitSession::figures(const FitFigures& figures) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  figures_ = figures;
+  if (figures.iteration > 0) stage_ = figures.stage;
+}
+
+void FitSession::note(const std::string& text) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  // The same trouble at every checkpoint is told once.
+  for (const std::string& earlier : notes_) {
+    if (earlier == text) return;
+  }
+  notes_.push_back(text);
+}
+
+bool FitSession::wantsPreview() {
+  return preview_is_wanted_.exchange(false);
+}
+
+void FitSession::preview(SplatCloud cloud, SplatQuantities seen) {
+  SeenCloud shared(std::move(cloud), std::move(seen));
+  std::lock_guard<std::mutex> lock(mutex_);
+  preview_ = std::move(shared);
+  preview_iteration_ = trainer_->iteration();
+}
+
+void FitSession::save(const TensorTable& table) {
+  writeCheckpoint(settings_json_, table, options_.checkpoint_path);
+}
+
+}  // namespace stipple

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstdint>
+
+#include "data/views/view_source.h"
+#include "train/loop/held_out.h"
+
+namespace stipple {
+
+/// What the data set says of its views; where it says nothing, or nothing is to be held out, every
+/// so many-th is (splitViews).
+FitViews splitAsTold(const ViewSource& views, uint64_t holdout);
+
+}  // namespace stipple
