@@ -18,6 +18,8 @@ TriMesh tetrahedron() {
   TriMesh mesh;
   mesh.positions = {0, 0, 0, 1.1f, 0, -0.0f, 0, -2.5e-7f, 3, 1e6f, 1, 0.3333333f};
   mesh.triangles = {0, 1, 2, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+  mesh.triangle_materials.assign(4, 0);
+  mesh.materials.resize(1);
   return mesh;
 }
 
