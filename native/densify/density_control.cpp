@@ -20,14 +20,6 @@ std::vector<uint32_t> staying(std::span<const uint8_t> goes) {
   return rows;
 }
 
-constexpr ControlRole kRoles[] = {
-    ControlRole::kMultiplication, ControlRole::kScore,          ControlRole::kChildren,
-    ControlRole::kChildOpacity,   ControlRole::kGrowth,         ControlRole::kRemoval,
-    ControlRole::kRecovery,       ControlRole::kOpacity,        ControlRole::kSteps,
-    ControlRole::kNoise,          ControlRole::kRegularisation, ControlRole::kParameterisation,
-    ControlRole::kFilter,
-};
-
 /// Refuses parts that nobody would ask.
 void requireUse(const char* name, const ControlAssembly& assembly) {
   constexpr ControlRoles kWhole = roles(ControlRole::kMultiplication, ControlRole::kChildren);
@@ -35,7 +27,8 @@ void requireUse(const char* name, const ControlAssembly& assembly) {
   ControlRoles owned = 0;
   for (const auto& part : assembly.parts) owned |= part->owns();
   for (const auto& part : assembly.parts) {
-    for (const ControlRole role : kRoles) {
+    for (uint32_t bit = 0; bit < kControlRoleCount; ++bit) {
+      const ControlRole role = static_cast<ControlRole>(1u << bit);
       if (part->needs() & ~owned & roles(role)) {
         fail(ErrorCode::kInvalidArgument, std::string(part->name()) + " does not go with " + name +
                                               ": nothing there decides " + wordsOf(role));
