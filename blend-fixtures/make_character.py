@@ -61,7 +61,7 @@ def make():
     base_colours.prepare_cycles(scene)
     scene.cycles.max_bounces = 2
 
-    splat_data = add_on().scene.splat_data
+    splat_data = add_on().scene.source.splat_data
     data = splat_data.new_data('Scan')
     splat_data.write(data, scan())
     scene.collection.objects.link(bpy.data.objects.new('Scan', data))

@@ -69,8 +69,8 @@ def tree(count):
 
 
 def add_splats(name, arrays):
-    data = add_on().scene.splat_data.new_data(name)
-    add_on().scene.splat_data.write(data, arrays)
+    data = add_on().scene.source.splat_data.new_data(name)
+    add_on().scene.source.splat_data.write(data, arrays)
     obj = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(obj)
     return obj

@@ -50,7 +50,7 @@ def ring(frame):
     arrays = stipple.binding.cloud.SplatArrays(
         *(a.astype(np.float32) for a in (positions, rotations, scales, np.full(COUNT, 0.9), harmonics)),
         frame=stipple.binding.structs.Frame.RFU)
-    return stipple.binding.cloud.Cloud.create(stipple.scene.sources.context(), arrays)
+    return stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), arrays)
 
 
 def load(folder, name, x):

@@ -14,6 +14,8 @@ packages=(
   zlib1g-dev libzstd-dev libwebp-dev
   # The command-line tool.
   libcli11-dev
+  # Images of plots: one header that reads and fills the outlines of letters.
+  libstb-dev
   # Fuzzing the readers: libFuzzer and the sanitizers come with clang alone.
   clang libclang-rt-dev
   # Tests and benchmarks; readelf and nm look at what the libraries need and export.

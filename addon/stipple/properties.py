@@ -10,7 +10,7 @@ from .binding.errors import StippleError
 from .scene import overlays
 from .scene.fit import fit_proposal, fitting, strategies
 from .scene.sequence import sequences
-from .scene.source import sources, sync
+from .scene.source import source_settings, sources, sync
 from .scene.view import effects, photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
@@ -36,11 +36,8 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
 
     source: StringProperty(name="Source", description="File that the splats are decoded from", subtype='FILE_PATH',
                            options=version.RELATIVE_PATH, override=_OVERRIDABLE)
-    source_kind: EnumProperty(name="Source Kind", items=(('NONE', "None", "The splats have no source"),
-                                                         ('MODEL', "Model", "Splats at any budget"),
-                                                         ('CLOUD', "Splats", "Splats as they are"),
-                                                         ('TREE', "Splat Tree", "Splats of a file at any budget")),
-                              default='NONE')
+    source_kind: EnumProperty(name="Source Kind", items=source_settings.KINDS, default='NONE')
+    source_settings: StringProperty(options={'HIDDEN'})  # which settings it has: scene/source/source_settings.py
     source_count: IntProperty(options={'HIDDEN'})  # of a splat tree
     source_stamp: StringProperty(options={'HIDDEN'})  # of the file as it was read
     budget_by: EnumProperty(name="Budget By", description="How the number of splats is given", items=BUDGET_KINDS,
@@ -65,7 +62,8 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                         options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good set of anchors", default=0,
                       soft_min=0, options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
-    # Of a field, which was learned for that many splats per anchor and those budgets; 0 of all else.
+    # Of a field, which was learned for that many splats per anchor and those budgets; 0 of all else. Kept for versions
+    # that know fields alone.
     learned_gaussians: IntProperty(options={'HIDDEN'})
     learned_least: IntProperty(options={'HIDDEN'})
     learned_most: IntProperty(options={'HIDDEN'})

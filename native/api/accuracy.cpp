@@ -1,10 +1,10 @@
 #include "api/accuracy.h"
 
-#include <cstdio>
 #include <iterator>
 #include <string>
 
 #include "api/guard.h"
+#include "base/number_text.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -53,12 +53,6 @@ constexpr Knob kKnobs[] = {
 
 [[noreturn]] void refuse(const std::string& what, const std::string& allowed) {
   fail(ErrorCode::kInvalidArgument, what + "; " + allowed);
-}
-
-std::string numberText(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%g", value);
-  return text;
 }
 
 void requireKnobs(const StippleAccuracy& a, const std::string& name) {

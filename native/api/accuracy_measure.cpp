@@ -1,10 +1,8 @@
 #include "api/accuracy_measure.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <string>
 #include <utility>
 
@@ -12,7 +10,9 @@
 #include "api/camera.h"
 #include "api/guard.h"
 #include "api/job.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "math/colour.h"
 
 using namespace stipple;
@@ -22,15 +22,9 @@ namespace stipple::api {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr uint64_t kBlockPixels = uint64_t{kRayBlockSide} * kRayBlockSide;
 /// A setting whose picture would take more than this share of the time is drawn in part.
 constexpr double kLongestShare = 0.05;
-
-double secondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 StippleAccuracy levelOf(uint32_t level) {
   StippleAccuracy accuracy;
@@ -38,12 +32,6 @@ StippleAccuracy levelOf(uint32_t level) {
     fail(ErrorCode::kInternal, "a level of accuracy is missing");
   }
   return accuracy;
-}
-
-std::string shortNumber(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.3g", value);
-  return text;
 }
 
 using Knobs = std::vector<std::pair<std::string, std::string>>;
@@ -56,8 +44,8 @@ Knobs knobsOf(const StippleAccuracy& a) {
           {"samples", std::to_string(a.samples_per_side)},
           {"degree", std::to_string(a.sh_degree_limit)},
           {"precision", a.precision == STIPPLE_PRECISION_DOUBLE ? "double" : "float"},
-          {"cut-off", shortNumber(a.least_alpha)},
-          {"share", shortNumber(a.budget_share)}};
+          {"cut-off", numberText(a.least_alpha, 3)},
+          {"share", numberText(a.budget_share, 3)}};
 }
 
 /// Levels, and final with each of its knobs moved alone. All along rays where the camera has
@@ -189,7 +177,7 @@ class Measuring {
 
   /// Every share is merged before anything is timed.
   void makeCuts() {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     for (const StippleAccuracy& accuracy : settings_.accuracies) {
       const bool known = std::any_of(cuts_.begin(), cuts_.end(), [&](const auto& cut) {
         return cut.first == accuracy.budget_share;
@@ -199,7 +187,7 @@ class Measuring {
       cutter_.cut(cut, accuracy.budget_share, &progress_);
       cuts_.emplace_back(accuracy.budget_share, std::move(cut));
     }
-    if (!cuts_.empty()) result_.report.cut_seconds = secondsSince(start);
+    if (!cuts_.empty()) result_.report.cut_seconds = watch.seconds();
   }
 
   const Instances& cutFor(const StippleAccuracy& accuracy) const {
@@ -228,9 +216,9 @@ class Measuring {
     rays.areas = blocks;
     rays.progress_begin = progress_begin;
     rays.progress_end = progress_end;
-    const auto start = Clock::now();
+    const Stopwatch watch;
     picture_ = renderRays(cutFor(accuracy).list, camera_, optionsFor(accuracy), rays, &progress_);
-    return secondsSince(start);
+    return watch.seconds();
   }
 
   /// Draws the blocks, and half of them, and from both what a whole picture would take: splats are
@@ -300,16 +288,16 @@ class Measuring {
   /// In turns, so that what else the machine does meets all alike.
   void repeat(const std::vector<size_t>& rows) {
     std::vector<std::vector<double>> times(rows.size());
-    const auto start = Clock::now();
+    const Stopwatch watch;
     for (uint32_t round = 0; round < settings_.repetitions; ++round) {
-      if (round > 0 && secondsSince(start) > settings_.most_seconds) break;
+      if (round > 0 && watch.seconds() > settings_.most_seconds) break;
       for (size_t k = 0; k < rows.size(); ++k) {
         progress_.advance(
             0.6 + 0.4 * partOf(round * rows.size() + k, settings_.repetitions * rows.size()),
             "Timing settings");
-        const auto begin = Clock::now();
+        const Stopwatch drawing;
         draw(result_.accuracies[rows[k]]);
-        times[k].push_back(secondsSince(begin));
+        times[k].push_back(drawing.seconds());
       }
     }
     for (size_t k = 0; k < rows.size(); ++k) {
@@ -382,7 +370,7 @@ MeasureSettings measureSettings(const StippleAccuracyMeasureOptions* options,
   }
   if (!(given.most_seconds > 0 && std::isfinite(given.most_seconds))) {
     fail(ErrorCode::kInvalidArgument, "options->most_seconds is " +
-                                          shortNumber(given.most_seconds) +
+                                          numberText(given.most_seconds, 3) +
                                           " s; more than 0 is allowed");
   }
   settings.repetitions = given.repetitions;

@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "api/bounds.h"
+#include "data/position_bounds.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"

@@ -2,6 +2,7 @@
 #include "api/handles.h"
 #include "base/parallel.h"
 #include "density/anchor_sampling.h"
+#include "density/octree_density.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -66,12 +67,12 @@ void stipple_density_free(StippleDensity* density) {
 
 StippleStatus stipple_density_info(const StippleDensity* density, StippleDensityInfo* info) {
   return guarded([&] {
-    const OctreeDensity& octree = *require(density, "density").density;
+    const DensityModel& model = *require(density, "density").density;
     StippleDensityInfo out = {};
-    out.leaf_level = static_cast<uint32_t>(octree.leafLevel());
-    out.leaf_count = octree.leafCount();
-    std::copy(octree.root().origin.begin(), octree.root().origin.end(), out.root_origin);
-    out.root_side = octree.root().side;
+    out.leaf_level = static_cast<uint32_t>(model.leafLevel());
+    out.leaf_count = model.leafCount();
+    std::copy(model.root().origin.begin(), model.root().origin.end(), out.root_origin);
+    out.root_side = model.root().side;
     deliver(info, out, "info");
   });
 }

@@ -184,8 +184,7 @@ StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleC
 StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model) {
   return guarded([&] {
     require(model, "model");
-    ModelParts parts = sessionOf(job).model();
-    *model = new StippleModel{job->context, std::move(parts)};
+    *model = new StippleModel{job->context, sessionOf(job).model()};
   });
 }
 

@@ -71,7 +71,7 @@ class FitSession final : public FitObserver {
   /// Of such a fit. May be called by several threads.
   SeenCloud decode(uint64_t budget) const;
   /// The same as a model. Errors: kUnsupported for explicit splats.
-  ModelParts model() const;
+  std::shared_ptr<const SplatModel> model() const;
   const FitSettings& settings() const { return settings_; }
   const std::string& settingsJson() const { return settings_json_; }
 

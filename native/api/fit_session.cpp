@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "data/views/view_check.h"
 #include "io/assets/checkpoint.h"
+#include "model/field_splats.h"
 
 namespace stipple::api {
 
@@ -145,18 +146,15 @@ SeenCloud FitSession::decode(uint64_t budget) const {
   return SeenCloud(std::move(cloud), trainer.seen());
 }
 
-ModelParts FitSession::model() const {
+std::shared_ptr<const SplatModel> FitSession::model() const {
   FitModel& model = ended().model();
   std::optional<FieldResult> learned = fieldResult(model);
   if (!learned) {
     fail(ErrorCode::kUnsupported, std::string("the ") + model.name() +
                                       " model has no field; its splats can be made a hierarchy");
   }
-  auto notes = std::make_shared<const ModelNotes>(ModelNotes{settings_json_, {}});
-  return {
-      FieldSource{std::make_shared<const OctreeDensity>(std::move(learned->density)),
-                  std::make_shared<const FieldDecoder>(std::move(learned->field)), learned->draws},
-      std::move(notes)};
+  return makeFieldSplats(std::make_shared<const OctreeDensity>(std::move(learned->density)),
+                         std::move(learned->field), learned->draws, {settings_json_, {}});
 }
 
 }  // namespace stipple::api

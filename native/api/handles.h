@@ -8,7 +8,6 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "api/cloud_cuts.h"
@@ -16,16 +15,13 @@
 #include "data/clouds/splat_cloud.h"
 #include "data/clouds/splat_quantities.h"
 #include "data/images/image.h"
+#include "data/images/image_channel.h"
 #include "data/meshes/tri_mesh.h"
 #include "data/sparse_volume.h"
 #include "data/views/memory_view_source.h"
-#include "decode/field/field_decoder.h"
-#include "decode/surface/surface_model.h"
-#include "decode/tree/hierarchy_decoder.h"
-#include "density/learned_draws.h"
-#include "density/octree_density.h"
-#include "io/assets/asset_header.h"
+#include "density/density_model.h"
 #include "io/views/camera_file.h"
+#include "model/splat_model.h"
 #include "splat/render/draw_order.h"
 #include "splat/render/render_backward.h"
 
@@ -44,25 +40,6 @@ struct ContextState {
   void requirePictureMemory(uint64_t bytes, const std::string& what, uint64_t pair_bytes) const;
 };
 using Context = std::shared_ptr<const ContextState>;
-
-/// What an asset file holds beside the source, for saving it again.
-struct ModelNotes {
-  std::string settings_json = "{}";
-  AssetExtras extras;
-};
-
-/// What was learned from views.
-struct FieldSource {
-  std::shared_ptr<const OctreeDensity> density;
-  std::shared_ptr<const FieldDecoder> decoder;
-  LearnedDraws draws;
-};
-
-/// A source of splats: of a mesh, of an existing cloud, or learned.
-struct ModelParts {
-  std::variant<SurfaceModel, std::shared_ptr<const HierarchyDecoder>, FieldSource> source;
-  std::shared_ptr<const ModelNotes> notes = {};  ///< null where it was not loaded
-};
 
 /// Splats, and what density control saw of them.
 struct SeenCloud {
@@ -130,12 +107,12 @@ struct StippleMesh {
 
 struct StippleDensity {
   stipple::api::Context context;
-  std::shared_ptr<const stipple::OctreeDensity> density;
+  std::shared_ptr<const stipple::DensityModel> density;
 };
 
 struct StippleModel {
   stipple::api::Context context;
-  stipple::api::ModelParts parts;
+  std::shared_ptr<const stipple::SplatModel> model;
 };
 
 /// Cameras alone have no source. Pictures handed in are added until a job takes a share of the
@@ -161,6 +138,11 @@ struct StippleVolume {
 struct StippleImage {
   stipple::api::Context context;
   std::shared_ptr<const stipple::Image> image;
+};
+
+struct StippleImageChannels {
+  stipple::api::Context context;
+  std::shared_ptr<const std::vector<stipple::ImageChannel>> channels;
 };
 
 struct StippleAccuracyReport {

@@ -53,6 +53,7 @@ Instances instancesFrom(const StippleInstance* instances, uint64_t count) {
     }
     const StippleCloud& cloud = require(given.cloud, (name + ".cloud").c_str());
     for (const double value : given.matrix) requireFinite(value, (name + ".matrix").c_str());
+    requireFinite(given.time, (name + ".time").c_str());
     SplatInstance placed;
     placed.cloud = cloud.cloud.get();
     placed.holdout = enumValue<uint32_t>(given.holdout, 1, (name + ".holdout").c_str()) == 1;

@@ -89,7 +89,8 @@ void stipple_job_free(StippleJob* job) {
 
 StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model) {
   return guarded([&] {
-    const auto& made = jobResult<ModelParts>(require(job, "job"), "model");
+    const auto& made =
+        jobResult<std::shared_ptr<const stipple::SplatModel>>(require(job, "job"), "model");
     require(model, "model") = new StippleModel{job->context, made};
   });
 }

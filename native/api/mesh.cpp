@@ -1,4 +1,4 @@
-#include "api/bounds.h"
+#include "data/position_bounds.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "io/mesh_file.h"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "api/guard.h"
-#include "plot/plot_picture.h"
+#include "plot/plot_image.h"
 
 namespace stipple::api {
 
@@ -15,9 +15,9 @@ void deliverPlot(const PlotSheet& sheet, double scale, uint64_t capacity, float*
   if (!pixels) return;
   if (capacity < count) {
     fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) +
-                                         " floats; the picture needs " + std::to_string(count));
+                                         " floats; the image needs " + std::to_string(count));
   }
-  const Image image = pictureOf(sheet, scale);
+  const Image image = imageOf(sheet, scale);
   std::copy(image.pixels.begin(), image.pixels.end(), pixels);
 }
 

@@ -6,7 +6,7 @@
 
 namespace stipple::api {
 
-/// A sheet as a picture in the caller's buffer. In: pixels, or null for its size alone. Errors:
+/// A sheet as an image in the caller's buffer. In: pixels, or null for its size alone. Errors:
 /// kInvalidArgument for a null width or height and a scale out of range; kBufferTooSmall, with the
 /// size set.
 void deliverPlot(const PlotSheet& sheet, double scale, uint64_t capacity, float* pixels,

@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <utility>
 
@@ -11,7 +9,9 @@
 #include "api/instances.h"
 #include "api/job.h"
 #include "api/volume.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "io/reports/fit_report.h"
 #include "splat/voxels/volume_sides.h"
 #include "splat/voxels/voxelize.h"
@@ -20,8 +20,6 @@ using namespace stipple;
 using namespace stipple::api;
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// Voxel sizes, in units of the finest.
 constexpr double kSizes[] = {1, 1.5, 2, 3, 4, 6, 8};
@@ -90,21 +88,17 @@ class Filling {
       std::vector<float> differences = sideDifferences(i == 0 ? finest : sidesOf(volume), finest);
       report.compared_pixels = differences.size() / 4;
       AccuracyRow row;
-      char name[48];
-      std::snprintf(name, sizeof(name), "voxel %.4g m", volume.voxel_size);
-      row.name = name;
-      std::snprintf(name, sizeof(name), "%.4g m", volume.voxel_size);
-      row.knobs = {{"voxel size", name}};
+      const std::string size = numberText(volume.voxel_size, 4) + " m";
+      row.name = "voxel " + size;
+      row.knobs = {{"voxel size", size}};
       row.value = volume.voxel_size;
       row.splat_count = row.visible_count = voxelsOf(volume);
       setErrors(differences, row);
       report.rows.push_back(std::move(row));
     }
-    const auto start = Clock::now();
+    const Stopwatch watch;
     for (uint32_t round = 1; round < settings_.repetitions; ++round) {
-      if (std::chrono::duration<double>(Clock::now() - start).count() > settings_.most_seconds) {
-        break;
-      }
+      if (watch.seconds() > settings_.most_seconds) break;
       for (size_t i = 0; i < std::size(kSizes); ++i) {
         filled(i, round, seconds);
         times[i].push_back(seconds);
@@ -125,9 +119,9 @@ class Filling {
     progress_.advance(done / all, "Filling volumes");
     VoxelizeOptions options = settings_.finest;
     if (size_ > 0) options.voxel_size = size_ * kSizes[place];
-    const auto start = Clock::now();
+    const Stopwatch watch;
     SparseVolume volume = voxelize(instances_.list, options, memory_limit_);
-    seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    seconds = watch.seconds();
     return volume;
   }
 

@@ -3,19 +3,20 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <chrono>
 #include <functional>
 #include <string>
 #include <vector>
+
+#include "base/stopwatch.h"
 
 namespace stipple::bench {
 
 /// Seconds that `work` takes.
 template <class Work>
 double secondsOf(const Work& work) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return watch.seconds();
 }
 
 /// Work to compare with.

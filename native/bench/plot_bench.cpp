@@ -1,4 +1,4 @@
-// The picture of a fit's report. Reference: the same pixels, filled once with white.
+// The image of a fit's report. Reference: the same pixels, filled once with white.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "bench/comparison.h"
 #include "data/images/image.h"
 #include "io/reports/fit_report.h"
-#include "plot/plot_picture.h"
+#include "plot/plot_image.h"
 
 namespace stipple::bench {
 
@@ -37,10 +37,10 @@ FitHistory history(size_t iterations) {
 /// At twice the size of its sheet, as Blender shows it. No target: the ratio is a yardstick.
 void report(benchmark::State& state) {
   const FitHistory told = history(30000);
-  const Image like = pictureOf(sheetOf(fitPlots(told)), 2);
+  const Image like = imageOf(sheetOf(fitPlots(told)), 2);
   compare(
       state, "fill",
-      [&] { benchmark::DoNotOptimize(pictureOf(sheetOf(fitPlots(told)), 2).pixels.data()); },
+      [&] { benchmark::DoNotOptimize(imageOf(sheetOf(fitPlots(told)), 2).pixels.data()); },
       [&] {
         const std::vector<float> white(like.pixels.size(), 1.0f);
         benchmark::DoNotOptimize(white.data());

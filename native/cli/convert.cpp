@@ -40,13 +40,13 @@ Source sourceOf(const Context& context, const std::string& path) {
     source.cloud = make<Cloud>(stipple_cloud_load, context.get(), path.c_str());
   } else {
     source.hierarchy = make<Model>(stipple_model_load, context.get(), path.c_str());
-    auto model = sized<StippleModelInfo>();
-    check(stipple_model_info(source.hierarchy.get(), &model));
-    if (model.kind != STIPPLE_MODEL_HIERARCHY) {
+    auto settings = sized<StippleModelSettings>();
+    check(stipple_model_settings(source.hierarchy.get(), &settings));
+    if (settings.budget_unit != STIPPLE_BUDGET_SPLATS) {
       throw Failure("'" + path +
                     "' holds a model of any budget and no splats; stipple decode makes them");
     }
-    source.cloud = cutOf(source.hierarchy, model.leaf_count);
+    source.cloud = cutOf(source.hierarchy, settings.maximum_budget);
   }
   auto info = sized<StippleCloudInfo>();
   check(stipple_cloud_info(source.cloud.get(), &info));

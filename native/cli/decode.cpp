@@ -24,6 +24,7 @@ struct Arguments {
   uint64_t seed = 0;
   uint64_t samples = 0;
   double detail_weight = 1.0;
+  double time = 0.0;
 };
 
 Model modelFrom(const Context& context, const Arguments& arguments) {
@@ -72,26 +73,30 @@ void checkBudget(const Arguments& arguments) {
   if (arguments.refine != 0) counted(arguments.refine, "--refine", kMaxRefineSteps);
 }
 
+StippleModelSettings settingsOf(const Model& model) {
+  auto settings = sized<StippleModelSettings>();
+  check(stipple_model_settings(model.get(), &settings));
+  return settings;
+}
+
 /// The budget as it was asked for: a count, or a share of an existing cloud.
 uint64_t budgetOf(const Model& model, const Arguments& arguments) {
   if (!arguments.ratio) return counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
-  auto info = sized<StippleModelInfo>();
-  check(stipple_model_info(model.get(), &info));
-  if (info.kind != STIPPLE_MODEL_HIERARCHY) {
+  const StippleModelSettings settings = settingsOf(model);
+  if (settings.budget_unit != STIPPLE_BUDGET_SPLATS) {
     throw Failure("--ratio is a share of existing splats; a mesh takes --anchors");
   }
-  const double count = std::round(*arguments.ratio * static_cast<double>(info.leaf_count));
+  const double count = std::round(*arguments.ratio * static_cast<double>(settings.maximum_budget));
   return static_cast<uint64_t>(std::max(count, 1.0));
 }
 
 /// The splats of a budget fitted to pictures of all of them.
 Cloud refined(const Cloud& cloud, const Model& model, const Arguments& arguments) {
-  auto info = sized<StippleModelInfo>();
-  check(stipple_model_info(model.get(), &info));
-  if (info.kind != STIPPLE_MODEL_HIERARCHY) {
+  const StippleModelSettings settings = settingsOf(model);
+  if (settings.budget_unit != STIPPLE_BUDGET_SPLATS) {
     throw Failure("--refine fits to existing splats; a mesh has none");
   }
-  const Cloud full = cutOf(model, info.leaf_count);
+  const Cloud full = cutOf(model, settings.maximum_budget);
   StippleRefineOptions options;
   stipple_refine_options_init(&options);
   options.iterations =
@@ -115,6 +120,7 @@ void decode(const Context& context, const Arguments& arguments) {
   options.order =
       arguments.order == "progressive" ? STIPPLE_ORDER_PROGRESSIVE : STIPPLE_ORDER_SYSTEMATIC;
   options.seed = arguments.seed;
+  options.time = arguments.time;
   // A glTF file that is there may hold a mesh; what is written over it holds splats.
   const FileKind out_kind =
       hasSplatEnding(arguments.out) ? FileKind::kSplats : fileKind(arguments.out);
@@ -138,8 +144,7 @@ void decode(const Context& context, const Arguments& arguments) {
   Report report;
   report.add("anchors", options.anchor_count);
   report.add("gaussians", info.count);
-  report.add("seconds",
-             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  report.add("seconds", secondsSince(start));
   report.print(false);
 }
 
@@ -177,6 +182,8 @@ void addDecode(CLI::App& app, const Context& context) {
                    "0: uniform over the area; more: denser at detail")
       ->capture_default_str();
   command->add_option("--samples", arguments->samples, "Surface samples, 0: automatic")
+      ->capture_default_str();
+  command->add_option("--time", arguments->time, "Seconds, for models of splats that move")
       ->capture_default_str();
   command->callback([arguments, &context] { decode(context, *arguments); });
 }

@@ -49,31 +49,28 @@ Report describeModel(const Context& context, const std::string& path) {
   const auto model = make<Model>(stipple_model_load, context.get(), path.c_str());
   auto info = sized<StippleModelInfo>();
   check(stipple_model_info(model.get(), &info));
+  auto settings = sized<StippleModelSettings>();
+  check(stipple_model_settings(model.get(), &settings));
   Report report;
-  if (info.kind == STIPPLE_MODEL_HIERARCHY) {
-    report.add("kind", "hierarchy of splats");
-    report.add("count", info.leaf_count);
-    report.add("harmonic_degree", uint64_t{info.sh_degree});
-    report.add("bounds_min", info.bounds_min);
-    report.add("bounds_max", info.bounds_max);
-    return report;
+  report.add("kind", info.kind_label);
+  if (settings.budget_unit == STIPPLE_BUDGET_SPLATS) report.add("count", info.leaf_count);
+  if (settings.maximum_learned_budget != 0) {
+    report.add("least_anchors", settings.minimum_learned_budget);
+    report.add("most_anchors", settings.maximum_learned_budget);
   }
-  if (info.kind == STIPPLE_MODEL_FIELD) {
-    report.add("kind", "learned field");
-    report.add("least_anchors", info.least_anchors);
-    report.add("most_anchors", info.most_anchors);
-    report.add("gaussians_per_anchor", uint64_t{info.gaussians_per_anchor});
-    report.add("harmonic_degree", uint64_t{info.sh_degree});
+  if (settings.minimum_gaussians_per_anchor > 1) {
+    report.add("gaussians_per_anchor", uint64_t{settings.default_gaussians_per_anchor});
+  }
+  report.add("harmonic_degree", uint64_t{info.sh_degree});
+  if (info.leaf_level != 0) {
     report.add("leaf_level", uint64_t{info.leaf_level});
     report.add("leaves", info.leaf_count);
-    report.add("bounds_min", info.bounds_min);
-    report.add("bounds_max", info.bounds_max);
-    return report;
   }
-  report.add("kind", "surface model");
-  report.add("leaf_level", uint64_t{info.leaf_level});
-  report.add("leaves", info.leaf_count);
-  report.add("surface_samples", info.sample_count);
+  if (info.sample_count != 0) report.add("surface_samples", info.sample_count);
+  if (settings.has_time) {
+    report.add("time_begin", settings.time_begin);
+    report.add("time_end", settings.time_end);
+  }
   report.add("bounds_min", info.bounds_min);
   report.add("bounds_max", info.bounds_max);
   return report;

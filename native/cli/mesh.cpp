@@ -41,8 +41,7 @@ void mesh(const Context& context, const Arguments& arguments) {
                 const_cast<const StippleVolumeToMeshOptions*>(&options));
   finish(job);
   const auto made = make<Mesh>(stipple_job_mesh, const_cast<const StippleJob*>(job.get()));
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = secondsSince(start);
   check(stipple_mesh_save(made.get(), arguments.out.c_str()));
   auto info = sized<StippleMeshInfo>();
   check(stipple_mesh_info(made.get(), &info));

@@ -94,8 +94,7 @@ void render(const Context& context, const Arguments& arguments) {
                              const_cast<const StippleRenderOptions*>(&options),
                              const_cast<const StippleRenderBuffers*>(&buffers));
   finish(job);
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = secondsSince(start);
   const auto image = make<Image>(stipple_image_create, context.get(), camera.width, camera.height,
                                  4u, static_cast<uint32_t>(STIPPLE_TRANSFER_LINEAR),
                                  const_cast<const float*>(colour.data()));

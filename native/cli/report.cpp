@@ -54,6 +54,10 @@ std::pair<std::string, std::string> triple(const T (&values)[3]) {
 
 }  // namespace
 
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 void Report::add(const std::string& name, const std::string& value) {
   entries_.push_back({name, value, jsonString(value)});
 }

@@ -1,11 +1,15 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace stipple::cli {
+
+/// Seconds of wall time; the tool uses the library's header alone, and so has a clock of its own.
+double secondsSince(std::chrono::steady_clock::time_point start);
 
 /// Figures of a command, printed on stdout as lines or as one JSON object.
 class Report {

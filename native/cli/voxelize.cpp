@@ -23,8 +23,7 @@ void voxelize(const Context& context, const Arguments& arguments) {
   const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
   const auto start = std::chrono::steady_clock::now();
   const Volume volume = voxelized(context, cloud, options);
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = secondsSince(start);
   check(stipple_volume_save(volume.get(), arguments.out.c_str()));
   auto info = sized<StippleVolumeInfo>();
   check(stipple_volume_info(volume.get(), &info));

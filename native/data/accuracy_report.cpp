@@ -2,21 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <optional>
 
 #include "base/error.h"
+#include "base/number_text.h"
 
 namespace stipple {
 
 namespace {
-
-std::string numberText(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.4g", value);
-  return text;
-}
 
 void requireRows(const AccuracyReport& report) {
   if (report.rows.empty())
@@ -134,7 +128,7 @@ void setSeconds(std::vector<double> times, AccuracyRow& row) {
 }
 
 std::string timeText(double seconds) {
-  return seconds < 1 ? numberText(seconds * 1e3) + " ms" : numberText(seconds) + " s";
+  return seconds < 1 ? numberText(seconds * 1e3, 4) + " ms" : numberText(seconds, 4) + " s";
 }
 
 }  // namespace stipple

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,9 @@ struct FitMeasure {
   double foreground_psnr = 0;  ///< the same where alpha is above 0; psnr where no view has alpha
   double ssim = 0;             ///< mean over views
   double density_entropy = 0;  ///< nats; NaN of models without a density
+  /// dB, the same as psnr over a few of the views that are learned from, by which the best state is
+  /// chosen; NaN: not known, of a checkpoint whose best was chosen otherwise.
+  double training_psnr = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// What one iteration was like.
@@ -36,7 +40,7 @@ struct FitHistory {
   std::vector<FitRecord> records;     ///< by iteration, from the first
   std::vector<FitMeasure> measures;   ///< while it ran, ascending iterations
   std::vector<FitMeasure> by_budget;  ///< of the result, ascending budgets
-  uint64_t best_iteration = 0;        ///< of the result
+  uint64_t best_iteration = 0;        ///< of the result: the highest training_psnr
   bool measured_on_held_out = true;   ///< false: too few views, measured on those of training
   uint64_t training_view_count = 0;
   uint64_t measured_view_count = 0;

@@ -5,7 +5,6 @@
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
 #include "density/anchor_sampling.h"
-#include "math/camera.h"
 
 namespace stipple {
 
@@ -14,15 +13,9 @@ struct DecodeRequest {
   const AnchorSet* anchors = nullptr;
   uint64_t budget = 0;  ///< P; only decoders without anchors (an existing cloud) read it
   uint32_t gaussians_per_anchor = 1;  ///< K
-  double time = 0.0;                  ///< seconds; only decoders of moving splats read it
-  const Camera* camera = nullptr;     ///< only view-adaptive decoders read it
+  double time = 0.0;                  ///< seconds, finite; only decoders of moving splats read it
   uint64_t seed = 0;
   Progress* progress = nullptr;
-};
-
-enum class DecodeCost : uint32_t {
-  kInteractive = 0,  ///< fast enough to run while a slider moves
-  kJob = 1,          ///< seconds and more
 };
 
 class Decoder {
@@ -30,7 +23,6 @@ class Decoder {
   virtual ~Decoder() = default;
   /// anchors → anchors * K splats, in anchor order.
   virtual SplatCloud decode(const DecodeRequest& request) const = 0;
-  virtual DecodeCost costHint() const = 0;
   /// Bytes that decode holds at most, the splats included, without the anchors.
   virtual uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const = 0;
 };

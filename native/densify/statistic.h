@@ -42,12 +42,11 @@ struct ViewErrors {
 /// Which of them a pass shall gather; each costs time only where it is asked for. Pictures have the
 /// size of the view.
 struct StatisticRequest {
-  bool contributions = false;  ///< against the target of the view
+  bool contributions = false;  ///< against the target of the view, its pixels as the loss has them
   bool blending_weights = false;
   bool screen_gradients = false;           ///< signed ones: next to nothing beside the pass itself
   bool absolute_screen_gradients = false;  ///< and lengths
   bool covered = false;                    ///< pixels and distances, and errors where there are any
-  std::vector<float> contribution_weights = {};  ///< [H,W] >= 0; empty: 1
   std::vector<float> edge_weights = {};          ///< [H,W] not empty: edge weights are gathered
   std::vector<float> errors = {};                ///< [H,W] not empty: errors are gathered
   /// Instead of `errors`: what it makes of the picture that was drawn, [H,W] >= 0. It may be called

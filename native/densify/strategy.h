@@ -107,7 +107,7 @@ struct ViewStatistics {
   uint32_t width = 0;   ///< pixels
   uint32_t height = 0;  ///< pixels
   const Camera* camera = nullptr;
-  double loss = 0;  ///< of the picture against its target, where ViewEvaluator tells
+  double loss = 0;  ///< of the picture against its target, without what regularises
   /// [N] 1 where the splat passed culling; what densification papers call visible.
   std::span<const uint8_t> visible;
   /// Of a statistic that was asked for; empty for the others.

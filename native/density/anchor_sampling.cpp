@@ -1,5 +1,6 @@
 #include "density/anchor_sampling.h"
 
+#include <optional>
 #include <string>
 
 #include "base/error.h"
@@ -54,9 +55,8 @@ uint64_t sampleMemoryBound(uint64_t count, bool with_ranks) {
 AnchorSet sampleAnchors(const DensityModel& model, const AnchorSamplingOptions& options,
                         Progress* progress) {
   AnchorSet anchors = makeAnchorSet(model, options);
-  const auto* octree = dynamic_cast<const OctreeDensity*>(&model);
-  if (octree != nullptr) {
-    sampleOctree({octree->cellsByLevel(), *octree->samplingTables()}, options, progress, anchors);
+  if (const std::optional<OctreeTables> tables = model.tables()) {
+    sampleOctree(*tables, options, progress, anchors);
   } else {
     sampleLevelByLevel(model, options, nullptr, progress, anchors);
   }

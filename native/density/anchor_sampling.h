@@ -6,7 +6,6 @@
 #include "base/default_init_vector.h"
 #include "base/progress.h"
 #include "density/density_model.h"
-#include "density/octree_density.h"
 #include "density/uniform_source.h"
 
 namespace stipple {
@@ -39,8 +38,8 @@ struct AnchorSet {
 /// Bytes that sampleAnchors holds at most, the result included, without those of the model.
 uint64_t sampleMemoryBound(uint64_t count, bool with_ranks);
 
-/// Ancestral sampling: exactly options.count anchors. An OctreeDensity goes through precomputed
-/// tables, any other model level by level on the sampled frontier, with the same result.
+/// Ancestral sampling: exactly options.count anchors. A model that has tables is read through them,
+/// any other is asked level by level on the sampled frontier, with the same result.
 /// Errors: kInvalidArgument for a count outside 1..2^28, ranks in the systematic order, an
 /// OctreeDensity that was never built, a model whose numbers are not log-probabilities; kCancelled.
 /// Threads and determinism: parallel; same result for any number of threads.

@@ -61,7 +61,7 @@ class LearnedDensity final : public DensityModel {
   void childLogProbabilities(int level, std::span<const uint64_t> cells,
                              std::span<float> out) const override;
 
-  const RootCube& root() const { return root_; }
+  const RootCube& root() const override { return root_; }
   const std::vector<LearnedLevel>& levels() const { return levels_; }
   size_t activeCellCount() const;
 
@@ -125,6 +125,7 @@ class SettledDensity final : public DensityModel {
  public:
   explicit SettledDensity(const LearnedDensity& density) : density_(density) {}
   int leafLevel() const override { return density_.settledLevel(); }
+  const RootCube& root() const override { return density_.root(); }
   void childLogProbabilities(int level, std::span<const uint64_t> cells,
                              std::span<float> out) const override {
     density_.settledLogProbabilities(level, cells, out);

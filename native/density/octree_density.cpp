@@ -168,6 +168,11 @@ OctreeDensity OctreeDensity::finished() && {
   return std::move(*this);
 }
 
+std::optional<OctreeTables> OctreeDensity::tables() const {
+  if (!tables_) return std::nullopt;
+  return OctreeTables{cells_, *tables_};
+}
+
 void OctreeDensity::childLogProbabilities(int level, std::span<const uint64_t> cells,
                                           std::span<float> out) const {
   if (level < 0 || level >= leaf_level_) {

@@ -1,25 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "density/density_model.h"
 
 namespace stipple {
-
-constexpr int kMaxLeafLevel = 10;
-
-struct SamplingTables;
-
-/// The cube in the world that the octree divides. World = origin + side * u, u in [0,1]^3.
-struct RootCube {
-  std::array<double, 3> origin = {0, 0, 0};  ///< metres, lowest corner
-  double side = 1.0;                         ///< metres
-};
 
 struct OctreeDensityOptions {
   int leaf_level = kMaxLeafLevel;  ///< 1..10; raising it follows the surface closer, costs memory
@@ -51,18 +41,17 @@ class OctreeDensity final : public DensityModel {
   void childLogProbabilities(int level, std::span<const uint64_t> cells,
                              std::span<float> out) const override;
 
-  const RootCube& root() const { return root_; }
-  size_t leafCount() const { return leaf_count_; }
+  const RootCube& root() const override { return root_; }
+  size_t leafCount() const override { return leaf_count_; }
   /// Parents at `level`, Morton-ordered.
   std::span<const uint64_t> cells(int level) const { return cells_[static_cast<size_t>(level)]; }
-  std::span<const std::vector<uint64_t>> cellsByLevel() const { return cells_; }
   /// [cells(level).size(), 8].
   std::span<const float> logProbabilities(int level) const {
     return log_probabilities_[static_cast<size_t>(level)];
   }
 
-  /// What the sampler reads in place of childLogProbabilities; null for a density never built.
-  const SamplingTables* samplingTables() const { return tables_.get(); }
+  /// None for a density that was never built.
+  std::optional<OctreeTables> tables() const override;
 
  private:
   OctreeDensity finished() &&;

@@ -34,6 +34,12 @@ struct SamplingTables {
   std::vector<Split> splits;  ///< [leaves - 1]
 };
 
+/// What sampling reads of an octree whose choices are all stored.
+struct OctreeTables {
+  std::span<const std::vector<uint64_t>> cells;  ///< [leaf level], Morton codes
+  const SamplingTables& tables;
+};
+
 /// In: per level the cells and [cells, 8] log-probabilities; already checked. Parallel.
 SamplingTables makeSamplingTables(std::span<const std::vector<uint64_t>> cells,
                                   std::span<const std::vector<float>> log_probabilities);

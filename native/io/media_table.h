@@ -9,7 +9,7 @@
 
 namespace stipple {
 
-constexpr uint32_t kMediaTableVersion = 5;
+constexpr uint32_t kMediaTableVersion = 6;
 
 extern "C" {
 
@@ -38,6 +38,27 @@ struct StippleMediaImage {
 
 enum StippleMediaImageArray : uint32_t {
   kMediaPixels = 0,  ///< float [height, width, channels]
+};
+
+/// One channel of an EXR file; its values are the array kMediaChannelPlanes + index.
+struct StippleMediaChannel {
+  uint32_t width;
+  uint32_t height;
+  uint32_t name_bytes;  ///< in kMediaChannelNames, one name after the other
+};
+
+enum StippleMediaChannelArray : uint32_t {
+  kMediaChannels = 0,       ///< StippleMediaChannel
+  kMediaChannelNames = 1,   ///< UTF-8
+  kMediaChannelPlanes = 2,  ///< + index: float [height, width]
+};
+
+/// The triangles of a mesh to write. The arrays are the caller's.
+struct StippleMediaMesh {
+  uint64_t vertex_count;
+  uint64_t triangle_count;
+  const float* positions;     ///< [V,3] metres, Z up
+  const uint32_t* triangles;  ///< [T,3]
 };
 
 /// One texture of a mesh; its pixels are the array kMediaTexturePixels + index.
@@ -134,7 +155,13 @@ struct StippleMediaTable {
   /// Float32 EXR. In: pixels [height, width, channels] scene linear, premultiplied.
   void (*exr_write)(const char* path, const StippleMediaImage* image, const float* pixels,
                     StippleMediaStatus* status);
+  /// All channels of all parts of an EXR file. The arrays of planes come after the two others, in
+  /// order. In: limit_bytes, what the planes may take together.
+  void (*exr_channels_read)(const char* path, uint64_t limit_bytes, const StippleMediaSink* sink,
+                            StippleMediaStatus* status);
   void (*mesh_read)(const char* path, const StippleMediaSink* sink, StippleMediaStatus* status);
+  /// GLB, Y up.
+  void (*mesh_write)(const char* path, const StippleMediaMesh* mesh, StippleMediaStatus* status);
   void (*volume_write)(const char* path, const StippleMediaVolume* volume,
                        StippleMediaStatus* status);
   void (*volume_read)(const char* path, double* voxel_size, double* origin,

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "io/media_library.h"
 
@@ -21,12 +21,6 @@ constexpr uint64_t kBytesPerBrick = kBrickVoxelCount * (4 + 2 + 4 + 4);
 // three such edges, so there are at most 4/3 points (12 bytes, there and here). Then two triangles,
 // and 4/3 times 13 bytes to find pieces.
 constexpr uint64_t kBytesPerCrossing = 2 * 16 + 2 * 16 + 2 * 12 + 20;
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.4g", value);
-  return text;
-}
 
 /// Edges of the grid that pass the threshold: exact inside a brick; of those that leave it, counted
 /// at their dense end, as many as there may be.
@@ -53,11 +47,11 @@ uint64_t mostCrossings(const SparseVolume& volume, float threshold) {
 void require(const SparseVolume& volume, double threshold, double adaptivity) {
   if (!(threshold > 0) || !std::isfinite(threshold)) {
     fail(ErrorCode::kInvalidArgument,
-         "threshold is " + number(threshold) + " per metre; a number above 0 is allowed");
+         "threshold is " + numberText(threshold, 4) + " per metre; a number above 0 is allowed");
   }
   if (!(adaptivity >= 0 && adaptivity <= 1)) {
     fail(ErrorCode::kInvalidArgument,
-         "adaptivity is " + number(adaptivity) + "; 0 to 1 is allowed");
+         "adaptivity is " + numberText(adaptivity, 4) + "; 0 to 1 is allowed");
   }
   if (volume.density.empty()) {
     fail(ErrorCode::kInvalidArgument,
@@ -69,9 +63,10 @@ void require(const SparseVolume& volume, double threshold, double adaptivity) {
     // The opacity of one voxel, as artists choose it, beside the density.
     const double opacity = -std::expm1(-largest * volume.voxel_size);
     fail(ErrorCode::kInvalidArgument, "no voxel is as dense as the threshold, " +
-                                          number(threshold) + " per metre; the densest has " +
-                                          number(largest) + " per metre, an opacity of " +
-                                          number(opacity) + ": choose a threshold below that");
+                                          numberText(threshold, 4) +
+                                          " per metre; the densest has " + numberText(largest, 4) +
+                                          " per metre, an opacity of " + numberText(opacity, 4) +
+                                          ": choose a threshold below that");
   }
 }
 

@@ -2,11 +2,11 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <string>
 
 #include "base/error.h"
+#include "base/number_text.h"
 
 namespace stipple {
 
@@ -17,19 +17,13 @@ constexpr uint32_t kMaxSide = 65536;
 constexpr double kMaxFocal = 1e9;
 constexpr double kMinNear = 1e-9;
 
-std::string shown(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%g", value);
-  return text;
-}
-
 /// A pixel more than the whole sphere: sizes are rounded.
 void requireWithin(double pixels, double per_radian, double limit, const char* side) {
   if (pixels <= limit * per_radian + 1) return;
   constexpr double kDegrees = 180 / std::numbers::pi;
-  fail(ErrorCode::kInvalidArgument, std::string("the panorama is ") +
-                                        shown(pixels / per_radian * kDegrees) + " degrees " + side +
-                                        "; at most " + shown(limit * kDegrees) + " is allowed");
+  fail(ErrorCode::kInvalidArgument,
+       std::string("the panorama is ") + numberText(pixels / per_radian * kDegrees) + " degrees " +
+           side + "; at most " + numberText(limit * kDegrees) + " is allowed");
 }
 
 void requireFieldOfView(const Camera& camera) {
@@ -44,15 +38,16 @@ void requireFieldOfView(const Camera& camera) {
     case CameraModel::kOrthographic:
       if (camera.field_of_view == 0) return;
       fail(ErrorCode::kInvalidArgument,
-           "camera.field_of_view is " + shown(camera.field_of_view) +
+           "camera.field_of_view is " + numberText(camera.field_of_view) +
                "; it is that of fisheyes, for other cameras 0 is allowed");
     case CameraModel::kFisheyeEquidistant:
     case CameraModel::kFisheyeEquisolid:
       // A little more: 360 degrees in single precision.
       if (camera.field_of_view >= 0 && camera.field_of_view <= limit * (1 + 1e-6)) return;
-      fail(ErrorCode::kInvalidArgument, "the fisheye's field of view is " +
-                                            shown(camera.field_of_view * 180 / std::numbers::pi) +
-                                            " degrees; 0 to 360 is allowed");
+      fail(ErrorCode::kInvalidArgument,
+           "the fisheye's field of view is " +
+               numberText(camera.field_of_view * 180 / std::numbers::pi) +
+               " degrees; 0 to 360 is allowed");
   }
   fail(ErrorCode::kInvalidArgument, "camera.model is " +
                                         std::to_string(static_cast<uint32_t>(camera.model)) +
@@ -66,7 +61,7 @@ void requireRigid(const Mat4d& matrix) {
   if (!(error < 1e-4) || rotation.determinant() < 0) {
     fail(ErrorCode::kInvalidArgument,
          "camera.world_to_camera is not a rotation and a translation (it differs by " +
-             shown(error) + " from orthonormal; at most 0.0001 is allowed)");
+             numberText(error) + " from orthonormal; at most 0.0001 is allowed)");
   }
   const Eigen::Matrix<double, 1, 4> last(0, 0, 0, 1);
   if (matrix.row(3) != last) {
@@ -86,7 +81,7 @@ void validate(const Camera& camera) {
   }
   for (const double focal : {camera.fx, camera.fy}) {
     if (!std::isfinite(focal) || focal <= 0 || focal > kMaxFocal) {
-      fail(ErrorCode::kInvalidArgument, "camera focal length is " + shown(focal) +
+      fail(ErrorCode::kInvalidArgument, "camera focal length is " + numberText(focal) +
                                             " pixels; it must be positive and at most 1e9");
     }
   }

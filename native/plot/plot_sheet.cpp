@@ -1,8 +1,8 @@
+#include "base/number_text.h"
 #include "plot/plot.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
@@ -70,15 +70,9 @@ std::vector<double> ticksOf(const Axis& axis) {
 std::string tickText(double value) {
   if (value == 0) return "0";
   const double size = std::abs(value);
-  char text[32];
-  if (size >= 1e6) {
-    std::snprintf(text, sizeof(text), "%.3gM", value / 1e6);
-  } else if (size >= 1e4) {
-    std::snprintf(text, sizeof(text), "%.3gk", value / 1e3);
-  } else {
-    std::snprintf(text, sizeof(text), "%.4g", value);
-  }
-  return text;
+  if (size >= 1e6) return numberText(value / 1e6, 3) + "M";
+  if (size >= 1e4) return numberText(value / 1e3, 3) + "k";
+  return numberText(value, 4);
 }
 
 /// Lines of the legend: none where there is but one curve to name.

@@ -89,7 +89,7 @@ def test_samples_are_a_larger_picture_averaged(library, renderer, cloud):
 def test_share_is_the_cloud_merged_to_so_many(library, context, renderer, cloud):
     job = Model.from_cloud_start(context, cloud, view_count=0)
     job.wait()
-    half = job.model().decode(DecodeSettings(COUNT // 2))
+    half = Model.of_job(job).decode(DecodeSettings(COUNT // 2))
     assert np.array_equal(drawn(renderer, cloud, accuracy(library, budget_share=0.5)), drawn(renderer, half))
 
 

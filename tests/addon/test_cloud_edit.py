@@ -127,7 +127,7 @@ def test_a_tree_without_some_splats_never_shows_them(context):
     given = arrays(300, degree=1)
     job = Model.from_cloud_start(context, Cloud.create(context, given))
     job.wait()
-    model = job.model()
+    model = Model.of_job(job)
     mask = (given.positions[:, 0] < 0).astype(np.uint8)
     kept = int(mask.sum())
     masked = model.masked(mask)

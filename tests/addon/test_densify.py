@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from test_fit import options, views  # noqa: F401
 
+from stipple.binding.cloud import Cloud
 from stipple.binding.densify import densify_start
 from stipple.binding.errors import StippleError
 from stipple.binding.fit import Fit
@@ -21,7 +22,7 @@ def few(context, views):  # noqa: F811
 def test_adds_splats_up_to_the_cap_and_keeps_the_others(context, views, few):  # noqa: F811
     job = densify_start(context, few, views, 'adaptive(threshold=1e-9)', max_splats=25)
     job.wait()
-    before, after = few.read(), job.cloud().read()
+    before, after = few.read(), Cloud.of_job(job).read()
     assert len(before.positions) == 20
     assert len(after.positions) == 25
     # At least 15 neither multiply nor go; their bits are as they were.

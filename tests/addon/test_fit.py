@@ -12,7 +12,7 @@ from stipple.binding.errors import CancelledError, StippleError
 from stipple.binding.fit import Fit, fit_memory_bound, fit_options
 from stipple.binding.model import DecodeSettings
 from stipple.binding.strategies import check_strategy, strategies, strategy_parts
-from stipple.binding.structs import ColourSpace, FitModel, FitQuality, FitShell, ModelKind, StippleCamera, Transfer
+from stipple.binding.structs import BudgetUnit, ColourSpace, FitModel, FitQuality, FitShell, StippleCamera, Transfer
 from stipple.binding.views import Views
 
 
@@ -83,7 +83,12 @@ def test_a_field_decodes_at_any_budget(context, views):
     assert fit.result(32).info().count == 128
     model = fit.model()
     info = model.info()
-    assert (info.kind, info.most_anchors, info.gaussians_per_anchor) == (ModelKind.FIELD, 64, 4)
+    assert (info.kind_label, info.most_anchors, info.gaussians_per_anchor) == (b'learned field', 64, 4)
+    settings = model.settings()
+    assert (settings.budget_unit, settings.maximum_learned_budget, settings.default_budget) == (BudgetUnit.ANCHORS, 64, 64)
+    assert settings.minimum_gaussians_per_anchor == settings.maximum_gaussians_per_anchor == 4
+    # A field is drawn from as it has learned, in one order.
+    assert (settings.has_order, settings.has_seed, settings.takes_mask, settings.has_time) == (0, 1, 0, 0)
     assert model.decode(DecodeSettings(anchors=20)).info().count == 80
 
 

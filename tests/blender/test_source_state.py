@@ -109,7 +109,7 @@ def test_a_changed_source_is_said_and_read_again(stipple, splats):
         cloud = binding.cloud.Cloud.create(native, make_arrays(stipple, COUNT, degree=0))
         job = binding.model.Model.from_cloud_start(native, cloud)
         job.wait()
-        job.model().save(path)
+        binding.model.Model.of_job(job).save(path)
     assert bpy.ops.stipple.relink(again=True) == {'FINISHED'}
     assert drawn(stipple, obj) == []
     if obj.data.stipple.source_kind == 'TREE':

@@ -1,4 +1,4 @@
-"""Renews what docs/accuracy_and_time.md says of the three scenes of blend-fixtures/, and its plots.
+"""Renews what docs/results/accuracy.md says of the three scenes of blend-fixtures/, and its plots.
 
     /usr/bin/python3 tests/peers/accuracy.py [--build build/release] [--work FOLDER] [--only suzanne|instances|terrain|volume]
 
@@ -15,7 +15,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGE = ROOT / 'docs' / 'accuracy_and_time.md'
+PAGE = ROOT / 'docs' / 'results' / 'accuracy.md'
 SCENES = ('suzanne', 'instances', 'terrain')
 VOLUME = 'volume'  # of the first scene
 VOXELS = 256  # along the longest side, of the finest
@@ -76,7 +76,7 @@ def main():
     for subject in (options.only,) if options.only else (*SCENES, VOLUME):
         export(SCENES[0] if subject == VOLUME else subject, options.build, work)
         rows, head = measure(subject, options.build, work)
-        made = f'<!-- {subject} -->\n{head}.\n\n{table(rows)}\n\n![{subject}](images/accuracy_{subject}.svg)\n<!-- end -->'
+        made = f'<!-- {subject} -->\n{head}.\n\n{table(rows)}\n\n![{subject}](../images/accuracy_{subject}.svg)\n<!-- end -->'
         page, count = re.subn(rf'<!-- {subject} -->.*?<!-- end -->', lambda _: made, page, flags=re.S)
         if count != 1:
             sys.exit(f'{PAGE} has {count} places for {subject}; 1 is expected')

@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits data sets with every strategy, keeps what came out, and writes the table and plot of docs/methods/densification.md.
+"""Fits data sets with every strategy, keeps what came out, and writes docs/results/strategies.md, its lines and its plot.
 
     compare_strategies.py STIPPLE FOLDER DOCS [--seeds 3] [--iterations 3000] [--strategies a,b] [--scenes a,b]
-        [--photos DATASET] [--table]
+        [--photos DATASET] [--again] [--table]
 
 FOLDER holds a folder with transforms.json for each scene, and results.jsonl: a line for each fit that is done. All of them are
-written to DOCS, too; copied back as results.jsonl, a run goes on from there on another machine.
+written to DOCS, too; copied back as results.jsonl, a run goes on from there on another machine. With --again the lines of
+--strategies are dropped first, and measured anew.
+
+Held-out views judge and choose nothing: budgets and strategies are chosen by `training_psnr`, that of views that a fit learns from.
 """
 
 import argparse
@@ -15,6 +18,7 @@ import os
 import statistics
 import subprocess
 import sys
+import textwrap
 import time
 from pathlib import Path
 
@@ -57,8 +61,8 @@ def fit(stipple, dataset, folder, job):
     if status != 0:
         raise RuntimeError(f'{job["strategy"]} on {job["scene"]}: {message.decode().splitlines()[-1]}')
     story = json.loads(report.read_text())
-    best = max(story['by_budget'], key=lambda row: row['psnr'])
-    return {**job, 'psnr': best['psnr'], 'ssim': best['ssim'], 'gaussians': best['gaussians'], 'seconds': seconds,
+    best = max(story['by_budget'], key=lambda row: row['training_psnr'])  # held-out views judge, and choose nothing
+    return {**job, 'training_psnr': best['training_psnr'], 'psnr': best['psnr'], 'ssim': best['ssim'], 'gaussians': best['gaussians'], 'seconds': seconds,
             'processor_seconds': usage.ru_utime + usage.ru_stime, 'megabytes': usage.ru_maxrss / 1024,
             'load': os.getloadavg()[0]}
 
@@ -73,6 +77,10 @@ class Results:
     def find(self, **wanted):
         return [row for row in self.rows if all(row.get(key) == value for key, value in wanted.items())]
 
+    def forget(self, names):
+        self.rows = [row for row in self.rows if row['strategy'] not in names]
+        self.path.write_text(''.join(json.dumps(row) + '\n' for row in self.rows))
+
     def add(self, row):
         self.rows.append(row)
         with self.path.open('a') as file:
@@ -80,10 +88,10 @@ class Results:
 
 
 def best(results, scene, iterations):
-    """Strategies of explicit splats with the highest PSNR on a scene, by the first seed, and adaptive."""
+    """Strategies of explicit splats with the highest PSNR of training views on a scene, by the first seed, and adaptive."""
     rows = [row for row in results.find(scene=scene, seed=0, kind='full', iterations=iterations)
-            if row['strategy'] not in ('learned_density', 'adaptive')]
-    return ['adaptive', *(row['strategy'] for row in sorted(rows, key=lambda row: -row['psnr'])[:BEST])]
+            if row['strategy'] not in ('learned_density', 'adaptive') and 'training_psnr' in row]
+    return ['adaptive', *(row['strategy'] for row in sorted(rows, key=lambda row: -row['training_psnr'])[:BEST])]
 
 
 def jobs(given, names, results):
@@ -130,16 +138,19 @@ def table(results, scene, kind, iterations):
 
 def write_page(results, given):
     seeds = len({row['seed'] for row in results.rows})
-    lines = ['# What every strategy reaches', '',
-             f'Written by `tests/peers/strategies.sh`: {given.iterations} iterations, at most {MOST_SPLATS:,} splats, '
-             f'up to {seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every eighth view held out, '
-             f'pictures of {464 // DOWNSCALE} × {256 // DOWNSCALE}.',
-             f'All fits together: {sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on '
-             f'{os.cpu_count()} cores. Their clocks add up to {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours '
-             f'(mean load of the machine {statistics.mean(row["load"] for row in results.rows):.1f}: above 2 they ran side by '
-             'side).', '',
+    head = (f'`bash tests/peers/strategies.sh` writes this page: fits of {given.iterations:,} iterations with at most '
+            f'{MOST_SPLATS:,} splats, up to {seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every '
+            f'eighth view held out, images of {464 // DOWNSCALE} × {256 // DOWNSCALE}. All fits together took '
+            f'{sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on {os.cpu_count()} cores. '
+            f'Their clocks add up to {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours; the mean load of the '
+            f'machine was {statistics.mean(row["load"] for row in results.rows):.1f}, and above 2 fits ran side by side.')
+    lines = ['# What every strategy reaches', '', *textwrap.wrap(head, 120), '',
              '![Processor seconds and PSNR of every strategy](../images/strategies.svg)', '',
-             '[Every fit, a line each](strategies_table.jsonl).', '']
+             '[What these figures say](densification.md). [Every fit, a line each](strategies.jsonl).', '']
+    if any('training_psnr' not in row for row in results.rows):
+        lines += textwrap.wrap('Fits without `training_psnr` there were chosen by held-out views, and are not measured again: the '
+                               "best state of each, the budget of a field, and which strategies get a third of `adaptive`'s "
+                               'count.', 120) + ['']
     for scene in given.scenes:
         lines += [f'## {SCENES.get(scene, scene).capitalize()}', '', *table(results, scene, 'full', given.iterations), '']
         for kind, share in (('half', 'half'), ('third', 'a third')):
@@ -150,8 +161,8 @@ def write_page(results, given):
     if unscaled:
         lines += ['## Without scaling', '', f'{SCENES[given.scenes[0]].capitalize()}, 30,000 iterations, schedules as '
                   'published:', '', *unscaled, '']
-    (given.docs / 'methods' / 'strategies_table.md').write_text('\n'.join(lines))
-    (given.docs / 'methods' / 'strategies_table.jsonl').write_text(
+    (given.docs / 'results' / 'strategies.md').write_text('\n'.join(lines))
+    (given.docs / 'results' / 'strategies.jsonl').write_text(
         ''.join(json.dumps(row) + '\n' for row in results.rows))
     full = [row for row in results.rows if row['kind'] == 'full' and row['iterations'] == given.iterations]
     (given.docs / 'images' / 'strategies.svg').write_text(plot(full, SCENES))
@@ -168,10 +179,13 @@ def main():
     parser.add_argument('--scenes', type=lambda text: text.split(','), default=list(SCENES))
     parser.add_argument('--photos', type=Path, help='a data set instead of the rendered photo set')
     parser.add_argument('--no-unscaled', dest='unscaled', action='store_false')
+    parser.add_argument('--again', action='store_true', help='measure --strategies anew')
     parser.add_argument('--table', action='store_true', help='only write what is there already')
     given = parser.parse_args()
     names = given.strategies or strategies(given.stipple)
     results = Results(given.folder / 'results.jsonl')
+    if given.again and given.strategies:
+        results.forget(given.strategies)
     if not given.table:
         # The second half of a round's jobs follows from the first.
         for job in jobs(given, names, results):

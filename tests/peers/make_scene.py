@@ -138,7 +138,7 @@ def main():
     add(mesh, *room(4.0))
     job = Model.from_mesh_start(context, mesh)
     job.wait()
-    model = job.model()
+    model = Model.of_job(job)
     # The pictures are of more splats than the fit begins with.
     shown = model.decode(DecodeSettings(anchors=10 * given.splats))
     write_cameras(given.folder, given.width, given.height)

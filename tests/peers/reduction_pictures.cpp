@@ -4,7 +4,6 @@
 //   reduction_pictures FILE VIEWS (BUDGET RULE SECONDS RESULT)...
 // VIEWS: 0 automatic, 1 from around, 2 from inside.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "decode/tree/hierarchy_decoder.h"
 #include "io/splats/splat_file.h"
 #include "splat/render/render.h"
@@ -27,9 +27,9 @@ namespace stipple {
 namespace {
 
 double secondsOf(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return watch.seconds();
 }
 
 struct Psnr {

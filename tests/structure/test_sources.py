@@ -153,3 +153,14 @@ def test_links_between_pages_lead_somewhere():
 def test_a_broken_link_is_found(tmp_path):
     plant(tmp_path, {'docs/a.md': '[b](b.md) [c](c.md#part) ![p](p.png) [web](https://example.org) [here](#top)\n', 'docs/b.md': ''})
     assert rules.broken_links(tmp_path) == ['docs/a.md: c.md#part', 'docs/a.md: p.png']
+
+
+def test_lines_of_documentation_fit_a_window():
+    assert rules.wide_prose(ROOT) == []
+
+
+def test_a_wide_line_of_documentation_is_found(tmp_path):
+    wide, table, link = 'word ' * 30, f'| {"x" * 150} | y |', 'https://example.org/' + 'x' * 150
+    plant(tmp_path, {'docs/deep/a.md': f'# A\n\n{wide}\n{table}\n{link}\n', 'README.md': f'{"x " * 61}\n',
+                     'tests/notes.md': wide, 'docs/b.md': 'x' * 60 + ' ' + 'y' * 59})
+    assert [line.split(': ')[0] for line in rules.wide_prose(tmp_path)] == ['README.md:1', 'docs/deep/a.md:3']

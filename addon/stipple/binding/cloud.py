@@ -98,6 +98,7 @@ def sh_degree_of(coefficient_count):
 
 class Cloud(Handle):
     free_function = 'stipple_cloud_free'
+    job_function = 'stipple_job_cloud'
 
     @classmethod
     def create(cls, context, arrays):
@@ -140,7 +141,7 @@ class Cloud(Handle):
 
     @staticmethod
     def load_start(context, path):
-        """A job whose cloud() is the file's: reads ahead."""
+        """A job that makes the Cloud of a file: reads ahead."""
         return Job(context.library,
                    new_handle(context.library, 'stipple_cloud_load_start', context.pointer, path_bytes(path)))
 

@@ -95,6 +95,7 @@ FUNCTIONS = {
     'stipple_model_save': (_status, [_handle, _path]),
     'stipple_model_free': (None, [_handle]),
     'stipple_model_info': (_status, [_handle, _to(s.StippleModelInfo)]),
+    'stipple_model_settings': (_status, [_handle, _to(s.StippleModelSettings)]),
     'stipple_model_density': (_status, [_handle, _out_handle]),
     'stipple_model_decode': (_status, [_handle, _to(s.StippleDecodeOptions), _out_handle]),
     'stipple_model_decode_start': (_status, [_handle, _to(s.StippleDecodeOptions), _out_handle]),
@@ -232,6 +233,11 @@ FUNCTIONS = {
     'stipple_image_read': (_status, [_handle, _floats, c_uint64]),
     'stipple_image_save': (_status, [_handle, _path, c_uint32]),
     'stipple_image_compare': (_status, [_handle, _handle, _to(s.StippleImageComparison)]),
+    'stipple_image_channels_load': (_status, [_handle, _path, _out_handle]),
+    'stipple_image_channels_free': (None, [_handle]),
+    'stipple_image_channels_count': (c_uint64, [_handle]),
+    'stipple_image_channels_info': (_status, [_handle, c_uint64, _to(s.StippleImageChannelInfo)]),
+    'stipple_image_channels_read': (_status, [_handle, c_uint64, _floats, c_uint64]),
 }
 
 

@@ -9,7 +9,7 @@ from .structs import StippleDensifyOptions
 
 
 def densify_start(context, cloud, views, strategy=None, **fields):
-    """A job whose cloud() has the splats; fields of StippleDensifyOptions by name."""
+    """A job that makes the Cloud; fields of StippleDensifyOptions by name."""
     options = StippleDensifyOptions()
     context.library.stipple_densify_options_init(byref(options))
     if strategy is not None:

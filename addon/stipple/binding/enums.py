@@ -81,10 +81,9 @@ class ViewRig(IntEnum):
     INSIDE = 2
 
 
-class ModelKind(IntEnum):
-    SURFACE = 0
-    HIERARCHY = 1
-    FIELD = 2
+class BudgetUnit(IntEnum):
+    ANCHORS = 0
+    SPLATS = 1
 
 
 class CameraModel(IntEnum):
@@ -200,7 +199,7 @@ ENUMS = {
     'StippleAnchorOrder': (AnchorOrder, 'STIPPLE_ORDER_'),
     'StippleViewRig': (ViewRig, 'STIPPLE_RIG_'),
     'StippleViewSplit': (ViewSplit, 'STIPPLE_VIEW_SPLIT_'),
-    'StippleModelKind': (ModelKind, 'STIPPLE_MODEL_'),
+    'StippleBudgetUnit': (BudgetUnit, 'STIPPLE_BUDGET_'),
     'StippleCameraModel': (CameraModel, 'STIPPLE_CAMERA_'),
     'StippleLowPass': (LowPass, 'STIPPLE_LOW_PASS_'),
     'StippleBlendSpace': (BlendSpace, 'STIPPLE_BLEND_'),

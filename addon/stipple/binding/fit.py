@@ -9,6 +9,7 @@ from .cloud import Cloud
 from .errors import check
 from .handle import new_handle, path_bytes, pointer_to
 from .job import Job
+from .model import Model
 from .structs import FitModel, FitQuality, StippleFitFigures, StippleFitOptions
 
 
@@ -74,7 +75,6 @@ class Fit(Job):
 
     def model(self):
         """A field as a model for any budget; of explicit splats Model.from_cloud_start(result()) makes one."""
-        from .model import Model
         return Model(self.library, new_handle(self.library, 'stipple_fit_model', self.pointer))
 
     def save_report(self, path):

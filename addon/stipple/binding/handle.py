@@ -17,6 +17,12 @@ class Handle:
     """One reference to a native thing; freed with the object, or earlier by close()."""
 
     free_function = ''
+    job_function = ''  # gives the thing that a finished job has made, where jobs make it
+
+    @classmethod
+    def of_job(cls, job):
+        """What a finished job has made. Errors: StippleError for a job that made another thing."""
+        return cls(job.library, new_handle(job.library, cls.job_function, job.pointer))
 
     def __init__(self, library, pointer):
         self.library = library

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures as files, and their comparison."""
+"""Images as files, the channels of layered ones, and the comparison of two."""
 
 from ctypes import byref
 
 import numpy as np
 
 from .handle import Handle, contiguous, new_handle, path_bytes, pointer_to
-from .structs import StippleImageComparison, StippleImageInfo, Transfer
+from .structs import StippleImageChannelInfo, StippleImageComparison, StippleImageInfo, Transfer
 
 
 class Image(Handle):
@@ -43,3 +43,29 @@ class Image(Handle):
         result = StippleImageComparison()
         self._check(self.library.stipple_image_compare(self.pointer, other.pointer, byref(result)))
         return result
+
+
+class ImageChannels(Handle):
+    """The named channels of an OpenEXR file; a name has its layer in front, 'ViewLayer.Depth.Z'."""
+
+    free_function = 'stipple_image_channels_free'
+
+    @classmethod
+    def load(cls, context, path):
+        return cls(context.library,
+                   new_handle(context.library, 'stipple_image_channels_load', context.pointer, path_bytes(path)))
+
+    def names(self):
+        return [self._info(i).name_utf8.decode() for i in range(self.library.stipple_image_channels_count(self.pointer))]
+
+    def read(self, index):
+        """[height,width] float32 of a channel, by its place in names(); row 0 is the top."""
+        info = self._info(index)
+        values = np.empty((info.height, info.width), np.float32)
+        self._check(self.library.stipple_image_channels_read(self.pointer, index, pointer_to(values), values.size))
+        return values
+
+    def _info(self, index):
+        info = StippleImageChannelInfo()
+        self._check(self.library.stipple_image_channels_info(self.pointer, index, byref(info)))
+        return info

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long native work that is polled: no callback ever enters Python."""
+"""Long native work that is polled: no callback ever enters Python. What a finished job made is asked of its own class, as
+Model.of_job(job) does."""
 
 from ctypes import byref
 
-from .handle import Handle, new_handle
+from .handle import Handle
 from .structs import JobState, StippleJobProgress
 
 
@@ -28,19 +29,3 @@ class Job(Handle):
     def wait(self):
         """Waits for the end; raises what went wrong, CancelledError after a cancel."""
         self._check(self.library.stipple_job_wait(self.pointer))
-
-    def model(self):
-        from .model import Model
-        return Model(self.library, new_handle(self.library, 'stipple_job_model', self.pointer))
-
-    def cloud(self):
-        from .cloud import Cloud
-        return Cloud(self.library, new_handle(self.library, 'stipple_job_cloud', self.pointer))
-
-    def volume(self):
-        from .volume import Volume
-        return Volume(self.library, new_handle(self.library, 'stipple_job_volume', self.pointer))
-
-    def mesh(self):
-        from .mesh import Mesh
-        return Mesh(self.library, new_handle(self.library, 'stipple_job_mesh', self.pointer))

@@ -33,6 +33,7 @@ def start_depth(context, placed, camera):
 
 class Mesh(Handle):
     free_function = 'stipple_mesh_free'
+    job_function = 'stipple_job_mesh'
 
     @classmethod
     def create(cls, context):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Models: sources of splats at any budget."""
 
+import math
 from ctypes import byref, c_uint64
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from .errors import invalid
 from .handle import Handle, contiguous, new_handle, path_bytes, pointer_to
 from .job import Job
 from .structs import (AnchorOrder, StippleDecodeOptions, StippleModelFromCloudOptions, StippleModelFromMeshOptions,
-                      StippleModelInfo, StippleRefineOptions, ViewRig)
+                      StippleModelInfo, StippleModelSettings, StippleRefineOptions, ViewRig)
 
 MAX_GAUSSIANS_PER_ANCHOR = 32
 
@@ -25,6 +26,7 @@ class DecodeSettings:
     gaussians_per_anchor: int = 1
     order: int = AnchorOrder.SYSTEMATIC
     seed: int = 0
+    time: float = 0.0  # seconds, 0 where nothing moves
 
     def check(self):
         """Refuses what does not fit the library's unsigned fields."""
@@ -34,6 +36,8 @@ class DecodeSettings:
                           f'{MAX_GAUSSIANS_PER_ANCHOR}.')
         if self.seed < 0:
             raise invalid(f'Seed is {self.seed}; allowed are 0 and above.')
+        if not math.isfinite(self.time):
+            raise invalid(f'Time is {self.time} s; a finite number is allowed.')
 
 
 def _unsigned(value, name, least):
@@ -44,7 +48,7 @@ def _unsigned(value, name, least):
 
 
 def refine_start(cloud, full, iterations=100, view_count=32, view_size=800, view_rig=ViewRig.AUTOMATIC, seed=0):
-    """A job whose cloud() is the reduced cloud, fitted to pictures of the full one."""
+    """A job that makes the reduced Cloud, fitted to pictures of the full one."""
     options = StippleRefineOptions()
     cloud.library.stipple_refine_options_init(byref(options))
     options.iterations = _unsigned(iterations, 'Iterations', 0)
@@ -58,10 +62,11 @@ def refine_start(cloud, full, iterations=100, view_count=32, view_size=800, view
 
 class Model(Handle):
     free_function = 'stipple_model_free'
+    job_function = 'stipple_job_model'
 
     @staticmethod
     def from_mesh_start(context, mesh, detail_weight=1.0, seed=0, leaf_level=10, sample_count=0):
-        """A job whose model() is the result."""
+        """A job that makes a Model."""
         if seed < 0:
             raise invalid(f'Seed is {seed}; allowed are 0 and above.')
         options = StippleModelFromMeshOptions()
@@ -76,7 +81,7 @@ class Model(Handle):
     @staticmethod
     def from_cloud_start(context, cloud, view_count=10, view_size=400, view_rig=ViewRig.AUTOMATIC, seed=0,
                          footprint=0.0):
-        """A job whose model() is the merge tree of an existing cloud."""
+        """A job that makes a Model, the merge tree of an existing cloud."""
         options = StippleModelFromCloudOptions()
         context.library.stipple_model_from_cloud_options_init(byref(options))
         options.view_rig = int(view_rig)
@@ -100,7 +105,7 @@ class Model(Handle):
 
     @staticmethod
     def load_start(context, path):
-        """A job whose model() is the file's: reads ahead."""
+        """A job that makes the Model of a file: reads ahead."""
         return Job(context.library,
                    new_handle(context.library, 'stipple_model_load_start', context.pointer, path_bytes(path)))
 
@@ -112,6 +117,12 @@ class Model(Handle):
         self._check(self.library.stipple_model_info(self.pointer, byref(info)))
         return info
 
+    def settings(self):
+        """Which settings it has, and their ranges (StippleModelSettings)."""
+        settings = StippleModelSettings()
+        self._check(self.library.stipple_model_settings(self.pointer, byref(settings)))
+        return settings
+
     def density(self):
         return Density(self.library, new_handle(self.library, 'stipple_model_density', self.pointer))
 
@@ -121,7 +132,7 @@ class Model(Handle):
                                               byref(self._options(settings))))
 
     def decode_start(self, settings):
-        """The same as a job (cloud())."""
+        """The same as a job that makes a Cloud."""
         return Job(self.library, new_handle(self.library, 'stipple_model_decode_start', self.pointer,
                                             byref(self._options(settings))))
 
@@ -140,4 +151,5 @@ class Model(Handle):
         options.anchor_count = settings.anchors
         options.seed = settings.seed
         options.gaussians_per_anchor = settings.gaussians_per_anchor
+        options.time = settings.time
         return options

@@ -3,9 +3,9 @@
 
 from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p, sizeof
 
-from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, CameraModel, ColourSpace, ENUMS, Effect,
-                    EffectChoice, FitBackground, FitModel, FitQuality, FitShell, Frame, JobState, LowPass, MaterialColour,
-                    ModelKind, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling, Side,
+from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, BudgetUnit, CameraModel, ColourSpace, ENUMS,
+                    Effect, EffectChoice, FitBackground, FitModel, FitQuality, FitShell, Frame, JobState, LowPass,
+                    MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling, Side,
                     SplatOrder, SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
 
 ABI_VERSION = 1
@@ -155,12 +155,21 @@ class StippleModelInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('leaf_count', c_uint64),
                 ('sample_count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3),
                 ('kind', c_uint32), ('sh_degree', c_uint32), ('least_anchors', c_uint64), ('most_anchors', c_uint64),
-                ('gaussians_per_anchor', c_uint32), ('reserved', c_uint32)]
+                ('gaussians_per_anchor', c_uint32), ('reserved', c_uint32), ('kind_label', c_char_p)]
+
+
+class StippleModelSettings(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('budget_unit', c_uint32), ('minimum_budget', c_uint64),
+                ('maximum_budget', c_uint64), ('default_budget', c_uint64), ('minimum_learned_budget', c_uint64),
+                ('maximum_learned_budget', c_uint64), ('minimum_gaussians_per_anchor', c_uint32),
+                ('maximum_gaussians_per_anchor', c_uint32), ('default_gaussians_per_anchor', c_uint32),
+                ('has_order', c_uint32), ('has_seed', c_uint32), ('takes_mask', c_uint32), ('has_time', c_uint32),
+                ('reserved', c_uint32), ('time_begin', c_double), ('time_end', c_double)]
 
 
 class StippleDecodeOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('order', c_uint32), ('anchor_count', c_uint64), ('seed', c_uint64),
-                ('gaussians_per_anchor', c_uint32), ('reserved', c_uint32)]
+                ('gaussians_per_anchor', c_uint32), ('reserved', c_uint32), ('time', c_double)]
 
 
 class StippleCamera(_Sized):
@@ -201,7 +210,7 @@ class StippleViewBuffers(_Sized):
 
 class StippleInstance(_Sized):
     _fields_ = [('struct_size', c_uint32), ('holdout', c_uint32), ('cloud', c_void_p), ('matrix', _matrix),
-                ('grade', POINTER(StippleGrade))]
+                ('grade', POINTER(StippleGrade)), ('time', c_double)]
 
 
 class StippleAccuracy(_Sized):
@@ -406,6 +415,11 @@ class StippleImageInfo(_Sized):
 class StippleImageComparison(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('psnr', c_double), ('ssim', c_double),
                 ('max_error', c_double), ('mean_error', c_double)]
+
+
+class StippleImageChannelInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('width', c_uint32), ('height', c_uint32), ('reserved', c_uint32),
+                ('name_utf8', c_char_p)]
 
 
 STRUCTS = {cls.__name__: cls for cls in _Sized.__subclasses__()}

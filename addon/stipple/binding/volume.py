@@ -12,10 +12,11 @@ from .structs import StippleVolumeInfo, StippleVolumeToMeshOptions, StippleVoxel
 
 class Volume(Handle):
     free_function = 'stipple_volume_free'
+    job_function = 'stipple_job_volume'
 
     @staticmethod
     def voxelize_start(context, instances, resolution=256, voxel_size=0.0):
-        """A job (volume()) over instances [(cloud, matrix)]. voxel_size 0: from resolution."""
+        """A job that makes a Volume of instances [(cloud, matrix)]. voxel_size 0: from resolution."""
         Volume.check_settings(resolution, voxel_size)
         options = StippleVoxelizeOptions()
         context.library.stipple_voxelize_options_init(byref(options))
@@ -39,7 +40,7 @@ class Volume(Handle):
                    new_handle(context.library, 'stipple_volume_load', context.pointer, path_bytes(path)))
 
     def mesh_start(self, opacity=0.5, adaptivity=0.0, largest_only=False):
-        """A job (mesh()) for the closed surface where a voxel has this opacity, 0..1."""
+        """A job that makes a Mesh: the closed surface where a voxel has this opacity, 0..1."""
         options = StippleVolumeToMeshOptions()
         self.library.stipple_volume_to_mesh_options_init(byref(options))
         options.opacity, options.adaptivity, options.largest_only = opacity, adaptivity, int(largest_only)

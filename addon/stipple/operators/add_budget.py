@@ -7,7 +7,7 @@ from bpy.props import BoolProperty
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene import geometry
-from ..scene.source import masks, sources, splat_data, sync
+from ..scene.source import masks, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
@@ -34,7 +34,7 @@ class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
         path = sources.model_path_for(obj.name)
 
         def work(task):
-            model = task.run(Model.from_cloud_start(native, cloud), 0.0, 0.9).model()
+            model = Model.of_job(task.run(Model.from_cloud_start(native, cloud), 0.0, 0.9))
             task.advance(0.9, 'Writing the tree')
             return model, sources.save_model(model, path), cloud.info().count
         return Task(work)
@@ -44,7 +44,7 @@ class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
         sources.remember_model(path, model)
         obj = self._object if self._in_place else self._new_object(context)
         data = obj.data
-        if data.stipple.source_kind == 'NONE':
+        if not source_settings.of(data.stipple).has_source:
             masks.clear(data)
         with sync.paused():
             sources.attach_tree(data, path, count)

@@ -9,7 +9,7 @@ from ..binding.errors import invalid
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene.sequence import frames
-from ..scene.source import edits, placement, sources, sync
+from ..scene.source import edits, placement, source_settings, sources, sync
 
 
 class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
@@ -31,7 +31,7 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
         for obj in objects:
             if obj.data.users > 1:
                 raise invalid(f"The splats of '{obj.name}' have {obj.data.users} users; make them single-user first.")
-        wanted = [(target, placement.matrix_of(obj), obj.data.stipple.source_kind == 'TREE',
+        wanted = [(target, placement.matrix_of(obj), source_settings.of(obj.data.stipple).counts_splats,
                    sources.model_path_for(obj.name)) for target, obj in zip(edits.targets(objects), objects)]
         native = sources.context()
 
@@ -42,7 +42,7 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
                 cloud, tree = cloud_edit.merge([(target.cloud, matrix)], frames.WORLD), None
                 if has_budget:
                     job = task.run(Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted), (i + 1) / len(wanted))
-                    tree = sources.save_model(job.model(), path)
+                    tree = sources.save_model(Model.of_job(job), path)
                 moved.append((target, cloud, tree))
             return moved
         return Task(work)

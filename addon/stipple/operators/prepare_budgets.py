@@ -12,7 +12,7 @@ from ..binding.model import Model
 from ..binding.structs import Status
 from ..jobs import JobOperator, Task
 from ..scene.sequence import numbered, sequences
-from ..scene.source import sources, splat_data, sync
+from ..scene.source import source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
@@ -27,7 +27,7 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
     def poll(cls, context):
         obj = context.object
         return (context.mode == 'OBJECT' and splat_data.is_splat_object(obj) and obj.data.library is None
-                and obj.data.stipple.is_sequence and obj.data.stipple.source_kind == 'CLOUD')
+                and obj.data.stipple.is_sequence and source_settings.of(obj.data.stipple).as_they_are)
 
     def invoke(self, context, _event):
         return self.run_in_window(context)
@@ -52,7 +52,7 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
                     part = (i / len(numbers), (i + 1) / len(numbers))
                     task.advance(part[0], f'File {i + 1} of {len(numbers)}')
                     cloud = Cloud.load(native, first.path(number))
-                    model = task.run(Model.from_cloud_start(native, cloud), *part).model()
+                    model = Model.of_job(task.run(Model.from_cloud_start(native, cloud), *part))
                     model.save(os.path.join(folder, f'{name}_{number:04d}{sources.MODEL_SUFFIX}'))
                 return _rename(folder, stem), len(numbers), name
             except OSError as error:
@@ -67,7 +67,7 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
         data = self._object.data
         with sync.paused():
             sequences.attach(data, os.path.join(folder, f'{name}_{self._first:04d}{sources.MODEL_SUFFIX}'),
-                             data.stipple.frame_duration, 'TREE')
+                             data.stipple.frame_duration, of_models=True)
         sync.write_shown(data)
         self.report({'INFO'}, f"Budgets of {count} files in '{folder}'")
 

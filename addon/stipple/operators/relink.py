@@ -8,10 +8,9 @@ from bpy_extras.io_utils import ImportHelper
 from ..binding.cloud import Cloud
 from ..binding.errors import StippleError, invalid
 from ..binding.model import Model
-from ..binding.structs import ModelKind
 from ..jobs import JobOperator
 from ..scene.sequence import numbered
-from ..scene.source import formats, masks, sources, splat_data, sync
+from ..scene.source import formats, masks, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
@@ -36,7 +35,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
     def poll(cls, context):
         obj = context.object
         return (splat_data.is_splat_object(obj) and context.mode == 'OBJECT' and obj.data.library is None
-                and obj.data.stipple.source_kind != 'NONE')
+                and source_settings.of(obj.data.stipple).has_source)
 
     def invoke(self, context, event):
         data = context.object.data
@@ -57,36 +56,35 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
         self._data, self._path = data, sources.absolute_path(data.stipple.source if self.again else self.filepath, data)
         if data.stipple.is_sequence and numbered.parse(self._path) is None:
             raise invalid(f"'{self._path}' has no number in its name, which the files of a series need.")
-        load = Cloud.load_start if data.stipple.source_kind == 'CLOUD' else Model.load_start
-        return load(sources.context(), self._path)
+        return _noun(data.stipple).load_start(sources.context(), self._path)
 
     def finish(self, _context, job):
         data, stipple = self._data, self._data.stipple
-        kind = stipple.source_kind
-        made = job.cloud() if kind == 'CLOUD' else job.model()
-        info = made.info()
-        if kind != 'CLOUD' and (info.kind == ModelKind.HIERARCHY) != (kind == 'TREE'):
-            holds = 'splats with a budget' if kind == 'MODEL' else 'splats of a mesh or a field'
+        known, made = source_settings.of(stipple), _noun(stipple).of_job(job)
+        found = source_settings.of_model(made.settings()) if known.has_budget else known
+        if found.counts_splats != known.counts_splats:
+            holds = 'splats with a budget' if found.counts_splats else 'splats of a mesh or a field'
             raise invalid(f"'{self._path}' holds {holds}, "
                           f"but '{data.name}' was made the other way; import it as an object of its own.")
-        count = info.count if kind == 'CLOUD' else info.leaf_count
+        info = made.info()
+        count = info.leaf_count if known.has_budget else info.count
         clears_mask = False
         edited = stipple.edited or sync.is_edited(data)
-        if kind != 'MODEL' and not stipple.is_sequence and not edited:
+        if not known.counts_anchors and not stipple.is_sequence and not edited:
             before = _count_before(data)
             if count != before and not self.other_count:
                 raise invalid(f"'{self._path}' has {count:,} splats; the source of '{data.name}' had {before:,}. Choose "
                               'another file, or Accept Another Count.')
             clears_mask = count != before
-        names = ('source', 'source_stamp', 'source_count', 'learned_gaussians', 'learned_least', 'learned_most')
+        names = ('source', 'source_stamp', 'source_count', *source_settings.PROPERTIES)
         kept = {name: getattr(stipple, name) for name in names}
         try:
             with sync.paused():
-                if kind == 'MODEL':
-                    sources.note_learned(stipple, info)
+                if known.counts_anchors:
+                    source_settings.note_model(stipple, found)
                 stipple.source = sources.blend_path(self._path)
                 stipple.source_stamp = sources.stamp(self._path)
-                if kind == 'TREE' and clears_mask:
+                if known.counts_splats and clears_mask:
                     stipple.source_count = count
             if not edited:  # what was changed by hand is never written over
                 self._write(data, made, clears_mask)
@@ -106,14 +104,19 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
             return
         if clears_mask:
             masks.clear(data)
-        splats = sources.masked(made, data) if stipple.source_kind == 'CLOUD' else sources.decode_data(
+        splats = sources.masked(made, data) if source_settings.of(stipple).as_they_are else sources.decode_data(
             data, sources.decode_settings(stipple))
         sync.write_decoded(data, splats.columns())
 
 
+def _noun(stipple):
+    """What the files of a source are."""
+    return Model if source_settings.of(stipple).has_budget else Cloud
+
+
 def _count_before(data):
     """Splats of the source as it was read."""
-    if data.stipple.source_kind == 'TREE':
+    if source_settings.of(data.stipple).counts_splats:
         return data.stipple.source_count
     counts = masks.counts(data)
     return splat_data.count(data) if counts is None else counts[0]

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty
 
-from ..scene.source import sources, splat_data
+from ..scene.source import source_settings, sources, splat_data
 
 
 class STIPPLE_OT_scale_budget(bpy.types.Operator):
@@ -22,12 +22,12 @@ class STIPPLE_OT_scale_budget(bpy.types.Operator):
         if not splat_data.is_splat_object(context.object):
             return False
         stipple = context.object.data.stipple
-        return stipple.is_sequence or stipple.source_kind in sources.MODEL_KINDS
+        return stipple.is_sequence or source_settings.of(stipple).has_budget
 
     def execute(self, context):
         stipple = context.object.data.stipple
         mode = 'RENDER' if self.render else 'VIEWPORT'
-        by_ratio = stipple.source_kind != 'MODEL' and stipple.budget_by == 'RATIO'
+        by_ratio = not source_settings.of(stipple).counts_anchors and stipple.budget_by == 'RATIO'
         name = 'ratio' if by_ratio else 'anchors'
         before = getattr(stipple, name + '_render') if self.render else getattr(stipple, name)
         if name == 'ratio':

@@ -66,12 +66,9 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
             obj = self._new_object(context)
         stipple = obj.data.stipple
         with sync.paused():
-            if result.kind == 'TREE':
-                sources.attach_tree(obj.data, result.path, result.splats.count)
-                stipple.ratio = stipple.ratio_render = 1.0
-            else:
-                stipple.anchors, stipple.seed = result.decoding.anchors, result.decoding.seed
-                sources.attach_model(obj.data, result.path, [], result.info)
+            sources.attach_asset(obj.data, result.path, result.settings)
+            stipple.ratio = stipple.ratio_render = 1.0
+            stipple.seed = result.decoding.seed
         sync.write_decoded(obj.data, result.splats)
         report = fit_reports.keep(obj.data, obj.name, result.report)
         if bpy.app.background:

@@ -5,6 +5,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import version
+from ..binding.cloud import Cloud
 from ..binding.errors import invalid
 from ..binding.model import DecodeSettings, Model
 from ..binding.structs import AnchorOrder
@@ -50,7 +51,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         return Model.from_mesh_start(native, mesh, self.detail_weight, self.seed)
 
     def finish(self, context, job):
-        model = job.model()
+        model = Model.of_job(job)
         # Decoding and writing the source go on side by side; a budget that is refused is refused before the file.
         decoding = model.decode_start(self._settings())
         active = context.view_layer.objects.active
@@ -58,14 +59,14 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         path = sources.save_model(model, sources.model_path_for(name, self.source_path), bool(self.source_path))
         sources.remember_model(path, model)
         decoding.wait()
-        splats = decoding.cloud().columns()
+        splats = Cloud.of_job(decoding).columns()
         obj = splat_data.new_object(name, splat_data.new_data(name))
         stipple = obj.data.stipple
         with sync.paused():
             stipple.anchors, stipple.gaussians_per_anchor = self.anchors, self.gaussians_per_anchor
             stipple.order, stipple.seed = self.order, self.seed
             stipple.detail_weight, stipple.color_from = self.detail_weight, self.color_from
-            sources.attach_model(obj.data, path, self._objects, model.info())
+            sources.attach_model(obj.data, path, self._objects, model.settings())
         sync.write_decoded(obj.data, splats)
         context.collection.objects.link(obj)
         self._select(context, obj)

@@ -12,10 +12,9 @@ from .. import preferences, version
 from ..binding.cloud import Cloud
 from ..binding.errors import StippleError
 from ..binding.model import Model
-from ..binding.structs import ModelKind
 from ..jobs import JobOperator, Task
 from ..scene.sequence import frames, numbered, sequences
-from ..scene.source import formats, sources, splat_data, sync
+from ..scene.source import formats, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
@@ -101,10 +100,10 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
         data = splat_data.new_data(name)
         with sync.paused():
             if frame_count > 1:
-                sequences.attach(data, path, frame_count, 'CLOUD' if model is None else 'TREE')
+                sequences.attach(data, path, frame_count, of_models=model is not None)
             elif model is not None:
                 sources.remember_model(path, model)
-                sources.attach_asset(data, path, model.info())
+                sources.attach_asset(data, path, model.settings())
             else:
                 sources.attach_cloud(data, path)
         if model is None:
@@ -113,8 +112,8 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
             sync.write_decoded(data, splats)
         obj = splat_data.new_object(data.name, data)
         axis = self.up_axis if self.up_axis != 'AUTO' or form is None else preferences.up_axis(form.name)
-        is_asset = model is not None and model.info().kind != ModelKind.HIERARCHY
-        own = frames.WORLD if is_asset else splats.frame  # what was made of meshes or views stands upright
+        # What was made of meshes or views stands upright; splats of a file stand as it says.
+        own = frames.WORLD if source_settings.of(data.stipple).counts_anchors else splats.frame
         frame = own if axis == 'AUTO' else frames.UP_AXES[axis]
         obj.matrix_world = Matrix(frames.to_world(frame).tolist())
         return obj
@@ -136,7 +135,7 @@ def _read(native, path):
     if not path.lower().endswith(sources.MODEL_SUFFIX):
         return Cloud.load(native, path).columns(), None
     model = Model.load(native, path)
-    return model.decode(sources.first_settings(model.info())).columns(), model
+    return model.decode(sources.first_settings(model.settings())).columns(), model
 
 
 classes = (STIPPLE_OT_splats_import,)

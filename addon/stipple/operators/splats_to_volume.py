@@ -78,7 +78,7 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
                 clouds = frame.clouds(native)
                 if not clouds:
                     continue
-                volume = task.run(Volume.voxelize_start(native, clouds, resolution, size), *part).volume()
+                volume = Volume.of_job(task.run(Volume.voxelize_start(native, clouds, resolution, size), *part))
                 written.append(numbered.frame_path(path, frame.number))
                 volume.save(written[-1])
                 size = volume.info().voxel_size
@@ -94,7 +94,7 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
             volumes.new_object(name, written[0], context.collection, size, self._timing)
             self.report({'INFO'}, f"{len(written)} volumes of {size:.4g} m voxels from '{written[0]}' on")
             return
-        volume = job.volume()
+        volume = Volume.of_job(job)
         volume.save(self._path)
         info = volume.info()
         volumes.new_object(name, self._path, context.collection, info.voxel_size)

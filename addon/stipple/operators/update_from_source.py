@@ -39,13 +39,13 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
         return Model.from_mesh_start(native, mesh, stipple.detail_weight, stipple.seed)
 
     def finish(self, _context, job):
-        model, data = job.model(), self._object.data
+        model, data = Model.of_job(job), self._object.data
         splats = model.decode(self._settings).columns()
         # Never over the old file: undo goes back to it.
         path = sources.save_model(model, sources.model_path_for(self._object.name))
         sources.remember_model(path, model)
         with sync.paused():
-            sources.attach_model(data, path, self._sources, model.info())
+            sources.attach_model(data, path, self._sources, model.settings())
         sync.write_decoded(data, splats)
         self.report({'INFO'}, f"{splats.count:,} splats from {len(self._sources)} source objects")
 

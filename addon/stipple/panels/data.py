@@ -9,7 +9,7 @@ import bpy
 
 from . import source_state
 from ..scene import geometry
-from ..scene.source import exporting, masks, sources, splat_data, sync
+from ..scene.source import exporting, masks, source_settings, sources, splat_data, sync
 from ..scene.view import viewed
 
 
@@ -36,11 +36,11 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
         layout.use_property_split = True
         stipple = context.object.data.stipple
         layout.prop(stipple, 'source')
-        if stipple.source_kind != 'NONE':
+        if source_settings.of(stipple).has_source:
             layout.operator('stipple.relink', icon='FILEBROWSER')
         if stipple.fit_report is not None:
             layout.operator('stipple.show_report', icon='GRAPH')
-        if stipple.source_kind != 'MODEL' or not stipple.source_objects:
+        if not stipple.source_objects:
             return
         column = layout.column()
         column.enabled = not stipple.edited
@@ -67,7 +67,7 @@ class STIPPLE_PT_clean_up(_SplatPanel, bpy.types.Panel):
         layout = self.layout
         stipple = context.object.data.stipple
         column = layout.column(align=True)
-        if stipple.source_kind == 'MODEL' and not stipple.edited:
+        if not source_settings.of(stipple).takes_mask and not stipple.edited:
             layout.label(text="Decoded anew at each budget", icon='INFO')
             layout.operator('stipple.use_as_new_source')
             column.enabled = False
@@ -82,17 +82,22 @@ class STIPPLE_PT_advanced(_SplatPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and context.object.data.stipple.source_kind == 'MODEL'
+        if not super().poll(context):
+            return False
+        known = source_settings.of(context.object.data.stipple)
+        return known.max_gaussians > 1 or known.has_order
 
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
         stipple = context.object.data.stipple
         layout.enabled = not stipple.edited
-        if stipple.learned_gaussians:
-            _draw_fixed(layout, "Splats per Anchor", f"{stipple.learned_gaussians}, as learned")
-        else:
+        known = source_settings.of(stipple)
+        if known.min_gaussians < known.max_gaussians:
             layout.prop(stipple, 'gaussians_per_anchor')
+        elif known.max_gaussians > 1:
+            _draw_fixed(layout, "Splats per Anchor", f"{known.max_gaussians}, as learned")
+        if known.has_order:
             layout.prop(stipple, 'order')
 
 
@@ -110,10 +115,11 @@ def _draw_budget(self, context):
         box.label(text=line, icon='OUTLINER_DATA_POINTCLOUD' if i == 0 else 'BLANK1')
     _draw_hidden(box, data)
     _draw_warnings(box, data)
-    if stipple.source_kind == 'TREE' or stipple.is_sequence:
+    known = source_settings.of(stipple)
+    if known.counts_splats or stipple.is_sequence:
         _draw_tree_budget(box, stipple)
         return
-    if stipple.source_kind != 'MODEL':
+    if not known.has_budget:
         box.operator('stipple.add_budget', icon='MOD_DECIM')
         return
     column = box.column()
@@ -121,11 +127,12 @@ def _draw_budget(self, context):
     single = sources.gaussians_per_anchor(stipple) == 1
     column.prop(stipple, 'anchors', text="Splats" if single else "Anchor Budget")
     column.prop(stipple, 'anchors_render', text="Render")
-    column.prop(stipple, 'seed')
-    if stipple.learned_most:
+    if known.has_seed:
+        column.prop(stipple, 'seed')
+    if known.is_learned:
         used = (stipple.anchors, stipple.anchors_render or stipple.anchors)
-        is_beyond = max(used) > stipple.learned_most or min(used) < stipple.learned_least
-        column.label(text=f"Learned for {stipple.learned_least:,} to {stipple.learned_most:,}",
+        is_beyond = max(used) > known.most_learned or min(used) < known.least_learned
+        column.label(text=f"Learned for {known.least_learned:,} to {known.most_learned:,}",
                      icon='INFO' if is_beyond else 'BLANK1')
 
 
@@ -142,7 +149,7 @@ def _shown_label(data):
     count = splat_data.count(data)
     if data.stipple.is_sequence:
         return f"{count:,} Gaussian Splats{SEPARATOR}frame of a series"
-    if data.stipple.source_kind != 'TREE':
+    if not source_settings.of(data.stipple).counts_splats:
         return f"{count:,} Gaussian Splats"
     size = exporting.megabytes(count * splat_data.bytes_each(data))
     return f"Showing {count:,} of {sources.visible_count(data.stipple):,}{SEPARATOR}{size}"

@@ -7,7 +7,7 @@ import bpy
 
 from ..binding.errors import StippleError
 from ..scene.sequence import sequences
-from ..scene.source import splat_data
+from ..scene.source import source_settings, splat_data
 
 
 class STIPPLE_PT_sequence(bpy.types.Panel):
@@ -35,7 +35,7 @@ class STIPPLE_PT_sequence(bpy.types.Panel):
         column.prop(stipple, 'frame_speed')
         column.prop(stipple, 'sequence_mode')
         column.prop(stipple, 'missing_frames')
-        if stipple.source_kind == 'CLOUD':
+        if source_settings.of(stipple).as_they_are:
             layout.operator('stipple.prepare_budgets', icon='MOD_DECIM')
 
 

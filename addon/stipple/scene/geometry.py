@@ -6,7 +6,7 @@ import numpy as np
 from .. import version
 from ..binding import cloud_edit
 from ..binding.errors import invalid
-from .source import placement, sources, splat_data
+from .source import placement, source_settings, sources, splat_data
 
 _NAMES = ('scale', 'rotation', 'radiance:base')
 
@@ -27,7 +27,7 @@ def may_carry_splats(obj):
     if obj is None or obj.library is not None or obj.type not in {'MESH', 'POINTCLOUD', 'CURVES'}:
         return False
     if splat_data.is_splats(obj.data) and (obj.data.stipple.is_sequence
-                                           or obj.data.stipple.source_kind in sources.MODEL_KINDS):
+                                           or source_settings.of(obj.data.stipple).has_budget):
         return False
     return carries_splats(obj.data) or len(obj.modifiers) > 0
 
@@ -36,7 +36,7 @@ def splats_of(obj, depsgraph):
     """The cloud of what an object shows, in its own space. Errors: StippleError where that is no splats."""
     if is_plain(obj):
         data = obj.data
-        if splat_data.is_splats(data) and data.stipple.source_kind == 'CLOUD' and not data.stipple.edited:
+        if splat_data.is_splats(data) and source_settings.of(data.stipple).as_they_are and not data.stipple.edited:
             return sources.whole_cloud(data)
         return splat_data.ungraded_cloud(sources.context(), data)
     inverse, found = np.linalg.inv(placement.matrix_of(obj)), []

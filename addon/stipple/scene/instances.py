@@ -41,7 +41,7 @@ def gather_keyed(depsgraph, mode, warn=lambda message: None):
             continue
         key = obj.data.as_pointer()
         if key not in clouds:
-            clouds[key] = _cloud_of(obj, mode, depsgraph.scene.frame_current, share.most(obj.original.data))
+            clouds[key] = _cloud_of(obj, mode, depsgraph.scene, share.most(obj.original.data))
         if clouds[key] is not None:
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
@@ -65,8 +65,8 @@ def _key_of(entry, owner, original):
     return (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
 
 
-def _cloud_of(obj, mode, frame, most):
-    """Native splats of an evaluated object at a frame of the scene, `most` at most, or None for none."""
+def _cloud_of(obj, mode, scene, most):
+    """Native splats of an evaluated object at the frame of the scene, `most` at most, or None for none."""
     data, original = obj.data, obj.original.data
     stipple = data.stipple
     if mode == 'RENDER' and bpy.app.background and not stipple.edited:
@@ -75,9 +75,9 @@ def _cloud_of(obj, mode, frame, most):
     if limits.has_budget(stipple) and not _has_modifiers(obj) and not _is_edited(original, mode):
         try:
             if stipple.is_sequence:
-                cloud = sequences.frame_of(original, stipple, frame, mode, most).cloud()
+                cloud = sequences.frame_of(original, stipple, scene.frame_current, mode, most).cloud()
             else:
-                cloud = sources.decode(original, sources.at_most(sources.decode_settings(stipple, mode), most))
+                cloud = sources.decode(original, sources.at_most(sources.decode_settings(stipple, mode, scene), most))
             return cloud and grades.apply(cloud, stipple)
         except StippleError as error:
             raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None

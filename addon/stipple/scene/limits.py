@@ -13,7 +13,7 @@ import bpy
 from ..binding.errors import StippleError
 from . import shown
 from .sequence import sequences
-from .source import sources, splat_data
+from .source import source_settings, sources, splat_data
 
 # Instances of each datablock, by name, that a view layer showed when it was evaluated last.
 _seen = {}
@@ -86,7 +86,7 @@ def forget():
 
 def has_budget(stipple):
     """Whether the number of splats that a datablock shows can be chosen."""
-    return (stipple.is_sequence or stipple.source_kind in sources.MODEL_KINDS) and not stipple.edited
+    return (stipple.is_sequence or source_settings.of(stipple).has_budget) and not stipple.edited
 
 
 def _splat_datablocks():

@@ -4,10 +4,10 @@
 
 #include <atomic>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 
 namespace stipple {
@@ -25,10 +25,10 @@ constexpr double kLuma[3] = {0.2126, 0.7152, 0.0722};
 /// again and again.
 void requireRange(double value, double low, double high, const char* owner, const char* name) {
   if (value >= low && value <= high) return;
-  char text[96];
-  std::snprintf(text, sizeof(text), " is %g; %g to %g is allowed", value, low, high);
   const std::string prefix(owner);
-  fail(ErrorCode::kInvalidArgument, prefix + (prefix.empty() ? "" : ": ") + name + text);
+  fail(ErrorCode::kInvalidArgument, prefix + (prefix.empty() ? "" : ": ") + name + " is " +
+                                        numberText(value) + "; " + numberText(low) + " to " +
+                                        numberText(high) + " is allowed");
 }
 
 }  // namespace

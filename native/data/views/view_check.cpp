@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 
 namespace stipple {
@@ -58,10 +59,6 @@ void checkArray(const ViewPicture& picture, const std::string& name, const char*
            (range == ValueRange::kShare      ? "a number from 0 to 1 is needed"
             : range == ValueRange::kPositive ? "a finite number of at least 0 is needed"
                                              : "a finite number is needed"));
-}
-
-std::string sizeOf(uint32_t width, uint32_t height) {
-  return std::to_string(width) + " x " + std::to_string(height) + " pixels";
 }
 
 enum class Content { kSomething, kBlack, kTransparent, kMasked };
@@ -174,8 +171,8 @@ void validateView(const Camera& camera, const ViewPicture& picture, const std::s
   }
   if (picture.width != camera.width || picture.height != camera.height) {
     fail(ErrorCode::kInvalidArgument,
-         name + ": the picture is " + sizeOf(picture.width, picture.height) + ", its camera's is " +
-             sizeOf(camera.width, camera.height));
+         name + ": the picture is " + sizeText(picture.width, picture.height) +
+             " pixels, its camera's is " + sizeText(camera.width, camera.height) + " pixels");
   }
   checkArray(picture, name, "colour", picture.colour, 3, false, ValueRange::kAny);
   checkArray(picture, name, "alpha", picture.alpha, 1, true, ValueRange::kShare);

@@ -36,7 +36,6 @@ class FieldDecoder final : public Decoder {
   /// Threads and determinism: parallel; same result for any number of threads.
   /// Cost: O(P log P) for the spacing, O(N) else; about 1 µs per Gaussian on one thread.
   SplatCloud decode(const DecodeRequest& request) const override;
-  DecodeCost costHint() const override { return DecodeCost::kInteractive; }
   uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
 
   const FieldParameters& field() const { return *field_; }

@@ -18,7 +18,6 @@ class SurfaceDecoder final : public Decoder {
   SurfaceDecoder(std::shared_ptr<const PointSet> surface, const RootCube& root, int leaf_level);
   ~SurfaceDecoder() override;
   SplatCloud decode(const DecodeRequest& request) const override;
-  DecodeCost costHint() const override { return DecodeCost::kInteractive; }
   uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
 
  private:

@@ -16,7 +16,6 @@ class HierarchyDecoder final : public Decoder {
   /// Errors: kInvalidArgument where the tree does not fit the cloud.
   HierarchyDecoder(std::shared_ptr<const SplatCloud> leaves, std::shared_ptr<const MergeTree> tree);
   SplatCloud decode(const DecodeRequest& request) const override;
-  DecodeCost costHint() const override { return DecodeCost::kInteractive; }
   uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
 
   /// Ids of the nodes of the cut (data of MergeTree), ascending. In: budget 1..N.

@@ -70,6 +70,7 @@ typedef struct StippleViews StippleViews;       /* cameras, and what they have s
 typedef struct StippleRenderer StippleRenderer;
 typedef struct StippleVolume StippleVolume;     /* sparse voxels */
 typedef struct StippleImage StippleImage;
+typedef struct StippleImageChannels StippleImageChannels; /* named channels of an EXR file */
 typedef struct StippleJob StippleJob;           /* long work in the background */
 
 /* ---- context ----------------------------------------------------------------------------------- */
@@ -434,7 +435,8 @@ typedef struct StippleMeshTopology {
 } StippleMeshTopology;
 /* Cost: O(T log T). */
 StippleStatus stipple_mesh_topology(const StippleMesh* mesh, StippleMeshTopology* topology);
-/* Writes positions and triangles by the ending: .ply, or .glb (Z up becomes Y up). */
+/* Writes positions and triangles by the ending: .ply, or .glb (Z up becomes Y up; STIPPLE_ERROR_UNAVAILABLE without
+ * libstipple_media.so). */
 StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8);
 
 /* ---- density and anchors ----------------------------------------------------------------------- */
@@ -529,7 +531,36 @@ typedef struct StippleModelInfo {
   uint64_t most_anchors;
   uint32_t gaussians_per_anchor; /* field: splats that it makes of an anchor; else 0 */
   uint32_t reserved;
+  const char* kind_label; /* of the kind, for people, such as "learned field"; lives as long as the library */
 } StippleModelInfo;
+
+/* What the budget of a model (StippleDecodeOptions.anchor_count) counts. */
+typedef enum StippleBudgetUnit {
+  STIPPLE_BUDGET_ANCHORS = 0, /* places that are drawn from its density; each becomes K splats */
+  STIPPLE_BUDGET_SPLATS = 1   /* splats of its own; the largest budget is all of them, bit for bit */
+} StippleBudgetUnit;
+
+/* Which settings a model has: whoever offers them to people asks this, and need not know the kinds. What a model does
+ * not have may be given and does not matter. */
+typedef struct StippleModelSettings {
+  uint32_t struct_size;
+  uint32_t budget_unit;             /* StippleBudgetUnit */
+  uint64_t minimum_budget;          /* budgets that it takes */
+  uint64_t maximum_budget;
+  uint64_t default_budget;          /* that shows it well */
+  uint64_t minimum_learned_budget;  /* budgets that it was learned for; 0: all are alike to it */
+  uint64_t maximum_learned_budget;
+  uint32_t minimum_gaussians_per_anchor; /* K; where both are equal there is no choice */
+  uint32_t maximum_gaussians_per_anchor;
+  uint32_t default_gaussians_per_anchor;
+  uint32_t has_order;   /* 1: StippleAnchorOrder changes the splats */
+  uint32_t has_seed;    /* 1: the seed changes the splats */
+  uint32_t takes_mask;  /* 1: splats of its own can be left out (stipple_model_keep) */
+  uint32_t has_time;    /* 1: the time changes the splats */
+  uint32_t reserved;
+  double time_begin;    /* seconds, where has_time: from when to when something moves */
+  double time_end;
+} StippleModelSettings;
 
 typedef struct StippleDecodeOptions {
   uint32_t struct_size;
@@ -540,6 +571,7 @@ typedef struct StippleDecodeOptions {
   uint32_t gaussians_per_anchor;  /* K, 1..32, default 1; of a hierarchy: 1; of a field: 1, which stands for
                                      its own count, or that */
   uint32_t reserved;
+  double time;                    /* seconds, finite, default 0; models without has_time give the same splats always */
 } StippleDecodeOptions;
 void stipple_decode_options_init(StippleDecodeOptions* options);
 
@@ -564,7 +596,9 @@ StippleStatus stipple_model_load_start(StippleContext* context, const char* path
 StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf8);
 void stipple_model_free(StippleModel* model);
 StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* info);
-/* Errors: UNSUPPORTED for a hierarchy, which has none. */
+/* Which settings it has, and their ranges. settings->struct_size must be set. */
+StippleStatus stipple_model_settings(const StippleModel* model, StippleModelSettings* settings);
+/* Errors: UNSUPPORTED for a model that is not sampled, such as a hierarchy. */
 StippleStatus stipple_model_density(const StippleModel* model, StippleDensity** density);
 /* P anchors, P*K splats. Fast enough to follow a slider (docs/methods/surface_splats.md has figures). */
 StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecodeOptions* options,
@@ -825,6 +859,7 @@ typedef struct StippleInstance {
   const StippleCloud* cloud;
   double matrix[16]; /* object to world; invertible */
   const StippleGrade* grade; /* read during the call; NULL: none. Costs nothing where it changes nothing */
+  double time; /* seconds, finite, 0 where nothing moves; the splats of a cloud are the same at every time */
 } StippleInstance;
 
 typedef enum StippleLowPass {
@@ -1279,7 +1314,8 @@ StippleStatus stipple_cloud_thin(const StippleCloud* cloud, uint64_t count, uint
                                  StippleCloud** thinned);
 /* The hierarchy of a cloud without the splats whose mask is 0: no budget shows any of them, and its largest
  * budget is what is left, bit for bit. mask [mask_count], mask_count = leaf_count of the model. Errors:
- * UNSUPPORTED for the model of a mesh; INVALID_ARGUMENT for a mask that keeps nothing. Cost: O(N). */
+ * UNSUPPORTED for a model whose settings have no takes_mask; INVALID_ARGUMENT for a mask that keeps nothing.
+ * Cost: O(N). */
 StippleStatus stipple_model_keep(const StippleModel* model, const uint8_t* mask, uint64_t mask_count,
                                  StippleModel** kept);
 /* One cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity keeps
@@ -1539,7 +1575,7 @@ StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud);
 /* Whether previews tell what each splat contributes (stipple_cloud_quantity): 1, or 0, as a fit begins. It then draws
  * 8 views for every preview; steps are the same either way. */
 StippleStatus stipple_fit_watch_contributions(StippleJob* job, uint32_t watched);
-/* The result of a job that has ended, however it ended: the state that did best on held-out views, decoded at a
+/* The result of a job that has ended, however it ended: the state that did best on views it learned from, decoded at a
  * budget (anchors of a field; 0: the largest; explicit splats have one size). INVALID_ARGUMENT where no step was
  * taken. */
 StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud);
@@ -1744,6 +1780,30 @@ StippleStatus stipple_image_save(const StippleImage* image, const char* path_utf
 /* Same size and channels; compared in display space. */
 StippleStatus stipple_image_compare(const StippleImage* a, const StippleImage* b,
                                     StippleImageComparison* result);
+
+typedef struct StippleImageChannelInfo {
+  uint32_t struct_size;
+  uint32_t width;
+  uint32_t height;
+  uint32_t reserved;
+  const char* name_utf8; /* "ViewLayer.Depth.Z"; lives as long as the channels */
+} StippleImageChannelInfo;
+
+/* Reads all channels of an OpenEXR file as float32: half, float and integer channels, of any compression, scan
+ * lines and tiles, one part or several. A name has its layer in front; where a part leaves that out of its channels,
+ * it is the part's name. Integers keep their value as near as float32 does. What lies outside the data window is 0.
+ * Errors: STIPPLE_ERROR_FORMAT for another kind of file and one that is cut off; STIPPLE_ERROR_UNSUPPORTED for deep
+ * pixels; STIPPLE_ERROR_MEMORY_LIMIT, before anything is allocated, where the values would take more than the
+ * context allows or than 4 GiB; STIPPLE_ERROR_UNAVAILABLE without libstipple_media.so. */
+StippleStatus stipple_image_channels_load(StippleContext* context, const char* path_utf8,
+                                          StippleImageChannels** channels);
+void stipple_image_channels_free(StippleImageChannels* channels);
+uint64_t stipple_image_channels_count(const StippleImageChannels* channels); /* 0 for NULL */
+StippleStatus stipple_image_channels_info(const StippleImageChannels* channels, uint64_t index,
+                                          StippleImageChannelInfo* info);
+/* values [height,width], row 0 = top. capacity: floats that values has room for. */
+StippleStatus stipple_image_channels_read(const StippleImageChannels* channels, uint64_t index, float* values,
+                                          uint64_t capacity);
 
 #ifdef __cplusplus
 }

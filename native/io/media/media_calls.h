@@ -20,8 +20,12 @@ void stipple_media_png_write(const char* path, const StippleMediaImage* image,
                              const uint8_t* pixels, StippleMediaStatus* status);
 void stipple_media_exr_write(const char* path, const StippleMediaImage* image, const float* pixels,
                              StippleMediaStatus* status);
+void stipple_media_exr_channels_read(const char* path, uint64_t limit_bytes,
+                                     const StippleMediaSink* sink, StippleMediaStatus* status);
 void stipple_media_mesh_read(const char* path, const StippleMediaSink* sink,
                              StippleMediaStatus* status);
+void stipple_media_mesh_write(const char* path, const StippleMediaMesh* mesh,
+                              StippleMediaStatus* status);
 void stipple_media_volume_write(const char* path, const StippleMediaVolume* volume,
                                 StippleMediaStatus* status);
 void stipple_media_volume_read(const char* path, double* voxel_size, double* origin,

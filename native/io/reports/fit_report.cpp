@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "io/bytes/output_file.h"
 #include "plot/svg_plot.h"
 
@@ -28,9 +28,7 @@ Json number(double value) {
 /// Six digits of a float: what was measured has no more, and files stay small.
 Json number(float value) {
   if (!std::isfinite(value)) return nullptr;
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6g", static_cast<double>(value));
-  return Json(std::strtod(text, nullptr));
+  return Json(std::strtod(numberText(static_cast<double>(value)).c_str(), nullptr));
 }
 
 Json column(const FitHistory& history, float FitRecord::*member) {
@@ -46,7 +44,8 @@ Json row(const FitMeasure& measure) {
           {"psnr", number(measure.psnr)},
           {"foreground_psnr", number(measure.foreground_psnr)},
           {"ssim", number(measure.ssim)},
-          {"density_entropy", number(measure.density_entropy)}};
+          {"density_entropy", number(measure.density_entropy)},
+          {"training_psnr", number(measure.training_psnr)}};
 }
 
 Json rows(const std::vector<FitMeasure>& measures) {

@@ -6,9 +6,9 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "io/splats/ply/ply_file.h"
 
 namespace stipple {
@@ -16,12 +16,6 @@ namespace stipple {
 namespace {
 
 using Json = nlohmann::json;
-
-std::string shown(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
 
 /// An object of the JSON with its place in it, so that messages can name the key.
 class Section {
@@ -183,7 +177,7 @@ class MetaReader {
     for (size_t axis = 0; axis < 3; ++axis) {
       for (const double value : {mins[axis], maxs[axis]}) {
         if (!(std::abs(value) <= kLargestLog)) {
-          fail(ErrorCode::kFormat, name_ + ": 'means' has a bound of " + shown(value) +
+          fail(ErrorCode::kFormat, name_ + ": 'means' has a bound of " + numberText(value) +
                                        "; it is a logarithm, at most 88.7228 is allowed");
         }
       }
@@ -205,7 +199,7 @@ class MetaReader {
       const double value = std::exp(static_cast<double>(logarithms[i]));
       if (!(value <= static_cast<double>(std::numeric_limits<float>::max()))) {
         fail(ErrorCode::kFormat, name_ + ": 'scales' holds " +
-                                     shown(static_cast<double>(logarithms[i])) +
+                                     numberText(static_cast<double>(logarithms[i])) +
                                      "; it is a logarithm, at most 88.7228 is allowed");
       }
       table[i] = static_cast<float>(value);
@@ -232,7 +226,7 @@ class MetaReader {
   float narrowed(double value, const std::string& key) const {
     if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max()))) {
       fail(ErrorCode::kFormat,
-           name_ + ": '" + key + "' holds " + shown(value) + ", which is no float32 number");
+           name_ + ": '" + key + "' holds " + numberText(value) + ", which is no float32 number");
     }
     return static_cast<float>(value);
   }

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "data/views/view_colour.h"
 #include "data/views/view_resample.h"
@@ -21,10 +22,6 @@ constexpr uint32_t kMaxDownscale = 64;
 constexpr size_t kPixelsPerTask = 65536;
 // Integer depths of nerfstudio are millimetres.
 constexpr float kMetresPerDepthUnit = 1e-3f;
-
-std::string sizeOf(uint32_t width, uint32_t height) {
-  return std::to_string(width) + " x " + std::to_string(height) + " pixels";
-}
 
 /// The size of a camera whose file says none is that of its picture.
 void takeSizeOfPicture(DatasetView& view) {
@@ -96,9 +93,9 @@ void requireFinitePixels(const Image& image, const std::string& path) {
 Image readOfSize(const std::string& path, const Camera& camera, ImageHeader* header) {
   Image image = readImageFile(path, header);
   if (image.width != camera.width || image.height != camera.height) {
-    fail(ErrorCode::kFormat, path + " is " + sizeOf(image.width, image.height) +
-                                 "; its camera is said to be " +
-                                 sizeOf(camera.width, camera.height));
+    fail(ErrorCode::kFormat, path + " is " + sizeText(image.width, image.height) +
+                                 " pixels; its camera is said to be " +
+                                 sizeText(camera.width, camera.height) + " pixels");
   }
   return image;
 }

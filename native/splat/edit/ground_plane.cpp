@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "math/affine.h"
@@ -40,9 +40,8 @@ Vec3d cross(const Vec3d& a, const Vec3d& b) {
 }
 
 std::string text(const Vec3d& v) {
-  char buffer[96];
-  std::snprintf(buffer, sizeof(buffer), "(%g, %g, %g)", v[0], v[1], v[2]);
-  return buffer;
+  return std::string("(") + numberText(v[0]) + ", " + numberText(v[1]) + ", " + numberText(v[2]) +
+         ")";
 }
 
 /// Up to `most` of the solid splats (of all where hardly any is solid), evenly over the list.

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "splat/voxels/voxelize_bricks.h"
 #include "splat/voxels/voxelize_kernel.h"
@@ -57,10 +58,8 @@ uint64_t effectiveLimit(uint64_t memory_limit_bytes) {
 
 void requireMemory(double bytes, const char* qualifier, uint64_t limit, double voxel_size) {
   if (bytes <= static_cast<double>(limit)) return;
-  char size[32];
-  std::snprintf(size, sizeof(size), "%g", voxel_size);
   fail(ErrorCode::kMemoryLimit, std::string("voxelize needs ") + qualifier + mebibytes(bytes) +
-                                    " at a voxel size of " + size + " m; " +
+                                    " at a voxel size of " + numberText(voxel_size) + " m; " +
                                     mebibytes(static_cast<double>(limit)) +
                                     " are allowed: use a larger voxel size or fewer splats");
 }

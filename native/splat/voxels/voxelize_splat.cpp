@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "math/affine.h"
 #include "math/colour.h"
@@ -31,12 +32,6 @@ constexpr double kMinAxis = 1e-9;
 constexpr double kMaxExponent = 86.0;
 constexpr double kMaxSigma = 13.12;  // sqrt(2 * 86): no splat reaches further
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%g", value);
-  return text;
-}
-
 [[noreturn]] void refuse(const std::string& message) {
   fail(ErrorCode::kInvalidArgument, message);
 }
@@ -47,15 +42,16 @@ void checkOptions(const VoxelizeOptions& options) {
   requireFinite(options.cut_off_sigma, "cut_off_sigma");
   requireFinite(options.min_density, "min_density");
   if (options.voxel_size < 0 || (options.voxel_size == 0 && options.resolution == 0)) {
-    refuse("voxel size is " + number(options.voxel_size) + " m and resolution " +
+    refuse("voxel size is " + numberText(options.voxel_size) + " m and resolution " +
            std::to_string(options.resolution) +
            "; a positive voxel size, or 0 with a resolution of at least 1, is allowed");
   }
   if (options.low_pass < 0 || options.low_pass > 16) {
-    refuse("low_pass is " + number(options.low_pass) + "; 0 to 16 voxels is allowed");
+    refuse("low_pass is " + numberText(options.low_pass) + "; 0 to 16 voxels is allowed");
   }
   if (options.min_density < 0) {
-    refuse("min_density is " + number(options.min_density) + " per metre; 0 or more is allowed");
+    refuse("min_density is " + numberText(options.min_density) +
+           " per metre; 0 or more is allowed");
   }
 }
 
@@ -164,10 +160,10 @@ bool prepareSplat(const SplatInstance& instance, size_t i, const VoxelizeOptions
     if (opacity <= 0) return false;
   }
   if (principal.lengths[0] < kMinAxis) {
-    refuse("splat " + std::to_string(i) + " is " + number(principal.lengths[0] * voxel_size) +
+    refuse("splat " + std::to_string(i) + " is " + numberText(principal.lengths[0] * voxel_size) +
            " m thin, so its extinction has no finite value at a voxel size of " +
-           number(voxel_size) + " m; a larger low_pass, or an axis of at least " +
-           number(kMinAxis * voxel_size) + " m, is needed");
+           numberText(voxel_size) + " m; a larger low_pass, or an axis of at least " +
+           numberText(kMinAxis * voxel_size) + " m, is needed");
   }
 
   const double minus_log_opacity = -std::log(opacity);
@@ -197,10 +193,10 @@ bool prepareSplat(const SplatInstance& instance, size_t i, const VoxelizeOptions
 
   const double furthest = (splat.centre.cwiseAbs() + splat.half_extent).maxCoeff();
   if (furthest > kMaxVoxelIndex) {
-    refuse("voxel size " + number(voxel_size) + " m puts splat " + std::to_string(i) +
-           " at voxel index " + number(furthest) + "; at most " + number(kMaxVoxelIndex) +
+    refuse("voxel size " + numberText(voxel_size) + " m puts splat " + std::to_string(i) +
+           " at voxel index " + numberText(furthest) + "; at most " + numberText(kMaxVoxelIndex) +
            " is allowed, a voxel size of at least " +
-           number(voxel_size * furthest / kMaxVoxelIndex) + " m");
+           numberText(voxel_size * furthest / kMaxVoxelIndex) + " m");
   }
   return true;
 }
@@ -236,14 +232,14 @@ double chooseVoxelSize(std::span<const SplatInstance> instances, const VoxelizeO
     }
     const double side = (high - low).maxCoeff();
     if (!(side > 0) || !std::isfinite(side)) {
-      refuse("the splats' bounds are " + number(std::max(side, 0.0)) +
+      refuse("the splats' bounds are " + numberText(std::max(side, 0.0)) +
              " m long, which gives no voxel size; set a voxel size above 0");
     }
     voxel_size = side / options.resolution;
   }
   if (voxel_size < kMinVoxelSize || voxel_size > kMaxVoxelSize) {
-    refuse("voxel size is " + number(voxel_size) + " m; " + number(kMinVoxelSize) + " to " +
-           number(kMaxVoxelSize) + " m is allowed");
+    refuse("voxel size is " + numberText(voxel_size) + " m; " + numberText(kMinVoxelSize) + " to " +
+           numberText(kMaxVoxelSize) + " m is allowed");
   }
   return voxel_size;
 }

@@ -25,20 +25,10 @@ std::vector<double> beginControl(RenderBackend& backend, const Strategy& strateg
   return rates;
 }
 
-void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment,
-                 const StepView& view, const StatisticRequest& request) {
+void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment, size_t view) {
   ViewStatistics statistics;
-  statistics.view = view.index;
-  statistics.width = view.camera->width;
-  statistics.height = view.camera->height;
-  statistics.camera = view.camera;
+  statistics.view = view;
   backend.lendStatistics(statistics);
-  if (request.error_maps) {
-    const size_t pixels = size_t{statistics.width} * statistics.height;
-    backend.lendErrors(statistics.errors);
-    statistics.errors.target = {view.target, pixels * 3};
-    statistics.errors.weights = {view.weights, view.weights ? pixels : size_t{0}};
-  }
   strategy.observe(moment, statistics);
 }
 

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "densify/strategy.h"
-#include "train/loop/fit_model.h"
 #include "train/loop/render_backend.h"
 
 // Between a strategy and the backend that holds its splats, with and without steps.
@@ -15,9 +14,8 @@ namespace stipple {
 /// Returns: rates of the extra parameters.
 std::vector<double> beginControl(RenderBackend& backend, const Strategy& strategy);
 
-/// Shows the strategy what the last backward pass has gathered. In: request: of it.
-void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment,
-                 const StepView& view, const StatisticRequest& request);
+/// Shows the strategy what the last backward pass has gathered. In: view: as ViewEvaluator counts.
+void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment, size_t view);
 
 /// Valid until the backend's next call.
 SplatStore storeOf(const RenderBackend& backend);

@@ -1,12 +1,11 @@
 #include <algorithm>
 #include <cstddef>
-#include <iterator>
 #include <string>
 #include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "splat/render/render_backward.h"
+#include "train/loop/cpu_view_pass.h"
 #include "train/loop/render_backend.h"
 #include "train/optimiser/splat_activation.h"
 
@@ -23,15 +22,6 @@ struct Target {
   std::vector<float> pixels;  ///< [H,W,3]
 };
 
-/// What has been done since the splats changed last; each pass needs the one before it.
-enum class Stage { kSplats, kDrawn, kLoss, kGradients };
-
-/// The arrays of Statistic, in its order.
-constexpr const GradientArray* kStatistics =
-    std::find_if(std::begin(kGradientArrays), std::end(kGradientArrays),
-                 [](const GradientArray& array) { return array.is_statistic; });
-static_assert(std::end(kGradientArrays) - kStatistics == static_cast<ptrdiff_t>(kStatisticCount));
-
 /// Arrays of one checkpoint, which must belong together.
 void requireLike(const RawSplats& splats, const RawSplats& others, const char* what) {
   SplatEdit as_edit;  // holds arrays to each other, and every number to be finite
@@ -45,9 +35,9 @@ void requireLike(const RawSplats& splats, const RawSplats& others, const char* w
 }
 
 class CpuBackend final : public RenderBackend {
- public:
-  CpuBackend() { workspace_.keepForBackward(true); }
+  using Stage = CpuViewPass::Stage;
 
+ public:
   const char* name() const override { return "cpu"; }
 
   void upload(const SplatCloud& cloud) override {
@@ -86,22 +76,15 @@ class CpuBackend final : public RenderBackend {
   const TrainingState& state() const override { return held_; }
 
   uint64_t memoryBytes() const override {
-    uint64_t floats = picture_.colour.capacity() + colour_gradient_.capacity() +
-                      residual_.capacity() + cloud_.scales.capacity() +
-                      cloud_.opacities.capacity() + visible_.capacity() / sizeof(float);
+    uint64_t floats = cloud_.scales.capacity() + cloud_.opacities.capacity();
     for (const RawSplats* splats : {&held_.splats, &held_.first_moments, &held_.second_moments,
                                     &held_.kept_gradients, &by_raw_}) {
       for (size_t i = 0; i < arrayCount(*splats); ++i) {
         floats += arrayOf(*splats, static_cast<RawArray>(i)).capacity();
       }
     }
-    for (const SplatGradients& gradients : gradients_.instances) {
-      for (const GradientArray& array : kGradientArrays) {
-        floats += (gradients.*array.values).capacity();
-      }
-    }
     for (const Target& target : targets_) floats += target.pixels.capacity();
-    return floats * sizeof(float) + workspace_.bytes() + image_loss_.workspaceBytes();
+    return floats * sizeof(float) + pass_.memoryBytes();
   }
 
   uint32_t addTarget(uint32_t width, uint32_t height, std::span<const float> pixels) override {
@@ -119,87 +102,51 @@ class CpuBackend final : public RenderBackend {
 
   void forward(const Camera& camera, const RenderOptions& options, Progress* progress) override {
     activate();
-    stage_ = Stage::kSplats;  // of a picture that fails half-way nothing may be used
     const Lent lent(*this);
-    const SplatInstance instance{&cloud_};
-    renderTiled({&instance, 1}, camera, options, workspace_, picture_, progress);
-    stage_ = Stage::kDrawn;
+    pass_.forward(cloud_, camera, options, progress);
   }
 
   ImageLossValue loss(uint32_t target, const ImageLossOptions& options,
                       std::span<const float> weights) override {
-    requireStage(Stage::kDrawn, "a loss needs a picture; call forward first");
+    pass_.requireStage(Stage::kDrawn, "a loss needs a picture; call forward first");
     if (target >= targets_.size()) {
       fail(ErrorCode::kInvalidArgument, "target is " + std::to_string(target) + "; there are " +
                                             std::to_string(targets_.size()));
     }
     const Target& wanted = targets_[target];
-    if (wanted.width != picture_.width || wanted.height != picture_.height) {
+    const RenderResult& drawn = pass_.drawn();
+    if (wanted.width != drawn.width || wanted.height != drawn.height) {
       fail(ErrorCode::kInvalidArgument,
            "target " + std::to_string(target) + " is " + std::to_string(wanted.width) + " x " +
                std::to_string(wanted.height) + " pixels; the picture is " +
-               std::to_string(picture_.width) + " x " + std::to_string(picture_.height));
+               std::to_string(drawn.width) + " x " + std::to_string(drawn.height));
     }
-    return loss(wanted.pixels, options, weights);
+    return pass_.loss(wanted.pixels, weights, options);
   }
 
   ImageLossValue loss(std::span<const float> target, const ImageLossOptions& options,
                       std::span<const float> weights) override {
-    requireStage(Stage::kDrawn, "a loss needs a picture; call forward first");
-    const size_t pixel_count = static_cast<size_t>(picture_.width) * picture_.height;
-    requireCount(target.size(), pixel_count * 3, "the target");
-    if (!weights.empty()) requireCount(weights.size(), pixel_count, "weights");
-    stage_ = Stage::kDrawn;
-    colour_gradient_.resize(pixel_count * 4);
-    const ImageLossValue value = image_loss_.evaluate(
-        picture_.width, picture_.height, {picture_.colour.data(), PixelLayout::kRgba},
-        {target.data(), PixelLayout::kRgb}, weights.empty() ? nullptr : weights.data(),
-        {colour_gradient_.data(), PixelLayout::kRgba}, options);
-    target_ = target;
-    stage_ = Stage::kLoss;
-    return value;
+    return pass_.loss(target, weights, options);
   }
 
   BackwardSummary backward(const StatisticRequest& request, Regulariser* regulariser,
                            Progress* progress) override {
-    requireStage(Stage::kLoss, "derivatives need a loss of the picture; call loss first");
-    BackwardInput input;
-    input.colour_gradient = colour_gradient_;
-    if (request.contributions) {
-      subtractTarget();
-      input.residual = residual_;
-      input.residual_weights = request.contribution_weights;
-    }
-    input.edge_weights = request.edge_weights;
-    input.errors = errorsOf(request);
-    input.with_blending_weights = request.blending_weights;
-    input.with_screen_gradients = request.screen_gradients;
-    input.with_absolute_screen_gradients = request.absolute_screen_gradients;
-    input.with_covered = request.covered;
-    double regularisation = 0;
-    const double light = regulariser ? regulariser->transmittanceWeight() : 0;
-    if (light != 0) {
-      regularisation = light * meanTransmittance();
-      input.coverage_gradient = -light / static_cast<double>(picture_.transmittance.size());
-    }
-    stage_ = Stage::kLoss;
     const Lent lent(*this);
-    renderBackward(workspace_, picture_, input, backward_workspace_, gradients_, UINT64_MAX,
-                   progress);
-    SplatGradients& by = gradients_.instances[0];
-    if (regulariser) regularisation += regulariser->evaluate(cloud_, spansOf(by));
+    BackwardSummary summary =
+        pass_.backward(request, regulariser ? regulariser->transmittanceWeight() : 0.0, progress);
+    SplatGradients& by = pass_.gradients();
+    if (regulariser) summary.regularisation += regulariser->evaluate(cloud_, spansOf(by));
     if (how_) {
       throughActivations(held_.splats, cloud_, *how_, by, by_raw_);
     } else {
       throughActivations(cloud_, by);
     }
-    stage_ = Stage::kGradients;
     are_kept_ = false;
-    return {gradients_.camera, gradients_.background, gradients_.visible_count, regularisation};
+    return summary;
   }
 
   void step(const StepOptions& options) override {
-    requireStage(Stage::kGradients, "a step needs derivatives; call backward first");
+    pass_.requireStage(Stage::kGradients, "a step needs derivatives; call backward first");
     // Those that were kept count, these too.
     if (held_.kept_gradients.size() > 0) addToKept();
     constexpr size_t kFirst = 3;  // numbers of the constant harmonic
@@ -222,9 +169,9 @@ class CpuBackend final : public RenderBackend {
   }
 
   void keepGradients() override {
-    requireStage(Stage::kGradients, "there are no derivatives to keep; call backward first");
+    pass_.requireStage(Stage::kGradients, "there are no derivatives to keep; call backward first");
     addToKept();
-    stage_ = Stage::kSplats;
+    pass_.forget();
   }
 
   void edit(const SplatEdit& edit) override {
@@ -237,14 +184,14 @@ class CpuBackend final : public RenderBackend {
   }
 
   std::vector<float> picture() const override {
-    requireStage(Stage::kDrawn, "there is no picture; call forward first");
-    return picture_.colour;
+    pass_.requireStage(Stage::kDrawn, "there is no picture; call forward first");
+    return pass_.drawn().colour;
   }
 
   RawSplats gradients() const override {
-    requireStage(Stage::kGradients, "there are no derivatives; call backward first");
+    pass_.requireStage(Stage::kGradients, "there are no derivatives; call backward first");
     if (how_) return by_raw_;
-    const SplatGradients& by = gradients_.instances[0];
+    const SplatGradients& by = pass_.gradients();
     RawSplats raw = zerosLike(held_.splats);
     raw.positions = by.positions;
     raw.rotations = by.rotations;
@@ -255,9 +202,9 @@ class CpuBackend final : public RenderBackend {
   }
 
   std::vector<float> statistic(Statistic statistic) const override {
-    requireStage(Stage::kGradients, "there are no statistics; call backward first");
-    const GradientArray& array = kStatistics[static_cast<size_t>(statistic)];
-    const std::vector<float>& seen = gradients_.instances[0].*array.values;
+    pass_.requireStage(Stage::kGradients, "there are no statistics; call backward first");
+    const GradientArray& array = arrayOf(statistic);
+    const std::vector<float>& seen = pass_.gradients().*array.values;
     if (seen.empty() && splatCount() > 0) {
       fail(ErrorCode::kInvalidArgument,
            std::string(array.name) + " were not asked for in the last backward pass");
@@ -266,23 +213,10 @@ class CpuBackend final : public RenderBackend {
   }
 
   void lendStatistics(ViewStatistics& statistics) override {
-    requireStage(Stage::kGradients, "there are no statistics; call backward first");
-    visibleFlags(workspace_, visible_);
-    statistics.visible = visible_;
-    for (size_t i = 0; i < kStatisticCount; ++i) {
-      statistics.arrays[i] = gradients_.instances[0].*kStatistics[i].values;
-    }
-    statistics.splats = {held_.splats.positions, held_.splats.rotations, cloud_.scales,
-                         cloud_.opacities};
-  }
-
-  void lendErrors(ViewErrors& errors) override {
-    requireStage(Stage::kLoss, "there are no errors; call loss first");
-    errors.width = picture_.width;
-    errors.height = picture_.height;
-    errors.structure = image_loss_.structureErrors();
-    errors.picture = picture_.colour;
-    requireCount(errors.structure.size(), picture_.colour.size() / 4, "the loss's error map");
+    pass_.lendStatistics(statistics);
+    // Without a parameterisation the cloud has these two only while it is drawn.
+    statistics.splats.positions = held_.splats.positions;
+    statistics.splats.rotations = held_.splats.rotations;
   }
 
  private:
@@ -308,17 +242,6 @@ class CpuBackend final : public RenderBackend {
     CpuBackend& backend_;
   };
 
-  static void requireCount(size_t seen, size_t needed, const char* what) {
-    if (seen != needed) {
-      fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(seen) +
-                                            " values; " + std::to_string(needed) + " are needed");
-    }
-  }
-
-  void requireStage(Stage least, const char* message) const {
-    if (stage_ < least) fail(ErrorCode::kInvalidArgument, message);
-  }
-
   void hold(TrainingState state) {
     held_ = std::move(state);
     cloud_ = {};
@@ -330,7 +253,7 @@ class CpuBackend final : public RenderBackend {
 
   void changed() {
     is_activated_ = false;
-    stage_ = Stage::kSplats;
+    pass_.forget();
   }
 
   void activate() {
@@ -346,7 +269,7 @@ class CpuBackend final : public RenderBackend {
   /// Derivatives by an array of the raw splats, of the last backward pass.
   std::span<const float> lastGradient(RawArray array) const {
     if (how_) return arrayOf(by_raw_, array);
-    const SplatGradients& by = gradients_.instances[0];
+    const SplatGradients& by = pass_.gradients();
     const std::vector<float>* const arrays[] = {&by.positions, &by.rotations, &by.scales,
                                                 &by.opacities, &by.sh};
     return *arrays[static_cast<size_t>(array)];
@@ -383,74 +306,15 @@ class CpuBackend final : public RenderBackend {
     are_kept_ = true;
   }
 
-  std::span<const float> errorsOf(const StatisticRequest& request) {
-    if (request.errors_of) {
-      if (request.structure_errors || !request.errors.empty()) {
-        fail(ErrorCode::kInvalidArgument,
-             "errors are asked for in two ways; one of them is allowed");
-      }
-      made_errors_ = request.errors_of({picture_.width,
-                                        picture_.height,
-                                        image_loss_.structureErrors(),
-                                        picture_.colour,
-                                        target_,
-                                        {}});
-      requireCount(made_errors_.size(), picture_.colour.size() / 4, "the map of errors");
-      return made_errors_;
-    }
-    if (!request.structure_errors) return request.errors;
-    if (!request.errors.empty()) {
-      fail(ErrorCode::kInvalidArgument,
-           "both errors and structure errors are asked for; one of them is allowed");
-    }
-    const std::span<const float> errors = image_loss_.structureErrors();
-    if (errors.empty()) {
-      fail(ErrorCode::kInvalidArgument,
-           "structure errors are asked for; the loss must be one with structure errors");
-    }
-    return errors;
-  }
-
-  double meanTransmittance() const {
-    if (picture_.transmittance.empty()) {
-      fail(ErrorCode::kInvalidArgument,
-           "the loss has the mean transmittance; the picture must be drawn with it");
-    }
-    double sum = 0;
-    for (const float value : picture_.transmittance) sum += static_cast<double>(value);
-    return sum / static_cast<double>(picture_.transmittance.size());
-  }
-
-  void subtractTarget() {
-    residual_.resize(target_.size());
-    parallelFor(target_.size() / 3, kGrain, [&](size_t begin, size_t end) {
-      for (size_t pixel = begin; pixel < end; ++pixel) {
-        for (size_t c = 0; c < 3; ++c) {
-          residual_[pixel * 3 + c] = picture_.colour[pixel * 4 + c] - target_[pixel * 3 + c];
-        }
-      }
-    });
-  }
-
   TrainingState held_;
   SplatCloud cloud_;  ///< stored scales and opacities; the rest only while it is drawn
   bool is_activated_ = false;
   const Parameterisation* how_ = nullptr;
   std::vector<Target> targets_;
 
-  Stage stage_ = Stage::kSplats;
-  RenderWorkspace workspace_;
-  RenderResult picture_;
-  ImageLoss image_loss_;
-  std::span<const float> target_;       ///< of the last loss, [H,W,3]
-  std::vector<float> made_errors_;      ///< [H,W] of StatisticRequest::errors_of
-  std::vector<float> colour_gradient_;  ///< [H,W,4]
-  std::vector<float> residual_;         ///< [H,W,3]
-  BackwardWorkspace backward_workspace_;
-  BackwardResult gradients_;      ///< by raw scales and opacities once a pass is done without how_
-  RawSplats by_raw_;              ///< with how_
-  bool are_kept_ = false;         ///< whether the last derivatives are among the kept ones
-  std::vector<uint8_t> visible_;  ///< [N]
+  CpuViewPass pass_;       ///< its derivatives are by raw scales and opacities without how_
+  RawSplats by_raw_;       ///< with how_
+  bool are_kept_ = false;  ///< whether the last derivatives are among the kept ones
   std::vector<AdamGroup> groups_;
 };
 

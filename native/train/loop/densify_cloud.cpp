@@ -35,7 +35,6 @@ class CloudDensifier {
         backend_(makeCpuBackend()),
         evaluator_([this] { return backend_->download(); }, pictures_, shown_, kBlack,
                    options.ssim_share) {
-    loss_options_.ssim_share = options.ssim_share;
     backend_->upload(cloud);
     beginControl(*backend_, *strategy_);
     origins_.resize(cloud.size());
@@ -81,31 +80,25 @@ class CloudDensifier {
   }
 
   void look(size_t index) {
-    StepView view;
-    view.index = index;
-    view.camera = &pictures_.views().camera(shown_[index]);
     pictures_.load(shown_[index], kBlack, target_);
-    view.target = target_.colour.data();
-    view.weights = target_.weights.empty() ? nullptr : target_.weights.data();
     if (index + 1 < shown_.size()) pictures_.prefetch(shown_[index + 1]);
     const TrainingView looked_at{index, target_.width, target_.height, target_.colour};
     moment_.standalone->looks_left = shown_.size() - index;
     moment_.view = &looked_at;
-    lookAt(view);
+    lookAt(index);
     moment_.view = nullptr;
   }
 
-  void lookAt(const StepView& view) {
+  void lookAt(size_t index) {
     const StatisticRequest request = strategy_->requests(moment_);
     if (!request.any()) return;
     RenderOptions drawing;
     drawing.with_depth = false;
     drawing.with_background = true;
-    backend_->forward(*view.camera, drawing);
-    loss_options_.with_structure_errors = request.structure_errors || request.error_maps;
-    backend_->loss(target_.colour, loss_options_, target_.weights);
+    backend_->forward(pictures_.views().camera(shown_[index]), drawing);
+    backend_->loss(target_.colour, lossFor(request, options_.ssim_share), target_.weights);
     backend_->backward(request);
-    observeView(*backend_, *strategy_, moment_, view, request);
+    observeView(*backend_, *strategy_, moment_, index);
   }
 
   void change() {
@@ -156,7 +149,6 @@ class CloudDensifier {
   std::unique_ptr<Strategy> strategy_;  ///< outlives the backend, which draws by its activations
   std::unique_ptr<RenderBackend> backend_;
   FitViewEvaluator evaluator_;
-  ImageLossOptions loss_options_;
   TargetPicture target_;
   FitMoment moment_;
   std::vector<uint32_t> origins_;  ///< [N] row of the cloud, or kNew

@@ -4,11 +4,11 @@
 #include "train/loop/explicit_model.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "densify/strategies.h"
 #include "train/loop/backend_control.h"
 #include "train/loop/render_backend.h"
@@ -21,20 +21,6 @@ namespace {
 
 /// Iterations, of 30,000, after which harmonics get another degree.
 constexpr uint64_t kDegreeInterval = 1000;
-
-using Clock = std::chrono::steady_clock;
-
-/// Seconds since the last call.
-class Stopwatch {
- public:
-  double lap() {
-    const Clock::time_point now = Clock::now();
-    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
-  }
-
- private:
-  Clock::time_point last_ = Clock::now();
-};
 
 uint64_t smallerLimit(uint64_t a, uint64_t b) {
   return a == 0 || b == 0 ? std::max(a, b) : std::min(a, b);
@@ -60,7 +46,6 @@ class ExplicitModel final : public FitModel, private Regulariser {
     if (begins) prepare();
     step_options_.extra_rates = beginControl(*backend_, *strategy_);
     strategy_->adjustRates(rates_);
-    loss_options_.ssim_share = options.ssim_share;
   }
 
   const char* name() const override { return "explicit"; }
@@ -83,9 +68,8 @@ class ExplicitModel final : public FitModel, private Regulariser {
     report.seconds.render = watch.lap();
 
     const StatisticRequest request = strategy_->requests(moment_);
-    loss_options_.with_structure_errors = request.structure_errors || request.error_maps;
     const ImageLossValue value =
-        backend_->loss({view.target, pixel_count * 3}, loss_options_,
+        backend_->loss({view.target, pixel_count * 3}, lossFor(request, options_.ssim_share),
                        {view.weights, view.weights ? pixel_count : size_t{0}});
     const BackwardSummary summary = backend_->backward(request, this, progress);
     report.loss = value.loss + summary.regularisation;
@@ -93,7 +77,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     report.ssim = value.ssim;
     report.seconds.backward = watch.lap();
 
-    if (request.any()) observeView(*backend_, *strategy_, moment_, view, request);
+    if (request.any()) observeView(*backend_, *strategy_, moment_, view.index);
     report.seconds.edit = watch.lap();
     if (strategy_->stepGate(moment_)) {
       setRates();
@@ -199,7 +183,6 @@ class ExplicitModel final : public FitModel, private Regulariser {
   ExplicitModelOptions options_;
   std::unique_ptr<RenderBackend> backend_;
   LearningRates rates_;
-  ImageLossOptions loss_options_;
   StepOptions step_options_;
   FitMoment moment_;  ///< of the step under way
   TrainingView view_under_way_;

@@ -4,7 +4,6 @@
 #include "train/loop/field_model.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -14,6 +13,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "base/stopwatch.h"
 #include "decode/field/field_decoder.h"
 #include "density/contribution_normalisation.h"
 #include "density/learned_density.h"
@@ -66,21 +66,6 @@ constexpr uint64_t kDrawWindow = 100;
 constexpr uint64_t kLeastDraws = 8;
 /// Levels that start active where nothing is known of surfaces.
 constexpr int kEvenLevels = 4;
-
-using Clock = std::chrono::steady_clock;
-
-/// Adds the seconds that it lives to a sum.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& sum) : sum_(sum) {}
-  ~Stopwatch() { sum_ += std::chrono::duration<double>(Clock::now() - start_).count(); }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& sum_;
-  Clock::time_point start_ = Clock::now();
-};
 
 void requireOptions(const FieldModelOptions& options, std::span<const size_t> training) {
   if (training.empty()) {
@@ -212,7 +197,7 @@ class FieldModel final : public FitModel {
   StepReport structureStep() {
     StepReport report;
     report.stage = "Density";
-    Stopwatch watch(report.seconds.field);
+    const TimedBlock watch(report.seconds.field);
     DensityGradient gradient;
     report.loss = state_.density.structuralLoss(1.0, &gradient);
     stepDensity(gradient, kStructureRate);
@@ -226,13 +211,13 @@ class FieldModel final : public FitModel {
     const bool learns_density = joint && options_.density_gradient;
     AnchorSet anchors;
     {
-      Stopwatch watch(report.seconds.field);
+      const TimedBlock watch(report.seconds.field);
       anchors = drawAnchors(moment, learns_density);
       FieldDecoder(state_.field).forward(anchors, tape_, cloud_);
     }
     report.splat_count = cloud_.size();
     {
-      Stopwatch watch(report.seconds.render);
+      const TimedBlock watch(report.seconds.render);
       RenderOptions options;
       options.with_depth = false;
       options.with_background = true;
@@ -241,7 +226,7 @@ class FieldModel final : public FitModel {
       renderTiled({&instance, 1}, *view.camera, options, drawn_, picture_, progress);
     }
     {
-      Stopwatch watch(report.seconds.backward);
+      const TimedBlock watch(report.seconds.backward);
       const ImageLossValue loss = pictureLoss(view);
       report.loss = loss.loss;
       report.l1 = loss.l1;
@@ -258,18 +243,18 @@ class FieldModel final : public FitModel {
       renderBackward(drawn_, picture_, input, backward_, by_picture_, UINT64_MAX, progress);
     }
     {
-      Stopwatch watch(report.seconds.field);
+      const TimedBlock watch(report.seconds.field);
       fieldGradients(anchors, report);
       if (learns_density) densityGradients(anchors);
     }
     {
-      Stopwatch watch(report.seconds.optimiser);
+      const TimedBlock watch(report.seconds.optimiser);
       const double share = rateShare(moment);
       stepField(share);
       if (learns_density) stepDensity(by_logits_, start_.logit_rate * share);
     }
     if (learns_density) {
-      Stopwatch watch(report.seconds.edit);
+      const TimedBlock watch(report.seconds.edit);
       growDensity(anchors, moment);
     }
     return report;

@@ -16,7 +16,9 @@ constexpr char kMeasures[] = "history.measures";
 constexpr char kHistory[] = "history.";
 constexpr char kBest[] = "best.";
 constexpr uint64_t kRecordLength = 9;
-constexpr uint64_t kMeasureLength = 7;
+constexpr uint64_t kMeasureLength = 8;
+/// Of checkpoints whose best state was chosen by the views that psnr is of.
+constexpr uint64_t kShorterMeasureLength = 7;
 
 constexpr float FitRecord::*kRecordNumbers[kRecordLength] = {&FitRecord::loss,
                                                              &FitRecord::l1,
@@ -71,7 +73,8 @@ void addFitState(TensorTable& table, uint64_t iteration, const FitHistory& histo
     measures.insert(
         measures.end(),
         {static_cast<double>(m.iteration), static_cast<double>(m.budget),
-         static_cast<double>(m.splat_count), m.psnr, m.foreground_psnr, m.ssim, m.density_entropy});
+         static_cast<double>(m.splat_count), m.psnr, m.foreground_psnr, m.ssim, m.density_entropy,
+         m.training_psnr});
   }
   table[kIteration] = whole(iteration);
   table[kBestIteration] = whole(history.best_iteration);
@@ -99,10 +102,13 @@ uint64_t takeFitState(const TensorTable& table, FitHistory& history) {
   const auto found = table.find(kMeasures);
   const uint64_t measure_count =
       found == table.end() || found->second.shape.empty() ? 0 : found->second.shape[0];
-  const auto& measures = valuesOf<double>(table, kMeasures, kMeasureLength, measure_count);
+  const bool is_shorter = found != table.end() && found->second.shape.size() == 2 &&
+                          found->second.shape[1] == kShorterMeasureLength;
+  const uint64_t length = is_shorter ? kShorterMeasureLength : kMeasureLength;
+  const auto& measures = valuesOf<double>(table, kMeasures, length, measure_count);
   history.measures.assign(measure_count, {});
   for (size_t i = 0; i < measure_count; ++i) {
-    const double* row = &measures[i * kMeasureLength];
+    const double* row = &measures[i * length];
     history.measures[i] = {static_cast<uint64_t>(row[0]),
                            static_cast<uint64_t>(row[1]),
                            static_cast<uint64_t>(row[2]),
@@ -110,6 +116,7 @@ uint64_t takeFitState(const TensorTable& table, FitHistory& history) {
                            row[4],
                            row[5],
                            row[6]};
+    if (!is_shorter) history.measures[i].training_psnr = row[7];
   }
   return iteration;
 }

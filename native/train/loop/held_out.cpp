@@ -92,6 +92,23 @@ double extentOfCameras(const ViewSource& views, std::span<const size_t> chosen) 
 
 FitMeasure ViewMeasure::measure(const SplatCloud& cloud, PictureStore& pictures,
                                 std::span<const size_t> chosen, const double background[3]) {
+  FitMeasure mean = sumOver(cloud, pictures, chosen, background, true);
+  const double count = static_cast<double>(chosen.size());
+  mean.psnr /= count;
+  mean.foreground_psnr /= count;
+  mean.ssim /= count;
+  return mean;
+}
+
+double ViewMeasure::meanPsnr(const SplatCloud& cloud, PictureStore& pictures,
+                             std::span<const size_t> chosen, const double background[3]) {
+  return sumOver(cloud, pictures, chosen, background, false).psnr /
+         static_cast<double>(chosen.size());
+}
+
+FitMeasure ViewMeasure::sumOver(const SplatCloud& cloud, PictureStore& pictures,
+                                std::span<const size_t> chosen, const double background[3],
+                                bool with_ssim) {
   FitMeasure sum;
   sum.splat_count = cloud.size();
   RenderOptions options;
@@ -119,6 +136,7 @@ FitMeasure ViewMeasure::measure(const SplatCloud& cloud, PictureStore& pictures,
     });
     const double psnr = psnrOf(seen_, target_.colour, target_.weights);
     sum.psnr += psnr;
+    if (!with_ssim) continue;
     sum.foreground_psnr += foreground_.empty() ? psnr : psnrOf(seen_, target_.colour, foreground_);
     sum.ssim += loss_
                     .evaluate(target_.width, target_.height, {seen_.data(), PixelLayout::kRgb},
@@ -126,10 +144,6 @@ FitMeasure ViewMeasure::measure(const SplatCloud& cloud, PictureStore& pictures,
                               target_.weights.empty() ? nullptr : target_.weights.data(), {})
                     .ssim;
   }
-  const double count = static_cast<double>(chosen.size());
-  sum.psnr /= count;
-  sum.foreground_psnr /= count;
-  sum.ssim /= count;
   return sum;
 }
 

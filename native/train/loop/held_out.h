@@ -34,11 +34,18 @@ class ViewMeasure {
   /// Mean PSNR and SSIM over views. Colours are held to 0..1 and compared in display space; SSIM as
   /// image_loss.h has it. Views with alpha stand over `background`. Pixels that a mask leaves out
   /// count for nothing.
-  /// In: chosen: views of the store, at least one. Out: iteration, budget, entropy are left alone.
+  /// In: chosen: views of the store, at least one. Out: PSNR, SSIM and the count; the rest is left
+  /// alone.
   FitMeasure measure(const SplatCloud& cloud, PictureStore& pictures,
                      std::span<const size_t> chosen, const double background[3]);
+  /// PSNR of the same alone.
+  double meanPsnr(const SplatCloud& cloud, PictureStore& pictures, std::span<const size_t> chosen,
+                  const double background[3]);
 
  private:
+  FitMeasure sumOver(const SplatCloud& cloud, PictureStore& pictures,
+                     std::span<const size_t> chosen, const double background[3], bool with_ssim);
+
   RenderWorkspace workspace_;
   RenderResult drawn_;
   ImageLoss loss_;

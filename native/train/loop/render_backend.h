@@ -13,6 +13,7 @@
 #include "densify/strategy.h"
 #include "math/camera.h"
 #include "splat/render/render.h"
+#include "train/loop/view_pass.h"
 #include "train/optimiser/adam.h"
 #include "train/optimiser/image_loss.h"
 
@@ -45,14 +46,6 @@ class Regulariser {
   /// Beside that: weight of the mean transmittance behind the last splat of each pixel. Where it is
   /// not 0, the picture must have been drawn with transmittance.
   virtual double transmittanceWeight() const { return 0; }
-};
-
-/// Of one backward pass; what they are is said at SplatGradients and BackwardResult.
-struct BackwardSummary {
-  std::array<double, 6> camera{};
-  std::array<double, 3> background{};
-  uint64_t visible_count = 0;
-  double regularisation = 0;  ///< value of the regulariser
 };
 
 /// Everything of a fit that a checkpoint has to keep.
@@ -106,7 +99,8 @@ class RenderBackend {
   /// [H,W] >= 0, or empty: 1.
   virtual ImageLossValue loss(uint32_t target, const ImageLossOptions& options,
                               std::span<const float> weights = {}) = 0;
-  /// The same against a picture [H,W,3] that is not kept: the caller's, until backward() is done.
+  /// The same against a picture [H,W,3] that is not kept: it and the weights are the caller's until
+  /// the last call about this view.
   virtual ImageLossValue loss(std::span<const float> target, const ImageLossOptions& options,
                               std::span<const float> weights = {}) = 0;
 
@@ -131,12 +125,9 @@ class RenderBackend {
   virtual RawSplats gradients() const = 0;
   /// [N] or as stated, of the last backward pass; refused where it was not asked for.
   virtual std::vector<float> statistic(Statistic statistic) const = 0;
-  /// All that were asked for, and which splats passed culling. Out: visible and arrays, valid until
-  /// the next call; the rest of `statistics` is left alone.
+  /// All that a strategy is told of the last backward pass. Out: everything but the number of the
+  /// view, valid until the next call.
   virtual void lendStatistics(ViewStatistics& statistics) = 0;
-  /// The picture that was drawn last, and its structure errors; refused where the loss was without
-  /// them. The rest of `errors` is left alone.
-  virtual void lendErrors(ViewErrors& errors) = 0;
 };
 
 /// On this processor, with native/splat, train/image_loss and train/adam.

@@ -1,7 +1,6 @@
 #include "train/loop/trainer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -9,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "base/stopwatch.h"
 #include "train/loop/contributions.h"
 #include "train/loop/fit_state.h"
 
@@ -20,6 +20,10 @@ namespace {
 /// something, few enough to take no time beside the steps.
 constexpr size_t kMeasuredViews = 8;
 constexpr size_t kFinallyMeasuredViews = 200;
+/// Views that are learned from, by which the best state is chosen: as many as a measurement has.
+/// States that are measured one after the other differ by tenths of a dB where one is spoilt, and
+/// the views are the same each time, so that what tells views apart cancels.
+constexpr size_t kChoosingViews = 8;
 // Of previews, that contributions are measured over.
 constexpr size_t kPreviewedViews = 8;
 constexpr uint64_t kMeasuresPerFit = 20;
@@ -29,12 +33,6 @@ constexpr size_t kRecentIterations = 50;
 constexpr uint64_t kEstimateSteps = 20;
 /// Of those, the first ones allocate and load; they are left out of the estimate.
 constexpr uint64_t kWarmUpSteps = 5;
-
-using Clock = std::chrono::steady_clock;
-
-double secondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// At most `count` of them, evenly.
 std::vector<size_t> someOf(const std::vector<size_t>& views, size_t count) {
@@ -82,8 +80,8 @@ void requireOptions(const TrainerOptions& options) {
 
 /// Clocks of one run; nothing of it reaches a result.
 struct Trainer::Pace {
-  Clock::time_point start = Clock::now();
-  Clock::time_point saved = Clock::now();
+  Stopwatch begun;
+  Stopwatch saved;  ///< since the last checkpoint
   uint64_t first_iteration = 0;
   std::vector<double> step_seconds;  ///< of this run
   std::optional<double> estimated_seconds;
@@ -103,6 +101,7 @@ Trainer::Trainer(std::shared_ptr<const ViewSource> views, FitViews split,
       pictures_(std::move(views), options.picture_bytes),
       split_(std::move(split)),
       measured_(someOf(viewsToMeasure(split_), kMeasuredViews)),
+      choosing_(someOf(split_.training, kChoosingViews)),
       model_(std::move(model)),
       extent_(1.0),
       order_(split_.training.size(), options.seed) {
@@ -139,7 +138,7 @@ void Trainer::backgroundOf(uint64_t iteration, double background[3]) const {
 }
 
 void Trainer::step(Pace& pace) {
-  const Clock::time_point start = Clock::now();
+  const Stopwatch watch;
   FitMoment moment;
   moment.iteration = iteration_ + 1;
   moment.iterations = options_.iterations;
@@ -165,24 +164,32 @@ void Trainer::step(Pace& pace) {
   const StepReport report = model_->step(moment, view, evaluator_.get(), nullptr);
   stage_ = report.stage;
   ++iteration_;
-  const double seconds = secondsSince(start);
+  const double seconds = watch.seconds();
   history_.records.push_back(recordOf(report, seconds));
   pace.step_seconds.push_back(seconds);
 }
 
 void Trainer::measure() {
-  double background[3];
-  backgroundOf(0, background);
-  FitMeasure measure = measure_.measure(model_->splats(0), pictures_, measured_, background);
+  FitMeasure measure = measureOf(model_->splats(0), measured_);
   measure.iteration = iteration_;
-  measure.density_entropy =
-      model_->densityEntropy().value_or(std::numeric_limits<double>::quiet_NaN());
+  // Views that are held out judge the result; who chose it by them would flatter it.
   double best = -std::numeric_limits<double>::infinity();
-  for (const FitMeasure& earlier : history_.measures) best = std::max(best, earlier.psnr);
+  for (const FitMeasure& earlier : history_.measures) best = std::max(best, earlier.training_psnr);
   history_.measures.push_back(measure);
-  if (measure.psnr < best) return;
+  if (measure.training_psnr < best) return;
   history_.best_iteration = iteration_;
   best_.reset();
+}
+
+/// In: views: that the figures are of; the choice of the best looks at others.
+FitMeasure Trainer::measureOf(const SplatCloud& splats, std::span<const size_t> views) {
+  double background[3];
+  backgroundOf(0, background);
+  FitMeasure measure = measure_.measure(splats, pictures_, views, background);
+  measure.training_psnr = measure_.meanPsnr(splats, pictures_, choosing_, background);
+  measure.density_entropy =
+      model_->densityEntropy().value_or(std::numeric_limits<double>::quiet_NaN());
+  return measure;
 }
 
 void Trainer::keepBest() {
@@ -195,14 +202,10 @@ void Trainer::measureBudgets() {
   const std::vector<size_t> views = someOf(viewsToMeasure(split_), kFinallyMeasuredViews);
   history_.measured_view_count = views.size();
   history_.by_budget.clear();
-  double background[3];
-  backgroundOf(0, background);
   for (const uint64_t budget : model_->budgets()) {
-    FitMeasure measure = measure_.measure(model_->splats(budget), pictures_, views, background);
+    FitMeasure measure = measureOf(model_->splats(budget), views);
     measure.iteration = history_.best_iteration;
     measure.budget = budget;
-    measure.density_entropy =
-        model_->densityEntropy().value_or(std::numeric_limits<double>::quiet_NaN());
     history_.by_budget.push_back(measure);
   }
 }
@@ -223,7 +226,7 @@ void Trainer::save(FitObserver& observer, Pace& pace) {
   } catch (const Error& error) {
     observer.note(std::string("the checkpoint is not saved: ") + error.what());
   }
-  pace.saved = Clock::now();
+  pace.saved = Stopwatch();
 }
 
 void Trainer::report(FitObserver& observer, const Pace& pace) const {
@@ -243,7 +246,7 @@ void Trainer::report(FitObserver& observer, const Pace& pace) const {
     if (measure.iteration == history_.best_iteration) figures.best_psnr = measure.psnr;
   }
   figures.best_iteration = history_.best_iteration;
-  figures.seconds = secondsSince(pace.start);
+  figures.seconds = pace.begun.seconds();
   figures.seconds_left = pace.recent() * static_cast<double>(options_.iterations - iteration_);
   figures.estimated_seconds = pace.estimated_seconds;
   figures.estimated_bytes = pace.estimated_bytes;
@@ -275,13 +278,13 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
           std::accumulate(pace.step_seconds.begin() + kWarmUpSteps, pace.step_seconds.end(), 0.0) /
           static_cast<double>(kEstimateSteps - kWarmUpSteps);
       pace.estimated_seconds =
-          secondsSince(pace.start) + mean * static_cast<double>(options_.iterations - iteration_);
+          pace.begun.seconds() + mean * static_cast<double>(options_.iterations - iteration_);
       pace.estimated_bytes = memoryBytes();
     }
     const bool interval_is_over =
         options_.checkpoint_interval > 0 && iteration_ % options_.checkpoint_interval == 0;
     const bool time_is_over =
-        options_.checkpoint_seconds > 0 && secondsSince(pace.saved) >= options_.checkpoint_seconds;
+        options_.checkpoint_seconds > 0 && pace.saved.seconds() >= options_.checkpoint_seconds;
     if (interval_is_over || time_is_over) save(observer, pace);
     if (observer.wantsPreview()) {
       const size_t views = observer.wantsContributions() ? kPreviewedViews : 0;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -79,7 +80,7 @@ class FitObserver {
 enum class FitEnd { kWhole, kStopped };
 
 /// Trains a model on views: chooses views, keeps their pictures, measures on held-out ones, keeps
-/// the best, saves and goes on. The same for every kind of model.
+/// the state that shows a fixed few of those that it learns from best, saves and goes on. The same for every kind of model.
 /// Determinism: the same views, options and model give the same bits, for any number of threads,
 /// any limit of memory and wherever the fit was stopped and restored in between.
 class Trainer {
@@ -91,8 +92,9 @@ class Trainer {
   ~Trainer();
 
   /// Takes all steps that are left, until progress is cancelled; then gives the model the state
-  /// that did best on held-out views and measures it at all its budgets. Where there are too few
-  /// views to hold any out, those of training are measured.
+  /// that did best on some of the views it learned from, evenly chosen, and measures it at all its
+  /// budgets on held-out views, which choose nothing. Where there are too few views to hold any
+  /// out, those of training are measured.
   /// Errors: of a view that cannot be loaded, and of a step, after the best has been brought back:
   /// the model is as good as if the fit had been cancelled.
   FitEnd run(FitObserver& observer, Progress* progress = nullptr);
@@ -118,6 +120,7 @@ class Trainer {
   void step(Pace& pace);
   bool measureIsDue() const;
   void measure();
+  FitMeasure measureOf(const SplatCloud& splats, std::span<const size_t> views);
   void save(FitObserver& observer, Pace& pace);
   void report(FitObserver& observer, const Pace& pace) const;
   void keepBest();
@@ -130,6 +133,7 @@ class Trainer {
   PictureStore pictures_;
   FitViews split_;
   std::vector<size_t> measured_;  ///< views, while it runs
+  std::vector<size_t> choosing_;  ///< views that the best state is chosen by
   std::unique_ptr<FitModel> model_;
   double extent_;
   ViewOrder order_;

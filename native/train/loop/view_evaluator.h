@@ -3,13 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "densify/strategy.h"
-#include "splat/render/render_backward.h"
 #include "train/loop/picture_store.h"
-#include "train/optimiser/image_loss.h"
+#include "train/loop/view_pass.h"
 
 namespace stipple {
 
@@ -41,18 +41,10 @@ class FitViewEvaluator final : public ViewEvaluator {
   PictureStore& pictures_;
   const std::vector<size_t>& training_;
   double background_[3];
-  ImageLossOptions loss_options_;
+  double ssim_share_;
   std::optional<SplatCloud> cloud_;
-  RenderWorkspace workspace_;
-  RenderResult drawn_;
-  BackwardWorkspace backward_workspace_;
-  BackwardResult backward_;
-  ImageLoss loss_;
+  std::unique_ptr<ViewPass> pass_;
   TargetPicture target_;
-  std::vector<float> colour_gradient_;  ///< [H,W,4]
-  std::vector<float> residual_;         ///< [H,W,3]
-  std::vector<float> made_errors_;      ///< [H,W] of StatisticRequest::errors_of
-  std::vector<uint8_t> visible_;
   ViewStatistics statistics_;
 };
 

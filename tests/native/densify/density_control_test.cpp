@@ -18,13 +18,16 @@ using namespace stipple::testing;
 /// Decides nothing; stands where roles matter alone.
 class Owner final : public ControlPart {
  public:
-  Owner(const char* name, ControlRoles owned) : name_(name), owned_(owned) {}
+  Owner(const char* name, ControlRoles owned, ControlRoles needed = 0)
+      : name_(name), owned_(owned), needed_(needed) {}
   const char* name() const override { return name_; }
   ControlRoles owns() const override { return owned_; }
+  ControlRoles needs() const override { return needed_; }
 
  private:
   const char* name_;
   ControlRoles owned_;
+  ControlRoles needed_;
 };
 
 std::vector<std::string> namesOf(const ControlAssembly& assembly) {
@@ -49,6 +52,18 @@ TEST(DensityControl, RefusesTwoOwnersOfOneDecisionByName) {
     addPart(assembly, std::make_unique<Owner>("narrow", roles(ControlRole::kChildOpacity)));
   });
   EXPECT_EQ(message, "narrow does not go with wide: both decide the opacity of children");
+}
+
+TEST(DensityControl, RefusesAPartWhoseNeedNobodyMeetsWhateverTheRole) {
+  for (uint32_t bit = 0; bit < kControlRoleCount; ++bit) {
+    const ControlRole role = static_cast<ControlRole>(1u << bit);
+    ASSERT_STRNE(wordsOf(role), "") << bit;
+    ControlAssembly assembly;
+    addPart(assembly, std::make_unique<Owner>("needy", 0, roles(role)));
+    EXPECT_EQ(messageOf([&] { makeDensityControl("own", std::move(assembly)); }),
+              std::string("needy does not go with own: nothing there decides ") + wordsOf(role));
+  }
+  EXPECT_STREQ(wordsOf(static_cast<ControlRole>(1u << kControlRoleCount)), "");
 }
 
 TEST(DensityControl, RefusesPartsThatNobodyWouldAsk) {

@@ -27,13 +27,14 @@ struct KnownView {
   std::vector<float> picture;  ///< [H,W,3]
   std::vector<uint8_t> visible;
   std::array<std::vector<float>, kStatisticCount> statistics;
+  double loss = 0.5;
   std::vector<float>& of(Statistic one) { return statistics[static_cast<size_t>(one)]; }
 };
 
 /// A view whose target and picture are of one colour each.
 inline KnownView plainView(const Camera& camera, float target, float picture) {
   const size_t count = size_t{camera.width} * camera.height * 3;
-  return {camera, std::vector<float>(count, target), std::vector<float>(count, picture), {}, {}};
+  return {camera, std::vector<float>(count, target), std::vector<float>(count, picture), {}, {}, 0.5};
 }
 
 class KnownViews final : public ViewEvaluator {
@@ -63,7 +64,7 @@ class KnownViews final : public ViewEvaluator {
     statistics_.width = known.camera.width;
     statistics_.height = known.camera.height;
     statistics_.camera = &known.camera;
-    statistics_.loss = 0.5;
+    statistics_.loss = known.loss;
     statistics_.visible = known.visible;
     statistics_.splats = {cloud.positions, cloud.rotations, cloud.scales, cloud.opacities};
     for (size_t k = 0; k < kStatisticCount; ++k) statistics_.arrays[k] = known.statistics[k];

@@ -68,6 +68,7 @@ class ConstantModel final : public DensityModel {
  public:
   ConstantModel(int leaf_level, std::array<float, 8> logs) : leaf_level_(leaf_level), logs_(logs) {}
   int leafLevel() const override { return leaf_level_; }
+  const RootCube& root() const override { return root_; }
   void childLogProbabilities(int, std::span<const uint64_t> cells,
                              std::span<float> out) const override {
     for (size_t i = 0; i < 8 * cells.size(); ++i) out[i] = logs_[i % 8];
@@ -76,6 +77,7 @@ class ConstantModel final : public DensityModel {
  private:
   int leaf_level_;
   std::array<float, 8> logs_;
+  RootCube root_;
 };
 
 }  // namespace stipple

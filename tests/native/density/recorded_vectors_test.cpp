@@ -21,6 +21,7 @@ class FrontierModel final : public DensityModel {
   using Logit = double (*)(size_t parent, size_t child, int level);
   explicit FrontierModel(Logit logit) : logit_(logit) {}
   int leafLevel() const override { return 8; }
+  const RootCube& root() const override { return root_; }
   void childLogProbabilities(int level, std::span<const uint64_t> cells,
                              std::span<float> out) const override {
     asked.emplace_back(cells.begin(), cells.end());
@@ -38,6 +39,7 @@ class FrontierModel final : public DensityModel {
 
  private:
   Logit logit_;
+  RootCube root_;
 };
 
 TEST(RecordedVectors, T1FollowsTheForcedPathToItsLeaf) {

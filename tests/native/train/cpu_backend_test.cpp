@@ -374,14 +374,24 @@ TEST(CpuBackend, LendsWhatAPassGathered) {
   const std::vector<float> wanted = target(721);
   ViewStatistics statistics;
   EXPECT_THAT(messageOf([&] { backend->lendStatistics(statistics); }), HasSubstr("backward first"));
-  EXPECT_THAT(messageOf([&] { backend->lendErrors(statistics.errors); }), HasSubstr("loss first"));
   backend->forward(camera(), overGrey());
-  backend->loss(wanted, {});
+  const double loss = backend->loss(wanted, {}).loss;
   StatisticRequest request;
   request.screen_gradients = true;
   const BackwardSummary summary = backend->backward(request);
-  EXPECT_THAT(messageOf([&] { backend->lendErrors(statistics.errors); }),
+  statistics.view = 4;
+  backend->lendStatistics(statistics);
+  EXPECT_EQ(statistics.view, 4u);
+  EXPECT_EQ(statistics.loss, loss);
+  EXPECT_EQ(statistics.camera, &camera());
+  EXPECT_EQ(statistics.width, camera().width);
+  EXPECT_EQ(statistics.height, camera().height);
+  EXPECT_TRUE(statistics.errors.structure.empty());
+  request.error_maps = true;
+  EXPECT_THAT(messageOf([&] { backend->backward(request); }),
               HasSubstr("the loss's error map holds 0 values"));
+  request.error_maps = false;
+  backend->backward(request);
   backend->lendStatistics(statistics);
   EXPECT_TRUE(std::equal(statistics.splats.positions.begin(), statistics.splats.positions.end(),
                          cloud.positions.begin(), cloud.positions.end()));
@@ -404,13 +414,16 @@ TEST(CpuBackend, LendsTheErrorsOfItsLastPicture) {
   const auto backend = makeCpuBackend();
   backend->upload(smallCloud(40, 0, 720));
   std::vector<float> wanted = target(721);
-  ImageLossOptions options;
-  options.with_structure_errors = true;
+  StatisticRequest request;
+  request.error_maps = true;
   backend->forward(camera(), overGrey());
-  const ImageLossValue value = backend->loss(wanted, options);
-  ViewErrors errors;
-  backend->lendErrors(errors);
-  errors.target = wanted;
+  const ImageLossValue value = backend->loss(wanted, lossFor(request, 0.2));
+  backend->backward(request);
+  ViewStatistics statistics;
+  backend->lendStatistics(statistics);
+  ViewErrors errors = statistics.errors;
+  EXPECT_EQ(errors.target.data(), wanted.data());
+  EXPECT_TRUE(errors.weights.empty());
   const size_t pixels = wanted.size() / 3;
   ASSERT_EQ(errors.structure.size(), pixels);
   double structure = 0, difference = 0;

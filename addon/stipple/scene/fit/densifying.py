@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ...binding.cloud import Cloud
 from ...binding.densify import densify_start
 from ...binding.errors import invalid
 from ...binding.model import Model
@@ -50,10 +51,10 @@ class DensifyTask(ViewTask):
         self.job = densify_start(self._native, self._cloud, views, **self._chosen)
         try:
             yield from self._until_done(self.job, VIEWS_END, _SPLATS_END)
-            made = self.job.cloud()
+            made = Cloud.of_job(self.job)
             self.job = Model.from_cloud_start(self._native, made, seed=self._chosen['seed'])
             yield from self._until_done(self.job, _SPLATS_END, 1.0)
-            self.result = self.job.model(), made
+            self.result = Model.of_job(self.job), made
         finally:
             self.job = None
 

@@ -55,8 +55,7 @@ class Result:
     splats: object      # SplatArrays at the budget of the viewport
     path: str           # of the asset file
     decoding: object    # DecodeSettings of these splats
-    kind: str           # source kind: 'TREE', or 'MODEL' of a field
-    info: object        # StippleModelInfo of the asset
+    settings: object    # StippleModelSettings of the asset
     report: object      # picture of the fit's curves, [H,W,4]
 
 
@@ -173,16 +172,14 @@ class FitTask(ViewTask):
         is_whole = state.figures.iteration == state.figures.iterations
         yield _FIT_END, 'Keeping the result'
         if is_field:
-            info = made.info()
-            decoding = DecodeSettings(info.most_anchors, info.gaussians_per_anchor)  # seed 0: the fit's own draws
-            self._keep(made, decoding, 'MODEL', report)
+            self._keep(made, sources.first_settings(made.settings()), report)  # seed 0: the fit's own draws
             self._forget(checkpoint if is_whole else None)
             return
         seen = made.seen()
         made = cloud_edit.merge([(made, np.eye(4))], self._frame)  # the same splats, with the label of their frame
         job = Model.from_cloud_start(self._native, made, seed=settings.seed)
         yield from self._until_done(job, _FIT_END, 1.0)
-        self._keep(job.model(), DecodeSettings(made.info().count), 'TREE', report, seen)
+        self._keep(Model.of_job(job), DecodeSettings(made.info().count), report, seen)
         self._forget(checkpoint if is_whole else None)
 
     @staticmethod
@@ -191,11 +188,11 @@ class FitTask(ViewTask):
         if checkpoint is not None:
             checkpoint.unlink(missing_ok=True)
 
-    def _keep(self, model, decoding, kind, report, seen=None):
+    def _keep(self, model, decoding, report, seen=None):
         """seen: of the splats at these settings."""
         path = sources.save_model(model, self._path or sources.model_path_for(state.name), bool(self._path))
         sources.remember_model(path, model)
-        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, kind, model.info(),
+        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, model.settings(),
                              report)
         self.result.splats.seen = seen or {}
         state.kept_count = self.result.splats.count

@@ -18,10 +18,11 @@ import numpy as np
 
 from ... import version
 from ...binding.errors import StippleError, invalid
+from ...binding.image import ImageChannels
 from ...binding.structs import Status
 from ...cycles_functions import CyclesRender, functions
-from ..source import splat_data
-from ..view import cameras, exr_layers
+from ..source import sources, splat_data
+from ..view import cameras
 
 ENGINES = {'CYCLES': 'CYCLES', 'EEVEE': version.EEVEE_ENGINE, 'WORKBENCH': 'BLENDER_WORKBENCH'}
 _CAPTURE_ENGINE = 'STIPPLE_CAPTURE'
@@ -180,14 +181,12 @@ class Capture:
 
     def _read_file(self):
         try:
-            channels = exr_layers.read(self._path)
+            self._passes.update(layers_of(ImageChannels.load(sources.context(), self._path)))
             os.truncate(self._path, 0)  # an old picture never passes for a new one
-        except (OSError, ValueError) as error:
+        except StippleError as error:
+            raise StippleError(f'A rendered view cannot be read: {error}', error.status) from None
+        except OSError as error:
             raise StippleError(f'A rendered view cannot be read: {error}', Status.ERROR_IO) from None
-        for name, letters in (('Combined', 'RGBA'), ('Depth', 'Z'), ('Normal', 'XYZ')):
-            planes = [next((v for k, v in channels.items() if k.endswith(f'{name}.{letter}')), None) for letter in letters]
-            if all(plane is not None for plane in planes):
-                self._passes[name] = np.stack(planes, axis=-1).astype(np.float32)
 
     def _captured(self, name, camera):
         linear = np.ascontiguousarray(self._passes['Combined'], np.float32)
@@ -206,6 +205,17 @@ class Capture:
             known = is_known[..., None] & (length > 0.5)
             normals = np.where(known, self._passes['Normal'] / np.maximum(length, 1e-9), 0).astype(np.float32)
         return Captured(name, camera, linear, np.where(is_known, depth, 0).astype(np.float32), normals)
+
+
+def layers_of(channels):
+    """{pass: [H,W,n]} of the passes that an ImageChannels has whole, whatever its view layer is called."""
+    names, found = channels.names(), {}
+    for name, letters in (('Combined', 'RGBA'), ('Depth', 'Z'), ('Normal', 'XYZ')):
+        places = [next((i for i, full in enumerate(names) if full.endswith(f'{name}.{letter}')), None)
+                  for letter in letters]
+        if None not in places:
+            found[name] = np.stack([channels.read(place) for place in places], axis=-1)
+    return found
 
 
 def _picture_path(stack):

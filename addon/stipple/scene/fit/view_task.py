@@ -124,7 +124,7 @@ class ViewTask:
         mesh = meshes.native_mesh(self._native, seen, depsgraph, 'MATERIAL')
         job = Model.from_mesh_start(self._native, mesh, 0.0, self._settings.seed)
         yield from self._until_done(job, 0.0, _POINTS_END)
-        cloud = job.model().decode(DecodeSettings(POINT_COUNT, 1, seed=self._settings.seed)).read()
+        cloud = Model.of_job(job).decode(DecodeSettings(POINT_COUNT, 1, seed=self._settings.seed)).read()
         views.set_points(cloud.positions, _linear_colours(cloud))
 
     def _add_views(self, views):

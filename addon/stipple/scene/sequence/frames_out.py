@@ -10,7 +10,7 @@ from ...binding.errors import StippleError, invalid
 from ...binding.grade import GradeSettings, graded
 from .. import grades
 from . import sequences
-from ..source import placement, sources, splat_data, sync
+from ..source import placement, source_settings, sources, splat_data, sync
 
 FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
           ('SERIES', "Whole Series", "Each file of the active object's series once, all objects placed as they are now"),
@@ -112,7 +112,7 @@ def _fixed_clouds(objects, with_models):
     fixed = {}
     for obj in objects:
         stipple = obj.data.stipple
-        changes = stipple.is_sequence or (stipple.source_kind in sources.MODEL_KINDS and not with_models)
+        changes = stipple.is_sequence or (source_settings.of(stipple).has_budget and not with_models)
         if not changes or stipple.edited or sync.is_edited(obj.data):
             fixed[obj] = sources.ungraded_cloud(obj)
     return fixed

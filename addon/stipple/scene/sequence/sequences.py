@@ -19,7 +19,7 @@ from ...binding.errors import StippleError, invalid
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import JobState, Status
 from . import numbered
-from ..source import masks, sources
+from ..source import masks, source_settings, sources
 
 # As Blender's own volume sequences name them.
 MODES = (('CLIP', "Clip", "Nothing before the first and after the last file"),
@@ -29,7 +29,7 @@ MODES = (('CLIP', "Clip", "Nothing before the first and after the last file"),
 GAPS = (('ERROR', "Stop", "A missing file is an error: the panel says so, and a render fails"),
         ('HOLD', "Hold Previous", "In place of a missing file, the one before it is shown"))
 
-_entries = OrderedDict()  # (path, time, size, kind) → _Entry, the one used last at the end
+_entries = OrderedDict()  # (path, time, size, of models) → _Entry, the one used last at the end
 _played = {}              # full name of a datablock → (frame shown last, direction of play)
 
 
@@ -51,7 +51,7 @@ class Frame:
     key: str
     path: str = ''
     stamp: tuple = ()     # time and size of the file
-    kind: str = 'CLOUD'
+    of_models: bool = False  # files are models, else splats as they are
     ratio: float = None   # of the file's splats, or
     count: int = None     # as many as this; neither: all
     most: int = None      # limit on top, while a slider is dragged
@@ -61,16 +61,15 @@ class Frame:
         """The splats as a native cloud; None where the series shows nothing. Errors: StippleError."""
         if not self.path:
             return None
-        entry = _read(self.path, self.stamp, self.kind)
-        _read_ahead(self.ahead, self.kind, entry)
+        entry = _read(self.path, self.stamp, self.of_models)
+        _read_ahead(self.ahead, self.of_models, entry)
         return self._cut(entry)
 
     def read_anew(self, native):
         """The same without the cache: for workers, which must not share it."""
         if not self.path:
             return None
-        load = Cloud.load if self.kind == 'CLOUD' else Model.load
-        return self._cut(_filled(_Entry(), load(native, self.path)))
+        return self._cut(_filled(_Entry(), _noun(self.of_models).load(native, self.path)))
 
     def _cut(self, entry):
         count = self._budget(entry.count)
@@ -87,7 +86,7 @@ class Frame:
 
     def available(self):
         """Splats in the file. Errors: StippleError."""
-        return _read(self.path, self.stamp, self.kind).count if self.path else 0
+        return _read(self.path, self.stamp, self.of_models).count if self.path else 0
 
     def splats(self):
         """cloud() as what is stored; that of a series that shows nothing is empty."""
@@ -97,12 +96,12 @@ class Frame:
         return SplatArrays(*(np.empty(shape, np.float32) for shape in ((0, 3), (0, 4), (0, 3), (0,), (0, 1, 3))))
 
 
-def attach(data, path, count, kind='CLOUD'):
+def attach(data, path, count, of_models=False):
     """Notes a series of this many files as the source of a datablock; path: the first. The rest of its timing stays."""
-    if kind == 'CLOUD':
-        sources.attach_cloud(data, path)
-    else:
+    if of_models:
         sources.attach_tree(data, path, 0)
+    else:
+        sources.attach_cloud(data, path)
     masks.clear(data)
     data.stipple.frame_duration = count
     data.stipple.is_sequence = True
@@ -172,7 +171,7 @@ def frame_of_file(data, stipple, path, mode, most=None, ahead=()):
             count = stipple.anchors_render if rendering and stipple.anchors_render != 0 else stipple.anchors
             DecodeSettings(count).check()
     key = f'{os.path.basename(path)}|{stamp[0]}|{stamp[1]}|{ratio}|{count}|{most}'
-    return Frame(key, path, stamp, stipple.source_kind, ratio, count, most, ahead)
+    return Frame(key, path, stamp, source_settings.of(stipple).has_budget, ratio, count, most, ahead)
 
 
 def forget():
@@ -198,16 +197,19 @@ def _stamp(path):
     return status.st_mtime_ns, status.st_size
 
 
-def _read(path, stamp, kind):
+def _noun(of_models):
+    return Model if of_models else Cloud
+
+
+def _read(path, stamp, of_models):
     """The entry of a file, read now unless it has been read ahead. Errors: StippleError."""
-    key = (path, *stamp, kind)
+    key = (path, *stamp, of_models)
     entry = _entries.pop(key, None)
     if entry is None:
-        load = Cloud.load if kind == 'CLOUD' else Model.load
-        entry = _filled(_Entry(), load(sources.context(), path))
+        entry = _filled(_Entry(), _noun(of_models).load(sources.context(), path))
     elif entry.job is not None:
         entry.job.wait()
-        _filled(entry, entry.job.cloud() if kind == 'CLOUD' else entry.job.model())
+        _filled(entry, _noun(of_models).of_job(entry.job))
     _entries[key] = entry
     _trim([entry])
     return entry
@@ -256,13 +258,12 @@ def _ahead(data, stipple, frame, path):
     return tuple(found)
 
 
-def _read_ahead(paths, kind, shown):
+def _read_ahead(paths, of_models, shown):
     """Starts reading files that are shown soon, as far as the cache has room beside what is shown now."""
     room, kept = _limits()[0] - shown.size, [shown]
-    start = Cloud.load_start if kind == 'CLOUD' else Model.load_start
     for path in paths:
         try:
-            key = (path, *_stamp(path), kind)
+            key = (path, *_stamp(path), of_models)
         except StippleError:
             continue
         entry = _entries.get(key)
@@ -271,7 +272,7 @@ def _read_ahead(paths, kind, shown):
         if room < 0:
             break
         if entry is None:
-            entry = _entries[key] = _Entry(start(sources.context(), path), size=key[2])
+            entry = _entries[key] = _Entry(_noun(of_models).load_start(sources.context(), path), size=key[2])
         _entries.move_to_end(key)
         kept.append(entry)
     _trim(kept)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...binding.cloud import Cloud
 from ...binding.errors import invalid
-from . import masks, sources, splat_data, sync
+from . import masks, source_settings, sources, splat_data, sync
 
 
 @dataclass
@@ -87,7 +87,7 @@ def write(edited):
 def show(data, cloud=None):
     """Writes the splats of a datablock anew after its mask has changed. cloud: the whole source, where it is at hand."""
     settings = sources.decode_settings(data.stipple)
-    if data.stipple.source_kind == 'CLOUD' and cloud is not None:
+    if source_settings.of(data.stipple).as_they_are and cloud is not None:
         splats = sources.masked(cloud, data)
     else:
         splats = sources.decode_data(data, settings)
@@ -106,8 +106,9 @@ def _check(obj):
     if data.library is not None:
         raise invalid(f"'{obj.name}' is linked from another file; make it local first.")
     refuse_sequence(obj)
-    if data.stipple.source_kind == 'MODEL':
-        made = 'decoded from a learned field' if data.stipple.learned_gaussians else 'made from meshes'
+    known = source_settings.of(data.stipple)
+    if not known.takes_mask:
+        made = 'decoded from a learned field' if known.is_learned else 'made from meshes'
         raise invalid(f"'{obj.name}' is {made}, so there are no splats of a file to hide; choose Use as New Source first, "
                       'which keeps the present ones.')
     if data.stipple.edited or sync.is_edited(data):
@@ -117,7 +118,7 @@ def _check(obj):
 def _source_of(obj):
     """The whole cloud of the source; splats that have none get a file of their own first."""
     data = obj.data
-    if data.stipple.source_kind == 'NONE' or not data.stipple.source:
+    if not source_settings.of(data.stipple).has_source or not data.stipple.source:
         path = sources.save_cloud(sources.ungraded_cloud(obj), obj.name)
         with sync.paused():
             sources.attach_cloud(data, path)

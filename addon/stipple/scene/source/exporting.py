@@ -12,7 +12,7 @@ from ...binding.errors import StippleError, invalid
 from ...binding.structs import Status
 from .. import grades
 from ..sequence import frames, sequences
-from . import formats, placement, sources, splat_data, sync
+from . import formats, placement, source_settings, sources, splat_data, sync
 
 
 def any_splats(context):
@@ -84,7 +84,8 @@ def joined(placed):
 def _cloud(obj, budget, apply_grade):
     data = obj.original.data
     cloud = None
-    if not (budget == 'VIEWPORT' or data.stipple.source_kind == 'NONE' or data.stipple.edited or sync.is_edited(data)):
+    if not (budget == 'VIEWPORT' or not source_settings.of(data.stipple).has_source or data.stipple.edited
+            or sync.is_edited(data)):
         cloud = _decoded(obj, data, budget)
     if cloud is None:
         return sources.cloud_from_object(obj) if apply_grade else sources.ungraded_cloud(obj)

@@ -21,17 +21,14 @@ from ...binding.cloud import Cloud
 from ...binding.context import Context
 from ...binding.errors import StippleError
 from ...binding.model import DecodeSettings, Model
-from ...binding.structs import AnchorOrder, JobState, ModelKind, Status
+from ...binding.structs import AnchorOrder, JobState, Status
 from .. import meshes
-from . import masks, splat_data
+from . import masks, source_settings, splat_data
 
-# Kinds of sources that give splats at any budget.
-MODEL_KINDS = ('MODEL', 'TREE')
 MODEL_SUFFIX = '.stipple.safetensors'
 _MAX_MODELS = 4
 # Splats that the viewport shows at first of a tree.
 FIRST_COUNT = 500_000
-_MAX_INT = 2**31 - 1  # of Blender's properties
 # Splats kept decoded over all cached clouds; 60 bytes each, so 1.2 GB at most.
 _MAX_CACHED_SPLATS = 20_000_000
 
@@ -92,7 +89,7 @@ def state(data):
     """What is with the file that a datablock's splats come from: 'FINE', 'MISSING' or 'CHANGED' since it was read.
     Files of a series are read when they are shown, so none of them is old."""
     stipple = data.stipple
-    if stipple.source_kind == 'NONE' or not stipple.source or stipple.is_sequence:
+    if not source_settings.of(stipple).has_source or not stipple.source or stipple.is_sequence:
         return 'FINE'
     found = stamp(absolute_path(stipple.source, data))
     if not found:
@@ -140,7 +137,7 @@ def model(path):
             known = Model.load(context(), path)
         else:
             job.wait()
-            known = job.model()
+            known = Model.of_job(job)
         remember_model(path, known)
     _models.move_to_end(key)
     return known
@@ -150,7 +147,7 @@ def is_at_hand(data, patience):
     """Whether decoding a datablock's source would not have to read its file first. Where it would, reading begins in the
     library's own thread, for the next call; patience: seconds that are waited for it."""
     stipple = data.stipple
-    if stipple.source_kind not in MODEL_KINDS or stipple.is_sequence:
+    if not source_settings.of(stipple).has_budget or stipple.is_sequence:
         return True
     try:
         path = absolute_path(stipple.source, data)
@@ -219,7 +216,7 @@ def decode(data, settings):
 
 def decode_data(data, settings):
     """The cloud that a datablock's source gives at these settings, without what its mask leaves out."""
-    if data.stipple.source_kind == 'CLOUD':
+    if source_settings.of(data.stipple).as_they_are:
         return masked(whole_cloud(data), data)
     return model_of(data).decode(settings)
 
@@ -227,7 +224,7 @@ def decode_data(data, settings):
 def whole_cloud(data):
     """All splats of a datablock's source, masked ones too."""
     path = absolute_path(data.stipple.source, data)
-    if data.stipple.source_kind == 'TREE':
+    if source_settings.of(data.stipple).counts_splats:
         return model(path).decode(DecodeSettings(data.stipple.source_count))
     return Cloud.load(context(), path)
 
@@ -236,15 +233,16 @@ def full_cloud(data):
     """A datablock at full count: the whole source without what is hidden, splats of meshes at the render budget, and
     what is stored where there is no source. Not graded."""
     stipple = data.stipple
-    if stipple.source_kind == 'NONE' or stipple.edited:
+    settings = source_settings.of(stipple)
+    if not settings.has_source or stipple.edited:
         return splat_data.ungraded_cloud(context(), data)
-    return decode_data(data, decode_settings(stipple, 'FULL' if stipple.source_kind == 'TREE' else 'RENDER'))
+    return decode_data(data, decode_settings(stipple, 'FULL' if settings.counts_splats else 'RENDER'))
 
 
 def count_of(data, budget):
     """Splats of a datablock at the budget 'RENDER' or 'FULL', without decoding."""
     stipple = data.stipple
-    if stipple.source_kind in MODEL_KINDS and not stipple.edited:
+    if source_settings.of(stipple).has_budget and not stipple.edited:
         settings = decode_settings(stipple, budget)
         return settings.anchors * settings.gaussians_per_anchor
     return splat_data.count(data)
@@ -256,19 +254,30 @@ def masked(cloud, data):
     return cloud if mask is None else cloud_edit.keep(cloud, mask)
 
 
-def decode_settings(stipple, mode='VIEWPORT'):
-    """The settings of a datablock as the binding takes them; mode 'RENDER' takes the render budget."""
-    if stipple.source_kind == 'TREE':
-        return DecodeSettings(_tree_budget(stipple, mode))
-    anchors = stipple.anchors
-    if mode == 'RENDER' and stipple.anchors_render != 0:
-        anchors = stipple.anchors_render
-    return DecodeSettings(anchors, gaussians_per_anchor(stipple), AnchorOrder[stipple.order], stipple.seed)
+def decode_settings(stipple, mode='VIEWPORT', scene=None):
+    """The settings of a datablock as the binding takes them; mode 'RENDER' takes the render budget. scene: whose frame
+    tells the time, None for the present one. What the source does not have is as it is in new settings."""
+    known = source_settings.of(stipple)
+    if known.counts_splats:
+        budget = _tree_budget(stipple, mode)
+    else:
+        budget = (mode == 'RENDER' and stipple.anchors_render) or stipple.anchors
+    return DecodeSettings(budget, gaussians_per_anchor(stipple),
+                          AnchorOrder[stipple.order] if known.has_order else AnchorOrder.SYSTEMATIC,
+                          stipple.seed if known.has_seed else 0, seconds(stipple, scene) if known.has_time else 0.0)
 
 
 def gaussians_per_anchor(stipple):
-    """Of a model: what a field was learned for, else what is chosen."""
-    return stipple.learned_gaussians or stipple.gaussians_per_anchor
+    """Splats that each anchor becomes: what is chosen, where there is a choice."""
+    known = source_settings.of(stipple)
+    return stipple.gaussians_per_anchor if known.min_gaussians < known.max_gaussians else known.default_gaussians
+
+
+def seconds(stipple, scene=None):
+    """The time of splats that move: 0 where their series starts, as frame_start and frame_speed have it."""
+    scene = bpy.context.scene if scene is None else scene
+    frames = scene.frame_current + scene.frame_subframe - stipple.frame_start
+    return frames * stipple.frame_speed * scene.render.fps_base / scene.render.fps
 
 
 def at_most(settings, most):
@@ -340,9 +349,8 @@ def attach_tree(data, path, count):
     stipple = data.stipple
     stipple.source = blend_path(path)
     stipple.source_stamp = stamp(path)
-    stipple.source_kind = 'TREE'
+    source_settings.note_tree(stipple)
     stipple.source_count = count
-    note_learned(stipple, None)
     stipple.is_sequence = False
     stipple.source_objects.clear()
     stipple.source_changed = stipple.edited = False
@@ -353,8 +361,7 @@ def attach_cloud(data, path):
     stipple = data.stipple
     stipple.source = blend_path(path)
     stipple.source_stamp = stamp(path)
-    stipple.source_kind = 'CLOUD'
-    note_learned(stipple, None)
+    source_settings.note_cloud(stipple)
     stipple.is_sequence = False
     stipple.source_objects.clear()
     stipple.source_changed = stipple.edited = False
@@ -387,42 +394,32 @@ def _save(write, path, suffix, overwrite):
     raise StippleError(f"'{stem}' has 1,000 numbered sources already; remove some of them.", Status.ERROR_IO)
 
 
-def note_learned(stipple, info):
-    """Notes what a model was learned for. In: info, StippleModelInfo, or None for all that is not learned."""
-    is_field = info is not None and info.kind == ModelKind.FIELD
-    stipple.learned_gaussians = info.gaussians_per_anchor if is_field else 0
-    budgets = (info.least_anchors, info.most_anchors) if is_field else (0, 0)
-    stipple.learned_least, stipple.learned_most = (min(budget, _MAX_INT) for budget in budgets)
+def first_settings(settings):
+    """How an asset is shown at first. In: settings, StippleModelSettings."""
+    known = source_settings.of_model(settings)
+    budget = min(known.default_budget, FIRST_COUNT) if known.counts_splats else known.default_budget
+    return DecodeSettings(budget, known.default_gaussians)
 
 
-def first_settings(info):
-    """How an asset is shown at first. In: info, StippleModelInfo."""
-    if info.kind == ModelKind.HIERARCHY:
-        return DecodeSettings(min(info.leaf_count, FIRST_COUNT))
-    if info.kind == ModelKind.FIELD:
-        return DecodeSettings(info.most_anchors, info.gaussians_per_anchor)
-    return DecodeSettings()
-
-
-def attach_asset(data, path, info):
-    """Notes an asset file as the source of a new datablock, with the budget of first_settings()."""
-    stipple, settings = data.stipple, first_settings(info)
-    if info.kind == ModelKind.HIERARCHY:
-        attach_tree(data, path, info.leaf_count)
-        stipple.ratio, stipple.ratio_render = settings.anchors / info.leaf_count, 1.0
+def attach_asset(data, path, settings):
+    """Notes an asset file as the source of a new datablock, with the budget of first_settings(). In: settings,
+    StippleModelSettings."""
+    stipple, first = data.stipple, first_settings(settings)
+    attach_model(data, path, [], settings)
+    if source_settings.of(stipple).counts_splats:
+        stipple.source_count = settings.maximum_budget
+        stipple.ratio, stipple.ratio_render = first.anchors / settings.maximum_budget, 1.0
     else:
-        attach_model(data, path, [], info)
-        stipple.anchors = settings.anchors
+        stipple.anchors = first.anchors
 
 
-def attach_model(data, path, objects, info):
-    """Notes a model as the source of a datablock, with the meshes and settings that it was made from. In: info,
-    StippleModelInfo."""
+def attach_model(data, path, objects, settings):
+    """Notes a model as the source of a datablock, with the meshes and settings that it was made from. In: settings,
+    StippleModelSettings."""
     stipple = data.stipple
-    note_learned(stipple, info)
+    source_settings.note_model(stipple, source_settings.of_model(settings))
     stipple.source = blend_path(path)
     stipple.source_stamp = stamp(path)
-    stipple.source_kind = 'MODEL'
     stipple.source_detail_weight = stipple.detail_weight
     stipple.source_color_from = stipple.color_from
     stipple.is_sequence = False

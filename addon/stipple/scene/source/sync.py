@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 from ...binding.errors import StippleError
 from .. import grades, handlers, limits, meshes
 from ..sequence import sequences
-from . import masks, sources, splat_data
+from . import masks, source_settings, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -54,7 +54,7 @@ def sync(obj, depsgraph, mode, most=None, share=None):
     data = obj.data
     stipple = data.stipple
     grade = grades.settings_of(_evaluated(data, depsgraph))
-    if stipple.source_kind == 'NONE' or not stipple.source or stipple.edited:
+    if not source_settings.of(stipple).has_source or not stipple.source or stipple.edited:
         return regrade(data, grade)
     if mode == 'RENDER' and bpy.app.background:
         # Nobody sees a panel that says what is wrong, so old splats must not pass for the source's.
@@ -79,11 +79,11 @@ def sync(obj, depsgraph, mode, most=None, share=None):
 def _wanted(data, depsgraph, mode, most):
     """(key of the splats that a datablock should have now, function that makes them)."""
     stipple = _evaluated(data, depsgraph)
+    scene = bpy.context.scene if depsgraph is None else depsgraph.scene
     if stipple.is_sequence:
-        scene = bpy.context.scene if depsgraph is None else depsgraph.scene
         frame = sequences.frame_of(data, stipple, scene.frame_current, mode, most)
         return frame.key, frame.splats
-    settings = sources.at_most(sources.decode_settings(stipple, mode), most)
+    settings = sources.at_most(sources.decode_settings(stipple, mode, scene), most)
     return written_key(data, settings), lambda: _decoded(data, settings)
 
 
@@ -128,12 +128,17 @@ def write_shown(data):
 
 def written_key(data, settings):
     """A text that is equal for equal splats."""
-    stipple = data.stipple
-    if stipple.source_kind == 'CLOUD':
+    known = source_settings.of(data.stipple)
+    if known.as_they_are:
         return masks.key(data)
-    if stipple.source_kind == 'TREE':
-        return f'{stipple.source}|{settings.anchors}|{masks.key(data)}'
-    return f'{stipple.source}|{settings.anchors}|{settings.gaussians_per_anchor}|{int(settings.order)}|{settings.seed}'
+    parts = [data.stipple.source, settings.anchors]
+    if known.counts_anchors:
+        parts += [settings.gaussians_per_anchor, int(settings.order), settings.seed]
+    if known.takes_mask:
+        parts.append(masks.key(data))
+    if known.has_time:
+        parts.append(f'{settings.time!r} s')
+    return '|'.join(map(str, parts))
 
 
 def copy_settings(old, new):

@@ -8,11 +8,11 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "io/bytes/input_file.h"
 #include "io/splats/ply/ply_comments.h"
@@ -42,12 +42,6 @@ struct Bad {
   size_t row = kNoColumn;
   std::string what;
 };
-
-std::string numberText(float value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
 
 class Reader {
  public:
@@ -199,7 +193,7 @@ class Reader {
       for (size_t row = begin; row < std::min(end, bad.row); ++row) {
         const float value = target.destination[row * target.stride];
         if (std::isfinite(value)) continue;
-        bad = {row, "holds " + numberText(value) + " in property '" +
+        bad = {row, "holds " + numberText(static_cast<double>(value)) + " in property '" +
                         vertices_->properties[target.property].name + "' of vertex " +
                         std::to_string(row) + "; every value must be a finite float32 number"};
       }
@@ -224,7 +218,7 @@ class Reader {
           scale[axis] = static_cast<float>(deviation);
           continue;
         }
-        *bad = {i, "holds " + numberText(logarithm) + " in property 'scale_" +
+        *bad = {i, "holds " + numberText(static_cast<double>(logarithm)) + " in property 'scale_" +
                        std::to_string(axis) + "' of vertex " + std::to_string(i) +
                        "; it is a logarithm, and 88.7 is the largest that float32 can undo"};
         return;

@@ -1,12 +1,13 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <vector>
 
-namespace stipple::api {
+namespace stipple {
 
-/// Bounds of positions [N,3] into the arrays of an info struct; left as they are where N is 0.
-inline void fillBounds(const std::vector<float>& positions, float lowest[3], float highest[3]) {
+/// Bounds of positions [N,3]. Out: lowest, highest [3], which stay as they are where N is 0.
+inline void fillBounds(const std::vector<float>& positions, float* lowest, float* highest) {
   for (size_t i = 0; i < positions.size(); ++i) {
     const size_t axis = i % 3;
     const float value = positions[i];
@@ -15,4 +16,4 @@ inline void fillBounds(const std::vector<float>& positions, float lowest[3], flo
   }
 }
 
-}  // namespace stipple::api
+}  // namespace stipple

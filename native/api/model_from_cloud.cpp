@@ -1,5 +1,3 @@
-#include "api/hierarchy.h"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -7,7 +5,7 @@
 
 #include "api/guard.h"
 #include "api/job.h"
-#include "io/assets/hierarchy_asset.h"
+#include "model/hierarchy_splats.h"
 #include "train/loop/refine.h"
 #include "train/loop/view_rig.h"
 #include "train/loop/visibility.h"
@@ -69,8 +67,8 @@ RefineOptions refineSettings(const StippleRefineOptions& given) {
   return settings;
 }
 
-Hierarchy build(const std::shared_ptr<const SplatCloud>& cloud, const HierarchySettings& settings,
-                Progress& progress) {
+std::shared_ptr<const SplatModel> build(const std::shared_ptr<const SplatCloud>& cloud,
+                                        const HierarchySettings& settings, Progress& progress) {
   std::vector<float> visibility;
   if (settings.view_count > 0) {
     const std::vector<Camera> views = viewsForVisibility(*cloud, settings.rig);
@@ -78,43 +76,10 @@ Hierarchy build(const std::shared_ptr<const SplatCloud>& cloud, const HierarchyS
   }
   auto tree = std::make_shared<const MergeTree>(
       buildMergeTree(*cloud, visibility, settings.tree, &progress));
-  return std::make_shared<const HierarchyDecoder>(cloud, std::move(tree));
+  return makeHierarchySplats(std::make_shared<const HierarchyDecoder>(cloud, std::move(tree)));
 }
 
 }  // namespace
-
-namespace stipple::api {
-
-ModelParts loadHierarchy(const std::string& path) {
-  HierarchyAsset asset = readHierarchyAsset(path);
-  auto notes = std::make_shared<const ModelNotes>(
-      ModelNotes{std::move(asset.settings_json), std::move(asset.extras)});
-  auto leaves = std::make_shared<const SplatCloud>(std::move(asset.leaves));
-  auto tree = std::make_shared<MergeTree>();
-  tree->nodes = std::move(asset.nodes);
-  tree->parents = std::move(asset.parents);
-  tree->errors = std::move(asset.errors);
-  try {
-    return {std::make_shared<const HierarchyDecoder>(std::move(leaves), std::move(tree)),
-            std::move(notes)};
-  } catch (const Error& error) {
-    fail(ErrorCode::kFormat, path + ": " + error.what());
-  }
-}
-
-void saveHierarchy(const HierarchyDecoder& hierarchy, const ModelNotes& notes,
-                   const std::string& path) {
-  HierarchyAsset asset;
-  asset.settings_json = notes.settings_json;
-  asset.extras = notes.extras;
-  asset.leaves = *hierarchy.leaves();
-  asset.nodes = hierarchy.tree()->nodes;
-  asset.parents = hierarchy.tree()->parents;
-  asset.errors = hierarchy.tree()->errors;
-  writeHierarchyAsset(asset, path);
-}
-
-}  // namespace stipple::api
 
 extern "C" {
 
@@ -144,7 +109,7 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
     context->state->requireMemory(hierarchyMemoryBound(*leaves, settings),
                                   "the hierarchy of this cloud");
     *job = startJob(context->state, [leaves, settings](Progress& progress) -> JobResult {
-      return ModelParts{build(leaves, settings, progress)};
+      return build(leaves, settings, progress);
     });
   });
 }

@@ -1,19 +1,17 @@
-#include "plot/plot_picture.h"
+#include "plot/plot_image.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "base/error.h"
-#include "plot/stroke_font.h"
+#include "plot/text_outlines.h"
 
 namespace stipple {
 
 namespace {
 
 constexpr double kSmallest = 0.25, kLargest = 8;
-/// Height of a capital letter, and width of the pen, in heights of a line of text.
-constexpr double kCapShare = 0.7, kPenShare = 0.095, kBoldPenShare = 0.15;
 
 using Point = std::array<double, 2>;
 
@@ -25,7 +23,7 @@ double distance(const Point& p, const Point& a, const Point& b) {
   return std::hypot(p[0] - a[0] - t * dx, p[1] - a[1] - t * dy);
 }
 
-/// A picture in which marks cover what lies below: each mark once, however its parts overlap.
+/// An image in which marks cover what lies below: each mark once, however its parts overlap.
 class Paper {
  public:
   Paper(Image& image, double scale)
@@ -56,6 +54,19 @@ class Paper {
       return share(centre[0], low[0], high[0]) * share(centre[1], low[1], high[1]);
     });
   }
+
+  /// In: share of a pixel, which may lie outside the image.
+  void cover(int x, int y, float share) {
+    if (x < 0 || y < 0) return;
+    const auto column = static_cast<uint32_t>(x), row = static_cast<uint32_t>(y);
+    if (column >= image_.width || row >= image_.height) return;
+    float& covered = covered_[static_cast<size_t>(row) * image_.width + column];
+    covered = std::max(covered, share);
+    first_row_ = std::min(first_row_, row);
+    end_row_ = std::max(end_row_, row + 1);
+  }
+
+  double scale() const { return scale_; }
 
   /// Mixes the colour in where something was covered since the last call.
   void fill(uint32_t colour, double opacity) {
@@ -91,13 +102,10 @@ class Paper {
     const uint32_t y_end = clamped(std::ceil(bottom + 1), image_.height);
     for (uint32_t y = y_begin; y < y_end; ++y) {
       for (uint32_t x = x_begin; x < x_end; ++x) {
-        const auto seen = static_cast<float>(coverage({x + 0.5, y + 0.5}));
-        float& covered = covered_[static_cast<size_t>(y) * image_.width + x];
-        covered = std::max(covered, seen);
+        cover(static_cast<int>(x), static_cast<int>(y),
+              static_cast<float>(coverage({x + 0.5, y + 0.5})));
       }
     }
-    first_row_ = std::min(first_row_, y_begin);
-    end_row_ = std::max(end_row_, y_end);
   }
 
   Image& image_;
@@ -107,21 +115,18 @@ class Paper {
 };
 
 void drawText(Paper& paper, const PlotMark& mark) {
-  const double unit = kCapShare * mark.size / kCapHeight;
-  const double width = unit * penWidth(mark.text);
-  double start = 0;
-  if (mark.anchor == TextAnchor::kMiddle) start = -width / 2;
-  if (mark.anchor == TextAnchor::kEnd) start = -width;
-  for (const PenStroke& stroke : penStrokes(mark.text)) {
-    std::vector<Point> points;
-    for (const auto& [x, y] : stroke) {
-      const double along = start + unit * x, up = unit * y;
-      const Point& at = mark.points[0];
-      points.push_back(paper.pixel(mark.is_upright ? Point{at[0] + along, at[1] - up}
-                                                   : Point{at[0] - up, at[1] - along}));
-    }
-    paper.pen(points, mark.size * (mark.is_bold ? kBoldPenShare : kPenShare));
-  }
+  OutlinedText text;
+  text.text = mark.text;
+  text.size_px = mark.size * paper.scale();
+  text.is_bold = mark.is_bold;
+  text.is_upright = mark.is_upright;
+  double before = 0;  // of the baseline, in front of the mark's place
+  if (mark.anchor == TextAnchor::kMiddle) before = lengthOf(text) / 2;
+  if (mark.anchor == TextAnchor::kEnd) before = lengthOf(text);
+  const Point at = paper.pixel(mark.points[0]);
+  text.x = mark.is_upright ? at[0] - before : at[0];
+  text.y = mark.is_upright ? at[1] : at[1] + before;
+  coverText(text, [&](int x, int y, float share) { paper.cover(x, y, share); });
 }
 
 void draw(Paper& paper, const PlotMark& mark) {
@@ -155,7 +160,7 @@ uint32_t plotPixels(double units, double scale) {
   return static_cast<uint32_t>(std::lround(units * scale));
 }
 
-Image pictureOf(const PlotSheet& sheet, double scale) {
+Image imageOf(const PlotSheet& sheet, double scale) {
   Image image;
   image.width = plotPixels(sheet.width, scale);
   image.height = plotPixels(sheet.height, scale);

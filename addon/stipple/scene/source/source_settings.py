@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which settings the splats of a datablock have.
+
+The library is asked when a source is attached (stipple_model_settings), and its answer is kept with the datablock, so
+that panels need not read a file. This file alone knows kinds of sources: all others ask of().
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+
+from ...binding.structs import BudgetUnit
+
+KINDS = (('NONE', "None", "The splats have no source"),
+         ('MODEL', "Model", "Splats at any budget"),
+         ('CLOUD', "Splats", "Splats as they are"),
+         ('TREE', "Splat Tree", "Splats of a file at any budget"))
+# Properties of a datablock that note_model() and note_cloud() set.
+PROPERTIES = ('source_kind', 'source_settings', 'learned_gaussians', 'learned_least', 'learned_most')
+_MAX_INT = 2**31 - 1  # of Blender's properties
+_MAX_GAUSSIANS = 32   # that models of earlier versions take
+
+
+@dataclass(frozen=True)
+class SourceSettings:
+    """The defaults are those of splats that have no source."""
+
+    has_source: bool = False
+    has_budget: bool = False     # it is a model: splats at any budget
+    counts_splats: bool = False  # the budget is a number of the source's own splats, else of anchors
+    takes_mask: bool = True      # splats can be hidden
+    default_budget: int = 0
+    least_learned: int = 0       # budgets that it was learned for; 0: all are alike
+    most_learned: int = 0
+    min_gaussians: int = 1       # splats per anchor
+    max_gaussians: int = 1
+    default_gaussians: int = 1
+    has_order: bool = False
+    has_seed: bool = False
+    has_time: bool = False       # its splats move
+
+    @property
+    def as_they_are(self):
+        """Whether the source is a file whose splats are all shown."""
+        return self.has_source and not self.has_budget
+
+    @property
+    def counts_anchors(self):
+        return self.has_budget and not self.counts_splats
+
+    @property
+    def is_learned(self):
+        return self.most_learned > 0
+
+
+_NOTHING = SourceSettings()
+_CLOUD = SourceSettings(has_source=True)
+_TREE = SourceSettings(has_source=True, has_budget=True, counts_splats=True)
+
+
+def of_model(settings):
+    """In: settings, StippleModelSettings."""
+    return SourceSettings(
+        True, True, settings.budget_unit == BudgetUnit.SPLATS, bool(settings.takes_mask), settings.default_budget,
+        settings.minimum_learned_budget, settings.maximum_learned_budget, settings.minimum_gaussians_per_anchor,
+        settings.maximum_gaussians_per_anchor, settings.default_gaussians_per_anchor, bool(settings.has_order),
+        bool(settings.has_seed), bool(settings.has_time))
+
+
+def of(stipple):
+    """The settings of a splat datablock's source."""
+    return _known(stipple.source_kind, stipple.source_settings, stipple.learned_gaussians, stipple.learned_least,
+                  stipple.learned_most)
+
+
+@lru_cache(maxsize=256)
+def _known(kind, stored, gaussians, least, most):
+    if kind == 'NONE':
+        return _NOTHING
+    if kind == 'CLOUD':
+        return _CLOUD
+    if stored:
+        # Settings of a later version that this one does not have are left out.
+        known = SourceSettings.__dataclass_fields__
+        return SourceSettings(**{name: value for name, value in json.loads(stored).items() if name in known})
+    if kind == 'TREE':
+        return _TREE
+    # Files of versions that did not store settings.
+    return SourceSettings(True, True, False, False, most or 20_000, least, most, gaussians or 1,
+                          gaussians or _MAX_GAUSSIANS, gaussians or 1, not gaussians, True)
+
+
+def note_model(stipple, settings):
+    """In: settings, SourceSettings of a model."""
+    stipple.source_kind = 'TREE' if settings.counts_splats else 'MODEL'
+    stipple.source_settings = json.dumps(asdict(settings))
+    # What versions that do not read the text above go by.
+    is_learned = settings.is_learned
+    stipple.learned_gaussians = settings.default_gaussians if is_learned else 0
+    stipple.learned_least = min(settings.least_learned, _MAX_INT)
+    stipple.learned_most = min(settings.most_learned, _MAX_INT)
+
+
+def note_tree(stipple):
+    """Notes splats with a budget whose file is yet to be read."""
+    note_model(stipple, _TREE)
+
+
+def note_cloud(stipple):
+    """Notes splats as they are."""
+    stipple.source_kind = 'CLOUD'
+    stipple.source_settings = ''
+    stipple.learned_gaussians = stipple.learned_least = stipple.learned_most = 0

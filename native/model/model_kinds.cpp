@@ -1,0 +1,33 @@
+#include "model/model_kinds.h"
+
+#include <array>
+
+namespace stipple {
+
+// The readers, each in the file of its kind.
+std::shared_ptr<const SplatModel> readSurfaceSplats(const std::string& path);
+std::shared_ptr<const SplatModel> readHierarchySplats(const std::string& path);
+std::shared_ptr<const SplatModel> readFieldSplats(const std::string& path);
+
+std::span<const ModelKind> modelKinds() {
+  static const std::array kinds = {
+      ModelKind{"surface",
+                "surface model",
+                0,
+                {.budget_unit = BudgetUnit::kAnchors, .has_order = true, .has_seed = true},
+                readSurfaceSplats},
+      ModelKind{"hierarchy",
+                "hierarchy of splats",
+                1,
+                {.budget_unit = BudgetUnit::kSplats, .takes_mask = true},
+                readHierarchySplats},
+      ModelKind{"field",
+                "learned field",
+                2,
+                {.budget_unit = BudgetUnit::kAnchors, .has_order = true, .has_seed = true},
+                readFieldSplats},
+  };
+  return kinds;
+}
+
+}  // namespace stipple
