@@ -33,7 +33,7 @@ def test_the_guide_adds_a_part_and_a_strategy(dataset, tmp_path):  # noqa: F811
         count = json.loads(guide.run('info', name, '--json'))['count']
         assert 40 < count <= limit, name
     # It is the part that decides: the strategy alone makes more of the same splats.
-    guide.run('fit', 'photos', 'alone.ply', *'--start 40 --iterations 450 --sh-degree 0 --strategy'.split(),
+    guide.run('fit', 'photos', 'alone.ply', *'--start 40 --iterations 450 --strategy'.split(),
               'adaptive(threshold=1e-9)')
     assert json.loads(guide.run('info', 'alone.ply', '--json'))['count'] > 90
     refused = guide.run('fit', 'photos', 'no.ply', '--strategy', 'mcmc+even_growth(splats=-1)', status=1)
