@@ -19,15 +19,14 @@ double secondsOf(const Work& work) {
   return watch.seconds();
 }
 
-/// Work to compare with. A target of 0 is none: the ratio is printed and not judged.
+/// Work to compare with.
 struct Reference {
   std::string name;
-  double target;
   std::function<void()> work;
 };
 
 /// Times `ours` and every reference in turn, so that all meet the same machine, and reports the
-/// ratios of the best times as counters `ratio_<name>` beside `target_<name>`; `reference_ms` is
+/// ratios of the best times as counters `ratio_<name>`, which limits.txt may judge; `reference_ms` is
 /// the first one's. The benchmark must use manual time.
 template <class Ours>
 void compareWithAll(benchmark::State& state, const Ours& ours,
@@ -47,18 +46,15 @@ void compareWithAll(benchmark::State& state, const Ours& ours,
   state.counters["reference_ms"] = 1e3 * best.front();
   for (size_t r = 0; r < references.size(); ++r) {
     state.counters["ratio_" + references[r].name] = best[r] / best_ours;
-    if (references[r].target > 0.0) {
-      state.counters["target_" + references[r].name] = references[r].target;
-    }
   }
 }
 
 /// Times `ours` and `reference` in turn, so that both meet the same machine, and reports the ratio
-/// of the best times as counter `ratio_<name>` beside `target_<name>`; the main program prints all
-/// such ratios in a table. The benchmark must use manual time. In: reference_work_per_ours: how
+/// of the best times as counter `ratio_<name>`; the main program prints all such ratios in a table,
+/// and limits.txt may judge them. The benchmark must use manual time. In: reference_work_per_ours: how
 /// much more the reference does in one call (points over points).
 template <class Ours, class Reference>
-void compare(benchmark::State& state, const std::string& name, double target, const Ours& ours,
+void compare(benchmark::State& state, const std::string& name, const Ours& ours,
              const Reference& reference, double reference_work_per_ours = 1.0) {
   double best_ours = 1e300;
   double best_reference = 1e300;
@@ -72,7 +68,6 @@ void compare(benchmark::State& state, const std::string& name, double target, co
   state.counters["best_ms"] = 1e3 * best_ours;
   state.counters["reference_ms"] = 1e3 * best_reference;
   state.counters["ratio_" + name] = best_reference / best_ours / reference_work_per_ours;
-  state.counters["target_" + name] = target;
 }
 
 }  // namespace stipple::bench

@@ -48,7 +48,7 @@ void densify(benchmark::State& state) {
   options.strategy = "adaptive(threshold=1e-9)";  // every splat that is seen multiplies
   withThreads(2, [&] {
     compare(
-        state, "bare_looks", 0.8,
+        state, "bare_looks",
         [&] { benchmark::DoNotOptimize(densifyCloud(cloudOf(kCase), views, shown, options)); },
         [&] { bareLooks(views); });
   });

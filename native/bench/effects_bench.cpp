@@ -53,8 +53,8 @@ void passes(benchmark::State& state) {
   normal.with_normal = true;
   objects.with_objects = true;
   compareWithAll(state, [&] { drawer.plain(); },
-                 {{"normal_to_plain", 0, [&] { drawer.plain(normal); }},
-                  {"objects_to_plain", 0, [&] { drawer.plain(objects); }}});
+                 {{"normal_to_plain", [&] { drawer.plain(normal); }},
+                  {"objects_to_plain", [&] { drawer.plain(objects); }}});
 }
 
 /// 16 pictures over lens and time against 16 times one.
@@ -75,8 +75,8 @@ void lensAndShutter(benchmark::State& state) {
                  [&] {
                    for (int i = 0; i < 16; ++i) drawer.plain();
                  },
-                 {{"lens_to_16_pictures", 0, [&] { drawer.sampled(lens); }},
-                  {"shutter_to_16_pictures", 0, [&] { drawer.sampled(shutter); }}});
+                 {{"lens_to_16_pictures", [&] { drawer.sampled(lens); }},
+                  {"shutter_to_16_pictures", [&] { drawer.sampled(shutter); }}});
 }
 
 /// Panorama and fisheye along rays against a perspective picture along rays, of as many pixels.
@@ -95,8 +95,8 @@ void wideCameras(benchmark::State& state) {
     withThreads(2, [&] { renderRays({&drawer.instance(), 1}, camera, {}, {}); });
   };
   compareWithAll(state, [&] { draw(CameraModel::kPerspective); },
-                 {{"panorama_to_perspective", 0, [&] { draw(CameraModel::kEquirectangular); }},
-                  {"fisheye_to_perspective", 0, [&] { draw(CameraModel::kFisheyeEquidistant); }}});
+                 {{"panorama_to_perspective", [&] { draw(CameraModel::kEquirectangular); }},
+                  {"fisheye_to_perspective", [&] { draw(CameraModel::kFisheyeEquidistant); }}});
 }
 
 /// Ten copies in each other, drawn one after the other against all splats together.
@@ -119,7 +119,7 @@ void objectOrder(benchmark::State& state) {
   };
   draw(ObjectOrder::kApart, instances.size());
   compareWithAll(state, [&] { draw(ObjectOrder::kTogether, instances.size()); },
-                 {{"apart_to_together", 0, [&] { draw(ObjectOrder::kApart, instances.size()); }}});
+                 {{"apart_to_together", [&] { draw(ObjectOrder::kApart, instances.size()); }}});
 }
 
 /// The same of one object, which has no order to choose.
@@ -129,7 +129,7 @@ void oneObject(benchmark::State& state) {
   RenderOptions apart;
   apart.object_order = ObjectOrder::kApart;
   compareWithAll(state, [&] { drawer.plain(); },
-                 {{"apart_to_together", 0, [&] { drawer.plain(apart); }}});
+                 {{"apart_to_together", [&] { drawer.plain(apart); }}});
 }
 
 const bool registered = [] {

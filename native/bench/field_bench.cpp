@@ -138,9 +138,7 @@ void steps(benchmark::State& state, const FieldCase& c) {
   // Thirty times as many points in cells of a quarter of the side: colder memory and two levels
   // more, but not thirty times the work.
   state.counters["ratio_large_octree"] = best / best_large;
-  state.counters["target_large_octree"] = 0.5;
   state.counters["ratio_explicit_passes"] = best_passes / best;
-  state.counters["target_explicit_passes"] = 0.25;
 }
 
 /// Pairs of a splat and a tile that it reaches.
@@ -195,9 +193,7 @@ void growth(benchmark::State& state) {
   // back go by pairs, which grow more slowly than anchors do, as smaller splats reach fewer tiles;
   // all else goes by anchors.
   state.counters["ratio_pairs"] = (passes[0] / pairs[0]) / (passes.back() / pairs.back());
-  state.counters["target_pairs"] = 1;
   state.counters["ratio_anchors"] = 16 * best[0] / best.back();
-  state.counters["target_anchors"] = 1;
 }
 
 /// The spread of a field's Gaussians against all pairs of its anchors.
@@ -243,7 +239,7 @@ void spread(benchmark::State& state, uint64_t anchor_count) {
     loss = regularise({}, *result.field, anchors, tape, cloud, gradient);
     benchmark::DoNotOptimize(loss);
   };
-  compare(state, "all_pairs", 20, ours, allPairs);
+  compare(state, "all_pairs", ours, allPairs);
 }
 
 const bool registered = [] {

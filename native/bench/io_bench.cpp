@@ -130,7 +130,7 @@ void readCase(benchmark::State& state, const Case& which) {
   const auto fread = [&] { benchmark::DoNotOptimize(readPlainly(path).data()); };
   std::vector<Reference> references;
   const auto withCopy = [&](const std::string& name, const std::function<void()>& plain) {
-    references = {{name, 0.6, plain}, {name + "+arrays", 0.0, [&decoded, plain] {
+    references = {{name, plain}, {name + "+arrays", [&decoded, plain] {
                                          plain();
                                          copyArrays(decoded);
                                        }}};
@@ -146,21 +146,21 @@ void readCase(benchmark::State& state, const Case& which) {
       });
       break;
     case Packing::kCompressedPly:
-      references = {{"fread+unpack", 0.6,
+      references = {{"fread+unpack",
                      [&] {
                        const PlainArrays arrays =
                            unpackCompressedPly(readPlainly(path), kSplats, which.degree);
                        benchmark::DoNotOptimize(arrays.sh.data());
                      }},
-                    {"fread", 0.0, fread}};
+                    {"fread", fread}};
       break;
     case Packing::kRecords:
-      references = {{"fread+unpack", 0.6,
+      references = {{"fread+unpack",
                      [&] {
                        const PlainArrays arrays = unpackSplat32(readPlainly(path));
                        benchmark::DoNotOptimize(arrays.sh.data());
                      }},
-                    {"fread", 0.0, fread}};
+                    {"fread", fread}};
       break;
   }
   compareWithAll(
@@ -182,7 +182,7 @@ void writeCase(benchmark::State& state, const Case& which) {
   const auto fwrite = [&] { writePlainly(floor_path, bytes); };
   std::vector<Reference> references;
   const auto withCopy = [&](const std::string& name, const std::function<void()>& write) {
-    references = {{name, 0.6, write}, {name + "+arrays", 0.0, [&cloud, write] {
+    references = {{name, write}, {name + "+arrays", [&cloud, write] {
                                          copyArrays(cloud);
                                          write();
                                        }}};
@@ -198,18 +198,18 @@ void writeCase(benchmark::State& state, const Case& which) {
       });
       break;
     case Packing::kCompressedPly:
-      references = {{"pack+fwrite", 0.6,
+      references = {{"pack+fwrite",
                      [&] { writePlainly(floor_path, packCompressedPly(cloud, bytes.size())); }},
-                    {"sort+pack+fwrite", 0.0,
+                    {"sort+pack+fwrite",
                      [&] {
                        benchmark::DoNotOptimize(sortPlainly(cloud).data());
                        writePlainly(floor_path, packCompressedPly(cloud, bytes.size()));
                      }},
-                    {"fwrite", 0.0, fwrite}};
+                    {"fwrite", fwrite}};
       break;
     case Packing::kRecords:
-      references = {{"pack+fwrite", 0.6, [&] { writePlainly(floor_path, packSplat32(cloud)); }},
-                    {"fwrite", 0.0, fwrite}};
+      references = {{"pack+fwrite", [&] { writePlainly(floor_path, packSplat32(cloud)); }},
+                    {"fwrite", fwrite}};
       break;
   }
   compareWithAll(

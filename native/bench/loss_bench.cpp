@@ -124,7 +124,7 @@ void lossAgainstFloor(benchmark::State& state, const Size& size, Output output, 
   evaluate(loss, size, threads, output);
   const size_t pixels = static_cast<size_t>(size.width) * size.height;
   compare(
-      state, "floor", 0.0, [&] { evaluate(loss, size, threads, output); },
+      state, "floor", [&] { evaluate(loss, size, threads, output); },
       [&] { blurFloor(pixels, threads, output == Output::kGradient ? 30 : 15); });
   label(state, size);
   state.counters["workspace_bytes"] = static_cast<double>(loss.workspaceBytes());
@@ -134,7 +134,7 @@ void lossAgainstOneThread(benchmark::State& state, const Size& size) {
   ImageLoss loss;
   evaluate(loss, size, 2, Output::kGradient);
   compare(
-      state, "one_thread", 0.0, [&] { evaluate(loss, size, 2, Output::kGradient); },
+      state, "one_thread", [&] { evaluate(loss, size, 2, Output::kGradient); },
       [&] { evaluate(loss, size, 1, Output::kGradient); });
   label(state, size);
 }
@@ -150,7 +150,7 @@ void lossAvx2AgainstBest(benchmark::State& state, const Size& size) {
   evaluate(best, size, 2, Output::kGradient);
   state.SetLabel(avx2.target);
   compare(
-      state, "best_target", 0.0, [&] { evaluate(ours, size, 2, Output::kGradient); },
+      state, "best_target", [&] { evaluate(ours, size, 2, Output::kGradient); },
       [&] { evaluate(best, size, 2, Output::kGradient); });
   label(state, size);
 }
@@ -209,7 +209,7 @@ void adamAgainstFloor(benchmark::State& state, size_t count) {
   parameters.step(2, kernel, nullptr);
   copy.run(2);
   compare(
-      state, "floor", 0.0, [&] { parameters.step(2, kernel, nullptr); }, [&] { copy.run(2); });
+      state, "floor", [&] { parameters.step(2, kernel, nullptr); }, [&] { copy.run(2); });
   state.counters["ns_per_gaussian"] = state.counters["best_ms"] * 1e6 / static_cast<double>(count);
 }
 
@@ -218,7 +218,7 @@ void adamAgainstOneThread(benchmark::State& state, size_t count) {
   const AdamKernel kernel = chosenAdamKernel();
   parameters.step(2, kernel, nullptr);
   compare(
-      state, "one_thread", 0.0, [&] { parameters.step(2, kernel, nullptr); },
+      state, "one_thread", [&] { parameters.step(2, kernel, nullptr); },
       [&] { parameters.step(1, kernel, nullptr); });
 }
 
@@ -234,7 +234,7 @@ void sparseAdamAgainstDense(benchmark::State& state, size_t count) {
   }
   parameters.step(2, kernel, nullptr);
   compare(
-      state, "dense", 0.0, [&] { parameters.step(2, kernel, visible.data()); },
+      state, "dense", [&] { parameters.step(2, kernel, visible.data()); },
       [&] { parameters.step(2, kernel, nullptr); });
 }
 

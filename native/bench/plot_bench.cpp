@@ -39,7 +39,7 @@ void report(benchmark::State& state) {
   const FitHistory told = history(30000);
   const Image like = imageOf(sheetOf(fitPlots(told)), 2);
   compare(
-      state, "fill", 0.0,
+      state, "fill",
       [&] { benchmark::DoNotOptimize(imageOf(sheetOf(fitPlots(told)), 2).pixels.data()); },
       [&] {
         const std::vector<float> white(like.pixels.size(), 1.0f);

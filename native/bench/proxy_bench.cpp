@@ -49,7 +49,7 @@ void shell(benchmark::State& state, int resolution, unsigned threads) {
   const SparseVolume volume = shellVolume(resolution);
   TriMesh mesh;
   compare(
-      state, "surface", 0.0,
+      state, "surface",
       [&] {
         withThreads(threads, [&] {
           mesh = triangulated(surfaceOfVolume(volume, kThreshold, 0.0));

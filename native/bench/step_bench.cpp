@@ -87,7 +87,6 @@ void steps(benchmark::State& state, const SplatCase& c) {
   }
   state.counters["step_ms"] = 1e3 * two.whole;
   state.counters["ratio_one_thread"] = one.whole / two.whole;
-  state.counters["target_one_thread"] = 1.8;
 }
 
 const bool registered = [] {

@@ -89,7 +89,7 @@ void decode(benchmark::State& state) {
   const auto count = static_cast<uint64_t>(state.range(0));
   const AnchorSet fixed = anchorsOf(count);
   compare(
-      state, "nearest_neighbour", 0.0,
+      state, "nearest_neighbour",
       [&] {
         const AnchorSet anchors = anchorsOf(count);
         DecodeRequest request;
@@ -111,7 +111,7 @@ void decode(benchmark::State& state) {
 /// Mesh to model to 100,000 splats, against copying the mesh's arrays.
 void build(benchmark::State& state) {
   compare(
-      state, "copy", 0.0,
+      state, "copy",
       [&] {
         const SurfaceModel built = buildSurfaceModel(mesh(), {});
         AnchorSamplingOptions options;

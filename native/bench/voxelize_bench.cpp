@@ -91,7 +91,7 @@ void cloud(benchmark::State& state, size_t count, uint32_t resolution, unsigned 
   const double values = valueCount(prepareVoxelSplats(instances, options, size, nullptr));
   size_t bricks = 0;
   compare(
-      state, "floor", 0.0,
+      state, "floor",
       [&] { withThreads(threads, [&] { bricks = voxelize(instances, options).brickCount(); }); },
       [&] { withThreads(threads, [&] { floorOfValues(values); }); });
   state.counters["splats"] = static_cast<double>(count);

@@ -32,7 +32,7 @@ struct Arguments {
   int64_t downscale = 1;
 };
 
-/// "name   summary" of all strategies, then of the parts.
+/// "name   summary" of all strategies, then of the parts; under each what can be set of it.
 void printStrategies() {
   const auto print = [](const char* title, auto count, auto info) {
     std::printf("%s\n", title);
@@ -44,6 +44,12 @@ void printStrategies() {
       const bool is_field = entry.model == STIPPLE_FIT_FIELD;
       std::printf("  %-24s %s%s\n", entry.name_utf8, entry.summary_utf8,
                   is_field ? " (--model field)" : "");
+      for (uint64_t k = 0; k < entry.setting_count; ++k) {
+        auto setting = sized<StippleStrategySetting>();
+        check(stipple_strategy_setting(entry.name_utf8, k, &setting));
+        std::printf("      %-20s %g, of %g to %g\n", setting.name_utf8, setting.default_value,
+                    setting.minimum, setting.maximum);
+      }
     }
   };
   print("strategies", stipple_strategy_count, stipple_strategy_info);

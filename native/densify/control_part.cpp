@@ -120,6 +120,12 @@ void requireApart(const ControlPart& added, const ControlPart& there) {
                                         there.name() + ": both decide " + wordsOf(role));
 }
 
+ControlAssembly assemblyOf(std::unique_ptr<ControlPart> part) {
+  ControlAssembly assembly;
+  assembly.parts.push_back(std::move(part));
+  return assembly;
+}
+
 void addPart(ControlAssembly& assembly, std::unique_ptr<ControlPart> part) {
   const ControlRoles added = part->owns();
   std::erase_if(assembly.parts, [&](const std::unique_ptr<ControlPart>& there) {

@@ -90,50 +90,23 @@ struct Candidate {
   bool replaces = false;  ///< two children instead of it, else a copy beside it
 };
 
-/// One decision, or several that belong together, of density control: a publication is a list of
-/// parts, and users add further ones. Hooks are called in the order in which they stand here; those
-/// of a role only of its owner. Hooks without a role are called of all parts.
+/// One decision, or several that belong together, of density control. A strategy is a list of parts
+/// with a preset of their settings, and users add further ones; every class that decides something
+/// is a part, and strategies.h has the one table of both. Hooks that have a role are called of its
+/// owner alone, the others of all parts.
 /// Determinism: answers depend on the calls and on FitMoment::seed alone, not on threads.
-class ControlPart {
+class ControlPart : public FitHooks<ControlMoment> {
  public:
-  virtual ~ControlPart() = default;
-
-  /// As users write it: "long_axis_split".
-  virtual const char* name() const = 0;
   virtual ControlRoles owns() const = 0;
   /// Roles that other parts must own, or this one has nothing to do.
   virtual ControlRoles needs() const { return 0; }
 
-  // ---- once, before the first iteration --------------------------------------------------------
-  /// Changes splats that a fit of so many iterations begins with (not those of a cloud that is
-  /// densified).
-  virtual void prepare(RawSplats&, uint64_t /*iterations*/) const {}
-  virtual void adjustRates(LearningRates&) const {}
-  /// kParameterisation.
-  virtual std::vector<ExtraParameter> parameters() const { return {}; }
-  virtual std::vector<std::vector<float>> initialExtras(const RawSplats&) const { return {}; }
-  virtual const Parameterisation* parameterisation() const { return nullptr; }
   /// kFilter.
   virtual const SplatFilter* filter() const { return nullptr; }
-
-  // ---- every iteration
-  // ---------------------------------------------------------------------------
-  /// Adds what it wants to `request`; pictures in it have one owner.
+  /// Every iteration: adds what it wants to `request`; pictures in it have one owner.
   virtual void request(const ControlMoment&, StatisticRequest&) const {}
-  /// kRegularisation.
-  virtual double loss(const ControlMoment&, const SplatCloud&, const CloudGradient&) { return 0; }
-  /// kRegularisation: weight of the mean transmittance behind the last splat, in the loss.
-  virtual double transmittanceWeight(const ControlMoment&) const { return 0; }
-  virtual void observe(const ControlMoment&, const ViewStatistics&) {}
-  /// kSteps.
-  virtual bool stepGate(const ControlMoment&) const { return true; }
-  /// kNoise.
-  virtual std::optional<SplatEdit> afterStep(const ControlMoment&, const SplatStore&) { return {}; }
-  virtual bool wantsSweep(const ControlMoment&) const { return false; }
-  virtual void sweep(const ControlMoment&, ViewEvaluator&) {}
 
-  // ---- at an event
-  // ---------------------------------------------------------------------------------
+  // ---- at an event -------------------------------------------------------------------------------
   /// kMultiplication without kChildren: who may multiply, rising rows, each once.
   virtual std::vector<Candidate> candidates(const ControlMoment&, const RawSplats&) { return {}; }
   /// kScore: how much each candidate is worth, >= 0. As many as there is room for are drawn without
@@ -176,13 +149,11 @@ class ControlPart {
                       const RawSplats& /*appended*/, std::span<uint8_t> /*goes*/,
                       std::span<uint8_t> /*appended_goes*/) {}
 
-  // ---- any iteration, after an event
-  // -----------------------------------------------------------------
+  // ---- any iteration, after an event -------------------------------------------------------------
   /// kOpacity: adds writes of logits, and changes those of appended rows.
   virtual void lowerOpacities(const ControlMoment&, const RawSplats&, SplatEdit&) {}
 
-  // ---- its own numbers
-  // -----------------------------------------------------------------------------
+  // ---- its own numbers ---------------------------------------------------------------------------
   /// After every edit: arrays per splat follow, and windows begin anew.
   virtual void edited(const ControlMoment&, const SplatEdit&, size_t /*count_before*/) {}
   /// [N] how much each splat asked to multiply at the last event, for looking at; empty where it
@@ -200,6 +171,9 @@ struct ControlAssembly {
 /// Errors: kInvalidArgument where nobody owns what a part needs, or a part would never be asked:
 /// the scores and opacities of children where multiplication is the whole of it.
 std::unique_ptr<Strategy> makeDensityControl(const char* name, ControlAssembly assembly);
+
+/// An assembly of one part: what a user adds to a strategy.
+ControlAssembly assemblyOf(std::unique_ptr<ControlPart> part);
 
 /// Puts a part into an assembly, in place of one whose roles it covers. Errors: kInvalidArgument
 /// where a part there owns one of its roles and others beside; the message names both and the role.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
@@ -8,6 +9,15 @@
 #include "densify/control_part.h"
 
 namespace stipple {
+
+/// One number that users may set of a strategy or a part.
+struct StrategySetting {
+  std::string name;
+  double otherwise = 0;  ///< what it is where nobody sets it
+  double least = 0;
+  double most = 0;
+  bool is_whole = false;  ///< a count, or 0 and 1 for no and yes
+};
 
 /// Numbers that a user sets for a strategy or a part, read by name while it is made.
 class StrategySettings {
@@ -23,25 +33,45 @@ class StrategySettings {
   /// which there are.
   void requireAllUsed() const;
 
+  /// What was asked for, in that order.
+  const std::vector<StrategySetting>& known() const { return known_; }
+
  private:
+  double read(const StrategySetting& setting);
+
   std::string owner_;
   std::map<std::string, double> values_;
-  std::vector<std::string> known_;
+  std::vector<StrategySetting> known_;
 };
 
-/// A strategy, or a part that goes into one, as users see it.
+constexpr uint32_t kNoPartBit = UINT32_MAX;
+
+/// What users may name: a whole strategy, or a part that goes into one. Both are lists of parts
+/// with a preset of their settings; the list of a part is one long. A row of the table in
+/// strategy_table.cpp.
 struct StrategyEntry {
-  const char* name;
+  const char* name;     ///< "long_axis_split"
+  const char* label;    ///< for people: "Long Axis Split"
   const char* summary;  ///< one sentence for artists
+  /// Null for those of fields, which are no lists of parts.
+  ControlAssembly (*make)(StrategySettings& settings) = nullptr;
+  /// Of a part, 0..30: under which files keep that it was chosen, so it is never given to another
+  /// one. Of a strategy: kNoPartBit.
+  uint32_t bit = kNoPartBit;
 };
 
 /// In the order in which they are shown.
 const std::vector<StrategyEntry>& strategyEntries();
 const std::vector<StrategyEntry>& partEntries();
-/// Of fields (train/loop/field_model.h), whose density decides where splats are; makeStrategy() makes
-/// none of them.
+/// Of fields (train/loop/field_model.h), whose density decides where splats are; makeStrategy()
+/// makes none of them.
 const std::vector<StrategyEntry>& fieldStrategyEntries();
 const std::vector<std::string>& strategyNames();
+
+/// The numbers that users may set, told by making it.
+std::vector<StrategySetting> settingsOf(const StrategyEntry& entry);
+/// What it decides; 0 for those of fields.
+ControlRoles rolesOf(const StrategyEntry& entry);
 
 /// A strategy with the settings of its publication, and parts beside or instead of its own:
 /// "adaptive", "adaptive+long_axis_split+growth_control", "improved(threshold=0.0002)". A part

@@ -142,52 +142,60 @@ struct SplatStore {
   const RawSplats& second_moments;
 };
 
-/// Controls which splats there are while they are trained. A strategy sees statistics and answers
-/// with edits; it draws nothing, steps nothing and knows nobody who does. Hooks are called in the
-/// order in which they stand here, once per iteration; those that are not overridden do nothing.
-/// Determinism: a strategy's answers depend on its calls and on FitMoment::seed alone.
-class Strategy {
+/// What happens in a fit, as whoever controls its splats hears of it: a whole strategy, and each of
+/// the parts that it is a list of (control_part.h). Hooks are called in the order in which they
+/// stand here; those that are not overridden do nothing. Moment: FitMoment of a strategy, and of a
+/// part a ControlMoment, which knows the strategy's schedule.
+template <typename Moment>
+class FitHooks {
  public:
-  virtual ~Strategy() = default;
+  virtual ~FitHooks() = default;
 
-  /// As users write it: "adaptive".
+  /// As users write it: "adaptive", "long_axis_split".
   virtual const char* name() const = 0;
 
-  /// Once, before the first iteration of so many: changes what a fit begins with, and how fast it
-  /// learns.
+  // ---- once, before the first iteration --------------------------------------------------------
+  /// Changes what a fit of so many iterations begins with (not the splats of a cloud that is
+  /// densified), and how fast it learns.
   virtual void prepare(RawSplats&, uint64_t /*iterations*/) const {}
   virtual void adjustRates(LearningRates&) const {}
-
-  /// Once, before the first iteration; the splats start with these, and the parameterisation stays.
+  /// The splats start with these, and the parameterisation stays. Of parts, the owner of
+  /// kParameterisation is asked.
   virtual std::vector<ExtraParameter> parameters() const { return {}; }
   /// One array per parameter, [N, row length].
   virtual std::vector<std::vector<float>> initialExtras(const RawSplats&) const { return {}; }
   virtual const Parameterisation* parameterisation() const { return nullptr; }
 
-  /// What this iteration's backward pass shall gather for observe().
-  virtual StatisticRequest requests(const FitMoment&) const { return {}; }
-
-  /// Value of a regulariser of the stored values; its derivative is added to `gradient`.
-  virtual double loss(const FitMoment&, const SplatCloud&, const CloudGradient& /*gradient*/) {
+  // ---- every iteration -------------------------------------------------------------------------
+  /// Value of a regulariser of the stored values; its derivative is added to `gradient`. Of parts:
+  /// kRegularisation.
+  virtual double loss(const Moment&, const SplatCloud&, const CloudGradient& /*gradient*/) {
     return 0;
   }
-
-  /// Weight of the mean transmittance behind the last splat of each pixel, in the loss.
-  virtual double transmittanceWeight(const FitMoment&) const { return 0; }
-
+  /// Weight of the mean transmittance behind the last splat of each pixel, in the loss. Of parts:
+  /// kRegularisation.
+  virtual double transmittanceWeight(const Moment&) const { return 0; }
   /// After the backward pass, with the statistics asked for.
-  virtual void observe(const FitMoment&, const ViewStatistics&) {}
-
-  /// Whether Adam takes its step in this iteration; derivatives add up where it does not.
-  virtual bool stepGate(const FitMoment&) const { return true; }
-
-  /// After the step: small changes of numbers (noise), as writes.
-  virtual std::optional<SplatEdit> afterStep(const FitMoment&, const SplatStore&) { return {}; }
-
+  virtual void observe(const Moment&, const ViewStatistics&) {}
+  /// Whether Adam takes its step in this iteration; derivatives add up where it does not. Of parts:
+  /// kSteps.
+  virtual bool stepGate(const Moment&) const { return true; }
+  /// After the step: small changes of numbers, as writes. Of parts: kNoise.
+  virtual std::optional<SplatEdit> afterStep(const Moment&, const SplatStore&) { return {}; }
   /// Before an edit: looks at further views. Called where wantsSweep says so. It may change how the
   /// parameterisation makes splats.
-  virtual bool wantsSweep(const FitMoment&) const { return false; }
-  virtual void sweep(const FitMoment&, ViewEvaluator&) {}
+  virtual bool wantsSweep(const Moment&) const { return false; }
+  virtual void sweep(const Moment&, ViewEvaluator&) {}
+};
+
+/// Controls which splats there are while they are trained, as the trainer sees it: a list of parts
+/// (makeDensityControl). A strategy sees statistics and answers with edits; it draws nothing, steps
+/// nothing and knows nobody who does.
+/// Determinism: a strategy's answers depend on its calls and on FitMoment::seed alone.
+class Strategy : public FitHooks<FitMoment> {
+ public:
+  /// What this iteration's backward pass shall gather for observe().
+  virtual StatisticRequest requests(const FitMoment&) const { return {}; }
 
   /// Which splats there shall be. The strategy's own arrays per splat follow its answer at once;
   /// whoever called applies it.

@@ -160,8 +160,19 @@ def test_lists_strategies_and_parts(context):
     known = strategies(context.library)
     assert known[0].name == 'adaptive'
     assert [entry.name for entry in known if entry.model == FitModel.FIELD] == ['learned_density']
-    parts = strategy_parts(context.library)
-    assert 'long_axis_split' in [entry.name for entry in parts]
+    parts = {entry.name: entry for entry in strategy_parts(context.library)}
+    # Files keep a part under its bit: these never change, and no other part gets one of them.
+    bits = ('edge_aware_score', 'long_axis_split', 'volume_split', 'recovery_pruning', 'growth_control',
+            'multi_step_update', 'opacity_correction', 'filter_3d')
+    assert [parts[name].bit for name in bits] == list(range(len(bits)))
+    assert len({entry.bit for entry in parts.values()}) == len(parts) and all(e.bit < 31 for e in parts.values())
+    assert all(entry.bit is None for entry in known)
+    growth = parts['growth_control']
+    assert (growth.label, growth.decides) == ('Growth Control', 'how many splats there may be')
+    assert [(s.name, s.default, s.minimum, s.is_whole) for s in growth.settings] == [('splats', 0, 0, True)]
+    threshold, = known[0].settings
+    assert (threshold.name, threshold.minimum, threshold.maximum, threshold.is_whole) == ('threshold', 1e-9, 1e9, False)
+    assert 1e-5 < threshold.default < 1e-3
     check_strategy(context.library, 'adaptive+long_axis_split')
     with pytest.raises(StippleError, match="part is 'nothing'"):
         check_strategy(context.library, 'adaptive+nothing')

@@ -48,11 +48,15 @@ def test_a_model_decodes_at_any_budget(dataset, tmp_path):
 
 def test_lists_strategies_and_parts():
     lines = run('fit', '--strategies').stdout.splitlines()
-    names = [line.split()[0] for line in lines if line.startswith('  ')]
+    names = [line.split()[0] for line in lines if line.startswith('  ') and line[2] != ' ']
     assert names[0] == 'adaptive'
     assert {'absolute', 'learned_density', 'long_axis_split'} <= set(names)
     assert lines.index('strategies') < lines.index('parts, after a strategy and +')
     assert all(len(line.split()) > 4 for line in lines if line.startswith('  '))
+    # What can be set stands under its owner, with its default and range.
+    settings = lines[lines.index(next(line for line in lines if 'multi_step_update' in line)) + 1:][:2]
+    assert [line.split() for line in settings] == [['few', '5,', 'of', '0', 'to', '1000'],
+                                                   ['many', '20,', 'of', '0', 'to', '1000']]
 
 
 def test_every_option_of_the_library_is_a_flag_with_a_help():

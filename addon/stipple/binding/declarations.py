@@ -209,6 +209,7 @@ FUNCTIONS = {
     'stipple_cloud_quantity': (_status, [_handle, c_uint32, c_uint64, _floats, POINTER(c_uint64)]),
     'stipple_strategy_count': (_status, [POINTER(c_uint64)]),
     'stipple_strategy_info': (_status, [c_uint64, _to(s.StippleStrategyInfo)]),
+    'stipple_strategy_setting': (_status, [_path, c_uint64, _to(s.StippleStrategySetting)]),
     'stipple_strategy_part_count': (_status, [POINTER(c_uint64)]),
     'stipple_strategy_part_info': (_status, [c_uint64, _to(s.StippleStrategyInfo)]),
     'stipple_strategy_check': (_status, [_path]),

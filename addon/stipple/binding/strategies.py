@@ -5,14 +5,27 @@ from ctypes import byref, c_uint64
 from dataclasses import dataclass
 
 from .errors import check
-from .structs import FitModel, StippleStrategyInfo
+from .structs import NO_INDEX, FitModel, StippleStrategyInfo, StippleStrategySetting
+
+
+@dataclass(frozen=True)
+class StrategySetting:
+    name: str
+    default: float
+    minimum: float
+    maximum: float
+    is_whole: bool   # a count, or 0 and 1 for no and yes
 
 
 @dataclass(frozen=True)
 class StrategyEntry:
     name: str        # as the option strategy takes it
+    label: str       # for people
     summary: str     # one sentence for artists
     model: FitModel  # that it is for
+    decides: str = ''      # in words, with commas between
+    bit: int | None = None  # of a part: under which files keep it
+    settings: tuple = ()   # of StrategySetting
 
 
 def strategies(library):
@@ -37,5 +50,15 @@ def _entries(library, count_of, info_of):
     for index in range(count.value):
         info = StippleStrategyInfo()
         check(library, info_of(index, byref(info)))
-        entries.append(StrategyEntry(info.name_utf8.decode(), info.summary_utf8.decode(), FitModel(info.model)))
+        name = info.name_utf8.decode()
+        entries.append(StrategyEntry(name, info.label_utf8.decode(), info.summary_utf8.decode(), FitModel(info.model),
+                                     info.decides_utf8.decode(), None if info.bit == NO_INDEX else info.bit,
+                                     tuple(_setting(library, name, i) for i in range(info.setting_count))))
     return entries
+
+
+def _setting(library, name, index):
+    setting = StippleStrategySetting()
+    check(library, library.stipple_strategy_setting(name.encode(), index, byref(setting)))
+    return StrategySetting(setting.name_utf8.decode(), setting.default_value, setting.minimum, setting.maximum,
+                           bool(setting.is_whole))

@@ -383,7 +383,13 @@ class StippleFitFigures(_Sized):
 
 
 class StippleStrategyInfo(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('model', c_uint32), ('name_utf8', c_char_p), ('summary_utf8', c_char_p)]
+    _fields_ = [('struct_size', c_uint32), ('model', c_uint32), ('name_utf8', c_char_p), ('summary_utf8', c_char_p),
+                ('label_utf8', c_char_p), ('decides_utf8', c_char_p), ('bit', c_uint32), ('setting_count', c_uint32)]
+
+
+class StippleStrategySetting(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('is_whole', c_uint32), ('name_utf8', c_char_p),
+                ('default_value', c_double), ('minimum', c_double), ('maximum', c_double)]
 
 
 class StippleDensifyOptions(_Sized):

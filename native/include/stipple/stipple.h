@@ -1656,6 +1656,11 @@ typedef struct StippleStrategyInfo {
   uint32_t model;            /* StippleFitModel that it is for */
   const char* name_utf8;     /* as StippleFitOptions::strategy_utf8 takes it */
   const char* summary_utf8;  /* one sentence for artists */
+  const char* label_utf8;    /* for people: "Long Axis Split" */
+  const char* decides_utf8;  /* what it decides, in words with commas between; empty of fields */
+  uint32_t bit;              /* of a part, 0..30: files keep under it that the part was chosen, and no other part
+                                ever gets it. STIPPLE_NO_INDEX of a strategy */
+  uint32_t setting_count;    /* of stipple_strategy_setting */
 } StippleStrategyInfo;
 StippleStatus stipple_strategy_count(uint64_t* count);
 /* index 0..count-1, in the order in which they are shown. */
@@ -1663,6 +1668,17 @@ StippleStatus stipple_strategy_info(uint64_t index, StippleStrategyInfo* info);
 /* Parts that go into strategies of explicit splats, by "strategy+part". */
 StippleStatus stipple_strategy_part_count(uint64_t* count);
 StippleStatus stipple_strategy_part_info(uint64_t index, StippleStrategyInfo* info);
+/* A number that can be set of a strategy or a part: "adaptive(threshold=0.0002)". */
+typedef struct StippleStrategySetting {
+  uint32_t struct_size;
+  uint32_t is_whole;      /* 1: a count, or 0 and 1 for no and yes */
+  const char* name_utf8;  /* lives as long as the library */
+  double default_value;
+  double minimum;
+  double maximum;
+} StippleStrategySetting;
+/* In: name_utf8 of a strategy or a part; index 0..setting_count-1. */
+StippleStatus stipple_strategy_setting(const char* name_utf8, uint64_t index, StippleStrategySetting* setting);
 /* Whether explicit splats take this strategy. Errors: INVALID_ARGUMENT for a name or setting that is not there, a
  * part that does not go with another (says which, and what both decide), a strategy of fields. */
 StippleStatus stipple_strategy_check(const char* strategy_utf8);

@@ -145,6 +145,7 @@ const std::vector<SplatFormat>& splatFormats() {
        .write = [](const SplatCloud& cloud, const std::string& path, const SplatWriteOptions&,
                    Progress* progress) { writeSog(cloud, path, {}, progress); },
        .estimate = estimateSog},
+      // Further formats go here.
   };
   return kFormats;
 }

@@ -43,7 +43,20 @@ TEST_F(StrategiesTest, AreListedWithSentencesAndCanBeMade) {
                                 : stipple_strategy_part_info(i - count, &info));
     EXPECT_TRUE(names.insert(info.name_utf8).second) << info.name_utf8;
     EXPECT_GT(std::string(info.summary_utf8).size(), 20u);
+    EXPECT_GT(std::string(info.label_utf8).size(), 2u);
+    EXPECT_EQ(info.bit == STIPPLE_NO_INDEX, i < count) << info.name_utf8;
     const bool is_field = info.model == STIPPLE_FIT_FIELD;
+    EXPECT_EQ(std::string(info.decides_utf8).empty(), is_field) << info.name_utf8;
+    for (uint64_t k = 0; k < info.setting_count; ++k) {
+      auto setting = sized<StippleStrategySetting>();
+      STIPPLE_ASSERT_OK(stipple_strategy_setting(info.name_utf8, k, &setting));
+      EXPECT_LE(setting.minimum, setting.default_value) << setting.name_utf8;
+      EXPECT_LE(setting.default_value, setting.maximum) << setting.name_utf8;
+      // What is told can be set.
+      const std::string text = std::string(i < count ? "" : "adaptive+") + info.name_utf8 + "(" +
+                               setting.name_utf8 + "=" + std::to_string(setting.maximum) + ")";
+      STIPPLE_EXPECT_OK(stipple_strategy_check(text.c_str()));
+    }
     EXPECT_EQ(is_field, std::string(info.name_utf8) == "learned_density");
     if (i < count && !is_field) {
       STIPPLE_EXPECT_OK(stipple_strategy_check(info.name_utf8));
@@ -56,6 +69,13 @@ TEST_F(StrategiesTest, AreListedWithSentencesAndCanBeMade) {
                 ("index is " + std::to_string(count)).c_str());
   expectRefused(stipple_strategy_part_info(part_count, &info), STIPPLE_ERROR_INVALID_ARGUMENT,
                 "index is");
+  auto setting = sized<StippleStrategySetting>();
+  expectRefused(stipple_strategy_setting("nothing", 0, &setting), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "which is no strategy and no part");
+  expectRefused(stipple_strategy_setting("adaptive", 9, &setting), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "index is 9");
+  expectRefused(stipple_strategy_setting("opacity_correction", 0, &setting),
+                STIPPLE_ERROR_INVALID_ARGUMENT, "has no settings");
   expectRefused(stipple_strategy_check("adaptive+nothing"), STIPPLE_ERROR_INVALID_ARGUMENT,
                 "part is 'nothing'");
 }

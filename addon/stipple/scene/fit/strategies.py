@@ -13,16 +13,13 @@ from ..source import sources
 ADAPTIVE = 'adaptive'
 # As the preset of the quality has it; the number is that of the item in files.
 BY_QUALITY, BY_QUALITY_NUMBER = 'by_quality', 1
-# Bits under which files keep parts: never given to another one.
-_PART_BITS = {name: bit for bit, name in enumerate((
-    'edge_aware_score', 'long_axis_split', 'volume_split', 'recovery_pruning', 'growth_control', 'multi_step_update',
-    'opacity_correction', 'filter_3d'))}
+_ADAPTIVE_ALONE = (native.StrategyEntry(ADAPTIVE, "Adaptive", "", FitModel.EXPLICIT),)
 
 
 @lru_cache(maxsize=1)
 def _of(library):
     return (tuple(entry for entry in native.strategies(library) if entry.model == FitModel.EXPLICIT),
-            tuple(entry for entry in native.strategy_parts(library) if entry.name in _PART_BITS))
+            tuple(native.strategy_parts(library)))
 
 
 def _library():
@@ -38,23 +35,20 @@ def _library():
 def _listed():
     """(strategies of splats, parts); without the library the one that a fit starts from."""
     library = _library()
-    return ((native.StrategyEntry(ADAPTIVE, "", FitModel.EXPLICIT),), ()) if library is None else _of(library)
-
-
-def _title(name):
-    return name.replace('_', ' ').title()
+    return (_ADAPTIVE_ALONE, ()) if library is None else _of(library)
 
 
 @lru_cache(maxsize=2)  # Blender keeps no reference to the texts of items
 def _strategy_items(entries):
-    chosen = (BY_QUALITY, _title(BY_QUALITY), "The strategy that goes with the quality", BY_QUALITY_NUMBER)
-    return (chosen, *((entry.name, _title(entry.name), entry.summary,
+    chosen = (BY_QUALITY, "By Quality", "The strategy that goes with the quality", BY_QUALITY_NUMBER)
+    return (chosen, *((entry.name, entry.label, entry.summary,
                        0 if entry.name == ADAPTIVE else crc32(entry.name.encode()) & 0x7fffffff) for entry in entries))
 
 
 @lru_cache(maxsize=2)
 def _part_items(entries):
-    return tuple((entry.name, _title(entry.name), entry.summary, 1 << _PART_BITS[entry.name]) for entry in entries)
+    return tuple((entry.name, entry.label, f"{entry.summary}. It decides {entry.decides}", 1 << entry.bit)
+                 for entry in entries)
 
 
 def strategy_items(_settings=None, _context=None):
@@ -78,11 +72,10 @@ def chosen(settings):
 def summary(settings):
     """One sentence on a fit's strategy, which it names where the quality chooses it."""
     name = chosen(settings)
-    return (f"{_title(name)}: " if name != settings.strategy else "") + _summary(name)
-
-
-def _summary(name):
-    return next((entry.summary for entries in _listed() for entry in entries if entry.name == name), "")
+    found = next((entry for entries in _listed() for entry in entries if entry.name == name), None)
+    if found is None:
+        return ""
+    return (f"{found.label}: " if name != settings.strategy else "") + found.summary
 
 
 def text_of(settings):

@@ -7,7 +7,9 @@ from . import sources
 
 # Blender asks which files may be dropped into its windows while it registers, before any library is loaded; a test
 # compares these with the library's.
-DROPPED_ENDINGS = ('.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog')
+DROPPED_ENDINGS = (
+    '.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog',
+)
 # Of dialogs, until a name is typed.
 USUAL_ENDING = '.ply'
 _known = {}
