@@ -44,6 +44,7 @@ struct FitMoment {
   uint64_t max_splats = 0;      ///< hard cap of the count; 0: none
   double position_rate = 0;     ///< of Adam in this iteration, metres
   size_t view_count = 0;        ///< that are learned from; 0: not known
+  double time = 0;              ///< seconds, of the view of this iteration; 0 where nothing moves
   const TrainingView* view = nullptr;  ///< of this iteration; nullptr where none is under way
   std::optional<StandaloneEvent> standalone = {};  ///< there is no fit
 };

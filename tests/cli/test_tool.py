@@ -132,6 +132,10 @@ def test_a_saved_model_decodes_to_the_same_splats(scene):
     run('decode', scene / 'cube.glb', scene / 'cube.stipple.safetensors')
     assert figures('info', scene / 'cube.stipple.safetensors')['kind'] == 'surface model'
     run('decode', scene / 'cube.stipple.safetensors', scene / 'again.ply', '--anchors', 5000)
+    # Nothing moves in it.
+    run('decode', scene / 'cube.stipple.safetensors', scene / 'later.ply', '--anchors', 5000, '--time', 2.5)
+    assert (scene / 'later.ply').read_bytes() == (scene / 'again.ply').read_bytes()
+    assert 'options->time' in error('decode', scene / 'cube.stipple.safetensors', scene / 'no.ply', '--time', 'nan')
     result = figures('compare', scene / 'cube.ply', scene / 'again.ply')
     assert result['same_order'] == 1 and result['max_position'] == 0
 

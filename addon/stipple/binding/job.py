@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long native work that is polled: no callback ever enters Python. What a finished job made is asked of its own class, as
-Model.of_job(job) does."""
+"""Long native work that is polled: no callback ever enters Python.
+
+What a finished job has made is asked of its own class, as Model.of_job(job) does.
+"""
 
 from ctypes import byref
 

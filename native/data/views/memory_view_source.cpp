@@ -7,11 +7,14 @@
 
 namespace stipple {
 
-void MemoryViewSource::add(const Camera& camera, const ViewPicture& picture, std::string name) {
+void MemoryViewSource::add(const Camera& camera, const ViewPicture& picture, std::string name,
+                           double time) {
   if (name.empty()) name = "view " + std::to_string(views_.size());
   validateView(camera, picture, name);
+  requireFinite(time, (name + ": time").c_str());
   auto packed = std::make_shared<const PackedPicture>(picture);
-  views_.push_back(std::make_shared<const View>(View{camera, std::move(packed), std::move(name)}));
+  views_.push_back(
+      std::make_shared<const View>(View{camera, std::move(packed), std::move(name), time}));
 }
 
 void MemoryViewSource::setPoints(PointSet points) {

@@ -210,6 +210,9 @@ std::vector<std::string> checkViews(const ViewSource& views, const ViewCheckOpti
   if (views.count() == 0) {
     fail(ErrorCode::kInvalidArgument, "there are no views; at least one is needed");
   }
+  for (size_t view = 0; view < views.count(); ++view) {
+    requireFinite(views.time(view), (views.name(view) + ": time").c_str());
+  }
   std::vector<std::string> warnings;
   checkCameras(views, warnings);
   checkPictures(views, options, progress, warnings);

@@ -46,6 +46,8 @@ class ViewSource {
   virtual ColourSpace colourSpace() const = 0;
   /// kNone where nothing is said.
   virtual ViewRole role(size_t) const { return ViewRole::kNone; }
+  /// When the picture was taken, seconds; 0 where nothing moves.
+  virtual double time(size_t) const { return 0; }
 
   /// May be called by several threads at once. Errors: kIo, kFormat (names the picture), and
   /// kInvalidArgument for numbers that are not finite.

@@ -43,6 +43,7 @@ struct StepView {
   const float* weights = nullptr;  ///< [H,W] or null: 1
   bool is_opaque = true;           ///< the view has no alpha: all of it is meant to be covered
   double background[3] = {0, 0, 0};
+  double time = 0;  ///< seconds, when the picture was taken; 0 where nothing moves
 };
 
 /// What is trained: explicit splats, or the field of a learned density. The trainer chooses views,

@@ -150,6 +150,7 @@ void Trainer::step(Pace& pace) {
   view.index = order_.at(iteration_);
   const size_t source_view = split_.training[view.index];
   view.camera = &pictures_.views().camera(source_view);
+  view.time = moment.time = pictures_.views().time(source_view);
   backgroundOf(moment.iteration, view.background);
   pictures_.load(source_view, view.background, target_);
   if (target_.alpha.empty()) backgroundOf(0, view.background);

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 
 #include "api/fixtures.h"
@@ -122,6 +123,37 @@ TEST_F(Grade, IsRefusedOutsideItsRange) {
   EXPECT_EQ(stipple_cloud_merge(&instance, 1, STIPPLE_FRAME_UNKNOWN, &merged),
             STIPPLE_ERROR_INVALID_ARGUMENT);
   EXPECT_THAT(stipple_last_error_message(), HasSubstr("instances[0].grade->struct_size is 4"));
+  stipple_cloud_free(cloud);
+}
+
+TEST_F(Grade, OfInstancesThatEndBeforeTheirTimeIsRead) {
+  StippleCloud* cloud = oneSplat(0.25f, 0.5f, 0.75f);
+  StippleInstance instance = placed(cloud);
+  StippleGrade grade;
+  stipple_grade_init(&grade);
+  grade.opacity = -1;
+  instance.grade = &grade;
+  instance.struct_size = offsetof(StippleInstance, time);
+  StippleCloud* merged = nullptr;
+  EXPECT_EQ(stipple_cloud_merge(&instance, 1, STIPPLE_FRAME_UNKNOWN, &merged),
+            STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_THAT(stipple_last_error_message(), HasSubstr("instances[0].grade"));
+  stipple_cloud_free(cloud);
+}
+
+TEST_F(Grade, TimeOfInstancesIsFiniteAndChangesNoCloud) {
+  StippleCloud* cloud = oneSplat(0.25f, 0.5f, 0.75f);
+  StippleInstance instance = placed(cloud);
+  StippleCloud* merged = nullptr;
+  for (const double time : {std::nan(""), HUGE_VAL}) {
+    instance.time = time;
+    EXPECT_EQ(stipple_cloud_merge(&instance, 1, STIPPLE_FRAME_UNKNOWN, &merged),
+              STIPPLE_ERROR_INVALID_ARGUMENT);
+    EXPECT_THAT(stipple_last_error_message(), HasSubstr("instances[0].time"));
+  }
+  instance.time = -2.5;
+  STIPPLE_EXPECT_OK(stipple_cloud_merge(&instance, 1, STIPPLE_FRAME_UNKNOWN, &merged));
+  stipple_cloud_free(merged);
   stipple_cloud_free(cloud);
 }
 

@@ -113,6 +113,42 @@ TEST(MemoryViewSource, RefusesBadCamerasAndPoints) {
             std::string::npos);
 }
 
+TEST(MemoryViewSource, KnowsWhenAPictureWasTaken) {
+  MemoryViewSource views(ColourSpace::kDisplay);
+  views.add(cameraOf(3, 2), pictureOf(3, 2, 0.5f));
+  views.add(cameraOf(3, 2), pictureOf(3, 2, 0.5f), "later", 2.5);
+  EXPECT_EQ(views.time(0), 0);
+  EXPECT_EQ(views.time(1), 2.5);
+  for (const double time : {std::nan(""), HUGE_VAL}) {
+    EXPECT_NE(messageOf([&] {
+                views.add(cameraOf(3, 2), pictureOf(3, 2, 0.5f), "never", time);
+              }).find("never: time"),
+              std::string::npos);
+  }
+  EXPECT_EQ(views.count(), 2u);
+}
+
+TEST(ViewCheck, RefusesATimeThatIsNotFinite) {
+  class Timeless final : public ViewSource {
+   public:
+    explicit Timeless(const MemoryViewSource& views) : views_(views) {}
+    size_t count() const override { return views_.count(); }
+    const Camera& camera(size_t view) const override { return views_.camera(view); }
+    std::string name(size_t view) const override { return views_.name(view); }
+    ColourSpace colourSpace() const override { return views_.colourSpace(); }
+    double time(size_t) const override { return std::nan(""); }
+    ViewPicture load(size_t view) const override { return views_.load(view); }
+    const PointSet& points() const override { return views_.points(); }
+
+   private:
+    const MemoryViewSource& views_;
+  };
+  MemoryViewSource views(ColourSpace::kDisplay);
+  views.add(cameraOf(3, 2), pictureOf(3, 2, 0.5f), "front");
+  EXPECT_NE(messageOf([&] { checkViews(Timeless(views), {}, nullptr); }).find("front: time"),
+            std::string::npos);
+}
+
 TEST(ViewCheck, RefusesNoViewsAndViewsThatShowNothing) {
   MemoryViewSource views(ColourSpace::kDisplay);
   EXPECT_EQ(messageOf([&] { checkViews(views); }), "there are no views; at least one is needed");

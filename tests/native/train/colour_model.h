@@ -37,6 +37,8 @@ class ColourModel final : public FitModel {
     }
     seen_views.push_back(view.index);
     seen_backgrounds.push_back(view.background[0]);
+    seen_times.push_back(view.time);
+    seen_moments.push_back(moment.time);
     StepReport report;
     report.loss = loss;
     report.splat_count = 1;
@@ -71,6 +73,8 @@ class ColourModel final : public FitModel {
 
   std::vector<size_t> seen_views;
   std::vector<double> seen_backgrounds;
+  std::vector<double> seen_times;    ///< of the views
+  std::vector<double> seen_moments;  ///< of the moments
 
  private:
   ColourModelOptions options_;
@@ -93,7 +97,8 @@ inline Camera cameraAt(double x, uint32_t width, uint32_t height, double distanc
 
 /// Views of one colour that differ a little from view to view. alpha below 1: of every pixel.
 inline std::shared_ptr<MemoryViewSource> colourViews(size_t count, float red, float green,
-                                                     float blue, float alpha = 1) {
+                                                     float blue, float alpha = 1,
+                                                     double seconds_apart = 0) {
   auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
   const float colour[3] = {red, green, blue};
   for (size_t v = 0; v < count; ++v) {
@@ -107,7 +112,8 @@ inline std::shared_ptr<MemoryViewSource> colourViews(size_t count, float red, fl
     if (alpha < 1) picture.alpha.assign(size_t{20} * 12, alpha);
     const std::string number = std::to_string(v);
     views->add(cameraAt(0.1 * static_cast<double>(v), 20, 12), std::move(picture),
-               "view" + std::string(4 - number.size(), '0') + number);
+               "view" + std::string(4 - number.size(), '0') + number,
+               seconds_apart * static_cast<double>(v));
   }
   return views;
 }

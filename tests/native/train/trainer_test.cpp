@@ -447,5 +447,18 @@ TEST(CameraExtent, IsThePublishedOneAndNeverZero) {
   EXPECT_NEAR(extentOfCameras(*views, one), 4.0, 1e-12);
 }
 
+TEST(Trainer, TellsTheModelWhenEachPictureWasTaken) {
+  const auto views = colourViews(9, 0.2f, 0.6f, 0.4f, 1, 0.5);
+  Fit fit(views, optionsOf(20));
+  fit.run();
+  const FitViews split = splitViews(*views, 8);
+  ASSERT_EQ(fit.model->seen_times.size(), 20u);
+  for (size_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(fit.model->seen_times[i],
+              0.5 * static_cast<double>(split.training[fit.model->seen_views[i]]));
+  }
+  EXPECT_EQ(fit.model->seen_moments, fit.model->seen_times);
+}
+
 }  // namespace
 }  // namespace stipple
