@@ -74,10 +74,12 @@ StippleStatus stipple_densify_start(StippleContext* context, const StippleCloud*
     context->state->requireMemory(densifyMemoryBound(*start, *source, settings),
                                   "densifying this cloud");
     const FitViews split = splitOf(*views, *source, given.holdout);
-    *job = startJob(context->state, [start, source, split, settings](Progress& progress) {
+    *job = startJob(context->state, [start, source, split, settings,
+                                     backends = context->state->backends](Progress& progress) {
       checkViews(*source, {}, &progress);
       SplatQuantities seen;
-      SplatCloud made = densifyCloud(*start, source, split.training, settings, &progress, &seen);
+      SplatCloud made =
+          densifyCloud(*backends, *start, source, split.training, settings, &progress, &seen);
       return JobResult{SeenCloud(std::move(made), std::move(seen))};
     });
   });

@@ -125,7 +125,8 @@ StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* vie
     holdToMemory(given.max_bytes, *source, settings);
     context->state->requireMemory(fitMemoryBound(settings, *source), "this fit");
     FitViews split = splitOf(*views, *source, settings.holdout);
-    auto session = std::make_shared<FitSession>(source, std::move(split), std::move(settings));
+    auto session = std::make_shared<FitSession>(context->state->backends, source, std::move(split),
+                                                std::move(settings));
     *job = startJob(
         context->state,
         [session](Progress& progress) -> JobResult {

@@ -55,7 +55,8 @@ uint64_t pictureMemoryBound(const ViewSource& views, uint64_t picture_bytes);
 /// One fit: what its job works on, and what others ask of it meanwhile.
 class FitSession final : public FitObserver {
  public:
-  FitSession(std::shared_ptr<const ViewSource> views, FitViews split, FitSettings settings);
+  FitSession(std::shared_ptr<const BackendFactory> backends,
+             std::shared_ptr<const ViewSource> views, FitViews split, FitSettings settings);
 
   /// The whole work, on the job's thread.
   void run(Progress& progress);
@@ -83,6 +84,7 @@ class FitSession final : public FitObserver {
   void save(const TensorTable& table) override;
 
  private:
+  std::shared_ptr<const BackendFactory> backends_;
   std::shared_ptr<const ViewSource> views_;
   FitViews split_;
   FitSettings settings_;

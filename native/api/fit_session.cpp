@@ -12,19 +12,24 @@ namespace stipple::api {
 
 namespace {
 
-std::unique_ptr<FitModel> makeModel(const ViewSource& views, const FitViews& split,
-                                    const FitSettings& settings, Progress* progress) {
+std::unique_ptr<FitModel> makeModel(const BackendFactory& backends, const ViewSource& views,
+                                    const FitViews& split, const FitSettings& settings,
+                                    Progress* progress) {
   if (settings.is_field) {
-    return makeFieldModel(views, split.training, settings.field_model, progress);
+    return makeFieldModel(backends, views, split.training, settings.field_model, progress);
   }
-  return makeExplicitModel(views, split.training, settings.explicit_model, progress);
+  return makeExplicitModel(backends, views, split.training, settings.explicit_model, progress);
 }
 
 }  // namespace
 
-FitSession::FitSession(std::shared_ptr<const ViewSource> views, FitViews split,
+FitSession::FitSession(std::shared_ptr<const BackendFactory> backends,
+                       std::shared_ptr<const ViewSource> views, FitViews split,
                        FitSettings settings)
-    : views_(std::move(views)), split_(std::move(split)), settings_(std::move(settings)) {
+    : backends_(std::move(backends)),
+      views_(std::move(views)),
+      split_(std::move(split)),
+      settings_(std::move(settings)) {
   figures_.iterations = settings_.trainer.iterations;
 }
 
@@ -38,7 +43,8 @@ void FitSession::run(Progress& progress) {
   }
   for (const std::string& warning : checkViews(*views_, {}, &progress)) note(warning);
   auto trainer = std::make_unique<Trainer>(
-      views_, split_, makeModel(*views_, split_, settings_, &progress), settings_.trainer);
+      *backends_, views_, split_, makeModel(*backends_, *views_, split_, settings_, &progress),
+      settings_.trainer);
   if (checkpoint) {
     try {
       trainer->restore(checkpoint->tensors);

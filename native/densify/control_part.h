@@ -120,7 +120,8 @@ class ControlPart {
   // ---------------------------------------------------------------------------
   /// Adds what it wants to `request`; pictures in it have one owner.
   virtual void request(const ControlMoment&, StatisticRequest&) const {}
-  /// kRegularisation.
+  /// kRegularisation: whether loss() has anything to add, for which splats are copied out.
+  virtual bool regularises(const ControlMoment&) const { return false; }
   virtual double loss(const ControlMoment&, const SplatCloud&, const CloudGradient&) { return 0; }
   /// kRegularisation: weight of the mean transmittance behind the last splat, in the loss.
   virtual double transmittanceWeight(const ControlMoment&) const { return 0; }
@@ -178,6 +179,8 @@ class ControlPart {
 
   // ---- any iteration, after an event
   // -----------------------------------------------------------------
+  /// kOpacity: whether it acts now.
+  virtual bool lowersAt(const ControlMoment& moment) const { return moment.is_event; }
   /// kOpacity: adds writes of logits, and changes those of appended rows.
   virtual void lowerOpacities(const ControlMoment&, const RawSplats&, SplatEdit&) {}
 
