@@ -53,8 +53,9 @@ StippleStatus stipple_densify_start(StippleContext* context, const StippleCloud*
     context->state->requireMemory(densifyMemoryBound(*start, *source, wanted),
                                   "densifying this cloud");
     const uint64_t holdout = given.holdout;
-    *job = startJob(context->state, [start, source, holdout, wanted](Progress& progress) {
-      return JobResult{densified(*start, source, holdout, wanted, &progress)};
+    *job = startJob(context->state, [start, source, holdout, wanted,
+                                     backends = context->state->backends](Progress& progress) {
+      return JobResult{densified(*backends, *start, source, holdout, wanted, &progress)};
     });
   });
 }

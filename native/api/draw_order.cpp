@@ -73,9 +73,9 @@ StippleStatus stipple_renderer_order_start(StippleRenderer* renderer,
                             first_rows = std::move(first_rows)](Progress& progress) mutable {
           output.first_rows = first_rows;
           const std::unique_lock<std::mutex> lock(memory->order_mutex, std::try_to_lock);
-          DrawOrderWorkspace own;
-          orderForDrawing(placed.list, view, output,
-                          lock.owns_lock() ? memory->order_workspace : own, &progress);
+          std::unique_ptr<ImageRenderer> own;
+          if (!lock.owns_lock()) own = memory->backends->makeImageRenderer();
+          (own ? *own : *memory->orders).order(placed.list, view, output, &progress);
           return JobResult{};
         });
   });

@@ -68,7 +68,8 @@ StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* vie
     require(context, "context");
     require(views, "views");
     require(job, "job");
-    auto session = std::make_shared<FitSession>(sourceOf(*views), fitOptionsFrom(options));
+    auto session = std::make_shared<FitSession>(context->state->backends, sourceOf(*views),
+                                                fitOptionsFrom(options));
     context->state->requireMemory(session->memoryBound(), "this fit");
     *job = startJob(
         context->state,
@@ -83,8 +84,8 @@ StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* vie
 StippleStatus stipple_fit_memory_bound(const StippleViews* views, const StippleFitOptions* options,
                                        uint64_t* bytes) {
   return guarded([&] {
-    const FitSession session(sourceOf(require(views, "views")), fitOptionsFrom(options));
-    require(bytes, "bytes") = session.memoryBound();
+    const std::shared_ptr<const ViewSource> source = sourceOf(require(views, "views"));
+    require(bytes, "bytes") = FitSession::memoryBound(*source, fitOptionsFrom(options));
   });
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "api/cloud_cuts.h"
@@ -23,8 +24,9 @@
 #include "density/density_model.h"
 #include "io/views/camera_file.h"
 #include "model/splat_model.h"
-#include "splat/render/draw_order.h"
+#include "splat/render/image_renderer.h"
 #include "splat/render/render_backward.h"
+#include "train/loop/backend_factory.h"
 
 namespace stipple::api {
 
@@ -32,6 +34,8 @@ namespace stipple::api {
 struct ContextState {
   uint32_t thread_count = 0;
   uint64_t memory_limit_bytes = UINT64_MAX;
+  /// What draws and differentiates, for fits and images alike.
+  std::shared_ptr<const BackendFactory> backends = cpuBackends();
 
   /// Refuses work that needs more than the limit. In: what, as a noun for the message.
   void requireMemory(uint64_t bytes, const char* what) const;
@@ -61,16 +65,23 @@ struct AccuracyResult {
 
 /// What a renderer keeps from one picture to the next; its jobs hold a share.
 struct RendererMemory {
+  explicit RendererMemory(std::shared_ptr<const BackendFactory> factory)
+      : backends(std::move(factory)),
+        images(backends->makeImageRenderer()),
+        orders(backends->makeImageRenderer()) {}
+
+  std::shared_ptr<const BackendFactory> backends;
+
   std::mutex mutex;  ///< held while a job uses the rest
-  RenderWorkspace workspace;
+  std::unique_ptr<ImageRenderer> images;
   RenderResult result;
   BackwardWorkspace backward_workspace;
   BackwardResult backward_result;
 
   CloudCuts cuts;  ///< has a lock of its own
 
-  std::mutex order_mutex;  ///< of order_workspace: an order and a picture may be made at once
-  DrawOrderWorkspace order_workspace;
+  std::mutex order_mutex;  ///< of orders: an order and a picture may be made at once
+  std::unique_ptr<ImageRenderer> orders;
 };
 
 }  // namespace stipple::api

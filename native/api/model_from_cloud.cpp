@@ -67,12 +67,13 @@ RefineOptions refineSettings(const StippleRefineOptions& given) {
   return settings;
 }
 
-std::shared_ptr<const SplatModel> build(const std::shared_ptr<const SplatCloud>& cloud,
+std::shared_ptr<const SplatModel> build(const BackendFactory& backends,
+                                        const std::shared_ptr<const SplatCloud>& cloud,
                                         const HierarchySettings& settings, Progress& progress) {
   std::vector<float> visibility;
   if (settings.view_count > 0) {
-    const std::vector<Camera> views = viewsForVisibility(*cloud, settings.rig);
-    visibility = splatVisibility(*cloud, views, &progress);
+    const std::vector<Camera> views = viewsForVisibility(backends, *cloud, settings.rig);
+    visibility = splatVisibility(backends, *cloud, views, &progress);
   }
   auto tree = std::make_shared<const MergeTree>(
       buildMergeTree(*cloud, visibility, settings.tree, &progress));
@@ -108,9 +109,11 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
     }
     context->state->requireMemory(hierarchyMemoryBound(*leaves, settings),
                                   "the hierarchy of this cloud");
-    *job = startJob(context->state, [leaves, settings](Progress& progress) -> JobResult {
-      return build(leaves, settings, progress);
-    });
+    *job = startJob(
+        context->state,
+        [leaves, settings, backends = context->state->backends](Progress& progress) -> JobResult {
+          return build(*backends, leaves, settings, progress);
+        });
   });
 }
 
@@ -138,9 +141,12 @@ StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const Stippl
     const std::shared_ptr<const SplatCloud> whole = full->cloud;
     cloud->context->requireMemory(refineMemoryBound(*start, *whole, settings),
                                   "refining this cloud");
-    *job = startJob(cloud->context, [start, whole, settings](Progress& progress) -> JobResult {
-      return std::make_shared<const SplatCloud>(refineCloud(*start, *whole, settings, &progress));
-    });
+    *job = startJob(cloud->context,
+                    [start, whole, settings,
+                     backends = cloud->context->backends](Progress& progress) -> JobResult {
+                      return std::make_shared<const SplatCloud>(
+                          refineCloud(*backends, *start, *whole, settings, &progress));
+                    });
   });
 }
 

@@ -95,20 +95,19 @@ void renderAccurateTo(RendererMemory& memory, Instances placed, const Camera& vi
   memory.cuts.cut(placed, settings.budget_share, &progress);
   const std::unique_lock<std::mutex> lock(memory.mutex, std::try_to_lock);
   if (lock.owns_lock()) {
-    renderAccurate(placed.list, view, settings.options, settings.accuracy, memory.workspace,
-                   memory.result, &progress);
+    memory.images->render(placed.list, view, settings.options, settings.accuracy, memory.result,
+                          &progress);
     deliverPicture(memory.result, settings, out);
   } else {
-    RenderWorkspace workspace;
     RenderResult result;
-    renderAccurate(placed.list, view, settings.options, settings.accuracy, workspace, result,
-                   &progress);
+    memory.backends->makeImageRenderer()->render(placed.list, view, settings.options,
+                                                 settings.accuracy, result, &progress);
     deliverPicture(result, settings, out);
   }
 }
 
 /// One of the pictures of an average.
-void drawPicture(RenderWorkspace& workspace, const RenderSettings& settings,
+void drawPicture(ImageRenderer& images, const RenderSettings& settings,
                  std::span<const SplatInstance> instances, const Camera& camera,
                  const RenderOptions& options, RenderResult& result, Progress* progress) {
   if (followsRays(settings.method)) {
@@ -130,7 +129,7 @@ void drawPicture(RenderWorkspace& workspace, const RenderSettings& settings,
     take(drawn.normal, result.normal);
     take(drawn.objects, result.objects);
   } else {
-    renderAccurate(instances, camera, options, settings.accuracy, workspace, result, progress);
+    images.render(instances, camera, options, settings.accuracy, result, progress);
   }
 }
 
@@ -140,12 +139,13 @@ void renderSampledTo(RendererMemory& memory, Instances placed, const Camera& vie
   memory.cuts.cut(placed, settings.budget_share, &progress);
   // Another job of the same renderer may be using its memory.
   const std::unique_lock<std::mutex> lock(memory.mutex, std::try_to_lock);
-  RenderWorkspace own;
-  RenderWorkspace& workspace = lock.owns_lock() ? memory.workspace : own;
+  std::unique_ptr<ImageRenderer> own;
+  if (!lock.owns_lock()) own = memory.backends->makeImageRenderer();
+  ImageRenderer& images = own ? *own : *memory.images;
   const DrawMoment draw = [&](std::span<const SplatInstance> instances, const Camera& camera,
                               const RenderOptions& options, RenderResult& result,
                               Progress* listener) {
-    drawPicture(workspace, settings, instances, camera, options, result, listener);
+    drawPicture(images, settings, instances, camera, options, result, listener);
     if (settings.linearise || settings.averages_light) {
       lineariseColour(result.colour.data(), result.colour.size() / 4);
     }
@@ -175,8 +175,8 @@ void stipple_render_options_init(StippleRenderOptions* options) {
 StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer) {
   return guarded([&] {
     require(context, "context");
-    require(renderer, "renderer") =
-        new StippleRenderer{context->state, std::make_shared<RendererMemory>()};
+    require(renderer, "renderer") = new StippleRenderer{
+        context->state, std::make_shared<RendererMemory>(context->state->backends)};
   });
 }
 

@@ -49,7 +49,10 @@ void densify(benchmark::State& state) {
   withThreads(2, [&] {
     compare(
         state, "bare_looks",
-        [&] { benchmark::DoNotOptimize(densifyCloud(cloudOf(kCase), views, shown, options)); },
+        [&] {
+          benchmark::DoNotOptimize(
+              densifyCloud(*cpuBackends(), cloudOf(kCase), views, shown, options));
+        },
         [&] { bareLooks(views); });
   });
 }

@@ -71,7 +71,7 @@ class BallViews {
     options.leaf_level = leaf_level;
     options.shell = ShellChoice::kOff;
     const std::vector<size_t> training = {0};
-    return makeFieldModel(views_, training, options);
+    return makeFieldModel(*cpuBackends(), views_, training, options);
   }
 
   StepReport step(FitModel& model, uint64_t iteration) const {

@@ -80,8 +80,8 @@ class SameViews {
       training_.push_back(v);
     }
     pictures_ = std::make_unique<PictureStore>(source, uint64_t{1} << 28);
-    evaluator_ = std::make_unique<FitViewEvaluator>([&model] { return model.splats(0); },
-                                                    *pictures_, training_, kBlack, 0.2);
+    evaluator_ = std::make_unique<FitViewEvaluator>(
+        *cpuBackends(), [&model] { return model.splats(0); }, *pictures_, training_, kBlack, 0.2);
   }
   FitViewEvaluator& evaluator() { return *evaluator_; }
 
@@ -97,7 +97,8 @@ void steps(benchmark::State& state, const SplatCase& c) {
   OneView view(c);
   ExplicitModelOptions options;
   options.sh_degree = c.degree;
-  const auto model = makeExplicitModel(cloudOf(c), makeStrategy("adaptive"), options);
+  const auto model =
+      makeExplicitModel(*cpuBackends(), cloudOf(c), makeStrategy("adaptive"), options);
   const auto backend = makeCpuBackend();
   backend->upload(cloudOf(c));
   RenderOptions render;
@@ -158,7 +159,8 @@ void densifyEvent(benchmark::State& state, const std::string& name) {
   ExplicitModelOptions options;
   options.sh_degree = c.degree;
   if (settings.caps) options.max_splats = c.splats + c.splats / 20;
-  const auto model = makeExplicitModel(cloudOf(c), makeStrategy(settings.strategy), options);
+  const auto model =
+      makeExplicitModel(*cpuBackends(), cloudOf(c), makeStrategy(settings.strategy), options);
   SameViews views(*model, view);
   double best_step = 1e300, best_last = 1e300, best_edit = 1e300;
   size_t count = 0;

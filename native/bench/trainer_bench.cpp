@@ -26,7 +26,7 @@ constexpr int kRounds = 3;
 std::unique_ptr<FitModel> modelOf(const ViewSource& views, const FitViews& split) {
   ExplicitModelOptions options;
   options.sh_degree = 0;
-  return makeExplicitModel(views, split.training, options);
+  return makeExplicitModel(*cpuBackends(), views, split.training, options);
 }
 
 /// Ends a fit after kSteps.
@@ -46,7 +46,7 @@ double trainerSeconds(const std::shared_ptr<const ViewSource>& views) {
   const FitViews split = splitViews(*views, 0);
   TrainerOptions options;
   options.iterations = 30000;
-  Trainer trainer(views, split, modelOf(*views, split), options);
+  Trainer trainer(*cpuBackends(), views, split, modelOf(*views, split), options);
   Progress progress;
   Stop stop(progress);
   trainer.run(stop, &progress);

@@ -150,6 +150,8 @@ class ControlPart : public FitHooks<ControlMoment> {
                       std::span<uint8_t> /*appended_goes*/) {}
 
   // ---- any iteration, after an event -------------------------------------------------------------
+  /// kOpacity: whether it acts now.
+  virtual bool lowersAt(const ControlMoment& moment) const { return moment.is_event; }
   /// kOpacity: adds writes of logits, and changes those of appended rows.
   virtual void lowerOpacities(const ControlMoment&, const RawSplats&, SplatEdit&) {}
 

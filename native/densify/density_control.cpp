@@ -85,6 +85,10 @@ class DensityControl final : public Strategy {
     return request;
   }
 
+  bool regularises(const FitMoment& given) const override {
+    const ControlPart* part = owner(ControlRole::kRegularisation);
+    return part && part->regularises(at(given));
+  }
   double loss(const FitMoment& given, const SplatCloud& cloud,
               const CloudGradient& gradient) override {
     ControlPart* part = owner(ControlRole::kRegularisation);
@@ -122,7 +126,7 @@ class DensityControl final : public Strategy {
 
   std::optional<SplatEdit> edit(const FitMoment& given, const SplatStore& store) override {
     const ControlMoment moment = at(given);
-    const size_t count = store.splats.size();
+    const size_t count = store.size();
     if (count == 0) return {};
     followAges(count, moment);
     SplatEdit edit;
@@ -131,14 +135,14 @@ class DensityControl final : public Strategy {
       if (moment.is_event) {
         multiply(moment, store, goes, edit);
         if (ControlPart* part = owner(ControlRole::kSecondSplit)) {
-          part->splitAgain(moment, store.splats, limit(moment, count), goes, edit.append);
+          part->splitAgain(moment, store.splats(), limit(moment, count), goes, edit.append);
         }
       }
-      removeSplats(moment, store.splats, goes, edit);
+      removeSplats(moment, store.splats(), goes, edit);
     }
     ControlPart* lowering = owner(ControlRole::kOpacity);
-    if (lowering && moment.takes_steps) {
-      lowering->lowerOpacities(moment, store.splats, edit);
+    if (lowering && moment.takes_steps && lowering->lowersAt(moment)) {
+      lowering->lowerOpacities(moment, store.splats(), edit);
     }
     if (!moment.is_event && edit.writes.empty() && !edit.keep && edit.append.size() == 0) return {};
     for (const auto& part : parts_) part->edited(moment, edit, count);
@@ -240,8 +244,8 @@ class DensityControl final : public Strategy {
                 SplatEdit& edit) {
     ControlPart* part = owner(ControlRole::kMultiplication);
     if (!part) return;
-    const RawSplats& splats = store.splats;
-    const uint64_t room = limit(moment, splats.size());
+    const RawSplats& splats = store.splats();
+    const uint64_t room = limit(moment, store.size());
     if (part->owns() & roles(ControlRole::kChildren)) {
       part->multiply(moment, store, room, edit);
       if (edit.keep) {

@@ -55,13 +55,15 @@ struct StatisticRequest {
   /// Instead of both: those of structure, 1 - SSIM of the picture and the view's target, mean
   /// of the channels, times what a mask says.
   bool structure_errors = false;
+  /// Splats as they are drawn, for ViewStatistics::splats: they are copied out for it.
+  bool drawn_splats = false;
   /// Pictures for ViewStatistics::errors: nothing is gathered of splats.
   bool error_maps = false;
 
   bool any() const {
     return contributions || blending_weights || screen_gradients || absolute_screen_gradients ||
-           structure_errors || error_maps || covered || errors_of || !edge_weights.empty() ||
-           !errors.empty();
+           structure_errors || drawn_splats || error_maps || covered || errors_of ||
+           !edge_weights.empty() || !errors.empty();
   }
 };
 

@@ -116,8 +116,8 @@ struct ViewStatistics {
     return arrays[static_cast<size_t>(statistic)];
   }
   std::array<std::span<const float>, kStatisticCount> arrays;
-  DrawnSplats splats;
-  ViewErrors errors;  ///< where StatisticRequest::error_maps asks for them
+  DrawnSplats splats;  ///< where StatisticRequest::drawn_splats asks for them
+  ViewErrors errors;   ///< where StatisticRequest::error_maps asks for them
 };
 
 /// Draws views on demand, without a step.
@@ -136,11 +136,34 @@ class ViewEvaluator {
   virtual const ViewStatistics& evaluate(size_t view, const StatisticRequest& request) = 0;
 };
 
-/// The splats as an edit may see them.
-struct SplatStore {
-  const RawSplats& splats;
-  const RawSplats& first_moments;
-  const RawSplats& second_moments;
+/// Who holds splats, and copies them out where they are asked for. Valid until the splats change.
+class SplatReader {
+ public:
+  virtual ~SplatReader() = default;
+  virtual const RawSplats& splats() const = 0;
+  virtual const RawSplats& firstMoments() const = 0;
+  virtual const RawSplats& secondMoments() const = 0;
+};
+
+/// The splats as an edit may see them. They may lie in another processor's memory: their number is
+/// always known, whatever else is asked for is copied.
+class SplatStore {
+ public:
+  SplatStore(size_t count, const SplatReader& reader) : count_(count), reader_(&reader) {}
+  /// Of arrays that are here, which must outlive this.
+  SplatStore(const RawSplats& splats, const RawSplats& first_moments,
+             const RawSplats& second_moments)
+      : count_(splats.size()), here_{&splats, &first_moments, &second_moments} {}
+
+  size_t size() const { return count_; }
+  const RawSplats& splats() const { return reader_ ? reader_->splats() : *here_[0]; }
+  const RawSplats& firstMoments() const { return reader_ ? reader_->firstMoments() : *here_[1]; }
+  const RawSplats& secondMoments() const { return reader_ ? reader_->secondMoments() : *here_[2]; }
+
+ private:
+  size_t count_;
+  const SplatReader* reader_ = nullptr;
+  std::array<const RawSplats*, 3> here_{};
 };
 
 /// What happens in a fit, as whoever controls its splats hears of it: a whole strategy, and each of
@@ -168,6 +191,9 @@ class FitHooks {
   virtual const Parameterisation* parameterisation() const { return nullptr; }
 
   // ---- every iteration -------------------------------------------------------------------------
+  /// Whether loss() has anything to add; where it has, stored values are copied out for it. Of
+  /// parts: kRegularisation.
+  virtual bool regularises(const Moment&) const { return false; }
   /// Value of a regulariser of the stored values; its derivative is added to `gradient`. Of parts:
   /// kRegularisation.
   virtual double loss(const Moment&, const SplatCloud&, const CloudGradient& /*gradient*/) {

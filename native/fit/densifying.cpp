@@ -31,12 +31,14 @@ void requireDensifyOptions(const DensifyOptions& options, const SplatCloud& clou
   requireDensifiable(cloud, views, options);
 }
 
-SeenCloud densified(const SplatCloud& cloud, std::shared_ptr<const ViewSource> views,
-                    uint64_t holdout, const DensifyOptions& options, Progress* progress) {
+SeenCloud densified(const BackendFactory& backends, const SplatCloud& cloud,
+                    std::shared_ptr<const ViewSource> views, uint64_t holdout,
+                    const DensifyOptions& options, Progress* progress) {
   checkViews(*views, {}, progress);
   const FitViews split = splitAsTold(*views, holdout);
   SplatQuantities seen;
-  SplatCloud made = densifyCloud(cloud, std::move(views), split.training, options, progress, &seen);
+  SplatCloud made = densifyCloud(backends, cloud, std::move(views), split.training, options,
+                                 progress, &seen);
   return SeenCloud(std::move(made), std::move(seen));
 }
 

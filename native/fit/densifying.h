@@ -6,6 +6,7 @@
 #include "base/progress.h"
 #include "data/clouds/seen_cloud.h"
 #include "data/views/view_source.h"
+#include "train/loop/backend_factory.h"
 #include "train/loop/densify_cloud.h"
 
 namespace stipple {
@@ -17,7 +18,8 @@ void requireDensifyOptions(const DensifyOptions& options, const SplatCloud& clou
 
 /// Density control of a cloud that is there, by the views that are not held out (densifyCloud), and
 /// what the strategy saw. In: holdout, as splitAsTold() has it.
-SeenCloud densified(const SplatCloud& cloud, std::shared_ptr<const ViewSource> views,
-                    uint64_t holdout, const DensifyOptions& options, Progress* progress);
+SeenCloud densified(const BackendFactory& backends, const SplatCloud& cloud,
+                    std::shared_ptr<const ViewSource> views, uint64_t holdout,
+                    const DensifyOptions& options, Progress* progress);
 
 }  // namespace stipple

@@ -62,12 +62,13 @@ ExplicitModelOptions explicitOptions(const FitOptions& options) {
   return model;
 }
 
-std::unique_ptr<FitModel> makeModel(const ViewSource& views, const FitViews& split,
-                                    const FitOptions& options, Progress* progress) {
+std::unique_ptr<FitModel> makeModel(const BackendFactory& backends, const ViewSource& views,
+                                    const FitViews& split, const FitOptions& options,
+                                    Progress* progress) {
   if (options.model == FitKind::kField) {
-    return makeFieldModel(views, split.training, fieldOptions(options), progress);
+    return makeFieldModel(backends, views, split.training, fieldOptions(options), progress);
   }
-  return makeExplicitModel(views, split.training, explicitOptions(options), progress);
+  return makeExplicitModel(backends, views, split.training, explicitOptions(options), progress);
 }
 
 FitOptions preparedOptions(const FitOptions& options, const ViewSource& views) {
@@ -79,8 +80,10 @@ FitOptions preparedOptions(const FitOptions& options, const ViewSource& views) {
 
 }  // namespace
 
-FitSession::FitSession(std::shared_ptr<const ViewSource> views, const FitOptions& options)
-    : views_(std::move(views)),
+FitSession::FitSession(std::shared_ptr<const BackendFactory> backends,
+                       std::shared_ptr<const ViewSource> views, const FitOptions& options)
+    : backends_(std::move(backends)),
+      views_(std::move(views)),
       options_(preparedOptions(options, *views_)),
       split_(splitAsTold(*views_, options_.holdout)) {
   figures_.iterations = options_.iterations;
@@ -88,6 +91,10 @@ FitSession::FitSession(std::shared_ptr<const ViewSource> views, const FitOptions
 
 uint64_t FitSession::memoryBound() const {
   return fitMemoryBound(options_, *views_);
+}
+
+uint64_t FitSession::memoryBound(const ViewSource& views, const FitOptions& options) {
+  return fitMemoryBound(preparedOptions(options, views), views);
 }
 
 std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
@@ -101,7 +108,8 @@ std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
   }
   for (const std::string& warning : checkViews(*views_, {}, &progress)) note(warning);
   auto trainer = std::make_unique<Trainer>(
-      views_, split_, makeModel(*views_, split_, options_, &progress), trainerOptions(options_));
+      *backends_, views_, split_, makeModel(*backends_, *views_, split_, options_, &progress),
+      trainerOptions(options_));
   if (!checkpoint) return trainer;
   try {
     trainer->restore(checkpoint->tensors);

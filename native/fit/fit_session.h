@@ -13,6 +13,7 @@
 #include "data/views/view_source.h"
 #include "fit/fit_options.h"
 #include "model/splat_model.h"
+#include "train/loop/backend_factory.h"
 #include "train/loop/trainer.h"
 
 namespace stipple {
@@ -32,10 +33,13 @@ struct FitStatus {
 class FitSession final : public FitObserver {
  public:
   /// Holds the options to their memory. Errors: those of requireFitOptions() and holdToMemory().
-  FitSession(std::shared_ptr<const ViewSource> views, const FitOptions& options);
+  FitSession(std::shared_ptr<const BackendFactory> backends,
+             std::shared_ptr<const ViewSource> views, const FitOptions& options);
 
   /// About what run() allocates, bytes.
   uint64_t memoryBound() const;
+  /// The same of a session that is not made. Errors: as the constructor.
+  static uint64_t memoryBound(const ViewSource& views, const FitOptions& options);
 
   /// The whole work. Errors: of views that nothing can be learned from, of a checkpoint that cannot
   /// be read or is of another fit, and those of Trainer::run().
@@ -70,6 +74,7 @@ class FitSession final : public FitObserver {
   std::unique_ptr<Trainer> prepared(Progress& progress);
   Trainer& ended() const;
 
+  std::shared_ptr<const BackendFactory> backends_;
   std::shared_ptr<const ViewSource> views_;
   FitOptions options_;  ///< resolved, held to their memory
   FitViews split_;

@@ -64,7 +64,8 @@ class Scene {
     options.density_gradient = gradient;
     options.jitter = jitter;
     options.seed = seed;
-    Trainer trainer(views_, split_, makeFieldModel(*views_, split_.training, options),
+    Trainer trainer(*cpuBackends(), views_, split_,
+                    makeFieldModel(*cpuBackends(), *views_, split_.training, options),
                     trainerOptions(seed));
     FitObserver nobody;
     trainer.run(nobody);
@@ -84,14 +85,15 @@ class Scene {
     options.seed = seed;
     TrainerOptions how = trainerOptions(seed);
     how.max_splats = most;
-    Trainer trainer(views_, split_, makeExplicitModel(*views_, split_.training, options), how);
+    Trainer trainer(*cpuBackends(), views_, split_,
+                    makeExplicitModel(*cpuBackends(), *views_, split_.training, options), how);
     FitObserver nobody;
     trainer.run(nobody);
     const auto leaves = std::make_shared<SplatCloud>(trainer.model().splats(0));
     const auto tree = std::make_shared<MergeTree>(buildMergeTree(*leaves, {}, {}));
     const HierarchyDecoder decoder(leaves, tree);
     PictureStore pictures(views_, uint64_t{1} << 30);
-    ViewMeasure judge;
+    ViewMeasure judge(*cpuBackends());
     const double black[3] = {0, 0, 0};
     Curve curve;
     for (const uint64_t budget : settings_.budgets()) {

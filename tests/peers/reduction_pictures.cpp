@@ -46,7 +46,7 @@ class Judge {
     rig.count = 16;
     rig.size = 800;
     rig.seed = 1234567;
-    views_ = viewsOfCloud(full, rig);
+    views_ = viewsOfCloud(*cpuBackends(), full, rig);
     for (const Camera& view : views_) wanted_.push_back(draw(full, view));
   }
 
@@ -96,7 +96,7 @@ uint32_t stepsWithin(double seconds, const SplatCloud& cut, const SplatCloud& fu
   const auto secondsFor = [&](uint32_t iterations) {
     RefineOptions options;
     options.iterations = iterations;
-    return secondsOf([&] { refineCloud(cut, full, options); });
+    return secondsOf([&] { refineCloud(*cpuBackends(), cut, full, options); });
   };
   secondsFor(1);
   const double few = secondsFor(2);
@@ -120,8 +120,10 @@ void compare(int argc, char** argv) {
   MergeTree tree;
   const double plain = secondsOf([&] { buildMergeTree(*full, {}, {}); });
   std::vector<float> visibility;
-  const double looking = secondsOf(
-      [&] { visibility = splatVisibility(*full, viewsForVisibility(*full, ViewRigOptions())); });
+  const double looking = secondsOf([&] {
+    visibility = splatVisibility(*cpuBackends(), *full,
+                                 viewsForVisibility(*cpuBackends(), *full, ViewRigOptions()));
+  });
   const double building = secondsOf([&] { tree = buildMergeTree(*full, visibility, {}); });
   std::printf("tree without pictures %.3f s; pictures %.3f s, tree %.3f s\n", plain, looking,
               building);
@@ -136,7 +138,8 @@ void compare(int argc, char** argv) {
     RefineOptions options;
     options.iterations = stepsWithin(seconds, cut, *full);
     SplatCloud refined;
-    const double refining = secondsOf([&] { refined = refineCloud(cut, *full, options); });
+    const double refining =
+        secondsOf([&] { refined = refineCloud(*cpuBackends(), cut, *full, options); });
     const std::string what = "refined, " + std::to_string(options.iterations) + " steps";
     print(what.c_str(), budget, judge.psnr(refined), refining);
   }

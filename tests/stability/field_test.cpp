@@ -110,7 +110,7 @@ TEST(FieldStability, EmptyViewsOnePointAndBudgetsFarAboveTheLeaves) {
   options.least_anchors = 1;
   options.most_anchors = 3000;
   options.gaussians_per_anchor = 4;
-  const auto model = makeFieldModel(*views, training, options);
+  const auto model = makeFieldModel(*cpuBackends(), *views, training, options);
   for (uint64_t i = 1; i <= 30; ++i) {
     FitMoment moment;
     moment.iteration = i;

@@ -27,7 +27,7 @@ void expectFinite(const TensorTable& table) {
 /// A fit of `iterations`, of the schedule of 3000, so that edits and resets come.
 std::unique_ptr<FitModel> fitted(const MemoryViewSource& views, uint64_t iterations,
                                  const ExplicitModelOptions& options = {}, double extent = 3.85) {
-  auto model = makeExplicitModel(views, allViews(views), options);
+  auto model = makeExplicitModel(*cpuBackends(), views, allViews(views), options);
   Fit fit(views, *model, 3000);
   fit.moment().extent = extent;
   for (uint64_t done = 100; done <= iterations; done += 100) {
@@ -157,9 +157,10 @@ TEST(FittingStability, StrategiesThatLookAroundWhereViewsSayNothing) {
       ExplicitModelOptions options = small();
       options.strategy = strategy;
       const std::vector<size_t> training = allViews(*views);
-      const auto model = makeExplicitModel(*views, training, options);
+      const auto model = makeExplicitModel(*cpuBackends(), *views, training, options);
       PictureStore pictures(views, 1 << 20);
-      FitViewEvaluator evaluator([&] { return model->splats(0); }, pictures, training, black, 0.2);
+      FitViewEvaluator evaluator(
+          *cpuBackends(), [&] { return model->splats(0); }, pictures, training, black, 0.2);
       Fit fit(*views, *model, 3000);
       for (uint64_t iteration = 1; iteration <= 410; ++iteration) {
         evaluator.forgetSplats();
@@ -185,7 +186,7 @@ TEST(FittingStability, FinishedSplatsOfAnySizeAreDensified) {
       DensifyOptions options;
       options.strategy = strategy;
       options.event_count = 2;
-      const SplatCloud made = densifyCloud(cloud, views, allViews(*views), options);
+      const SplatCloud made = densifyCloud(*cpuBackends(), cloud, views, allViews(*views), options);
       validate(made, "densified");
       EXPECT_LE(made.size(), 100u);
     }

@@ -192,8 +192,8 @@ TEST(ReductionStability, VisibilityIsAShare) {
     options.size = 32;
     for (const ViewRig rig : {ViewRig::kAround, ViewRig::kInside, ViewRig::kAutomatic}) {
       options.rig = rig;
-      const std::vector<float> seen =
-          splatVisibility(hard.cloud, viewsOfCloud(hard.cloud, options));
+      const std::vector<float> seen = splatVisibility(
+          *cpuBackends(), hard.cloud, viewsOfCloud(*cpuBackends(), hard.cloud, options));
       for (const float share : seen) ASSERT_TRUE(share >= 0.0f && share <= 1.0f) << share;
     }
   }
@@ -212,7 +212,7 @@ TEST(ReductionStability, RefinementKeepsTheCountAndEveryValueValid) {
     options.view_count = 2;
     options.view_size = 32;
     const SplatCloud cut = decoder.decode(request);
-    const SplatCloud refined = refineCloud(cut, hard.cloud, options);
+    const SplatCloud refined = refineCloud(*cpuBackends(), cut, hard.cloud, options);
     EXPECT_EQ(refined.size(), cut.size());
     EXPECT_NO_THROW(validate(refined, "refined"));
   }
@@ -229,7 +229,7 @@ TEST(ReductionStability, RefinementLeavesWhatNoViewShows) {
   options.view_count = 3;
   options.view_size = 48;
   options.rig = ViewRig::kAround;
-  const SplatCloud refined = refineCloud(start, full, options);
+  const SplatCloud refined = refineCloud(*cpuBackends(), start, full, options);
   EXPECT_NO_THROW(validate(refined, "refined"));
   EXPECT_EQ(refined.positions[0], start.positions[0]);
   // Scales and opacities go through a logarithm and back.

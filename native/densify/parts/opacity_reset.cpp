@@ -18,18 +18,23 @@ class OpacityReset final : public ControlPart {
   const char* name() const override { return "opacity_reset"; }
   ControlRoles owns() const override { return roles(ControlRole::kOpacity); }
 
+  bool lowersAt(const ControlMoment& moment) const override {
+    return moment.is_learning && (isSoftlyDue(moment) || isWhollyDue(moment));
+  }
   void lowerOpacities(const ControlMoment& moment, const RawSplats& splats,
                       SplatEdit& edit) override {
     if (!moment.is_learning) return;
-    if (options_.soft_interval > 0 && isDue(moment, options_.soft_interval, 1)) {
-      limitOpacities(splats, options_.soft_opacity, edit);
-    }
-    if (isDue(moment, options_.interval, options_.least_steps)) {
-      limitOpacities(splats, options_.opacity, edit);
-    }
+    if (isSoftlyDue(moment)) limitOpacities(splats, options_.soft_opacity, edit);
+    if (isWhollyDue(moment)) limitOpacities(splats, options_.opacity, edit);
   }
 
  private:
+  bool isSoftlyDue(const ControlMoment& moment) const {
+    return options_.soft_interval > 0 && isDue(moment, options_.soft_interval, 1);
+  }
+  bool isWhollyDue(const ControlMoment& moment) const {
+    return isDue(moment, options_.interval, options_.least_steps);
+  }
   static bool isDue(const ControlMoment& moment, uint64_t published, uint64_t least_steps) {
     const uint64_t interval = scaleSchedule(published, moment.iterations);
     return interval >= least_steps && moment.iteration % interval == 0;

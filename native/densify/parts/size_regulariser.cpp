@@ -43,6 +43,7 @@ class SizeRegulariser final : public ControlPart {
   const char* name() const override { return "size_regulariser"; }
   ControlRoles owns() const override { return roles(ControlRole::kRegularisation); }
 
+  bool regularises(const ControlMoment&) const override { return true; }
   double loss(const ControlMoment& moment, const SplatCloud& cloud,
               const CloudGradient& gradient) override {
     const double per_metre = options_.scale_weight / publishedUnit(moment);

@@ -58,6 +58,7 @@ class FrequencyControl final : public ControlPart {
     StatisticRequest request;
     request.blending_weights = true;
     request.absolute_screen_gradients = true;  // and their lengths
+    request.drawn_splats = true;
     for (size_t v = 0; v < views.viewCount(); ++v) {
       const ViewStatistics& view = views.evaluate(v, request);
       addGradients(view, sums, weights);
@@ -72,7 +73,7 @@ class FrequencyControl final : public ControlPart {
 
   void multiply(const ControlMoment& moment, const SplatStore& store, uint64_t room,
                 SplatEdit& edit) override {
-    const RawSplats& splats = store.splats;
+    const RawSplats& splats = store.splats();
     const bool has_looked = gradients_.size() == splats.size();
     std::vector<uint32_t> stay = staying(splats);
     std::vector<double> gradients;

@@ -49,8 +49,8 @@ class OpacityRelocation final : public ControlPart {
 
   void multiply(const ControlMoment& moment, const SplatStore& store, uint64_t room,
                 SplatEdit& edit) override {
-    const size_t count = store.splats.size();
-    RelocatedSplats splats(store.splats);
+    const size_t count = store.size();
+    RelocatedSplats splats(store.splats());
     splats.moveDead(moment, options_.dead_opacity);
     if (room != UINT64_MAX && room > count) {
       splats.appendCopies(moment, static_cast<size_t>(room - count), edit.append);
@@ -120,7 +120,7 @@ class PositionNoise final : public ControlPart {
     // Covariance times rate is a length to the third power: both in published units.
     const double strength = noise_ * moment.position_rate / (unit * unit);
     if (!(strength > 0)) return {};
-    const RawSplats& splats = store.splats;
+    const RawSplats& splats = store.splats();
     const uint64_t seed = mixBits(moment.seed) ^ moment.iteration;
     const size_t ranges = rangeCount(splats.size(), kGrain);
     std::vector<RowWrite> writes(ranges);

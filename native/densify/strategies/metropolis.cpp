@@ -160,7 +160,8 @@ class MetropolisBirth final : public ControlPart {
 
   /// Views of the block that iterations draw by themselves.
   void request(const ControlMoment& moment, StatisticRequest& request) const override {
-    if (moment.view && looks(moment, moment.view->index)) request.error_maps = true;
+    if (moment.view && looks(moment, moment.view->index))
+      request.error_maps = request.drawn_splats = true;
   }
   void observe(const ControlMoment& moment, const ViewStatistics& view) override {
     if (!looks(moment, view.view) || view.errors.structure.empty()) return;
@@ -189,13 +190,13 @@ class MetropolisBirth final : public ControlPart {
 
   void multiply(const ControlMoment& moment, const SplatStore& store, uint64_t room,
                 SplatEdit& edit) override {
-    const size_t count = store.splats.size();
+    const size_t count = store.size();
     // Without a look around, opacity alone decides who tries.
     if (cues_.size() != count) {
       cues_.reset(count);
       std::fill(cues_.view_counts.begin(), cues_.view_counts.end(), 1u);
     }
-    RelocatedSplats splats(store.splats);
+    RelocatedSplats splats(store.splats());
     splats.moveDead(moment, options_.dead_opacity);
     splats.write(edit);
     std::vector<Birth> births = accepted(moment, splats, importance(splats));

@@ -204,7 +204,7 @@ class TamingScore final : public ControlPart {
   }
 
   void ask(StatisticRequest& request) const {
-    request.covered = request.blending_weights = true;
+    request.covered = request.blending_weights = request.drawn_splats = true;
     request.errors_of = [error_weight = options_.error_weight,
                          edge_weight = options_.edge_weight](const ViewErrors& seen) {
       return pixelWeights(seen, error_weight, edge_weight);

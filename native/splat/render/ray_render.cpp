@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "splat/render/affine_splats.h"
+#include "splat/cpu/rays/affine_splats.h"
 #include "splat/render/object_order.h"
 #include "splat/render/pixel_passes.h"
 #include "splat/render/ray_splats.h"

@@ -33,8 +33,7 @@ void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& mo
 }
 
 SplatStore storeOf(const RenderBackend& backend) {
-  const TrainingState& state = backend.state();
-  return {state.splats, state.first_moments, state.second_moments};
+  return {backend.splatCount(), backend};
 }
 
 void applyControl(RenderBackend& backend, const Strategy& strategy, const FitMoment& moment,

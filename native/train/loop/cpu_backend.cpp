@@ -74,6 +74,9 @@ class CpuBackend final : public RenderBackend {
     return cloud;
   }
   const TrainingState& state() const override { return held_; }
+  const RawSplats& splats() const override { return held_.splats; }
+  const RawSplats& firstMoments() const override { return held_.first_moments; }
+  const RawSplats& secondMoments() const override { return held_.second_moments; }
 
   uint64_t memoryBytes() const override {
     uint64_t floats = cloud_.scales.capacity() + cloud_.opacities.capacity();
@@ -135,7 +138,9 @@ class CpuBackend final : public RenderBackend {
     BackwardSummary summary =
         pass_.backward(request, regulariser ? regulariser->transmittanceWeight() : 0.0, progress);
     SplatGradients& by = pass_.gradients();
-    if (regulariser) summary.regularisation += regulariser->evaluate(cloud_, spansOf(by));
+    if (regulariser && regulariser->readsSplats()) {
+      summary.regularisation += regulariser->evaluate(cloud_, spansOf(by));
+    }
     if (how_) {
       throughActivations(held_.splats, cloud_, *how_, by, by_raw_);
     } else {
@@ -214,6 +219,7 @@ class CpuBackend final : public RenderBackend {
 
   void lendStatistics(ViewStatistics& statistics) override {
     pass_.lendStatistics(statistics);
+    if (statistics.splats.scales.empty()) return;
     // Without a parameterisation the cloud has these two only while it is drawn.
     statistics.splats.positions = held_.splats.positions;
     statistics.splats.rotations = held_.splats.rotations;

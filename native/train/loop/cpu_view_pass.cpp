@@ -109,6 +109,7 @@ BackwardSummary CpuViewPass::backward(const StatisticRequest& request, double tr
   renderBackward(workspace_, drawn_, input, workspace_of_backward_, backward_, UINT64_MAX,
                  progress);
   has_error_maps_ = request.error_maps;
+  has_drawn_splats_ = request.drawn_splats;
   stage_ = Stage::kGradients;
   return {backward_.camera, backward_.background, backward_.visible_count, regularisation};
 }
@@ -147,7 +148,9 @@ void CpuViewPass::lendStatistics(ViewStatistics& statistics) {
   for (size_t i = 0; i < kStatisticCount; ++i) {
     statistics.arrays[i] = gradients().*kStatistics[i].values;
   }
-  statistics.splats = {cloud_->positions, cloud_->rotations, cloud_->scales, cloud_->opacities};
+  if (has_drawn_splats_) {
+    statistics.splats = {cloud_->positions, cloud_->rotations, cloud_->scales, cloud_->opacities};
+  }
   if (has_error_maps_) {
     statistics.errors = {drawn_.width,  drawn_.height, loss_.structureErrors(),
                          drawn_.colour, target_,       weights_};

@@ -53,6 +53,7 @@ class CpuViewPass final : public ViewPass {
   std::span<const float> weights_;        ///< [H,W] the same
   std::span<const float> loss_gradient_;  ///< [H,W,4] of the last loss, or the caller's
   bool has_error_maps_ = false;           ///< whether the last backward pass was asked for them
+  bool has_drawn_splats_ = false;         ///< the same
   std::vector<float> own_gradient_;       ///< [H,W,4]
   std::vector<float> residual_;           ///< [H,W,3]
   std::vector<float> made_errors_;        ///< [H,W] of StatisticRequest::errors_of

@@ -24,17 +24,19 @@ constexpr uint32_t kNew = UINT32_MAX;
 
 class CloudDensifier {
  public:
-  CloudDensifier(const SplatCloud& cloud, std::shared_ptr<const ViewSource> views,
-                 std::span<const size_t> shown, const DensifyOptions& options, Progress* progress)
+  CloudDensifier(const BackendFactory& backends, const SplatCloud& cloud,
+                 std::shared_ptr<const ViewSource> views, std::span<const size_t> shown,
+                 const DensifyOptions& options, Progress* progress)
       : cloud_(cloud),
         shown_(shown.begin(), shown.end()),
         options_(options),
         progress_(progress),
         pictures_(std::move(views), options.picture_bytes),
         strategy_(makeStrategy(options.strategy)),
-        backend_(makeCpuBackend()),
-        evaluator_([this] { return backend_->download(); }, pictures_, shown_, kBlack,
-                   options.ssim_share) {
+        backend_(backends.makeRenderBackend()),
+        evaluator_(
+            backends, [this] { return backend_->download(); }, pictures_, shown_, kBlack,
+            options.ssim_share) {
     backend_->upload(cloud);
     beginControl(*backend_, *strategy_);
     origins_.resize(cloud.size());
@@ -156,14 +158,14 @@ class CloudDensifier {
 
 }  // namespace
 
-SplatCloud densifyCloud(const SplatCloud& cloud, std::shared_ptr<const ViewSource> views,
-                        std::span<const size_t> shown, const DensifyOptions& options,
-                        Progress* progress, SplatQuantities* seen) {
+SplatCloud densifyCloud(const BackendFactory& backends, const SplatCloud& cloud,
+                        std::shared_ptr<const ViewSource> views, std::span<const size_t> shown,
+                        const DensifyOptions& options, Progress* progress, SplatQuantities* seen) {
   requireDensifiable(cloud, *views, options);
   if (shown.empty()) {
     fail(ErrorCode::kInvalidArgument, "there are no views to look at; at least one is needed");
   }
-  CloudDensifier densifier(cloud, std::move(views), shown, options, progress);
+  CloudDensifier densifier(backends, cloud, std::move(views), shown, options, progress);
   SplatCloud made = densifier.run();
   if (seen) *seen = densifier.look();
   return made;

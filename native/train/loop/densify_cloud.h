@@ -9,6 +9,7 @@
 #include "data/clouds/splat_cloud.h"
 #include "data/clouds/splat_quantities.h"
 #include "data/views/view_source.h"
+#include "train/loop/backend_factory.h"
 
 namespace stipple {
 
@@ -39,9 +40,10 @@ struct DensifyOptions {
 /// per view.
 /// Out: seen, where it is not null: what the strategy saw of the splats that come out, and what
 /// they contribute to kContributionViews of the views.
-SplatCloud densifyCloud(const SplatCloud& cloud, std::shared_ptr<const ViewSource> views,
-                        std::span<const size_t> shown, const DensifyOptions& options,
-                        Progress* progress = nullptr, SplatQuantities* seen = nullptr);
+SplatCloud densifyCloud(const BackendFactory& backends, const SplatCloud& cloud,
+                        std::shared_ptr<const ViewSource> views, std::span<const size_t> shown,
+                        const DensifyOptions& options, Progress* progress = nullptr,
+                        SplatQuantities* seen = nullptr);
 
 /// The errors that are known before any view is looked at.
 void requireDensifiable(const SplatCloud& cloud, const ViewSource& views,

@@ -11,7 +11,6 @@
 #include "base/stopwatch.h"
 #include "densify/strategies.h"
 #include "train/loop/backend_control.h"
-#include "train/loop/render_backend.h"
 #include "train/loop/splat_tables.h"
 #include "train/prior/start_splats.h"
 
@@ -39,9 +38,10 @@ void requireOptions(const ExplicitModelOptions& options) {
 
 class ExplicitModel final : public FitModel, private Regulariser {
  public:
-  ExplicitModel(const SplatCloud& start, std::unique_ptr<Strategy> strategy,
-                const ExplicitModelOptions& options, bool begins)
-      : strategy_(std::move(strategy)), options_(options), backend_(makeCpuBackend()) {
+  ExplicitModel(const BackendFactory& backends, const SplatCloud& start,
+                std::unique_ptr<Strategy> strategy, const ExplicitModelOptions& options,
+                bool begins)
+      : strategy_(std::move(strategy)), options_(options), backend_(backends.makeRenderBackend()) {
     backend_->upload(start);
     if (begins) prepare();
     step_options_.extra_rates = beginControl(*backend_, *strategy_);
@@ -177,6 +177,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     return strategy_->loss(moment_, cloud, gradient);
   }
 
+  bool readsSplats() const override { return strategy_->regularises(moment_); }
   double transmittanceWeight() const override { return transmittance_weight_; }
 
   std::unique_ptr<Strategy> strategy_;  ///< outlives the backend, which draws by its activations
@@ -198,7 +199,7 @@ uint64_t bytesPerSplat(int sh_degree) {
   return row * 13 + kOfDrawing;
 }
 
-std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
+std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const ViewSource& views,
                                             std::span<const size_t> training,
                                             const ExplicitModelOptions& options,
                                             Progress* progress) {
@@ -213,15 +214,15 @@ std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
   start.sh_degree = options.sh_degree;
   start.antialias = options.antialias;
   start.seed = options.seed;
-  return std::make_unique<ExplicitModel>(startSplats(views, training, start, progress),
+  return std::make_unique<ExplicitModel>(backends, startSplats(views, training, start, progress),
                                          std::move(strategy), options, true);
 }
 
-std::unique_ptr<FitModel> makeExplicitModel(const SplatCloud& start,
+std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,
                                             std::unique_ptr<Strategy> strategy,
                                             const ExplicitModelOptions& options) {
   requireOptions(options);
-  return std::make_unique<ExplicitModel>(start, std::move(strategy), options, false);
+  return std::make_unique<ExplicitModel>(backends, start, std::move(strategy), options, false);
 }
 
 }  // namespace stipple

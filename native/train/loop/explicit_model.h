@@ -10,6 +10,7 @@
 #include "data/clouds/splat_cloud.h"
 #include "data/views/view_source.h"
 #include "densify/strategy.h"
+#include "train/loop/backend_factory.h"
 #include "train/loop/fit_model.h"
 
 namespace stipple {
@@ -36,14 +37,14 @@ uint64_t bytesPerSplat(int sh_degree);
 /// Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023.
 /// Errors: kInvalidArgument for no views, options out of range, an unknown strategy (says which
 /// there are).
-std::unique_ptr<FitModel> makeExplicitModel(const ViewSource& views,
+std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const ViewSource& views,
                                             std::span<const size_t> training,
                                             const ExplicitModelOptions& options,
                                             Progress* progress = nullptr);
 
 /// The same from splats that are there, with a strategy of the caller's; of options, seed and
 /// start_splats count for nothing.
-std::unique_ptr<FitModel> makeExplicitModel(const SplatCloud& start,
+std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,
                                             std::unique_ptr<Strategy> strategy,
                                             const ExplicitModelOptions& options);
 

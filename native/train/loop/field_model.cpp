@@ -17,7 +17,6 @@
 #include "decode/field/field_decoder.h"
 #include "density/contribution_normalisation.h"
 #include "density/learned_density.h"
-#include "splat/render/render_backward.h"
 #include "train/loop/field_state.h"
 #include "train/optimiser/field_regularisers.h"
 #include "train/optimiser/sparse_adam.h"
@@ -133,10 +132,12 @@ double rateShare(const FitMoment& moment) {
 
 class FieldModel final : public FitModel {
  public:
-  FieldModel(FieldState state, const FieldStart& start, const FieldModelOptions& options)
-      : options_(options), start_(start), state_(std::move(state)) {
-    drawn_.keepForBackward(true);
-  }
+  FieldModel(const BackendFactory& backends, FieldState state, const FieldStart& start,
+             const FieldModelOptions& options)
+      : options_(options),
+        start_(start),
+        state_(std::move(state)),
+        pass_(backends.makeViewPass()) {}
 
   const char* name() const override { return "field"; }
 
@@ -189,8 +190,7 @@ class FieldModel final : public FitModel {
     const uint64_t density = state_.density.activeCellCount() * 8 * (6 * sizeof(float) + 1);
     const uint64_t splats = cloud_.size() * (cloud_.shStride() + 11) * 3 * sizeof(float);
     const uint64_t anchors = tape_.inputs.size() * 8 * sizeof(float);
-    const uint64_t pictures = colour_gradient_.size() * 3 * sizeof(float);
-    return field + density + splats + anchors + pictures + drawn_.bytes();
+    return field + density + splats + anchors + pass_->memoryBytes();
   }
 
  private:
@@ -222,25 +222,20 @@ class FieldModel final : public FitModel {
       options.with_depth = false;
       options.with_background = true;
       std::copy_n(view.background, 3, options.background);
-      const SplatInstance instance{&cloud_};
-      renderTiled({&instance, 1}, *view.camera, options, drawn_, picture_, progress);
+      pass_->forward(cloud_, *view.camera, options, progress);
     }
     {
       const TimedBlock watch(report.seconds.backward);
-      const ImageLossValue loss = pictureLoss(view);
+      StatisticRequest request;
+      request.contributions = learns_density;
+      const size_t pixel_count = size_t{view.camera->width} * view.camera->height;
+      const ImageLossValue loss = pass_->loss(
+          {view.target, pixel_count * 3}, {view.weights, view.weights ? pixel_count : size_t{0}},
+          lossFor(request, options_.ssim_share));
       report.loss = loss.loss;
       report.l1 = loss.l1;
       report.ssim = loss.ssim;
-      BackwardInput input;
-      input.colour_gradient = colour_gradient_;
-      if (learns_density) {
-        findResidual(view);
-        input.residual = residual_;
-        if (view.weights != nullptr) {
-          input.residual_weights = {view.weights, colour_gradient_.size() / 4};
-        }
-      }
-      renderBackward(drawn_, picture_, input, backward_, by_picture_, UINT64_MAX, progress);
+      pass_->backward(request, 0.0, progress);
     }
     {
       const TimedBlock watch(report.seconds.field);
@@ -283,46 +278,16 @@ class FieldModel final : public FitModel {
                                   : drawLearned(state_.density, sampling, draws());
   }
 
-  ImageLossValue pictureLoss(const StepView& view) {
-    ImageLossOptions options;
-    options.ssim_share = options_.ssim_share;
-    colour_gradient_.resize(picture_.colour.size());
-    return image_loss_.evaluate(picture_.width, picture_.height,
-                                {picture_.colour.data(), PixelLayout::kRgba},
-                                {view.target, PixelLayout::kRgb}, view.weights,
-                                {colour_gradient_.data(), PixelLayout::kRgba}, options);
-  }
-
-  void findResidual(const StepView& view) {
-    residual_.resize(picture_.colour.size() / 4 * 3);
-    parallelFor(residual_.size() / 3, kGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        for (size_t c = 0; c < 3; ++c) {
-          residual_[i * 3 + c] = picture_.colour[i * 4 + c] - view.target[i * 3 + c];
-        }
-      }
-    });
-  }
-
   void fieldGradients(const AnchorSet& anchors, StepReport& report) {
-    SplatGradients& by = by_picture_.instances[0];
-    // Lent for the call: the arrays go back to the renderer, which uses them again.
-    const auto exchange = [&] {
-      std::swap(cloud_gradient_.positions, by.positions);
-      std::swap(cloud_gradient_.rotations, by.rotations);
-      std::swap(cloud_gradient_.scales, by.scales);
-      std::swap(cloud_gradient_.opacities, by.opacities);
-      std::swap(cloud_gradient_.sh, by.sh);
-    };
-    exchange();
+    pass_->swapGradients(cloud_gradient_);
     report.loss += regularise({}, *state_.field, anchors, tape_, cloud_, cloud_gradient_);
     FieldDecoder(state_.field).backward(anchors, tape_, cloud_, cloud_gradient_, gradients_);
-    exchange();
+    pass_->swapGradients(cloud_gradient_);
   }
 
   /// Derivatives by the logits: what each anchor does to the loss, and the prior's pull.
   void densityGradients(const AnchorSet& anchors) {
-    const std::vector<float>& contributions = by_picture_.instances[0].contributions;
+    const std::span<const float> contributions = pass_->statistic(Statistic::kContributions);
     std::vector<double> g(anchors.size(), 0.0);
     for (size_t n = 0; n < contributions.size(); ++n) {
       g[n / options_.gaussians_per_anchor] += static_cast<double>(contributions[n]);
@@ -422,31 +387,26 @@ class FieldModel final : public FitModel {
   std::optional<OctreeDensity> frozen_;  ///< of the density as it is now
 
   // Memory of steps, used again.
-  ImageLoss image_loss_;
-  RenderWorkspace drawn_;
-  RenderResult picture_;
-  BackwardWorkspace backward_;
-  BackwardResult by_picture_;
+  std::unique_ptr<ViewPass> pass_;
   FieldTape tape_;
   SplatCloud cloud_;
   SplatCloud cloud_gradient_;
   FieldGradients gradients_;
   DensityGradient by_logits_;
   SparseAdamScratch scratch_;
-  std::vector<float> colour_gradient_;  ///< [H,W,4]
-  std::vector<float> residual_;         ///< [H,W,3]
 };
 
 }  // namespace
 
-std::unique_ptr<FitModel> makeFieldModel(const ViewSource& views, std::span<const size_t> training,
+std::unique_ptr<FitModel> makeFieldModel(const BackendFactory& backends, const ViewSource& views,
+                                         std::span<const size_t> training,
                                          const FieldModelOptions& options, Progress* progress) {
   requireOptions(options, training);
   ScenePriorOptions prior_options;
   prior_options.seed = options.seed;
   prior_options.shell = options.shell;
   const ScenePrior prior = scenePrior(views, training, prior_options, progress);
-  return std::make_unique<FieldModel>(startOf(prior, options, views.colourSpace()),
+  return std::make_unique<FieldModel>(backends, startOf(prior, options, views.colourSpace()),
                                       howToStart(prior), options);
 }
 

@@ -12,6 +12,7 @@
 #include "decode/field/field_parameters.h"
 #include "density/learned_draws.h"
 #include "density/octree_density.h"
+#include "train/loop/backend_factory.h"
 #include "train/loop/fit_model.h"
 #include "train/prior/scene_prior.h"
 
@@ -38,7 +39,8 @@ struct FieldModelOptions {
 /// budget. Trained in three stages: the density to the structural prior, the attributes with the
 /// density held, both. See docs/methods/learned_density.md and attribute_field.md.
 /// Errors: kInvalidArgument for no views, options out of range.
-std::unique_ptr<FitModel> makeFieldModel(const ViewSource& views, std::span<const size_t> training,
+std::unique_ptr<FitModel> makeFieldModel(const BackendFactory& backends, const ViewSource& views,
+                                         std::span<const size_t> training,
                                          const FieldModelOptions& options,
                                          Progress* progress = nullptr);
 

@@ -120,7 +120,7 @@ FitMeasure ViewMeasure::sumOver(const SplatCloud& cloud, PictureStore& pictures,
   for (size_t k = 0; k < chosen.size(); ++k) {
     pictures.load(chosen[k], background, target_);
     if (k + 1 < chosen.size()) pictures.prefetch(chosen[k + 1]);
-    renderTiled({&instance, 1}, pictures.views().camera(chosen[k]), options, workspace_, drawn_);
+    images_->render({&instance, 1}, pictures.views().camera(chosen[k]), options, {}, drawn_);
     seen_.resize(target_.colour.size());
     foreground_ = target_.alpha;
     parallelFor(seen_.size() / 3, kGrain, [&](size_t begin, size_t end) {

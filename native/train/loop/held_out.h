@@ -1,13 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "data/clouds/splat_cloud.h"
 #include "data/fit_history.h"
 #include "data/views/view_source.h"
-#include "splat/render/render.h"
+#include "train/loop/backend_factory.h"
 #include "train/loop/picture_store.h"
 #include "train/optimiser/image_loss.h"
 
@@ -31,6 +32,8 @@ double extentOfCameras(const ViewSource& views, std::span<const size_t> chosen);
 /// Compares drawings of splats with views.
 class ViewMeasure {
  public:
+  explicit ViewMeasure(const BackendFactory& backends) : images_(backends.makeImageRenderer()) {}
+
   /// Mean PSNR and SSIM over views. Colours are held to 0..1 and compared in display space; SSIM as
   /// image_loss.h has it. Views with alpha stand over `background`. Pixels that a mask leaves out
   /// count for nothing.
@@ -46,7 +49,7 @@ class ViewMeasure {
   FitMeasure sumOver(const SplatCloud& cloud, PictureStore& pictures,
                      std::span<const size_t> chosen, const double background[3], bool with_ssim);
 
-  RenderWorkspace workspace_;
+  std::unique_ptr<ImageRenderer> images_;
   RenderResult drawn_;
   ImageLoss loss_;
   TargetPicture target_;

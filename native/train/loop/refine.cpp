@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "data/clouds/cloud_extent.h"
 #include "splat/render/render_backward.h"
-#include "train/loop/render_backend.h"
 #include "train/loop/view_order.h"
 #include "train/optimiser/adam.h"
 
@@ -93,16 +92,15 @@ RenderOptions renderOptions(size_t view) {
   return options;
 }
 
-void addTargets(const SplatCloud& full, const std::vector<Camera>& views, RenderBackend& backend,
-                Progress* progress) {
+void addTargets(const SplatCloud& full, const std::vector<Camera>& views, ImageRenderer& images,
+                RenderBackend& backend, Progress* progress) {
   const SplatInstance instance{&full};
-  RenderWorkspace workspace;
   RenderResult picture;
   std::vector<float> pixels;
   for (size_t v = 0; v < views.size(); ++v) {
     advance(progress, 0.2 * static_cast<double>(v) / static_cast<double>(views.size()),
             "Drawing all splats");
-    renderTiled({&instance, 1}, views[v], renderOptions(v), workspace, picture);
+    images.render({&instance, 1}, views[v], renderOptions(v), {}, picture);
     const size_t count = picture.colour.size() / 4;
     pixels.resize(count * 3);
     for (size_t i = 0; i < count; ++i) {
@@ -158,8 +156,8 @@ uint64_t refineMemoryBound(const SplatCloud& start, const SplatCloud& full,
          std::max(drawing, steps) + (uint64_t{1} << 20);
 }
 
-SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
-                       const RefineOptions& options, Progress* progress) {
+SplatCloud refineCloud(const BackendFactory& backends, const SplatCloud& start,
+                       const SplatCloud& full, const RefineOptions& options, Progress* progress) {
   validateInput(start, full, options);
   if (options.iterations == 0) return start;
   ViewRigOptions rig;
@@ -167,10 +165,10 @@ SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
   rig.count = options.view_count;
   rig.size = options.view_size;
   rig.seed = options.seed;
-  const std::vector<Camera> views = viewsOfCloud(full, rig);
-  const std::unique_ptr<RenderBackend> backend = makeCpuBackend();
+  const std::vector<Camera> views = viewsOfCloud(backends, full, rig);
+  const std::unique_ptr<RenderBackend> backend = backends.makeRenderBackend();
   backend->upload(start);
-  addTargets(full, views, *backend, progress);
+  addTargets(full, views, *backends.makeImageRenderer(), *backend, progress);
   ImageLossOptions loss;
   loss.ssim_share = options.ssim_share;
   const double size = typicalSize(start);

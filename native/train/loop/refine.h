@@ -4,6 +4,7 @@
 
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
+#include "train/loop/backend_factory.h"
 #include "train/loop/view_rig.h"
 
 namespace stipple {
@@ -26,8 +27,9 @@ struct RefineOptions {
 /// Cost: iterations times (drawing, loss, backward) of one view, and view_count drawings of full.
 /// Source: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section 5
 /// (loss and Adam on activated attributes). Differs: no densification; targets are drawings.
-SplatCloud refineCloud(const SplatCloud& start, const SplatCloud& full,
-                       const RefineOptions& options, Progress* progress = nullptr);
+SplatCloud refineCloud(const BackendFactory& backends, const SplatCloud& start,
+                       const SplatCloud& full, const RefineOptions& options,
+                       Progress* progress = nullptr);
 
 /// Upper bound of the bytes that refineCloud allocates: targets, and what a step holds. Errors: as
 /// refineCloud.

@@ -41,6 +41,8 @@ struct StepOptions {
 class Regulariser {
  public:
   virtual ~Regulariser() = default;
+  /// False: evaluate() has nothing to add, and is not called: splats are copied out for it.
+  virtual bool readsSplats() const { return true; }
   /// Returns: the value of what depends on the splats alone. Its derivative is added to `gradient`.
   virtual double evaluate(const SplatCloud& cloud, const CloudGradient& gradient) = 0;
   /// Beside that: weight of the mean transmittance behind the last splat of each pixel. Where it is
@@ -59,16 +61,15 @@ struct TrainingState {
 
 /// Holds the splats of a fit and does its passes, each by one call: forward, loss, backward, step,
 /// and now and then an edit. Parameters, moments, pictures, derivatives and statistics stay inside,
-/// so that they may lie in the memory of another processor; what the caller wants to see is copied
-/// out on demand. One call at a time.
+/// so that they may lie in the memory of another processor; what the caller wants to see (that of
+/// SplatReader, state() and what follows backward()) is copied out on demand, and valid until the
+/// next call that changes anything. One call at a time.
 ///
 /// Errors of every call: kInvalidArgument for arguments outside their range and for a pass out of
 /// its order; what the backend holds is then as it was.
 /// Determinism: the same calls give the same bits, for any number of threads.
-class RenderBackend {
+class RenderBackend : public SplatReader {
  public:
-  virtual ~RenderBackend() = default;
-
   /// "cpu" and so on.
   virtual const char* name() const = 0;
 
@@ -77,13 +78,13 @@ class RenderBackend {
   virtual void upload(const SplatCloud& cloud) = 0;
   virtual void restore(const TrainingState& state) = 0;
 
-  /// How raw numbers become splats, from now on; null: as raw_splats.h says. It must live as long
-  /// as the backend. Extras without it get no derivative.
+  /// How raw numbers become splats, from now on; null: as raw_splats.h says. It works on arrays of
+  /// the host: with it raw numbers are copied out, and derivatives back, in every step. It must
+  /// live as long as the backend. Extras without it get no derivative.
   virtual void parameterise(const Parameterisation* how) = 0;
 
   virtual size_t splatCount() const = 0;
   virtual SplatCloud download() const = 0;
-  /// Valid until the next call.
   virtual const TrainingState& state() const = 0;
   virtual uint64_t memoryBytes() const = 0;  ///< held now, about
 

@@ -95,8 +95,8 @@ struct Trainer::Pace {
   }
 };
 
-Trainer::Trainer(std::shared_ptr<const ViewSource> views, FitViews split,
-                 std::unique_ptr<FitModel> model, const TrainerOptions& options)
+Trainer::Trainer(const BackendFactory& backends, std::shared_ptr<const ViewSource> views,
+                 FitViews split, std::unique_ptr<FitModel> model, const TrainerOptions& options)
     : options_(options),
       pictures_(std::move(views), options.picture_bytes),
       split_(std::move(split)),
@@ -104,7 +104,8 @@ Trainer::Trainer(std::shared_ptr<const ViewSource> views, FitViews split,
       choosing_(someOf(split_.training, kChoosingViews)),
       model_(std::move(model)),
       extent_(1.0),
-      order_(split_.training.size(), options.seed) {
+      order_(split_.training.size(), options.seed),
+      measure_(backends) {
   requireOptions(options);
   if (split_.training.empty()) {
     fail(ErrorCode::kInvalidArgument, "there are no views to learn from; at least one is needed");
@@ -112,8 +113,9 @@ Trainer::Trainer(std::shared_ptr<const ViewSource> views, FitViews split,
   extent_ = extentOfCameras(pictures_.views(), split_.training);
   double background[3];
   backgroundOf(0, background);
-  evaluator_ = std::make_unique<FitViewEvaluator>([this] { return model_->splats(0); }, pictures_,
-                                                  split_.training, background, options.ssim_share);
+  evaluator_ = std::make_unique<FitViewEvaluator>(
+      backends, [this] { return model_->splats(0); }, pictures_, split_.training, background,
+      options.ssim_share);
   history_.measured_on_held_out = !split_.held_out.empty();
   history_.training_view_count = split_.training.size();
 }

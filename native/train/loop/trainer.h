@@ -85,10 +85,10 @@ enum class FitEnd { kWhole, kStopped };
 /// any limit of memory and wherever the fit was stopped and restored in between.
 class Trainer {
  public:
-  /// In: split: disjoint, of `views`; training: at least one view.
-  /// Errors: kInvalidArgument for options out of range or no views.
-  Trainer(std::shared_ptr<const ViewSource> views, FitViews split, std::unique_ptr<FitModel> model,
-          const TrainerOptions& options);
+  /// In: backends: for what draws between steps, for this call; split: disjoint, of `views`;
+  /// training: at least one view. Errors: kInvalidArgument for options out of range or no views.
+  Trainer(const BackendFactory& backends, std::shared_ptr<const ViewSource> views, FitViews split,
+          std::unique_ptr<FitModel> model, const TrainerOptions& options);
   ~Trainer();
 
   /// Takes all steps that are left, until progress is cancelled; then gives the model the state

@@ -8,14 +8,15 @@
 
 namespace stipple {
 
-FitViewEvaluator::FitViewEvaluator(std::function<SplatCloud()> splats, PictureStore& pictures,
+FitViewEvaluator::FitViewEvaluator(const BackendFactory& backends,
+                                   std::function<SplatCloud()> splats, PictureStore& pictures,
                                    const std::vector<size_t>& training, const double background[3],
                                    double ssim_share)
     : splats_(std::move(splats)),
       pictures_(pictures),
       training_(training),
       ssim_share_(ssim_share),
-      pass_(makeCpuViewPass()) {
+      pass_(backends.makeViewPass()) {
   std::copy_n(background, 3, background_);
 }
 

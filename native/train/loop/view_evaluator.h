@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "densify/strategy.h"
+#include "train/loop/backend_factory.h"
 #include "train/loop/picture_store.h"
-#include "train/loop/view_pass.h"
 
 namespace stipple {
 
@@ -17,11 +17,11 @@ namespace stipple {
 /// that there are when forgetSplats() was called last. Views are numbered as StepView::index.
 class FitViewEvaluator final : public ViewEvaluator {
  public:
-  /// In: splats: gives them as they are now; references outlive this; background [3] behind
-  /// transparent views.
-  FitViewEvaluator(std::function<SplatCloud()> splats, PictureStore& pictures,
-                   const std::vector<size_t>& training, const double background[3],
-                   double ssim_share);
+  /// In: backends: for this call; splats: gives them as they are now; references outlive this;
+  /// background [3] behind transparent views.
+  FitViewEvaluator(const BackendFactory& backends, std::function<SplatCloud()> splats,
+                   PictureStore& pictures, const std::vector<size_t>& training,
+                   const double background[3], double ssim_share);
 
   /// Call where the splats may have changed.
   void forgetSplats() { cloud_.reset(); }

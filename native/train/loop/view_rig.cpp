@@ -10,7 +10,6 @@
 #include "base/random.h"
 #include "data/clouds/cloud_extent.h"
 #include "math/quaternion.h"
-#include "splat/render/render.h"
 
 // Based on: Gonzalez, Measurement of Areas on a Sphere Using Fibonacci and Latitude-Longitude
 // Lattices, Mathematical Geosciences 2010 (the directions).
@@ -135,18 +134,18 @@ Camera viewFromAround(const CloudExtent& extent, const Vec3d& outward, uint32_t 
 
 }  // namespace
 
-ViewRig chooseRig(const SplatCloud& cloud) {
+ViewRig chooseRig(const BackendFactory& backends, const SplatCloud& cloud) {
   const CloudExtent extent = cloudExtent(cloud);
   RenderOptions options;
   options.with_depth = true;
   const SplatInstance instance{&cloud};
-  RenderWorkspace workspace;
+  const std::unique_ptr<ImageRenderer> images = backends.makeImageRenderer();
   RenderResult result;
   uint64_t far_count = 0;
   uint64_t pixel_count = 0;
   for (int face = 0; face < 6; ++face) {
     const Camera camera = cubeFace(centreOf(extent), face, kProbeSize, extent.radius);
-    renderTiled({&instance, 1}, camera, options, workspace, result);
+    images->render({&instance, 1}, camera, options, {}, result);
     for (size_t i = 0; i < result.depth.size(); ++i) {
       const bool covered = result.colour[i * 4 + 3] > 0.5f;
       const bool far = static_cast<double>(result.depth[i]) > kProbeDepthShare * extent.radius;
@@ -157,11 +156,12 @@ ViewRig chooseRig(const SplatCloud& cloud) {
   return 2 * far_count >= pixel_count ? ViewRig::kInside : ViewRig::kAround;
 }
 
-std::vector<Camera> viewsOfCloud(const SplatCloud& cloud, const ViewRigOptions& options) {
+std::vector<Camera> viewsOfCloud(const BackendFactory& backends, const SplatCloud& cloud,
+                                 const ViewRigOptions& options) {
   validate(cloud, options);
   // A hollow thing, as a mesh becomes, and a room are alike from their middle: seen both ways.
   const bool is_automatic = options.rig == ViewRig::kAutomatic;
-  const bool is_hollow = is_automatic && chooseRig(cloud) == ViewRig::kInside;
+  const bool is_hollow = is_automatic && chooseRig(backends, cloud) == ViewRig::kInside;
   const CloudExtent extent = cloudExtent(cloud);
   const Mat3d turn = turnOf(options.seed);
   std::vector<Camera> cameras;
@@ -180,10 +180,12 @@ std::vector<Camera> viewsOfCloud(const SplatCloud& cloud, const ViewRigOptions& 
   return cameras;
 }
 
-std::vector<Camera> viewsForVisibility(const SplatCloud& cloud, const ViewRigOptions& options) {
+std::vector<Camera> viewsForVisibility(const BackendFactory& backends, const SplatCloud& cloud,
+                                       const ViewRigOptions& options) {
   validate(cloud, options);
   ViewRig rig = options.rig;
-  const bool is_hollow = rig == ViewRig::kAutomatic && chooseRig(cloud) == ViewRig::kInside;
+  const bool is_hollow =
+      rig == ViewRig::kAutomatic && chooseRig(backends, cloud) == ViewRig::kInside;
   if (rig == ViewRig::kAutomatic && !is_hollow) rig = ViewRig::kAround;
   const CloudExtent extent = cloudExtent(cloud);
   const uint32_t share = (options.count * kHollowShare + 9) / 10;

@@ -60,8 +60,8 @@ SplatCloud withoutColours(const SplatCloud& cloud) {
 
 }  // namespace
 
-std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Camera> views,
-                                   Progress* progress) {
+std::vector<float> splatVisibility(const BackendFactory& backends, const SplatCloud& cloud,
+                                   std::span<const Camera> views, Progress* progress) {
   const size_t count = cloud.size();
   std::vector<double> seen(count, 0.0);
   std::vector<double> whole(count, 0.0);
@@ -70,9 +70,8 @@ std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Came
   // The derivative of the sum of a picture's red by a splat's constant harmonic is what it adds
   // where all are grey: the cheapest of the backward passes, and harmonics above need no look.
   const SplatCloud grey = withoutColours(cloud);
-  const SplatInstance instance{&grey};
-  BackwardWorkspace workspace;
-  BackwardResult result;
+  const std::unique_ptr<ViewPass> pass = backends.makeViewPass();
+  SplatCloud gradients;
   std::vector<float> red;
   for (size_t v = 0; v < views.size(); ++v) {
     advance(progress, static_cast<double>(v) / static_cast<double>(views.size()),
@@ -80,10 +79,11 @@ std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Came
     const Camera& camera = views[v];
     red.assign(size_t{4} * camera.width * camera.height, 0.0f);
     for (size_t i = 0; i < red.size(); i += 4) red[i] = 1.0f;
-    BackwardInput input;
-    input.colour_gradient = red;
-    renderBackward({&instance, 1}, camera, options, input, workspace, result, UINT64_MAX, nullptr);
-    const std::vector<float>& by_colour = result.instances[0].sh;
+    pass->forward(grey, camera, options);
+    pass->setLossGradient(red);
+    pass->backward({});
+    pass->swapGradients(gradients);
+    const std::vector<float>& by_colour = gradients.sh;
     const View<double> view = makeView<double>(camera);
     const Mat3d linear = camera.world_to_camera.topLeftCorner<3, 3>();
     const Vec3d translation = camera.world_to_camera.topRightCorner<3, 1>();
@@ -106,6 +106,7 @@ std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Came
         whole[i] += unhiddenWeight(projected) * pixel * pixel;
       }
     });
+    pass->swapGradients(gradients);
   }
   std::vector<float> visibility(count);
   for (size_t i = 0; i < count; ++i) {

@@ -7,6 +7,7 @@
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
 #include "math/camera.h"
+#include "train/loop/backend_factory.h"
 
 namespace stipple {
 
@@ -14,8 +15,8 @@ namespace stipple {
 /// alpha, the rasteriser's blending weight) over what it would add with nothing in front. In:
 /// cloud, views. Returns: [N] 0..1; 1 for splats that stand in no view, 0 for those too faint to
 /// show. Same values for any number of threads. Cost: one backward pass per view.
-std::vector<float> splatVisibility(const SplatCloud& cloud, std::span<const Camera> views,
-                                   Progress* progress = nullptr);
+std::vector<float> splatVisibility(const BackendFactory& backends, const SplatCloud& cloud,
+                                   std::span<const Camera> views, Progress* progress = nullptr);
 
 /// Upper bound of the bytes that splatVisibility allocates for views of this many pixels per side,
 /// the result included.

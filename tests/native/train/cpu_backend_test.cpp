@@ -381,6 +381,7 @@ TEST(CpuBackend, LendsWhatAPassGathered) {
   const BackwardSummary summary = backend->backward(request);
   statistics.view = 4;
   backend->lendStatistics(statistics);
+  EXPECT_TRUE(statistics.splats.positions.empty());  // nobody asked
   EXPECT_EQ(statistics.view, 4u);
   EXPECT_EQ(statistics.loss, loss);
   EXPECT_EQ(statistics.camera, &camera());
@@ -391,6 +392,7 @@ TEST(CpuBackend, LendsWhatAPassGathered) {
   EXPECT_THAT(messageOf([&] { backend->backward(request); }),
               HasSubstr("the loss's error map holds 0 values"));
   request.error_maps = false;
+  request.drawn_splats = true;
   backend->backward(request);
   backend->lendStatistics(statistics);
   EXPECT_TRUE(std::equal(statistics.splats.positions.begin(), statistics.splats.positions.end(),

@@ -60,7 +60,8 @@ TEST(DensifyCloud, MultipliesWhatPicturesPullAtAndKeepsTheRestBitForBit) {
   const Scene scene;
   DensifyOptions options;
   options.max_splats = 90;
-  const SplatCloud made = densifyCloud(scene.coarse, scene.views, all(*scene.views), options);
+  const SplatCloud made =
+      densifyCloud(*cpuBackends(), scene.coarse, scene.views, all(*scene.views), options);
   EXPECT_EQ(made.size(), 90u);
   // Those that stay come first, in their order.
   size_t from = 0, kept = 0;
@@ -84,7 +85,8 @@ DensifyOptions nothingMultiplies() {
 TEST(DensifyCloud, LeavesSplatsThatNeitherMultiplyNorGoBitForBit) {
   const SplatCloud cloud = toyBall(300);
   const auto views = toyViews(cloud, kViews, kSize);
-  EXPECT_TRUE(isEqual(densifyCloud(cloud, views, all(*views), nothingMultiplies()), cloud));
+  EXPECT_TRUE(
+      isEqual(densifyCloud(*cpuBackends(), cloud, views, all(*views), nothingMultiplies()), cloud));
 }
 
 TEST(DensifyCloud, GivesTheSameForAnyNumberOfThreadsAndAnyPictureMemory) {
@@ -92,11 +94,13 @@ TEST(DensifyCloud, GivesTheSameForAnyNumberOfThreadsAndAnyPictureMemory) {
   DensifyOptions options;
   options.event_count = 3;
   SplatCloud one, two;
-  withThreads(1,
-              [&] { one = densifyCloud(scene.coarse, scene.views, all(*scene.views), options); });
+  withThreads(1, [&] {
+    one = densifyCloud(*cpuBackends(), scene.coarse, scene.views, all(*scene.views), options);
+  });
   options.picture_bytes = 0;
-  withThreads(2,
-              [&] { two = densifyCloud(scene.coarse, scene.views, all(*scene.views), options); });
+  withThreads(2, [&] {
+    two = densifyCloud(*cpuBackends(), scene.coarse, scene.views, all(*scene.views), options);
+  });
   EXPECT_GT(one.size(), scene.coarse.size());
   EXPECT_TRUE(isEqual(one, two));
 }
@@ -106,9 +110,9 @@ TEST(DensifyCloud, LooksAgainBetweenEvents) {
   DensifyOptions options;
   options.max_splats = 100000;
   const std::vector<size_t> shown = all(*scene.views);
-  const SplatCloud once = densifyCloud(scene.coarse, scene.views, shown, options);
+  const SplatCloud once = densifyCloud(*cpuBackends(), scene.coarse, scene.views, shown, options);
   options.event_count = 3;
-  const SplatCloud thrice = densifyCloud(scene.coarse, scene.views, shown, options);
+  const SplatCloud thrice = densifyCloud(*cpuBackends(), scene.coarse, scene.views, shown, options);
   EXPECT_GT(once.size(), scene.coarse.size());
   EXPECT_GT(thrice.size(), once.size());
 }
@@ -117,7 +121,8 @@ TEST(DensifyCloud, RemovesFaintSplatsAndLowersNoOpacity) {
   SplatCloud cloud = toyBall(300);
   const auto views = toyViews(cloud, kViews, kSize);
   cloud.opacities[7] = 0.001f;
-  const SplatCloud made = densifyCloud(cloud, views, all(*views), nothingMultiplies());
+  const SplatCloud made =
+      densifyCloud(*cpuBackends(), cloud, views, all(*views), nothingMultiplies());
   EXPECT_EQ(made.size(), 299u);
   EXPECT_EQ(*std::min_element(made.opacities.begin(), made.opacities.end()), 0.95f);
 }
@@ -129,14 +134,16 @@ TEST(DensifyCloud, KeepsASkyThatIsLargerThanTheWholeRig) {
     cloud.positions[a] = 500.0f;  // far out: no picture of the ball shows it
     cloud.scales[a] = 100.0f;
   }
-  EXPECT_EQ(densifyCloud(cloud, views, all(*views), nothingMultiplies()).size(), 300u);
+  EXPECT_EQ(densifyCloud(*cpuBackends(), cloud, views, all(*views), nothingMultiplies()).size(),
+            300u);
 }
 
 TEST(DensifyCloud, NeverExceedsItsCapNorTwiceTheCountWhereNoneIsGiven) {
   const Scene scene;
   DensifyOptions options;
   options.event_count = 20;
-  const SplatCloud made = densifyCloud(scene.coarse, scene.views, all(*scene.views), options);
+  const SplatCloud made =
+      densifyCloud(*cpuBackends(), scene.coarse, scene.views, all(*scene.views), options);
   EXPECT_GT(made.size(), 60u);
   EXPECT_LE(made.size(), 120u);
 }
@@ -144,7 +151,7 @@ TEST(DensifyCloud, NeverExceedsItsCapNorTwiceTheCountWhereNoneIsGiven) {
 TEST(DensifyCloud, TakesOneSplatAndOneViewOfOnePixel) {
   const SplatCloud cloud = toyBall(1);
   const auto views = toyViews(toyBall(300), 1, 1);
-  const SplatCloud made = densifyCloud(cloud, views, all(*views), {});
+  const SplatCloud made = densifyCloud(*cpuBackends(), cloud, views, all(*views), {});
   EXPECT_GE(made.size(), 1u);
   EXPECT_LE(made.size(), 2u);
 }
@@ -153,10 +160,12 @@ TEST(DensifyCloud, SaysWhatItCannotTake) {
   const Scene scene;
   const std::vector<size_t> shown = all(*scene.views);
   const auto refusal = [&](const DensifyOptions& options) {
-    return messageOf([&] { densifyCloud(scene.coarse, scene.views, shown, options); });
+    return messageOf(
+        [&] { densifyCloud(*cpuBackends(), scene.coarse, scene.views, shown, options); });
   };
-  EXPECT_THAT(messageOf([&] { densifyCloud({}, scene.views, shown, {}); }), HasSubstr("no splats"));
-  EXPECT_THAT(messageOf([&] { densifyCloud(scene.coarse, scene.views, {}, {}); }),
+  EXPECT_THAT(messageOf([&] { densifyCloud(*cpuBackends(), {}, scene.views, shown, {}); }),
+              HasSubstr("no splats"));
+  EXPECT_THAT(messageOf([&] { densifyCloud(*cpuBackends(), scene.coarse, scene.views, {}, {}); }),
               HasSubstr("no views to look at"));
   DensifyOptions options;
   options.max_splats = 59;
@@ -169,7 +178,7 @@ TEST(DensifyCloud, SaysWhatItCannotTake) {
   EXPECT_THAT(refusal(options), HasSubstr("strategy is 'best'; there is adaptive"));
   SplatCloud linear = scene.coarse;
   linear.colour_space = ColourSpace::kLinear;
-  EXPECT_THAT(messageOf([&] { densifyCloud(linear, scene.views, shown, {}); }),
+  EXPECT_THAT(messageOf([&] { densifyCloud(*cpuBackends(), linear, scene.views, shown, {}); }),
               HasSubstr("different colour spaces"));
 }
 
@@ -177,7 +186,9 @@ TEST(DensifyCloud, EndsWhereItIsCancelled) {
   const Scene scene;
   Progress progress;
   progress.cancel();
-  EXPECT_THROW(densifyCloud(scene.coarse, scene.views, all(*scene.views), {}, &progress), Error);
+  EXPECT_THROW(
+      densifyCloud(*cpuBackends(), scene.coarse, scene.views, all(*scene.views), {}, &progress),
+      Error);
 }
 
 TEST(StandaloneEvents, AreSpreadOverTheWindowAndTakeNoSteps) {

@@ -39,7 +39,7 @@ const MemoryViewSource& scene() {
 
 std::unique_ptr<FitModel> startModel(const MemoryViewSource& views,
                                      const ExplicitModelOptions& options = {}) {
-  return makeExplicitModel(views, allViews(views), options);
+  return makeExplicitModel(*cpuBackends(), views, allViews(views), options);
 }
 
 ExplicitModelOptions plain() {
@@ -253,6 +253,7 @@ class Noting final : public Strategy {
     request.contributions = true;
     return request;
   }
+  bool regularises(const FitMoment&) const override { return true; }
   double loss(const FitMoment&, const SplatCloud& cloud, const CloudGradient& gradient) override {
     log.push_back("loss");
     for (float& value : gradient.opacities) value += 0.5f;
@@ -270,7 +271,7 @@ class Noting final : public Strategy {
   }
   std::optional<SplatEdit> afterStep(const FitMoment&, const SplatStore& store) override {
     log.push_back("afterStep");
-    EXPECT_EQ(store.splats.extras[0].size(), store.splats.positions.size());
+    EXPECT_EQ(store.splats().extras[0].size(), store.splats().positions.size());
     return {};
   }
   bool wantsSweep(const FitMoment& moment) const override { return moment.iteration == 2; }
@@ -281,7 +282,7 @@ class Noting final : public Strategy {
     log.push_back("edit");
     if (moment.iteration != 2) return {};
     SplatEdit edit;
-    edit.append = rowsOf(store.splats, std::vector<uint32_t>(appended, 0));
+    edit.append = rowsOf(store.splats(), std::vector<uint32_t>(appended, 0));
     return edit;
   }
   TensorTable state() const override { return {{"appended", {{1}, std::vector<uint64_t>{9}}}}; }
@@ -324,7 +325,7 @@ TEST(ExplicitModel, CallsTheHooksOfAStrategyInTheirOrder) {
   Noting& noting = *strategy;
   noting.appended = 2;
   SplatCloud start = truth();
-  const auto model = makeExplicitModel(start, std::move(strategy), plain());
+  const auto model = makeExplicitModel(*cpuBackends(), start, std::move(strategy), plain());
   Fit fit(scene(), *model, 1000);
   NoViews views;
   StepReport report = fit.run(1, &views);
@@ -345,7 +346,7 @@ TEST(ExplicitModel, CallsTheHooksOfAStrategyInTheirOrder) {
   for (size_t i = 0; i < raw.size(); ++i) EXPECT_EQ(drawn.positions[i], raw[i] + extra[i]);
   // And are in a checkpoint.
   auto other_strategy = std::make_unique<Noting>(log);
-  const auto other = makeExplicitModel(start, std::move(other_strategy), plain());
+  const auto other = makeExplicitModel(*cpuBackends(), start, std::move(other_strategy), plain());
   other->restore(state);
   EXPECT_EQ(other->splats(0).positions, drawn.positions);
 }
@@ -354,7 +355,7 @@ TEST(ExplicitModel, DerivativesAddUpWhileTheGateIsClosed) {
   std::vector<std::string> log;
   auto strategy = std::make_unique<Noting>(log);
   Noting& noting = *strategy;
-  const auto model = makeExplicitModel(truth(), std::move(strategy), plain());
+  const auto model = makeExplicitModel(*cpuBackends(), truth(), std::move(strategy), plain());
   Fit fit(scene(), *model, 1000);
   noting.gate_is_open = false;
   fit.run(3);
@@ -379,7 +380,7 @@ TEST(ExplicitModel, DerivativesAddUpWhileTheGateIsClosed) {
   }
   // What was kept goes on, too.
   auto other_strategy = std::make_unique<Noting>(log);
-  const auto other = makeExplicitModel(truth(), std::move(other_strategy), plain());
+  const auto other = makeExplicitModel(*cpuBackends(), truth(), std::move(other_strategy), plain());
   other->restore(saved);
   Fit second(scene(), *other, 1000);
   second.moment().iteration = 4;
@@ -393,7 +394,7 @@ TEST(ExplicitModel, AStrategyThatIgnoresTheCapIsStopped) {
   strategy->appended = 100;
   ExplicitModelOptions options = plain();
   options.max_splats = 100;
-  const auto model = makeExplicitModel(truth(), std::move(strategy), options);
+  const auto model = makeExplicitModel(*cpuBackends(), truth(), std::move(strategy), options);
   EXPECT_THAT(messageOf([&] { Fit(scene(), *model, 10).run(2); }, ErrorCode::kInternal),
               HasSubstr("noting makes 160 splats; at most 100"));
 }
@@ -440,9 +441,10 @@ TEST(ExplicitModel, RefusesOptionsOutOfRange) {
   options = {};
   options.ssim_share = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(refused(options), HasSubstr("0 to 1 is allowed"));
-  EXPECT_THAT(messageOf([&] { makeExplicitModel(scene(), {}, ExplicitModelOptions()); },
-                        ErrorCode::kInvalidArgument),
-              HasSubstr("no views to learn from"));
+  EXPECT_THAT(
+      messageOf([&] { makeExplicitModel(*cpuBackends(), scene(), {}, ExplicitModelOptions()); },
+                ErrorCode::kInvalidArgument),
+      HasSubstr("no views to learn from"));
 }
 
 TEST(ExplicitModel, ASplatTakesAsManyBytesAsItCounts) {
@@ -454,7 +456,7 @@ TEST(ExplicitModel, ASplatTakesAsManyBytesAsItCounts) {
       cloud.sh_degree = degree;
       cloud.sh.resize(counts[k] * cloud.shStride());
       const auto views = viewsOf(ballOfSplats(30, 1), camerasAround(2, 32));
-      const auto model = makeExplicitModel(cloud, makeStrategy("absolute"), {});
+      const auto model = makeExplicitModel(*cpuBackends(), cloud, makeStrategy("absolute"), {});
       Fit(*views, *model, 3000).run(3);
       bytes[k] = model->memoryBytes();
     }

@@ -96,7 +96,7 @@ double heldOutPsnr(FitModel& model, const MemoryViewSource& views, uint64_t budg
 
 TEST(FieldModel, LearnsABallThatDecodesAtAnyBudget) {
   const auto views = toyViews(toyBall(6000), kViews, kSize);
-  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
   const double before = heldOutPsnr(*model, *views, 1024);
   train(*model, *views, 1, 250, 250);
   std::vector<double> psnr;
@@ -130,7 +130,7 @@ double psnrOfNothing(const MemoryViewSource& views) {
 /// As NeRF's synthetic sets are: cameras and pictures with alpha.
 TEST(FieldModel, LearnsFromSilhouettesWherePointsAreMissing) {
   const auto views = toyViews(toyBall(6000), kViews, kSize, false);
-  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
   train(*model, *views, 1, 250, 250);
   // With points it is 22 dB.
   EXPECT_GT(heldOutPsnr(*model, *views, 1024), psnrOfNothing(*views) + 10);
@@ -146,7 +146,7 @@ TEST(FieldModel, LearnsWhereNothingButCamerasIsKnown) {
     picture.alpha.clear();
     views->add(with_alpha->camera(v), std::move(picture));
   }
-  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
   const double entropy = *model->densityEntropy();
   train(*model, *views, 1, 400, 400);
   EXPECT_GT(heldOutPsnr(*model, *views, 1024), psnrOfNothing(*views) + 6);
@@ -183,7 +183,7 @@ TEST(FieldModel, AShellHoldsWhatIsFarAway) {
   for (const bool shell : {false, true}) {
     FieldModelOptions options = smallOptions();
     options.shell = shell ? ShellChoice::kAuto : ShellChoice::kOff;
-    const auto model = makeFieldModel(*views, trainingViews(), options);
+    const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), options);
     train(*model, *views, 1, 300, 300);
     psnr[shell] = heldOutPsnr(*model, *views, 1024);
     const SplatCloud cloud = model->splats(1024);
@@ -200,7 +200,7 @@ TEST(FieldModel, AShellHoldsWhatIsFarAway) {
 
 TEST(FieldModel, GoesThroughItsStages) {
   const auto views = toyViews(toyBall(2000), kViews, 32);
-  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
   const std::vector<StepReport> reports = train(*model, *views, 1, 200, 200);
   EXPECT_STREQ(reports[0].stage, "Density");
   EXPECT_EQ(reports[0].splat_count, 0u);
@@ -225,7 +225,7 @@ TEST(FieldModel, TheDensityMovesOnlyWhereItsGradientIsOn) {
   FieldModelOptions options = smallOptions();
   const auto entropyAfter = [&](bool gradient) {
     options.density_gradient = gradient;
-    const auto model = makeFieldModel(*views, trainingViews(), options);
+    const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), options);
     train(*model, *views, 1, 30, 100);  // the first two stages
     const double before = *model->densityEntropy();
     train(*model, *views, 31, 100, 100);
@@ -250,7 +250,7 @@ TEST(FieldModel, TheDensityLeavesPlacesThatDoNotHelp) {
   const auto outsideShare = [&](bool gradient) {
     FieldModelOptions options = smallOptions();
     options.density_gradient = gradient;
-    const auto model = makeFieldModel(*views, trainingViews(), options);
+    const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), options);
     train(*model, *views, 1, 150, 150);
     const SplatCloud cloud = model->splats(1024);
     size_t outside = 0;
@@ -265,11 +265,11 @@ TEST(FieldModel, TheDensityLeavesPlacesThatDoNotHelp) {
 
 TEST(FieldModel, GoesOnBitForBitFromItsState) {
   const auto views = toyViews(toyBall(2000), kViews, 32);
-  const auto whole = makeFieldModel(*views, trainingViews(), smallOptions());
+  const auto whole = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
   train(*whole, *views, 1, 60, 120);
   const TensorTable saved = whole->state();
   train(*whole, *views, 61, 120, 120);
-  const auto resumed = makeFieldModel(*views, trainingViews(), smallOptions());
+  const auto resumed = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
   resumed->restore(saved);
   train(*resumed, *views, 61, 120, 120);
   const TensorTable one = whole->state(), other = resumed->state();
@@ -286,7 +286,7 @@ TEST(FieldModel, ItsResultDecodesWithoutIt) {
   for (const bool jitter : {true, false}) {
     FieldModelOptions options = smallOptions();
     options.jitter = jitter;
-    const auto model = makeFieldModel(*views, trainingViews(), options);
+    const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), options);
     train(*model, *views, 1, 20, 20);
     const FieldResult result = *fieldResult(*model);
     // As an asset keeps it: tensors, and everything else apart.
@@ -309,7 +309,7 @@ TEST(FieldModel, ItsResultDecodesWithoutIt) {
 
 TEST(FieldModel, RefusesTensorsOfAnotherField) {
   const auto views = toyViews(toyBall(500), kViews, 32);
-  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
   const FieldResult result = *fieldResult(*model);
   const TensorTable good = tensorsOfField(*result.field);
   const auto messageOf = [&](const TensorTable& table) -> std::string {
@@ -340,7 +340,7 @@ TEST(FieldModel, HasTheSameBitsForAnyNumberOfThreads) {
   for (const unsigned threads : {1u, 3u}) {
     std::vector<float> positions;
     withThreads(threads, [&] {
-      const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+      const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
       train(*model, *views, 1, 40, 60);
       positions = model->splats(200).positions;
     });
@@ -351,7 +351,7 @@ TEST(FieldModel, HasTheSameBitsForAnyNumberOfThreads) {
 
 TEST(FieldModel, RefusesStatesThatAreNotItsOwn) {
   const auto views = toyViews(toyBall(500), kViews, 32);
-  const auto model = makeFieldModel(*views, trainingViews(), smallOptions());
+  const auto model = makeFieldModel(*cpuBackends(), *views, trainingViews(), smallOptions());
   const TensorTable good = model->state();
   const auto messageOf = [&](const TensorTable& table) -> std::string {
     try {
@@ -382,7 +382,7 @@ TEST(FieldModel, RefusesOptionsOutOfRange) {
   const auto views = toyViews(toyBall(100), kViews, 16);
   const auto messageOf = [&](const FieldModelOptions& options) -> std::string {
     try {
-      makeFieldModel(*views, trainingViews(), options);
+      makeFieldModel(*cpuBackends(), *views, trainingViews(), options);
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
       return error.what();
@@ -401,7 +401,7 @@ TEST(FieldModel, RefusesOptionsOutOfRange) {
   options = smallOptions();
   options.ssim_share = 2;
   EXPECT_THAT(messageOf(options), ::testing::HasSubstr("ssim_share is 2"));
-  EXPECT_THROW(makeFieldModel(*views, {}, smallOptions()), Error);
+  EXPECT_THROW(makeFieldModel(*cpuBackends(), *views, {}, smallOptions()), Error);
 }
 
 TEST(FieldModel, TakesScenesThatHaveAlmostNothing) {
@@ -414,8 +414,8 @@ TEST(FieldModel, TakesScenesThatHaveAlmostNothing) {
     auto views = toyViews(SplatCloud(), 3, 16, false);
     if (points == 1) views->setPoints(toyPoints(toyBall(1)));
     const std::vector<size_t> training = {0, 1, 2};
-    const auto model =
-        makeFieldModel(*views, std::span(training).first(points == 1 ? 1 : 3), options);
+    const auto model = makeFieldModel(*cpuBackends(), *views,
+                                      std::span(training).first(points == 1 ? 1 : 3), options);
     for (uint64_t i = 1; i <= 30; ++i) {
       FitMoment moment;
       moment.iteration = i;

@@ -84,35 +84,35 @@ TEST(ViewRig, LooksAtThingsFromAroundAndAtRoomsFromInside) {
   // A ball with a core is a thing: from its middle everything is near.
   SplatCloud thing = sphere(3000, 1.0, 1);
   append(thing, sphere(1000, 0.2, 2));
-  EXPECT_EQ(chooseRig(thing), ViewRig::kAround);
-  EXPECT_EQ(chooseRig(sphere(3000, 1.0, 1)), ViewRig::kInside);
+  EXPECT_EQ(chooseRig(*cpuBackends(), thing), ViewRig::kAround);
+  EXPECT_EQ(chooseRig(*cpuBackends(), sphere(3000, 1.0, 1)), ViewRig::kInside);
   ViewRigOptions options;
   options.count = 20;
   options.rig = ViewRig::kAround;
   const double radius = cloudExtent(thing).radius;
-  for (const Camera& camera : viewsOfCloud(thing, options)) {
+  for (const Camera& camera : viewsOfCloud(*cpuBackends(), thing, options)) {
     EXPECT_NO_THROW(validate(camera));
     // The sphere around the cloud touches the borders of a picture of 40 degrees.
     EXPECT_NEAR(cameraCentre(camera).norm(), radius / std::sin(20 * 3.141592653589793 / 180), 0.1);
   }
   options.rig = ViewRig::kInside;
-  for (const Camera& camera : viewsOfCloud(thing, options)) {
+  for (const Camera& camera : viewsOfCloud(*cpuBackends(), thing, options)) {
     EXPECT_NO_THROW(validate(camera));
     EXPECT_LT(cameraCentre(camera).norm(), 0.5 * radius);
   }
   // Hollow: a room, or a thing that was a mesh. Seen both ways.
   options.rig = ViewRig::kAutomatic;
   size_t inside_count = 0;
-  for (const Camera& camera : viewsOfCloud(sphere(3000, 1.0, 1), options)) {
+  for (const Camera& camera : viewsOfCloud(*cpuBackends(), sphere(3000, 1.0, 1), options)) {
     inside_count += cameraCentre(camera).norm() < 1 ? 1 : 0;
   }
   EXPECT_EQ(inside_count, options.count / 2);
-  for (const Camera& camera : viewsOfCloud(thing, options)) {
+  for (const Camera& camera : viewsOfCloud(*cpuBackends(), thing, options)) {
     EXPECT_GT(cameraCentre(camera).norm(), 1);
   }
   options.count = 0;
-  EXPECT_THROW(viewsOfCloud(thing, options), Error);
-  EXPECT_THROW(viewsOfCloud({}, {}), Error);
+  EXPECT_THROW(viewsOfCloud(*cpuBackends(), thing, options), Error);
+  EXPECT_THROW(viewsOfCloud(*cpuBackends(), {}, {}), Error);
 }
 
 TEST(ViewRig, LooksOutFromPlacesWithRoomAround) {
@@ -125,7 +125,7 @@ TEST(ViewRig, LooksOutFromPlacesWithRoomAround) {
   options.rig = ViewRig::kInside;
   options.count = 16;
   double sum = 0;
-  for (const Camera& camera : viewsOfCloud(cloud, options)) {
+  for (const Camera& camera : viewsOfCloud(*cpuBackends(), cloud, options)) {
     sum += std::abs(cameraCentre(camera)[0]);
   }
   // Places are spread evenly over a quarter of the radius to both sides, so one alone is an eighth
@@ -139,7 +139,7 @@ TEST(ViewRig, LooksEveryWayFromPlacesInsideForVisibility) {
   const double radius = cloudExtent(room).radius;
   std::vector<Camera> inside;
   size_t around_count = 0;
-  for (const Camera& camera : viewsForVisibility(room, {})) {
+  for (const Camera& camera : viewsForVisibility(*cpuBackends(), room, {})) {
     EXPECT_NO_THROW(validate(camera));
     if (cameraCentre(camera).norm() > radius) {
       ++around_count;
@@ -173,8 +173,8 @@ TEST(ViewRig, LooksEveryWayFromPlacesInsideForVisibility) {
   // A thing is looked at as it always is.
   SplatCloud thing = sphere(3000, 1.0, 1);
   append(thing, sphere(1000, 0.2, 2));
-  const std::vector<Camera> seen = viewsForVisibility(thing, {});
-  const std::vector<Camera> usual = viewsOfCloud(thing, {});
+  const std::vector<Camera> seen = viewsForVisibility(*cpuBackends(), thing, {});
+  const std::vector<Camera> usual = viewsOfCloud(*cpuBackends(), thing, {});
   ASSERT_EQ(seen.size(), usual.size());
   for (size_t i = 0; i < seen.size(); ++i) {
     EXPECT_EQ(seen[i].world_to_camera, usual[i].world_to_camera);
@@ -182,12 +182,12 @@ TEST(ViewRig, LooksEveryWayFromPlacesInsideForVisibility) {
   }
   ViewRigOptions options;
   options.rig = ViewRig::kInside;
-  for (const Camera& camera : viewsForVisibility(thing, options)) {
+  for (const Camera& camera : viewsForVisibility(*cpuBackends(), thing, options)) {
     EXPECT_LT(cameraCentre(camera).norm(), radius);
   }
   options.count = 0;
-  EXPECT_THROW(viewsForVisibility(thing, options), Error);
-  EXPECT_THROW(viewsForVisibility({}, {}), Error);
+  EXPECT_THROW(viewsForVisibility(*cpuBackends(), thing, options), Error);
+  EXPECT_THROW(viewsForVisibility(*cpuBackends(), {}, {}), Error);
 }
 
 TEST(Visibility, CountsEverySplatThatReachesIntoAPicture) {
@@ -201,7 +201,7 @@ TEST(Visibility, CountsEverySplatThatReachesIntoAPicture) {
   options.rig = ViewRig::kInside;
   options.count = 3;
   options.size = 96;
-  const std::vector<Camera> views = viewsOfCloud(cloud, options);
+  const std::vector<Camera> views = viewsOfCloud(*cpuBackends(), cloud, options);
   std::vector<double> seen(cloud.size(), 0.0), whole(cloud.size(), 0.0);
   RenderOptions plain;
   plain.with_depth = false;
@@ -228,7 +228,7 @@ TEST(Visibility, CountsEverySplatThatReachesIntoAPicture) {
       whole[i] += 2 * 3.141592653589793 * f.opacity / (f.l00 * f.l11) * area;
     }
   }
-  const std::vector<float> visibility = splatVisibility(cloud, views);
+  const std::vector<float> visibility = splatVisibility(*cpuBackends(), cloud, views);
   for (size_t i = 0; i < cloud.size(); ++i) {
     const double expected = whole[i] > 0 ? std::min(seen[i] / whole[i], 1.0) : 1.0;
     // Sums of float32 blending weights.
@@ -243,8 +243,8 @@ TEST(Visibility, IsALittleInAClosedSurfaceAndNearZeroBehindIt) {
   ViewRigOptions options;
   options.rig = ViewRig::kAround;
   options.size = 128;
-  const auto views = viewsOfCloud(cloud, options);
-  const std::vector<float> visibility = splatVisibility(cloud, views);
+  const auto views = viewsOfCloud(*cpuBackends(), cloud, options);
+  const std::vector<float> visibility = splatVisibility(*cpuBackends(), cloud, views);
   double front = 0;
   double behind = 0;
   for (size_t i = 0; i < cloud.size(); ++i) {
@@ -260,13 +260,13 @@ TEST(Visibility, IsALittleInAClosedSurfaceAndNearZeroBehindIt) {
 
 TEST(Visibility, IsThatOfTheShapesWhateverTheirColours) {
   SplatCloud cloud = sphere(500, 1.0, 1);
-  const auto views = viewsOfCloud(cloud, {});
-  const std::vector<float> seen = splatVisibility(cloud, views);
+  const auto views = viewsOfCloud(*cpuBackends(), cloud, {});
+  const std::vector<float> seen = splatVisibility(*cpuBackends(), cloud, views);
   // Black beyond black, and harmonics that brighten one side.
   for (float& x : cloud.sh) x = -5.0f;
   cloud.sh_degree = 1;
   cloud.sh.resize(cloud.size() * cloud.shStride(), 3.0f);
-  EXPECT_EQ(splatVisibility(cloud, views), seen);
+  EXPECT_EQ(splatVisibility(*cpuBackends(), cloud, views), seen);
 }
 
 TEST(Visibility, MatchesTheBlendingWeights) {
@@ -274,7 +274,7 @@ TEST(Visibility, MatchesTheBlendingWeights) {
   ViewRigOptions options;
   options.count = 1;
   options.size = 96;
-  const auto views = viewsOfCloud(cloud, options);
+  const auto views = viewsOfCloud(*cpuBackends(), cloud, options);
   const SplatInstance instance{&cloud};
   std::vector<float> zeros(size_t{4} * 96 * 96, 0.0f);
   BackwardInput input;
@@ -284,7 +284,7 @@ TEST(Visibility, MatchesTheBlendingWeights) {
   plain.with_depth = false;
   const BackwardResult result = renderBackward({&instance, 1}, views[0], plain, input);
   const std::vector<float>& weights = result.instances[0].blending_weights;
-  const std::vector<float> visibility = splatVisibility(cloud, views);
+  const std::vector<float> visibility = splatVisibility(*cpuBackends(), cloud, views);
   size_t shown = 0;
   for (size_t i = 0; i < cloud.size(); ++i) {
     SplatCloud alone = sphere(300, 1.0, 4);
@@ -310,11 +310,13 @@ TEST(Visibility, OfSplatsApartIsNearlyOne) {
   options.rig = ViewRig::kAround;
   options.size = 256;
   // Alpha ends at 1/255 (1/230 of the splat's mass), and no view is along the line of both.
-  for (const float x : splatVisibility(cloud, viewsOfCloud(cloud, options))) {
+  for (const float x :
+       splatVisibility(*cpuBackends(), cloud, viewsOfCloud(*cpuBackends(), cloud, options))) {
     EXPECT_GT(x, 0.97f);
   }
   cloud.opacities[1] = 0.001f;
-  EXPECT_EQ(splatVisibility(cloud, viewsOfCloud(cloud, options))[1], 0.0f);
+  EXPECT_EQ(splatVisibility(*cpuBackends(), cloud, viewsOfCloud(*cpuBackends(), cloud, options))[1],
+            0.0f);
 }
 
 TEST(Refine, BringsAWrongCloudNearerToTheFullOne) {
@@ -329,12 +331,12 @@ TEST(Refine, BringsAWrongCloudNearerToTheFullOne) {
   options.iterations = 80;
   options.view_count = 12;
   options.view_size = 96;
-  const SplatCloud refined = refineCloud(start, full, options);
+  const SplatCloud refined = refineCloud(*cpuBackends(), start, full, options);
   ASSERT_EQ(refined.size(), start.size());
   ViewRigOptions unseen;
   unseen.seed = 99;
   unseen.size = 96;
-  const auto views = viewsOfCloud(full, unseen);
+  const auto views = viewsOfCloud(*cpuBackends(), full, unseen);
   EXPECT_LT(pictureError(refined, full, views), 0.4 * pictureError(start, full, views));
 }
 
@@ -346,15 +348,15 @@ TEST(Refine, IsTheSameForAnyNumberOfThreads) {
   options.view_count = 3;
   options.view_size = 64;
   SplatCloud one, four;
-  withThreads(1, [&] { one = refineCloud(start, full, options); });
-  withThreads(4, [&] { four = refineCloud(start, full, options); });
+  withThreads(1, [&] { one = refineCloud(*cpuBackends(), start, full, options); });
+  withThreads(4, [&] { four = refineCloud(*cpuBackends(), start, full, options); });
   EXPECT_EQ(one.positions, four.positions);
   EXPECT_EQ(one.sh, four.sh);
   options.iterations = 0;
-  EXPECT_EQ(refineCloud(start, full, options).positions, start.positions);
-  EXPECT_THROW(refineCloud({}, full, options), Error);
+  EXPECT_EQ(refineCloud(*cpuBackends(), start, full, options).positions, start.positions);
+  EXPECT_THROW(refineCloud(*cpuBackends(), {}, full, options), Error);
   start.colour_space = ColourSpace::kLinear;
-  EXPECT_THROW(refineCloud(start, full, options), Error);
+  EXPECT_THROW(refineCloud(*cpuBackends(), start, full, options), Error);
 }
 
 TEST(Refine, StaysBelowItsMemoryBound) {
@@ -364,7 +366,8 @@ TEST(Refine, StaysBelowItsMemoryBound) {
   options.iterations = 2;
   options.view_count = 6;
   options.view_size = 160;
-  const size_t most = testing::mostBytesDuring([&] { refineCloud(start, full, options); });
+  const size_t most =
+      testing::mostBytesDuring([&] { refineCloud(*cpuBackends(), start, full, options); });
   EXPECT_LE(most, refineMemoryBound(start, full, options));
   // The targets alone: more views are more memory, and the bound follows.
   EXPECT_GE(most, 6u * 160 * 160 * 12);
@@ -378,8 +381,8 @@ TEST(Visibility, StaysBelowItsMemoryBound) {
   const SplatCloud cloud = sphere(5000, 1.0, 1);
   ViewRigOptions options;
   options.size = 128;
-  const auto views = viewsOfCloud(cloud, options);
-  EXPECT_LE(testing::mostBytesDuring([&] { splatVisibility(cloud, views); }),
+  const auto views = viewsOfCloud(*cpuBackends(), cloud, options);
+  EXPECT_LE(testing::mostBytesDuring([&] { splatVisibility(*cpuBackends(), cloud, views); }),
             visibilityMemoryBound(cloud, options.size));
 }
 

@@ -34,10 +34,12 @@ const std::shared_ptr<MemoryViewSource>& scene() {
 class Looking {
  public:
   explicit Looking(const std::string& strategy)
-      : model_(makeExplicitModel(*scene(), allViews(*scene()), options(strategy))),
+      : model_(makeExplicitModel(*cpuBackends(), *scene(), allViews(*scene()), options(strategy))),
         training_(allViews(*scene())),
         pictures_(scene(), 1 << 24),
-        views_([this] { return model_->splats(0); }, pictures_, training_, kBlack, 0.2),
+        views_(
+            *cpuBackends(), [this] { return model_->splats(0); }, pictures_, training_, kBlack,
+            0.2),
         fit_(*scene(), *model_, 3000) {}
 
   void run(uint64_t last) {

@@ -176,10 +176,10 @@ Outcome scoresOfAFit(bool plants_zero) {
   TrainerOptions options;
   options.iterations = 3000;
   options.seed = 4;
-  Trainer trainer(
-      views, {allViews(*views), {}},
-      makeExplicitModel(start, std::make_unique<Witness>(by_hand, sums, plants_zero), model),
-      options);
+  Trainer trainer(*cpuBackends(), views, {allViews(*views), {}},
+                  makeExplicitModel(*cpuBackends(), start,
+                                    std::make_unique<Witness>(by_hand, sums, plants_zero), model),
+                  options);
   StopsAfter observer(kEvent);
   trainer.run(observer, &observer.progress);
   Outcome outcome{by_hand.scores, std::vector<double>(kSplats, 0.0)};

@@ -63,7 +63,8 @@ struct Fit {
                const ColourModelOptions& model_options = {}) {
     auto made = std::make_unique<ColourModel>(model_options);
     model = made.get();
-    trainer = std::make_unique<Trainer>(views, splitViews(*views, 8), std::move(made), options);
+    trainer = std::make_unique<Trainer>(*cpuBackends(), views, splitViews(*views, 8),
+                                        std::move(made), options);
   }
   FitEnd run() { return trainer->run(listener, &listener.progress); }
 
@@ -357,7 +358,7 @@ TEST(Trainer, RefusesOptionsOutOfRange) {
   options.checkpoint_seconds = -1;
   EXPECT_NE(messageOf([&] { Fit(views, options); }).find("checkpoint_seconds is -1"),
             std::string::npos);
-  EXPECT_EQ(messageOf([&] { Trainer(views, {}, std::make_unique<ColourModel>(), optionsOf(10)); }),
+  EXPECT_EQ(messageOf([&] { Trainer(*cpuBackends(), views, {}, std::make_unique<ColourModel>(), optionsOf(10)); }),
             "there are no views to learn from; at least one is needed");
 }
 
@@ -368,7 +369,8 @@ TEST(ViewMeasure, AgreesWithAPsnrByHand) {
   ColourModel model;
   const double black[3] = {0, 0, 0};
   const size_t chosen[1] = {0};
-  const FitMeasure seen = ViewMeasure().measure(model.splats(0), pictures, chosen, black);
+  const FitMeasure seen =
+      ViewMeasure(*cpuBackends()).measure(model.splats(0), pictures, chosen, black);
   // One splat lets 0.01 of the background through: 0.495 is drawn.
   const double squares = (0.245 * 0.245 + 0.005 * 0.005 + 0.255 * 0.255) / 3;
   // Targets are kept in 16 bits: 1e-5 of a dB.
@@ -392,8 +394,9 @@ TEST(ViewMeasure, CountsOnlyWhatMasksAndAlphaLeave) {
   ColourModel model;
   PictureStore all(std::make_shared<MemoryViewSource>(plain), 1 << 20);
   PictureStore left(std::make_shared<MemoryViewSource>(masked), 1 << 20);
-  const FitMeasure with = ViewMeasure().measure(model.splats(0), all, chosen, black);
-  const FitMeasure without = ViewMeasure().measure(model.splats(0), left, chosen, black);
+  const FitMeasure with = ViewMeasure(*cpuBackends()).measure(model.splats(0), all, chosen, black);
+  const FitMeasure without =
+      ViewMeasure(*cpuBackends()).measure(model.splats(0), left, chosen, black);
   EXPECT_NEAR(with.psnr, -10 * std::log10(0.495 * 0.495 / 2), 0.01);
   EXPECT_GT(with.foreground_psnr, 80);
   EXPECT_GT(without.psnr, 80);
@@ -405,7 +408,8 @@ TEST(FitViewEvaluator, DrawsAndJudgesTrainingViews) {
   ColourModel model;
   const double white[3] = {1, 1, 1};
   const std::vector<size_t> training = {2, 0};
-  FitViewEvaluator evaluator([&] { return model.splats(0); }, pictures, training, white, 0.2);
+  FitViewEvaluator evaluator(
+      *cpuBackends(), [&] { return model.splats(0); }, pictures, training, white, 0.2);
   EXPECT_EQ(evaluator.viewCount(), 2u);
   EXPECT_EQ(&evaluator.camera(0), &views->camera(2));
   // Half of 0.27 and half of white; a grey splat that lets 0.01 of white through.

@@ -33,6 +33,7 @@ StatisticRequest everything() {
   StatisticRequest request;
   request.contributions = request.blending_weights = request.screen_gradients = true;
   request.absolute_screen_gradients = request.covered = request.error_maps = true;
+  request.drawn_splats = true;
   request.edge_weights.assign(48 * 48, 0.5f);
   return request;
 }
@@ -83,7 +84,8 @@ Told byAnEvaluator(const SplatCloud& cloud, const std::shared_ptr<MemoryViewSour
                    const StatisticRequest& request) {
   PictureStore pictures(views, 1 << 24);
   const std::vector<size_t> training = {0};
-  FitViewEvaluator evaluator([&] { return cloud; }, pictures, training, kGrey, 0.2);
+  FitViewEvaluator evaluator(
+      *cpuBackends(), [&] { return cloud; }, pictures, training, kGrey, 0.2);
   return keptOf(evaluator.evaluate(0, request));
 }
 

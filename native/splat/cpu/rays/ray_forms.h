@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "splat/render/affine_splats.h"
+#include "splat/cpu/rays/affine_splats.h"
 #include "splat/render/ray_splats.h"
 
 namespace stipple {

@@ -1,4 +1,4 @@
-#include "splat/render/affine_splats.h"
+#include "splat/cpu/rays/affine_splats.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "base/progress.h"
+#include "splat/render/accurate_render.h"
+#include "splat/render/draw_order.h"
+#include "splat/render/render.h"
+
+namespace stipple {
+
+/// Draws images of placed splats, and orders splats for who draws them by himself. It keeps its
+/// memory from one image to the next. One call at a time.
+/// Errors of both: those of renderAccurate and orderForDrawing, which say what a call gives.
+/// Determinism: the same calls give the same bits, for any number of threads.
+class ImageRenderer {
+ public:
+  virtual ~ImageRenderer() = default;
+
+  virtual void render(std::span<const SplatInstance> instances, const Camera& camera,
+                      const RenderOptions& options, const RenderAccuracy& accuracy,
+                      RenderResult& result, Progress* progress = nullptr) = 0;
+
+  virtual void order(std::span<const SplatInstance> instances, const Camera& camera,
+                     const DrawOrderOutput& output, Progress* progress = nullptr) = 0;
+
+  virtual uint64_t memoryBytes() const = 0;  ///< held now, about
+};
+
+/// On this processor, with native/splat.
+std::unique_ptr<ImageRenderer> makeCpuImageRenderer();
+
+}  // namespace stipple

@@ -1,0 +1,24 @@
+#include "train/loop/backend_factory.h"
+
+namespace stipple {
+
+namespace {
+
+class CpuBackends final : public BackendFactory {
+ public:
+  const char* name() const override { return "cpu"; }
+  std::unique_ptr<ImageRenderer> makeImageRenderer() const override {
+    return makeCpuImageRenderer();
+  }
+  std::unique_ptr<ViewPass> makeViewPass() const override { return makeCpuViewPass(); }
+  std::unique_ptr<RenderBackend> makeRenderBackend() const override { return makeCpuBackend(); }
+};
+
+}  // namespace
+
+const std::shared_ptr<const BackendFactory>& cpuBackends() {
+  static const std::shared_ptr<const BackendFactory> made = std::make_shared<CpuBackends>();
+  return made;
+}
+
+}  // namespace stipple
