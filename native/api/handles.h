@@ -11,8 +11,7 @@
 #include <variant>
 #include <vector>
 
-#include "api/cloud_cuts.h"
-#include "data/accuracy_report.h"
+#include "base/memory_limit.h"
 #include "data/clouds/splat_cloud.h"
 #include "data/clouds/splat_quantities.h"
 #include "data/images/image.h"
@@ -26,22 +25,15 @@
 #include "density/octree_density.h"
 #include "io/assets/asset_header.h"
 #include "io/views/camera_file.h"
-#include "splat/render/draw_order.h"
-#include "splat/render/render_backward.h"
+#include "measure/picture_accuracy.h"
+#include "shot/mesh_layers.h"
+#include "shot/renderer.h"
 
 namespace stipple::api {
 
 /// What a context carries; every handle made from it keeps a share.
-struct ContextState {
+struct ContextState : MemoryLimit {
   uint32_t thread_count = 0;
-  uint64_t memory_limit_bytes = UINT64_MAX;
-
-  /// Refuses work that needs more than the limit. In: what, as a noun for the message.
-  void requireMemory(uint64_t bytes, const char* what) const;
-
-  /// Refuses a picture, or its derivative, that needs more than the limit or than this machine has.
-  /// In: what, as a noun with its numbers; pair_bytes: of those, for pairs of splat and tile.
-  void requirePictureMemory(uint64_t bytes, const std::string& what, uint64_t pair_bytes) const;
 };
 using Context = std::shared_ptr<const ContextState>;
 
@@ -84,26 +76,6 @@ struct ViewNote {
   uint32_t source_width = 0;
   uint32_t source_height = 0;
   bool is_distorted = false;
-};
-
-/// A view, measured.
-struct AccuracyResult {
-  AccuracyReport report;
-  std::vector<StippleAccuracy> accuracies;  ///< of its rows
-};
-
-/// What a renderer keeps from one picture to the next; its jobs hold a share.
-struct RendererMemory {
-  std::mutex mutex;  ///< held while a job uses the rest
-  RenderWorkspace workspace;
-  RenderResult result;
-  BackwardWorkspace backward_workspace;
-  BackwardResult backward_result;
-
-  CloudCuts cuts;  ///< has a lock of its own
-
-  std::mutex order_mutex;  ///< of order_workspace: an order and a picture may be made at once
-  DrawOrderWorkspace order_workspace;
 };
 
 }  // namespace stipple::api
@@ -150,7 +122,7 @@ struct StippleViews {
 
 struct StippleRenderer {
   stipple::api::Context context;
-  std::shared_ptr<stipple::api::RendererMemory> memory;
+  std::shared_ptr<stipple::Renderer> renderer;  ///< jobs hold a share
 };
 
 struct StippleVolume {
@@ -163,6 +135,11 @@ struct StippleImage {
   std::shared_ptr<const stipple::Image> image;
 };
 
+struct StippleLayers {
+  stipple::api::Context context;
+  stipple::MeshLayers layers;
+};
+
 struct StippleAccuracyReport {
-  std::shared_ptr<const stipple::api::AccuracyResult> result;
+  std::shared_ptr<const stipple::MeasuredAccuracy> result;
 };

@@ -20,7 +20,7 @@ namespace stipple::api {
 /// control saw with it, a volume, a mesh or a report of accuracy.
 using JobResult = std::variant<std::monostate, ModelParts, std::shared_ptr<const SplatCloud>,
                                std::shared_ptr<const SparseVolume>, std::shared_ptr<const TriMesh>,
-                               std::shared_ptr<const AccuracyResult>, SeenCloud>;
+                               std::shared_ptr<const MeasuredAccuracy>, SeenCloud>;
 
 /// Work of a job: runs on the job's own thread within the context's thread limit. It owns shares of
 /// all that it uses, apart from the caller's buffers.

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <utility>
 
-#include "api/bounds.h"
+#include "data/position_bounds.h"
 #include "api/field.h"
 #include "api/guard.h"
 #include "api/handles.h"
