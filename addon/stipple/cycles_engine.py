@@ -210,7 +210,8 @@ def _make_engine():
                 found = passes.get(name)
                 return None if found is None else version.read_pass(found, picture.border.width, picture.border.height)
 
-            cycles = layers.CyclesLayers(read('Combined'), read('Depth')[..., 0], read(_SHADOW_PASS))
+            cycles = layers.CyclesLayers(sources.context(), read('Combined'), read('Depth')[..., 0],
+                                         read(_SHADOW_PASS))
             if matte is not None:
                 cycles.hold_out(matte)
             if picture.background is not None:

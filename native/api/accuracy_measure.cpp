@@ -1,438 +1,54 @@
-#include "api/accuracy_measure.h"
-
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <string>
 #include <utility>
 
-#include "api/accuracy.h"
 #include "api/camera.h"
-#include "api/guard.h"
+#include "api/conversions.h"
 #include "api/job.h"
-#include "base/number_text.h"
-#include "base/parallel.h"
-#include "base/stopwatch.h"
-#include "math/colour.h"
+#include "measure/picture_accuracy.h"
+#include "measure/volume_accuracy.h"
 
 using namespace stipple;
 using namespace stipple::api;
 
-namespace stipple::api {
-
 namespace {
 
-constexpr uint64_t kBlockPixels = uint64_t{kRayBlockSide} * kRayBlockSide;
-/// A setting whose picture would take more than this share of the time is drawn in part.
-constexpr double kLongestShare = 0.05;
-
-StippleAccuracy levelOf(uint32_t level) {
-  StippleAccuracy accuracy;
-  if (stipple_accuracy_init(level, &accuracy) != STIPPLE_OK) {
-    fail(ErrorCode::kInternal, "a level of accuracy is missing");
-  }
-  return accuracy;
-}
-
-using Knobs = std::vector<std::pair<std::string, std::string>>;
-
-Knobs knobsOf(const StippleAccuracy& a) {
-  const char* sampling[] = {"as trained", "mip", "samples"};
-  return {{"order", a.order == STIPPLE_ORDER_PIXEL ? "pixel" : "centre"},
-          {"projection", a.projection == STIPPLE_PROJECTION_RAY ? "ray" : "affine"},
-          {"antialiasing", sampling[a.antialiasing]},
-          {"samples", std::to_string(a.samples_per_side)},
-          {"degree", std::to_string(a.sh_degree_limit)},
-          {"precision", a.precision == STIPPLE_PRECISION_DOUBLE ? "double" : "float"},
-          {"cut-off", numberText(a.least_alpha, 3)},
-          {"share", numberText(a.budget_share, 3)}};
-}
-
-/// Levels, and final with each of its knobs moved alone. All along rays where the camera has
-/// nothing else.
-std::vector<StippleAccuracy> usualAccuracies(const Camera& camera) {
-  std::vector<StippleAccuracy> list;
-  for (uint32_t level = STIPPLE_ACCURACY_DRAFT; level <= STIPPLE_ACCURACY_FINAL; ++level) {
-    list.push_back(levelOf(level));
-  }
-  const auto add = [&](auto change) {
-    StippleAccuracy accuracy = levelOf(STIPPLE_ACCURACY_FINAL);
-    change(accuracy);
-    list.push_back(accuracy);
-  };
-  add([](StippleAccuracy& a) { a.sh_degree_limit = 0; });
-  add([](StippleAccuracy& a) { a.budget_share = 0.5; });
-  add([](StippleAccuracy& a) { a.budget_share = 0.25; });
-  add([](StippleAccuracy& a) { a.budget_share = 0.1; });
-  add([](StippleAccuracy& a) { a.least_alpha = 0.02; });
-  add([](StippleAccuracy& a) { a.least_alpha = 1e-4; });
-  add([](StippleAccuracy& a) { a.order = STIPPLE_ORDER_PIXEL; });
-  add([](StippleAccuracy& a) { a.projection = STIPPLE_PROJECTION_RAY; });
-  add([](StippleAccuracy& a) {
-    a.order = STIPPLE_ORDER_PIXEL;
-    a.projection = STIPPLE_PROJECTION_RAY;
-  });
-  add([](StippleAccuracy& a) {
-    a.order = STIPPLE_ORDER_PIXEL;
-    a.projection = STIPPLE_PROJECTION_RAY;
-    a.least_alpha = 1e-4;
-  });
-  add([](StippleAccuracy& a) { a.precision = STIPPLE_PRECISION_DOUBLE; });
-  if (hasImagePlane(camera)) return list;
-  std::vector<StippleAccuracy> along_rays;
-  for (StippleAccuracy accuracy : list) {
-    accuracy.projection = STIPPLE_PROJECTION_RAY;
-    // Rays of directions are drawn in double whatever is asked for.
-    accuracy.precision = STIPPLE_PRECISION_FLOAT;
-    const std::string name = accuracyName(accuracy);
-    const bool is_new =
-        std::none_of(along_rays.begin(), along_rays.end(),
-                     [&](const StippleAccuracy& other) { return accuracyName(other) == name; });
-    if (is_new) along_rays.push_back(accuracy);
-  }
-  return along_rays;
-}
-
-/// Blocks of pixels that are spread evenly over the picture, by the additive sequence of the
-/// plastic number, which fills a square evenly at any length. Source: Roberts, The Unreasonable
-/// Effectiveness of Quasirandom Sequences, 2018.
-std::vector<PixelArea> spreadBlocks(const Camera& camera, uint64_t pixels) {
-  const uint32_t columns = (camera.width + kRayBlockSide - 1) / kRayBlockSide;
-  const uint32_t rows = (camera.height + kRayBlockSide - 1) / kRayBlockSide;
-  const uint64_t all = uint64_t{columns} * rows;
-  const uint64_t wanted =
-      pixels == 0 ? all : std::clamp<uint64_t>((pixels + kBlockPixels - 1) / kBlockPixels, 1, all);
-  constexpr double kStep[2] = {0.7548776662466927, 0.5698402909980532};
-  std::vector<uint8_t> taken(all);
-  std::vector<PixelArea> blocks;
-  const auto take = [&](uint64_t block) {
-    if (taken[block] || blocks.size() == wanted) return;
-    taken[block] = 1;
-    const uint32_t x0 = static_cast<uint32_t>(block % columns) * kRayBlockSide;
-    const uint32_t y0 = static_cast<uint32_t>(block / columns) * kRayBlockSide;
-    blocks.push_back({x0, y0, std::min(kRayBlockSide, camera.width - x0),
-                      std::min(kRayBlockSide, camera.height - y0)});
-  };
-  for (uint64_t k = 0; k < 4 * all; ++k) {
-    const double x = 0.5 + static_cast<double>(k) * kStep[0];
-    const double y = 0.5 + static_cast<double>(k) * kStep[1];
-    const auto column = static_cast<uint64_t>((x - std::floor(x)) * columns);
-    const auto row = static_cast<uint64_t>((y - std::floor(y)) * rows);
-    take(row * columns + column);
-  }
-  for (uint64_t block = 0; block < all; ++block) take(block);
-  return blocks;
-}
-
-uint64_t pixelsOf(std::span<const PixelArea> areas) {
-  uint64_t count = 0;
-  for (const PixelArea& area : areas) count += uint64_t{area.width} * area.height;
-  return count;
-}
-
-class Measuring {
- public:
-  Measuring(const Instances& instances, const Camera& camera, const RenderSettings& render,
-            const MeasureSettings& settings, Progress& progress)
-      : instances_(instances),
-        camera_(camera),
-        options_(render.options),
-        is_display_(compositesInDisplaySpace(instances, render.options.blend_space)),
-        settings_(settings),
-        progress_(progress),
-        blocks_(spreadBlocks(camera, settings.reference_pixels)) {
-    options_.with_depth = false;
-    low_pass_ = options_.low_pass;
-    degree_ = options_.sh_degree_limit;
-  }
-
-  AccuracyResult run() {
-    const StippleAccuracy yardstick = levelOf(STIPPLE_ACCURACY_REFERENCE);
-    result_.report.width = camera_.width;
-    result_.report.height = camera_.height;
-    result_.report.compared_pixels = pixelsOf(blocks_);
-    result_.report.splat_count = splatsOf(instances_);
-    result_.report.thread_count = static_cast<uint32_t>(threadLimit());
-    makeCuts();
-    drawReference(yardstick);
-    std::vector<size_t> repeated;
-    for (size_t i = 0; i < settings_.accuracies.size(); ++i) {
-      progress_.advance(0.4 + 0.2 * partOf(i, settings_.accuracies.size()), "Comparing settings");
-      if (measureOnce(settings_.accuracies[i])) repeated.push_back(i + 1);
-    }
-    repeat(repeated);
-    // The reference is last, as the dearest.
-    std::rotate(result_.report.rows.begin(), result_.report.rows.begin() + 1,
-                result_.report.rows.end());
-    std::rotate(result_.accuracies.begin(), result_.accuracies.begin() + 1,
-                result_.accuracies.end());
-    markFront(result_.report);
-    return std::move(result_);
-  }
-
- private:
-  static double partOf(size_t done, size_t all) {
-    return static_cast<double>(done) / static_cast<double>(std::max<size_t>(all, 1));
-  }
-
-  /// Every share is merged before anything is timed.
-  void makeCuts() {
-    const Stopwatch watch;
-    for (const StippleAccuracy& accuracy : settings_.accuracies) {
-      const bool known = std::any_of(cuts_.begin(), cuts_.end(), [&](const auto& cut) {
-        return cut.first == accuracy.budget_share;
-      });
-      if (known || accuracy.budget_share >= 1) continue;
-      Instances cut = instances_;
-      cutter_.cut(cut, accuracy.budget_share, &progress_);
-      cuts_.emplace_back(accuracy.budget_share, std::move(cut));
-    }
-    if (!cuts_.empty()) result_.report.cut_seconds = watch.seconds();
-  }
-
-  const Instances& cutFor(const StippleAccuracy& accuracy) const {
-    for (const auto& [share, cut] : cuts_) {
-      if (share == accuracy.budget_share) return cut;
-    }
-    return instances_;
-  }
-
-  RenderOptions optionsFor(const StippleAccuracy& accuracy) const {
-    RenderOptions options = options_;
-    options.low_pass = accuracy.antialiasing == STIPPLE_SAMPLING_MIP ? LowPass::kMip : low_pass_;
-    options.sh_degree_limit = std::min(degree_, static_cast<int>(accuracy.sh_degree_limit));
-    return options;
-  }
-
-  void draw(const StippleAccuracy& accuracy) {
-    renderAccurate(cutFor(accuracy).list, camera_, optionsFor(accuracy), renderAccuracy(accuracy),
-                   workspace_, picture_);
-  }
-
-  /// Seconds of drawing only some of the blocks.
-  double drawBlocks(const StippleAccuracy& accuracy, std::span<const PixelArea> blocks,
-                    double progress_begin, double progress_end) {
-    RayOptions rays = rayOptions(renderAccuracy(accuracy));
-    rays.areas = blocks;
-    rays.progress_begin = progress_begin;
-    rays.progress_end = progress_end;
-    const Stopwatch watch;
-    picture_ = renderRays(cutFor(accuracy).list, camera_, optionsFor(accuracy), rays, &progress_);
-    return watch.seconds();
-  }
-
-  /// Draws the blocks, and half of them, and from both what a whole picture would take: splats are
-  /// placed once, pixels follow their number. Leaves the picture of all blocks.
-  double estimate(const StippleAccuracy& accuracy, double progress_begin, double progress_end) {
-    const std::span<const PixelArea> all = blocks_;
-    const auto half = all.subspan(0, all.size() / 2);
-    const double middle = progress_begin + (progress_end - progress_begin) / 3;
-    const uint64_t picture_pixels = uint64_t{camera_.width} * camera_.height;
-    const double less = half.empty() ? 0.0 : drawBlocks(accuracy, half, progress_begin, middle);
-    const double more =
-        drawBlocks(accuracy, all, half.empty() ? progress_begin : middle, progress_end);
-    const auto drawn = static_cast<double>(pixelsOf(all));
-    const double added = drawn - static_cast<double>(pixelsOf(half));
-    const double left = static_cast<double>(picture_pixels) - drawn;
-    return more + std::max(0.0, more - less) / added * left;
-  }
-
-  bool comparesAll() const {
-    return result_.report.compared_pixels == uint64_t{camera_.width} * camera_.height;
-  }
-
-  AccuracyRow& addRow(const StippleAccuracy& accuracy) {
-    AccuracyRow row;
-    row.name = accuracyName(accuracy);
-    row.knobs = knobsOf(accuracy);
-    row.splat_count = splatsOf(cutFor(accuracy));
-    row.visible_count = picture_.visible_count;
-    std::vector<float> differences = valuesOf(picture_);
-    for (size_t i = 0; i < differences.size(); ++i) differences[i] -= reference_[i];
-    setErrors(differences, row);
-    result_.report.rows.push_back(std::move(row));
-    result_.accuracies.push_back(accuracy);
-    return result_.report.rows.back();
-  }
-
-  void drawReference(const StippleAccuracy& yardstick) {
-    double seconds = 0;
-    if (comparesAll()) {
-      seconds = drawBlocks(yardstick, blocks_, 0.0, 0.4);
-    } else {
-      seconds = estimate(yardstick, 0.0, 0.4);
-    }
-    reference_ = valuesOf(picture_);
-    AccuracyRow& row = addRow(yardstick);
-    setSeconds({seconds}, row);
-    row.is_estimated = !comparesAll();
-  }
-
-  /// Returns whether the setting is to be timed again.
-  bool measureOnce(const StippleAccuracy& accuracy) {
-    if (isSlow(renderAccuracy(accuracy), camera_) && !comparesAll()) {
-      const double at = progress_.fraction();
-      const double seconds = estimate(accuracy, at, at);
-      if (seconds > kLongestShare * settings_.most_seconds) {
-        AccuracyRow& row = addRow(accuracy);
-        setSeconds({seconds}, row);
-        row.is_estimated = true;
-        return false;
-      }
-    }
-    draw(accuracy);  // and the workspace grows before anything is timed
-    addRow(accuracy);
-    return true;
-  }
-
-  /// In turns, so that what else the machine does meets all alike.
-  void repeat(const std::vector<size_t>& rows) {
-    std::vector<std::vector<double>> times(rows.size());
-    const Stopwatch watch;
-    for (uint32_t round = 0; round < settings_.repetitions; ++round) {
-      if (round > 0 && watch.seconds() > settings_.most_seconds) break;
-      for (size_t k = 0; k < rows.size(); ++k) {
-        progress_.advance(
-            0.6 + 0.4 * partOf(round * rows.size() + k, settings_.repetitions * rows.size()),
-            "Timing settings");
-        const Stopwatch drawing;
-        draw(result_.accuracies[rows[k]]);
-        times[k].push_back(drawing.seconds());
-      }
-    }
-    for (size_t k = 0; k < rows.size(); ++k) {
-      setSeconds(std::move(times[k]), result_.report.rows[rows[k]]);
-    }
-  }
-
-  /// Display values of the compared pixels, four channels each.
-  std::vector<float> valuesOf(const RenderResult& picture) const {
-    std::vector<float> values;
-    values.reserve(result_.report.compared_pixels * 4);
-    for (const PixelArea& area : blocks_) {
-      for (uint32_t y = area.y0; y < area.y0 + area.height; ++y) {
-        const float* row = &picture.colour[(size_t{y} * camera_.width + area.x0) * 4];
-        for (size_t i = 0; i < size_t{area.width} * 4; ++i) {
-          values.push_back(is_display_ || i % 4 == 3 ? row[i] : linearToSrgb(row[i]));
-        }
-      }
-    }
-    return values;
-  }
-
-  const Instances& instances_;
-  const Camera& camera_;
-  RenderOptions options_;
-  LowPass low_pass_;
-  int degree_;
-  bool is_display_;
-  const MeasureSettings& settings_;
-  Progress& progress_;
-  std::vector<PixelArea> blocks_;
-  CloudCuts cutter_;
-  std::vector<std::pair<double, Instances>> cuts_;
-  RenderWorkspace workspace_;
-  RenderResult picture_;
-  std::vector<float> reference_;
-  AccuracyResult result_;
-};
-
-}  // namespace
-
-uint64_t splatsOf(const Instances& instances) {
-  uint64_t count = 0;
-  for (const SplatInstance& instance : instances.list) count += instance.cloud->size();
-  return count;
-}
-
-std::string accuracyName(const StippleAccuracy& accuracy) {
-  const Knobs own = knobsOf(accuracy), usual = knobsOf(levelOf(accuracy.level));
-  std::string name = stipple_accuracy_level_name(accuracy.level);
-  for (size_t i = 0; i < own.size(); ++i) {
-    if (own[i].second == usual[i].second) continue;
-    if (own[i].first == "antialiasing" && accuracy.antialiasing == STIPPLE_SAMPLING_SAMPLES) {
-      continue;  // the number of samples says it
-    }
-    name += " + " + own[i].first + " " + own[i].second;
-  }
-  return name;
-}
-
-MeasureSettings measureSettings(const StippleAccuracyMeasureOptions* options,
-                                const Camera& camera) {
+PictureAccuracyOptions pictureOptionsFrom(const StippleAccuracyMeasureOptions* options,
+                                          const Camera& camera) {
   StippleAccuracyMeasureOptions defaults;
   stipple_accuracy_measure_options_init(&defaults);
   const StippleAccuracyMeasureOptions given = completed(options, defaults, "options");
-  MeasureSettings settings;
-  if (given.repetitions < 1 || given.repetitions > 1000) {
-    fail(ErrorCode::kInvalidArgument,
-         "options->repetitions is " + std::to_string(given.repetitions) + "; 1 to 1000 is allowed");
-  }
-  if (!(given.most_seconds > 0 && std::isfinite(given.most_seconds))) {
-    fail(ErrorCode::kInvalidArgument, "options->most_seconds is " +
-                                          numberText(given.most_seconds, 3) +
-                                          " s; more than 0 is allowed");
-  }
-  settings.repetitions = given.repetitions;
-  settings.most_seconds = given.most_seconds;
-  settings.reference_pixels = given.reference_pixels;
-  if (given.setting_count == 0) {
-    settings.accuracies = usualAccuracies(camera);
-    return settings;
-  }
-  const auto* bytes =
-      reinterpret_cast<const std::byte*>(&require(given.settings, "options->settings"));
-  const size_t step = given.settings->struct_size;
+  PictureAccuracyOptions made;
+  made.timing = {given.repetitions, given.most_seconds};
+  made.reference_pixels = given.reference_pixels;
+  if (given.setting_count == 0) made.accuracies = usualAccuracies(camera);
+  const StructArray<StippleAccuracy> settings(given.settings, given.setting_count,
+                                              "options->settings");
   for (uint64_t i = 0; i < given.setting_count; ++i) {
-    const std::string name = "options->settings[" + std::to_string(i) + "]";
-    const auto* entry = reinterpret_cast<const StippleAccuracy*>(bytes + i * step);
-    if (entry->struct_size != step) {
-      failStructSize(name.c_str(), entry->struct_size, sizeof(StippleAccuracy));
-    }
-    settings.accuracies.push_back(accuracyFrom(entry, name.c_str()));
-    if (settings.accuracies.back().projection == STIPPLE_PROJECTION_AFFINE) {
-      requireImagePlane(camera, (name + "->projection affine").c_str());
-    }
+    made.accuracies.push_back(accuracyFrom(settings.at(i), settings.nameOf(i).c_str()));
   }
-  return settings;
+  return made;
 }
 
-RenderMemory measureMemory(const Instances& instances, const Camera& camera,
-                           const RenderSettings& render, const MeasureSettings& settings) {
-  RenderMemory memory = rayMemory(instances.list, camera, render.options);
-  double least_share = 1;
-  for (const StippleAccuracy& accuracy : settings.accuracies) {
-    const RenderMemory one =
-        accurateMemory(instances.list, camera, render.options, renderAccuracy(accuracy));
-    if (one.sum() > memory.sum()) memory = one;
-    least_share = std::min(least_share, accuracy.budget_share);
-  }
-  memory.other_bytes += CloudCuts::memoryBound(instances, least_share);
-  // The reference's and another's values of what is compared.
-  const uint64_t pixels = uint64_t{camera.width} * camera.height;
-  const uint64_t compared =
-      settings.reference_pixels == 0 ? pixels : std::min(pixels, settings.reference_pixels * 2);
-  memory.other_bytes += compared * 4 * sizeof(float) * 2;
-  return memory;
+VolumeAccuracyOptions volumeOptionsFrom(const StippleVoxelizeOptions* finest,
+                                        const StippleVolumeAccuracyOptions* options) {
+  StippleVolumeAccuracyOptions defaults;
+  stipple_volume_accuracy_options_init(&defaults);
+  const StippleVolumeAccuracyOptions given = completed(options, defaults, "options");
+  return {voxelizeOptionsFrom(finest), {given.repetitions, given.most_seconds}};
 }
 
-AccuracyResult measureAccuracy(const Instances& instances, const Camera& camera,
-                               const RenderSettings& render, const MeasureSettings& settings,
-                               Progress& progress) {
-  return Measuring(instances, camera, render, settings, progress).run();
-}
-
-}  // namespace stipple::api
+}  // namespace
 
 extern "C" {
 
 void stipple_accuracy_measure_options_init(StippleAccuracyMeasureOptions* options) {
   if (!options) return;
+  const PictureAccuracyOptions defaults;
   *options = {};
   options->struct_size = sizeof(StippleAccuracyMeasureOptions);
-  options->repetitions = 7;
-  options->reference_pixels = 16 * kBlockPixels;
-  options->most_seconds = 60;
+  options->repetitions = defaults.timing.repetitions;
+  options->reference_pixels = defaults.reference_pixels;
+  options->most_seconds = defaults.timing.most_seconds;
 }
 
 StippleStatus stipple_accuracy_measure_start(StippleContext* context,
@@ -445,38 +61,50 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context,
     require(context, "context");
     require(job, "job");
     Instances placed = instancesFrom(instances, count);
-    const RenderSettings drawing = renderSettings(render, placed);
-    if (drawing.has_accuracy) {
-      fail(ErrorCode::kInvalidArgument,
-           "render->accuracy is set, which measuring chooses itself; it must be NULL");
-    }
-    if (isSampled(drawing.sampling)) {
-      fail(ErrorCode::kInvalidArgument,
-           "render has a lens, a shutter or samples; what is measured is one sharp picture");
-    }
-    if (drawing.method != STIPPLE_RENDER_TILED) {
-      fail(ErrorCode::kInvalidArgument, "render->method is " + std::to_string(drawing.method) +
-                                            ", which measuring chooses itself; 0 is allowed");
-    }
-    if (drawing.splat_light || drawing.options.surface.depth) {
-      fail(ErrorCode::kInvalidArgument,
-           "render has a surface or light, which measuring does not draw; they must be NULL");
-    }
-    if (splatsOf(placed) == 0) {
-      fail(ErrorCode::kInvalidArgument, "the instances have 0 splats; measuring needs at least 1");
-    }
+    const ShotSettings shot = shotFrom(render, placed);
+    requireMeasurable(shot);
     const Camera view = cameraFrom(camera);
     validate(view);
-    const MeasureSettings settings = measureSettings(options, view);
-    const RenderMemory memory = measureMemory(placed, view, drawing, settings);
+    const PictureAccuracyOptions measured = pictureOptionsFrom(options, view);
+    validate(measured, placed, view);
+    const RenderMemory memory = measurePictureMemory(placed, view, shot, measured);
     context->state->requirePictureMemory(memory.sum(), "measuring a picture of " + sizeText(view),
                                          memory.pair_bytes);
     *job = startJob(
         context->state,
-        [placed = std::move(placed), drawing, settings, view](Progress& progress) -> JobResult {
-          return std::make_shared<const AccuracyResult>(
-              measureAccuracy(placed, view, drawing, settings, progress));
+        [placed = std::move(placed), shot, measured, view](Progress& progress) -> JobResult {
+          return std::make_shared<const MeasuredAccuracy>(
+              measurePicture(placed, view, shot, measured, progress));
         });
+  });
+}
+
+void stipple_volume_accuracy_options_init(StippleVolumeAccuracyOptions* options) {
+  if (!options) return;
+  const VolumeAccuracyOptions defaults;
+  *options = {};
+  options->struct_size = sizeof(StippleVolumeAccuracyOptions);
+  options->repetitions = defaults.timing.repetitions;
+  options->most_seconds = defaults.timing.most_seconds;
+}
+
+StippleStatus stipple_volume_accuracy_start(StippleContext* context,
+                                            const StippleInstance* instances, uint64_t count,
+                                            const StippleVoxelizeOptions* finest,
+                                            const StippleVolumeAccuracyOptions* options,
+                                            StippleJob** job) {
+  return guarded([&] {
+    require(context, "context");
+    require(job, "job");
+    Instances placed = instancesFrom(instances, count);
+    const VolumeAccuracyOptions measured = volumeOptionsFrom(finest, options);
+    validate(measured, placed);
+    const uint64_t limit = context->state->memory_limit_bytes;
+    *job = startJob(context->state,
+                    [placed = std::move(placed), measured, limit](Progress& progress) -> JobResult {
+                      return std::make_shared<const MeasuredAccuracy>(
+                          MeasuredAccuracy{measureVolume(placed, measured, limit, progress), {}});
+                    });
   });
 }
 

@@ -1,12 +1,11 @@
-#include "data/accuracy_report.h"
-
 #include <string>
 
-#include "api/guard.h"
-#include "api/handles.h"
+#include "api/conversions.h"
 #include "api/job.h"
 #include "api/plot.h"
 #include "io/reports/accuracy_file.h"
+#include "measure/accuracy_choice.h"
+#include "measure/fit_accuracy.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -17,20 +16,49 @@ const AccuracyReport& reportOf(const StippleAccuracyReport* report) {
   return require(report, "report").result->report;
 }
 
+StippleAccuracyRow rowTo(const MeasuredAccuracy& measured, size_t index) {
+  const AccuracyRow& from = measured.report.rows[index];
+  StippleAccuracyRow out = {};
+  out.is_on_front = from.is_on_front ? 1 : 0;
+  out.name_utf8 = from.name.c_str();
+  out.setting.struct_size = sizeof(out.setting);
+  if (!measured.accuracies.empty()) out.setting = accuracyTo(measured.accuracies[index]);
+  out.seconds = from.seconds;
+  out.seconds_low = from.seconds_low;
+  out.seconds_high = from.seconds_high;
+  out.psnr = from.psnr;
+  out.largest_error = from.largest_error;
+  out.error_99_9 = from.error_99_9;
+  out.splat_count = from.splat_count;
+  out.visible_count = from.visible_count;
+  out.repetitions = from.repetitions;
+  out.is_estimated = from.is_estimated ? 1 : 0;
+  out.value = from.value;
+  return out;
+}
+
 }  // namespace
 
 extern "C" {
 
 StippleStatus stipple_job_accuracy_report(const StippleJob* job, StippleAccuracyReport** report) {
   return guarded([&] {
-    const auto& made =
-        jobResult<std::shared_ptr<const AccuracyResult>>(require(job, "job"), "report of accuracy");
+    const auto& made = jobResult<std::shared_ptr<const MeasuredAccuracy>>(require(job, "job"),
+                                                                          "report of accuracy");
     require(report, "report") = new StippleAccuracyReport{made};
   });
 }
 
 void stipple_accuracy_report_free(StippleAccuracyReport* report) {
   delete report;
+}
+
+StippleStatus stipple_fit_accuracy_report(const char* path_utf8, StippleAccuracyReport** report) {
+  return guarded([&] {
+    const std::string path = &require(path_utf8, "path_utf8");
+    require(report, "report") = new StippleAccuracyReport{
+        std::make_shared<const MeasuredAccuracy>(MeasuredAccuracy{fitAccuracy(path), {}})};
+  });
 }
 
 StippleStatus stipple_accuracy_report_info(const StippleAccuracyReport* report,
@@ -58,23 +86,7 @@ StippleStatus stipple_accuracy_report_row(const StippleAccuracyReport* report, u
       fail(ErrorCode::kInvalidArgument, "index is " + std::to_string(index) + "; 0 to " +
                                             std::to_string(made.rows.size() - 1) + " is allowed");
     }
-    const stipple::AccuracyRow& from = made.rows[index];
-    StippleAccuracyRow out = {};
-    out.is_on_front = from.is_on_front ? 1 : 0;
-    out.name_utf8 = from.name.c_str();
-    out.setting = report->result->accuracies[index];
-    out.seconds = from.seconds;
-    out.seconds_low = from.seconds_low;
-    out.seconds_high = from.seconds_high;
-    out.psnr = from.psnr;
-    out.largest_error = from.largest_error;
-    out.error_99_9 = from.error_99_9;
-    out.splat_count = from.splat_count;
-    out.visible_count = from.visible_count;
-    out.repetitions = from.repetitions;
-    out.is_estimated = from.is_estimated ? 1 : 0;
-    out.value = from.value;
-    deliver(row, out, "row");
+    deliver(row, rowTo(*report->result, index), "row");
   });
 }
 

@@ -6,11 +6,8 @@
 #include <vector>
 
 #include "api/camera.h"
-#include "api/guard.h"
-#include "api/handles.h"
-#include "api/instances.h"
+#include "api/conversions.h"
 #include "api/job.h"
-#include "api/render_settings.h"
 #include "base/parallel.h"
 #include "splat/render/render_backward.h"
 #include "train/optimiser/image_loss.h"
@@ -104,32 +101,6 @@ BackwardInput inputFrom(const StippleBackwardInput* input, const Buffers& buffer
   return made;
 }
 
-/// Refuses what is drawn but has no derivative here.
-void requireDerivative(const RenderSettings& settings, const Instances& placed) {
-  if (settings.method != STIPPLE_RENDER_TILED) {
-    fail(ErrorCode::kInvalidArgument, "options->method is " + std::to_string(settings.method) +
-                                          "; derivatives have 0 (tiled) only");
-  }
-  if (isSampled(settings.sampling)) {
-    fail(ErrorCode::kInvalidArgument,
-         "options has a lens, a shutter or samples; derivatives are those of one sharp picture");
-  }
-  if (settings.options.surface.depth || settings.splat_light) {
-    fail(ErrorCode::kInvalidArgument,
-         "options has a surface or a splat_light; derivatives are those of splats alone");
-  }
-  for (size_t i = 0; i < placed.list.size(); ++i) {
-    if (!placed.list[i].holdout) continue;
-    fail(ErrorCode::kInvalidArgument,
-         "instances[" + std::to_string(i) + "].holdout is 1; instances with derivatives have 0");
-  }
-  if (settings.linearise) {
-    fail(ErrorCode::kInvalidArgument,
-         "options->output_colour is 0 (scene linear), which converts the composited picture; "
-         "derivatives are those of 1 (composited)");
-  }
-}
-
 void deliverGradients(const BackwardResult& made, const Buffers& buffers,
                       StippleBackwardResult* result) {
   for (size_t i = 0; i < buffers.size(); ++i) {
@@ -147,30 +118,22 @@ void deliverGradients(const BackwardResult& made, const Buffers& buffers,
   deliver(result, out, "result");
 }
 
-/// In the renderer's own memory, or in new where another job of the same renderer is using that.
-void runBackward(RendererMemory& memory, const Instances& placed, const Camera& view,
-                 const RenderOptions& options, const BackwardInput& input, const Buffers& buffers,
-                 StippleBackwardResult* result, Progress& progress) {
-  const std::unique_lock<std::mutex> lock(memory.mutex, std::try_to_lock);
-  if (lock.owns_lock()) {
-    renderBackward(placed.list, view, options, input, memory.backward_workspace,
-                   memory.backward_result, UINT64_MAX, &progress);
-    progress.throwIfCancelled();
-    deliverGradients(memory.backward_result, buffers, result);
-  } else {
-    const BackwardResult made =
-        renderBackward(placed.list, view, options, input, UINT64_MAX, &progress);
-    progress.throwIfCancelled();
-    deliverGradients(made, buffers, result);
-  }
-}
-
+/// In: channels of a StippleImageLossOptions, name of the field.
 PixelLayout layoutOf(uint32_t channels, const char* name) {
   if (channels != 3 && channels != 4) {
     fail(ErrorCode::kInvalidArgument,
          std::string(name) + " is " + std::to_string(channels) + "; 3 or 4 is allowed");
   }
   return channels == 4 ? PixelLayout::kRgba : PixelLayout::kRgb;
+}
+
+void requireSides(uint32_t width, uint32_t height) {
+  constexpr uint32_t kMaxSide = 65536;
+  if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) {
+    fail(ErrorCode::kInvalidArgument, "the picture is " + std::to_string(width) + " x " +
+                                          std::to_string(height) +
+                                          " pixels; each side must be 1 to 65536");
+  }
 }
 
 }  // namespace
@@ -188,15 +151,7 @@ StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer,
     require(renderer, "renderer");
     require(job, "job");
     Instances placed = instancesFrom(instances, count);
-    const RenderSettings settings = renderSettings(options, placed);
-    if (settings.options.object_order != ObjectOrder::kTogether) {
-      fail(ErrorCode::kUnsupported,
-           "options->object_order is 1, which a backward pass does not follow; 0 is allowed");
-    }
-    if (settings.has_accuracy) {
-      fail(ErrorCode::kInvalidArgument,
-           "options->accuracy is set, which a backward pass does not follow; it must be NULL");
-    }
+    const ShotSettings settings = shotFrom(options, placed);
     requireDerivative(settings, placed);
     const Camera view = cameraFrom(camera);
     validate(view);
@@ -209,9 +164,13 @@ StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer,
         "the backward pass of a picture of " + sizeText(view),
         renderMemory(placed.list, view, settings.options).pair_bytes);
     *job = startJob(
-        renderer->context, [memory = renderer->memory, placed = std::move(placed), settings, view,
-                            given, buffers = std::move(buffers), result](Progress& progress) {
-          runBackward(*memory, placed, view, settings.options, given, buffers, result, progress);
+        renderer->context,
+        [shared = renderer->renderer, placed = std::move(placed), options = settings.options, view,
+         given, buffers = std::move(buffers), result](Progress& progress) {
+          shared->backward(
+              placed, view, options, given,
+              [&](const BackwardResult& made) { deliverGradients(made, buffers, result); },
+              progress);
           return JobResult{};
         });
   });
@@ -259,12 +218,7 @@ StippleStatus stipple_image_loss(StippleContext* context, uint32_t width, uint32
     const PixelLayout layout = layoutOf(given.rendered_channels, "options->rendered_channels");
     const PictureView target_view = {target,
                                      layoutOf(given.target_channels, "options->target_channels")};
-    constexpr uint32_t kMaxSide = 65536;
-    if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) {
-      fail(ErrorCode::kInvalidArgument, "the picture is " + std::to_string(width) + " x " +
-                                            std::to_string(height) +
-                                            " pixels; each side must be 1 to 65536");
-    }
+    requireSides(width, height);
     ImageLossValue made;
     withThreads(context->state->thread_count, [&] {
       made = ImageLoss().evaluate(width, height, {rendered, layout}, target_view, weights,

@@ -4,7 +4,6 @@
 #include <iterator>
 #include <utility>
 
-#include "data/position_bounds.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
@@ -12,6 +11,7 @@
 #include "data/clouds/cloud_columns.h"
 #include "data/clouds/cloud_comparison.h"
 #include "data/clouds/cloud_transform.h"
+#include "data/position_bounds.h"
 #include "io/splats/splat_file.h"
 
 using namespace stipple;
@@ -21,32 +21,20 @@ static_assert(std::size(StippleCloudColumns{}.rest) == kMaxShColumns);
 
 namespace {
 
-void normaliseRotations(SplatCloud& cloud) {
-  parallelFor(cloud.size(), 16384, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      float* q = &cloud.rotations[i * 4];
-      double squares = 0;
-      for (int k = 0; k < 4; ++k) squares += static_cast<double>(q[k]) * static_cast<double>(q[k]);
-      const double length = std::sqrt(squares);
-      for (int k = 0; k < 4; ++k) q[k] = static_cast<float>(static_cast<double>(q[k]) / length);
-    }
-  });
-}
-
-/// A cloud as a handle holds it: its values are in range, its quaternions of length one.
-std::shared_ptr<const SplatCloud> checked(SplatCloud cloud) {
+/// A handle of values that are in range, with quaternions of length one.
+StippleCloud* handleOf(const Context& context, SplatCloud cloud) {
   validate(cloud, "splats");
   normaliseRotations(cloud);
-  return std::make_shared<const SplatCloud>(std::move(cloud));
+  return new StippleCloud{context, std::make_shared<const SplatCloud>(std::move(cloud))};
 }
 
-/// What arrays and columns have in common. In: the name of the argument in the header.
+/// What StippleCloudArrays and StippleCloudColumns have in common.
 template <class Given>
-void describe(const Given& given, const std::string& name, SplatCloud& cloud) {
-  cloud.colour_space =
-      enumValue<ColourSpace>(given.colour_space, 1, (name + "->colour_space").c_str());
-  cloud.antialias = enumValue<Antialias>(given.antialias, 1, (name + "->antialias").c_str());
-  cloud.frame = enumValue<Frame>(given.frame, kLastFrame, (name + "->frame").c_str());
+void describe(const Given& given, const char* name, SplatCloud& cloud) {
+  const auto field = [&](const char* member) { return std::string(name) + "->" + member; };
+  cloud.colour_space = enumValue<ColourSpace>(given.colour_space, 1, field("colour_space").c_str());
+  cloud.antialias = enumValue<Antialias>(given.antialias, 1, field("antialias").c_str());
+  cloud.frame = enumValue<Frame>(given.frame, kLastFrame, field("frame").c_str());
 }
 
 int degreeOf(uint32_t given, const char* name) {
@@ -126,12 +114,18 @@ const SplatFormat& formatAt(uint64_t index) {
   return splatFormats()[static_cast<size_t>(index)];
 }
 
-std::shared_ptr<const SplatCloud> loaded(const ContextState& context, const std::string& path,
-                                         Progress* progress) {
-  auto cloud = std::make_shared<const SplatCloud>(readSplatFile(path, progress));
-  const uint64_t floats = cloud->size() * (11 + cloud->shStride());
-  context.requireMemory(floats * sizeof(float), ("the splats of '" + path + "'").c_str());
-  return cloud;
+/// Refuses what a file held where the memory limit leaves no room for it.
+void requireRoom(const SplatCloud& cloud, const std::string& path, const MemoryLimit& limit) {
+  const uint64_t floats = cloud.size() * (11 + cloud.shStride());
+  limit.requireMemory(floats * sizeof(float), ("the splats of '" + path + "'").c_str());
+}
+
+std::vector<const SplatCloud*> cloudsOf(const StippleCloud* const* levels, uint64_t level_count) {
+  std::vector<const SplatCloud*> clouds;
+  for (uint64_t i = 0; i < level_count; ++i) {
+    clouds.push_back(require(levels[i], ("levels[" + std::to_string(i) + "]").c_str()).cloud.get());
+  }
+  return clouds;
 }
 
 }  // namespace
@@ -145,9 +139,8 @@ StippleStatus stipple_cloud_create(StippleContext* context, const StippleCloudAr
     require(cloud, "cloud");
     const StippleCloudArrays given =
         completeUpTo(arrays, offsetof(StippleCloudArrays, frame), "arrays");
-    withThreads(context->state->thread_count, [&] {
-      *cloud = new StippleCloud{context->state, checked(fromArrays(given))};
-    });
+    withThreads(context->state->thread_count,
+                [&] { *cloud = handleOf(context->state, fromArrays(given)); });
   });
 }
 
@@ -158,9 +151,8 @@ StippleStatus stipple_cloud_create_from_columns(StippleContext* context,
     require(context, "context");
     require(cloud, "cloud");
     const StippleCloudColumns given = complete(columns, "columns");
-    withThreads(context->state->thread_count, [&] {
-      *cloud = new StippleCloud{context->state, checked(fromColumns(given))};
-    });
+    withThreads(context->state->thread_count,
+                [&] { *cloud = handleOf(context->state, fromColumns(given)); });
   });
 }
 
@@ -214,7 +206,9 @@ StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8,
     require(cloud, "cloud");
     const std::string path = &require(path_utf8, "path_utf8");
     withThreads(context->state->thread_count, [&] {
-      *cloud = new StippleCloud{context->state, loaded(*context->state, path, nullptr)};
+      auto splats = std::make_shared<const SplatCloud>(readSplatFile(path));
+      requireRoom(*splats, path, *context->state);
+      *cloud = new StippleCloud{context->state, std::move(splats)};
     });
   });
 }
@@ -225,7 +219,9 @@ StippleStatus stipple_cloud_load_start(StippleContext* context, const char* path
     const Context state = require(context, "context").state;
     const std::string path = &require(path_utf8, "path_utf8");
     require(job, "job") = startJob(state, [state, path](Progress& progress) -> JobResult {
-      return loaded(*state, path, &progress);
+      auto splats = std::make_shared<const SplatCloud>(readSplatFile(path, &progress));
+      requireRoom(*splats, path, *state);
+      return splats;
     });
   });
 }
@@ -256,11 +252,7 @@ StippleStatus stipple_cloud_save_levels(const StippleCloud* const* levels, uint6
       fail(ErrorCode::kInvalidArgument, "level_count is 0; at least 1 is needed");
     }
     require(levels, "levels");
-    std::vector<const SplatCloud*> clouds;
-    for (uint64_t i = 0; i < level_count; ++i) {
-      clouds.push_back(
-          require(levels[i], ("levels[" + std::to_string(i) + "]").c_str()).cloud.get());
-    }
+    const std::vector<const SplatCloud*> clouds = cloudsOf(levels, level_count);
     const SplatWriteOptions write = writeOptions(options);
     withThreads(levels[0]->context->thread_count, [&] {
       writeSplatLevels(clouds, environment != nullptr ? environment->cloud.get() : nullptr, path,

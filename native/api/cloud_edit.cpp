@@ -1,8 +1,6 @@
 #include <utility>
 
-#include "api/guard.h"
-#include "api/handles.h"
-#include "api/instances.h"
+#include "api/conversions.h"
 #include "api/job.h"
 #include "base/parallel.h"
 #include "data/clouds/cloud_selection.h"
@@ -41,13 +39,9 @@ void requireMask(const uint8_t* mask, uint64_t mask_count, const SplatCloud& clo
 /// A selection of what is inside becomes the mask of what to keep.
 void deliverMask(std::vector<uint8_t> inside, StippleSide side, uint8_t* mask,
                  uint64_t* kept_count) {
-  uint64_t count = 0;
-  for (uint8_t& value : inside) {
-    value ^= side == STIPPLE_SIDE_OUTSIDE ? 1 : 0;
-    count += value;
-  }
+  if (side == STIPPLE_SIDE_OUTSIDE) invertMask(inside);
   if (!inside.empty()) std::memcpy(mask, inside.data(), inside.size());
-  if (kept_count) *kept_count = count;
+  if (kept_count) *kept_count = selectedCount(inside);
 }
 
 FloaterOptions floaterOptions(const StippleFloaterOptions* options) {

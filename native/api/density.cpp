@@ -14,18 +14,6 @@ void copyTo(const Values& values, T* out) {
   if (out && !values.empty()) std::memcpy(out, values.data(), values.size() * sizeof(T));
 }
 
-void copyPositions(const AnchorSet& anchors, const RootCube& root, float* out) {
-  if (!out) return;
-  parallelFor(anchors.size(), 1 << 14, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const double unit = anchors.positions[i * 3 + axis];
-        out[i * 3 + axis] = static_cast<float>(root.origin[axis] + root.side * unit);
-      }
-    }
-  });
-}
-
 }  // namespace
 
 extern "C" {
@@ -95,7 +83,7 @@ StippleStatus stipple_density_sample(const StippleDensity* density,
                                     "sampling these anchors");
     withThreads(density->context->thread_count, [&] {
       const AnchorSet anchors = sampleAnchors(*density->density, sampling);
-      copyPositions(anchors, density->density->root(), out.positions);
+      if (out.positions) anchorPositions(anchors, density->density->root(), out.positions);
       copyTo(anchors.log_q, out.log_q);
       copyTo(anchors.leaves, out.leaves);
       copyTo(anchors.ranks, out.ranks);

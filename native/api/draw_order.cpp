@@ -3,9 +3,7 @@
 #include <utility>
 
 #include "api/camera.h"
-#include "api/guard.h"
-#include "api/handles.h"
-#include "api/instances.h"
+#include "api/conversions.h"
 #include "api/job.h"
 
 using namespace stipple;
@@ -16,12 +14,6 @@ static_assert(STIPPLE_DRAW_ROW_FLOATS == kDrawRowFloats);
 static_assert(STIPPLE_MAX_DRAW_ROWS == kMaxDrawRows);
 
 namespace {
-
-uint64_t splatCount(const Instances& placed) {
-  uint64_t count = 0;
-  for (const SplatInstance& instance : placed.list) count += instance.cloud->size();
-  return count;
-}
 
 [[noreturn]] void failCapacity(const char* name, uint64_t capacity, uint64_t count) {
   fail(ErrorCode::kBufferTooSmall, std::string(name) + " is " + std::to_string(capacity) + "; " +
@@ -69,13 +61,10 @@ StippleStatus stipple_renderer_order_start(StippleRenderer* renderer,
     validateDrawOrder(placed.list, view, output);
     renderer->context->requireMemory(drawOrderMemoryBound(splats), "ordering these splats");
     *job = startJob(
-        renderer->context, [memory = renderer->memory, placed = std::move(placed), view, output,
+        renderer->context, [shared = renderer->renderer, placed = std::move(placed), view, output,
                             first_rows = std::move(first_rows)](Progress& progress) mutable {
           output.first_rows = first_rows;
-          const std::unique_lock<std::mutex> lock(memory->order_mutex, std::try_to_lock);
-          std::unique_ptr<ImageRenderer> own;
-          if (!lock.owns_lock()) own = memory->backends->makeImageRenderer();
-          (own ? *own : *memory->orders).order(placed.list, view, output, &progress);
+          shared->order(placed, view, output, progress);
           return JobResult{};
         });
   });

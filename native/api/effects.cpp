@@ -5,11 +5,9 @@
 #include <string>
 
 #include "api/camera.h"
-#include "api/guard.h"
-#include "api/handles.h"
-#include "api/instances.h"
+#include "api/conversions.h"
 #include "base/parallel.h"
-#include "splat/render/effects_plan.h"
+#include "shot/effects_plan.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -83,6 +81,52 @@ StippleEffectFacts defaultFacts() {
   return facts;
 }
 
+StippleEffectsSurvey surveyTo(const EffectsSurvey& seen) {
+  StippleEffectsSurvey made = {};
+  made.sh_degree = static_cast<uint32_t>(seen.sh_degree);
+  made.splat_count = seen.splat_count;
+  made.looked_count = seen.looked_count;
+  made.seen_count = seen.seen_count;
+  made.object_count = seen.object_count;
+  made.mixed_count = seen.mixed_count;
+  std::copy(seen.view_change.begin(), seen.view_change.end(), made.view_change);
+  made.affine_error_px = seen.affine_error_px;
+  made.error_ahead_px = seen.error_ahead_px;
+  made.field_of_view = seen.field_of_view;
+  made.widening = seen.widening;
+  return made;
+}
+
+StippleEffectRow rowTo(const EffectRow& row, int sh_degree) {
+  StippleEffectRow made = {};
+  made.effect = static_cast<uint32_t>(row.effect);
+  made.is_on = row.is_on ? 1 : 0;
+  made.sh_degree = row.effect == Effect::kViewColour ? static_cast<uint32_t>(sh_degree) : 0;
+  made.seconds = row.seconds;
+  std::strncpy(made.reason, row.reason.c_str(), sizeof(made.reason) - 1);
+  return made;
+}
+
+/// Older and newer callers have shorter and longer rows, which lie that far apart; the first says
+/// so.
+void deliverRows(const EffectsPlan& plan, StippleEffectRow* rows, uint64_t capacity) {
+  const size_t step = require(rows, "rows").struct_size;
+  if (step % alignof(StippleEffectRow) != 0) {
+    failStructSize("rows", step, sizeof(StippleEffectRow));
+  }
+  if (capacity < plan.rows.size()) {
+    fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + "; " +
+                                         std::to_string(plan.rows.size()) + " rows need room");
+  }
+  auto* bytes = reinterpret_cast<std::byte*>(rows);
+  for (const EffectRow& row : plan.rows) {
+    auto* out = reinterpret_cast<StippleEffectRow*>(bytes);
+    out->struct_size = static_cast<uint32_t>(step);
+    deliver(out, rowTo(row, plan.sh_degree), "rows");
+    bytes += step;
+  }
+}
+
 }  // namespace
 
 extern "C" {
@@ -97,19 +141,7 @@ StippleStatus stipple_effects_survey(StippleContext* context, const StippleInsta
     const Camera view = cameraFrom(camera);
     EffectsSurvey seen;
     withThreads(owner.state->thread_count, [&] { seen = surveyEffects(placed.list, view); });
-    StippleEffectsSurvey made = {};
-    made.sh_degree = static_cast<uint32_t>(seen.sh_degree);
-    made.splat_count = seen.splat_count;
-    made.looked_count = seen.looked_count;
-    made.seen_count = seen.seen_count;
-    made.object_count = seen.object_count;
-    made.mixed_count = seen.mixed_count;
-    std::copy(seen.view_change.begin(), seen.view_change.end(), made.view_change);
-    made.affine_error_px = seen.affine_error_px;
-    made.error_ahead_px = seen.error_ahead_px;
-    made.field_of_view = seen.field_of_view;
-    made.widening = seen.widening;
-    deliver(survey, made, "survey");
+    deliver(survey, surveyTo(seen), "survey");
   });
 }
 
@@ -128,29 +160,7 @@ StippleStatus stipple_effects_plan(const StippleEffectFacts* facts, StippleEffec
       survey = surveyFrom(seen);
       wanted.survey = &survey;
     }
-    const EffectsPlan plan = planEffects(wanted);
-    // Older and newer callers have shorter and longer rows, which lie that far apart.
-    const size_t step = require(rows, "rows").struct_size;
-    if (step % alignof(StippleEffectRow) != 0)
-      failStructSize("rows", step, sizeof(StippleEffectRow));
-    if (capacity < plan.rows.size()) {
-      fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + "; " +
-                                           std::to_string(plan.rows.size()) + " rows need room");
-    }
-    for (size_t i = 0; i < plan.rows.size(); ++i) {
-      const EffectRow& row = plan.rows[i];
-      StippleEffectRow made = {};
-      made.effect = static_cast<uint32_t>(row.effect);
-      made.is_on = row.is_on ? 1 : 0;
-      made.sh_degree =
-          row.effect == Effect::kViewColour ? static_cast<uint32_t>(plan.sh_degree) : 0;
-      made.seconds = row.seconds;
-      std::strncpy(made.reason, row.reason.c_str(), sizeof(made.reason) - 1);
-      auto* row_out =
-          reinterpret_cast<StippleEffectRow*>(reinterpret_cast<std::byte*>(rows) + i * step);
-      row_out->struct_size = static_cast<uint32_t>(step);
-      deliver(row_out, made, "rows");
-    }
+    deliverRows(planEffects(wanted), rows, capacity);
   });
 }
 

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 
-#include "api/guard.h"
-#include "api/handles.h"
-#include "api/instances.h"
+#include "api/conversions.h"
 
 using namespace stipple;
 using namespace stipple::api;

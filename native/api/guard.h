@@ -3,6 +3,8 @@
 #include <stipple/stipple.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -85,6 +87,35 @@ void deliver(T* out, T value, const char* name) {
   value.struct_size = size;
   std::memcpy(out, &value, std::min<size_t>(size, sizeof(T)));
 }
+
+/// Structs [count] of the caller, as far apart as the first one's struct_size says: older and newer
+/// callers have shorter and longer ones.
+template <typename T>
+class StructArray {
+ public:
+  StructArray(const T* first, uint64_t count, const char* name) : first_(first), name_(name) {
+    if (count == 0) return;
+    step_ = require(first, name).struct_size;
+    if (step_ % alignof(T) != 0) failStructSize(nameOf(0).c_str(), step_, sizeof(T));
+  }
+
+  std::string nameOf(uint64_t i) const { return name_ + "[" + std::to_string(i) + "]"; }
+
+  /// Errors: kInvalidArgument where it has another size than the first.
+  const T* at(uint64_t i) const {
+    const auto* bytes = reinterpret_cast<const std::byte*>(first_) + i * step_;
+    const auto* entry = reinterpret_cast<const T*>(bytes);
+    if (entry->struct_size != step_) {
+      failStructSize(nameOf(i).c_str(), entry->struct_size, sizeof(T));
+    }
+    return entry;
+  }
+
+ private:
+  const T* first_;
+  std::string name_;
+  size_t step_ = 0;
+};
 
 /// Refuses enum values outside 0..last.
 template <typename Enum>

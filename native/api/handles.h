@@ -11,8 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "api/cloud_cuts.h"
-#include "data/accuracy_report.h"
+#include "base/memory_limit.h"
 #include "data/clouds/seen_cloud.h"
 #include "data/clouds/splat_cloud.h"
 #include "data/clouds/splat_quantities.h"
@@ -23,26 +22,19 @@
 #include "data/views/memory_view_source.h"
 #include "density/density_model.h"
 #include "io/views/camera_file.h"
+#include "measure/picture_accuracy.h"
 #include "model/splat_model.h"
-#include "splat/render/image_renderer.h"
-#include "splat/render/render_backward.h"
+#include "shot/mesh_layers.h"
+#include "shot/renderer.h"
 #include "train/loop/backend_factory.h"
 
 namespace stipple::api {
 
 /// What a context carries; every handle made from it keeps a share.
-struct ContextState {
+struct ContextState : MemoryLimit {
   uint32_t thread_count = 0;
-  uint64_t memory_limit_bytes = UINT64_MAX;
   /// What draws and differentiates, for fits and images alike.
   std::shared_ptr<const BackendFactory> backends = cpuBackends();
-
-  /// Refuses work that needs more than the limit. In: what, as a noun for the message.
-  void requireMemory(uint64_t bytes, const char* what) const;
-
-  /// Refuses a picture, or its derivative, that needs more than the limit or than this machine has.
-  /// In: what, as a noun with its numbers; pair_bytes: of those, for pairs of splat and tile.
-  void requirePictureMemory(uint64_t bytes, const std::string& what, uint64_t pair_bytes) const;
 };
 using Context = std::shared_ptr<const ContextState>;
 
@@ -55,33 +47,6 @@ struct ViewNote {
   uint32_t source_width = 0;
   uint32_t source_height = 0;
   bool is_distorted = false;
-};
-
-/// A view, measured.
-struct AccuracyResult {
-  AccuracyReport report;
-  std::vector<StippleAccuracy> accuracies;  ///< of its rows
-};
-
-/// What a renderer keeps from one picture to the next; its jobs hold a share.
-struct RendererMemory {
-  explicit RendererMemory(std::shared_ptr<const BackendFactory> factory)
-      : backends(std::move(factory)),
-        images(backends->makeImageRenderer()),
-        orders(backends->makeImageRenderer()) {}
-
-  std::shared_ptr<const BackendFactory> backends;
-
-  std::mutex mutex;  ///< held while a job uses the rest
-  std::unique_ptr<ImageRenderer> images;
-  RenderResult result;
-  BackwardWorkspace backward_workspace;
-  BackwardResult backward_result;
-
-  CloudCuts cuts;  ///< has a lock of its own
-
-  std::mutex order_mutex;  ///< of orders: an order and a picture may be made at once
-  std::unique_ptr<ImageRenderer> orders;
 };
 
 }  // namespace stipple::api
@@ -128,7 +93,7 @@ struct StippleViews {
 
 struct StippleRenderer {
   stipple::api::Context context;
-  std::shared_ptr<stipple::api::RendererMemory> memory;
+  std::shared_ptr<stipple::Renderer> renderer;  ///< jobs hold a share
 };
 
 struct StippleVolume {
@@ -146,6 +111,11 @@ struct StippleImageChannels {
   std::shared_ptr<const std::vector<stipple::ImageChannel>> channels;
 };
 
+struct StippleLayers {
+  stipple::api::Context context;
+  stipple::MeshLayers layers;
+};
+
 struct StippleAccuracyReport {
-  std::shared_ptr<const stipple::api::AccuracyResult> result;
+  std::shared_ptr<const stipple::MeasuredAccuracy> result;
 };

@@ -1,9 +1,12 @@
 #include "data/position_bounds.h"
 #include "api/guard.h"
 #include "api/handles.h"
+#include "api/job.h"
 #include "io/mesh_file.h"
+#include "io/mesh_writer.h"
 #include "math/affine.h"
 #include "mesh/mesh_part.h"
+#include "mesh/surface_pieces.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -131,6 +134,49 @@ StippleStatus stipple_mesh_info(const StippleMesh* mesh, StippleMeshInfo* info) 
     fillBounds(triangles.positions, out.bounds_min, out.bounds_max);
     deliver(info, out, "info");
   });
+}
+
+StippleStatus stipple_job_mesh(const StippleJob* job, StippleMesh** mesh) {
+  return guarded([&] {
+    const auto& made = jobResult<std::shared_ptr<const TriMesh>>(require(job, "job"), "mesh");
+    // Meshes can be added to, so each handle has one of its own.
+    require(mesh, "mesh") = new StippleMesh{job->context, std::make_shared<TriMesh>(*made)};
+  });
+}
+
+StippleStatus stipple_mesh_read(const StippleMesh* mesh, const StippleMeshBuffers* buffers) {
+  return guarded([&] {
+    const TriMesh& from = *require(mesh, "mesh").mesh;
+    const StippleMeshBuffers to = complete(buffers, "buffers");
+    const auto need = [](uint64_t count, uint64_t capacity, const char* what) {
+      if (capacity >= count) return;
+      fail(ErrorCode::kBufferTooSmall, std::string("buffers->") + what + "_capacity is " +
+                                           std::to_string(capacity) + "; " + std::to_string(count) +
+                                           " are needed");
+    };
+    if (to.positions) need(from.vertexCount(), to.vertex_capacity, "vertex");
+    if (to.triangles) need(from.triangleCount(), to.triangle_capacity, "triangle");
+    if (to.positions) std::copy(from.positions.begin(), from.positions.end(), to.positions);
+    if (to.triangles) std::copy(from.triangles.begin(), from.triangles.end(), to.triangles);
+  });
+}
+
+StippleStatus stipple_mesh_topology(const StippleMesh* mesh, StippleMeshTopology* topology) {
+  return guarded([&] {
+    const MeshTopology made = topologyOf(*require(mesh, "mesh").mesh);
+    StippleMeshTopology out = {};
+    out.edge_count = made.edge_count;
+    out.open_edge_count = made.open_edge_count;
+    out.piece_count = made.piece_count;
+    out.euler = made.euler;
+    out.volume = made.volume;
+    deliver(topology, out, "topology");
+  });
+}
+
+StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8) {
+  return guarded(
+      [&] { writeMeshFile(*require(mesh, "mesh").mesh, &require(path_utf8, "path_utf8")); });
 }
 
 }  // extern "C"

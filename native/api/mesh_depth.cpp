@@ -9,6 +9,7 @@
 #include "api/job.h"
 #include "math/affine.h"
 #include "mesh/mesh_depth.h"
+#include "shot/mattes.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -59,6 +60,30 @@ StippleStatus stipple_mesh_depth_start(StippleContext* context,
     *job = startJob(context->state, [placed = std::move(placed), view, depth](Progress& progress) {
       const size_t pixel_count = static_cast<size_t>(view.width) * view.height;
       drawMeshDepth(placed.list, view, {depth, pixel_count}, &progress);
+      return JobResult{};
+    });
+  });
+}
+
+StippleStatus stipple_mesh_matte_start(StippleContext* context,
+                                       const StippleMeshInstance* instances, uint64_t count,
+                                       const StippleCamera* camera, uint32_t samples_per_side,
+                                       float* depth, float* opacity, StippleJob** job) {
+  return guarded([&] {
+    require(context, "context");
+    require(depth, "depth");
+    require(opacity, "opacity");
+    require(job, "job");
+    PlacedMeshes placed = meshesFrom(instances, count);
+    const Camera view = cameraFrom(camera);
+    validateMatte(view, samples_per_side);
+    context->state->requireMemory(matteMemoryBound(placed.list, view, samples_per_side),
+                                  "a matte of meshes");
+    *job = startJob(context->state, [placed = std::move(placed), view, samples_per_side, depth,
+                                     opacity](Progress& progress) {
+      const size_t pixel_count = static_cast<size_t>(view.width) * view.height;
+      drawMatte(placed.list, view, samples_per_side, {depth, pixel_count}, {opacity, pixel_count},
+                &progress);
       return JobResult{};
     });
   });

@@ -4,10 +4,9 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "base/parallel.h"
-#include "data/views/view_check.h"
+#include "data/views/rgba_picture.h"
 #include "data/views/view_colour.h"
 #include "io/views/dataset.h"
-#include "math/empty_depth.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -48,21 +47,10 @@ ViewPicture pictureFrom(const StippleViewPicture& given, const Camera& camera) {
   picture.width = camera.width;
   picture.height = camera.height;
   const size_t pixels = size_t{camera.width} * camera.height;
-  const float* rgba = &require(given.rgba, "picture->rgba");
-  picture.colour.resize(pixels * 3);
-  picture.alpha.resize(pixels);
-  bool opaque = true;
-  for (size_t i = 0; i < pixels; ++i) {
-    std::copy(rgba + i * 4, rgba + i * 4 + 3, &picture.colour[i * 3]);
-    picture.alpha[i] = rgba[i * 4 + 3];
-    opaque = opaque && picture.alpha[i] == 1.0f;
-  }
-  if (opaque) picture.alpha.clear();
+  takeRgba(&require(given.rgba, "picture->rgba"), picture);
   picture.weights = copied(given.weights, pixels);
   picture.depth = copied(given.depth, pixels);
-  for (float& depth : picture.depth) {
-    if (depth >= kEmptyDepth) depth = 0.0f;
-  }
+  forgetEmptyDepth(picture);
   picture.normals = copied(given.normals, pixels * 3);
   return picture;
 }
@@ -71,6 +59,25 @@ void requireCapacity(uint64_t needed, uint64_t capacity, const char* what) {
   if (capacity >= needed) return;
   fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " " + what + "; " +
                                        std::to_string(needed) + " are needed");
+}
+
+/// What is known of the views of a data set; each must be readable within the memory limit.
+void noteDataset(const Dataset& dataset, StippleViews& views) {
+  for (size_t i = 0; i < dataset.count(); ++i) {
+    const DatasetView& source = dataset.source(i);
+    const Camera& seen_by = source.view.camera;
+    views.context->requireMemory(uint64_t{seen_by.width} * seen_by.height * kBytesPerPixelRead,
+                                 ("reading " + source.image_path).c_str());
+    ViewNote note;
+    note.name = dataset.name(i);
+    note.image_path = source.image_path;
+    note.camera_model = source.view.camera_model.c_str();
+    note.split = static_cast<StippleViewSplit>(dataset.role(i));
+    note.source_width = seen_by.width;
+    note.source_height = seen_by.height;
+    note.is_distorted = source.view.lens.isDistorted();
+    views.notes.push_back(std::move(note));
+  }
 }
 
 /// Values to a buffer of the caller, or `otherwise` where nothing is known.
@@ -106,21 +113,7 @@ StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
     withThreads(state.thread_count, [&] { dataset = openDataset(path, asked); });
     auto made = std::make_unique<StippleViews>();
     made->context = context->state;
-    for (size_t i = 0; i < dataset->count(); ++i) {
-      const DatasetView& source = dataset->source(i);
-      const Camera& seen_by = source.view.camera;
-      state.requireMemory(uint64_t{seen_by.width} * seen_by.height * kBytesPerPixelRead,
-                          ("reading " + source.image_path).c_str());
-      ViewNote note;
-      note.name = dataset->name(i);
-      note.image_path = source.image_path;
-      note.camera_model = source.view.camera_model.c_str();
-      note.split = static_cast<StippleViewSplit>(dataset->role(i));
-      note.source_width = seen_by.width;
-      note.source_height = seen_by.height;
-      note.is_distorted = source.view.lens.isDistorted();
-      made->notes.push_back(std::move(note));
-    }
+    noteDataset(*dataset, *made);
     made->source = std::move(dataset);
     *views = made.release();
   });
@@ -242,12 +235,7 @@ StippleStatus stipple_views_read(const StippleViews* views, uint64_t index,
     requireCapacity(pixels, out.capacity, "pixels");
     ViewPicture picture;
     withThreads(views->context->thread_count, [&] { picture = views->source->load(index); });
-    if (out.rgba) {
-      for (size_t i = 0; i < pixels; ++i) {
-        std::copy_n(&picture.colour[i * 3], 3, out.rgba + i * 4);
-        out.rgba[i * 4 + 3] = picture.alpha.empty() ? 1.0f : picture.alpha[i];
-      }
-    }
+    if (out.rgba) giveRgba(picture, out.rgba);
     give(picture.weights, pixels, 1.0f, out.weights);
     give(picture.depth, pixels, 0.0f, out.depth);
     give(picture.normals, pixels * 3, 0.0f, out.normals);

@@ -26,10 +26,6 @@ Camera cameraFrom(const StippleCamera* camera) {
   return made;
 }
 
-std::string sizeText(const Camera& camera) {
-  return std::to_string(camera.width) + " x " + std::to_string(camera.height) + " pixels";
-}
-
 StippleCamera cameraTo(const Camera& camera) {
   StippleCamera out = {};
   out.model = static_cast<uint32_t>(camera.model);
@@ -46,22 +42,6 @@ StippleCamera cameraTo(const Camera& camera) {
   return out;
 }
 
-const char* modelName(const Camera& camera) {
-  switch (camera.model) {
-    case CameraModel::kPerspective:
-      return "PINHOLE";
-    case CameraModel::kOrthographic:
-      return "ORTHOGRAPHIC";
-    case CameraModel::kEquirectangular:
-      return "EQUIRECTANGULAR";
-    case CameraModel::kFisheyeEquidistant:
-      return "FISHEYE_EQUIDISTANT";
-    case CameraModel::kFisheyeEquisolid:
-      return "FISHEYE_EQUISOLID";
-  }
-  return "PINHOLE";
-}
-
 void requireView(const StippleViews& views, uint64_t index) {
   if (index < views.notes.size()) return;
   fail(ErrorCode::kInvalidArgument, "view " + std::to_string(index) + " was asked for; there are " +
@@ -74,6 +54,21 @@ void requireView(const StippleViews& views, uint64_t index) {
 using namespace stipple;
 using namespace stipple::api;
 
+namespace {
+
+void noteCameras(StippleViews& views) {
+  for (const CameraView& view : views.cameras) {
+    ViewNote note;
+    note.name = view.image_path;
+    note.camera_model = modelName(view.camera);
+    note.source_width = view.camera.width;
+    note.source_height = view.camera.height;
+    views.notes.push_back(std::move(note));
+  }
+}
+
+}  // namespace
+
 extern "C" {
 
 StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8,
@@ -85,14 +80,7 @@ StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8,
     auto made = std::make_unique<StippleViews>();
     made->context = context->state;
     made->cameras = readCameraFile(path);
-    for (const CameraView& view : made->cameras) {
-      ViewNote note;
-      note.name = view.image_path;
-      note.camera_model = modelName(view.camera);
-      note.source_width = view.camera.width;
-      note.source_height = view.camera.height;
-      made->notes.push_back(std::move(note));
-    }
+    noteCameras(*made);
     *views = made.release();
   });
 }

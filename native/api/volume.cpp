@@ -1,12 +1,12 @@
-#include "api/volume.h"
-
+#include <algorithm>
 #include <utility>
 
-#include "api/guard.h"
-#include "api/handles.h"
-#include "api/instances.h"
+#include "api/conversions.h"
 #include "api/job.h"
 #include "io/volume_file.h"
+#include "io/volume_surface.h"
+#include "mesh/edge_pairs.h"
+#include "mesh/surface_pieces.h"
 #include "splat/voxels/voxelize.h"
 
 using namespace stipple;
@@ -28,6 +28,26 @@ VoxelizeOptions voxelizeOptionsFrom(const StippleVoxelizeOptions* options) {
 }
 
 }  // namespace stipple::api
+
+namespace {
+
+StippleVolumeToMeshOptions completeOptions(const StippleVolumeToMeshOptions* options) {
+  StippleVolumeToMeshOptions defaults;
+  stipple_volume_to_mesh_options_init(&defaults);
+  return completed(options, defaults, "options");
+}
+
+/// Per metre: the density of a voxel of this opacity.
+double thresholdOf(const StippleVolumeToMeshOptions& options, const SparseVolume& volume) {
+  if (options.density != 0.0) return options.density;
+  if (!(options.opacity > 0.0 && options.opacity < 1.0)) {
+    fail(ErrorCode::kInvalidArgument,
+         "opacity is " + std::to_string(options.opacity) + "; a number between 0 and 1 is allowed");
+  }
+  return densityOfOpacity(options.opacity, volume.voxel_size);
+}
+
+}  // namespace
 
 extern "C" {
 
@@ -81,19 +101,11 @@ StippleStatus stipple_volume_info(const StippleVolume* volume, StippleVolumeInfo
     StippleVolumeInfo out = {};
     out.brick_count = voxels.brickCount();
     out.voxel_size = voxels.voxel_size;
-    for (const float density : voxels.density) {
-      if (density > 0) ++out.active_voxel_count;
-      out.max_density = std::max(out.max_density, static_cast<double>(density));
-    }
-    for (size_t b = 0; b < voxels.bricks.size(); ++b) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        // Half a voxel beyond the centres of the first and last voxel of the brick.
-        const double low = voxels.origin[axis] + voxels.voxel_size * (voxels.bricks[b][axis] - 0.5);
-        const double high = low + voxels.voxel_size * kBrickSide;
-        out.bounds_min[axis] = b == 0 ? low : std::min(out.bounds_min[axis], low);
-        out.bounds_max[axis] = b == 0 ? high : std::max(out.bounds_max[axis], high);
-      }
-    }
+    const VolumeExtent extent = extentOf(voxels);
+    out.active_voxel_count = extent.active_voxel_count;
+    out.max_density = extent.max_density;
+    std::copy(extent.lowest.begin(), extent.lowest.end(), out.bounds_min);
+    std::copy(extent.highest.begin(), extent.highest.end(), out.bounds_max);
     deliver(info, out, "info");
   });
 }
@@ -112,6 +124,51 @@ StippleStatus stipple_volume_load(StippleContext* context, const char* path_utf8
     const std::string path = &require(path_utf8, "path_utf8");
     *volume = new StippleVolume{context->state,
                                 std::make_shared<const SparseVolume>(readVolumeFile(path))};
+  });
+}
+
+void stipple_volume_to_mesh_options_init(StippleVolumeToMeshOptions* options) {
+  if (!options) return;
+  *options = {};
+  options->struct_size = sizeof(StippleVolumeToMeshOptions);
+  options->largest_only = 0;
+  options->opacity = 0.5;
+  options->density = 0.0;
+  options->adaptivity = 0.0;
+}
+
+StippleStatus stipple_volume_to_mesh_start(const StippleVolume* volume,
+                                           const StippleVolumeToMeshOptions* options,
+                                           StippleJob** job) {
+  return guarded([&] {
+    require(volume, "volume");
+    require(job, "job");
+    const auto voxels = volume->volume;
+    const StippleVolumeToMeshOptions given = completeOptions(options);
+    const double threshold = voxels->brickCount() == 0 ? 1.0 : thresholdOf(given, *voxels);
+    volume->context->requireMemory(surfaceMemoryBound(*voxels, threshold), "the mesh of a volume");
+    *job = startJob(volume->context, [voxels, given, threshold](Progress& progress) -> JobResult {
+      advance(&progress, 0.0, "Finding the surface");
+      PolygonSurface surface = surfaceOfVolume(*voxels, threshold, given.adaptivity);
+      advance(&progress, 0.8, "Making triangles");
+      auto mesh = std::make_shared<TriMesh>(triangulated(surface));
+      surface = {};
+      progress.throwIfCancelled();
+      pairEdges(*mesh);
+      if (given.largest_only != 0) keepLargestPiece(*mesh, &progress);
+      return std::shared_ptr<const TriMesh>(std::move(mesh));
+    });
+  });
+}
+
+StippleStatus stipple_volume_to_mesh_memory_bound(const StippleVolume* volume,
+                                                  const StippleVolumeToMeshOptions* options,
+                                                  uint64_t* bytes) {
+  return guarded([&] {
+    const SparseVolume& voxels = *require(volume, "volume").volume;
+    const StippleVolumeToMeshOptions given = completeOptions(options);
+    const double threshold = voxels.brickCount() == 0 ? 1.0 : thresholdOf(given, voxels);
+    require(bytes, "bytes") = surfaceMemoryBound(voxels, threshold);
   });
 }
 

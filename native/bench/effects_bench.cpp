@@ -5,7 +5,7 @@
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
 #include "splat/render/ray_render.h"
-#include "splat/render/sampled_render.h"
+#include "shot/sampled_render.h"
 
 // What effects cost, as ratios to the picture without them.
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -45,25 +44,5 @@ struct AccuracyReport {
   double cut_seconds = 0;  ///< to merge clouds for the shares, once and not part of any row
   std::vector<AccuracyRow> rows;
 };
-
-/// Sets is_on_front of every row.
-void markFront(AccuracyReport& report);
-
-/// The row with the largest PSNR among those of at most `seconds`. Errors: kInvalidArgument, with
-/// the least that any row needs, where there is none; for a budget that is not above 0.
-size_t bestWithin(const AccuracyReport& report, double seconds);
-
-/// The fastest row of at least `psnr` dB. Errors: kInvalidArgument, with the best that any row but
-/// the reference itself has, where there is none.
-size_t cheapestAbove(const AccuracyReport& report, double psnr);
-
-/// PSNR and errors of a row. In: differences from the reference, any sign; they are reordered.
-void setErrors(std::vector<float>& differences, AccuracyRow& row);
-
-/// Median and quartiles of a row's times. In: at least one, seconds.
-void setSeconds(std::vector<double> times, AccuracyRow& row);
-
-/// Text of a time: "12.4 ms", "3.21 s".
-std::string timeText(double seconds);
 
 }  // namespace stipple

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "density/level_sampling.h"
 #include "density/octree_sampling.h"
 
@@ -40,6 +41,17 @@ AnchorSet makeAnchorSet(const DensityModel& model, const AnchorSamplingOptions& 
 }
 
 }  // namespace
+
+void anchorPositions(const AnchorSet& anchors, const RootCube& root, float* out) {
+  parallelFor(anchors.size(), 1 << 14, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const double unit = anchors.positions[i * 3 + axis];
+        out[i * 3 + axis] = static_cast<float>(root.origin[axis] + root.side * unit);
+      }
+    }
+  });
+}
 
 uint64_t sampleMemoryBound(uint64_t count, bool with_ranks) {
   // Result: 3 + 1 floats and a leaf code. Two frontiers of at most one cell an anchor (code, count,

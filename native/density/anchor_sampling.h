@@ -35,6 +35,9 @@ struct AnchorSet {
   size_t size() const { return log_q.size(); }
 };
 
+/// Positions [P,3] of anchors in metres. In: root, the cube that they were drawn from.
+void anchorPositions(const AnchorSet& anchors, const RootCube& root, float* out);
+
 /// Bytes that sampleAnchors holds at most, the result included, without those of the model.
 uint64_t sampleMemoryBound(uint64_t count, bool with_ranks);
 

@@ -25,7 +25,7 @@ class CameraRays {
  public:
   /// In: a camera that validate() accepts. A point of the lens counts for cameras without an image
   /// plane only, whose lens stands across every ray, x horizontal; the others see the same from a
-  /// camera that is moved and shifted (splat/render/sampled_render.h).
+  /// camera that is moved and shifted (shot/sampled_render.h).
   explicit CameraRays(const Camera& camera, const LensPoint& lens = {});
 
   /// In: a place in the picture, pixels; centres of pixels are at +0.5. Returns false where the

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "splat/random_scene.h"
-#include "splat/render/sampled_render.h"
+#include "shot/sampled_render.h"
 
 // How the error of a sampled picture falls with its samples: the table of docs/effects.md. Prints
 // root mean square errors of colour and alpha against 16,384 samples, and the slope, beside those

@@ -4,7 +4,7 @@
 
 #include "effect_cases.h"
 #include "splat/render/accurate_render.h"
-#include "splat/render/sampled_render.h"
+#include "shot/sampled_render.h"
 #include "wide_reference.h"
 
 namespace stipple::testing {

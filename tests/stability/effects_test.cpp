@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "effect_cases.h"
-#include "splat/render/sampled_render.h"
+#include "shot/sampled_render.h"
 
 // Cameras, lenses, shutters and passes on hard cases, with traps on: nothing is NaN, alpha stays
 // within 0..1 and colours within the hull of those of the splats, 0 among them.

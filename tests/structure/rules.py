@@ -200,6 +200,113 @@ def crowded_folders(root):
             if count > FILE_LIMIT and folder not in MORE_FILES_ALLOWED]
 
 
+# Errors, handles and jobs: what every exported function stands on.
+BOUNDARY_MACHINERY = {'errors.cpp', 'guard.h', 'handles.h', 'job.cpp', 'job.h'}
+# Files of native/api that still hold more than marshalling; each leaves this list when its work has a room.
+MORE_THAN_MARSHALLING = {'native/api/' + name for name in (
+    'densify.cpp', 'field.cpp', 'field.h', 'fit.cpp', 'fit.h', 'fit_session.cpp', 'fit_settings.cpp',
+    'hierarchy.cpp', 'hierarchy.h', 'model.cpp')}
+FUNCTION_LIMIT = 40  # lines of a function of native/api
+# What a conversion has no use for: it measures no time, draws no numbers and sorts nothing.
+NO_CONVERSION_INCLUDES = {'chrono', 'numeric', 'random', 'execution'}
+NO_CONVERSION_CALLS = re.compile(r'\b(parallelFor|parallelSum|sort|stable_sort|nth_element|partial_sort|accumulate|reduce|transform|'
+                                 r'inner_product|count_if|min_element|max_element)\s*[(<]')
+# What the signature of a conversion has: a type of the header, a raw pointer to numbers, or the name of the caller's
+# argument. A check of an argument, require… or fail…, may have neither.
+C_SIGNATURE = re.compile(r'\bStipple[A-Z]\w*|\b(float|double|uint8_t|uint32_t|uint64_t|T|To)\s*\*|\bconst char\s*\*\s*name\b')
+# Of things that come by the thousand. Instances, views, levels, rows and formats come by the dozen.
+MANY_THINGS = re.compile(r'splat|pixel|voxel|vert|triangle|anchor|point|brick|density|position|width|height|rgba', re.I)
+
+
+def without_comments(text):
+    """The code of a C++ file at its own lines: comments, texts and preprocessor lines are blanked."""
+    def blank(match):
+        return re.sub(r'[^\n]', ' ', match.group(0))
+    text = re.sub(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])\'', blank, text, flags=re.S)
+    return re.sub(r'^[ \t]*#(?:[^\n]*\\\n)*[^\n]*', blank, text, flags=re.M)
+
+
+def functions_of(text):
+    """(head, body, line of the head) of every function that a C++ file defines, members of its types too."""
+    code = without_comments(text).replace('extern        {', 'extern "C"{')  # a blanked text has its quotes blanked too
+    found, at, begin = [], 0, 0
+    while at < len(code):
+        if code[at] == '{':
+            head = re.sub(r'\b(public|private|protected)\s*:', ' ', code[begin:at])
+            is_type = re.search(r'^\s*(template\s*<[^{}]*>\s*)?(struct|class|union)\b[^()]*$', head)
+            if not is_type and not re.search(r'\bnamespace\b[^()]*$|\bextern\s*(""|"C")?\s*$', head):
+                end = _closing(code, at)
+                if '(' in head and not re.search(r'=\s*$', head):
+                    start = begin + len(code[begin:at]) - len(code[begin:at].lstrip())
+                    found.append((head.strip(), code[at:end], code.count('\n', 0, start) + 1))
+                at = end
+            begin = at + 1
+        elif code[at] in ';}':
+            begin = at + 1
+        at += 1
+    return found
+
+
+def _closing(code, at):
+    """The place behind the brace that closes the one at `at`."""
+    depth = 0
+    for place in range(at, len(code)):
+        depth += {'{': 1, '}': -1}.get(code[place], 0)
+        if depth == 0:
+            return place + 1
+    return len(code)
+
+
+def _loop_heads(body):
+    """What stands in the brackets of every `for` and `while`."""
+    for match in re.finditer(r'\b(for|while)\s*\(', body):
+        depth, place = 1, match.end()
+        while depth and place < len(body):
+            depth += {'(': 1, ')': -1}.get(body[place], 0)
+            place += 1
+        yield body[match.end():place - 1]
+
+
+def _what_is_wrong(head, body, is_machinery):
+    """Why a function of native/api is no marshalling, as sentences."""
+    name = re.search(r'([~\w]+)\s*\(', re.sub(r'\[\[.*?\]\]|template\s*<[^{}]*?>(?=\s)', ' ', head))
+    name = name.group(1) if name else head
+    is_exported = name.startswith('stipple_')
+    is_conversion = C_SIGNATURE.search(head) or re.match(r'(require|fail)[A-Z]', name)
+    if not (is_exported or is_conversion or is_machinery):
+        yield f'{name} is neither an exported function nor a conversion'
+    lines = (head + body).count('\n') + 1
+    if lines > FUNCTION_LIMIT:
+        yield f'{name} has {lines} lines, at most {FUNCTION_LIMIT} are allowed'
+    loops = list(_loop_heads(body))
+    if is_exported and loops:
+        yield f'{name} is exported and has a loop'
+    yield from (f'{name} has a loop over {loop.strip()}' for loop in loops if not is_exported and MANY_THINGS.search(loop))
+    call = NO_CONVERSION_CALLS.search(body)
+    if call:
+        yield f'{name} calls {call.group(1)}'
+
+
+def boundary_violations(root, excepted=None):
+    """What of native/api is not marshalling, and exceptions that are none any more."""
+    excepted = MORE_THAN_MARSHALLING if excepted is None else excepted
+    found = []
+    for name in project_files(root):
+        folder, _, file = name.rpartition('/')
+        if folder != 'native/api' or not file.endswith(('.cpp', '.h')):
+            continue
+        path = pathlib.Path(root) / name
+        wrong = [f'{name}:{line}: {included}: a conversion has no use for it' for line, included in includes(path)
+                 if included in NO_CONVERSION_INCLUDES]
+        for head, body, line in functions_of(path.read_text(encoding='utf-8')):
+            wrong += [f'{name}:{line}: {reason}' for reason in _what_is_wrong(head, body, file in BOUNDARY_MACHINERY)]
+        if name not in excepted:
+            found += wrong
+        elif not wrong:
+            found.append(f'{name}: is marshalling alone and needs no exception')
+    return found
+
+
 def c99_violations(header, scratch):
     """What a C99 compiler says about a header that is included on its own."""
     source = pathlib.Path(scratch) / 'only_the_header.c'

@@ -126,6 +126,52 @@ def test_a_crowded_folder_is_found(tmp_path):
     assert rules.crowded_folders(tmp_path) == ['native/splat: 41 files, at most 40 are allowed']
 
 
+def test_the_boundary_is_marshalling():
+    assert rules.boundary_violations(ROOT) == []
+
+
+_LONG = 'StippleStatus stipple_long(const StippleCloud* cloud) {\n' + '  cloud;\n' * 39 + '}\n'
+
+
+@pytest.mark.parametrize('text, reason', [
+    ('double entropyOf(const OctreeDensity& density) { return 0; }', 'entropyOf is neither an exported function nor a conversion'),
+    ('namespace {\nclass Timing {\n public:\n  void run() { go(); }\n};\n}', 'run is neither an exported function nor a conversion'),
+    ('#include <chrono>', 'chrono: a conversion has no use for it'),
+    (_LONG, 'stipple_long has 41 lines, at most 40 are allowed'),
+    ('StippleStatus stipple_f(void) { return guarded([&] { for (auto& row : rows) row.f(); }); }', 'stipple_f is exported and has a loop'),
+    ('StippleStatus stipple_f(void) { while (next()) {} }', 'stipple_f is exported and has a loop'),
+    ('Cloud from(const StippleCloud& c) { for (size_t i = 0; i < splats.size(); ++i) f(i); }', 'from has a loop over'),
+    ('void give(const std::vector<float>& pixels, float* to) { for (float p : pixels) *to++ = p; }', 'give has a loop over'),
+    ('Cloud from(const StippleCloud& c) { parallelFor(n, 1, f); }', 'from calls parallelFor'),
+    ('Rows rowsFrom(const StippleRow* rows) { std::sort(rows, rows + 3); }', 'rowsFrom calls sort'),
+])
+def test_more_than_marshalling_is_found(tmp_path, text, reason):
+    plant(tmp_path, {'native/api/some.cpp': text + '\n'})
+    found = rules.boundary_violations(tmp_path, set())
+    assert len(found) == 1 and reason in found[0], found
+    assert rules.boundary_violations(tmp_path, {'native/api/some.cpp'}) == []
+
+
+def test_marshalling_is_accepted(tmp_path):
+    plant(tmp_path, {'native/api/some.cpp': """
+        // for (auto& pixel : pixels) in a comment, and std::sort( in another.
+        namespace { struct Kept { std::vector<int> list; };
+        constexpr float* StippleRow::*kMembers[] = {&StippleRow::x};
+        Row rowFrom(const StippleRow& row, const char* name) { for (auto m : kMembers) copy(row.*m); return {}; }
+        void requireSides(uint32_t width) { if (width < 1) fail("for (pixel)"); }
+        template <typename T> void copyTo(const std::vector<T>& values, T* out) { std::copy(values.begin(), values.end(), out); } }
+        extern "C" { StippleStatus stipple_row(const StippleRow* row) { return guarded([&] { rowFrom(*row, "row"); }); } }
+        """, 'native/api/guard.h': 'inline void anything() { work(); }\n',
+                     'native/shot/elsewhere.cpp': 'void work() { for (auto& pixel : pixels) f(pixel); }\n'})
+    assert rules.boundary_violations(tmp_path, set()) == []
+
+
+def test_an_exception_that_is_none_any_more_is_found(tmp_path):
+    plant(tmp_path, {'native/api/clean.cpp': 'void stipple_f(void) {}\n'})
+    assert rules.boundary_violations(tmp_path, {'native/api/clean.cpp'}) == [
+        'native/api/clean.cpp: is marshalling alone and needs no exception']
+
+
 def test_the_public_header_is_c99(tmp_path):
     assert rules.c99_violations(HEADER, tmp_path) == []
 

@@ -12,23 +12,26 @@ from .structs import (NO_INDEX, MaterialColour, StippleMaterial, StippleMeshBuff
                       StippleMeshInstance, StippleMeshPart, StippleMeshTopology)
 
 
-class DepthTask:
-    """The depth of meshes while it is drawn: poll, cancel or wait through `job`, then read `depth`."""
+class MatteTask:
+    """What meshes hide while it is drawn: poll, cancel or wait through `job`, then read the arrays, row 0 = top."""
 
-    def __init__(self, job, depth):
+    def __init__(self, job, depth, opacity):
         self.job = job
-        self.depth = depth  # [H,W] metres, row 0 = top, 1e10 where no mesh is
+        self.depth = depth      # [H,W] metres, 1e10 where no mesh is
+        self.opacity = opacity  # [H,W] share of each pixel's samples that a mesh hides
 
 
-def start_depth(context, placed, camera):
-    """Starts drawing how far meshes [(mesh, 4x4 object to world)] are; they must outlive the start only."""
-    depth = np.empty((camera.height, camera.width), np.float32)
+def start_matte(context, placed, camera, side):
+    """Starts drawing what meshes [(mesh, 4x4 object to world)] hide, with side x side samples for each pixel; they must
+    outlive the start only."""
+    depth, opacity = (np.empty((camera.height, camera.width), np.float32) for _ in range(2))
     array = (StippleMeshInstance * max(len(placed), 1))()
     for entry, (mesh, matrix) in zip(array, placed):
         entry.__init__(mesh=mesh.pointer, matrix=matrix16(matrix))
-    job = Job(context.library, new_handle(context.library, 'stipple_mesh_depth_start', context.pointer, array,
-                                          len(placed), byref(camera), pointer_to(depth)), keep=(depth, array))
-    return DepthTask(job, depth)
+    job = Job(context.library, new_handle(context.library, 'stipple_mesh_matte_start', context.pointer, array,
+                                          len(placed), byref(camera), side, pointer_to(depth), pointer_to(opacity)),
+              keep=(depth, opacity, array))
+    return MatteTask(job, depth, opacity)
 
 
 class Mesh(Handle):

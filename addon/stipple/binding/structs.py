@@ -271,6 +271,16 @@ class StippleMeshInstance(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('mesh', c_void_p), ('matrix', _matrix)]
 
 
+class StippleLayersInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('has_light', c_uint32), ('has_shadows', c_uint32),
+                ('has_opacity', c_uint32), ('width', c_uint32), ('height', c_uint32)]
+
+
+class StippleLayersBuffers(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('depth', _floats), ('colour', _floats),
+                ('light', _floats), ('opacity', _floats)]
+
+
 class StippleRenderBuffers(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour', _floats), ('depth', _floats),
                 ('median_depth', _floats), ('counts', POINTER(c_uint32)), ('transmittance', _floats),

@@ -179,7 +179,7 @@ class ViewPicture:
         meshes = None
         if hiding and samples == 1:
             meshes = mattes.start_samples([matte for _, _, matte in hiding], part, side)
-        self._task = _Making(begin, meshes, side, self._surface, self._key, seen.border, coarse, samples)
+        self._task = _Making(begin, meshes, self._surface, self._key, seen.border, coarse, samples)
 
     def _accuracy(self, scene, depsgraph, seen, coarse):
         """How exact a picture is. While the view turns nothing slow is done, whatever a resting one asks for."""
@@ -234,10 +234,10 @@ class ViewPicture:
 class _Making:
     """A picture that a job makes, after another has drawn the depth of meshes where there are any."""
 
-    def __init__(self, begin, meshes, side, surface, key, border, coarse, samples):
+    def __init__(self, begin, meshes, surface, key, border, coarse, samples):
         """begin: starts the picture's job behind a Surface, or None. meshes: of mattes.start_samples, or None for those
         of `surface`."""
-        self._begin, self._meshes, self._side = begin, meshes, side
+        self._begin, self._meshes = begin, meshes
         self.surface = surface if coarse == 1 else None
         self._task = begin(self.surface) if meshes is None else None
         self.key, self.border, self.samples = key, border, samples
@@ -253,7 +253,7 @@ class _Making:
             if self._meshes.job.poll()[0] == JobState.RUNNING:
                 return True
             self._meshes.job.wait()
-            self.surface = mattes.surface_of(self._meshes, self._side)
+            self.surface = mattes.surface_of(self._meshes)
             self._task = self._begin(self.surface)
         return self._task.job.poll()[0] == JobState.RUNNING
 

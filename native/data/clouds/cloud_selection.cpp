@@ -29,6 +29,16 @@ void gather(const std::vector<float>& from, size_t stride, const std::vector<siz
 
 }  // namespace
 
+void invertMask(std::vector<uint8_t>& mask) {
+  for (uint8_t& value : mask) value ^= 1;
+}
+
+uint64_t selectedCount(std::span<const uint8_t> mask) {
+  uint64_t count = 0;
+  for (const uint8_t value : mask) count += value;
+  return count;
+}
+
 std::vector<uint8_t> insideBox(const SplatCloud& cloud, const Mat4d& cloud_to_box) {
   validate(cloud, "cloud");
   validateAffine(cloud_to_box, "cloud_to_box");

@@ -14,6 +14,12 @@ namespace stipple {
 /// 1. Evaluated in double.
 std::vector<uint8_t> insideBox(const SplatCloud& cloud, const Mat4d& cloud_to_box);
 
+/// A selection becomes its opposite: 1 where it was 0.
+void invertMask(std::vector<uint8_t>& mask);
+
+/// How many splats a mask of 0 and 1 selects.
+uint64_t selectedCount(std::span<const uint8_t> mask);
+
 /// Which of `total` splats a plain thinning to `count` keeps: 1 for those with the smallest numbers
 /// keyed by (seed, index). [total] A smaller count is a part of a larger one, and the choice looks
 /// at nothing but the index: frames of a series whose splats keep their places thin alike. Errors:

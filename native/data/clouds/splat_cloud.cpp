@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <string>
 
@@ -133,6 +134,18 @@ void validate(const SplatCloud& cloud, const char* what) {
       }
     }
   }
+}
+
+void normaliseRotations(SplatCloud& cloud) {
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      float* q = &cloud.rotations[i * 4];
+      double squares = 0;
+      for (int k = 0; k < 4; ++k) squares += static_cast<double>(q[k]) * static_cast<double>(q[k]);
+      const double length = std::sqrt(squares);
+      for (int k = 0; k < 4; ++k) q[k] = static_cast<float>(static_cast<double>(q[k]) / length);
+    }
+  });
 }
 
 }  // namespace stipple

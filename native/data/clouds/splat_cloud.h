@@ -47,6 +47,9 @@ struct SplatCloud {
 /// anywhere, negative scale, opacity outside 0..1, zero quaternion). `what` names the cloud.
 void validate(const SplatCloud& cloud, const char* what);
 
+/// Makes the quaternions of a cloud that validate() accepts of length one, in double.
+void normaliseRotations(SplatCloud& cloud);
+
 /// The part of validate() that reads no values: degree and array sizes.
 void validateSizes(const SplatCloud& cloud, const char* what);
 

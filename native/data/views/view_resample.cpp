@@ -70,9 +70,9 @@ Tap tapAt(double position, uint32_t size) {
   return tap;
 }
 
-void sample(const Image& image, const Vec2d& at, Sampling sampling, float* out) {
+void sample(const Image& image, const Vec2d& at, PixelLookup lookup, float* out) {
   Tap x = tapAt(at.x(), image.width), y = tapAt(at.y(), image.height);
-  if (sampling == Sampling::kNearest) {
+  if (lookup == PixelLookup::kNearest) {
     x = {x.share < 0.5f ? x.first : x.second, 0, 0.0f};
     y = {y.share < 0.5f ? y.first : y.second, 0, 0.0f};
   }
@@ -155,7 +155,7 @@ Camera undistortedCamera(const Camera& seen_by, const Lens& lens) {
 }
 
 Image undistort(const Image& image, const Camera& seen_by, const Lens& lens, const Camera& target,
-                Sampling sampling, std::vector<float>* covered) {
+                PixelLookup lookup, std::vector<float>* covered) {
   Image made = emptyLike(image, target.width, target.height);
   if (covered) covered->assign(made.pixelCount(), 0.0f);
   const double corner_x = std::max(target.cx, target.width - target.cx) / target.fx;
@@ -170,7 +170,7 @@ Image undistort(const Image& image, const Camera& seen_by, const Lens& lens, con
         const Vec2d at = lensPixel(seen_by, lens, point);
         if (!isInside(seen_by, at)) continue;
         const size_t pixel = row * target.width + column;
-        sample(image, at, sampling, &made.pixels[pixel * made.channels]);
+        sample(image, at, lookup, &made.pixels[pixel * made.channels]);
         if (covered) (*covered)[pixel] = 1.0f;
       }
     }

@@ -15,14 +15,14 @@ namespace stipple {
 /// Errors: kUnsupported for a lens that maps nothing around its principal point one to one.
 Camera undistortedCamera(const Camera& seen_by, const Lens& lens);
 
-enum class Sampling { kBilinear, kNearest };
+enum class PixelLookup { kBilinear, kNearest };
 
 /// The picture of undistortedCamera(). In: image, of the size of seen_by; colours are interpolated
 /// as they stand. Out: covered [H,W], 1 where the lens saw something, 0 elsewhere (the picture is 0
 /// there); may be null.
 /// Cost: one evaluation of the lens's model per pixel; all threads.
 Image undistort(const Image& image, const Camera& seen_by, const Lens& lens, const Camera& target,
-                Sampling sampling, std::vector<float>* covered);
+                PixelLookup lookup, std::vector<float>* covered);
 
 /// A camera for the same picture at another size. One of size 0 x 0 is in units of the picture
 /// (io/views/camera_file.h): its focal lengths are in widths, its axis is in the middle.

@@ -1113,6 +1113,69 @@ StippleStatus stipple_mesh_depth_start(StippleContext* context, const StippleMes
                                        uint64_t count, const StippleCamera* camera, float* depth,
                                        StippleJob** job);
 
+/* The same with smooth edges: each pixel is hidden as far as its samples_per_side x samples_per_side samples are.
+ * Out: depth [H,W] metres, that of the nearest sample, 1e10 where none hits; opacity [H,W], the share of samples
+ * that do. Both must stay valid until the job has ended. In: samples_per_side, 1 to 16; the picture that many times
+ * as large may have 65,536 pixels a side. Cost: as many pixels; 64 MB of samples are held at a time.
+ * Errors of the start: INVALID_ARGUMENT for a camera, matrix or number of samples outside its range; MEMORY_LIMIT. */
+StippleStatus stipple_mesh_matte_start(StippleContext* context, const StippleMeshInstance* instances,
+                                       uint64_t count, const StippleCamera* camera, uint32_t samples_per_side,
+                                       float* depth, float* opacity, StippleJob** job);
+
+/* ---- layers of another renderer ---------------------------------------------------------------------- */
+
+/* What another renderer drew of everything but the splats, as a surface between them, and the picture of both.
+ * Colours are premultiplied and scene linear. All arrays of one handle share one order of rows, whichever that is.
+ * Order of calls: hold_out, take_world and light_before as far as each is needed; then what is read. A handle is
+ * used by one thread at a time. Same bits for any number of threads. Cost of each: O(pixels). */
+typedef struct StippleLayers StippleLayers;
+
+/* In: passes of a film that was transparent. combined [H,W,4]; depth [H,W] metres of one sample of each pixel, 1e10
+ * or NaN where nothing is; shadow [H,W,3], factors of the light of what is behind a shadow catcher, or NULL without
+ * one. Colours that are not finite count as black. Errors: INVALID_ARGUMENT for a side of 0; MEMORY_LIMIT. */
+StippleStatus stipple_layers_create(StippleContext* context, uint32_t width, uint32_t height, const float* combined,
+                                    const float* depth, const float* shadow, StippleLayers** layers);
+void stipple_layers_free(StippleLayers* layers);
+/* Takes the holdouts, of which the passes show nothing but what they leave of the rest. In: depth, opacity [H,W] as
+ * of stipple_mesh_matte_start. */
+StippleStatus stipple_layers_hold_out(StippleLayers* layers, const float* depth, const float* opacity);
+/* Takes the light that the camera sees of the world. In: seen [H,W,3]; plain [3], its colour, or NULL where it has
+ * many: what is hidden by a shadow catcher is then filled in from the pixels around. */
+StippleStatus stipple_layers_take_world(StippleLayers* layers, const float* seen, const float* plain);
+/* Leaves shadows to the splats at and behind shadow catchers. In: composited colours [H,W,4] of the splats before
+ * the catchers (stipple_layers_matte), and of all; the light of each pixel is shared as these are. */
+StippleStatus stipple_layers_light_before(StippleLayers* layers, const float* before, const float* whole);
+
+typedef struct StippleLayersInfo {
+  uint32_t struct_size;
+  uint32_t has_light;   /* 1: surface buffers have a light */
+  uint32_t has_shadows; /* 1: and it is not 1 everywhere */
+  uint32_t has_opacity; /* 1: there are holdouts, and the opacity is not that of the colour */
+  uint32_t width;
+  uint32_t height;
+} StippleLayersInfo;
+StippleStatus stipple_layers_info(const StippleLayers* layers, StippleLayersInfo* info);
+
+/* What is wanted; NULL: not. As the surface_, matte_ and splat_light fields of StippleRenderOptions. */
+typedef struct StippleLayersBuffers {
+  uint32_t struct_size;
+  uint32_t reserved;
+  float* depth;   /* [H,W] metres. A pixel that a mesh covers in part has the nearest depth among itself and its
+                     neighbours that a mesh covers: its one sample may have missed the mesh */
+  float* colour;  /* [H,W,4] of meshes alone */
+  float* light;   /* [H,W,3] factors of the splats; INVALID_ARGUMENT without has_light */
+  float* opacity; /* [H,W] how much meshes and holdouts hide */
+} StippleLayersBuffers;
+StippleStatus stipple_layers_surface(const StippleLayers* layers, const StippleLayersBuffers* buffers);
+/* Meshes and holdouts as a matte, with shadow catchers that are `margin` metres nearer than they are: nothing behind
+ * a catcher is left. In: catcher_depth [H,W]. Out: depth, opacity [H,W]. */
+StippleStatus stipple_layers_matte(const StippleLayers* layers, const float* catcher_depth, float margin,
+                                   float* depth, float* opacity);
+/* The picture of meshes, splats and world. In and out: colour [H,W,4] and depth [H,W] of splats that were drawn with
+ * the surface between them. In: transmittance [H,W] of that picture. */
+StippleStatus stipple_layers_compose(const StippleLayers* layers, float* colour, float* depth,
+                                     const float* transmittance);
+
 /* ---- effects that a picture needs ---------------------------------------------------------------- */
 
 #define STIPPLE_EFFECT_COUNT 12u

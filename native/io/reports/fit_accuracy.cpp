@@ -44,7 +44,8 @@ AccuracyRow rowOf(const Json& measure, const std::vector<double>& seconds) {
   row.name = "iteration " + std::to_string(iteration);
   row.knobs = {{"iterations", std::to_string(iteration)}};
   row.value = static_cast<double>(iteration);
-  setSeconds({seconds[iteration]}, row);
+  row.seconds = row.seconds_low = row.seconds_high = seconds[iteration];
+  row.repetitions = 1;
   const Json& psnr = measure.at("psnr");
   row.psnr = psnr.is_null() ? std::numeric_limits<double>::infinity() : psnr.get<double>();
   row.largest_error = row.error_99_9 = std::numeric_limits<double>::quiet_NaN();
@@ -67,7 +68,6 @@ AccuracyReport reportOf(const Json& json) {
   if (report.rows.empty()) {
     fail(ErrorCode::kInvalidArgument, "it has 0 measurements; a fit that ran on has at least 1");
   }
-  markFront(report);
   return report;
 }
 

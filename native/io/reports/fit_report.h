@@ -22,6 +22,7 @@ void writeFitReport(const FitReportHead& head, const FitHistory& history, const 
 
 /// What each measurement of a written report cost and brought, in the form of a report of accuracy:
 /// seconds are those of all iterations up to it, errors those of the views that it was measured on.
+/// Which are on the front is left to measure/fit_accuracy.h.
 /// Errors: kIo; kFormat for a file that is no such report; kInvalidArgument for one of a fit that
 /// measured nothing.
 AccuracyReport readFitAccuracy(const std::string& path);

@@ -157,7 +157,7 @@ std::vector<float> readDepth(const DatasetView& view, const Camera& full, const 
     depth = nearestPixels(depth, seen_by.width, seen_by.height);
   }
   if (view.view.lens.isDistorted()) {
-    depth = undistort(depth, seen_by, view.view.lens, full, Sampling::kNearest, nullptr);
+    depth = undistort(depth, seen_by, view.view.lens, full, PixelLookup::kNearest, nullptr);
   }
   return nearestPixels(depth, given.width, given.height).pixels;
 }
@@ -252,9 +252,9 @@ ViewPicture Dataset::read(size_t view) const {
   const Camera full = distorted ? undistortedCamera(seen_by, files.view.lens) : seen_by;
   if (distorted) {
     std::vector<float> covered;
-    image = undistort(image, seen_by, files.view.lens, full, Sampling::kBilinear, &covered);
+    image = undistort(image, seen_by, files.view.lens, full, PixelLookup::kBilinear, &covered);
     if (!mask.pixels.empty()) {
-      mask = undistort(mask, seen_by, files.view.lens, full, Sampling::kBilinear, nullptr);
+      mask = undistort(mask, seen_by, files.view.lens, full, PixelLookup::kBilinear, nullptr);
     }
     weights = combined(std::move(mask.pixels), covered);
   } else {

@@ -29,6 +29,13 @@ class ImageRenderer {
   virtual uint64_t memoryBytes() const = 0;  ///< held now, about
 };
 
+/// Makes image renderers, for one kind of processor. May be called by several threads.
+class ImageRendererFactory {
+ public:
+  virtual ~ImageRendererFactory() = default;
+  virtual std::unique_ptr<ImageRenderer> makeImageRenderer() const = 0;
+};
+
 /// On this processor, with native/splat.
 std::unique_ptr<ImageRenderer> makeCpuImageRenderer();
 

@@ -11,14 +11,11 @@ namespace stipple {
 /// Makes everything that draws splats and differentiates their images, for one kind of processor. A
 /// context holds one and passes it down: nobody who fits, judges or draws splats makes his own.
 /// May be called by several threads; what it makes is of one each.
-class BackendFactory {
+class BackendFactory : public ImageRendererFactory {
  public:
-  virtual ~BackendFactory() = default;
-
   /// "cpu" and so on.
   virtual const char* name() const = 0;
 
-  virtual std::unique_ptr<ImageRenderer> makeImageRenderer() const = 0;
   virtual std::unique_ptr<ViewPass> makeViewPass() const = 0;
   virtual std::unique_ptr<RenderBackend> makeRenderBackend() const = 0;
 };

@@ -77,7 +77,7 @@ TEST(Undistortion, PointsLandWhereTheFullModelSeesThem) {
     validate(target);
     std::vector<float> covered;
     const Image image = undistort(coordinates(160, 120), seen_by, given.lens, target,
-                                  Sampling::kBilinear, &covered);
+                                  PixelLookup::kBilinear, &covered);
     ASSERT_EQ(image.width, target.width);
     size_t seen = 0;
     std::uniform_int_distribution<uint32_t> column(0, target.width - 1), row(0, target.height - 1);
@@ -124,7 +124,7 @@ TEST(Undistortion, CountsNothingOutsideOfTheLensPicture) {
   const Camera target = undistortedCamera(seen_by, lens);
   std::vector<float> covered;
   const Image image =
-      undistort(coordinates(100, 100), seen_by, lens, target, Sampling::kBilinear, &covered);
+      undistort(coordinates(100, 100), seen_by, lens, target, PixelLookup::kBilinear, &covered);
   // A pincushion's corners lie beyond the picture, its sides inside.
   EXPECT_EQ(covered.front(), 0.0f);
   EXPECT_EQ(image.pixels[2], 0.0f);
@@ -140,7 +140,7 @@ TEST(Undistortion, DoesNotShowWhatAModelFoldsOver) {
   const Camera target = undistortedCamera(seen_by, lens);
   EXPECT_LT(target.cx / target.fx, 0.977);
   std::vector<float> covered;
-  undistort(coordinates(200, 200), seen_by, lens, target, Sampling::kBilinear, &covered);
+  undistort(coordinates(200, 200), seen_by, lens, target, PixelLookup::kBilinear, &covered);
   for (uint32_t y = 0; y < target.height; ++y) {
     for (uint32_t x = 0; x < target.width; ++x) {
       const double radius =

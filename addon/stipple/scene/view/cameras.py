@@ -118,15 +118,6 @@ def _held_angle(angle, name):
     return min(angle, 2 * np.pi)
 
 
-def finer_rows(camera, first, count, side):
-    """The camera of rows first .. first + count of a picture, with side x side pixels for each of its own."""
-    part = type(camera).from_buffer_copy(camera)
-    part.width, part.height = camera.width * side, count * side
-    part.fx, part.fy = camera.fx * side, camera.fy * side
-    part.cx, part.cy = camera.cx * side, (camera.cy - first) * side
-    return part
-
-
 def from_view(region_data, width, height):
     """The camera of a 3D view, at a picture size that has the view's proportions."""
     window = np.array(region_data.window_matrix, np.float64)

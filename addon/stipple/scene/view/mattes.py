@@ -6,14 +6,12 @@ import numpy as np
 from ... import version
 from ...binding import mesh as native
 from ...binding.errors import StippleError
-from ...binding.renderer import EMPTY_DEPTH, Surface
+from ...binding.renderer import Surface
 from .. import geometry, meshes, shown
 from ..source import placement, sources, splat_data
-from . import cameras
 
-# Samples of a pixel along each side, and of a picture that are held at a time (64 MB).
+# Samples of a pixel along each side.
 SIDE = 4
-MOST_SAMPLES = 16_000_000
 LONGEST_SIDE = 65536  # of a native picture, pixels
 
 
@@ -64,46 +62,21 @@ def gather_owned(depsgraph, wanted='ALL', read_mesh=None):
 def surface(placed, camera, wait):
     """What they hide as this camera sees them: a Surface.
 
-    Edges are smooth: a pixel is hidden as far as its SIDE x SIDE samples are. wait: called with each job on the way.
+    Edges are smooth: a pixel is hidden as far as its SIDE x SIDE samples are. wait: called with the job.
     """
-    height, width = camera.height, camera.width
-    depth, opacity = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
-    side = SIDE if max(width, height) * SIDE <= LONGEST_SIDE else 1
-    rows = max(1, MOST_SAMPLES // (width * side * side))
-    for first in range(0, height, rows):
-        count = min(rows, height - first)
-        task = native.start_depth(sources.context(), placed, cameras.finer_rows(camera, first, count, side))
-        wait(task.job)
-        depth[first:first + count], opacity[first:first + count] = _folded(task.depth, side)
-    return Surface(depth, opacity=opacity)
+    task = start_samples(placed, camera, SIDE if max(camera.width, camera.height) * SIDE <= LONGEST_SIDE else 1)
+    wait(task.job)
+    return surface_of(task)
 
 
 def start_samples(placed, camera, side):
-    """Starts the samples, side x side of each pixel, of a small picture."""
-    return native.start_depth(sources.context(), placed, cameras.finer_rows(camera, 0, camera.height, side))
+    """Starts the same with side x side samples for each pixel."""
+    return native.start_matte(sources.context(), placed, camera, side)
 
 
-def surface_of(samples, side):
+def surface_of(task):
     """The Surface of finished samples."""
-    depth, opacity = _folded(samples.depth, side)
-    return Surface(depth, opacity=opacity)
-
-
-def _folded(samples, side):
-    """(nearest depth, share that is hit) of each pixel's side x side samples."""
-    height, width = samples.shape
-    samples = samples.reshape(height // side, side, width // side, side)
-    depth = _along_last(np.minimum, samples.min(axis=1))
-    hits = _along_last(np.add, (samples < EMPTY_DEPTH).sum(axis=1, dtype=np.uint8))
-    return depth, hits / np.float32(side * side)
-
-
-def _along_last(function, samples):
-    """function of all values along the last, short axis: ten times as quick as numpy's reduce, which takes them one by one."""
-    result = samples[..., 0]
-    for i in range(1, samples.shape[-1]):
-        result = function(result, samples[..., i])
-    return result
+    return Surface(task.depth, opacity=task.opacity)
 
 
 def _sources_of_splats(depsgraph):

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <stipple/stipple.h>
+
+#include <string>
+
+#include "api/guard.h"
+#include "api/handles.h"
+#include "shot/passes.h"
+#include "shot/shot_settings.h"
+#include "splat/voxels/voxelize.h"
+
+// Structs of the caller in the library's own terms: conversions that several files share. What is
+// outside the range of its type is refused with kInvalidArgument and the argument's name; what the
+// values mean together is for the rooms to refuse.
+
+namespace stipple::api {
+
+ColourGrade gradeFrom(const StippleGrade& grade, const char* name);
+
+Instances instancesFrom(const StippleInstance* instances, uint64_t count);
+
+/// What is not given is that of the level; validate() has accepted all. In: given, not NULL.
+AccuracySettings accuracyFrom(const StippleAccuracy* given, const char* name);
+StippleAccuracy accuracyTo(const AccuracySettings& accuracy);
+
+/// NULL: defaults.
+ShotSettings shotFrom(const StippleRenderOptions* options, const Instances& instances);
+
+/// NULL: defaults.
+VoxelizeOptions voxelizeOptionsFrom(const StippleVoxelizeOptions* options);
+
+}  // namespace stipple::api
