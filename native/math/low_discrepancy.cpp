@@ -69,4 +69,14 @@ double scrambledSobol(uint32_t index, uint32_t dimension) {
   return reversed(permuted(reversed(bits), seed)) * 0x1p-32;
 }
 
+double radicalInverse(uint64_t index, uint32_t base) {
+  double value = 0;
+  double share = 1.0 / base;
+  for (; index > 0; index /= base) {
+    value += static_cast<double>(index % base) * share;
+    share /= base;
+  }
+  return value;
+}
+
 }  // namespace stipple

@@ -16,4 +16,8 @@ constexpr uint32_t kSobolDimensions = 5;
 /// (the hash).
 double scrambledSobol(uint32_t index, uint32_t dimension);
 
+/// Number `index` of van der Corput's sequence: its digits in `base`, mirrored at the point,
+/// 0 <= result < 1. In: base: at least 2; prime ones of several dimensions make Halton's sequence.
+double radicalInverse(uint64_t index, uint32_t base);
+
 }  // namespace stipple

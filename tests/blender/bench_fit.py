@@ -54,7 +54,7 @@ def test_suzanne(stipple, tmp_path, model):
     result = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
     cloud = stipple.scene.source.sources.decode_data(result.data, stipple.scene.source.sources.decode_settings(result.data.stipple))
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    poses = rigs.around(bpy.context.scene, depsgraph, rigs.bounds_of([obj], depsgraph), HELD_OUT, seed=5)
+    poses = rigs.poses('AROUND', bpy.context.scene, depsgraph, rigs.bounds_of([obj], depsgraph), HELD_OUT, seed=5)
     renderer = binding.Renderer(stipple.scene.source.sources.context())
     black, foreground = [], []
     with capturing.Capture(bpy.context, [obj], capturing.CaptureSettings('CYCLES', 256, 256)) as capture:

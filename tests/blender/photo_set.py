@@ -12,7 +12,7 @@ def write(rigs, capture, source, folder, count, settings):
     """In: the add-on's modules view_rigs and view_capture, the object, CaptureSettings."""
     folder.mkdir()
     graph = bpy.context.evaluated_depsgraph_get()
-    poses = rigs.around(bpy.context.scene, graph, rigs.bounds_of([source], graph), count, seed=3)
+    poses = rigs.poses('AROUND', bpy.context.scene, graph, rigs.bounds_of([source], graph), count, seed=3)
     frames = []
     with capture.Capture(bpy.context, [source], settings) as views:
         for i, pose in enumerate(poses):

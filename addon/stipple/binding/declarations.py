@@ -201,6 +201,13 @@ FUNCTIONS = {
     'stipple_image_loss_options_init': (None, [_to(s.StippleImageLossOptions)]),
     'stipple_image_loss': (_status, [_handle, c_uint32, c_uint32, _floats, _floats, _floats,
                                      _to(s.StippleImageLossOptions), _to(s.StippleImageLoss), _floats]),
+    # cameras of a fit
+    'stipple_rig_search_options_init': (None, [_to(s.StippleRigSearchOptions)]),
+    'stipple_rig_search_create': (_status, [_to(s.StippleRigSearchOptions), _out_handle]),
+    'stipple_rig_search_free': (None, [_handle]),
+    'stipple_rig_search_rays': (_status, [_handle, c_uint64, _doubles, POINTER(c_uint64)]),
+    'stipple_rig_search_answer': (_status, [_handle, _to(s.StippleRayHits)]),
+    'stipple_rig_search_camera': (_status, [_handle, c_uint64, _to(s.StippleCamera)]),
     # fitting splats to views
     'stipple_fit_options_init': (None, [_to(s.StippleFitOptions)]),
     'stipple_fit_options_preset': (_status, [_to(s.StippleFitOptions), c_uint32, c_uint32]),

@@ -377,6 +377,18 @@ class StippleFitOptions(_Sized):
                 ('shell', c_uint32), ('reserved', c_uint32)]
 
 
+class StippleRigSearchOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('view_rig', c_uint32), ('view_count', c_uint32), ('view_size', c_uint32),
+                ('has_viewer', c_uint32), ('reserved', c_uint32), ('seed', c_uint64), ('angle', c_double),
+                ('bounds_min', c_double * 3), ('bounds_max', c_double * 3), ('viewer', c_double * 3)]
+
+
+class StippleRayHits(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('count', c_uint64), ('distances', POINTER(c_double)),
+                ('normals', POINTER(c_double)), ('objects', POINTER(c_uint32)), ('object_count', c_uint64),
+                ('object_sizes', POINTER(c_double))]
+
+
 class StippleFitOptionInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('kind', c_uint32), ('models', c_uint32), ('fixed_models', c_uint32),
                 ('name_utf8', c_char_p), ('help_utf8', c_char_p), ('choices_utf8', c_char_p), ('minimum', c_double),

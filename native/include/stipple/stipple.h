@@ -670,6 +670,51 @@ StippleStatus stipple_views_camera(const StippleViews* views, uint64_t index, St
  * over the width. */
 StippleStatus stipple_camera_resize(StippleCamera* camera, uint32_t width, uint32_t height);
 
+/* Where cameras of a fit stand that see a scene from everywhere: around things, or inside a room. The search does not
+ * know the scene; it asks which rays meet what, and the caller answers, until nothing is asked any more:
+ *   create; while rays gives a count above 0: cast them, answer; camera for each view. */
+typedef struct StippleRigSearch StippleRigSearch;
+
+typedef struct StippleRigSearchOptions {
+  uint32_t struct_size;
+  uint32_t view_rig;    /* StippleViewRig; automatic, the default: inside where the viewer stands between walls */
+  uint32_t view_count;  /* 1..4096, default 10 */
+  uint32_t view_size;   /* pixels per side, 1..65536, default 400 */
+  uint32_t has_viewer;  /* 1: viewer is given; default 0 */
+  uint32_t reserved;
+  uint64_t seed;        /* other seeds give other views, spread as evenly */
+  double angle;         /* full, of both sides, radians, below pi; 0, the default: 40 degrees around, 75 inside */
+  double bounds_min[3]; /* of all that is to be seen; world, z up, metres */
+  double bounds_max[3];
+  double viewer[3];     /* where the scene's own camera stands */
+} StippleRigSearchOptions;
+void stipple_rig_search_options_init(StippleRigSearchOptions* options);
+
+/* What N rays met first. */
+typedef struct StippleRayHits {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t count;              /* N */
+  const double* distances;     /* [N] metres from the origin; infinity: nothing */
+  const double* normals;       /* [N,3] of the faces, world, as they point */
+  const uint32_t* objects;     /* [N] which object, 0..object_count-1 */
+  uint64_t object_count;       /* M */
+  const double* object_sizes;  /* [M,3] sides of the objects' boxes along the world's axes, metres */
+} StippleRayHits;
+
+/* Errors: INVALID_ARGUMENT for options out of range. */
+StippleStatus stipple_rig_search_create(const StippleRigSearchOptions* options, StippleRigSearch** search);
+void stipple_rig_search_free(StippleRigSearch* search);
+/* What is to be asked now. In: capacity, rays that there is room for. Out: rays [count,7]: origin, direction (unit) and
+ * the farthest distance that counts (infinity: any), or NULL: only the number is wanted; count, 0: the cameras are
+ * known. Errors: BUFFER_TOO_SMALL, with count set. */
+StippleStatus stipple_rig_search_rays(const StippleRigSearch* search, uint64_t capacity, double* rays, uint64_t* count);
+/* In: what these rays met, in their order. Errors: INVALID_ARGUMENT for another number of answers, and where no place is
+ * left for a camera. The same answers give the same cameras. */
+StippleStatus stipple_rig_search_answer(StippleRigSearch* search, const StippleRayHits* hits);
+/* index 0..view_count-1. Errors: INVALID_ARGUMENT while rays are to be asked. */
+StippleStatus stipple_rig_search_camera(const StippleRigSearch* search, uint64_t index, StippleCamera* camera);
+
 /* ---- views with pictures ------------------------------------------------------------------------ */
 
 /* What splats are fitted to: photographs from files, or renders that are handed in. */

@@ -9,17 +9,13 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "data/clouds/cloud_extent.h"
+#include "math/camera_rig.h"
 #include "math/quaternion.h"
-
-// Based on: Gonzalez, Measurement of Areas on a Sphere Using Fibonacci and Latitude-Longitude
-// Lattices, Mathematical Geosciences 2010 (the directions).
 
 namespace stipple {
 
 namespace {
 
-constexpr double kAngleAround = 40.0 * std::numbers::pi / 180;
-constexpr double kAngleInside = 75.0 * std::numbers::pi / 180;
 /// Places of cameras inside lie within this share of the radius.
 constexpr double kInsideShare = 0.25;
 /// Of this many places the one farthest from everything is taken: a camera with its nose to a wall
@@ -39,20 +35,10 @@ constexpr double kProbeDepthShare = 0.3;
 
 Camera lookingAlong(const Vec3d& eye, const Vec3d& forward, double angle, uint32_t size,
                     double radius) {
-  Camera camera;
-  camera.width = camera.height = size;
-  camera.fx = camera.fy = 0.5 * size / std::tan(0.5 * angle);
-  camera.cx = camera.cy = 0.5 * size;
+  const Vec3d aside = std::abs(forward[1]) < 0.9 ? Vec3d(0, 1, 0) : Vec3d(1, 0, 0);
+  Camera camera = cameraAlong(eye, forward, aside, angle, size);
   camera.near_plane = std::max(1e-3 * radius, 1e-9);
   camera.far_plane = std::max(camera.far_plane, kFarRadii * radius);
-  const Vec3d aside = std::abs(forward[1]) < 0.9 ? Vec3d(0, 1, 0) : Vec3d(1, 0, 0);
-  const Vec3d right = forward.cross(aside).normalized();
-  Mat3d rotation;
-  rotation.row(0) = right;
-  rotation.row(1) = forward.cross(right);
-  rotation.row(2) = forward;
-  camera.world_to_camera.topLeftCorner<3, 3>() = rotation;
-  camera.world_to_camera.topRightCorner<3, 1>() = -rotation * eye;
   return camera;
 }
 
@@ -69,11 +55,7 @@ Mat3d turnOf(uint64_t seed) {
 }
 
 Vec3d direction(const Mat3d& turn, uint32_t index, uint32_t count) {
-  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
-  const double z = 1 - (2.0 * index + 1) / count;
-  const double ring = std::sqrt(std::max(0.0, 1 - z * z));
-  const double angle = golden * index;
-  return (turn * Vec3d(ring * std::cos(angle), ring * std::sin(angle), z)).normalized();
+  return (turn * fibonacciDirection(index, count)).normalized();
 }
 
 Vec3d centreOf(const CloudExtent& extent) {

@@ -153,9 +153,7 @@ class ViewTask:
             return [(camera.name, camera) for camera in cameras]
         depsgraph = self._context.evaluated_depsgraph_get()
         bounds = view_rigs.bounds_of(self._objects, depsgraph)
-        rig = settings.rig if settings.rig != 'AUTO' else view_rigs.choose(scene, bounds, depsgraph)
-        place = view_rigs.inside if rig == 'INSIDE' else view_rigs.around
-        poses = place(scene, depsgraph, bounds, settings.view_count, settings.seed)
+        poses = view_rigs.poses(settings.rig, scene, depsgraph, bounds, settings.view_count, settings.seed)
         return [(f'view_{i:04d}', pose) for i, pose in enumerate(poses)]
 
     def _until_done(self, job, start, end):
