@@ -292,7 +292,8 @@ def test_strategies_and_parts_are_those_of_the_library(stipple, ball, fitting):
     assert [item[0] for item in strategies.part_items()] == [entry.name for entry in native.strategy_parts(library)]
     # A part that the library gets has a box at once.
     parts = native.strategy_parts(library)
-    another = native.StrategyEntry('another', "Another Part", "Does something", FitModel.EXPLICIT, 'what goes', 30)
+    another = native.StrategyEntry('another', "Another Part", "Does something", native.FitModel.EXPLICIT,
+                                   'what goes', 30)
     shown = strategies._part_items((*parts, another))
     assert shown[-1] == ('another', "Another Part", "Does something. It decides what goes", 1 << 30)
     assert [item[3] for item in shown[:-1]] == [1 << entry.bit for entry in parts]

@@ -24,8 +24,8 @@ def test_the_guide_adds_a_kind_of_model(tmp_path):
     assert 'ring' in outputs[-1]
     still, later = (conversions.read_ply(guide.folder / name, 0)[:, :3] for name in ('still.ply', 'later.ply'))
     assert len(still) == len(later) == 100
-    np.testing.assert_allclose(np.hypot(still[:, 0], still[:, 1]), 2, rtol=1e-6)
-    # A quarter of a second is a quarter of a turn: x becomes y. The files are in their own frame, where z is -y.
+    np.testing.assert_allclose(np.linalg.norm(still, axis=1), 2, rtol=1e-6)
+    # A quarter of a second is a quarter of a rotation: x becomes y, the square root of 2 times the radius away.
     distance = np.linalg.norm(later - still, axis=1)
     np.testing.assert_allclose(distance, 2 * np.sqrt(2), rtol=1e-5)
 
