@@ -8,8 +8,9 @@ from . import version
 
 
 POINTS_ABOVE = 1_000_000
-UP_AXES = (('AUTO', "From File", "As the file says, or as files of its format usually are"),
-           ('Z', "Z Up", "As in Blender"), ('-Y', "-Y Up", "As most captured scenes: the frame of their first camera"),
+UP_AXES = (('AUTO', "From File", "The frame is what the file says, or what files of its format usually have"),
+           ('Z', "Z Up", "As in Blender"), ('-Y', "-Y Up", "Y points down, as in most captured scenes: the frame of "
+                                                           "their first camera"),
            ('Y', "Y Up", "As in glTF and most game engines"))
 
 
@@ -35,8 +36,9 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
                             max=64)
     library_path: StringProperty(name="Library", description="Path of libstipple.so, empty for the one inside the "
                                  "add-on", subtype='FILE_PATH', options=version.RELATIVE_PATH)
-    points_above: IntProperty(name="Points Above", description="Splats that 3D views draw as ellipses at most; of more "
-                              "than this, the largest objects are drawn as colored points", default=POINTS_ABOVE, min=0,
+    points_above: IntProperty(name="Points Above", description="Maximum number of splats that a 3D view draws as "
+                                                               "ellipses. Beyond it, the largest objects are drawn as"
+                                                               " colored points", default=POINTS_ABOVE, min=0,
                               max=16_000_000)
     formats: CollectionProperty(type=STIPPLE_PG_format)
 

@@ -16,14 +16,16 @@ from .scene.view import effects, photo_cameras, quality
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
 _CHANGEABLE = {'ANIMATABLE'}
 
-ORDERS = (('SYSTEMATIC', "Systematic", "Most even at every budget"),
-          ('PROGRESSIVE', "Progressive", "A smaller budget is a part of a larger one, so splats only appear"))
+ORDERS = (('SYSTEMATIC', "Systematic", "Anchors are spread most evenly at every budget"),
+          ('PROGRESSIVE', "Progressive", "The anchors of a smaller budget are a part of those of a larger one, so a "
+                                         "moving budget adds and removes anchors; splats shift a little"))
 COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: textures, color attributes, plain colors; "
                   "other node trees are baked"),
                  ('BAKED', "Baked Lighting", "Colors as lit by the scene, baked by Cycles"),
                  ('ATTRIBUTE', "Attribute", "The active color attribute"))
 
-BUDGET_KINDS = (('RATIO', "Ratio", "As a share of the source's splats"), ('COUNT', "Count", "As a number of splats"))
+BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats"), ('COUNT', "Count", "The budget is a number of "
+                                                                                                       "splats"))
 SIDES = (('INSIDE', "Inside", "Keep what is inside"), ('OUTSIDE', "Outside", "Keep what is outside"))
 
 
@@ -40,7 +42,7 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     source_settings: StringProperty(options={'HIDDEN'})  # which settings it has: scene/source/source_settings.py
     source_count: IntProperty(options={'HIDDEN'})  # of a splat tree
     source_stamp: StringProperty(options={'HIDDEN'})  # of the file as it was read
-    budget_by: EnumProperty(name="Budget By", description="How the number of splats is given", items=BUDGET_KINDS,
+    budget_by: EnumProperty(name="Budget By", description="Whether the budget is a share or a number of splats", items=BUDGET_KINDS,
                             options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
     ratio: FloatProperty(name="Ratio", description="Share of the source's splats that the viewport shows", default=1.0,
                          min=0.0, max=1.0, subtype='FACTOR', precision=3, options=_CHANGEABLE, override=_OVERRIDABLE,
@@ -89,13 +91,15 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     frame_offset: IntProperty(name="Offset", description="Added to the number of the file that is shown; keyframes "
                               "here time the series freely", default=0, options=_CHANGEABLE, override=_OVERRIDABLE,
                               update=sync.on_property_change)
-    frame_speed: FloatProperty(name="Speed", description="Files for each frame of the scene; below 0 backward",
+    frame_speed: FloatProperty(name="Speed", description="Number of files that pass in each frame of the scene; a "
+                                                         "negative number plays backward",
                                default=1.0, soft_min=-4.0, soft_max=4.0, options=set(), override=_OVERRIDABLE,
                                update=sync.on_property_change)
     sequence_mode: EnumProperty(name="Mode", description="What is shown before the first and after the last file",
                                 items=sequences.MODES, options=set(), override=_OVERRIDABLE,
                                 update=sync.on_property_change)
-    missing_frames: EnumProperty(name="Missing Files", description="What a gap in the series does",
+    missing_frames: EnumProperty(name="Missing Files", description="What happens where a file of the series is "
+                                                                   "missing",
                                  items=sequences.GAPS, options=set(), override=_OVERRIDABLE,
                                  update=sync.on_property_change)
     # The colour grade: limits are those of the native library.
@@ -105,7 +109,8 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     tint: FloatVectorProperty(name="Tint", description="Color that the light of every splat is multiplied by, white for "
                               "none", size=3, default=(1.0, 1.0, 1.0), min=0.0, max=16.0, soft_max=1.0, subtype='COLOR',
                               options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
-    saturation: FloatProperty(name="Saturation", description="Strength of colors, 0 for grey, 1 for as they are",
+    saturation: FloatProperty(name="Saturation", description="Strength of the colors: 0 makes them grey, 1 leaves "
+                                                             "them as they are",
                               default=1.0, min=0.0, max=16.0, soft_max=2.0, options=_CHANGEABLE, override=_OVERRIDABLE,
                               update=sync.on_property_change)
     grade_opacity: FloatProperty(name="Opacity", description="Share of every splat's opacity, 0 hides the object",
@@ -120,62 +125,69 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
     """How splats are fitted to views of the scene."""
 
     views_from: EnumProperty(name="Views", description="What the splats are to look like",
-                             items=(('RIG', "Camera Rig", "Renders of the selected meshes, else of all, from cameras "
-                                     "that are made for it"),
-                                    ('CAMERAS', "Scene Cameras", "Renders through the cameras of the scene"),
-                                    ('DATASET', "Photos", "A folder of photographs with their cameras: COLMAP, "
-                                     "transforms.json")), options=set())
-    rig: EnumProperty(name="Rig", description="Where the cameras stand",
-                      items=(('AUTO', "Automatic", "In a room where the scene's camera stands between walls, else "
-                              "around"),
-                             ('AROUND', "Around", "On a sphere around everything, looking in"),
-                             ('INSIDE', "Inside", "Between the walls of a room, looking everywhere")), options=set())
+                             items=(('RIG', "Camera Rig", "The fit renders the selected meshes, or all if none is "
+                                                          "selected, from cameras that are made for it"),
+                                    ('CAMERAS', "Scene Cameras", "The fit renders through the cameras of the scene"),
+                                    ('DATASET', "Photos", "The fit learns from a folder of photographs with their "
+                                                          "cameras: COLMAP or transforms.json")), options=set())
+    rig: EnumProperty(name="Rig", description="Where the cameras of the rig are placed",
+                      items=(('AUTO', "Automatic", "Inside if the scene's camera is between walls, otherwise around"),
+                             ('AROUND', "Around", "The cameras are on a sphere around everything and look in"),
+                             ('INSIDE', "Inside", "The cameras are between the walls of a room and look everywhere")), options=set())
     view_count: IntProperty(name="Count", description="Number of views that are rendered", default=60, min=1,
                             soft_max=500, max=10000, options=set())
     view_size: IntProperty(name="Resolution", description="Pixels of the longer side of a view", default=256, min=16,
                            soft_max=1024, max=8192, options=set())
     engine: EnumProperty(name="Engine", description="Engine that renders the views",
-                         items=(('CYCLES', "Cycles", "Light as in the final picture"),
-                                ('EEVEE', "EEVEE", "Light as EEVEE shows it"),
-                                ('WORKBENCH', "Workbench", "Plain colors without light, quickest")), options=set())
+                         items=(('CYCLES', "Cycles", "Cycles renders the light as in the final image"),
+                                ('EEVEE', "EEVEE", "EEVEE renders the light as it shows it in the viewport"),
+                                ('WORKBENCH', "Workbench", "Workbench renders plain colors without light, and is the "
+                                                           "quickest")), options=set())
     samples: IntProperty(name="Samples", description="Samples per pixel of a view", default=64, min=1, soft_max=1024,
                          options=set())
-    transparent: BoolProperty(name="Transparent Film", description="Fit the objects alone; off: also the world behind "
-                              "them", default=True, options=set())
+    transparent: BoolProperty(name="Transparent Film", description="On, the fit learns the objects alone; off, it "
+                                                                   "also learns the world behind them", default=True, options=set())
     dataset: StringProperty(name="Folder", description="Folder with photographs and their cameras",
                             subtype='DIR_PATH', options=version.RELATIVE_PATH)
     up_axis: EnumProperty(name="Up Axis", description="Which way is up in the data set; choose the same for its cameras",
                           items=photo_cameras.UP_AXES, options=set())
-    downscale: IntProperty(name="Downscale", description="Pixels of a photograph along each side for one that is "
-                           "learned from", default=1, min=1, soft_max=8, max=64, options=set())
-    max_splats: IntProperty(name="Splats", description="The fit never has more splats than this", default=100000, min=100,
+    downscale: IntProperty(name="Downscale", description="Factor by which photographs are made smaller along each "
+                                                         "side before the fit learns from them", default=1, min=1, soft_max=8, max=64, options=set())
+    max_splats: IntProperty(name="Splats", description="Maximum number of splats of the fit", default=100000, min=100,
                             soft_max=1000000, max=100000000, options=set())
-    quality: EnumProperty(name="Quality", description="How long the fit may learn",
-                          items=(('FAST', "Fast", "For a first look"), ('BALANCED', "Balanced", "For most shots"),
-                                 ('FINE_DETAIL', "Fine Detail", "For close views of fine texture")), default='BALANCED',
+    quality: EnumProperty(name="Quality", description="How many steps the fit takes",
+                          items=(('FAST', "Fast", "Few steps, for a first look"), ('BALANCED', "Balanced", "A number of steps that is "
+                                                                                                           "enough for most shots"),
+                                 ('FINE_DETAIL', "Fine Detail", "Many steps, for close views of fine texture")), default='BALANCED',
                           options=set())
-    view_dependent: BoolProperty(name="View-Dependent Color", description="Colors change with the direction they are seen "
-                                 "from, as those of shiny things do; more numbers per splat", default=False,
+    view_dependent: BoolProperty(name="View-Dependent Color", description="Colors change with the direction of the "
+                                                                          "view, as those of shiny objects do. Each "
+                                                                          "splat then has more numbers", default=False,
                                  options=set())
-    model: EnumProperty(name="Model", description="What is learned",
-                        items=(('EXPLICIT', "Splats", "Splats, each with numbers of its own"),
-                               ('FIELD', "Density Field", "A density of anchors, which decodes at any budget")),
+    model: EnumProperty(name="Model", description="What the fit learns: splats, or a density of anchors",
+                        items=(('EXPLICIT', "Splats", "The fit learns splats, each with numbers of its own"),
+                               ('FIELD', "Density Field", "The fit learns a density of anchors, which decodes at any "
+                                                          "budget")),
                         options=set())
     strategy: EnumProperty(name="Strategy", description="How splats are added and removed while they are fitted",
                            items=strategies.strategy_items, default=strategies.BY_QUALITY_NUMBER, options=set())
-    parts: EnumProperty(name="Parts", description="What the strategy does beside, or instead of its own way",
+    parts: EnumProperty(name="Parts", description="Parts of other strategies that are added, or that take the place "
+                                                  "of the strategy's own",
                         items=strategies.part_items, options={'ENUM_FLAG'})
-    density_gradient: BoolProperty(name="Learn Density", description="Move anchors to where they help the picture "
-                                   "most", default=True, options=set())
-    shell: EnumProperty(name="Shell", description="Room behind the objects, for a world or a landscape, and for what "
-                        "closes the gaps of walls",
-                        items=(('AUTO', "Auto", "Where views are opaque: far out, or close behind walls that hide all else"),
+    density_gradient: BoolProperty(name="Learn Density", description="The fit moves anchors to where they help the "
+                                                                     "images most", default=True, options=set())
+    shell: EnumProperty(name="Shell", description="The field gets a shell behind the objects that holds a world or a "
+                                                  "landscape, and fills the gaps between the splats of walls",
+                        items=(('AUTO', "Auto", "The field gets a shell where views are opaque: far out, or close "
+                                                "behind the walls of a closed room"),
                                ('ON', "On", "Always"), ('OFF', "Off", "Never")), options=set())
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,
                       options=set())
-    shown: EnumProperty(name="Show", description="What the 3D view shows until the fit is accepted; renders show the "
-                        "source", items=(('SPLATS', "Splats", "The fit alone"), ('SOURCE', "Source", "What is fitted"),
-                                         ('BOTH', "Both", "One in the other")), options={'SKIP_SAVE'},
+    shown: EnumProperty(name="Show", description="What the 3D view shows until you accept the fit; renders show the "
+                                                 "source", items=(('SPLATS', "Splats", "The 3D view shows the fit "
+                                                                                       "alone"), ('SOURCE', "Source", "The 3D view shows what is "
+                                                                                                                      "fitted"),
+                                         ('BOTH', "Both", "The 3D view shows both")), options={'SKIP_SAVE'},
                         update=fit_proposal.on_shown_change)
     # A bar for Blenders whose layouts have none of their own.
     progress: FloatProperty(name="Progress", subtype='PERCENTAGE', min=0.0, max=100.0, precision=0,
@@ -185,17 +197,17 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
     checkpoint: StringProperty(name="Checkpoint", description="File (.safetensors) that keeps the state of a fit once a "
                                "minute while it runs, so that it can go on after a stop or a crash; empty for none",
                                subtype='FILE_PATH', options=version.RELATIVE_PATH)
-    resume: BoolProperty(name="Go On", description="Go on from the checkpoint where there is one; else begin anew and "
-                         "replace it", default=True, options=set())
+    resume: BoolProperty(name="Go On", description="The fit goes on from the checkpoint if there is one; otherwise it"
+                                                   " starts from the beginning and replaces it", default=True, options=set())
 
 
 class STIPPLE_PG_overlay(bpy.types.PropertyGroup):
     """What the 3D view colours splats by."""
 
-    kind: EnumProperty(name="Color By", description="What splats are coloured by in the 3D view, to look at density "
-                       "control", items=overlays.KINDS, options=set(), update=overlays.on_change)
-    auto_range: BoolProperty(name="Auto Range", description="From the lowest to the highest of what is shown, without a few "
-                             "extremes", default=True, options=set(), update=overlays.on_change)
+    kind: EnumProperty(name="Color By", description="Quantity that colors the splats in the 3D view, to examine "
+                                                    "density control", items=overlays.KINDS, options=set(), update=overlays.on_change)
+    auto_range: BoolProperty(name="Auto Range", description="The color range goes from the lowest to the highest "
+                                                            "value that is shown, without a few extremes", default=True, options=set(), update=overlays.on_change)
     low: FloatProperty(name="From", description="Value of the darkest color", default=0.0, options=set(),
                        update=overlays.on_change)
     high: FloatProperty(name="To", description="Value of the brightest color", default=1.0, options=set(),
@@ -212,60 +224,64 @@ def _on_level_change(self, _context):
 class STIPPLE_PG_quality(bpy.types.PropertyGroup):
     """How exact pictures are: a level, which sets every knob, and the knobs."""
 
-    level: EnumProperty(name="Quality", description="How exact pictures are", items=quality.LEVELS, default='FINAL',
+    level: EnumProperty(name="Quality", description="How exact images are", items=quality.LEVELS, default='FINAL',
                         options=set(), override=_OVERRIDABLE, update=_on_level_change)
-    order: EnumProperty(name="Order", description="Which splat is before which", items=quality.ORDERS, options=set(),
+    order: EnumProperty(name="Order", description="How splats are ordered in depth", items=quality.ORDERS, options=set(),
                         override=_OVERRIDABLE)
-    projection: EnumProperty(name="Projection", description="How splats come into the picture", options=set(),
+    projection: EnumProperty(name="Projection", description="How splats are projected into the image", options=set(),
                              items=quality.PROJECTIONS, override=_OVERRIDABLE)
-    antialiasing: EnumProperty(name="Anti-Aliasing", description="What happens to what is smaller than pixels",
+    antialiasing: EnumProperty(name="Anti-Aliasing", description="How splats that are smaller than pixels are "
+                                                                 "filtered",
                                items=quality.SAMPLINGS, options=set(), override=_OVERRIDABLE)
     samples_per_side: IntProperty(name="Samples", description="Samples along each side of a pixel", default=1, min=1,
                                   max=16, options=set(), override=_OVERRIDABLE)
     sh_degree_limit: IntProperty(name="Harmonics", description="Colors change with the view up to this degree",
                                  default=4, min=0, max=4, options=set(), override=_OVERRIDABLE)
-    precision: EnumProperty(name="Precision", description="Of the numbers that are summed up", items=quality.PRECISIONS,
+    precision: EnumProperty(name="Precision", description="Precision of the numbers in which splats are blended", items=quality.PRECISIONS,
                             options=set(), override=_OVERRIDABLE)
     least_alpha: FloatProperty(name="Cut-Off", description="Splats are skipped where they cover less than this share of "
                                "a pixel", default=1 / 255, min=1e-9, max=0.5, precision=5, options=set(),
                                override=_OVERRIDABLE)
-    budget_share: FloatProperty(name="Share of Splats", description="Splats are merged until this share is left",
+    budget_share: FloatProperty(name="Share of Splats", description="Splats are merged until this share of them is "
+                                                                    "left",
                                 default=1.0, min=0.001, max=1.0, subtype='FACTOR', options=set(), override=_OVERRIDABLE)
 
 
 class STIPPLE_PG_scene(bpy.types.PropertyGroup):
     quality_viewport: PointerProperty(type=STIPPLE_PG_quality)
     quality_render: PointerProperty(type=STIPPLE_PG_quality)
-    compare_first: EnumProperty(name="Left", description="The one half of a comparison", items=quality.SIDES,
+    compare_first: EnumProperty(name="Left", description="Setting of the first half of a comparison", items=quality.SIDES,
                                 default='VIEWPORT', options=set(), override=_OVERRIDABLE)
-    compare_second: EnumProperty(name="Right", description="The other half of a comparison", items=quality.SIDES,
+    compare_second: EnumProperty(name="Right", description="Setting of the second half of a comparison", items=quality.SIDES,
                                  default='RENDER', options=set(), override=_OVERRIDABLE)
     view_color: EnumProperty(
-        name="View-Dependent Color", description="Colors that change with the direction they are seen from. Auto: up to "
-        "the degree of harmonics that carries 99.9 % of the change", items=effects.CHOICES, options=set(),
+        name="View-Dependent Color", description="Colors change with the direction of the view. Auto uses the degree "
+                                                 "of harmonics that carries 99.9 % of the change", items=effects.CHOICES, options=set(),
         override=_OVERRIDABLE)
     exact_projection: EnumProperty(
-        name="Exact Projection", description="Splats are seen along the rays of the pixels instead of as flat ellipses. "
-        "Auto: where ellipses miss by more than a pixel", items=effects.CHOICES, options=set(), override=_OVERRIDABLE)
+        name="Exact Projection", description="Splats are drawn along the rays of the pixels instead of as flat "
+                                             "ellipses. Auto does so where ellipses are wrong by more than a pixel", items=effects.CHOICES, options=set(), override=_OVERRIDABLE)
     zoom_antialiasing: EnumProperty(
-        name="Zoom Anti-Aliasing", description="Splats smaller than pixels keep their light. Auto: where the low-pass "
-        "that they were trained with makes them twice as large", items=effects.CHOICES, options=set(),
+        name="Zoom Anti-Aliasing", description="Splats smaller than pixels keep their light. Auto does so where the "
+                                               "low-pass that they were trained with makes them twice as large", items=effects.CHOICES, options=set(),
         override=_OVERRIDABLE)
     global_order: EnumProperty(
-        name="Global Ordering", description="Splats of all objects are sorted together. Off: each object is drawn as a "
-        "whole, farther ones behind it. Auto: where objects share a range of depth", items=effects.CHOICES,
+        name="Global Ordering", description="Splats of all objects are sorted together. Off draws each object as a "
+                                            "whole, with farther ones behind it. Auto sorts them together where "
+                                            "objects share a range of depth", items=effects.CHOICES,
         options=set(), override=_OVERRIDABLE)
     blur_samples: IntProperty(
-        name="Blur Samples", description="Pictures that depth of field and motion blur are averaged from, 0 for as many "
-        "as the blur needs", default=0, min=0, soft_max=256, max=65536, options=set(), override=_OVERRIDABLE)
+        name="Blur Samples", description="Number of images that depth of field and motion blur average; 0 chooses as "
+                                         "many as the blur needs", default=0, min=0, soft_max=256, max=65536, options=set(), override=_OVERRIDABLE)
     splat_color: EnumProperty(
         name="Splat Color", description="Space in which splats are blended over each other",
         items=(('AS_TRAINED', "As Trained", "Blend in display space, as splats are trained and web viewers show them"),
                ('SCENE_LINEAR', "Scene Linear", "Blend light, as all other objects are")),
         options=set(), override=_OVERRIDABLE)
     meshes_as_mattes: BoolProperty(
-        name="Meshes as Mattes", description="Meshes hide the splats behind them and leave a hole in the picture, for "
-        "putting a render of the meshes there. Shadow catchers hide nothing", default=True, options=set(),
+        name="Meshes as Mattes", description="Meshes hide the splats behind them and leave a hole in the image, in "
+                                             "which a render of the meshes can be composited. Shadow catchers hide "
+                                             "nothing", default=True, options=set(),
         override=_OVERRIDABLE)
     shadow_margin: FloatProperty(
         name="Shadow Margin", description="Splats that are nearer to the camera than a shadow catcher by more than this get "
@@ -274,12 +290,14 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
     fit: PointerProperty(type=STIPPLE_PG_fit)
     overlay: PointerProperty(type=STIPPLE_PG_overlay)
     max_splats: IntProperty(
-        name="Max Splats", description="Splats that the viewport shows at most, over all objects and their instances; 0 "
-        "for no limit. Objects share them in proportion to their own budgets", default=0, min=0, soft_max=10000000,
+        name="Max Splats", description="Maximum number of splats that the viewport shows, over all objects and their "
+                                       "instances; 0 is no limit. Objects share them in proportion to their own "
+                                       "budgets", default=0, min=0, soft_max=10000000,
         options=set(), override=_OVERRIDABLE, update=sync.on_limit_change)
     max_splats_render: IntProperty(
-        name="Max Splats", description="Splats that a render shows at most, over all objects and their instances; 0 for "
-        "no limit. Objects share them in proportion to their own budgets", default=0, min=0, soft_max=100000000,
+        name="Max Splats", description="Maximum number of splats that a render shows, over all objects and their "
+                                       "instances; 0 is no limit. Objects share them in proportion to their own "
+                                       "budgets", default=0, min=0, soft_max=100000000,
         options=set(), override=_OVERRIDABLE)
 
 

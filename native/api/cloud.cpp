@@ -105,7 +105,7 @@ SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options) {
   return write;
 }
 
-const SplatFormat& formatAt(uint64_t index) {
+const SplatFormat& requireFormat(uint64_t index) {
   if (index >= splatFormats().size()) {
     fail(ErrorCode::kInvalidArgument, "index is " + std::to_string(index) + "; 0 to " +
                                           std::to_string(splatFormats().size() - 1) +
@@ -276,7 +276,7 @@ StippleStatus stipple_format_of_file(const char* path_utf8, uint64_t* index) {
 
 StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
   return guarded([&] {
-    const SplatFormat& format = formatAt(index);
+    const SplatFormat& format = requireFormat(index);
     StippleFormatInfo out = {};
     out.can_read = format.read != nullptr ? 1 : 0;
     out.can_write = format.write != nullptr ? 1 : 0;
@@ -298,7 +298,7 @@ StippleStatus stipple_format_estimate(uint64_t index, uint64_t count, uint32_t s
     const int degree =
         enumValue<int>(sh_degree, static_cast<uint32_t>(kMaxShDegree), "sh_degree");
     require(bytes, "bytes") =
-        estimatedFileBytes(formatAt(index), count, degree, writeOptions(options));
+        estimatedFileBytes(requireFormat(index), count, degree, writeOptions(options));
   });
 }
 

@@ -2,10 +2,13 @@
 
 #include <stipple/stipple.h>
 
+#include <memory>
 #include <string>
 
 #include "api/guard.h"
 #include "api/handles.h"
+#include "data/views/view_source.h"
+#include "fit/fit_options.h"
 #include "shot/passes.h"
 #include "shot/shot_settings.h"
 #include "splat/voxels/voxelize.h"
@@ -29,5 +32,11 @@ ShotSettings shotFrom(const StippleRenderOptions* options, const Instances& inst
 
 /// NULL: defaults.
 VoxelizeOptions voxelizeOptionsFrom(const StippleVoxelizeOptions* options);
+
+/// The images of views. Errors: kInvalidArgument where there are cameras alone.
+std::shared_ptr<const ViewSource> sourceOf(const StippleViews& views);
+
+/// In: options as a caller gave them; null, and what a shorter struct lacks, are the defaults.
+FitOptions fitOptionsFrom(const StippleFitOptions* options);
 
 }  // namespace stipple::api

@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "api/fit.h"
+#include "api/conversions.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"

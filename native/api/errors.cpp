@@ -23,7 +23,7 @@ StippleStatus statusOfCurrentException() noexcept {
     setLastError(error.what());
     return static_cast<StippleStatus>(error.code());
   } catch (const std::bad_alloc&) {
-    setLastError("out of memory; fewer splats, a smaller picture or larger voxels need less");
+    setLastError("out of memory; fewer splats, a smaller image or larger voxels need less");
     return STIPPLE_ERROR_OUT_OF_MEMORY;
   } catch (const std::length_error&) {
     setLastError("out of memory; the sizes asked for are larger than any machine's memory");

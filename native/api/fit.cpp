@@ -1,10 +1,8 @@
-#include "api/fit.h"
-
 #include <cstdio>
 #include <limits>
 #include <utility>
 
-#include "api/fit_options.h"
+#include "api/conversions.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
@@ -53,7 +51,7 @@ namespace stipple::api {
 std::shared_ptr<const ViewSource> sourceOf(const StippleViews& views) {
   if (!views.source) {
     fail(ErrorCode::kInvalidArgument,
-         "the views are cameras without pictures; fitting needs pictures");
+         "the views are cameras without images; a fit needs images");
   }
   return views.source;
 }

@@ -1,10 +1,9 @@
-#include "api/fit_options.h"
-
 #include <cstring>
 #include <string>
 #include <type_traits>
 #include <vector>
 
+#include "api/conversions.h"
 #include "api/guard.h"
 #include "fit/fit_option_table.h"
 
@@ -95,20 +94,12 @@ void pointText(StippleFitOptions& options, const FitOption& option, const char* 
   }
 }
 
-/// What stays alive of a table whose values are made.
-struct DefaultTexts {
-  std::vector<std::string> texts;
-  DefaultTexts() {
-    const FitOptions defaults = defaultFitOptions();
-    for (const FitOption& option : fitOptionTable()) {
-      texts.push_back(fitValueText(option, option.member.get(defaults)));
-    }
+/// The texts of a preset, which the table keeps.
+void pointPresetTexts(StippleFitOptions& options, uint32_t model, uint32_t quality) {
+  for (const FitOption& option : fitOptionTable()) {
+    const char* text = option.presets[model][quality];
+    if (text) pointText(options, option, text);
   }
-};
-
-const char* defaultText(size_t index) {
-  static const DefaultTexts kDefaults;
-  return kDefaults.texts[index].c_str();
 }
 
 StippleFitOptionInfo infoOf(size_t index) {
@@ -122,7 +113,7 @@ StippleFitOptionInfo infoOf(size_t index) {
   info.choices_utf8 = option.choices;
   info.minimum = option.minimum;
   info.maximum = option.maximum;
-  info.default_utf8 = defaultText(index);
+  info.default_utf8 = defaultFitText(index);
   std::memcpy(info.presets_utf8, option.presets, sizeof(info.presets_utf8));
   info.former_name_utf8 = option.former_name;
   info.former_unit = option.former_unit;
@@ -159,10 +150,7 @@ StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t mo
     FitOptions changed = taken(chosen);
     applyPreset(changed, kind, wanted);
     give(changed, chosen);
-    for (const FitOption& option : fitOptionTable()) {
-      const char* text = option.presets[model][quality];
-      if (text) pointText(chosen, option, text);
-    }
+    pointPresetTexts(chosen, model, quality);
     deliver(options, chosen, "options");
   });
 }

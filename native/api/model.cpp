@@ -76,11 +76,6 @@ StippleModelSettings settingsFrom(const ModelSettings& settings) {
   return out;
 }
 
-std::shared_ptr<const SplatCloud> decoded(const SplatModel& model, const ModelRequest& request,
-                                          Progress* progress) {
-  return std::make_shared<const SplatCloud>(model.decode(request, progress));
-}
-
 }  // namespace
 
 extern "C" {
@@ -156,7 +151,8 @@ StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecod
     const ModelRequest request = requestFrom(options);
     model->context->requireMemory(source.memoryBound(request), "this budget");
     withThreads(model->context->thread_count, [&] {
-      *cloud = new StippleCloud{model->context, decoded(source, request, nullptr)};
+      *cloud = new StippleCloud{model->context,
+                                std::make_shared<const SplatCloud>(source.decode(request))};
     });
   });
 }
@@ -169,7 +165,7 @@ StippleStatus stipple_model_decode_start(const StippleModel* model,
     const ModelRequest request = requestFrom(options);
     model->context->requireMemory(source->memoryBound(request), "this budget");
     *job = startJob(model->context, [source, request](Progress& progress) -> JobResult {
-      return decoded(*source, request, &progress);
+      return std::make_shared<const SplatCloud>(source->decode(request, &progress));
     });
   });
 }
@@ -180,6 +176,20 @@ StippleStatus stipple_model_decode_memory_bound(const StippleModel* model,
   return guarded([&] {
     const SplatModel& source = *require(model, "model").model;
     require(bytes, "bytes") = source.memoryBound(requestFrom(options));
+  });
+}
+
+StippleStatus stipple_model_keep(const StippleModel* model, const uint8_t* mask,
+                                 uint64_t mask_count, StippleModel** kept) {
+  return guarded([&] {
+    const SplatModel& source = *require(model, "model").model;
+    require(mask, "mask");
+    require(kept, "kept");
+    model->context->requireMemory(source.keepMemoryBound(), "leaving splats out of a tree");
+    withThreads(model->context->thread_count, [&] {
+      *kept =
+          new StippleModel{model->context, source.keep({mask, static_cast<size_t>(mask_count)})};
+    });
   });
 }
 

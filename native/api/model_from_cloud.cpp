@@ -1,14 +1,10 @@
-#include <algorithm>
 #include <cmath>
-#include <utility>
-#include <vector>
+#include <string>
 
 #include "api/guard.h"
 #include "api/job.h"
-#include "model/hierarchy_splats.h"
+#include "model/hierarchy_from_cloud.h"
 #include "train/loop/refine.h"
-#include "train/loop/view_rig.h"
-#include "train/loop/visibility.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -23,14 +19,8 @@ void requireRange(uint32_t value, uint32_t first, uint32_t last, const char* nam
   }
 }
 
-struct HierarchySettings {
-  ViewRigOptions rig;
-  uint32_t view_count = 0;
-  MergeTreeOptions tree;
-};
-
-HierarchySettings hierarchySettings(const StippleModelFromCloudOptions& given) {
-  HierarchySettings settings;
+HierarchyOptions hierarchyOptions(const StippleModelFromCloudOptions& given) {
+  HierarchyOptions settings;
   settings.rig.rig = enumValue<ViewRig>(given.view_rig, 2, "options->view_rig");
   requireRange(given.view_count, 0, 4096, "options->view_count");
   requireRange(given.view_size, 1, 65536, "options->view_size");
@@ -46,14 +36,6 @@ HierarchySettings hierarchySettings(const StippleModelFromCloudOptions& given) {
   return settings;
 }
 
-/// Pictures are over when the tree begins; what they found stays.
-uint64_t hierarchyMemoryBound(const SplatCloud& cloud, const HierarchySettings& settings) {
-  const uint64_t pictures =
-      settings.view_count > 0 ? visibilityMemoryBound(cloud, settings.rig.size) : 0;
-  const uint64_t visibility = settings.view_count > 0 ? cloud.size() * sizeof(float) : 0;
-  return std::max(pictures, mergeTreeMemoryBound(cloud.size(), cloud.sh_degree) + visibility);
-}
-
 RefineOptions refineSettings(const StippleRefineOptions& given) {
   RefineOptions settings;
   requireRange(given.iterations, 0, 1000000, "options->iterations");
@@ -65,19 +47,6 @@ RefineOptions refineSettings(const StippleRefineOptions& given) {
   settings.rig = enumValue<ViewRig>(given.view_rig, 2, "options->view_rig");
   settings.seed = given.seed;
   return settings;
-}
-
-std::shared_ptr<const SplatModel> build(const BackendFactory& backends,
-                                        const std::shared_ptr<const SplatCloud>& cloud,
-                                        const HierarchySettings& settings, Progress& progress) {
-  std::vector<float> visibility;
-  if (settings.view_count > 0) {
-    const std::vector<Camera> views = viewsForVisibility(backends, *cloud, settings.rig);
-    visibility = splatVisibility(backends, *cloud, views, &progress);
-  }
-  auto tree = std::make_shared<const MergeTree>(
-      buildMergeTree(*cloud, visibility, settings.tree, &progress));
-  return makeHierarchySplats(std::make_shared<const HierarchyDecoder>(cloud, std::move(tree)));
 }
 
 }  // namespace
@@ -102,7 +71,7 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
     require(job, "job");
     StippleModelFromCloudOptions defaults;
     stipple_model_from_cloud_options_init(&defaults);
-    const HierarchySettings settings = hierarchySettings(completed(options, defaults, "options"));
+    const HierarchyOptions settings = hierarchyOptions(completed(options, defaults, "options"));
     const std::shared_ptr<const SplatCloud> leaves = cloud->cloud;
     if (leaves->size() == 0) {
       fail(ErrorCode::kInvalidArgument, "the cloud has 0 splats; a hierarchy needs at least 1");
@@ -112,7 +81,7 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
     *job = startJob(
         context->state,
         [leaves, settings, backends = context->state->backends](Progress& progress) -> JobResult {
-          return build(*backends, leaves, settings, progress);
+          return hierarchyFromCloud(*backends, leaves, settings, &progress);
         });
   });
 }

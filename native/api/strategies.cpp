@@ -3,7 +3,6 @@
 #include <stipple/stipple.h>
 
 #include <algorithm>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -17,38 +16,8 @@ using namespace stipple::api;
 
 namespace {
 
-/// What is told of an entry beside its row, which making it tells; kept as long as the library.
-struct EntryFacts {
-  std::string decides;
-  std::vector<StrategySetting> settings;
-};
-
-EntryFacts factsOf(const StrategyEntry& entry) {
-  EntryFacts facts;
-  const ControlRoles owned = rolesOf(entry);
-  for (uint32_t bit = 0; bit < kControlRoleCount; ++bit) {
-    const ControlRole role = static_cast<ControlRole>(1u << bit);
-    if ((owned & roles(role)) == 0) continue;
-    facts.decides += (facts.decides.empty() ? "" : ", ") + std::string(wordsOf(role));
-  }
-  facts.settings = settingsOf(entry);
-  return facts;
-}
-
-/// By name, of strategies and parts.
-const std::map<std::string, EntryFacts>& allFacts() {
-  static const std::map<std::string, EntryFacts> kFacts = [] {
-    std::map<std::string, EntryFacts> all;
-    for (const auto* entries : {&strategyEntries(), &partEntries(), &fieldStrategyEntries()}) {
-      for (const StrategyEntry& entry : *entries) all[entry.name] = factsOf(entry);
-    }
-    return all;
-  }();
-  return kFacts;
-}
-
 void deliverEntry(const StrategyEntry& entry, StippleFitModel model, StippleStrategyInfo* info) {
-  const EntryFacts& facts = allFacts().at(entry.name);
+  const EntryFacts& facts = *findFacts(entry.name);
   StippleStrategyInfo out = {};
   out.model = model;
   out.name_utf8 = entry.name;
@@ -102,13 +71,13 @@ StippleStatus stipple_strategy_setting(const char* name_utf8, uint64_t index,
                                        StippleStrategySetting* setting) {
   return guarded([&] {
     const std::string name = &require(name_utf8, "name_utf8");
-    const auto found = allFacts().find(name);
-    if (found == allFacts().end()) {
+    const EntryFacts* found = findFacts(name);
+    if (!found) {
       fail(ErrorCode::kInvalidArgument, "name_utf8 is '" + name +
                                             "', which is no strategy and no part; "
                                             "stipple_strategy_info lists them");
     }
-    const std::vector<StrategySetting>& settings = found->second.settings;
+    const std::vector<StrategySetting>& settings = found->settings;
     if (settings.empty()) fail(ErrorCode::kInvalidArgument, name + " has no settings");
     requireIndex(index, settings.size());
     const StrategySetting& wanted = settings[static_cast<size_t>(index)];

@@ -10,6 +10,7 @@
 #include "bench/comparison.h"
 #include "bench/openvdb_scatter.h"
 #include "density/anchor_sampling.h"
+#include "density/octree_density.h"
 
 namespace stipple::bench {
 namespace {

@@ -171,12 +171,12 @@ void addAccuracy(CLI::App& app, const Context& context) {
                       "Instead, what iterations brought: of the report that 'fit --report' wrote");
   command->add_option("-o,--out", arguments->out, "Reports: .json, .csv, .svg")->required();
   command->add_option("--repetitions", arguments->repetitions,
-                      "Timings of each setting, in turns; default 7, of volumes 5");
+                      "Timings of each setting, alternately; default 7, for volumes 5");
   command->add_option(
       "--reference-pixels", arguments->reference_pixels,
-      "Compared with the reference, spread over the picture; 0: all; default 65536");
+      "Pixels that are compared with the reference, spread over the image; 0: all; default 65536");
   command->add_option("--seconds", arguments->seconds,
-                      "No further turn begins after so many; default 60");
+                      "Seconds after which no further round begins; default 60");
   command->add_option("--within", arguments->within,
                       "Milliseconds: say the best setting that needs no more");
   command->add_option("--above", arguments->above, "dB: say the cheapest setting that reaches it");

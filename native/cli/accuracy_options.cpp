@@ -35,7 +35,7 @@ void addAccuracyOptions(CLI::App& command, AccuracyArguments& arguments) {
                   "as-trained; mip; samples (see --samples)")
       ->check(CLI::IsMember({"as-trained", "mip", "samples"}));
   command.add_option("--samples", arguments.samples,
-                     "Averages the picture at this many times the size, 1 to 16");
+                     "Averages the image at this many times the size, 1 to 16");
   command.add_option("--degree", arguments.degree, "Harmonics above are left out, 0 to 4");
   command.add_option("--precision", arguments.precision, "Default: of the accuracy")
       ->check(CLI::IsMember({"float", "double"}));

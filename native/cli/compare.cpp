@@ -51,9 +51,9 @@ void addCompare(CLI::App& app, const Context& context) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
-      "compare", "PSNR, SSIM and largest error of two pictures, or differences of two clouds");
-  command->add_option("a", arguments->a, "Picture or splat file")->required();
-  command->add_option("b", arguments->b, "Picture or splat file of the same kind")->required();
+      "compare", "PSNR, SSIM and largest error of two images, or differences of two clouds");
+  command->add_option("a", arguments->a, "Image or splat file")->required();
+  command->add_option("b", arguments->b, "Image or splat file of the same kind")->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([arguments, &context] {
     const FileKind kind = fileKind(arguments->a);

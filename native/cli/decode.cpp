@@ -168,7 +168,8 @@ void addDecode(CLI::App& app, const Context& context) {
   command->add_option("--ratio", arguments->ratio, "Budget as a share of existing splats, 0..1")
       ->excludes(anchors);
   command->add_option("--refine", arguments->refine,
-                      "Existing splats: steps that fit the result to pictures of all of them");
+                      "Existing splats: number of steps that fit the result to images of all of "
+                      "them");
   command
       ->add_option("--gaussians-per-anchor", arguments->gaussians_per_anchor,
                    "Splats made of each anchor")

@@ -61,26 +61,26 @@ void addDensify(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   Arguments& to = *arguments;
   CLI::App* command = app.add_subcommand(
-      "densify", "Splits, copies and removes splats where pictures ask for it; nothing is trained");
+      "densify", "Splits, copies and removes splats where images ask for it; nothing is trained");
   command->add_option("in", to.in, "Splats")->required();
   command->add_option("out", to.out, "Splats (.ply and others)")->required();
   command
       ->add_option("--dataset", to.dataset,
-                   "COLMAP folder, or transforms.json or its folder, with the pictures")
+                   "COLMAP folder, or transforms.json or its folder, with the images")
       ->required();
   command->add_option("--strategy", to.strategy, "How splats are added and removed")
       ->capture_default_str();
   command->add_option("--gaussians", to.gaussians,
-                      "The most splats there may be; default: twice as many as there are");
+                      "Maximum number of splats; default: twice as many as there are");
   command->add_option("--events", to.events, "How often splats multiply and go")
       ->capture_default_str();
-  command->add_option("--downscale", to.downscale, "Pictures are made smaller by this factor")
+  command->add_option("--downscale", to.downscale, "Images are made smaller by this factor")
       ->capture_default_str();
-  command->add_option("--holdout", to.holdout, "Every so many-th picture is left out; 0: none")
+  command->add_option("--holdout", to.holdout, "Every N-th view is left out; 0: none")
       ->capture_default_str();
   command
       ->add_option("--picture-memory", to.picture_mib,
-                   "MiB of pictures kept; others are read again whenever they are wanted")
+                   "MiB of images that are kept; others are read again whenever they are wanted")
       ->capture_default_str();
   command->add_option("--seed", to.seed)->capture_default_str();
   command->callback([arguments, &context] { densify(context, *arguments); });

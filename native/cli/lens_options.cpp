@@ -43,19 +43,19 @@ void addLensOptions(CLI::App& command, LensArguments& arguments) {
       .add_option("--field-of-view", arguments.field_of_view, "Of a fisheye, degrees, up to 360")
       ->capture_default_str();
   command.add_option("--aperture", arguments.aperture_radius,
-                     "Radius of the lens's opening, metres; default: everything is sharp");
+                     "Radius of the aperture, metres; default: everything is sharp");
   command.add_option("--focus-distance", arguments.focus_distance,
                      "Metres; needed with --aperture");
   command.add_option("--blades", arguments.blades,
-                     "Corners of the opening, 3 to 64; default: round");
+                     "Corners of the aperture, 3 to 64; default: round");
   command.add_option("--aperture-rotation", arguments.rotation, "Degrees");
-  command.add_option("--aperture-ratio", arguments.ratio, "Height of the opening over its width")
+  command.add_option("--aperture-ratio", arguments.ratio, "Height of the aperture over its width")
       ->capture_default_str();
   command.add_option("--moves-to", arguments.moves_to,
                      "The view where the camera is when the shutter closes: motion blur");
   command.add_option(
       "--blur-samples", arguments.samples,
-      "Pictures that are averaged over lens, time and pixel, 1 to 65536; default: by "
+      "Number of images that are averaged over aperture, time and pixel, 1 to 65536; default: by "
       "how far they spread the splats");
 }
 

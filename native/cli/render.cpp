@@ -114,7 +114,7 @@ void render(const Context& context, const Arguments& arguments) {
 
 void addRender(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("render", "A picture of splats");
+  CLI::App* command = app.add_subcommand("render", "Draws an image of splats");
   command->add_option("in", arguments->in, "Splat files, rendered together")->required();
   addCameraOptions(*command, arguments->camera);
   addLensOptions(*command, arguments->lens);

@@ -81,6 +81,18 @@ std::vector<Term> parse(const std::string& text) {
   return terms;
 }
 
+EntryFacts madeFacts(const StrategyEntry& entry) {
+  EntryFacts facts;
+  const ControlRoles owned = rolesOf(entry);
+  for (uint32_t bit = 0; bit < kControlRoleCount; ++bit) {
+    const ControlRole role = static_cast<ControlRole>(1u << bit);
+    if ((owned & roles(role)) == 0) continue;
+    facts.decides += (facts.decides.empty() ? "" : ", ") + std::string(wordsOf(role));
+  }
+  facts.settings = settingsOf(entry);
+  return facts;
+}
+
 }  // namespace
 
 StrategySettings::StrategySettings(std::string owner, std::map<std::string, double> values)
@@ -148,6 +160,18 @@ ControlRoles rolesOf(const StrategyEntry& entry) {
   ControlRoles owned = 0;
   for (const auto& part : entry.make(settings).parts) owned |= part->owns();
   return owned;
+}
+
+const EntryFacts* findFacts(const std::string& name) {
+  static const std::map<std::string, EntryFacts> kFacts = [] {
+    std::map<std::string, EntryFacts> all;
+    for (const auto* entries : {&strategyEntries(), &partEntries(), &fieldStrategyEntries()}) {
+      for (const StrategyEntry& each : *entries) all[each.name] = madeFacts(each);
+    }
+    return all;
+  }();
+  const auto found = kFacts.find(name);
+  return found == kFacts.end() ? nullptr : &found->second;
 }
 
 std::unique_ptr<Strategy> makeStrategy(const std::string& text) {

@@ -73,6 +73,15 @@ std::vector<StrategySetting> settingsOf(const StrategyEntry& entry);
 /// What it decides; 0 for those of fields.
 ControlRoles rolesOf(const StrategyEntry& entry);
 
+/// What is told of an entry beside its row, found by making it.
+struct EntryFacts {
+  std::string decides;  ///< words for its roles, with commas between
+  std::vector<StrategySetting> settings;
+};
+
+/// The facts of the strategy or part of this name, or null; they last as long as the library.
+const EntryFacts* findFacts(const std::string& name);
+
 /// A strategy with the settings of its publication, and parts beside or instead of its own:
 /// "adaptive", "adaptive+long_axis_split+growth_control", "improved(threshold=0.0002)". A part
 /// takes the place of the strategy's own that decides the same. Errors: kInvalidArgument for a

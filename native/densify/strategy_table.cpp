@@ -88,7 +88,7 @@ const std::vector<StrategyEntry>& strategyEntries() {
   static const std::vector<StrategyEntry> kEntries = {
       {.name = "adaptive",
        .label = "Adaptive",
-       .summary = "Copies small splats and splits large ones that the pictures pull at",
+       .summary = "Copies small splats and splits large ones at which the images pull",
        .make = makeAdaptive},
       {.name = "absolute",
        .label = "Absolute",
@@ -97,7 +97,7 @@ const std::vector<StrategyEntry>& strategyEntries() {
       {.name = "improved",
        .label = "Improved",
        .summary =
-           "Splits along the longest side where pictures have edges: sharper with fewer splats",
+           "Splits along the longest side where images have edges: sharper with fewer splats",
        .make = improvedControl},
       {.name = "direction",
        .label = "Direction",
@@ -118,15 +118,15 @@ const std::vector<StrategyEntry>& strategyEntries() {
        .make = mcmcControl},
       {.name = "metropolis",
        .label = "Metropolis",
-       .summary = "Tries new splats where pictures are wrong and keeps them where there is room",
+       .summary = "Tries new splats where images are wrong and keeps them where there is room",
        .make = metropolisControl},
       {.name = "taming",
        .label = "Taming",
-       .summary = "Spends a budget of splats on those that matter most to the pictures",
+       .summary = "Spends a budget of splats on those that matter most to the images",
        .make = tamingControl},
       {.name = "revised",
        .label = "Revised",
-       .summary = "Multiplies the splats that show what pictures get wrong, at a steady pace",
+       .summary = "Multiplies the splats with the largest errors of the images, at a steady pace",
        .make = revisedControl},
       // Further strategies go here.
   };
@@ -137,7 +137,7 @@ const std::vector<StrategyEntry>& partEntries() {
   static const std::vector<StrategyEntry> kEntries = {
       {.name = "edge_aware_score",
        .label = "Edge Aware Score",
-       .summary = "Adds detail first where the pictures have edges",
+       .summary = "Adds detail first where the images have edges",
        .make = edgeAwareScore,
        .bit = 0},
       {.name = "long_axis_split",
@@ -173,7 +173,7 @@ const std::vector<StrategyEntry>& partEntries() {
       {.name = "filter_3d",
        .label = "Filter 3D",
        .summary =
-           "Makes no splat finer than the pictures can show, so that zooming in stays smooth",
+           "Makes no splat finer than the images can show, so that zooming in stays smooth",
        .make = filter3dPart,
        .bit = 7},
       // Further parts go here, each with the next bit.
@@ -185,7 +185,7 @@ const std::vector<StrategyEntry>& fieldStrategyEntries() {
   static const std::vector<StrategyEntry> kEntries = {
       {.name = "learned_density",
        .label = "Learned Density",
-       .summary = "Moves a density towards the places where splats bring pictures nearest"},
+       .summary = "Moves a density towards the places where splats bring images nearest"},
   };
   return kEntries;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -74,6 +75,10 @@ const char* fitQualityNames();
 
 /// The value as a user writes it: a word of a choice, "1GiB", 0.2.
 std::string fitValueText(const FitOption& option, const FitValue& value);
+
+/// The default of the option in this row of the table, as a user writes it; it lasts as long as the
+/// library.
+const char* defaultFitText(size_t index);
 
 /// What requireFitOptions() allows, for a message or a help: "1 to 10000000".
 std::string fitRangeText(const FitOption& option);

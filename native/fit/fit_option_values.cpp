@@ -96,6 +96,18 @@ std::string fitValueText(const FitOption& option, const FitValue& value) {
   return std::to_string(count);
 }
 
+const char* defaultFitText(size_t index) {
+  static const std::vector<std::string> kTexts = [] {
+    const FitOptions defaults = defaultFitOptions();
+    std::vector<std::string> texts;
+    for (const FitOption& option : fitOptionTable()) {
+      texts.push_back(fitValueText(option, option.member.get(defaults)));
+    }
+    return texts;
+  }();
+  return kTexts[index].c_str();
+}
+
 std::string fitRangeText(const FitOption& option) {
   if (option.kind == FitOptionKind::kText) return "any text";
   if (option.kind == FitOptionKind::kSwitch) return "0 or 1";

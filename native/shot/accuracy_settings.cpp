@@ -14,14 +14,15 @@ constexpr const char* kLevelNames[kAccuracyLevelCount] = {"draft", "preview", "f
 
 constexpr AccuracyKnob kKnobs[] = {
     {"order", "Order", false,
-     "No bound: by their centres, one of two splats that cross is in front as a whole, and changes "
-     "at once when the camera turns. By pixel, the order is exact."},
+     "No bound: by their centres, one of two splats that cross is in front as a whole, and they "
+     "swap at once when the camera rotates. By pixel, the order is exact."},
     {"projection", "Projection", false,
-     "No bound: affine ellipses are wrong for splats that fill a wide angle, far from the axis or "
-     "close to the camera. Along rays the picture of each splat is exact."},
+     "No bound: affine ellipses are wrong for splats that fill a wide angle, far from the axis or"
+     " close to the camera. Along rays the image of each splat is exact."},
     {"antialiasing", "Anti-aliasing", false,
-     "No bound, another filter: as trained, splats smaller than a pixel grow when zoomed out. Mip "
-     "keeps their light; samples average a larger picture, at the square of their number in time."},
+     "No bound, another filter: as trained, splats smaller than a pixel grow when zoomed out. Mip"
+     " keeps their light; samples average a larger image, which takes the square of their number "
+     "in time."},
     {"samples_per_side", "Samples per Side", false,
      "No bound: detail finer than a sample still counts as one; the error falls with the number of "
      "samples, which cost their square in time."},

@@ -86,7 +86,8 @@ void requireDerivative(const ShotSettings& settings, const Instances& instances)
     refuse(methodText(settings.method) + "; derivatives have 0 (tiled) only");
   }
   if (isSampled(settings.sampling)) {
-    refuse("options has a lens, a shutter or samples; derivatives are those of one sharp picture");
+    refuse("options has an aperture, a shutter or samples; derivatives are those of one sharp "
+           "image");
   }
   if (settings.options.surface.depth || settings.splat_light) {
     refuse("options has a surface or a splat_light; derivatives are those of splats alone");
@@ -107,7 +108,7 @@ void requireMeasurable(const ShotSettings& settings) {
     refuse("render->accuracy is set, which measuring chooses itself; it must be NULL");
   }
   if (isSampled(settings.sampling)) {
-    refuse("render has a lens, a shutter or samples; what is measured is one sharp picture");
+    refuse("render has an aperture, a shutter or samples; what is measured is one sharp image");
   }
   if (settings.method != ShotMethod::kTiled) {
     refuse("render->method is " + std::to_string(static_cast<uint32_t>(settings.method)) +

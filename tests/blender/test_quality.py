@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How exact pictures are: levels in both engines and the view, measuring, choosing, comparing."""
+"""How exact images are: levels in both engines and the view, measuring, choosing, comparing."""
 
 import importlib
 import json

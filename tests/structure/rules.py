@@ -47,7 +47,6 @@ LINE_LIMIT = 600
 PROSE_WIDTH = 120  # characters of a line of documentation
 PAGES_BY_TESTS = {'docs/numerical_stability.md'}  # a test writes them, as wide as it likes
 FILE_LIMIT = 40  # of one folder
-MORE_FILES_ALLOWED = {'native/api'}  # until what is not marshalling has left it
 LONGER_ALLOWED = {'native/include/stipple/stipple.h'}  # one public header: it is the manual
 
 # Everything that only exists inside Blender.
@@ -197,15 +196,11 @@ def crowded_folders(root):
     counts = collections.Counter(os.path.dirname(name) for name in project_files(root)
                                  if name.startswith(('native/', 'addon/')))
     return [f'{folder}: {count} files, at most {FILE_LIMIT} are allowed' for folder, count in sorted(counts.items())
-            if count > FILE_LIMIT and folder not in MORE_FILES_ALLOWED]
+            if count > FILE_LIMIT]
 
 
 # Errors, handles and jobs: what every exported function stands on.
 BOUNDARY_MACHINERY = {'errors.cpp', 'guard.h', 'handles.h', 'job.cpp', 'job.h'}
-# Files of native/api that still hold more than marshalling; each leaves this list when its work has a room.
-MORE_THAN_MARSHALLING = {'native/api/' + name for name in (
-    'densify.cpp', 'field.cpp', 'field.h', 'fit.cpp', 'fit.h', 'fit_session.cpp', 'fit_settings.cpp',
-    'hierarchy.cpp', 'hierarchy.h', 'model.cpp')}
 FUNCTION_LIMIT = 40  # lines of a function of native/api
 # What a conversion has no use for: it measures no time, draws no numbers and sorts nothing.
 NO_CONVERSION_INCLUDES = {'chrono', 'numeric', 'random', 'execution'}
@@ -287,23 +282,18 @@ def _what_is_wrong(head, body, is_machinery):
         yield f'{name} calls {call.group(1)}'
 
 
-def boundary_violations(root, excepted=None):
-    """What of native/api is not marshalling, and exceptions that are none any more."""
-    excepted = MORE_THAN_MARSHALLING if excepted is None else excepted
+def boundary_violations(root):
+    """What of native/api is not marshalling."""
     found = []
     for name in project_files(root):
         folder, _, file = name.rpartition('/')
         if folder != 'native/api' or not file.endswith(('.cpp', '.h')):
             continue
         path = pathlib.Path(root) / name
-        wrong = [f'{name}:{line}: {included}: a conversion has no use for it' for line, included in includes(path)
-                 if included in NO_CONVERSION_INCLUDES]
+        found += [f'{name}:{line}: {included}: a conversion has no use for it' for line, included in includes(path)
+                  if included in NO_CONVERSION_INCLUDES]
         for head, body, line in functions_of(path.read_text(encoding='utf-8')):
-            wrong += [f'{name}:{line}: {reason}' for reason in _what_is_wrong(head, body, file in BOUNDARY_MACHINERY)]
-        if name not in excepted:
-            found += wrong
-        elif not wrong:
-            found.append(f'{name}: is marshalling alone and needs no exception')
+            found += [f'{name}:{line}: {reason}' for reason in _what_is_wrong(head, body, file in BOUNDARY_MACHINERY)]
     return found
 
 

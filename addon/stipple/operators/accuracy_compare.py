@@ -27,9 +27,11 @@ class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
 
     first: EnumProperty(name="Left", items=quality.SIDES, default='VIEWPORT')
     second: EnumProperty(name="Right", items=quality.SIDES, default='RENDER')
-    show: EnumProperty(name="Show", items=(('WIPE', "Wipe", "One to the left of a line, the other to its right"),
-                                           ('ERROR', "Error × 10", "How far apart they are, ten times as large")))
-    wipe: FloatProperty(name="Line", description="Where the line is", default=0.5, min=0.0, max=1.0, subtype='FACTOR')
+    show: EnumProperty(name="Show", items=(('WIPE', "Wipe", "The first setting is to the left of a line and the "
+                                                            "second to its right"),
+                                           ('ERROR', "Error × 10", "The image shows ten times the difference of the "
+                                                                   "two settings")))
+    wipe: FloatProperty(name="Line", description="Position of the line between the two settings", default=0.5, min=0.0, max=1.0, subtype='FACTOR')
 
     def invoke(self, context, _event):
         return self.run_in_window(context)

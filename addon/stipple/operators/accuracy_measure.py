@@ -14,14 +14,14 @@ from ..scene.view import measured_quality, quality, rendered_view
 
 
 class STIPPLE_OT_accuracy_measure(JobOperator, bpy.types.Operator):
-    """Draw the present view with all settings in turns, on this machine, and compare them with the reference"""
+    """Draw the present view with all settings alternately, on this machine, and compare them with the reference"""
 
     bl_idname = 'stipple.accuracy_measure'
     bl_label = "Measure This View"
     bl_options = {'REGISTER'}
 
-    repetitions: IntProperty(name="Repetitions", description="Timings of each setting", default=7, min=1, max=1000)
-    most_seconds: FloatProperty(name="Time", description="No further turn of timings begins after this", default=60.0,
+    repetitions: IntProperty(name="Repetitions", description="Number of timings of each setting", default=7, min=1, max=1000)
+    most_seconds: FloatProperty(name="Time", description="Seconds after which no further round of timings begins", default=60.0,
                                 min=0.1, subtype='TIME_ABSOLUTE', unit='TIME_ABSOLUTE')
     filepath: StringProperty(name="Report", description="File for the report (.json, .csv or .svg); empty for none",
                              subtype='FILE_PATH')
@@ -65,10 +65,13 @@ class STIPPLE_OT_accuracy_choose(bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     column: EnumProperty(name="For", items=quality.COLUMNS, default='RENDER')
-    by: EnumProperty(name="Choose", items=(('TIME', "Best Within", "The best setting of at most so many milliseconds"),
-                                           ('QUALITY', "Cheapest Above", "The fastest setting of at least so many dB")))
+    by: EnumProperty(name="Choose", items=(('TIME', "Best Within", "Choose the best setting that takes no more than "
+                                                                   "this many milliseconds"),
+                                           ('QUALITY', "Cheapest Above", "Choose the fastest setting that reaches "
+                                                                         "this many dB")))
     milliseconds: FloatProperty(name="Milliseconds", default=100.0, min=0.0, soft_max=10000.0)
-    decibels: FloatProperty(name="PSNR", description="dB: from 45 on it looks identical, from 38 on it is hard to see",
+    decibels: FloatProperty(name="PSNR", description="Quality in dB: from 45 on the image looks identical, from 38 on"
+                                                     " the difference is hard to see",
                             default=38.0, min=0.0, soft_max=100.0)
 
     @classmethod

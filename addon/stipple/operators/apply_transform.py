@@ -13,7 +13,7 @@ from ..scene.source import edits, placement, source_settings, sources, sync
 
 
 class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
-    """Move, turn and scale the splats themselves as their object does, harmonics included"""
+    """Move, rotate and scale the splats themselves as their object does, harmonics included"""
 
     bl_idname = 'stipple.apply_transform'
     bl_label = "Apply Transform to Splats"

@@ -25,8 +25,8 @@ class STIPPLE_OT_cameras_import(bpy.types.Operator, ImportHelper):
     backgrounds: BoolProperty(name="Background Images", default=True, description="Show each camera's photo behind its "
                               "view. Photos of a lens that distorts are shown as they are: they fit the view in the middle "
                               "and drift off towards the edges, while fitting takes the distortion out")
-    up_axis: EnumProperty(name="Up Axis", description="Which way is up in the data set; choose the same for splats that "
-                          "were fitted to it", items=photo_cameras.UP_AXES)
+    up_axis: EnumProperty(name="Up Axis", description="The up direction of the data set; choose the same for splats "
+                                                      "that were fitted to it", items=photo_cameras.UP_AXES)
     set_resolution: BoolProperty(name="Set Resolution", description="Give the scene the first photo's resolution, so that "
                                  "the camera's view has its frame", default=True)
 

@@ -20,11 +20,12 @@ class STIPPLE_OT_delete_floaters(JobOperator, bpy.types.Operator):
     by_opacity: BoolProperty(name="Faint", default=True)
     min_opacity: FloatProperty(name="Minimum Opacity", default=0.02, min=0.0, max=1.0, subtype='FACTOR')
     by_size: BoolProperty(name="Large", default=True)
-    max_size: FloatProperty(name="Maximum Size", description="Standard deviation along the longest axis, in the file's "
-                            "units, 0 to tell from the splats' own sizes", default=0.0, min=0.0)
+    max_size: FloatProperty(name="Maximum Size", description="Largest standard deviation along the longest axis, in "
+                                                             "the file's units; 0 derives it from the splats' own "
+                                                             "sizes", default=0.0, min=0.0)
     by_connectivity: BoolProperty(name="Isolated", default=True)
-    radius: FloatProperty(name="Gap", description="Splats this near to each other hang together, in the file's units, 0 "
-                          "to tell from their distances", default=0.0, min=0.0)
+    radius: FloatProperty(name="Gap", description="Splats within this distance belong to one group, in the file's "
+                                                  "units; 0 derives it from their distances", default=0.0, min=0.0)
     min_group: IntProperty(name="Smallest Group", description="Groups of fewer splats are hidden, 0 for a thousandth of "
                            "all", default=0, min=0)
 

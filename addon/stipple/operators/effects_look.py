@@ -11,7 +11,7 @@ from ..scene.view import rendered_view
 class STIPPLE_OT_effects_look(bpy.types.Operator):
     bl_idname = 'stipple.effects_look'
     bl_label = "Look at This View"
-    bl_description = "Look at the splats that the camera sees now, and say which effects a picture of them needs"
+    bl_description = "Examine the splats that the camera sees now, and say which effects an image of them needs"
     bl_options = {'REGISTER'}
 
     @classmethod

@@ -8,7 +8,7 @@ from ..scene.view import effect_costs, effects, rendered_view
 
 
 class STIPPLE_OT_effects_measure(JobOperator, bpy.types.Operator):
-    """Draw the present view with and without each active effect, and show what each takes"""
+    """Draw the present view with and without each active effect, and show how much time each takes"""
 
     bl_idname = 'stipple.effects_measure'
     bl_label = "Measure Costs"

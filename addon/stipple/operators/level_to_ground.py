@@ -22,7 +22,7 @@ class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.O
     use_points: BoolProperty(name="Pick Points", description="Three points of the floor, instead of a search for it",
                              default=False)
     points: FloatVectorProperty(name="Points", size=9, options={'SKIP_SAVE', 'HIDDEN'})
-    max_tilt: FloatProperty(name="Maximum Tilt", description="How far from level the floor may be now", default=0.785398,
+    max_tilt: FloatProperty(name="Maximum Tilt", description="Maximum angle between the floor and level now", default=0.785398,
                             min=0.0174533, max=1.570796, subtype='ANGLE')
     seed: IntProperty(name="Seed", description="Another seed may find another plane", default=0, min=0)
 

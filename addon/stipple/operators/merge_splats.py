@@ -12,7 +12,7 @@ from ..scene.source import edits, masks, placement, sources, splat_data, sync
 
 
 class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
-    """Join the selected splats into the active object, with their harmonics turned along"""
+    """Join the selected splats into the active object, and rotate their harmonics with them"""
 
     bl_idname = 'stipple.merge_splats'
     bl_label = "Merge Splats"

@@ -19,10 +19,9 @@ class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
 
     strategy: StringProperty(name="Strategy", description="How splats are added and removed; empty for the strategy of "
                              "the fit's settings")
-    events: IntProperty(name="Events", description="How often splats multiply and go; between two all views are looked "
-                        "at again", default=1, min=1, soft_max=20, max=1000)
-    max_splats: IntProperty(name="Splats", description="There are never more splats than this; 0 for twice as many as "
-                            "there are", default=0, min=0, max=100000000)
+    events: IntProperty(name="Events", description="How often splats multiply and are removed; between two events all"
+                                                   " views are drawn again", default=1, min=1, soft_max=20, max=1000)
+    max_splats: IntProperty(name="Splats", description="Maximum number of splats; 0 is twice as many as there are", default=0, min=0, max=100000000)
 
     @classmethod
     def poll(cls, context):

@@ -34,12 +34,13 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     use_selection: BoolProperty(name="Selected Only", description="Export selected splats only, instead of all that are "
                                 "visible", default=True)
     budget: EnumProperty(name="Budget", items=BUDGETS)
-    apply_transform: BoolProperty(name="Apply Transform", description="Write the splats where their objects put them, with "
-                                  "their harmonics turned; otherwise in the active object's own space", default=True)
+    apply_transform: BoolProperty(name="Apply Transform", description="Write the splats where their objects put them,"
+                                                                      " with their harmonics rotated; otherwise in "
+                                                                      "the active object's own space", default=True)
     apply_grade: BoolProperty(name="Apply Grade", description="Write colors and opacities with the Color Grade of each "
                               "object, which the file then has for good; otherwise as they were before it", default=True)
-    up_axis: EnumProperty(name="Up Axis", description="Which way is up in the file, where the transform is applied",
-                          items=(('AUTO', "By Format", "As files of this format usually are"),) + UP_AXES[1:])
+    up_axis: EnumProperty(name="Up Axis", description="The up direction of the file, where the transform is applied",
+                          items=(('AUTO', "By Format", "The frame that files of this format usually have"),) + UP_AXES[1:])
     max_degree: IntProperty(name="Harmonics", description="Highest degree of the colors' harmonics that is written, 0 for "
                             "colors that do not change with the view", default=4, min=0, max=4)
     frames: EnumProperty(name="Frames", items=frames_out.FRAMES, options={'SKIP_SAVE'})

@@ -28,11 +28,12 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
     filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
-    up_axis: EnumProperty(name="Up Axis", description="Which way is up in the files; objects are turned, their data stay "
-                          "as they are", items=preferences.UP_AXES)
+    up_axis: EnumProperty(name="Up Axis", description="The up direction of the files; the objects are rotated, and "
+                                                      "their data stay as they are", items=preferences.UP_AXES)
 
-    as_sequence: BoolProperty(name="As Sequence", description="Numbered files become one object that shows one of them "
-                              "for each frame. One file that is chosen alone stands for all of its series",
+    as_sequence: BoolProperty(name="As Sequence", description="Numbered files become one object that shows one of "
+                                                              "them in each frame. A single chosen file stands for "
+                                                              "all of its series",
                               default=False)
 
     _asked = False

@@ -22,10 +22,10 @@ class STIPPLE_OT_splats_to_mesh(JobOperator, bpy.types.Operator):
     voxel_size: FloatProperty(name="Voxel Size", description="Side of a voxel, 0 to take the resolution. Details smaller "
                               "than two voxels are lost", default=0.0, soft_min=0.0, subtype='DISTANCE', unit='LENGTH',
                               precision=4)
-    threshold: FloatProperty(name="Threshold", description="How opaque a voxel has to be to lie inside the mesh: lower "
-                             "takes haze along, higher only what is solid", default=0.5, min=0.001, max=0.999,
+    threshold: FloatProperty(name="Threshold", description="How opaque a voxel has to be to lie inside the mesh: a "
+                                                           "low value includes haze, a high one only what is solid", default=0.5, min=0.001, max=0.999,
                              subtype='FACTOR', precision=3)
-    adaptivity: FloatProperty(name="Adaptivity", description="Larger faces where the surface is flat", default=0.0,
+    adaptivity: FloatProperty(name="Adaptivity", description="Make larger faces where the surface is flat", default=0.0,
                               min=0.0, max=1.0, subtype='FACTOR')
     largest_only: BoolProperty(name="Largest Piece Only", description="Leave out floating pieces and hollows inside",
                                default=True)

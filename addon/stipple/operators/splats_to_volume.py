@@ -16,7 +16,7 @@ from ..scene.source import placement, sources, splat_data
 
 
 class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper):
-    """Turn the selected splats into a volume of density and color"""
+    """Make a volume of density and color from the selected splats"""
 
     bl_idname = 'stipple.splats_to_volume'
     bl_label = "Splats to Volume"
@@ -24,8 +24,9 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
 
     filename_ext = '.vdb'
     filter_glob: StringProperty(default='*.vdb', options={'HIDDEN'})
-    resolution: IntProperty(name="Resolution", description="Voxels along the longest side, where Voxel Size is 0; of a "
-                            "sequence, along that of its largest frame", default=256, soft_min=8, soft_max=2048)
+    resolution: IntProperty(name="Resolution", description="Number of voxels along the longest side, where Voxel Size"
+                                                           " is 0; for a sequence, along the longest side of its "
+                                                           "largest frame", default=256, soft_min=8, soft_max=2048)
     voxel_size: FloatProperty(name="Voxel Size", description="Side of a voxel, 0 to take the resolution", default=0.0,
                               soft_min=0.0, subtype='DISTANCE', unit='LENGTH', precision=4)
     frames: EnumProperty(name="Frames", items=frames_out.FRAMES, options={'SKIP_SAVE'})

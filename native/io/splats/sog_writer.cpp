@@ -22,7 +22,7 @@
 #include "io/splats/sog_file.h"
 #include "io/splats/sog_meta.h"
 #include "io/webp_image.h"
-#include "math/vector_palette.h"
+#include "math/clusters/vector_palette.h"
 
 namespace stipple {
 

@@ -274,7 +274,7 @@ TEST_F(Backward, RefusesWhatHasNoDerivative) {
   expectRefused(seen.plain(), "options->method is 1; derivatives have 0 (tiled) only");
   options_.method = STIPPLE_RENDER_TILED;
   options_.samples = 4;
-  expectRefused(seen.plain(), "derivatives are those of one sharp picture");
+  expectRefused(seen.plain(), "derivatives are those of one sharp image");
   options_.samples = 0;
   options_.output_colour = STIPPLE_OUTPUT_SCENE_LINEAR;
   expectRefused(seen.plain(), "derivatives are those of 1 (composited)");

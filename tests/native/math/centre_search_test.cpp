@@ -1,4 +1,4 @@
-#include "math/centre_search.h"
+#include "math/clusters/centre_search.h"
 
 #include <gtest/gtest.h>
 

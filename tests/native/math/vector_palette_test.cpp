@@ -1,4 +1,4 @@
-#include "math/vector_palette.h"
+#include "math/clusters/vector_palette.h"
 
 #include <gtest/gtest.h>
 

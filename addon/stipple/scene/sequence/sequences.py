@@ -25,7 +25,7 @@ from ..source import masks, source_settings, sources
 MODES = (('CLIP', "Clip", "Nothing before the first and after the last file"),
          ('EXTEND', "Extend", "The first file before the start, the last one after the end"),
          ('REPEAT', "Repeat", "From the first file again after the last one"),
-         ('PING_PONG', "Ping-Pong", "Forward and backward in turn"))
+         ('PING_PONG', "Ping-Pong", "The files play forward and backward alternately"))
 GAPS = (('ERROR', "Stop", "A missing file is an error: the panel says so, and a render fails"),
         ('HOLD', "Hold Previous", "In place of a missing file, the one before it is shown"))
 

@@ -12,9 +12,9 @@ from functools import lru_cache
 from ...binding.structs import BudgetUnit
 
 KINDS = (('NONE', "None", "The splats have no source"),
-         ('MODEL', "Model", "Splats at any budget"),
-         ('CLOUD', "Splats", "Splats as they are"),
-         ('TREE', "Splat Tree", "Splats of a file at any budget"))
+         ('MODEL', "Model", "The source decodes to splats at any budget"),
+         ('CLOUD', "Splats", "The source is splats, shown as they are"),
+         ('TREE', "Splat Tree", "The source is a splat file, shown at any budget"))
 # Properties of a datablock that note_model() and note_cloud() set.
 PROPERTIES = ('source_kind', 'source_settings', 'learned_gaussians', 'learned_least', 'learned_most')
 _MAX_INT = 2**31 - 1  # of Blender's properties

@@ -6,14 +6,17 @@ import struct
 from ...binding import accuracy as native
 from ...binding.structs import AccuracyLevel, Effect, Precision, Projection, Sampling, SplatOrder
 
-LEVELS = (('DRAFT', "Draft", "A quarter of the splats with plain colors, for finding a view"),
-          ('PREVIEW', "Preview", "Half of the splats, for trying things"),
-          ('FINAL', "Final", "All splats, as they are trained"),
-          ('REFERENCE', "Reference", "Exact along every ray, without any limit: the yardstick, many times as slow"))
-ORDERS = (('CENTRE', "By Center", "Splats come as wholes, in the order of their centers"),
-          ('PIXEL', "By Pixel", "Right where splats cross, and nothing pops when the camera turns"))
+LEVELS = (('DRAFT', "Draft", "Draw a quarter of the splats with plain colors, for finding a view"),
+          ('PREVIEW', "Preview", "Draw half of the splats, for experiments"),
+          ('FINAL', "Final", "Draw all splats, as they are trained"),
+          ('REFERENCE', "Reference", "Draw exactly along every ray, without any limit. Other levels are compared with"
+                                     " this one, which is many times as slow"))
+ORDERS = (('CENTRE', "By Center", "Splats are ordered as wholes, by the depth of their centers"),
+          ('PIXEL', "By Pixel", "Splats are ordered at each pixel: right where splats cross, and nothing pops when "
+                                "the camera rotates"))
 PROJECTIONS = (('AFFINE', "Ellipses", "Splats are drawn as ellipses, as they are trained"),
-               ('RAY', "Along Rays", "Right at wide angles and close by"))
+               ('RAY', "Along Rays", "Splats are drawn along the rays of the pixels: right at wide angles and close "
+                                     "to the camera"))
 SAMPLINGS = (('AS_TRAINED', "As Trained", "The low-pass that the splats were trained with"),
              ('MIP', "Every Zoom", "Splats smaller than pixels keep their light"),
              ('SAMPLES', "Samples", "Several samples for each pixel"))
@@ -24,9 +27,9 @@ _ENUMS = {'order': SplatOrder, 'projection': Projection, 'antialiasing': Samplin
 _NUMBERS = ('samples_per_side', 'sh_degree_limit', 'least_alpha', 'budget_share')
 KNOBS = tuple(_ENUMS) + _NUMBERS
 _knobs = {}
-COLUMNS = (('VIEWPORT', "Viewport", "Rendered shading of the engine Stipple"), ('RENDER', "Render", "Final pictures"))
+COLUMNS = (('VIEWPORT', "Viewport", "Rendered shading of the engine Stipple"), ('RENDER', "Render", "Final renders"))
 # What can be compared.
-SIDES = COLUMNS + (('REFERENCE', "Reference", "The yardstick; it may take minutes"),)
+SIDES = COLUMNS + (('REFERENCE', "Reference", "The level that others are compared with; it may take minutes"),)
 
 
 def column(scene, name):

@@ -1,9 +1,9 @@
 // The scores against all centres are a matrix product whose rows are looked through at once and
 // never stored. Lanes are centres; four vectors share what is loaded.
-#include "math/centre_search.h"
+#include "math/clusters/centre_search.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "math/centre_search.cpp"
+#define HWY_TARGET_INCLUDE "math/clusters/centre_search.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 

@@ -2,7 +2,7 @@
 // Quantization and Signal Compression, 1992, section 12.4 (tree-structured search). Differs: after
 // the two levels every vector is compared with the palettes of its nearest cells, not only of its
 // own, and the palette moves again, which takes back most of what the tree costs.
-#include "math/vector_palette.h"
+#include "math/clusters/vector_palette.h"
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "math/centre_search.h"
+#include "math/clusters/centre_search.h"
 #include "math/radix_order.h"
 
 namespace stipple {
