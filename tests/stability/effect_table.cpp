@@ -307,15 +307,15 @@ std::vector<EffectCase> effectCases() {
       "points of the opening are never divided by their distance", "an opening of 1e-12 m", 1e-6,
       nothingOpenError);
   add("focus at 1e15 m", "depth of field", "1/z - 1/F of single precision loses 1/F",
-      "the camera moves, the picture is shifted by f l/F in double", kDouble, kSingleError,
+      "the camera moves, the image is shifted by f l/F in double", kDouble, kSingleError,
       [] { return sampledError(lens(0.3, 1e15)); });
   add("an opening of 1 km", "depth of field", "shifts of a million pixels overflow integers",
-      "boxes are cut to the picture before they are whole numbers", kDouble, kSingleError,
+      "boxes are cut to the image before they are whole numbers", kDouble, kSingleError,
       [] { return sampledError(lens(1e3, 2)); });
   add("1,000 km together with the camera", "motion blur", "float32 matrices have steps of 6 cm",
       "steps and what lies between are double", "standing still", 1e-5, farJumpError);
   add("half a turn", "motion blur", "the matrix halfway is flat; slerp divides by sin(180 degrees)",
-      "quaternions of one half space, turned the short way", kDouble, kSingleError,
+      "quaternions of one half space, rotated the short way", kDouble, kSingleError,
       [] { return sampledError(halfTurn()); });
   add("shrinking to 1e-5", "motion blur", "rotations of a small matrix drown in its rounding",
       "rotation and stretch by polar decomposition in double", kDouble, kSingleError,

@@ -69,8 +69,8 @@ inline std::vector<HardCase> hardCases() {
       "scales of 1e18", "squares overflow float32", "squares are double",
       [] { return testing::withScales(20, 1e18f, 1e18f, 1e18f, 4); }, small);
   add(
-      "screen-filling", "tiles far outside the picture overflow integers",
-      "boxes are cut to the picture before they are whole numbers",
+      "screen-filling", "tiles far outside the image overflow integers",
+      "boxes are cut to the image before they are whole numbers",
       [] { return testing::withScales(40, 50.0f, 30.0f, 40.0f, 5); }, small);
   add(
       "sub-pixel", "nothing is hit between pixel centres",

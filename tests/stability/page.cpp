@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <sstream>
+#include <string>
 
 namespace stipple::testing {
 
@@ -12,13 +14,13 @@ namespace {
 
 constexpr const char* kHead =
     "# Numerical stability\n\n"
-    "Made by `STIPPLE_STABILITY_TABLE=docs/numerical_stability.md "
-    "build/release/tests/test_stability --gtest_filter='*Stability.EveryHardCase*'`.\n\n"
+    "This command makes the page:\n\n"
+    "    STIPPLE_STABILITY_TABLE=docs/numerical_stability.md \\\n"
+    "      build/release/tests/test_stability --gtest_filter='*Stability.EveryHardCase*'\n\n"
     "Everything here is drawn with floating-point traps on: a division by zero, an overflow or an "
-    "invalid operation ends the test. No picture has a NaN, an alpha outside 0..1 or a colour "
+    "invalid operation ends the test. No image has a NaN, an alpha outside 0..1 or a colour "
     "outside the hull of the splats' colours, up to rounding (1e-5 of levels, 1e-4 of effects). "
-    "Not a number, infinity and "
-    "rotations of zero are refused at the entry, with a message.\n\n"
+    "NaN, infinity and rotations of zero are refused at the entry, with a message.\n\n"
     "## Levels\n\n"
     "Every case at each level with every low-pass, draft and preview with their share of the "
     "splats, merged by the tree that makes it. The numbers are the largest difference of any "
@@ -44,6 +46,26 @@ constexpr const char* kNaive =
     "by all there is, a matrix halfway through half a turn is flat, and the root of a shutter "
     "curve of 1e-300 is lost.\n";
 
+constexpr size_t kPageWidth = 120;  // characters of a line of documentation
+
+/// The text with its long lines broken at spaces; rows of tables and indented commands stay whole.
+std::string wrapped(const std::string& text) {
+  std::istringstream lines(text);
+  std::string out, line;
+  while (std::getline(lines, line)) {
+    if (line.size() > kPageWidth && line[0] != '|' && line[0] != ' ') {
+      size_t start = 0;
+      while (line.size() - start > kPageWidth) {
+        const size_t space = line.rfind(' ', start + kPageWidth);
+        line[space] = '\n';
+        start = space + 1;
+      }
+    }
+    out += line + '\n';
+  }
+  return out;
+}
+
 class Writing : public ::testing::Environment {
  public:
   void TearDown() override {
@@ -52,7 +74,7 @@ class Writing : public ::testing::Environment {
     const StabilityPage& page = StabilityPage::ofThisRun();
     ASSERT_FALSE(page.levels.empty() || page.effects.empty())
         << "the page needs the tests *Stability.EveryHardCase*";
-    std::ofstream(path) << kHead << page.levels << kEffects << page.effects << kNaive;
+    std::ofstream(path) << wrapped(kHead + page.levels + kEffects + page.effects + kNaive);
   }
 };
 

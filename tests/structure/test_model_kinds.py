@@ -42,7 +42,7 @@ def test_few_files_of_the_addon_name_a_kind():
 
 
 def test_what_all_kinds_share_names_none():
-    for name in ('native/api/handles.h', 'native/api/job.h', 'native/api/model.cpp', 'native/api/model_mask.cpp',
+    for name in ('native/api/handles.h', 'native/api/job.h', 'native/api/model.cpp',
                  'native/model/splat_model.h', 'native/model/splat_model.cpp', 'native/model/model_reading.cpp',
                  'native/cli/info.cpp', 'native/cli/decode.cpp', 'native/cli/convert.cpp'):
         code = re.sub(r'//.*', '', (ROOT / name).read_text(encoding='utf-8'))

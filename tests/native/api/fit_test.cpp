@@ -80,7 +80,7 @@ TEST_F(FitTest, FitsPicturesAndReports) {
   EXPECT_EQ(width, 960u);
   std::vector<float> pixels(4 * size_t{width} * height, -1.0f);
   expectRefused(stipple_fit_report_draw(job, 1, pixels.size() - 1, pixels.data(), &width, &height),
-                STIPPLE_ERROR_BUFFER_TOO_SMALL, "the picture needs");
+                STIPPLE_ERROR_BUFFER_TOO_SMALL, "the image needs");
   STIPPLE_ASSERT_OK(stipple_fit_report_draw(job, 1, pixels.size(), pixels.data(), &width, &height));
   EXPECT_EQ(*std::max_element(pixels.begin(), pixels.end()), 1.0f);
   EXPECT_EQ(*std::min_element(pixels.begin(), pixels.end()), 0.0f);
