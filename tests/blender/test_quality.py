@@ -124,7 +124,7 @@ def test_measuring_without_splats_is_one_error(stipple, camera):
 
 def test_the_view_obeys_its_own_level(stipple, walls):
     """A resting picture as the viewport's column has it; a turning one is never slow."""
-    view_picture = module(stipple, 'view_picture')
+    view_picture = module(stipple, 'viewport.view_picture')
     facts = module(stipple, 'scene.view.facts')
     from test_viewport import made_pictures
     whole = facts.Border(0, 0, 60, 60)

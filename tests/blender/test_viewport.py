@@ -150,7 +150,7 @@ def made_pictures(view_picture, viewed, borders):
     picture = view_picture.ViewPicture()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     picture.update(depsgraph, print)
-    camera = importlib.import_module(view_picture.__name__.replace('view_picture', 'scene.view.cameras')).camera_of(
+    camera = importlib.import_module(view_picture.__name__.replace('viewport.view_picture', 'scene.view.cameras')).camera_of(
         bpy.context.scene.camera, bpy.context.scene.render, None)
     found = []
     for coarse in (2, 1):
