@@ -23,7 +23,7 @@ struct SplatQuantities {
   std::vector<float> age;
   std::vector<float> contribution;
 
-  /// Of those that are kept here. Not of kSplitAxis, which the cloud itself tells.
+  /// The values of a quantity that is kept here; the cloud itself tells kSplitAxis.
   const std::vector<float>& of(SplatQuantity quantity) const;
 };
 

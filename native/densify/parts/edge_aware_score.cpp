@@ -74,7 +74,7 @@ class EdgeAwareScore final : public ControlPart {
     views_.clear();
   }
 
-  /// Of the last event; new splats have 0.
+  /// The scores are those of the last event; new splats have 0.
   std::vector<float> scores() const override { return shown_; }
 
   void put(TensorTable& table) const override {

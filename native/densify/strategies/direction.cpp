@@ -122,7 +122,7 @@ class DirectionPull final : public ControlPart {
     if (score_.size() == count_before) followEdit(edit, 1, 0.0f, score_);
   }
 
-  /// Of the last event, in units of the threshold.
+  /// The scores are those of the last event, in units of the threshold.
   std::vector<float> scores() const override { return score_; }
 
   void put(TensorTable& table) const override {

@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 /// Ten million iterations of all figures.
 constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
 
-/// Of all parts of an iteration, summed up to each: [iterations + 1].
+/// The seconds of all parts of an iteration, summed up to each: [iterations + 1].
 std::vector<double> secondsUpTo(const Json& report) {
   const Json& each = report.at("by_iteration").at("seconds");
   std::vector<double> sums(report.at("iterations").get<uint64_t>() + 1, 0.0);

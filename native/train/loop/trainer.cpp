@@ -31,7 +31,7 @@ constexpr uint64_t kLeastMeasureInterval = 100;
 /// Iterations whose loss and time are averaged for the figures.
 constexpr size_t kRecentIterations = 50;
 constexpr uint64_t kEstimateSteps = 20;
-/// Of those, the first ones allocate and load; they are left out of the estimate.
+/// The first of those steps allocate and load; the estimate leaves them out.
 constexpr uint64_t kWarmUpSteps = 5;
 
 /// At most `count` of them, evenly.
