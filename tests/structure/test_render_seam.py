@@ -6,7 +6,7 @@ ROOT = Path(__file__).resolve().parents[2]
 #: Functions of one kind of processor, and what makes its implementations.
 OF_A_PROCESSOR = re.compile(r'\b(renderTiled\w*|renderBackward\w*|renderAccurate|orderForDrawing|makeCpu\w+|CpuViewPass)\b')
 #: Files that are that kind of processor, or say that there is one.
-MAY = re.compile(r'train/loop/(cpu_\w+|backend_factory|view_pass|render_backend)\.(cpp|h)$')
+MAY = re.compile(r'train/loop/(cpu_\w+|host_backend|backend_factory|view_pass|render_backend)\.(cpp|h)$')
 
 
 def names_in(path):

@@ -6,7 +6,6 @@ namespace {
 
 class CpuBackends final : public BackendFactory {
  public:
-  const char* name() const override { return "cpu"; }
   std::unique_ptr<ImageRenderer> makeImageRenderer() const override {
     return makeCpuImageRenderer();
   }
@@ -16,7 +15,7 @@ class CpuBackends final : public BackendFactory {
 
 }  // namespace
 
-const std::shared_ptr<const BackendFactory>& cpuBackends() {
+std::shared_ptr<const BackendFactory> cpuBackends() {
   static const std::shared_ptr<const BackendFactory> made = std::make_shared<CpuBackends>();
   return made;
 }

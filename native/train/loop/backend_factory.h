@@ -13,14 +13,11 @@ namespace stipple {
 /// May be called by several threads; what it makes is of one each.
 class BackendFactory : public ImageRendererFactory {
  public:
-  /// "cpu" and so on.
-  virtual const char* name() const = 0;
-
   virtual std::unique_ptr<ViewPass> makeViewPass() const = 0;
   virtual std::unique_ptr<RenderBackend> makeRenderBackend() const = 0;
 };
 
 /// On this processor.
-const std::shared_ptr<const BackendFactory>& cpuBackends();
+std::shared_ptr<const BackendFactory> cpuBackends();
 
 }  // namespace stipple
