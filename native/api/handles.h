@@ -26,7 +26,7 @@
 #include "model/splat_model.h"
 #include "shot/mesh_layers.h"
 #include "shot/renderer.h"
-#include "train/loop/backend_table.h"
+#include "train/backend/backend_table.h"
 
 namespace stipple::api {
 

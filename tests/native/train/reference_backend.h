@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple::testing {
 

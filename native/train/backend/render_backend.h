@@ -13,7 +13,7 @@
 #include "densify/strategy.h"
 #include "math/camera.h"
 #include "splat/render/render.h"
-#include "train/loop/view_pass.h"
+#include "train/backend/view_pass.h"
 #include "train/optimiser/adam.h"
 #include "train/optimiser/image_loss.h"
 

@@ -1,4 +1,6 @@
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
+
+#include "splat/render/render_backward.h"
 
 namespace stipple {
 
@@ -14,6 +16,12 @@ class CpuBackends final : public BackendFactory {
 };
 
 }  // namespace
+
+uint64_t BackendFactory::passMemory(const SplatCloud& cloud, const Camera& camera,
+                                    const RenderOptions& options) const {
+  const SplatInstance instance{&cloud};
+  return backwardMemoryBound({&instance, 1}, camera, options, {});
+}
 
 std::shared_ptr<const BackendFactory> cpuBackends() {
   static const std::shared_ptr<const BackendFactory> made = std::make_shared<CpuBackends>();

@@ -3,7 +3,7 @@
 #include <memory>
 #include <span>
 
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 

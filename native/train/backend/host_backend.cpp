@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/render/render_backward.h"
-#include "train/loop/render_backend.h"
+#include "train/backend/render_backend.h"
 #include "train/optimiser/splat_activation.h"
 
 namespace stipple {
@@ -215,8 +215,8 @@ class HostBackend final : public RenderBackend {
   std::vector<float> statistic(Statistic statistic) const override {
     const std::span<const float> seen = pass_->statistic(statistic);
     if (seen.empty() && splatCount() > 0) {
-      fail(ErrorCode::kInvalidArgument, std::string(arrayOf(statistic).name) +
-                                            " were not asked for in the last backward pass");
+      fail(ErrorCode::kInvalidArgument,
+           std::string(arrayOf(statistic).name) + " were not asked for in the last backward pass");
     }
     return {seen.begin(), seen.end()};
   }
@@ -343,7 +343,7 @@ class HostBackend final : public RenderBackend {
   SplatCloud by_;                    ///< derivatives; scales and opacities are raw without how_
   bool has_gradients_ = false;       ///< by_ has arrays of the pass
   RawSplats by_raw_;                 ///< with how_
-  bool are_kept_ = false;  ///< whether the last derivatives are among the kept ones
+  bool are_kept_ = false;            ///< whether the last derivatives are among the kept ones
   std::vector<AdamGroup> groups_;
 };
 

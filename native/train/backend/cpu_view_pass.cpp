@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/render/render_backward.h"
-#include "train/loop/view_pass.h"
+#include "train/backend/view_pass.h"
 
 namespace stipple {
 

@@ -1,4 +1,4 @@
-#include "train/loop/view_pass.h"
+#include "train/backend/view_pass.h"
 
 #include <algorithm>
 #include <cstddef>

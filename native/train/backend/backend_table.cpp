@@ -1,4 +1,4 @@
-#include "train/loop/backend_table.h"
+#include "train/backend/backend_table.h"
 
 #include <array>
 #include <cstdlib>
@@ -8,11 +8,12 @@
 
 namespace stipple {
 
-// Every backend, each made by a function of its own file.
+// The backends, each made by a function of its own file.
 
 std::span<const BackendKind> backendKinds() {
   static const std::array kinds = {
       BackendKind{"cpu", cpuBackends},
+      // Further backends go here.
   };
   return kinds;
 }
