@@ -144,6 +144,12 @@ TEST(Renderer, TheFactoryDrawsWhatIsNotADefinition) {
   }
   settings.sampling = {};
   settings.method = ShotMethod::kRays;
+  // By rays means the exact order and shape of splats, in double.
+  Renderer own(cpuImages());
+  ShotSettings asked = settings;
+  askForPasses({}, asked.options);
+  EXPECT_EQ(colourOf(own, instances, settings),
+            renderRays(instances.list, view(), asked.options, {}).colour);
   EXPECT_EQ(renderer.memory(instances, view(), settings).sum(), 7u);
 }
 
