@@ -235,9 +235,9 @@ StippleStatus stipple_cloud_create_from_columns(StippleContext* context, const S
 StippleStatus stipple_cloud_read_columns(const StippleCloud* cloud, const StippleCloudColumnBuffers* buffers);
 /* Reads a splat file of any format that stipple_format_info lists. The content of the file tells its format. */
 StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8, StippleCloud** cloud);
-/* This reads a file as a job (stipple_job_cloud), for reading ahead: a file that is missing or broken is an
- * error of the job. Errors of both: IO, FORMAT, UNSUPPORTED; MEMORY_LIMIT where the splats take more than the
- * limit. */
+/* This reads a file as a job (stipple_job_cloud), for reading ahead: a file that is missing or broken is an error
+ * of the job.
+ * Errors of both: IO, FORMAT, UNSUPPORTED; MEMORY_LIMIT where the splats take more than the limit. */
 StippleStatus stipple_cloud_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);
 
 typedef struct StippleCloudSaveOptions {
@@ -283,22 +283,23 @@ typedef struct StippleFormatInfo {
 StippleStatus stipple_format_count(uint64_t* count);
 /* index 0..count-1. */
 StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info);
-/* Estimates how many bytes `count` splats take in this format, all files together. In: index as of
- * stipple_format_info; sh_degree 0..4 of the cloud, which the format and the options may lower; options as of
- * stipple_cloud_save, or NULL. Out: bytes, 0 where the format is not written. The sizes of formats that pack
- * their numbers (SPZ, SOG) and of text depend on the scene: the estimate is within about a quarter of them, and
- * within 1 % of the others. Cost: none. */
+/* Estimates how many bytes `count` splats take in this format, all files together.
+ * In: index as of stipple_format_info; sh_degree 0..4 of the cloud, which the format and the options may lower;
+ * options as of stipple_cloud_save, or NULL.
+ * Out: bytes, 0 where the format is not written. The sizes of formats that pack their numbers (SPZ, SOG) and of
+ * text depend on the scene: the estimate is within about a quarter of them, and within 1 % of the others.
+ * Cost: none. */
 StippleStatus stipple_format_estimate(uint64_t index, uint64_t count, uint32_t sh_degree,
                                       const StippleCloudSaveOptions* options, uint64_t* bytes);
-/* Tells the format of an existing file by its content, or by its extension where the format has no first bytes
- * of its own. A glTF file is one of splats only where it names KHR_gaussian_splatting. Out: index, or *count* of
- * stipple_format_count where the file is of no splat format. */
+/* Tells the format of an existing file by its content, or by its extension where the format has no first bytes of
+ * its own. A glTF file is one of splats only where it names KHR_gaussian_splatting.
+ * Out: index, or *count* of stipple_format_count where the file is of no splat format. */
 StippleStatus stipple_format_of_file(const char* path_utf8, uint64_t* index);
 
 /* Moves a cloud by an affine matrix: covariances become M C M^T, and harmonics are rotated (and mirrored) by the
- * orthogonal part of M's polar decomposition; the label of the frame stays. Images equal those of an instance
- * with that matrix, except that colours above degree 0 do not follow uneven scale and shear. Errors:
- * INVALID_ARGUMENT for a matrix that is singular or not affine. */
+ * orthogonal part of M's polar decomposition; the label of the frame stays. Images equal those of an instance with
+ * that matrix, except that colours above degree 0 do not follow uneven scale and shear.
+ * Errors: INVALID_ARGUMENT for a matrix that is singular or not affine. */
 StippleStatus stipple_cloud_transform(const StippleCloud* cloud, const double matrix[16],
                                       StippleCloud** moved);
 
@@ -325,10 +326,10 @@ typedef struct StippleGrade {
 /* Fills in the grade that changes nothing. */
 void stipple_grade_init(StippleGrade* grade);
 /* Gives the map of settings, for colours stored in a StippleColourSpace. With f = 2^exposure tint for each
- * channel: scene linear colours become f colour; display colours g colour + 0.055 (g - 1), g = f^(1/2.4),
- * exactly what f does to their light where they lie above the foot of the sRGB curve (0.04045) before and after.
- * Below it the value is off by up to 0.055 |g - 1|. Then luma + saturation (colour - luma), on the stored
- * values. Errors: INVALID_ARGUMENT for a setting outside its range. docs/methods/colour_grade.md. */
+ * channel: scene linear colours become f colour; display colours g colour + 0.055 (g - 1), g = f^(1/2.4), exactly
+ * what f does to their light where they lie above the foot of the sRGB curve (0.04045) before and after. Below it
+ * the value is off by up to 0.055 |g - 1|. Then luma + saturation (colour - luma), on the stored values.
+ * Errors: INVALID_ARGUMENT for a setting outside its range. docs/methods/colour_grade.md. */
 StippleStatus stipple_grade_from_settings(const StippleGradeSettings* settings, uint32_t colour_space,
                                           StippleGrade* grade);
 /* Gives the cloud with the grade in its harmonics and opacities. Images equal those of an instance with that
@@ -437,8 +438,8 @@ typedef struct StippleMeshTopology {
 } StippleMeshTopology;
 /* Cost: O(T log T). */
 StippleStatus stipple_mesh_topology(const StippleMesh* mesh, StippleMeshTopology* topology);
-/* Writes positions and triangles in the format that the extension says: .ply, or .glb (Z up becomes Y up;
- * Errors: UNAVAILABLE without libstipple_media.so). */
+/* Writes positions and triangles in the format that the extension says: .ply, or .glb (Z up becomes Y up).
+ * Errors: UNAVAILABLE without libstipple_media.so for .glb. */
 StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8);
 
 /* ---- density and anchors ----------------------------------------------------------------------- */
@@ -581,17 +582,18 @@ void stipple_decode_options_init(StippleDecodeOptions* options);
 StippleStatus stipple_model_from_mesh_start(StippleContext* context, const StippleMesh* mesh,
                                             const StippleModelFromMeshOptions* options,
                                             StippleJob** job);
-/* Makes the merge tree of an existing cloud, as a job (stipple_job_model). Decoded at P it gives exactly P
- * splats: those of the whole cloud bit for bit where P is its count. At P + 1 one splat is replaced by the two
- * that it was merged from. order and seed of the decode options do not matter. The result is the same for any
- * number of threads. Errors: INVALID_ARGUMENT for an empty cloud; MEMORY_LIMIT. Cost: a few microseconds per
- * splat, and the drawing of the images (docs/methods/reduction.md). */
+/* Makes the merge tree of an existing cloud, as a job (stipple_job_model). Decoded at P it gives exactly P splats:
+ * those of the whole cloud bit for bit where P is its count. At P + 1 one splat is replaced by the two that it was
+ * merged from. order and seed of the decode options do not matter. The result is the same for any number of
+ * threads.
+ * Errors: INVALID_ARGUMENT for an empty cloud; MEMORY_LIMIT.
+ * Cost: a few microseconds per splat, and the drawing of the images (docs/methods/reduction.md). */
 StippleStatus stipple_model_from_cloud_start(StippleContext* context, const StippleCloud* cloud,
                                              const StippleModelFromCloudOptions* options,
                                              StippleJob** job);
-/* Reads an asset file (docs/formats.md). Tensors and metadata of a newer minor version are kept with the model
- * as it was loaded and saved with it; models made from it do not have them. Errors: UNSUPPORTED for a newer
- * major version; FORMAT with what is wrong. */
+/* Reads an asset file (docs/formats.md). Tensors and metadata of a newer minor version are kept with the model as
+ * it was loaded and saved with it; models made from it do not have them.
+ * Errors: UNSUPPORTED for a newer major version; FORMAT with what is wrong. */
 StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8, StippleModel** model);
 /* This does the same as a job (stipple_job_model). */
 StippleStatus stipple_model_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);
@@ -624,11 +626,12 @@ typedef struct StippleRefineOptions {
 void stipple_refine_options_init(StippleRefineOptions* options);
 
 /* Fits a reduced cloud (a decoded model) to images of the full one, as a job (stipple_job_cloud): positions,
- * rotations, scales, opacities and harmonics change; the count and the order stay. The result is the same for
- * any number of threads. Errors: INVALID_ARGUMENT for an empty cloud or clouds of different colour space;
- * MEMORY_LIMIT before anything is allocated, where the images (12 bytes per pixel of every view) and the passes
- * would need more than the context's limit. Cost: one drawing of `full` per view, one drawing and one backward
- * pass of `cloud` per iteration. */
+ * rotations, scales, opacities and harmonics change; the count and the order stay. The result is the same for any
+ * number of threads.
+ * Errors: INVALID_ARGUMENT for an empty cloud or clouds of different colour space; MEMORY_LIMIT before anything is
+ * allocated, where the images (12 bytes per pixel of every view) and the passes would need more than the context's
+ * limit.
+ * Cost: one drawing of `full` per view, one drawing and one backward pass of `cloud` per iteration. */
 StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const StippleCloud* full,
                                          const StippleRefineOptions* options, StippleJob** job);
 
@@ -664,8 +667,8 @@ typedef struct StippleCamera {
 
 /* Reads the cameras of transforms.json (nerfstudio, NeRF-synthetic) or a COLMAP model. path_utf8: a file, or a
  * folder with transforms.json, else with transforms_train.json (and _test, _val), else with images.bin or
- * images.txt in it or in sparse/0. Errors: UNSUPPORTED for distorted cameras; stipple_views_open makes pinholes
- * of them. */
+ * images.txt in it or in sparse/0.
+ * Errors: UNSUPPORTED for distorted cameras; stipple_views_open makes pinholes of them. */
 StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8, StippleViews** views);
 void stipple_views_free(StippleViews* views);
 StippleStatus stipple_views_count(const StippleViews* views, uint64_t* count);
@@ -710,9 +713,11 @@ typedef struct StippleRayHits {
 /* Errors: INVALID_ARGUMENT for options out of range. */
 StippleStatus stipple_rig_search_create(const StippleRigSearchOptions* options, StippleRigSearch** search);
 void stipple_rig_search_free(StippleRigSearch* search);
-/* Gives the rays that are to be cast now. In: capacity, rays that there is room for. Out: rays [count,7]:
- * origin, direction (unit) and the farthest distance that counts (infinity: any), or NULL: only the number is
- * wanted; count, 0: the cameras are known. Errors: BUFFER_TOO_SMALL, with count set. */
+/* Gives the rays that are to be cast now.
+ * In: capacity, rays that there is room for.
+ * Out: rays [count,7]: origin, direction (unit) and the farthest distance that counts (infinity: any), or NULL:
+ * only the number is wanted; count, 0: the cameras are known.
+ * Errors: BUFFER_TOO_SMALL, with count set. */
 StippleStatus stipple_rig_search_rays(const StippleRigSearch* search, uint64_t capacity, double* rays, uint64_t* count);
 /* Takes what these rays met, in their order. Errors: INVALID_ARGUMENT for another number of answers, and where
  * no place is left for a camera. The same answers give the same cameras. */
@@ -795,19 +800,20 @@ typedef struct StippleViewsOpenOptions {
 void stipple_views_open_options_init(StippleViewsOpenOptions* options);
 
 /* Opens a photo data set: a COLMAP model with its images, transforms.json of nerfstudio, or a NeRF-synthetic
- * folder (path_utf8 as in stipple_views_load); options may be NULL. Lens distortion is taken out of images as
- * they are read: cameras are pinholes. The colour space is that of the first image: display of 8 and 16 bits,
- * scene linear of float. Masks give the weights. docs/formats.md, Data sets. Errors: IO where images are
- * missing, with the first of them; FORMAT; UNSUPPORTED for camera models that are not known; MEMORY_LIMIT where
- * the largest image cannot be read within it. No image is decoded. Cost: one header is read per file where the
- * cameras say no size. */
+ * folder (path_utf8 as in stipple_views_load); options may be NULL. Lens distortion is taken out of images as they
+ * are read: cameras are pinholes. The colour space is that of the first image: display of 8 and 16 bits, scene
+ * linear of float. Masks give the weights. docs/formats.md, Data sets.
+ * Errors: IO where images are missing, with the first of them; FORMAT; UNSUPPORTED for camera models that are not
+ * known; MEMORY_LIMIT where the largest image cannot be read within it. No image is decoded.
+ * Cost: one header is read per file where the cameras say no size. */
 StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
                                  const StippleViewsOpenOptions* options, StippleViews** views);
 /* Makes a set that has no views yet. In: colour_space, a StippleColourSpace: that of the splats to be. */
 StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_space, StippleViews** views);
 /* Adds a view, and copies its image (0..1 as 16 bits). name_utf8 may be NULL: the view is then called "view" and
- * its number. Jobs under way do not see what is added. Errors: INVALID_ARGUMENT, by name and pixel, for values
- * that are not finite or out of range, and for views that were not made by stipple_views_create; MEMORY_LIMIT. */
+ * its number. Jobs under way do not see what is added.
+ * Errors: INVALID_ARGUMENT, by name and pixel, for values that are not finite or out of range, and for views that
+ * were not made by stipple_views_create; MEMORY_LIMIT. */
 StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera,
                                 const StippleViewImage* image, const char* name_utf8);
 /* Sets the points, in the place of earlier ones. Errors: as of stipple_views_add. */
@@ -938,8 +944,8 @@ typedef enum StippleRenderMethod {
   /* Along the rays of the pixels, in the order in which splats are densest there: exact at wide angles and for
    * splats that are close or cross each other. Double precision, many times as slow as the first. */
   STIPPLE_RENDER_RAYS = 2,
-  /* As STIPPLE_RENDER_RAYS, without any limit: no alpha is held below 1, no pixel ends early, and nothing above 1e-9 is left
-   * out. The accuracy level reference draws so. */
+  /* As STIPPLE_RENDER_RAYS, without any limit: no alpha is held below 1, no pixel ends early, and nothing above
+   * 1e-9 is left out. The accuracy level reference draws so. */
   STIPPLE_RENDER_RAYS_UNLIMITED = 3
 } StippleRenderMethod;
 
@@ -1005,12 +1011,12 @@ typedef struct StippleRenderOptions {
   /* How exact the image is, and how long it takes. Read during the call. NULL: as the level final. With it,
    * method must be STIPPLE_RENDER_TILED. Not for backward passes. */
   const StippleAccuracy* accuracy;
-  /* What an image is averaged over. With any of these, colours and transmittance are the mean of `samples`
-   * images, each from its own point of the aperture, moment of the shutter and place in the pixel, in scene
-   * linear light; depths and counts are those of one more image from the middle of all. The points come from a
-   * fixed low-discrepancy sequence, so that any number of threads gives the same bits. A surface takes part in
-   * every image as it is: hand it in blurred, as it is to appear. Cost: that of `samples` images, and 50 bytes
-   * more per pixel. */
+  /* What an image is averaged over. With any of these, colours and transmittance are the mean of `samples` images,
+   * each from its own point of the aperture, moment of the shutter and place in the pixel, in scene linear light;
+   * depths and counts are those of one more image from the middle of all. The points come from a fixed
+   * low-discrepancy sequence, so that any number of threads gives the same bits. A surface takes part in every
+   * image as it is: hand it in blurred, as it is to appear.
+   * Cost: that of `samples` images, and 50 bytes more per pixel. */
   const StippleAperture* aperture; /* read during the call; NULL or radius 0: everything is sharp */
   const StippleShutter* shutter;   /* read during the call; NULL: nothing moves */
   uint32_t samples;                /* 1..65536; 1: the middle of all. 0: 1 without aperture and shutter, else a
@@ -1038,9 +1044,9 @@ typedef struct StippleRenderBuffers {
 
 StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer);
 void stipple_renderer_free(StippleRenderer* renderer);
-/* Renders instances [count] together, as a job; with count 0 the image is empty. Errors of the start:
- * INVALID_ARGUMENT for a camera, matrix, surface or option outside its range; UNSUPPORTED with
- * STIPPLE_BLEND_AS_TRAINED for clouds of different colour spaces; MEMORY_LIMIT, with the numbers, before
+/* Renders instances [count] together, as a job; with count 0 the image is empty.
+ * Errors of the start: INVALID_ARGUMENT for a camera, matrix, surface or option outside its range; UNSUPPORTED
+ * with STIPPLE_BLEND_AS_TRAINED for clouds of different colour spaces; MEMORY_LIMIT, with the numbers, before
  * anything is allocated. */
 StippleStatus stipple_renderer_render_start(StippleRenderer* renderer, const StippleInstance* instances,
                                             uint64_t count, const StippleCamera* camera,
@@ -1127,9 +1133,10 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context, const Stip
                                              uint64_t count, const StippleCamera* camera,
                                              const StippleRenderOptions* render,
                                              const StippleAccuracyMeasureOptions* options, StippleJob** job);
-/* Tells what the iterations of a fit cost and brought, from the report that stipple_fit_report_save has written:
- * a row for each measurement; nothing is fitted again. Errors: IO; FORMAT for another file; UNSUPPORTED for a
- * newer report; INVALID_ARGUMENT where nothing was measured. */
+/* Tells what the iterations of a fit cost and brought, from the report that stipple_fit_report_save has written: a
+ * row for each measurement; nothing is fitted again.
+ * Errors: IO; FORMAT for another file; UNSUPPORTED for a newer report; INVALID_ARGUMENT where nothing was
+ * measured. */
 StippleStatus stipple_fit_accuracy_report(const char* path_utf8, StippleAccuracyReport** report);
 /* The result of a job of measuring that has ended well. */
 StippleStatus stipple_job_accuracy_report(const StippleJob* job, StippleAccuracyReport** report);
@@ -1164,20 +1171,22 @@ typedef struct StippleMeshInstance {
 } StippleMeshInstance;
 
 /* Measures how far meshes are: planar z of the nearest triangle, from either side, that the ray through each
- * pixel's centre meets between the near and far plane. Out: depth [H,W] metres, row 0 = top, 1e10 where there is
- * none; it must stay valid until the job has ended. As a matte for stipple_renderer_render_start. Same bits for
- * any number of threads. Cost: O(vertices + pixels of the triangles' bounding boxes); 24 bytes per vertex of the
- * largest mesh. Errors of the start: INVALID_ARGUMENT for a camera or matrix outside its range; MEMORY_LIMIT. */
+ * pixel's centre meets between the near and far plane.
+ * Out: depth [H,W] metres, row 0 = top, 1e10 where there is none; it must stay valid until the job has ended. As a
+ * matte for stipple_renderer_render_start. Same bits for any number of threads.
+ * Cost: O(vertices + pixels of the triangles' bounding boxes); 24 bytes per vertex of the largest mesh.
+ * Errors of the start: INVALID_ARGUMENT for a camera or matrix outside its range; MEMORY_LIMIT. */
 StippleStatus stipple_mesh_depth_start(StippleContext* context, const StippleMeshInstance* instances,
                                        uint64_t count, const StippleCamera* camera, float* depth,
                                        StippleJob** job);
 
 /* This does the same with smooth edges: each pixel is hidden as far as its samples_per_side x samples_per_side
- * samples are. Out: depth [H,W] metres, that of the nearest sample, 1e10 where none hits; opacity [H,W], the
- * share of samples that do. Both must stay valid until the job has ended. In: samples_per_side, 1 to 16; an
- * image that is that many times as large may have 65,536 pixels a side. Cost: as many pixels; 64 MB of samples
- * are held at a time. Errors of the start: INVALID_ARGUMENT for a camera, matrix or number of samples outside
- * its range; MEMORY_LIMIT. */
+ * samples are.
+ * Out: depth [H,W] metres, that of the nearest sample, 1e10 where none hits; opacity [H,W], the share of samples
+ * that do. Both must stay valid until the job has ended.
+ * In: samples_per_side, 1 to 16; an image that is that many times as large may have 65,536 pixels a side.
+ * Cost: as many pixels; 64 MB of samples are held at a time.
+ * Errors of the start: INVALID_ARGUMENT for a camera, matrix or number of samples outside its range; MEMORY_LIMIT. */
 StippleStatus stipple_mesh_matte_start(StippleContext* context, const StippleMeshInstance* instances,
                                        uint64_t count, const StippleCamera* camera, uint32_t samples_per_side,
                                        float* depth, float* opacity, StippleJob** job);
@@ -1190,10 +1199,11 @@ StippleStatus stipple_mesh_matte_start(StippleContext* context, const StippleMes
  * used by one thread at a time. Same bits for any number of threads. Cost of each: O(pixels). */
 typedef struct StippleLayers StippleLayers;
 
-/* Makes the layers of passes whose film was transparent. In: combined [H,W,4]; depth [H,W] metres of one sample
- * of each pixel, 1e10 or NaN where nothing is; shadow [H,W,3], factors of the light of what is behind a shadow
- * catcher, or NULL without one. Colours that are not finite count as black. Errors: INVALID_ARGUMENT for a side
- * of 0; MEMORY_LIMIT. */
+/* Makes the layers of passes whose film was transparent.
+ * In: combined [H,W,4]; depth [H,W] metres of one sample of each pixel, 1e10 or NaN where nothing is; shadow
+ * [H,W,3], factors of the light of what is behind a shadow catcher, or NULL without one. Colours that are not
+ * finite count as black.
+ * Errors: INVALID_ARGUMENT for a side of 0; MEMORY_LIMIT. */
 StippleStatus stipple_layers_create(StippleContext* context, uint32_t width, uint32_t height, const float* combined,
                                     const float* depth, const float* shadow, StippleLayers** layers);
 void stipple_layers_free(StippleLayers* layers);
@@ -1282,7 +1292,8 @@ typedef struct StippleEffectsSurvey {
   double widening;         /* area of the splats with the low-pass that they were made for over that without */
 } StippleEffectsSurvey;
 
-/* Inspects splats. In: instances [count], as for a render. Out: survey. Errors: INVALID_ARGUMENT as of a render.
+/* Inspects splats.
+ * In: instances [count], as for a render. Out: survey. Errors: INVALID_ARGUMENT as of a render.
  * Threads and determinism: the call returns when all is done; the result is the same for any number of threads.
  * Cost: O(131,072), tens of milliseconds; with several instances also a pass over all positions. */
 StippleStatus stipple_effects_survey(StippleContext* context, const StippleInstance* instances, uint64_t count,
@@ -1325,9 +1336,9 @@ typedef struct StippleEffectRow {
   char reason[256];   /* one sentence in UTF-8, without a full stop */
 } StippleEffectRow;
 
-/* Decides which effects an image needs, and gives one row for each. In: capacity, rows that there is room for;
- * rows[0].struct_size must be set and is that of all. Errors: INVALID_ARGUMENT for a fact outside its range,
- * BUFFER_TOO_SMALL. Cost: none. */
+/* Decides which effects an image needs, and gives one row for each.
+ * In: capacity, rows that there is room for; rows[0].struct_size must be set and is that of all.
+ * Errors: INVALID_ARGUMENT for a fact outside its range, BUFFER_TOO_SMALL. Cost: none. */
 StippleStatus stipple_effects_plan(const StippleEffectFacts* facts, StippleEffectRow* rows, uint64_t capacity);
 
 /* ---- drawing by a graphics card ------------------------------------------------------------------ */
@@ -1432,21 +1443,23 @@ StippleStatus stipple_cloud_select_floaters_start(const StippleCloud* cloud,
 StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask, uint64_t mask_count,
                                  StippleCloud** kept);
 /* Thins a cloud that has no tree: exactly count splats, 0 to all, stay, chosen by random numbers keyed by (seed,
- * index) alone, in their order, each axis longer by the cube root of all / count, so that their volume stays;
- * bit for bit where all stay. A smaller count is a part of a larger one, and frames of a series whose splats
- * keep their places thin alike. A tree's cut (stipple_model_from_cloud_start) looks better. Errors:
- * INVALID_ARGUMENT where count is above the cloud's. Cost: O(N). */
+ * index) alone, in their order, each axis longer by the cube root of all / count, so that their volume stays; bit
+ * for bit where all stay. A smaller count is a part of a larger one, and frames of a series whose splats keep
+ * their places thin alike. A tree's cut (stipple_model_from_cloud_start) looks better.
+ * Errors: INVALID_ARGUMENT where count is above the cloud's. Cost: O(N). */
 StippleStatus stipple_cloud_thin(const StippleCloud* cloud, uint64_t count, uint64_t seed,
                                  StippleCloud** thinned);
-/* Gives the hierarchy of a cloud without the splats whose mask is 0: no budget shows any of them, and its
- * largest budget is what is left, bit for bit. mask [mask_count], mask_count = leaf_count of the model. Errors:
- * UNSUPPORTED for a model whose settings have no takes_mask; INVALID_ARGUMENT for a mask that keeps nothing.
+/* Gives the hierarchy of a cloud without the splats whose mask is 0: no budget shows any of them, and its largest
+ * budget is what is left, bit for bit. mask [mask_count], mask_count = leaf_count of the model.
+ * Errors: UNSUPPORTED for a model whose settings have no takes_mask; INVALID_ARGUMENT for a mask that keeps
+ * nothing.
  * Cost: O(N). */
 StippleStatus stipple_model_keep(const StippleModel* model, const uint8_t* mask, uint64_t mask_count,
                                  StippleModel** kept);
-/* Makes one cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity
- * keeps every bit) with its grade baked in, harmonics padded to the highest degree. frame: StippleFrame that the
- * matrices lead to, the label of the result. Errors: UNSUPPORTED where colour spaces or antialias flags differ. */
+/* Makes one cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity keeps
+ * every bit) with its grade baked in, harmonics padded to the highest degree. frame: StippleFrame that the
+ * matrices lead to, the label of the result.
+ * Errors: UNSUPPORTED where colour spaces or antialias flags differ. */
 StippleStatus stipple_cloud_merge(const StippleInstance* instances, uint64_t count, uint32_t frame,
                                   StippleCloud** merged);
 
@@ -1530,16 +1543,18 @@ typedef struct StippleBackwardResult {
   uint64_t visible_count;
 } StippleBackwardResult;
 
-/* Gives the derivatives of a loss by everything that stipple_renderer_render_start draws of the same arguments,
- * as a job. The clamps of alpha at 0.99 and of colours at 0 pass no derivative; where a splat ends (alpha =
- * 1/255), where a pixel ends and the order of blending are taken as fixed. In: gradients [count], one per
- * instance; result may be NULL. The images and buffers must stay valid until the job has ended. Errors of the
- * start: those of drawing; INVALID_ARGUMENT for a method other than TILED, an output that is converted after
- * compositing (choose STIPPLE_OUTPUT_COMPOSITED), and for a statistic without the image that it needs;
- * BUFFER_TOO_SMALL; MEMORY_LIMIT before anything is allocated. Of the job: INVALID_ARGUMENT for a value outside
- * its range. Nothing is written unless the job ends well. Threads and determinism: the same bits for any number
- * of threads. Cost: about twice drawing, and up to half as much again with every statistic.
- * docs/methods/rasterization.md, docs/methods/leave_one_out.md. */
+/* Gives the derivatives of a loss by everything that stipple_renderer_render_start draws of the same arguments, as
+ * a job. The clamps of alpha at 0.99 and of colours at 0 pass no derivative; where a splat ends (alpha = 1/255),
+ * where a pixel ends and the order of blending are taken as fixed.
+ * In: gradients [count], one per instance; result may be NULL. The images and buffers must stay valid until the
+ * job has ended.
+ * Errors of the start: those of drawing; INVALID_ARGUMENT for a method other than TILED, an output that is
+ * converted after compositing (choose STIPPLE_OUTPUT_COMPOSITED), and for a statistic without the image that it
+ * needs; BUFFER_TOO_SMALL; MEMORY_LIMIT before anything is allocated. Of the job: INVALID_ARGUMENT for a value
+ * outside its range. Nothing is written unless the job ends well.
+ * Threads and determinism: the same bits for any number of threads.
+ * Cost: about twice drawing, and up to half as much again with every statistic. docs/methods/rasterization.md,
+ * docs/methods/leave_one_out.md. */
 StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer, const StippleInstance* instances,
                                               uint64_t count, const StippleCamera* camera,
                                               const StippleRenderOptions* options,
@@ -1571,12 +1586,14 @@ typedef struct StippleImageLoss {
   double ssim; /* 11x11 Gaussian window of sigma 1.5, which reads zeros outside the image */
 } StippleImageLoss;
 
-/* Gives the loss of trained splats and its exact gradient, on this thread and the others of the context. In:
- * rendered, target [H,W,channels] as composited, about 0..1 (at most 1e6 in size), row 0 = top; weights [H,W] >=
- * 0, or NULL: 1. Out: value; gradient [H,W,rendered_channels] dL/d(rendered), or NULL: not wanted, for less than
- * half the time; it may not overlap the images. Errors: INVALID_ARGUMENT for sides outside 1..65536 and for
- * values outside their range; the gradient's buffer then has no meaning. The same bits for any number of
- * threads. Cost: about 20 ns a pixel and core; 0.5 MB a thread. docs/methods/loss.md. */
+/* Gives the loss of trained splats and its exact gradient, on this thread and the others of the context.
+ * In: rendered, target [H,W,channels] as composited, about 0..1 (at most 1e6 in size), row 0 = top; weights [H,W]
+ * >= 0, or NULL: 1.
+ * Out: value; gradient [H,W,rendered_channels] dL/d(rendered), or NULL: not wanted, for less than half the time;
+ * it may not overlap the images.
+ * Errors: INVALID_ARGUMENT for sides outside 1..65536 and for values outside their range; the gradient's buffer
+ * then has no meaning. The same bits for any number of threads.
+ * Cost: about 20 ns a pixel and core; 0.5 MB a thread. docs/methods/loss.md. */
 StippleStatus stipple_image_loss(StippleContext* context, uint32_t width, uint32_t height,
                                  const float* rendered, const float* target, const float* weights,
                                  const StippleImageLossOptions* options, StippleImageLoss* value,
@@ -1655,12 +1672,13 @@ void stipple_fit_options_init(StippleFitOptions* options);
  * In: options->struct_size set. docs/results/fitting.md says what each costs. */
 StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t model, uint32_t quality);
 
-/* Sets an option by its name and a text, as a flag of the tool and a file of settings have them: "iterations"
- * and "500", "background" and "white" (or "2"), "image_bytes" and "512MiB". A text that is kept as such
- * (strategy, checkpoint_path) stays the caller's and must live as long as the options are used; "" is none. In:
- * options->struct_size set; name_utf8: the name of an option or one of its aliases (stipple_fit_option_info); -
- * counts as _, and -- in front as nothing. Errors: INVALID_ARGUMENT for another name, and for a value out of
- * range (says which is allowed, with the name as it was given). */
+/* Sets an option by its name and a text, as a flag of the tool and a file of settings have them: "iterations" and
+ * "500", "background" and "white" (or "2"), "image_bytes" and "512MiB". A text that is kept as such (strategy,
+ * checkpoint_path) stays the caller's and must live as long as the options are used; "" is none.
+ * In: options->struct_size set; name_utf8: the name of an option or one of its aliases (stipple_fit_option_info);
+ * - counts as _, and -- in front as nothing.
+ * Errors: INVALID_ARGUMENT for another name, and for a value out of range (says which is allowed, with the name as
+ * it was given). */
 StippleStatus stipple_fit_options_set(StippleFitOptions* options, const char* name_utf8, const char* value_utf8);
 
 /* What an option of a fit holds. */
@@ -1687,7 +1705,7 @@ typedef struct StippleFitOptionInfo {
   const char* default_utf8;    /* as stipple_fit_options_set takes it */
   const char* presets_utf8[6]; /* what stipple_fit_options_preset sets: [3 * StippleFitModel + StippleFitQuality];
                                   NULL: it is left alone */
-  const char* aliases_utf8[3]; /* other names that settings and flags may use, former ones too; "" behind the last */
+  const char* aliases_utf8[3]; /* other names in settings and flags, former ones too; "" where there is none */
   double alias_units[3];       /* how much 1 is under each: 1048576 of "image_memory" */
 } StippleFitOptionInfo;
 StippleStatus stipple_fit_option_count(uint64_t* count);
@@ -1713,16 +1731,16 @@ typedef struct StippleFitFigures {
   char stage[64];
 } StippleFitFigures;
 
-/* Fits splats to views, as a job. It reads the images of views as they are at the start. After a cancel, and
- * after an error of a step or an image, the result is the best state that was measured until then
- * (stipple_fit_cloud). Checkpoints appear under their name when they are whole; a job that ends early leaves
- * one. Where one cannot be written, that is a note and the fit goes on. Errors of the start: INVALID_ARGUMENT
- * for options out of range, an unknown strategy, views without images; MEMORY_LIMIT. Of the job:
- * INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black, transparent or masked out,
- * cameras that see none of the points); those of reading images; with resume IO, FORMAT, UNSUPPORTED, and
- * INVALID_ARGUMENT for a checkpoint of other options or views (says which). Threads and determinism: the same
- * bits for any number of threads, any image_bytes, and wherever it was stopped and resumed in between.
- * docs/methods/fitting.md. */
+/* Fits splats to views, as a job. It reads the images of views as they are at the start. After a cancel, and after
+ * an error of a step or an image, the result is the best state that was measured until then (stipple_fit_cloud).
+ * Checkpoints appear under their name when they are whole; a job that ends early leaves one. Where one cannot be
+ * written, that is a note and the fit goes on.
+ * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without images;
+ * MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
+ * transparent or masked out, cameras that see none of the points); those of reading images; with resume IO,
+ * FORMAT, UNSUPPORTED, and INVALID_ARGUMENT for a checkpoint of other options or views (says which).
+ * Threads and determinism: the same bits for any number of threads, any image_bytes, and wherever it was stopped
+ * and resumed in between. docs/methods/fitting.md. */
 StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* views, const StippleFitOptions* options,
                                 StippleJob** job);
 /* Estimates the bytes that a fit allocates: images up to image_bytes, the model at its largest, its best state
@@ -1751,11 +1769,13 @@ StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model);
 /* Writes the report of a job that has ended: JSON at path_utf8, and its curves as SVG beside it, under the same
  * name with the extension .svg. Errors: IO; INVALID_ARGUMENT where no step was taken. */
 StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_utf8);
-/* Draws the same curves as an image: dark on white, with axes, titles and legends. In: scale 0.25..8, pixels of
- * a unit of the SVG, whose two columns are 960 units wide; capacity, floats of pixels. Out: pixels
- * [height,width,4] display sRGB 0..1, opaque, row 0 = top, or NULL: only the size is wanted; width, height.
- * Errors: INVALID_ARGUMENT where no step was taken; BUFFER_TOO_SMALL, with the size set. Threads and
- * determinism: the same bits everywhere. Cost: about 0.1 s at scale 2. */
+/* Draws the same curves as an image: dark on white, with axes, titles and legends.
+ * In: scale 0.25..8, pixels of a unit of the SVG, whose two columns are 960 units wide; capacity, floats of
+ * pixels.
+ * Out: pixels [height,width,4] display sRGB 0..1, opaque, row 0 = top, or NULL: only the size is wanted; width,
+ * height.
+ * Errors: INVALID_ARGUMENT where no step was taken; BUFFER_TOO_SMALL, with the size set.
+ * Threads and determinism: the same bits everywhere. Cost: about 0.1 s at scale 2. */
 StippleStatus stipple_fit_report_draw(const StippleJob* job, double scale, uint64_t capacity, float* pixels,
                                       uint32_t* width, uint32_t* height);
 
@@ -1826,12 +1846,13 @@ void stipple_densify_options_init(StippleDensifyOptions* options);
 /* Does the density control of a finished cloud, as a job (stipple_job_cloud): its splats are copied, split and
  * removed as a strategy says, by what views tell of them; no parameter takes a step and no opacity is reset.
  * Splats that stay come first, in their order and bit for bit, then new ones. A fit of the result moves them to
- * their places. In: views: of the cloud's colour space and frame, with images; transparent ones stand before
- * black. Errors of the start: INVALID_ARGUMENT for an empty cloud, views without images or of another colour
- * space, a strategy that is not there (says which are), options out of range; MEMORY_LIMIT. Of the job:
- * INVALID_ARGUMENT for views that show nothing; those of reading images. Threads and determinism: the same bits
- * for any number of threads. Cost: for each event one drawing and one backward pass per view.
- * docs/methods/densification.md. */
+ * their places.
+ * In: views: of the cloud's colour space and frame, with images; transparent ones stand before black.
+ * Errors of the start: INVALID_ARGUMENT for an empty cloud, views without images or of another colour space, a
+ * strategy that is not there (says which are), options out of range; MEMORY_LIMIT. Of the job: INVALID_ARGUMENT
+ * for views that show nothing; those of reading images.
+ * Threads and determinism: the same bits for any number of threads.
+ * Cost: for each event one drawing and one backward pass per view. docs/methods/densification.md. */
 StippleStatus stipple_densify_start(StippleContext* context, const StippleCloud* cloud, const StippleViews* views,
                                     const StippleDensifyOptions* options, StippleJob** job);
 
@@ -1872,13 +1893,13 @@ typedef struct StippleVolumeAccuracyOptions {
   double max_seconds;   /* default 60; no further round of timings begins after this many seconds */
 } StippleVolumeAccuracyOptions;
 void stipple_volume_accuracy_options_init(StippleVolumeAccuracyOptions* options);
-/* Measures what the voxel size of a volume costs, as a job (stipple_job_accuracy_report): voxels of the size
- * that `finest` says (NULL: its defaults), then 1.5, 2, 3, 4, 6 and 8 times as large; the finest is the last row
- * and judges the others. It compares how the volumes look along their three axes, blended front to back at the
- * pixels of the finest, in display values. A cancel waits for the volume that is being filled. Errors of the
- * start: INVALID_ARGUMENT; of the job: those of stipple_voxelize_start. Threads and determinism: errors are the
- * same for any number of threads. Cost: about 1.5 repetitions times that of the finest.
- * docs/accuracy_and_time.md. */
+/* Measures what the voxel size of a volume costs, as a job (stipple_job_accuracy_report): voxels of the size that
+ * `finest` says (NULL: its defaults), then 1.5, 2, 3, 4, 6 and 8 times as large; the finest is the last row and
+ * judges the others. It compares how the volumes look along their three axes, blended front to back at the pixels
+ * of the finest, in display values. A cancel waits for the volume that is being filled.
+ * Errors of the start: INVALID_ARGUMENT; of the job: those of stipple_voxelize_start.
+ * Threads and determinism: errors are the same for any number of threads.
+ * Cost: about 1.5 repetitions times that of the finest. docs/accuracy_and_time.md. */
 StippleStatus stipple_volume_accuracy_start(StippleContext* context, const StippleInstance* instances,
                                             uint64_t count, const StippleVoxelizeOptions* finest,
                                             const StippleVolumeAccuracyOptions* options, StippleJob** job);
@@ -1899,9 +1920,10 @@ void stipple_volume_to_mesh_options_init(StippleVolumeToMeshOptions* options);
 
 /* Makes the closed surface of a volume's density, for shadows and collisions, as a job (stipple_job_mesh). Every
  * edge has two triangles, which run against each other. Colours are not read. Same result for any number of
- * threads. Errors of the start: INVALID_ARGUMENT, MEMORY_LIMIT; of the job: INVALID_ARGUMENT for an empty volume
- * and, with the largest value, for a threshold that no voxel reaches; UNAVAILABLE where libstipple_media cannot
- * be loaded. A cancel waits for the surface itself, which is one call of OpenVDB. docs/methods/proxy_mesh.md. */
+ * threads.
+ * Errors of the start: INVALID_ARGUMENT, MEMORY_LIMIT; of the job: INVALID_ARGUMENT for an empty volume and, with
+ * the largest value, for a threshold that no voxel reaches; UNAVAILABLE where libstipple_media cannot be loaded. A
+ * cancel waits for the surface itself, which is one call of OpenVDB. docs/methods/proxy_mesh.md. */
 StippleStatus stipple_volume_to_mesh_start(const StippleVolume* volume,
                                            const StippleVolumeToMeshOptions* options, StippleJob** job);
 StippleStatus stipple_volume_to_mesh_memory_bound(const StippleVolume* volume,
