@@ -41,8 +41,8 @@ def test_words_and_switches_are_those_of_the_library(options):
 
 def test_a_tooltip_is_one_sentence_about_the_same_setting(options):
     """The panel says in an artist's words what the library says in a caller's: both name the same thing."""
-    same = {'density_gradient': 'learn', 'max_splats': 'splats', 'model': 'splats', 'resume': 'checkpoint', 'seed': 'seed',
-            'shell': 'shell', 'strategy': 'splats are added and removed'}
+    same = {'density_gradient': 'learn', 'max_splats': 'splats', 'model': 'splats', 'resume': 'checkpoint',
+            'seed': 'seed', 'shell': 'shell', 'strategy': 'splats are added and removed'}
     for name, (option, shown) in options.items():
         tooltip = shown.description + ' ' + shown.name
         assert same[name] in tooltip.lower() and same[name] in option.help.lower(), (name, tooltip, option.help)

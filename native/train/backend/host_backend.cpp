@@ -125,7 +125,7 @@ class HostBackend final : public RenderBackend {
     if (is_drawn && (wanted.width != width_ || wanted.height != height_)) {
       fail(ErrorCode::kInvalidArgument,
            "target " + std::to_string(target) + " is " + std::to_string(wanted.width) + " x " +
-               std::to_string(wanted.height) + " pixels; the picture is " + std::to_string(width_) +
+               std::to_string(wanted.height) + " pixels; the image is " + std::to_string(width_) +
                " x " + std::to_string(height_));
     }
     return loss(wanted.pixels, options, weights);
