@@ -67,15 +67,16 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context,
     validate(view);
     const PictureAccuracyOptions measured = pictureOptionsFrom(options, view);
     validate(measured, placed, view);
-    const RenderMemory memory = measurePictureMemory(placed, view, shot, measured);
+    const auto backends = context->state->backends;
+    const RenderMemory memory = measurePictureMemory(*backends, placed, view, shot, measured);
     context->state->requirePictureMemory(memory.sum(), "measuring an image of " + sizeText(view),
                                          memory.pair_bytes);
-    *job = startJob(
-        context->state,
-        [placed = std::move(placed), shot, measured, view](Progress& progress) -> JobResult {
-          return std::make_shared<const MeasuredAccuracy>(
-              measurePicture(placed, view, shot, measured, progress));
-        });
+    *job = startJob(context->state,
+                    [backends, placed = std::move(placed), shot, measured,
+                     view](Progress& progress) -> JobResult {
+                      return std::make_shared<const MeasuredAccuracy>(
+                          measurePicture(*backends, placed, view, shot, measured, progress));
+                    });
   });
 }
 

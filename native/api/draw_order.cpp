@@ -59,7 +59,8 @@ StippleStatus stipple_renderer_order_start(StippleRenderer* renderer,
     }
     output.first_rows = first_rows;
     validateDrawOrder(placed.list, view, output);
-    renderer->context->requireMemory(drawOrderMemoryBound(splats), "ordering these splats");
+    renderer->context->requireMemory(renderer->context->backends->orderMemory(splats),
+                                     "ordering these splats");
     *job = startJob(renderer->context,
                     [shared = renderer->renderer, placed = std::move(placed), view, output,
                      first_rows = std::move(first_rows)](Progress& progress) mutable {
@@ -75,7 +76,8 @@ StippleStatus stipple_renderer_order_memory_bound(const StippleRenderer* rendere
                                                   uint64_t* bytes) {
   return guarded([&] {
     require(renderer, "renderer");
-    require(bytes, "bytes") = drawOrderMemoryBound(splatCount(instancesFrom(instances, count)));
+    require(bytes, "bytes") = renderer->context->backends->orderMemory(
+        splatCount(instancesFrom(instances, count)));
   });
 }
 

@@ -26,7 +26,7 @@
 #include "model/splat_model.h"
 #include "shot/mesh_layers.h"
 #include "shot/renderer.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_table.h"
 
 namespace stipple::api {
 
@@ -34,7 +34,7 @@ namespace stipple::api {
 struct ContextState : MemoryLimit {
   uint32_t thread_count = 0;
   /// What draws and differentiates, for fits and images alike.
-  std::shared_ptr<const BackendFactory> backends = cpuBackends();
+  std::shared_ptr<const BackendFactory> backends = chosenBackends();
 };
 using Context = std::shared_ptr<const ContextState>;
 

@@ -76,13 +76,12 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
     if (leaves->size() == 0) {
       fail(ErrorCode::kInvalidArgument, "the cloud has 0 splats; a hierarchy needs at least 1");
     }
-    context->state->requireMemory(hierarchyMemoryBound(*leaves, settings),
+    const auto backends = context->state->backends;
+    context->state->requireMemory(hierarchyMemoryBound(*backends, *leaves, settings),
                                   "the hierarchy of this cloud");
-    *job = startJob(
-        context->state,
-        [leaves, settings, backends = context->state->backends](Progress& progress) -> JobResult {
-          return hierarchyFromCloud(*backends, leaves, settings, &progress);
-        });
+    *job = startJob(context->state, [leaves, settings, backends](Progress& progress) -> JobResult {
+      return hierarchyFromCloud(*backends, leaves, settings, &progress);
+    });
   });
 }
 
@@ -108,11 +107,11 @@ StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const Stippl
     const RefineOptions settings = refineSettings(completed(options, defaults, "options"));
     const std::shared_ptr<const SplatCloud> start = cloud->cloud;
     const std::shared_ptr<const SplatCloud> whole = full->cloud;
-    cloud->context->requireMemory(refineMemoryBound(*start, *whole, settings),
+    const auto backends = cloud->context->backends;
+    cloud->context->requireMemory(refineMemoryBound(*backends, *start, *whole, settings),
                                   "refining this cloud");
     *job = startJob(cloud->context,
-                    [start, whole, settings,
-                     backends = cloud->context->backends](Progress& progress) -> JobResult {
+                    [start, whole, settings, backends](Progress& progress) -> JobResult {
                       return std::make_shared<const SplatCloud>(
                           refineCloud(*backends, *start, *whole, settings, &progress));
                     });

@@ -55,7 +55,7 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     validate(settings, view);
     const ShotPasses passes = passesFrom(buffers);
     askForPasses(passes, settings.options);
-    const RenderMemory memory = Renderer::memory(placed, view, settings);
+    const RenderMemory memory = renderer->renderer->memory(placed, view, settings);
     renderer->context->requirePictureMemory(memory.sum(), "this image of " + sizeText(view),
                                             memory.pair_bytes);
     *job = startJob(renderer->context, [shared = renderer->renderer, placed = std::move(placed),
@@ -87,7 +87,8 @@ StippleStatus stipple_renderer_memory_bound(const StippleRenderer* renderer,
   return guarded([&] {
     require(renderer, "renderer");
     const Instances placed = instancesFrom(instances, count);
-    require(bytes, "bytes") = renderMemoryBound(placed.list, cameraFrom(camera), RenderOptions{});
+    require(bytes, "bytes") =
+        renderer->context->backends->imageMemory(placed.list, cameraFrom(camera), {}, {}).sum();
   });
 }
 

@@ -9,9 +9,9 @@
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
 #include "bench/splat_views.h"
+#include "train/backend/render_backend.h"
 #include "train/loop/densify_cloud.h"
 #include "train/loop/picture_store.h"
-#include "train/loop/render_backend.h"
 
 namespace stipple::bench {
 namespace {

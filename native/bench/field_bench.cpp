@@ -19,8 +19,8 @@
 #include "density/learned_draws.h"
 #include "splat/cpu/tiles/tile_lists.h"
 #include "splat/render/render.h"
+#include "train/backend/render_backend.h"
 #include "train/loop/field_model.h"
-#include "train/loop/render_backend.h"
 #include "train/optimiser/field_regularisers.h"
 
 namespace stipple::bench {

@@ -12,9 +12,9 @@
 #include "bench/splat_scene.h"
 #include "data/views/memory_view_source.h"
 #include "densify/strategies.h"
+#include "train/backend/render_backend.h"
 #include "train/loop/explicit_model.h"
 #include "train/loop/picture_store.h"
-#include "train/loop/render_backend.h"
 #include "train/loop/view_evaluator.h"
 
 namespace stipple::bench {

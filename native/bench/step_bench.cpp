@@ -9,7 +9,7 @@
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "train/loop/render_backend.h"
+#include "train/backend/render_backend.h"
 
 namespace stipple::bench {
 namespace {

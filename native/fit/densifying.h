@@ -6,7 +6,7 @@
 #include "base/progress.h"
 #include "data/clouds/seen_cloud.h"
 #include "data/views/view_source.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 #include "train/loop/densify_cloud.h"
 
 namespace stipple {

@@ -13,7 +13,7 @@
 #include "data/views/view_source.h"
 #include "fit/fit_options.h"
 #include "model/splat_model.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 #include "train/loop/trainer.h"
 
 namespace stipple {

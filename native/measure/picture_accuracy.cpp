@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -61,15 +62,16 @@ uint64_t pixelsOf(std::span<const PixelArea> areas) {
 
 class Measuring {
  public:
-  Measuring(const Instances& instances, const Camera& camera, const ShotSettings& shot,
-            const PictureAccuracyOptions& settings, Progress& progress)
+  Measuring(const ImageRendererFactory& images, const Instances& instances, const Camera& camera,
+            const ShotSettings& shot, const PictureAccuracyOptions& settings, Progress& progress)
       : instances_(instances),
         camera_(camera),
         options_(shot.options),
         is_display_(compositesInDisplaySpace(instances, shot.options.blend_space)),
         settings_(settings),
         progress_(progress),
-        blocks_(spreadBlocks(camera, settings.reference_pixels)) {
+        blocks_(spreadBlocks(camera, settings.reference_pixels)),
+        images_(images.makeImageRenderer()) {
     options_.with_depth = false;
     low_pass_ = options_.low_pass;
     degree_ = options_.sh_degree_limit;
@@ -134,8 +136,8 @@ class Measuring {
   }
 
   void draw(const AccuracySettings& accuracy) {
-    renderAccurate(cutFor(accuracy).list, camera_, optionsFor(accuracy), renderAccuracy(accuracy),
-                   workspace_, picture_);
+    images_->render(cutFor(accuracy).list, camera_, optionsFor(accuracy), renderAccuracy(accuracy),
+                    picture_);
   }
 
   /// Seconds of drawing only some of the blocks.
@@ -209,7 +211,7 @@ class Measuring {
         return false;
       }
     }
-    draw(accuracy);  // and the workspace grows before anything is timed
+    draw(accuracy);  // and its memory grows before anything is timed
     addRow(accuracy);
     return true;
   }
@@ -260,7 +262,7 @@ class Measuring {
   std::vector<PixelArea> blocks_;
   CloudCuts cutter_;
   std::vector<std::pair<double, Instances>> cuts_;
-  RenderWorkspace workspace_;
+  std::unique_ptr<ImageRenderer> images_;
   RenderResult picture_;
   std::vector<float> reference_;
   MeasuredAccuracy result_;
@@ -324,14 +326,14 @@ void validate(const PictureAccuracyOptions& options, const Instances& instances,
   }
 }
 
-RenderMemory measurePictureMemory(const Instances& instances, const Camera& camera,
-                                  const ShotSettings& shot,
+RenderMemory measurePictureMemory(const ImageRendererFactory& images, const Instances& instances,
+                                  const Camera& camera, const ShotSettings& shot,
                                   const PictureAccuracyOptions& settings) {
   RenderMemory memory = rayMemory(instances.list, camera, shot.options);
   double least_share = 1;
   for (const AccuracySettings& accuracy : settings.accuracies) {
     const RenderMemory one =
-        accurateMemory(instances.list, camera, shot.options, renderAccuracy(accuracy));
+        images.imageMemory(instances.list, camera, shot.options, renderAccuracy(accuracy));
     if (one.sum() > memory.sum()) memory = one;
     least_share = std::min(least_share, accuracy.budget_share);
   }
@@ -344,10 +346,10 @@ RenderMemory measurePictureMemory(const Instances& instances, const Camera& came
   return memory;
 }
 
-MeasuredAccuracy measurePicture(const Instances& instances, const Camera& camera,
-                                const ShotSettings& shot, const PictureAccuracyOptions& settings,
-                                Progress& progress) {
-  return Measuring(instances, camera, shot, settings, progress).run();
+MeasuredAccuracy measurePicture(const ImageRendererFactory& images, const Instances& instances,
+                                const Camera& camera, const ShotSettings& shot,
+                                const PictureAccuracyOptions& settings, Progress& progress) {
+  return Measuring(images, instances, camera, shot, settings, progress).run();
 }
 
 }  // namespace stipple

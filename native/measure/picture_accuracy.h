@@ -7,6 +7,7 @@
 #include "data/accuracy_report.h"
 #include "measure/timing.h"
 #include "shot/shot_settings.h"
+#include "splat/render/image_renderer.h"
 
 namespace stipple {
 
@@ -34,13 +35,14 @@ void validate(const PictureAccuracyOptions& options, const Instances& instances,
               const Camera& camera);
 
 /// Bytes that measurePicture allocates at most.
-RenderMemory measurePictureMemory(const Instances& instances, const Camera& camera,
-                                  const ShotSettings& shot, const PictureAccuracyOptions& options);
+RenderMemory measurePictureMemory(const ImageRendererFactory& images, const Instances& instances,
+                                  const Camera& camera, const ShotSettings& shot,
+                                  const PictureAccuracyOptions& options);
 
 /// Draws the view at every accuracy and against the reference, and times it. In: shot, which
 /// requireMeasurable() accepts; options, which validate() accepts, with accuracies.
-MeasuredAccuracy measurePicture(const Instances& instances, const Camera& camera,
-                                const ShotSettings& shot, const PictureAccuracyOptions& options,
-                                Progress& progress);
+MeasuredAccuracy measurePicture(const ImageRendererFactory& images, const Instances& instances,
+                                const Camera& camera, const ShotSettings& shot,
+                                const PictureAccuracyOptions& options, Progress& progress);
 
 }  // namespace stipple

@@ -23,10 +23,11 @@ std::shared_ptr<const SplatModel> hierarchyFromCloud(const BackendFactory& backe
   return makeHierarchySplats(std::make_shared<const HierarchyDecoder>(cloud, std::move(tree)));
 }
 
-uint64_t hierarchyMemoryBound(const SplatCloud& cloud, const HierarchyOptions& options) {
+uint64_t hierarchyMemoryBound(const BackendFactory& backends, const SplatCloud& cloud,
+                              const HierarchyOptions& options) {
   // The images are over when the tree begins; what they found stays.
   const uint64_t images =
-      options.view_count > 0 ? visibilityMemoryBound(cloud, options.rig.size) : 0;
+      options.view_count > 0 ? visibilityMemoryBound(backends, cloud, options.rig.size) : 0;
   const uint64_t visibility = options.view_count > 0 ? cloud.size() * sizeof(float) : 0;
   return std::max(images, mergeTreeMemoryBound(cloud.size(), cloud.sh_degree) + visibility);
 }

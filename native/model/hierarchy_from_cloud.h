@@ -7,7 +7,7 @@
 #include "data/clouds/splat_cloud.h"
 #include "decode/tree/merge_tree.h"
 #include "model/splat_model.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 #include "train/loop/view_rig.h"
 
 namespace stipple {
@@ -29,6 +29,7 @@ std::shared_ptr<const SplatModel> hierarchyFromCloud(const BackendFactory& backe
                                                      Progress* progress);
 
 /// Bytes that hierarchyFromCloud() holds at most, without the cloud.
-uint64_t hierarchyMemoryBound(const SplatCloud& cloud, const HierarchyOptions& options);
+uint64_t hierarchyMemoryBound(const BackendFactory& backends, const SplatCloud& cloud,
+                              const HierarchyOptions& options);
 
 }  // namespace stipple

@@ -8,20 +8,26 @@ namespace stipple {
 
 namespace {
 
-RayOptions raysOf(ShotMethod method) {
-  return method == ShotMethod::kYardstick ? rayYardstick() : RayOptions{};
+/// How a backend draws it.
+RenderAccuracy accuracyOf(const ShotSettings& settings) {
+  if (settings.method != ShotMethod::kRays) return settings.accuracy;
+  RenderAccuracy rays;
+  rays.order = RayOrder::kResponse;
+  rays.projection = RayProjection::kRay;
+  rays.precision = Precision::kDouble;
+  return rays;
 }
 
 /// One of the pictures of an average.
 void drawMoment(ImageRenderer& images, const ShotSettings& settings,
                 std::span<const SplatInstance> instances, const Camera& camera,
                 const RenderOptions& options, RenderResult& result, Progress* progress) {
-  if (followsRays(settings.method)) {
-    result = renderRays(instances, camera, options, raysOf(settings.method), progress);
+  if (settings.method == ShotMethod::kYardstick) {
+    result = renderRays(instances, camera, options, rayYardstick(), progress);
   } else if (settings.method == ShotMethod::kReference) {
     narrow(renderReference(instances, camera, options, progress), result);
   } else {
-    images.render(instances, camera, options, settings.accuracy, result, progress);
+    images.render(instances, camera, options, accuracyOf(settings), result, progress);
   }
 }
 
@@ -40,10 +46,9 @@ void Renderer::render(Instances instances, const Camera& camera, const ShotSetti
   } else if (settings.method == ShotMethod::kReference) {
     fillPasses(renderReference(instances.list, camera, settings.options, &progress), settings,
                passes);
-  } else if (followsRays(settings.method)) {
-    fillPasses(
-        renderRays(instances.list, camera, settings.options, raysOf(settings.method), &progress),
-        settings, passes);
+  } else if (settings.method == ShotMethod::kYardstick) {
+    fillPasses(renderRays(instances.list, camera, settings.options, rayYardstick(), &progress),
+               settings, passes);
   } else {
     renderSharp(instances, camera, settings, passes, progress);
   }
@@ -54,13 +59,13 @@ void Renderer::renderSharp(const Instances& instances, const Camera& camera,
                            Progress& progress) {
   const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
   if (lock.owns_lock()) {
-    images_->render(instances.list, camera, settings.options, settings.accuracy, result_,
+    images_->render(instances.list, camera, settings.options, accuracyOf(settings), result_,
                     &progress);
     fillPasses(result_, settings, passes);
   } else {
     RenderResult result;
     factory_->makeImageRenderer()->render(instances.list, camera, settings.options,
-                                          settings.accuracy, result, &progress);
+                                          accuracyOf(settings), result, &progress);
     fillPasses(result, settings, passes);
   }
 }
@@ -87,11 +92,11 @@ void Renderer::renderBlurred(const Instances& instances, const Camera& camera,
 }
 
 RenderMemory Renderer::memory(const Instances& instances, const Camera& camera,
-                              const ShotSettings& settings) {
+                              const ShotSettings& settings) const {
   RenderMemory memory =
-      followsRays(settings.method)
+      settings.method == ShotMethod::kYardstick
           ? rayMemory(instances.list, camera, settings.options)
-          : accurateMemory(instances.list, camera, settings.options, settings.accuracy);
+          : factory_->imageMemory(instances.list, camera, settings.options, accuracyOf(settings));
   memory.other_bytes += CloudCuts::memoryBound(instances, settings.budget_share);
   if (isSampled(settings.sampling)) {
     memory.other_bytes +=

@@ -29,8 +29,8 @@ class Renderer {
               const ShotPasses& passes, Progress& progress);
 
   /// Upper bounds of the bytes that render() allocates.
-  static RenderMemory memory(const Instances& instances, const Camera& camera,
-                             const ShotSettings& settings);
+  RenderMemory memory(const Instances& instances, const Camera& camera,
+                      const ShotSettings& settings) const;
 
   /// How many pictures render() averages: 1 where all is sharp.
   static uint32_t sampleCount(const Instances& instances, const Camera& camera,

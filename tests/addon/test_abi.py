@@ -116,6 +116,14 @@ def test_functions_match(header):
         assert declarations.FUNCTIONS[name] == types, name
 
 
+def test_every_free_accepts_null(library):
+    """One that does not ends the process."""
+    frees = [name for name in declarations.FUNCTIONS if name.endswith('_free')]
+    assert len(frees) == 14
+    for name in frees:
+        assert getattr(library, name)(None) is None
+
+
 def test_structs_match(header, c_layout):
     assert set(structs.STRUCTS) == set(c_structs(header))
     sizes = {line[1]: int(line[2]) for line in c_layout if line[0] == 'size'}

@@ -128,7 +128,8 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
     ({'transparent': False}, 5, 1e9),                         # the world behind the ball
     ({'transparent': False, 'shell': 'OFF'}, 0, 2),
     ({}, 0, 2),                                               # alpha tells what belongs to the scene
-    ({'transparent': False, 'rig': 'INSIDE'}, 0, 5),          # walls all around: right behind them
+    ({'transparent': False, 'rig': 'INSIDE'}, 1.3, 5),        # walls all around: right behind them
+    ({'transparent': False, 'rig': 'INSIDE', 'shell': 'OFF'}, 0, 1.2),
 ], ids=str)
 def test_a_field_has_a_shell_for_what_is_far_away(stipple, ball, chosen, least, most):
     if 'rig' in chosen:

@@ -99,22 +99,26 @@ class Guide:
         (library.parent / 'libstipple_media.so').symlink_to(BUILD / 'lib' / 'libstipple_media.so')
         return library
 
-    def run(self, *arguments, status=0):
+    def run(self, *arguments, status=0, environment=None):
         """The tool with the library that was built: its standard output."""
-        environment = {**os.environ, 'LD_LIBRARY_PATH': str(self.folder / 'lib')}
+        environment = {**os.environ, **(environment or {}), 'LD_LIBRARY_PATH': str(self.folder / 'lib')}
         result = subprocess.run([str(BUILD / 'bin' / 'stipple'), *map(str, arguments)], capture_output=True, text=True,
                                 cwd=self.folder, env=environment, timeout=120)
         assert result.returncode == status, (arguments, result.stdout, result.stderr)
         return result.stdout if status == 0 else result.stderr
 
+    def run_command(self, command):
+        """A line of a shell: variables of the environment, and the tool with its arguments."""
+        words = shlex.split(command)
+        environment = {}
+        while '=' in words[0]:
+            name, environment[name] = words.pop(0).split('=', 1)
+        assert words[0] == 'stipple', command
+        return self.run(*words[1:], environment=environment)
+
     def run_commands(self):
         """The page's commands, {command: output}."""
-        outputs = {}
-        for command in self.commands:
-            program, *arguments = shlex.split(command)
-            assert program == 'stipple', command
-            outputs[command] = self.run(*arguments)
-        return outputs
+        return {command: self.run_command(command) for command in self.commands}
 
 
 def _commands_of(target):

@@ -15,7 +15,7 @@
 #include "io/image_file.h"
 #include "io/splats/splat_file.h"
 #include "io/views/camera_file.h"
-#include "train/loop/render_backend.h"
+#include "train/backend/render_backend.h"
 
 namespace stipple {
 namespace {

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -146,53 +145,6 @@ TEST(LevelStability, WhatIsNotANumberIsRefusedAtEveryLevel) {
       EXPECT_THROW(drawn(cloud, camera, kind, LowPass::kClassic, precision), Error);
     }
   }
-}
-
-// What the plain forms do, so that nobody brings them back.
-
-TEST(NaiveForms, TheInverseCovarianceOfANeedleInFloatHasNoDigitRight) {
-  // 1 : 1e6 along the diagonal of the picture, pixels. d lies on the axis: d^T C^-1 d = 2 / 1e12.
-  const float half = 0.5f * 1e12f, thin = 0.5f;
-  const float a = half + thin, b = half - thin;  // C = [a b; b a]
-  const float determinant = a * a - b * b;
-  EXPECT_TRUE(!(std::abs(determinant / 1e12f - 1.0f) < 0.5f));
-}
-
-TEST(NaiveForms, ADifferenceOfSquaresLosesTheDistanceFromANeedle) {
-  // Whitened: 1e6 standard deviations away along the ray, 1 across.
-  const std::array<float, 3> from = {1e6f, 1.0f, 0.0f}, along = {1.0f, 0.0f, 0.0f};
-  const float squared = from[0] * from[0] + from[1] * from[1];
-  const float dot = from[0] * along[0] + from[1] * along[1];
-  const float difference = squared - dot * dot;
-  EXPECT_GE(std::abs(difference - 1.0f), 1.0f);
-  const float cross = from[0] * along[1] - from[1] * along[0];
-  EXPECT_EQ(cross * cross, 1.0f);
-}
-
-TEST(NaiveForms, LongitudesAtTheSeamDifferByAWholeTurn) {
-  const double left = std::atan2(-1e-9, -1.0), right = std::atan2(1e-9, -1.0);
-  EXPECT_NEAR(right - left, 2 * std::acos(-1.0), 1e-8);
-}
-
-TEST(NaiveForms, TheAffineMapOfAPanoramaAtAPoleIsAllThereIs) {
-  // Pixels to the right per metre, on a unit sphere: f / cos(latitude).
-  const auto perMetre = [](double latitude) { return 100 / std::cos(latitude); };
-  EXPECT_GE(perMetre(std::acos(-1.0) / 2), 1e17);
-}
-
-TEST(NaiveForms, AMatrixHalfwayThroughHalfATurnIsFlat) {
-  EXPECT_EQ(0.5 * 1.0 + 0.5 * std::cos(std::acos(-1.0)), 0.0);
-}
-
-TEST(NaiveForms, TheRootOfAFaintShutterCurveIsLost) {
-  // After a share of 0.25 of an even curve c the time is 0.25: 2 c 0.25 / (c + sqrt(c^2)).
-  const double c = 1e-300;
-  EXPECT_EQ(2 * (c * 0.25) / (c + std::sqrt(c * c)), 0.5);
-}
-
-TEST(NaiveForms, FloatPositionsFarAwayAreOffByCentimetres) {
-  const float far = 1e6f + 0.02f;
-  EXPECT_GE(std::abs((far - 1e6f) - 0.02f), 0.01f);
 }
 
 }  // namespace

@@ -37,15 +37,6 @@ constexpr const char* kEffects =
     "| effect | case | the plain form | here | error | judged by |\n"
     "|---|---|---|---|---|---|\n";
 
-constexpr const char* kNaive =
-    "\n## Plain forms\n\n"
-    "What they lose, measured by `NaiveForms.*` of the same binary: the inverse covariance of a "
-    "needle in float32 has no digit right, the distance of a ray as a difference of squares is off "
-    "by more than a standard deviation, a position in float32 at 1,000,000 m by centimetres, a "
-    "difference of longitudes at the seam by a whole turn, the affine map of a panorama at a pole "
-    "by all there is, a matrix halfway through half a turn is flat, and the root of a shutter "
-    "curve of 1e-300 is lost.\n";
-
 constexpr size_t kPageWidth = 120;  // characters of a line of documentation
 
 /// The text with its long lines broken at spaces; rows of tables and indented commands stay whole.
@@ -74,7 +65,7 @@ class Writing : public ::testing::Environment {
     const StabilityPage& page = StabilityPage::ofThisRun();
     ASSERT_FALSE(page.levels.empty() || page.effects.empty())
         << "the page needs the tests *Stability.EveryHardCase*";
-    std::ofstream(path) << wrapped(kHead + page.levels + kEffects + page.effects + kNaive);
+    std::ofstream(path) << wrapped(kHead + page.levels + kEffects + page.effects);
   }
 };
 

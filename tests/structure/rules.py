@@ -355,7 +355,7 @@ def wide_prose(root):
     """Lines of documentation that are wider than a window; tables and single words cannot be broken."""
     found = []
     for name in project_files(root):
-        if name == 'README.md' or name.startswith('docs/') and name.endswith('.md'):
+        if name.endswith('README.md') or name.startswith('docs/') and name.endswith('.md'):
             for number, line in enumerate((pathlib.Path(root) / name).read_text(encoding='utf-8').splitlines(), 1):
                 if len(line) > PROSE_WIDTH and not line.lstrip().startswith('|') and len(line.split()) > 1:
                     found.append(f'{name}:{number}: {len(line)} characters, at most {PROSE_WIDTH} are allowed')

@@ -210,15 +210,6 @@ def test_lines_of_documentation_fit_a_window():
 def test_a_wide_line_of_documentation_is_found(tmp_path):
     wide, table, link = 'word ' * 30, f'| {"x" * 150} | y |', 'https://example.org/' + 'x' * 150
     plant(tmp_path, {'docs/deep/a.md': f'# A\n\n{wide}\n{table}\n{link}\n', 'README.md': f'{"x " * 61}\n',
-                     'tests/notes.md': wide, 'docs/b.md': 'x' * 60 + ' ' + 'y' * 59})
-    assert [line.split(': ')[0] for line in rules.wide_prose(tmp_path)] == ['README.md:1', 'docs/deep/a.md:3']
-
-
-def test_lines_of_python_fit_a_window():
-    assert rules.wide_python(ROOT) == []
-
-
-def test_a_wide_line_of_python_is_found(tmp_path):
-    plant(tmp_path, {'addon/stipple/a.py': 'x = 1\n' + 'y' * 121 + '\n', 'tests/b.py': '#' * 120,
-                     'docs/c.py': '#' * 121})
-    assert rules.wide_python(tmp_path) == ['addon/stipple/a.py:2: 121 characters, at most 120 are allowed']
+                     'tests/notes.md': wide, 'tests/peers/README.md': wide, 'docs/b.md': 'x' * 60 + ' ' + 'y' * 59})
+    assert [line.split(': ')[0] for line in rules.wide_prose(tmp_path)] == ['README.md:1', 'docs/deep/a.md:3',
+                                                                            'tests/peers/README.md:1']

@@ -82,7 +82,8 @@ typedef struct StippleContextOptions {
 } StippleContextOptions;
 
 void stipple_context_options_init(StippleContextOptions* options);
-/* options may be NULL (defaults). */
+/* options may be NULL (defaults). The environment variable STIPPLE_BACKEND names what draws and fits;
+   not set: "cpu". Errors: STIPPLE_ERROR_INVALID_ARGUMENT for a name that the library does not have. */
 StippleStatus stipple_context_create(const StippleContextOptions* options, StippleContext** context);
 void stipple_context_free(StippleContext* context);
 

@@ -26,6 +26,16 @@ class CpuImageRenderer final : public ImageRenderer {
 
 }  // namespace
 
+RenderMemory ImageRendererFactory::imageMemory(std::span<const SplatInstance> instances,
+                                               const Camera& camera, const RenderOptions& options,
+                                               const RenderAccuracy& accuracy) const {
+  return accurateMemory(instances, camera, options, accuracy);
+}
+
+uint64_t ImageRendererFactory::orderMemory(uint64_t splat_count) const {
+  return drawOrderMemoryBound(splat_count);
+}
+
 std::unique_ptr<ImageRenderer> makeCpuImageRenderer() {
   return std::make_unique<CpuImageRenderer>();
 }

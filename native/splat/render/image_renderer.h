@@ -34,6 +34,13 @@ class ImageRendererFactory {
  public:
   virtual ~ImageRendererFactory() = default;
   virtual std::unique_ptr<ImageRenderer> makeImageRenderer() const = 0;
+
+  /// Upper bounds of the bytes of the host that one call of render() and of order() allocates. Who
+  /// says nothing else is held to what this processor's own take.
+  virtual RenderMemory imageMemory(std::span<const SplatInstance> instances, const Camera& camera,
+                                   const RenderOptions& options,
+                                   const RenderAccuracy& accuracy) const;
+  virtual uint64_t orderMemory(uint64_t splat_count) const;
 };
 
 /// On this processor, with native/splat.

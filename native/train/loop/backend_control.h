@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "densify/strategy.h"
-#include "train/loop/render_backend.h"
+#include "train/backend/render_backend.h"
 
 // Between a strategy and the backend that holds its splats, with and without steps.
 

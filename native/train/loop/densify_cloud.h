@@ -9,7 +9,7 @@
 #include "data/clouds/splat_cloud.h"
 #include "data/clouds/splat_quantities.h"
 #include "data/views/view_source.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 

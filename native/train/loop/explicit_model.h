@@ -10,7 +10,7 @@
 #include "data/clouds/splat_cloud.h"
 #include "data/views/view_source.h"
 #include "densify/strategy.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 #include "train/loop/fit_model.h"
 
 namespace stipple {

@@ -12,7 +12,7 @@
 #include "decode/field/field_parameters.h"
 #include "density/learned_draws.h"
 #include "density/octree_density.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 #include "train/loop/fit_model.h"
 #include "train/prior/scene_prior.h"
 

@@ -8,7 +8,7 @@
 #include "data/clouds/splat_cloud.h"
 #include "data/fit_history.h"
 #include "data/views/view_source.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 #include "train/loop/picture_store.h"
 #include "train/optimiser/image_loss.h"
 

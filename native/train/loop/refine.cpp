@@ -8,7 +8,6 @@
 
 #include "base/error.h"
 #include "data/clouds/cloud_extent.h"
-#include "splat/render/render_backward.h"
 #include "train/loop/view_order.h"
 #include "train/optimiser/adam.h"
 
@@ -138,17 +137,16 @@ uint64_t lossBytes(uint64_t pixel_count) {
 
 }  // namespace
 
-uint64_t refineMemoryBound(const SplatCloud& start, const SplatCloud& full,
-                           const RefineOptions& options) {
+uint64_t refineMemoryBound(const BackendFactory& backends, const SplatCloud& start,
+                           const SplatCloud& full, const RefineOptions& options) {
   validateInput(start, full, options);
   const uint64_t pixel_count = uint64_t{options.view_size} * options.view_size;
   const Camera camera = cameraOfSize(options.view_size);
   const SplatInstance whole{&full};
-  const SplatInstance cut{&start};
   // The drawing of the targets is over when the steps begin, the targets stay.
-  const uint64_t drawing = renderMemoryBound({&whole, 1}, camera, renderOptions(0));
+  const uint64_t drawing = backends.imageMemory({&whole, 1}, camera, renderOptions(0), {}).sum();
   const uint64_t picture = pixel_count * (4 * sizeof(float));
-  const uint64_t pass = backwardMemoryBound({&cut, 1}, camera, renderOptions(0), {});
+  const uint64_t pass = backends.passMemory(start, camera, renderOptions(0));
   // Raw splats, their zeros and both moments, the cloud that is drawn and that is handed back.
   const uint64_t row = sizeof(float) * (11 + start.shStride());
   const uint64_t steps = 2 * picture + pass + 6 * row * start.size() + lossBytes(pixel_count);

@@ -4,7 +4,7 @@
 
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 #include "train/loop/view_rig.h"
 
 namespace stipple {
@@ -33,7 +33,7 @@ SplatCloud refineCloud(const BackendFactory& backends, const SplatCloud& start,
 
 /// Upper bound of the bytes that refineCloud allocates: targets, and what a step holds. Errors: as
 /// refineCloud.
-uint64_t refineMemoryBound(const SplatCloud& start, const SplatCloud& full,
-                           const RefineOptions& options);
+uint64_t refineMemoryBound(const BackendFactory& backends, const SplatCloud& start,
+                           const SplatCloud& full, const RefineOptions& options);
 
 }  // namespace stipple

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "data/tensor_table.h"
-#include "train/loop/render_backend.h"
+#include "train/backend/render_backend.h"
 
 // What a checkpoint keeps of explicit splats, as named tensors.
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "densify/strategy.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 #include "train/loop/picture_store.h"
 
 namespace stipple {

@@ -5,7 +5,7 @@
 
 #include "data/clouds/splat_cloud.h"
 #include "math/camera.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 

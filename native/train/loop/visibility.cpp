@@ -7,7 +7,6 @@
 #include "base/parallel.h"
 #include "math/covariance.h"
 #include "splat/render/projection.h"
-#include "splat/render/render_backward.h"
 
 namespace stipple {
 
@@ -118,14 +117,13 @@ std::vector<float> splatVisibility(const BackendFactory& backends, const SplatCl
   return visibility;
 }
 
-uint64_t visibilityMemoryBound(const SplatCloud& cloud, uint32_t view_size) {
+uint64_t visibilityMemoryBound(const BackendFactory& backends, const SplatCloud& cloud,
+                               uint32_t view_size) {
   Camera camera;
   camera.width = camera.height = view_size;
   camera.fx = camera.fy = view_size;
-  const SplatInstance instance{&cloud};
-  const BackwardInput input;
   const uint64_t gradient = uint64_t{view_size} * view_size * (4 * sizeof(float));
-  return backwardMemoryBound({&instance, 1}, camera, {}, input) + gradient +
+  return backends.passMemory(cloud, camera, {}) + gradient +
          cloud.size() * (2 * sizeof(double) + 15 * sizeof(float)) + (uint64_t{1} << 16);
 }
 

@@ -7,7 +7,7 @@
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
 #include "math/camera.h"
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 
@@ -20,6 +20,7 @@ std::vector<float> splatVisibility(const BackendFactory& backends, const SplatCl
 
 /// Upper bound of the bytes that splatVisibility allocates for views of this many pixels per side,
 /// the result included.
-uint64_t visibilityMemoryBound(const SplatCloud& cloud, uint32_t view_size);
+uint64_t visibilityMemoryBound(const BackendFactory& backends, const SplatCloud& cloud,
+                               uint32_t view_size);
 
 }  // namespace stipple

@@ -34,7 +34,7 @@ void opacitiesThrough(const SplatCloud& cloud, const float* by_opacities, float*
 
 }  // namespace
 
-CloudGradient spansOf(SplatGradients& gradients) {
+CloudGradient spansOf(SplatCloud& gradients) {
   return {gradients.positions, gradients.rotations, gradients.scales, gradients.opacities,
           gradients.sh};
 }
@@ -56,13 +56,13 @@ void activateAll(const RawSplats& raw, const Parameterisation& how, SplatCloud& 
   how.activate(raw, cloud);
 }
 
-void throughActivations(const SplatCloud& cloud, SplatGradients& gradients) {
+void throughActivations(const SplatCloud& cloud, SplatCloud& gradients) {
   scalesThrough(cloud, gradients.scales.data(), gradients.scales.data());
   opacitiesThrough(cloud, gradients.opacities.data(), gradients.opacities.data());
 }
 
 void throughActivations(const RawSplats& raw, const SplatCloud& cloud, const Parameterisation& how,
-                        SplatGradients& by_cloud, RawSplats& by_raw) {
+                        SplatCloud& by_cloud, RawSplats& by_raw) {
   by_raw.sh_degree = raw.sh_degree;
   by_raw.extra_lengths = raw.extra_lengths;
   by_raw.resize(raw.size());

@@ -3,14 +3,13 @@
 #include "data/clouds/splat_cloud.h"
 #include "densify/raw_splats.h"
 #include "densify/strategy.h"
-#include "splat/render/render_backward.h"
 
 // Between raw numbers and stored values, both ways.
 
 namespace stipple {
 
-/// The derivatives of a backward pass, without its statistics.
-CloudGradient spansOf(SplatGradients& gradients);
+/// The arrays of derivatives, which are shaped as the cloud.
+CloudGradient spansOf(SplatCloud& gradients);
 
 /// Writes stored scales and opacities; positions, rotations and harmonics are the same numbers raw
 /// and stored and are left alone.
@@ -20,11 +19,11 @@ void activateShapes(const RawSplats& raw, SplatCloud& cloud);
 void activateAll(const RawSplats& raw, const Parameterisation& how, SplatCloud& cloud);
 
 /// Derivatives by stored scales and opacities become those by raw ones, in place.
-void throughActivations(const SplatCloud& cloud, SplatGradients& gradients);
+void throughActivations(const SplatCloud& cloud, SplatCloud& gradients);
 
 /// The same into an array of raw splats of their own, through `how` too. In: by_cloud, by stored
 /// values.
 void throughActivations(const RawSplats& raw, const SplatCloud& cloud, const Parameterisation& how,
-                        SplatGradients& by_cloud, RawSplats& by_raw);
+                        SplatCloud& by_cloud, RawSplats& by_raw);
 
 }  // namespace stipple

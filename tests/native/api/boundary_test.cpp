@@ -26,20 +26,6 @@ TEST_F(Boundary, RefusesNullArgumentsByName) {
   EXPECT_EQ(stipple_job_wait(nullptr), STIPPLE_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(Boundary, EveryFreeAcceptsNull) {
-  stipple_context_free(nullptr);
-  stipple_cloud_free(nullptr);
-  stipple_mesh_free(nullptr);
-  stipple_density_free(nullptr);
-  stipple_model_free(nullptr);
-  stipple_views_free(nullptr);
-  stipple_renderer_free(nullptr);
-  stipple_volume_free(nullptr);
-  stipple_image_free(nullptr);
-  stipple_job_free(nullptr);
-  SUCCEED();
-}
-
 TEST_F(Boundary, KeepsMessagesApartByThread) {
   EXPECT_NE(stipple_cloud_info(nullptr, nullptr), STIPPLE_OK);
   std::string other;

@@ -98,6 +98,61 @@ TEST(Renderer, EveryMethodDrawsTheSamePicture) {
   EXPECT_LT(largestDifference(colourOf(renderer, instances, settings), tiled), 1e-4 * 2);
 }
 
+/// Draws everything in one colour.
+class PlainImages final : public ImageRendererFactory {
+ public:
+  std::unique_ptr<ImageRenderer> makeImageRenderer() const override {
+    return std::make_unique<Plain>();
+  }
+  RenderMemory imageMemory(std::span<const SplatInstance>, const Camera&, const RenderOptions&,
+                           const RenderAccuracy&) const override {
+    return {.result_bytes = 7};
+  }
+
+ private:
+  class Plain final : public ImageRenderer {
+   public:
+    void render(std::span<const SplatInstance>, const Camera& camera, const RenderOptions&,
+                const RenderAccuracy&, RenderResult& result, Progress*) override {
+      result.width = camera.width;
+      result.height = camera.height;
+      result.colour.assign(size_t{4} * camera.width * camera.height, 0.25f);
+    }
+    void order(std::span<const SplatInstance>, const Camera&, const DrawOrderOutput&,
+               Progress*) override {}
+    uint64_t memoryBytes() const override { return 0; }
+  };
+};
+
+TEST(Renderer, TheFactoryDrawsWhatIsNotADefinition) {
+  const Instances instances = placed(100);
+  Renderer renderer(std::make_shared<PlainImages>());
+  ShotSettings settings = settingsFor(instances, OutputColour::kComposited);
+  for (const bool is_blurred : {false, true}) {
+    settings.sampling.aperture.radius = is_blurred ? 0.1 : 0;
+    settings.sampling.samples = is_blurred ? 2 : 0;
+    for (const ShotMethod method :
+         {ShotMethod::kTiled, ShotMethod::kRays, ShotMethod::kReference, ShotMethod::kYardstick}) {
+      settings.method = method;
+      const std::vector<float> colour = colourOf(renderer, instances, settings);
+      const bool is_plain = std::all_of(colour.begin(), colour.end(), [](float value) {
+        return std::abs(value - 0.25f) < 1e-6f;
+      });
+      EXPECT_EQ(is_plain, method == ShotMethod::kTiled || method == ShotMethod::kRays)
+          << static_cast<int>(method) << (is_blurred ? " blurred" : "");
+    }
+  }
+  settings.sampling = {};
+  settings.method = ShotMethod::kRays;
+  // By rays means the exact order and shape of splats, in double.
+  Renderer own(cpuImages());
+  ShotSettings asked = settings;
+  askForPasses({}, asked.options);
+  EXPECT_EQ(colourOf(own, instances, settings),
+            renderRays(instances.list, view(), asked.options, {}).colour);
+  EXPECT_EQ(renderer.memory(instances, view(), settings).sum(), 7u);
+}
+
 TEST(Renderer, AShareOfTheSplatsIsThatOfTheCutAndDrawsFewer) {
   const Instances instances = placed(400);
   Renderer renderer(cpuImages());
@@ -110,8 +165,8 @@ TEST(Renderer, AShareOfTheSplatsIsThatOfTheCutAndDrawsFewer) {
   ShotSettings whole = settings;
   whole.budget_share = 1;
   EXPECT_EQ(colourOf(renderer, instances, settings), colourOf(renderer, cut, whole));
-  EXPECT_GT(Renderer::memory(instances, view(), settings).sum(),
-            Renderer::memory(instances, view(), whole).sum());
+  EXPECT_GT(renderer.memory(instances, view(), settings).sum(),
+            renderer.memory(instances, view(), whole).sum());
 }
 
 TEST(Renderer, PicturesThatAreMadeAtOnceHaveTheBitsOfThoseMadeAlone) {

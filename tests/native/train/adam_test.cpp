@@ -315,8 +315,15 @@ TEST(Adam, RefusesBadOptionsAndChangesNothing) {
 
 TEST(Adam, NoGroupsAndEmptyGroupsAreNoWork) {
   adamStep({}, 1);
-  const AdamGroup empty[] = {AdamGroup{}, AdamGroup{nullptr, nullptr, nullptr, nullptr, 0, 3, 0.1}};
-  adamStep(empty, 1);
+  Parameters alone(5, 3, 0.1), between(5, 3, 0.1);
+  for (Parameters* some : {&alone, &between}) fill(some->g, 1, 7);
+  const AdamGroup one[] = {alone.group()};
+  adamStep(one, 1);
+  const AdamGroup with_empty[] = {
+      AdamGroup{}, between.group(), {nullptr, nullptr, nullptr, nullptr, 0, 3, 0.1}};
+  adamStep(with_empty, 1);
+  EXPECT_NE(between.p, std::vector<float>(15));
+  EXPECT_EQ(between.p, alone.p);
 }
 
 }  // namespace

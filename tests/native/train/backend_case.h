@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "splat/backward_cases.h"
-#include "train/loop/render_backend.h"
+#include "train/backend/render_backend.h"
 
 // What the tests of the backend share: a camera, options, rates.
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "train/backend/render_backend.h"
 #include "train/backend_case.h"
-#include "train/loop/render_backend.h"
 
 // What the backend adds to the loss of a picture, and parameters of another kind.
 

@@ -10,8 +10,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "splat/backward_cases.h"
+#include "train/backend/render_backend.h"
 #include "train/backend_case.h"
-#include "train/loop/render_backend.h"
 
 namespace stipple {
 namespace {

@@ -105,13 +105,11 @@ TEST(FieldModel, LearnsABallThatDecodesAtAnyBudget) {
     psnr.push_back(heldOutPsnr(*model, *views, budget));
     EXPECT_EQ(model->splats(budget).size(), budget * 4);
   }
-  // At the largest budget Gaussians are smaller than the pixels, and one octave loses a little:
-  // 0.28, 0.31 and 0.36 dB on three instruction sets, whose last bits 250 steps make visible.
-  for (size_t i = 1; i < psnr.size(); ++i) {
-    EXPECT_GE(psnr[i], psnr[i - 1] - (i + 1 < psnr.size() ? 0.05 : 0.5)) << i;
-  }
+  // Octaves gain 2.3, 1.4, 0.8 and 0.4 dB, and the last has 29.2 dB; the last bits of another
+  // instruction set, which 250 steps make visible, move these by 0.06 dB.
+  for (size_t i = 1; i < psnr.size(); ++i) EXPECT_GT(psnr[i], psnr[i - 1] + 0.2) << i;
   EXPECT_GT(psnr.back(), before + 5);
-  EXPECT_GT(psnr.back(), 21);
+  EXPECT_GT(psnr.back(), 28.5);
   EXPECT_EQ(model->splats(0).size(), 4096u);
 }
 
@@ -235,7 +233,8 @@ TEST(FieldModel, TheDensityMovesOnlyWhereItsGradientIsOn) {
   const auto on = entropyAfter(true);
   EXPECT_EQ(off.first, off.second);
   EXPECT_EQ(on.first, off.first);
-  EXPECT_NE(on.second, on.first);
+  // By 0.011 nats in these 70 steps, on every instruction set.
+  EXPECT_GT(std::abs(on.second - on.first), 0.007);
 }
 
 /// Half of the prior stands where nothing is: views show that it does not help.
@@ -260,7 +259,8 @@ TEST(FieldModel, TheDensityLeavesPlacesThatDoNotHelp) {
     }
     return static_cast<double>(outside) / static_cast<double>(cloud.size());
   };
-  EXPECT_GT(outsideShare(true), outsideShare(false) + 0.02);
+  // 57 % of the splats against 50 %.
+  EXPECT_GT(outsideShare(true), outsideShare(false) + 0.05);
 }
 
 TEST(FieldModel, GoesOnBitForBitFromItsState) {

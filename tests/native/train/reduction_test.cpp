@@ -368,12 +368,13 @@ TEST(Refine, StaysBelowItsMemoryBound) {
   options.view_size = 160;
   const size_t most =
       testing::mostBytesDuring([&] { refineCloud(*cpuBackends(), start, full, options); });
-  EXPECT_LE(most, refineMemoryBound(start, full, options));
+  EXPECT_LE(most, refineMemoryBound(*cpuBackends(), start, full, options));
   // The targets alone: more views are more memory, and the bound follows.
   EXPECT_GE(most, 6u * 160 * 160 * 12);
   RefineOptions more = options;
   more.view_count = 12;
-  EXPECT_EQ(refineMemoryBound(start, full, more) - refineMemoryBound(start, full, options),
+  EXPECT_EQ(refineMemoryBound(*cpuBackends(), start, full, more) -
+                refineMemoryBound(*cpuBackends(), start, full, options),
             6u * 160 * 160 * 12);
 }
 
@@ -383,7 +384,7 @@ TEST(Visibility, StaysBelowItsMemoryBound) {
   options.size = 128;
   const auto views = viewsOfCloud(*cpuBackends(), cloud, options);
   EXPECT_LE(testing::mostBytesDuring([&] { splatVisibility(*cpuBackends(), cloud, views); }),
-            visibilityMemoryBound(cloud, options.size));
+            visibilityMemoryBound(*cpuBackends(), cloud, options.size));
 }
 
 }  // namespace

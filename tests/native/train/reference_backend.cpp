@@ -227,6 +227,7 @@ class ReferencePass final : public ViewPass {
     statistics.splats = {splats(cloud_.positions), splats(cloud_.rotations), splats(cloud_.scales),
                          splats(cloud_.opacities)};
   }
+  void forget() override { poisonCopies(); }
   uint64_t memoryBytes() const override { return 0; }
 
   const SplatGradients& gradients() const { return by_; }
@@ -257,8 +258,6 @@ using DoubleSplats = std::array<Doubles, kRawArrayCount>;
 
 class ReferenceBackend final : public RenderBackend {
  public:
-  const char* name() const override { return "reference"; }
-
   void upload(const SplatCloud& cloud) override {
     TrainingState state;
     state.splats = rawSplats(cloud);

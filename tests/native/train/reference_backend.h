@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple::testing {
 
@@ -15,7 +15,6 @@ namespace stipple::testing {
 /// parameterisation of a strategy; it refuses the rest.
 class ReferenceBackends final : public BackendFactory {
  public:
-  const char* name() const override { return "reference"; }
   std::unique_ptr<ImageRenderer> makeImageRenderer() const override;
   std::unique_ptr<ViewPass> makeViewPass() const override;
   std::unique_ptr<RenderBackend> makeRenderBackend() const override;

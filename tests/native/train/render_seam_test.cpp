@@ -231,6 +231,9 @@ TEST(RenderSeam, StrategiesReadSplatsAtEventsAlone) {
   const RawSplats splats = rawSplats(ballOfSplats(20, 1));
   for (const std::string& name : strategyNames()) {
     const auto strategy = makeStrategy(name);
+    // The table of docs/architecture.md; a strategy with the part filter_3d has one too.
+    EXPECT_EQ(strategy->parameterisation() != nullptr, name == "frequency") << name;
+    EXPECT_TRUE(makeStrategy("mcmc+filter_3d")->parameterisation());
     if (strategy->parameterisation()) continue;  // raw numbers pass through the host in every step
     const Counting reader(splats);
     FitMoment moment;

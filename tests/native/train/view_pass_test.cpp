@@ -1,6 +1,6 @@
 // A strategy is told the same of a view whether a fit learns from it or it is drawn between steps.
 
-#include "train/loop/view_pass.h"
+#include "train/backend/view_pass.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -13,7 +13,7 @@
 #include "densify/strategy.h"
 #include "math/camera.h"
 #include "splat/render/render.h"
-#include "train/loop/view_pass.h"
+#include "train/backend/view_pass.h"
 #include "train/optimiser/adam.h"
 #include "train/optimiser/image_loss.h"
 
@@ -70,9 +70,6 @@ struct TrainingState {
 /// Determinism: the same calls give the same bits, for any number of threads.
 class RenderBackend : public SplatReader {
  public:
-  /// "cpu" and so on.
-  virtual const char* name() const = 0;
-
   /// Takes the splats of a fit, forgets what was held. Moments and step become 0, or those of a
   /// checkpoint; pictures stay.
   virtual void upload(const SplatCloud& cloud) = 0;
@@ -131,7 +128,11 @@ class RenderBackend : public SplatReader {
   virtual void lendStatistics(ViewStatistics& statistics) = 0;
 };
 
-/// On this processor, with native/splat, train/image_loss and train/adam.
+/// Keeps splats, moments and targets on the host and takes its steps there; what it draws and
+/// differentiates is done by `pass`. A kind of processor that has a pass can fit splats with it.
+std::unique_ptr<RenderBackend> makeHostBackend(std::unique_ptr<ViewPass> pass);
+
+/// The same with the pass of this processor.
 std::unique_ptr<RenderBackend> makeCpuBackend();
 
 }  // namespace stipple

@@ -16,6 +16,8 @@
 
 namespace stipple {
 
+struct GradientArray;
+
 /// The loss whose backward pass can gather what `request` asks for.
 ImageLossOptions lossFor(const StatisticRequest& request, double ssim_share);
 
@@ -71,10 +73,19 @@ class ViewPass {
   /// view.
   virtual void lendStatistics(ViewStatistics& statistics) = 0;
 
+  /// The splats are others now: image, loss and derivatives are of none that there is.
+  virtual void forget() = 0;
+
   virtual uint64_t memoryBytes() const = 0;  ///< held now, about
 };
 
 /// On this processor, with native/splat and train/optimiser/image_loss.
 std::unique_ptr<ViewPass> makeCpuViewPass();
+
+/// The arrays of Statistic, in its order.
+const GradientArray& arrayOf(Statistic statistic);
+
+/// Refuses an array of another length. In: what, as a noun.
+void requireCount(size_t seen, size_t needed, const char* what);
 
 }  // namespace stipple

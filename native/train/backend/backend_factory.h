@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "splat/render/image_renderer.h"
-#include "train/loop/render_backend.h"
-#include "train/loop/view_pass.h"
+#include "train/backend/render_backend.h"
+#include "train/backend/view_pass.h"
 
 namespace stipple {
 
@@ -13,14 +13,17 @@ namespace stipple {
 /// May be called by several threads; what it makes is of one each.
 class BackendFactory : public ImageRendererFactory {
  public:
-  /// "cpu" and so on.
-  virtual const char* name() const = 0;
-
   virtual std::unique_ptr<ViewPass> makeViewPass() const = 0;
   virtual std::unique_ptr<RenderBackend> makeRenderBackend() const = 0;
+
+  /// Upper bound of the bytes of the host that a view pass allocates for the image of a cloud and
+  /// its derivatives, without statistics. Who says nothing else is held to what this processor's
+  /// own takes.
+  virtual uint64_t passMemory(const SplatCloud& cloud, const Camera& camera,
+                              const RenderOptions& options) const;
 };
 
 /// On this processor.
-const std::shared_ptr<const BackendFactory>& cpuBackends();
+std::shared_ptr<const BackendFactory> cpuBackends();
 
 }  // namespace stipple

@@ -1,4 +1,6 @@
-#include "train/loop/backend_factory.h"
+#include "train/backend/backend_factory.h"
+
+#include "splat/render/render_backward.h"
 
 namespace stipple {
 
@@ -6,7 +8,6 @@ namespace {
 
 class CpuBackends final : public BackendFactory {
  public:
-  const char* name() const override { return "cpu"; }
   std::unique_ptr<ImageRenderer> makeImageRenderer() const override {
     return makeCpuImageRenderer();
   }
@@ -16,7 +17,13 @@ class CpuBackends final : public BackendFactory {
 
 }  // namespace
 
-const std::shared_ptr<const BackendFactory>& cpuBackends() {
+uint64_t BackendFactory::passMemory(const SplatCloud& cloud, const Camera& camera,
+                                    const RenderOptions& options) const {
+  const SplatInstance instance{&cloud};
+  return backwardMemoryBound({&instance, 1}, camera, options, {});
+}
+
+std::shared_ptr<const BackendFactory> cpuBackends() {
   static const std::shared_ptr<const BackendFactory> made = std::make_shared<CpuBackends>();
   return made;
 }

@@ -5,8 +5,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "train/loop/cpu_view_pass.h"
-#include "train/loop/render_backend.h"
+#include "splat/render/render_backward.h"
+#include "train/backend/render_backend.h"
 #include "train/optimiser/splat_activation.h"
 
 namespace stipple {
@@ -34,11 +34,9 @@ void requireLike(const RawSplats& splats, const RawSplats& others, const char* w
   }
 }
 
-class CpuBackend final : public RenderBackend {
-  using Stage = CpuViewPass::Stage;
-
+class HostBackend final : public RenderBackend {
  public:
-  const char* name() const override { return "cpu"; }
+  explicit HostBackend(std::unique_ptr<ViewPass> pass) : pass_(std::move(pass)) {}
 
   void upload(const SplatCloud& cloud) override {
     validate(cloud, "splats");
@@ -80,6 +78,10 @@ class CpuBackend final : public RenderBackend {
 
   uint64_t memoryBytes() const override {
     uint64_t floats = cloud_.scales.capacity() + cloud_.opacities.capacity();
+    for (const auto* values :
+         {&by_.positions, &by_.rotations, &by_.scales, &by_.opacities, &by_.sh}) {
+      floats += values->capacity();
+    }
     for (const RawSplats* splats : {&held_.splats, &held_.first_moments, &held_.second_moments,
                                     &held_.kept_gradients, &by_raw_}) {
       for (size_t i = 0; i < arrayCount(*splats); ++i) {
@@ -87,7 +89,7 @@ class CpuBackend final : public RenderBackend {
       }
     }
     for (const Target& target : targets_) floats += target.pixels.capacity();
-    return floats * sizeof(float) + pass_.memoryBytes();
+    return floats * sizeof(float) + pass_->memoryBytes();
   }
 
   uint32_t addTarget(uint32_t width, uint32_t height, std::span<const float> pixels) override {
@@ -104,54 +106,59 @@ class CpuBackend final : public RenderBackend {
   }
 
   void forward(const Camera& camera, const RenderOptions& options, Progress* progress) override {
+    forget();  // an image that fails half-way is of no splats
     activate();
     const Lent lent(*this);
-    pass_.forward(cloud_, camera, options, progress);
+    pass_->forward(cloud_, camera, options, progress);
+    width_ = camera.width;
+    height_ = camera.height;
   }
 
   ImageLossValue loss(uint32_t target, const ImageLossOptions& options,
                       std::span<const float> weights) override {
-    pass_.requireStage(Stage::kDrawn, "a loss needs an image; call forward first");
     if (target >= targets_.size()) {
       fail(ErrorCode::kInvalidArgument, "target is " + std::to_string(target) + "; there are " +
                                             std::to_string(targets_.size()));
     }
     const Target& wanted = targets_[target];
-    const RenderResult& drawn = pass_.drawn();
-    if (wanted.width != drawn.width || wanted.height != drawn.height) {
+    const bool is_drawn = width_ > 0;  // else the pass says what is missing
+    if (is_drawn && (wanted.width != width_ || wanted.height != height_)) {
       fail(ErrorCode::kInvalidArgument,
            "target " + std::to_string(target) + " is " + std::to_string(wanted.width) + " x " +
-               std::to_string(wanted.height) + " pixels; the image is " +
-               std::to_string(drawn.width) + " x " + std::to_string(drawn.height));
+               std::to_string(wanted.height) + " pixels; the image is " + std::to_string(width_) +
+               " x " + std::to_string(height_));
     }
-    return pass_.loss(wanted.pixels, weights, options);
+    return loss(wanted.pixels, options, weights);
   }
 
   ImageLossValue loss(std::span<const float> target, const ImageLossOptions& options,
                       std::span<const float> weights) override {
-    return pass_.loss(target, weights, options);
+    takeBack();
+    return pass_->loss(target, weights, options);
   }
 
   BackwardSummary backward(const StatisticRequest& request, Regulariser* regulariser,
                            Progress* progress) override {
+    takeBack();
     const Lent lent(*this);
     BackwardSummary summary =
-        pass_.backward(request, regulariser ? regulariser->transmittanceWeight() : 0.0, progress);
-    SplatGradients& by = pass_.gradients();
+        pass_->backward(request, regulariser ? regulariser->transmittanceWeight() : 0.0, progress);
+    pass_->swapGradients(by_);
+    has_gradients_ = true;
     if (regulariser && regulariser->readsSplats()) {
-      summary.regularisation += regulariser->evaluate(cloud_, spansOf(by));
+      summary.regularisation += regulariser->evaluate(cloud_, spansOf(by_));
     }
     if (how_) {
-      throughActivations(held_.splats, cloud_, *how_, by, by_raw_);
+      throughActivations(held_.splats, cloud_, *how_, by_, by_raw_);
     } else {
-      throughActivations(cloud_, by);
+      throughActivations(cloud_, by_);
     }
     are_kept_ = false;
     return summary;
   }
 
   void step(const StepOptions& options) override {
-    pass_.requireStage(Stage::kGradients, "a step needs derivatives; call backward first");
+    requireGradients("a step needs derivatives; call backward first");
     // Those that were kept count, these too.
     if (held_.kept_gradients.size() > 0) addToKept();
     constexpr size_t kFirst = 3;  // numbers of the constant harmonic
@@ -174,9 +181,9 @@ class CpuBackend final : public RenderBackend {
   }
 
   void keepGradients() override {
-    pass_.requireStage(Stage::kGradients, "there are no derivatives to keep; call backward first");
+    requireGradients("there are no derivatives to keep; call backward first");
     addToKept();
-    pass_.forget();
+    forget();
   }
 
   void edit(const SplatEdit& edit) override {
@@ -189,36 +196,33 @@ class CpuBackend final : public RenderBackend {
   }
 
   std::vector<float> picture() const override {
-    pass_.requireStage(Stage::kDrawn, "there is no image; call forward first");
-    return pass_.drawn().colour;
+    const std::span<const float> image = pass_->image();
+    return {image.begin(), image.end()};
   }
 
   RawSplats gradients() const override {
-    pass_.requireStage(Stage::kGradients, "there are no derivatives; call backward first");
+    requireGradients("there are no derivatives; call backward first");
     if (how_) return by_raw_;
-    const SplatGradients& by = pass_.gradients();
     RawSplats raw = zerosLike(held_.splats);
-    raw.positions = by.positions;
-    raw.rotations = by.rotations;
-    raw.log_scales = by.scales;
-    raw.logits = by.opacities;
-    raw.sh = by.sh;
+    raw.positions = by_.positions;
+    raw.rotations = by_.rotations;
+    raw.log_scales = by_.scales;
+    raw.logits = by_.opacities;
+    raw.sh = by_.sh;
     return raw;
   }
 
   std::vector<float> statistic(Statistic statistic) const override {
-    pass_.requireStage(Stage::kGradients, "there are no statistics; call backward first");
-    const GradientArray& array = arrayOf(statistic);
-    const std::vector<float>& seen = pass_.gradients().*array.values;
+    const std::span<const float> seen = pass_->statistic(statistic);
     if (seen.empty() && splatCount() > 0) {
       fail(ErrorCode::kInvalidArgument,
-           std::string(array.name) + " were not asked for in the last backward pass");
+           std::string(arrayOf(statistic).name) + " were not asked for in the last backward pass");
     }
-    return seen;
+    return {seen.begin(), seen.end()};
   }
 
   void lendStatistics(ViewStatistics& statistics) override {
-    pass_.lendStatistics(statistics);
+    pass_->lendStatistics(statistics);
     if (statistics.splats.scales.empty()) return;
     // Without a parameterisation the cloud has these two only while it is drawn.
     statistics.splats.positions = held_.splats.positions;
@@ -230,7 +234,7 @@ class CpuBackend final : public RenderBackend {
   /// drawn, the cloud has the arrays. With a parameterisation it has arrays of its own.
   class Lent {
    public:
-    explicit Lent(CpuBackend& backend) : backend_(backend) {
+    explicit Lent(HostBackend& backend) : backend_(backend) {
       if (!backend_.how_) exchange();
     }
     ~Lent() {
@@ -245,7 +249,7 @@ class CpuBackend final : public RenderBackend {
       backend_.cloud_.rotations.swap(backend_.held_.splats.rotations);
       backend_.cloud_.sh.swap(backend_.held_.splats.sh);
     }
-    CpuBackend& backend_;
+    HostBackend& backend_;
   };
 
   void hold(TrainingState state) {
@@ -259,7 +263,24 @@ class CpuBackend final : public RenderBackend {
 
   void changed() {
     is_activated_ = false;
-    pass_.forget();
+    forget();
+  }
+
+  /// Image and derivatives are of no splats that there are.
+  void forget() {
+    takeBack();
+    pass_->forget();
+    width_ = height_ = 0;
+  }
+
+  /// The pass gets its arrays again before it is asked for others.
+  void takeBack() {
+    if (has_gradients_) pass_->swapGradients(by_);
+    has_gradients_ = false;
+  }
+
+  void requireGradients(const char* message) const {
+    if (!has_gradients_) fail(ErrorCode::kInvalidArgument, message);
   }
 
   void activate() {
@@ -275,9 +296,8 @@ class CpuBackend final : public RenderBackend {
   /// Derivatives by an array of the raw splats, of the last backward pass.
   std::span<const float> lastGradient(RawArray array) const {
     if (how_) return arrayOf(by_raw_, array);
-    const SplatGradients& by = pass_.gradients();
-    const std::vector<float>* const arrays[] = {&by.positions, &by.rotations, &by.scales,
-                                                &by.opacities, &by.sh};
+    const std::vector<float>* const arrays[] = {&by_.positions, &by_.rotations, &by_.scales,
+                                                &by_.opacities, &by_.sh};
     return *arrays[static_cast<size_t>(array)];
   }
 
@@ -318,16 +338,23 @@ class CpuBackend final : public RenderBackend {
   const Parameterisation* how_ = nullptr;
   std::vector<Target> targets_;
 
-  CpuViewPass pass_;       ///< its derivatives are by raw scales and opacities without how_
-  RawSplats by_raw_;       ///< with how_
-  bool are_kept_ = false;  ///< whether the last derivatives are among the kept ones
+  std::unique_ptr<ViewPass> pass_;
+  uint32_t width_ = 0, height_ = 0;  ///< drawn last; 0: nothing of the splats that there are
+  SplatCloud by_;                    ///< derivatives; scales and opacities are raw without how_
+  bool has_gradients_ = false;       ///< by_ has arrays of the pass
+  RawSplats by_raw_;                 ///< with how_
+  bool are_kept_ = false;            ///< whether the last derivatives are among the kept ones
   std::vector<AdamGroup> groups_;
 };
 
 }  // namespace
 
+std::unique_ptr<RenderBackend> makeHostBackend(std::unique_ptr<ViewPass> pass) {
+  return std::make_unique<HostBackend>(std::move(pass));
+}
+
 std::unique_ptr<RenderBackend> makeCpuBackend() {
-  return std::make_unique<CpuBackend>();
+  return makeHostBackend(makeCpuViewPass());
 }
 
 }  // namespace stipple

@@ -1,11 +1,13 @@
-#include "train/loop/cpu_view_pass.h"
-
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
+#include <span>
+#include <vector>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "splat/render/render_backward.h"
+#include "train/backend/view_pass.h"
 
 namespace stipple {
 
@@ -13,30 +15,54 @@ namespace {
 
 constexpr size_t kGrain = 1 << 14;
 
-constexpr const GradientArray* kStatistics =
-    std::find_if(std::begin(kGradientArrays), std::end(kGradientArrays),
-                 [](const GradientArray& array) { return array.is_statistic; });
-static_assert(std::end(kGradientArrays) - kStatistics == static_cast<ptrdiff_t>(kStatisticCount));
+/// On this processor, with native/splat and train/optimiser/image_loss.
+class CpuViewPass final : public ViewPass {
+ public:
+  CpuViewPass();
 
-}  // namespace
+  void forward(const SplatCloud& cloud, const Camera& camera, const RenderOptions& options,
+               Progress* progress = nullptr) override;
+  ImageLossValue loss(std::span<const float> target, std::span<const float> weights,
+                      const ImageLossOptions& options) override;
+  void setLossGradient(std::span<const float> gradient) override;
+  BackwardSummary backward(const StatisticRequest& request, double transmittance_weight = 0,
+                           Progress* progress = nullptr) override;
+  std::span<const float> image() override;
+  std::span<const float> statistic(Statistic statistic) override;
+  void swapGradients(SplatCloud& gradients) override;
+  void lendStatistics(ViewStatistics& statistics) override;
+  void forget() override { stage_ = Stage::kSplats; }
+  uint64_t memoryBytes() const override;
 
-ImageLossOptions lossFor(const StatisticRequest& request, double ssim_share) {
-  ImageLossOptions options;
-  options.ssim_share = ssim_share;
-  options.with_structure_errors = request.structure_errors || request.error_maps;
-  return options;
-}
+ private:
+  /// What has been done since the splats changed last; each pass needs the one before it.
+  enum class Stage { kSplats, kDrawn, kLoss, kGradients };
+  void requireStage(Stage least, const char* message) const;
+  SplatGradients& gradients() { return backward_.instances[0]; }
 
-const GradientArray& arrayOf(Statistic statistic) {
-  return kStatistics[static_cast<size_t>(statistic)];
-}
+  std::span<const float> errorsOf(const StatisticRequest& request);
+  std::span<const float> residual();
+  double meanTransmittance() const;
 
-void requireCount(size_t seen, size_t needed, const char* what) {
-  if (seen != needed) {
-    fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(seen) +
-                                          " values; " + std::to_string(needed) + " are needed");
-  }
-}
+  Stage stage_ = Stage::kSplats;
+  const SplatCloud* cloud_ = nullptr;
+  const Camera* camera_ = nullptr;
+  RenderWorkspace workspace_;
+  RenderResult drawn_;
+  ImageLoss loss_;
+  double loss_value_ = 0;
+  std::span<const float> target_;         ///< [H,W,3] of the last loss
+  std::span<const float> weights_;        ///< [H,W] the same
+  std::span<const float> loss_gradient_;  ///< [H,W,4] of the last loss, or the caller's
+  bool has_error_maps_ = false;           ///< whether the last backward pass was asked for them
+  bool has_drawn_splats_ = false;         ///< the same
+  std::vector<float> own_gradient_;       ///< [H,W,4]
+  std::vector<float> residual_;           ///< [H,W,3]
+  std::vector<float> made_errors_;        ///< [H,W] of StatisticRequest::errors_of
+  BackwardWorkspace workspace_of_backward_;
+  BackwardResult backward_;
+  std::vector<uint8_t> visible_;  ///< [N]
+};
 
 CpuViewPass::CpuViewPass() {
   workspace_.keepForBackward(true);
@@ -146,7 +172,7 @@ void CpuViewPass::lendStatistics(ViewStatistics& statistics) {
   statistics.loss = loss_value_;
   statistics.visible = visible_;
   for (size_t i = 0; i < kStatisticCount; ++i) {
-    statistics.arrays[i] = gradients().*kStatistics[i].values;
+    statistics.arrays[i] = gradients().*arrayOf(static_cast<Statistic>(i)).values;
   }
   if (has_drawn_splats_) {
     statistics.splats = {cloud_->positions, cloud_->rotations, cloud_->scales, cloud_->opacities};
@@ -220,6 +246,8 @@ double CpuViewPass::meanTransmittance() const {
   for (const float value : drawn_.transmittance) sum += static_cast<double>(value);
   return sum / static_cast<double>(drawn_.transmittance.size());
 }
+
+}  // namespace
 
 std::unique_ptr<ViewPass> makeCpuViewPass() {
   return std::make_unique<CpuViewPass>();
