@@ -25,15 +25,27 @@ class ImageJudge {
   /// In: a whole image, which differs little from the reference. Without it blocks alone judge.
   void setStandIn(const RenderResult& image);
   /// Fills in PSNR and errors of a row. is_whole: more of the image than the blocks was drawn.
-  void judge(const RenderResult& image, bool is_whole, AccuracyRow& row) const;
+  /// One of which the blocks alone were drawn takes what is outside of them from the whole image
+  /// that it hardly differs from in the blocks, where there is such an image.
+  void judge(const RenderResult& image, bool is_whole, AccuracyRow& row);
 
   const std::vector<PixelArea>& blocks() const { return blocks_; }
   uint64_t comparedPixels() const;
 
   /// Bytes that it keeps and needs for a moment at most.
-  static uint64_t memoryBound(uint64_t compared_pixels, uint64_t image_pixels);
+  static uint64_t memoryBound(uint64_t compared_pixels, uint64_t image_pixels, size_t images);
 
  private:
+  /// A whole image that was judged.
+  struct Judged {
+    std::vector<float> in_blocks;  ///< values
+    double error_in_blocks = 0;    ///< mean square against the reference
+    double error = 0;              ///< of the whole
+    double largest_error = 0;
+    double error_99_9 = 0;
+  };
+
+  const Judged* closeTo(const std::vector<float>& in_blocks, double error) const;
   std::vector<float> valuesOf(const RenderResult& image, const std::vector<PixelArea>& areas) const;
 
   uint32_t width_;
@@ -43,6 +55,7 @@ class ImageJudge {
   std::vector<float> stand_in_;            ///< of the whole image; empty without
   std::vector<float> stand_in_of_blocks_;  ///< of the blocks
   double stand_in_error_ = 0;              ///< mean square, in the blocks
+  std::vector<Judged> judged_;
 };
 
 }  // namespace stipple

@@ -342,7 +342,7 @@ RenderMemory measurePictureMemory(const Instances& instances, const Camera& came
   const uint64_t pixels = uint64_t{camera.width} * camera.height;
   const uint64_t compared =
       settings.reference_pixels == 0 ? pixels : std::min(pixels, settings.reference_pixels * 2);
-  memory.other_bytes += ImageJudge::memoryBound(compared, pixels);
+  memory.other_bytes += ImageJudge::memoryBound(compared, pixels, settings.accuracies.size());
   return memory;
 }
 
