@@ -31,9 +31,11 @@ class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
     second: EnumProperty(name="Right", description="What is drawn to the right of the line", items=quality.SIDES,
                          default='RENDER')
     show: EnumProperty(name="Show", description="How the two images are put together",
-                       items=(('WIPE', "Wipe", "The first setting is to the left of a line and the second to its right"),
+                       items=(('WIPE', "Wipe",
+                               "The first setting is to the left of a line and the second to its right"),
                               ('ERROR', "Error × 10", "The image shows ten times the difference of the two settings")))
-    wipe: FloatProperty(name="Line", description="Position of the line between the two settings", default=0.5, min=0.0, max=1.0, subtype='FACTOR')
+    wipe: FloatProperty(name="Line", description="Position of the line between the two settings", default=0.5, min=0.0,
+                        max=1.0, subtype='FACTOR')
 
     def invoke(self, context, _event):
         return self.run_in_window(context)

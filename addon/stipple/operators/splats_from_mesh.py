@@ -25,8 +25,9 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
 
     anchors: IntProperty(name="Splats", description="Number of splats, or of the anchors that each become several. It "
                          "can be changed afterwards", default=20000, soft_min=1, soft_max=1000000)
-    gaussians_per_anchor: IntProperty(name="Splats per Anchor", description="Number of splats that each anchor becomes, "
-                                      "side by side on the surface", default=1, soft_min=1, soft_max=32)
+    gaussians_per_anchor: IntProperty(name="Splats per Anchor",
+                                      description="Number of splats that each anchor becomes, "
+                                                  "side by side on the surface", default=1, soft_min=1, soft_max=32)
     detail_weight: FloatProperty(name="Detail Weight", description="How much texture detail and curvature attract "
                                  "anchors, 0 for an even spread", default=1.0, soft_min=0.0, soft_max=4.0)
     order: EnumProperty(name="Order", description="How anchors are drawn from the density", items=ORDERS)
@@ -36,7 +37,8 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
     hide_source: BoolProperty(name="Hide Source", description="Hide the meshes in the viewport and in renders",
                               default=True)
     source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
-                                "beside the .blend file", subtype='FILE_PATH', options={'SKIP_SAVE'} | version.RELATIVE_PATH)
+                                "beside the .blend file", subtype='FILE_PATH',
+                                options={'SKIP_SAVE'} | version.RELATIVE_PATH)
 
     @classmethod
     def poll(cls, context):

@@ -9,8 +9,8 @@ import bpy
 
 from ..scene.source import splat_data
 
-_NAMES = ('DATA_PT_vertex_groups', 'DATA_PT_shape_keys', 'DATA_PT_uv_texture', 'DATA_PT_vertex_colors', 'DATA_PT_face_maps',
-          'DATA_PT_normals', 'DATA_PT_texture_space', 'DATA_PT_remesh', 'DATA_PT_customdata')
+_NAMES = ('DATA_PT_vertex_groups', 'DATA_PT_shape_keys', 'DATA_PT_uv_texture', 'DATA_PT_vertex_colors',
+          'DATA_PT_face_maps', 'DATA_PT_normals', 'DATA_PT_texture_space', 'DATA_PT_remesh', 'DATA_PT_customdata')
 _polls = {}  # name of a panel: the poll that it has itself, None where it inherits one
 
 

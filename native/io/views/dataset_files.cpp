@@ -109,8 +109,8 @@ fs::path colmapPictures(const std::string& model, const std::vector<CameraView>&
     around = around.parent_path();
   }
   fail(ErrorCode::kIo,
-       model + ": the picture '" + cameras.front().image_path +
-           "' is missing, and all others are; the model's pictures are looked for in " + looked_in +
+       model + ": the image '" + cameras.front().image_path +
+           "' is missing, and all others are; the model's images are looked for in " + looked_in +
            " and the folders around them");
 }
 
@@ -146,7 +146,7 @@ void addTransforms(const std::string& path, std::vector<DatasetView>& views, Mis
   for (const CameraView& camera : readCameraFile(path, Distorted::kKeep)) {
     if (camera.image_path.empty()) {
       fail(ErrorCode::kFormat,
-           path + ": frame " + std::to_string(frame) + " has no 'file_path'; it has no picture");
+           path + ": frame " + std::to_string(frame) + " has no 'file_path'; it has no image");
     }
     ++frame;
     DatasetView view{camera, {}, {}, {}};
