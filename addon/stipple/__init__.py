@@ -16,7 +16,7 @@ import bpy
 from . import cycles_engine, engine, operators, panels, preferences, properties
 from .viewport import drawing
 from .scene.source import sync
-from .scene.view import steady_effects
+from .scene.view import splat_engines, steady_effects
 
 _classes = (preferences.classes + properties.classes + operators.classes + panels.classes + engine.classes
             + cycles_engine.classes)
@@ -29,11 +29,13 @@ def register():
     panels.register()
     sync.register()
     steady_effects.register()
+    splat_engines.register()
     drawing.register()
 
 
 def unregister():
     drawing.unregister()
+    splat_engines.unregister()
     steady_effects.unregister()
     sync.unregister()
     panels.unregister()

@@ -17,7 +17,7 @@ UP_AXES = (('AUTO', "From File", "The frame is what the file says, or what files
 class STIPPLE_PG_format(bpy.types.PropertyGroup):
     """What was chosen last for files of a format; its name is the format's."""
 
-    up_axis: EnumProperty(name="Up Axis", items=UP_AXES)
+    up_axis: EnumProperty(name="Up Axis", description="The up direction of files that do not say theirs", items=UP_AXES)
 
 
 class STIPPLE_AP_preferences(bpy.types.AddonPreferences):

@@ -38,7 +38,8 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
 
     source: StringProperty(name="Source", description="File that the splats are decoded from", subtype='FILE_PATH',
                            options=version.RELATIVE_PATH, override=_OVERRIDABLE)
-    source_kind: EnumProperty(name="Source Kind", items=source_settings.KINDS, default='NONE')
+    source_kind: EnumProperty(name="Source Kind", description="What kind of file the source is",
+                              items=source_settings.KINDS, default='NONE')
     source_settings: StringProperty(options={'HIDDEN'})  # which settings it has: scene/source/source_settings.py
     source_count: IntProperty(options={'HIDDEN'})  # of a splat tree
     source_stamp: StringProperty(options={'HIDDEN'})  # of the file as it was read
@@ -51,7 +52,7 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                                 default=1.0, min=0.0, max=1.0, subtype='FACTOR', precision=3, options=_CHANGEABLE,
                                 override=_OVERRIDABLE)
     # Limits are checked where the value is used, so that one beyond them is reported and not bent.
-    anchors: IntProperty(name="Anchor Budget", description="Number of places on the surface that get splats",
+    anchors: IntProperty(name="Splats", description="Number of splats, or of the anchors that each become several",
                          default=20000, soft_min=1, soft_max=1000000, options=_CHANGEABLE, override=_OVERRIDABLE,
                          update=sync.on_property_change)
     anchors_render: IntProperty(name="Render Budget", description="Anchor budget of renders, 0 for the same as in the "

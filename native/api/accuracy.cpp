@@ -34,6 +34,9 @@ StippleAccuracyRow rowTo(const MeasuredAccuracy& measured, size_t index) {
   out.repetitions = from.repetitions;
   out.is_estimated = from.is_estimated ? 1 : 0;
   out.value = from.value;
+  out.verdict_utf8 = measured.accuracies.empty()
+                         ? accuracyVerdict(from.psnr)
+                         : accuracyVerdict(measured.accuracies[index], from.psnr);
   return out;
 }
 

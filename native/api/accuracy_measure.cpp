@@ -13,14 +13,14 @@ using namespace stipple::api;
 namespace {
 
 PictureAccuracyOptions pictureOptionsFrom(const StippleAccuracyMeasureOptions* options,
-                                          const Camera& camera) {
+                                          const Instances& instances, const Camera& camera) {
   StippleAccuracyMeasureOptions defaults;
   stipple_accuracy_measure_options_init(&defaults);
   const StippleAccuracyMeasureOptions given = completed(options, defaults, "options");
   PictureAccuracyOptions made;
   made.timing = {given.repetitions, given.max_seconds};
   made.reference_pixels = given.reference_pixels;
-  if (given.setting_count == 0) made.accuracies = usualAccuracies(camera);
+  if (given.setting_count == 0) made.accuracies = usualAccuracies(instances, camera);
   const StructArray<StippleAccuracy> settings(given.settings, given.setting_count,
                                               "options->settings");
   for (uint64_t i = 0; i < given.setting_count; ++i) {
@@ -65,7 +65,7 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context,
     requireMeasurable(shot);
     const Camera view = cameraFrom(camera);
     validate(view);
-    const PictureAccuracyOptions measured = pictureOptionsFrom(options, view);
+    const PictureAccuracyOptions measured = pictureOptionsFrom(options, placed, view);
     validate(measured, placed, view);
     const auto backends = context->state->backends;
     const RenderMemory memory = measurePictureMemory(*backends, placed, view, shot, measured);

@@ -74,10 +74,12 @@ void printTable(const AccuracyReport& report, uint64_t count, bool is_volume) {
       std::snprintf(quartiles, sizeof(quartiles), "%.4g-%.4g", row.seconds_low * 1e3,
                     row.seconds_high * 1e3);
     }
-    std::printf("%-42s %9.4g%s %17s %8.2f %8.4g %8.4g %10llu  %s%s\n", row.name_utf8,
-                row.seconds * 1e3, row.is_estimated ? "e" : " ", quartiles, row.psnr,
+    char psnr[32] = "exact";
+    if (std::isfinite(row.psnr)) std::snprintf(psnr, sizeof(psnr), "%.2f", row.psnr);
+    std::printf("%-42s %9.4g%s %17s %8s %8.4g %8.4g %10llu  %s%s\n", row.name_utf8,
+                row.seconds * 1e3, row.is_estimated ? "e" : " ", quartiles, psnr,
                 row.largest_error, row.error_99_9, static_cast<unsigned long long>(row.splat_count),
-                stipple_accuracy_verdict(row.psnr), row.is_on_front ? " *" : "");
+                row.verdict_utf8, row.is_on_front ? " *" : "");
   }
 }
 

@@ -26,7 +26,7 @@ struct AccuracyRow {
   double seconds_high = 0;  ///< and upper
   uint32_t repetitions = 0;
   bool is_estimated = false;   ///< from the pixels that were drawn, not from whole pictures
-  double psnr = 0;             ///< dB, peak 1, all four channels; infinite where nothing differs
+  double psnr = 0;             ///< dB, peak 1, channels that show; infinite where nothing differs
   double largest_error = 0;    ///< of any channel of any compared pixel; NaN: not known, of fits
   double error_99_9 = 0;       ///< 99.9 % of the channels of compared pixels are no further off
   uint64_t splat_count = 0;    ///< that the setting has; of volumes, voxels that are not empty

@@ -106,6 +106,7 @@ std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
     checkpoint = readCheckpoint(options_.checkpoint_path);
     requireSameSettings(checkpoint->settings_json, settings, options_.checkpoint_path);
   }
+  for (const std::string& text : views_->notes()) note(text);
   for (const std::string& warning : checkViews(*views_, {}, &progress)) note(warning);
   auto trainer = std::make_unique<Trainer>(
       *backends_, views_, split_, makeModel(*backends_, *views_, split_, options_, &progress),

@@ -10,9 +10,9 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
-#include "math/colour.h"
 #include "measure/accuracy_choice.h"
 #include "measure/accuracy_row.h"
+#include "measure/image_judge.h"
 #include "shot/cloud_cuts.h"
 
 namespace stipple {
@@ -60,6 +60,21 @@ uint64_t pixelsOf(std::span<const PixelArea> areas) {
   return count;
 }
 
+bool hasHarmonics(const Instances& instances) {
+  return std::any_of(instances.list.begin(), instances.list.end(), [](const auto& instance) {
+    return instance.cloud && instance.cloud->sh_degree > 0;
+  });
+}
+
+/// What of the settings that an image can be drawn whole with is closest to the reference.
+AccuracySettings standInAccuracy() {
+  AccuracySettings accuracy = accuracyOf(AccuracyLevel::kFinal);
+  accuracy.order = RayOrder::kResponse;
+  accuracy.projection = RayProjection::kRay;
+  accuracy.least_alpha = 1e-4;
+  return accuracy;
+}
+
 class Measuring {
  public:
   Measuring(const ImageRendererFactory& images, const Instances& instances, const Camera& camera,
@@ -70,7 +85,8 @@ class Measuring {
         is_display_(compositesInDisplaySpace(instances, shot.options.blend_space)),
         settings_(settings),
         progress_(progress),
-        blocks_(spreadBlocks(camera, settings.reference_pixels)),
+        judge_(camera.width, camera.height, is_display_,
+               spreadBlocks(camera, settings.reference_pixels)),
         images_(images.makeImageRenderer()) {
     options_.with_depth = false;
     low_pass_ = options_.low_pass;
@@ -78,14 +94,14 @@ class Measuring {
   }
 
   MeasuredAccuracy run() {
-    const AccuracySettings yardstick = accuracyOf(AccuracyLevel::kReference);
     result_.report.width = camera_.width;
     result_.report.height = camera_.height;
-    result_.report.compared_pixels = pixelsOf(blocks_);
+    result_.report.compared_pixels = judge_.comparedPixels();
     result_.report.splat_count = splatCount(instances_);
     result_.report.thread_count = static_cast<uint32_t>(threadLimit());
     makeCuts();
-    drawReference(yardstick);
+    drawReference();
+    drawStandIn();
     std::vector<size_t> repeated;
     for (size_t i = 0; i < settings_.accuracies.size(); ++i) {
       progress_.advance(0.4 + 0.2 * partOf(i, settings_.accuracies.size()), "Comparing settings");
@@ -155,7 +171,7 @@ class Measuring {
   /// Draws the blocks, and half of them, and from both what a whole picture would take: splats are
   /// placed once, pixels follow their number. Leaves the picture of all blocks.
   double estimate(const AccuracySettings& accuracy, double progress_begin, double progress_end) {
-    const std::span<const PixelArea> all = blocks_;
+    const std::span<const PixelArea> all = judge_.blocks();
     const auto half = all.subspan(0, all.size() / 2);
     const double middle = progress_begin + (progress_end - progress_begin) / 3;
     const uint64_t picture_pixels = uint64_t{camera_.width} * camera_.height;
@@ -172,31 +188,38 @@ class Measuring {
     return result_.report.compared_pixels == uint64_t{camera_.width} * camera_.height;
   }
 
-  AccuracyRow& addRow(const AccuracySettings& accuracy) {
+  /// is_whole: the image that was drawn last, rather than its blocks alone.
+  AccuracyRow& addRow(const AccuracySettings& accuracy, bool is_whole) {
     AccuracyRow row;
     row.name = accuracyName(accuracy);
     row.knobs = knobValues(accuracy);
     row.splat_count = splatCount(cutFor(accuracy));
     row.visible_count = picture_.visible_count;
-    std::vector<float> differences = valuesOf(picture_);
-    for (size_t i = 0; i < differences.size(); ++i) differences[i] -= reference_[i];
-    setErrors(differences, row);
+    judge_.judge(picture_, is_whole, row);
     result_.report.rows.push_back(std::move(row));
     result_.accuracies.push_back(accuracy);
     return result_.report.rows.back();
   }
 
-  void drawReference(const AccuracySettings& yardstick) {
+  void drawReference() {
+    const AccuracySettings reference = accuracyOf(AccuracyLevel::kReference);
     double seconds = 0;
     if (comparesAll()) {
-      seconds = drawBlocks(yardstick, blocks_, 0.0, 0.4);
+      seconds = drawBlocks(reference, judge_.blocks(), 0.0, 0.4);
     } else {
-      seconds = estimate(yardstick, 0.0, 0.4);
+      seconds = estimate(reference, 0.0, 0.4);
     }
-    reference_ = valuesOf(picture_);
-    AccuracyRow& row = addRow(yardstick);
+    judge_.setReference(picture_);
+    AccuracyRow& row = addRow(reference, false);
     setSeconds({seconds}, row);
     row.is_estimated = !comparesAll();
+  }
+
+  void drawStandIn() {
+    const AccuracySettings accuracy = standInAccuracy();
+    if (comparesAll() || isSlow(renderAccuracy(accuracy), camera_)) return;
+    draw(accuracy);
+    judge_.setStandIn(picture_);
   }
 
   /// Returns whether the setting is to be timed again.
@@ -205,14 +228,14 @@ class Measuring {
       const double at = progress_.fraction();
       const double seconds = estimate(accuracy, at, at);
       if (seconds > kLongestShare * settings_.timing.most_seconds) {
-        AccuracyRow& row = addRow(accuracy);
+        AccuracyRow& row = addRow(accuracy, false);
         setSeconds({seconds}, row);
         row.is_estimated = true;
         return false;
       }
     }
     draw(accuracy);  // and its memory grows before anything is timed
-    addRow(accuracy);
+    addRow(accuracy, true);
     return true;
   }
 
@@ -236,21 +259,6 @@ class Measuring {
     }
   }
 
-  /// Display values of the compared pixels, four channels each.
-  std::vector<float> valuesOf(const RenderResult& picture) const {
-    std::vector<float> values;
-    values.reserve(result_.report.compared_pixels * 4);
-    for (const PixelArea& area : blocks_) {
-      for (uint32_t y = area.y0; y < area.y0 + area.height; ++y) {
-        const float* row = &picture.colour[(size_t{y} * camera_.width + area.x0) * 4];
-        for (size_t i = 0; i < size_t{area.width} * 4; ++i) {
-          values.push_back(is_display_ || i % 4 == 3 ? row[i] : linearToSrgb(row[i]));
-        }
-      }
-    }
-    return values;
-  }
-
   const Instances& instances_;
   const Camera& camera_;
   RenderOptions options_;
@@ -259,18 +267,17 @@ class Measuring {
   bool is_display_;
   const PictureAccuracyOptions& settings_;
   Progress& progress_;
-  std::vector<PixelArea> blocks_;
+  ImageJudge judge_;
   CloudCuts cutter_;
   std::vector<std::pair<double, Instances>> cuts_;
   std::unique_ptr<ImageRenderer> images_;
   RenderResult picture_;
-  std::vector<float> reference_;
   MeasuredAccuracy result_;
 };
 
 }  // namespace
 
-std::vector<AccuracySettings> usualAccuracies(const Camera& camera) {
+std::vector<AccuracySettings> usualAccuracies(const Instances& instances, const Camera& camera) {
   std::vector<AccuracySettings> list;
   for (const auto level : {AccuracyLevel::kDraft, AccuracyLevel::kPreview, AccuracyLevel::kFinal}) {
     list.push_back(accuracyOf(level));
@@ -280,7 +287,7 @@ std::vector<AccuracySettings> usualAccuracies(const Camera& camera) {
     change(accuracy);
     list.push_back(accuracy);
   };
-  add([](AccuracySettings& a) { a.sh_degree_limit = 0; });
+  if (hasHarmonics(instances)) add([](AccuracySettings& a) { a.sh_degree_limit = 0; });
   add([](AccuracySettings& a) { a.budget_share = 0.5; });
   add([](AccuracySettings& a) { a.budget_share = 0.25; });
   add([](AccuracySettings& a) { a.budget_share = 0.1; });
@@ -292,11 +299,7 @@ std::vector<AccuracySettings> usualAccuracies(const Camera& camera) {
     a.order = RayOrder::kResponse;
     a.projection = RayProjection::kRay;
   });
-  add([](AccuracySettings& a) {
-    a.order = RayOrder::kResponse;
-    a.projection = RayProjection::kRay;
-    a.least_alpha = 1e-4;
-  });
+  list.push_back(standInAccuracy());
   add([](AccuracySettings& a) { a.precision = Precision::kDouble; });
   if (hasImagePlane(camera)) return list;
   std::vector<AccuracySettings> along_rays;
@@ -338,11 +341,10 @@ RenderMemory measurePictureMemory(const ImageRendererFactory& images, const Inst
     least_share = std::min(least_share, accuracy.budget_share);
   }
   memory.other_bytes += CloudCuts::memoryBound(instances, least_share);
-  // The reference's and another's values of what is compared.
   const uint64_t pixels = uint64_t{camera.width} * camera.height;
   const uint64_t compared =
       settings.reference_pixels == 0 ? pixels : std::min(pixels, settings.reference_pixels * 2);
-  memory.other_bytes += compared * 4 * sizeof(float) * 2;
+  memory.other_bytes += ImageJudge::memoryBound(compared, pixels, settings.accuracies.size());
   return memory;
 }
 

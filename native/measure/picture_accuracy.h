@@ -26,8 +26,8 @@ struct MeasuredAccuracy {
 };
 
 /// Levels, and final with each of its knobs moved alone. All along rays where the camera has
-/// nothing else.
-std::vector<AccuracySettings> usualAccuracies(const Camera& camera);
+/// nothing else; colours by harmonics only where there are some.
+std::vector<AccuracySettings> usualAccuracies(const Instances& instances, const Camera& camera);
 
 /// Refuses options outside their range, a camera that cannot be drawn so, and instances without
 /// splats. Errors: kInvalidArgument.

@@ -173,4 +173,10 @@ const char* accuracyVerdict(double psnr) {
   return "obvious";
 }
 
+const char* accuracyVerdict(const AccuracySettings& accuracy, double psnr) {
+  if (accuracyName(accuracy) == accuracyLevelName(AccuracyLevel::kFinal)) return "as trained";
+  if (accuracy.level == AccuracyLevel::kReference) return "the reference itself";
+  return accuracyVerdict(psnr);
+}
+
 }  // namespace stipple

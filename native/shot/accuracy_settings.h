@@ -63,5 +63,9 @@ std::span<const AccuracyKnob> accuracyKnobs();
 
 /// A PSNR in dB as an artist would say it: "looks identical" to "obvious".
 const char* accuracyVerdict(double psnr);
+/// The same of an image at a setting, against the reference. Splats look as they were trained at the
+/// level final, whose difference from the reference is that of the order and the projection that
+/// training had: it is no fault that one sees, so the level is not judged by it.
+const char* accuracyVerdict(const AccuracySettings& accuracy, double psnr);
 
 }  // namespace stipple

@@ -159,10 +159,14 @@ EffectRow exactProjection(const EffectFacts& facts) {
   row.is_on = survey.affine_error_px > facts.largest_error_px;
   const double angle = degrees(survey.field_of_view);
   const double bound = degrees(affineFieldOfView(survey.error_ahead_px, facts.largest_error_px));
-  row.reason = text(
-      "Flat ellipses miss by up to %.2g px, %s %g px (field of view %.0f\u00b0; it may be about "
-      "%.0f\u00b0)",
-      survey.affine_error_px, row.is_on ? "above" : "within", facts.largest_error_px, angle, bound);
+  row.reason = text("Flat ellipses miss by up to %.2g px, %s %g px", survey.affine_error_px,
+                    row.is_on ? "above" : "within", facts.largest_error_px);
+  if (row.is_on && bound < 1) {
+    row.reason += text(" at any field of view; this one is %.0f\u00b0", angle);
+  } else {
+    row.reason += text("; the field of view is %.0f\u00b0, and they %s do up to about %.0f\u00b0",
+                       angle, row.is_on ? "would" : "will", bound);
+  }
   return row;
 }
 

@@ -58,7 +58,7 @@ def test_wide_angles_and_distance_change_the_plan(context, cloud):
     large = [(cloud, np.diag([8.0, 8.0, 8.0, 1.0]))]
     rows = effects.plan(context.library, effects.facts(context.library, effects.survey(context, large, camera())))
     assert rows[Effect.EXACT_PROJECTION].is_on, rows[Effect.EXACT_PROJECTION].reason
-    assert 'field of view 109' in rows[Effect.EXACT_PROJECTION].reason
+    assert '109\N{DEGREE SIGN}' in rows[Effect.EXACT_PROJECTION].reason
 
 
 def test_panoramas_are_looked_at_and_follow_rays(context, cloud):

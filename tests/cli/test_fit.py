@@ -248,8 +248,9 @@ def no_camera(folder):
     scene(folder, frames=[])
 
 
-def missing_picture(folder):
-    (folder / 'images' / '03.png').unlink()
+def few_pictures(folder):
+    for path in sorted((folder / 'images').iterdir())[2:]:
+        path.unlink()
 
 
 def other_size(folder):
@@ -267,7 +268,7 @@ def transparent(folder):
 
 
 @pytest.mark.parametrize('damage, text', [
-    (no_camera, 'at least one camera is needed'), (missing_picture, '03.png'),
+    (no_camera, 'at least one camera is needed'), (few_pictures, 'at least 3 must be there'),
     (other_size, '03.png is 40 x 36 pixels; its camera is said to be 48 x 36 pixels'),
     (black, 'black everywhere'), (transparent, 'transparent everywhere')],
     ids=lambda value: getattr(value, '__name__', ''))
@@ -275,6 +276,14 @@ def test_one_line_says_what_is_wrong_with_views(copy, tmp_path, damage, text):
     damage(copy)
     assert text in error('fit', copy, tmp_path / 'out.ply', *FEW)
     assert not (tmp_path / 'out.ply').exists()
+
+
+def test_views_of_deleted_pictures_are_left_out_with_a_note(copy, tmp_path):
+    count = len(list((copy / 'images').iterdir()))
+    (copy / 'images' / '03.png').unlink()
+    said = run('fit', copy, tmp_path / 'out.ply', *FEW).stderr
+    assert f'note: {copy}: 1 of {count} images is missing' in said and '03.png; their views are left out' in said
+    assert (tmp_path / 'out.ply').exists()
 
 
 def test_one_view_is_fitted_with_a_note(copy, tmp_path):

@@ -73,6 +73,7 @@ class AccuracyRow:
     repetitions: int
     is_estimated: bool     # seconds follow from the compared pixels
     is_on_front: bool      # no other setting is as fast and as good
+    verdict: str           # what the PSNR means to who looks: 'as trained', 'hard to see'
 
 
 class AccuracyReport(Handle):
@@ -92,7 +93,7 @@ class AccuracyReport(Handle):
         setting = StippleAccuracy.from_buffer_copy(row.setting)
         return AccuracyRow(row.name_utf8.decode(), setting, row.seconds, row.seconds_low, row.seconds_high, row.psnr,
                            row.largest_error, row.error_99_9, row.splat_count, row.visible_count, row.repetitions,
-                           row.is_estimated == 1, row.is_on_front == 1)
+                           row.is_estimated == 1, row.is_on_front == 1, row.verdict_utf8.decode())
 
     def best_within(self, seconds):
         """The best row of at most so many seconds; StippleError says what the fastest needs."""

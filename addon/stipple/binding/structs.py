@@ -266,7 +266,7 @@ class StippleAccuracyRow(_Sized):
                 ('setting', StippleAccuracy), ('seconds', c_double), ('seconds_low', c_double),
                 ('seconds_high', c_double), ('psnr', c_double), ('largest_error', c_double), ('error_99_9', c_double),
                 ('splat_count', c_uint64), ('visible_count', c_uint64), ('repetitions', c_uint32),
-                ('is_estimated', c_uint32), ('value', c_double)]
+                ('is_estimated', c_uint32), ('value', c_double), ('verdict_utf8', c_char_p)]
 
 
 class StippleMeshInstance(_Sized):

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty
 
+from ..binding.image import Image
 from ..binding.renderer import Renderer
 from ..binding.structs import AccuracyLevel
 from ..binding import accuracy as native
@@ -19,18 +20,20 @@ GAIN = 10.0
 
 
 class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
-    """Draw the present view with two settings, into one Image"""
+    """Draw what the scene's camera sees with two settings, into one image"""
 
     bl_idname = 'stipple.accuracy_compare'
     bl_label = "Compare"
     bl_options = {'REGISTER'}
 
-    first: EnumProperty(name="Left", items=quality.SIDES, default='VIEWPORT')
-    second: EnumProperty(name="Right", items=quality.SIDES, default='RENDER')
-    show: EnumProperty(name="Show", items=(('WIPE', "Wipe", "The first setting is to the left of a line and the "
-                                                            "second to its right"),
-                                           ('ERROR', "Error × 10", "The image shows ten times the difference of the "
-                                                                   "two settings")))
+    first: EnumProperty(name="Left", description="What is drawn to the left of the line", items=quality.SIDES,
+                        default='VIEWPORT')
+    second: EnumProperty(name="Right", description="What is drawn to the right of the line", items=quality.SIDES,
+                         default='RENDER')
+    show: EnumProperty(name="Show", description="How the two images are put together",
+                       items=(('WIPE', "Wipe",
+                               "The first setting is to the left of a line and the second to its right"),
+                              ('ERROR', "Error × 10", "The image shows ten times the difference of the two settings")))
     wipe: FloatProperty(name="Line", description="Position of the line between the two settings", default=0.5, min=0.0,
                         max=1.0, subtype='FACTOR')
 
@@ -48,20 +51,23 @@ class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
             else:
                 accuracy = quality.accuracy_of(owner.library, quality.column(context.scene, side), view.rows)
             chosen.append(renderer.options(blend_space=view.picture.blend_space,
-                                           background=view.picture.background or (0.0, 0.0, 0.0), accuracy=accuracy))
+                                           background=view.picture.background, accuracy=accuracy))
 
         def work(task):
             pictures = []
             for place, options in enumerate(chosen):
                 made = renderer.start(view.placed, view.camera, options, with_depth=False)
                 task.run(made.job, place / 2, (place + 1) / 2)
-                pictures.append(_display(made.colour))
-            return pictures
+                pictures.append(made.colour)
+            # The judge of measurements, over all pixels.
+            judged = [Image.create(owner, picture) for picture in pictures]
+            return pictures, judged[0].compare(judged[1]).psnr
 
         return Task(work)
 
     def finish(self, context, job):
-        first, second = job.result
+        drawn, psnr = job.result
+        first, second = (_display(picture) for picture in drawn)
         if self.show == 'ERROR':
             pixels = np.minimum(GAIN * np.abs(first - second), 1.0)
             pixels[..., 3] = 1.0
@@ -80,14 +86,12 @@ class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
         measured_quality.write(image, pixels)
         if not bpy.app.background:
             fit_reports.show(context, image)
-        error = float(np.mean(np.square((first - second)[..., :3], dtype=np.float64)))
-        decibels = float('inf') if error == 0 else -10 * np.log10(error)
-        words = native.accuracy_verdict(sources.context().library, decibels)
-        self.report({'INFO'}, f'{words} ({decibels:.1f} dB)')
+        words = native.accuracy_verdict(sources.context().library, psnr)
+        self.report({'INFO'}, f'{words} ({measured_quality.decibels(psnr)})')
 
 
 def _display(colour):
-    """Display sRGB of opaque scene linear pixels [H,W,4]."""
+    """Display sRGB over black of scene linear pixels [H,W,4], premultiplied."""
     light = np.clip(colour, 0.0, 1.0)
     shown = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055).astype(np.float32)
     shown[..., 3] = 1.0

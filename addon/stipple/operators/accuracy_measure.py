@@ -14,10 +14,11 @@ from ..scene.view import measured_quality, quality, rendered_view
 
 
 class STIPPLE_OT_accuracy_measure(JobOperator, bpy.types.Operator):
-    """Draw the present view with all settings alternately, on this machine, and compare them with the reference"""
+    """Draw what the scene's camera sees with all settings alternately, on this machine, and compare the images with
+    the reference"""
 
     bl_idname = 'stipple.accuracy_measure'
-    bl_label = "Measure This View"
+    bl_label = "Measure Camera View"
     bl_options = {'REGISTER'}
 
     repetitions: IntProperty(name="Repetitions", description="Number of timings of each setting", default=7, min=1,
@@ -65,12 +66,14 @@ class STIPPLE_OT_accuracy_choose(bpy.types.Operator):
     bl_description = "Choose a setting from what was measured, and store it for the viewport or for renders"
     bl_options = {'REGISTER', 'UNDO'}
 
-    column: EnumProperty(name="For", items=quality.COLUMNS, default='RENDER')
-    by: EnumProperty(name="Choose", items=(('TIME', "Best Within", "Choose the best setting that takes no more than "
-                                                                   "this many milliseconds"),
-                                           ('QUALITY', "Cheapest Above", "Choose the fastest setting that reaches "
-                                                                         "this many dB")))
-    milliseconds: FloatProperty(name="Milliseconds", default=100.0, min=0.0, soft_max=10000.0)
+    column: EnumProperty(name="For", description="What the chosen setting is stored for", items=quality.COLUMNS,
+                         default='RENDER')
+    by: EnumProperty(name="Choose", description="What limits the choice",
+                     items=(('TIME', "Best Within", "Choose the best setting that takes no more than this many "
+                                                    "milliseconds"),
+                            ('QUALITY', "Cheapest Above", "Choose the fastest setting that reaches this many dB")))
+    milliseconds: FloatProperty(name="Milliseconds", description="Time that one image may take", default=100.0, min=0.0,
+                                soft_max=10000.0)
     decibels: FloatProperty(name="PSNR", description="Quality in dB: from 45 on the image looks identical, from 38 on"
                                                      " the difference is hard to see",
                             default=38.0, min=0.0, soft_max=100.0)
@@ -96,7 +99,7 @@ class STIPPLE_OT_accuracy_choose(bpy.types.Operator):
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
         quality.store(quality.column(context.scene, self.column), row.setting)
-        self.report({'INFO'}, f'{row.name}: {1000 * row.seconds:.3g} ms, {row.psnr:.1f} dB')
+        self.report({'INFO'}, f'{row.name}: {1000 * row.seconds:.3g} ms, {measured_quality.decibels(row.psnr)}')
         return {'FINISHED'}
 
 

@@ -20,7 +20,7 @@ class STIPPLE_OT_crop_by_box(JobOperator, bpy.types.Operator):
     bl_label = "Crop by Box"
     bl_options = {'REGISTER', 'UNDO'}
 
-    keep: bpy.props.EnumProperty(name="Keep", items=SIDES)
+    keep: bpy.props.EnumProperty(name="Keep", description="Which side of the boxes' surfaces stays", items=SIDES)
 
     @classmethod
     def poll(cls, context):

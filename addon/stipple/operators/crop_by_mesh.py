@@ -18,7 +18,7 @@ class STIPPLE_OT_crop_by_mesh(JobOperator, bpy.types.Operator):
     bl_label = "Crop by Mesh"
     bl_options = {'REGISTER', 'UNDO'}
 
-    keep: bpy.props.EnumProperty(name="Keep", items=SIDES)
+    keep: bpy.props.EnumProperty(name="Keep", description="Which side of the meshes' surfaces stays", items=SIDES)
 
     @classmethod
     def poll(cls, context):

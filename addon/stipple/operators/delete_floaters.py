@@ -17,13 +17,15 @@ class STIPPLE_OT_delete_floaters(JobOperator, bpy.types.Operator):
     bl_label = "Delete Floaters"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
-    by_opacity: BoolProperty(name="Faint", default=True)
-    min_opacity: FloatProperty(name="Minimum Opacity", default=0.02, min=0.0, max=1.0, subtype='FACTOR')
-    by_size: BoolProperty(name="Large", default=True)
+    by_opacity: BoolProperty(name="Faint", description="Hide splats that are hardly opaque", default=True)
+    min_opacity: FloatProperty(name="Minimum Opacity", description="Splats that are less opaque than this are faint",
+                               default=0.02, min=0.0, max=1.0, subtype='FACTOR')
+    by_size: BoolProperty(name="Large", description="Hide splats that are far larger than the others", default=True)
     max_size: FloatProperty(name="Maximum Size", description="Largest standard deviation along the longest axis, in "
                                                              "the file's units; 0 derives it from the splats' own "
                                                              "sizes", default=0.0, min=0.0)
-    by_connectivity: BoolProperty(name="Isolated", default=True)
+    by_connectivity: BoolProperty(name="Isolated", description="Hide small groups of splats that are away from all "
+                                  "others", default=True)
     radius: FloatProperty(name="Gap", description="Splats within this distance belong to one group, in the file's "
                                                   "units; 0 derives it from their distances", default=0.0, min=0.0)
     min_group: IntProperty(name="Smallest Group",

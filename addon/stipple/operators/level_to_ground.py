@@ -9,6 +9,7 @@ from ..binding import cloud_edit
 from ..jobs import JobOperator
 from ..scene.source import placement, sources, splat_data
 from ..scene.view import picking
+from ..viewport.picked_points import PickedPoints
 
 
 class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.Operator):
@@ -18,6 +19,7 @@ class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.O
     bl_label = "Level to Ground"
     bl_options = {'REGISTER', 'UNDO'}
 
+    marks_of = PickedPoints
     point_count = 3
     use_points: BoolProperty(name="Pick Points", description="Three points of the floor, instead of a search for it",
                              default=False)

@@ -14,7 +14,7 @@ class STIPPLE_OT_scale_budget(bpy.types.Operator):
     bl_label = "Scale Budget"
     bl_options = {'REGISTER', 'UNDO'}
 
-    factor: FloatProperty(name="Factor", default=0.5, min=0.0)
+    factor: FloatProperty(name="Factor", description="What the number of splats is multiplied by", default=0.5, min=0.0)
     render: BoolProperty(name="Render", description="The budget of renders instead of the viewport's", default=False)
 
     @classmethod

@@ -9,6 +9,7 @@ from ..binding import cloud_edit
 from ..jobs import JobOperator
 from ..scene.source import placement, sources, splat_data
 from ..scene.view import picking
+from ..viewport.picked_points import PickedPoints
 
 
 class STIPPLE_OT_set_scale(picking.PointOperator, JobOperator, bpy.types.Operator):
@@ -18,6 +19,7 @@ class STIPPLE_OT_set_scale(picking.PointOperator, JobOperator, bpy.types.Operato
     bl_label = "Set Scale"
     bl_options = {'REGISTER', 'UNDO'}
 
+    marks_of = PickedPoints
     point_count = 2
     use_points = True
     points: FloatVectorProperty(name="Points", size=6, options={'SKIP_SAVE', 'HIDDEN'})

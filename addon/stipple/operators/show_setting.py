@@ -14,7 +14,7 @@ class STIPPLE_OT_show_setting(bpy.types.Operator):
     bl_description = "Show the tab of the properties editor that has the switch of this effect"
     bl_options = {'INTERNAL'}
 
-    tab: EnumProperty(items=TABS)
+    tab: EnumProperty(items=TABS, options={'HIDDEN'})
 
     def execute(self, context):
         space = context.space_data

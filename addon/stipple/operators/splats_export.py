@@ -34,7 +34,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     use_selection: BoolProperty(name="Selected Only",
                                 description="Export selected splats only, instead of all that are "
                                             "visible", default=True)
-    budget: EnumProperty(name="Budget", items=BUDGETS)
+    budget: EnumProperty(name="Budget", description="How many splats are written", items=BUDGETS)
     apply_transform: BoolProperty(name="Apply Transform", description="Write the splats where their objects put them,"
                                                                       " with their harmonics rotated; otherwise in "
                                                                       "the active object's own space", default=True)
@@ -47,7 +47,8 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     max_degree: IntProperty(name="Harmonics",
                             description="Highest degree of the colors' harmonics that is written, 0 for "
                                         "colors that do not change with the view", default=4, min=0, max=4)
-    frames: EnumProperty(name="Frames", items=frames_out.FRAMES, options={'SKIP_SAVE'})
+    frames: EnumProperty(name="Frames", description="Which frames are written, each to a file of its own",
+                         items=frames_out.FRAMES, options={'SKIP_SAVE'})
     ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger (.ply)", default=False)
 
     @classmethod

@@ -32,7 +32,14 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == 'OBJECT' and not fitting.state.is_running
+        if fitting.state.is_running:
+            cls.poll_message_set('A fit is running')
+            return False
+        waiting = fit_proposal.find(context)
+        if waiting is not None:
+            cls.poll_message_set(f"'{waiting.name}' waits to be accepted or discarded")
+            return False
+        return context.mode == 'OBJECT'
 
     def invoke(self, context, _event):
         return self.run_in_window(context)

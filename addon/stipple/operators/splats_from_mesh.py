@@ -10,6 +10,7 @@ from ..binding.errors import invalid
 from ..binding.model import DecodeSettings, Model
 from ..binding.structs import AnchorOrder
 from ..jobs import JobOperator
+from ..panels.text import draw_anchors
 from ..properties import COLOR_SOURCES, ORDERS
 from ..scene import meshes
 from ..scene.source import sources, splat_data, sync
@@ -22,13 +23,17 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
     bl_label = "Splats from Mesh"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
-    anchors: IntProperty(name="Anchor Budget", default=20000, soft_min=1, soft_max=1000000)
-    gaussians_per_anchor: IntProperty(name="Splats per Anchor", default=1, soft_min=1, soft_max=32)
+    anchors: IntProperty(name="Splats", description="Number of splats, or of the anchors that each become several. It "
+                         "can be changed afterwards", default=20000, soft_min=1, soft_max=1000000)
+    gaussians_per_anchor: IntProperty(name="Splats per Anchor",
+                                      description="Number of splats that each anchor becomes, "
+                                                  "side by side on the surface", default=1, soft_min=1, soft_max=32)
     detail_weight: FloatProperty(name="Detail Weight", description="How much texture detail and curvature attract "
                                  "anchors, 0 for an even spread", default=1.0, soft_min=0.0, soft_max=4.0)
-    order: EnumProperty(name="Order", items=ORDERS)
-    seed: IntProperty(name="Seed", default=0, soft_min=0)
-    color_from: EnumProperty(name="Color From", items=COLOR_SOURCES)
+    order: EnumProperty(name="Order", description="How anchors are drawn from the density", items=ORDERS)
+    seed: IntProperty(name="Seed", description="Another seed gives another, equally good set of anchors", default=0,
+                      soft_min=0)
+    color_from: EnumProperty(name="Color From", description="Where the splats' colors come from", items=COLOR_SOURCES)
     hide_source: BoolProperty(name="Hide Source", description="Hide the meshes in the viewport and in renders",
                               default=True)
     source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
@@ -72,6 +77,15 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         context.collection.objects.link(obj)
         self._select(context, obj)
         self.report({'INFO'}, f"{splats.count:,} splats in '{obj.name}'")
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        draw_anchors(layout, self, 'anchors', self.gaussians_per_anchor)
+        for name in ('gaussians_per_anchor', 'detail_weight', 'order', 'seed', 'color_from', 'hide_source',
+                     'source_path'):
+            layout.prop(self, name)
 
     def _settings(self):
         return DecodeSettings(self.anchors, self.gaussians_per_anchor, AnchorOrder[self.order], self.seed)

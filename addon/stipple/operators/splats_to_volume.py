@@ -29,7 +29,8 @@ class STIPPLE_OT_splats_to_volume(JobOperator, bpy.types.Operator, ExportHelper)
                                                            "largest frame", default=256, soft_min=8, soft_max=2048)
     voxel_size: FloatProperty(name="Voxel Size", description="Side of a voxel, 0 to take the resolution", default=0.0,
                               soft_min=0.0, subtype='DISTANCE', unit='LENGTH', precision=4)
-    frames: EnumProperty(name="Frames", items=frames_out.FRAMES, options={'SKIP_SAVE'})
+    frames: EnumProperty(name="Frames", description="Which frames become volumes, each in a file of its own",
+                         items=frames_out.FRAMES, options={'SKIP_SAVE'})
 
     @classmethod
     def poll(cls, context):

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing only."""
 
-from . import data, effects, fit, menus, overlay, quality, render, sequence
+from . import data, effects, fit, menus, mesh_panels, overlay, quality, render, sequence, start
 
-classes = (data.classes + sequence.classes + render.classes + quality.classes + effects.classes + fit.classes
-           + overlay.classes + menus.classes)
+classes = (data.classes + sequence.classes + render.classes + quality.classes + effects.classes + start.classes
+           + fit.classes + overlay.classes + menus.classes)
 
 
 def register():
     data.register()
+    mesh_panels.register()
     menus.register()
     render.register()
 
@@ -16,4 +17,5 @@ def register():
 def unregister():
     render.unregister()
     menus.unregister()
+    mesh_panels.unregister()
     data.unregister()

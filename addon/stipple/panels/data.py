@@ -11,6 +11,7 @@ from . import source_state
 from ..scene import geometry
 from ..scene.source import exporting, masks, source_settings, sources, splat_data, sync
 from ..scene.view import viewed
+from .text import draw_anchors
 
 
 SEPARATOR = ' \u00b7 '
@@ -124,9 +125,9 @@ def _draw_budget(self, context):
         return
     column = box.column()
     column.enabled = not stipple.edited
-    single = sources.gaussians_per_anchor(stipple) == 1
-    column.prop(stipple, 'anchors', text="Splats" if single else "Anchor Budget")
-    column.prop(stipple, 'anchors_render', text="Render")
+    each = sources.gaussians_per_anchor(stipple)
+    draw_anchors(column, stipple, 'anchors', each)
+    draw_anchors(column, stipple, 'anchors_render', each, "Render")
     if known.has_seed:
         column.prop(stipple, 'seed')
     if known.is_learned:

@@ -3,7 +3,6 @@
 
 import bpy
 
-from ..binding import accuracy as native
 from ..binding.errors import StippleError
 from ..scene.source import sources
 from ..scene.view import measured_quality, quality
@@ -71,8 +70,8 @@ class STIPPLE_PT_quality_table(SplatRenderPanel, bpy.types.Panel):
         column = layout.column(align=True)
         for row in measured.report.rows:
             column.label(text=_sentence(row.name), icon='KEYTYPE_KEYFRAME_VEC' if row.is_on_front else 'BLANK1')
-            for text in (f"{_time(row)}, {row.psnr:.1f} dB, \N{LESS-THAN OR EQUAL TO} {row.error_99_9:.2g}",
-                         _verdict(row)):
+            error = f"\N{LESS-THAN OR EQUAL TO} {row.error_99_9:.2g}"
+            for text in (f"{_time(row)}, {measured_quality.decibels(row.psnr)}, {error}", row.verdict):
                 _draw_quiet(column, text)
         draw_text(layout, context,
                   "Marked: no other setting is as fast and as good. Time, PSNR, and what 99.9 % of the "
@@ -114,7 +113,7 @@ def _draw_figures(layout, context, name, measured):
         column.label(text="Time: \N{EN DASH}")
         return
     column.active = measured_quality.is_current(context.scene, measured)
-    for text in (_sentence(_verdict(row)), f"{_time(row)}, {row.psnr:.1f} dB"):
+    for text in (_sentence(row.verdict), f"{_time(row)}, {measured_quality.decibels(row.psnr)}"):
         draw_text(column, context, text, columns=len(quality.COLUMNS))
 
 
@@ -126,10 +125,6 @@ def _draw_quiet(layout, text):
 
 def _sentence(text):
     return text[:1].upper() + text[1:]
-
-
-def _verdict(row):
-    return native.accuracy_verdict(sources.context().library, row.psnr)
 
 
 def _time(row):

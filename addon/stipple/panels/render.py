@@ -3,10 +3,11 @@
 
 import bpy
 
-from ..scene.view import facts
+from ..scene.view import facts, splat_engines
+from .text import draw_text
 
-ENGINE = 'STIPPLE'
-CYCLES_ENGINE = 'STIPPLE_CYCLES'
+ENGINE = splat_engines.STIPPLE
+CYCLES_ENGINE = splat_engines.CYCLES
 # Blender's panels that name BLENDER_RENDER but do nothing for this engine.
 _EXCLUDED = {'VIEWLAYER_PT_filter', 'VIEWLAYER_PT_layer_passes', 'RENDER_PT_freestyle',
              'RENDER_PT_simplify_greasepencil', 'RENDER_PT_gpencil', 'RENDER_PT_stereoscopy'}
@@ -46,6 +47,25 @@ class STIPPLE_PT_render_splats(SplatRenderPanel, bpy.types.Panel):
             box = layout.box()
             box.label(text=f"{scene.view_settings.view_transform} view changes colors", icon='INFO')
             box.operator('stipple.use_standard_view')
+
+
+class STIPPLE_PT_other_engine(bpy.types.Panel):
+    """Where the chosen engine leaves splats out of renders."""
+
+    bl_label = "Gaussian Splats"
+    bl_space_type = 'PROPERTIES'
+    bl_region_type = 'WINDOW'
+    bl_context = 'render'
+
+    @classmethod
+    def poll(cls, context):
+        return bool(splat_engines.hint(context.scene))
+
+    def draw(self, context):
+        draw_text(self.layout, context, splat_engines.hint(context.scene) + '. These engines do:', 'INFO')
+        column = self.layout.column(align=True)
+        for name, label, _ in splat_engines.ENGINES:
+            column.operator('stipple.use_engine', text=f'Use {label}').engine = name
 
 
 class STIPPLE_PT_render_film(bpy.types.Panel):
@@ -142,4 +162,4 @@ def unregister():
         panel.COMPAT_ENGINES.difference_update({ENGINE, CYCLES_ENGINE})
 
 
-classes = (STIPPLE_PT_render_splats, STIPPLE_PT_render_film, STIPPLE_PT_view_layer_passes)
+classes = (STIPPLE_PT_render_splats, STIPPLE_PT_other_engine, STIPPLE_PT_render_film, STIPPLE_PT_view_layer_passes)

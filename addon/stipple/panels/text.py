@@ -18,3 +18,16 @@ def draw_text(layout, context, text, icon='NONE', is_quiet=False, columns=1):
         column.active, column.scale_y = False, 0.8
     for i, line in enumerate(textwrap.wrap(text, characters)):
         column.label(text=line, icon=icon if i == 0 or icon == 'NONE' else 'BLANK1')
+
+
+def draw_anchors(layout, owner, name, each, text="Splats"):
+    """The budget that a property of anchors is. each: splats that an anchor becomes; where there are several, the field
+    has the anchors, and the splats stand beside it."""
+    if each == 1:
+        layout.prop(owner, name, text=text)
+        return
+    layout.prop(owner, name, text="Anchors" if text == "Splats" else f"{text} Anchors")
+    split = layout.split(factor=0.4)
+    split.label()
+    count = getattr(owner, name) * each
+    split.label(text=f"{count:,} splats" if count else "As in the viewport")

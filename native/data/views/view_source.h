@@ -58,6 +58,9 @@ class ViewSource {
   /// validateView().
   virtual std::shared_ptr<const PackedPicture> packed(size_t view) const;
 
+  /// What was wrong and could be gone past, a sentence each, for whoever uses the views.
+  virtual std::vector<std::string> notes() const { return {}; }
+
   /// Where surfaces are known to be: points of a reconstruction or samples of meshes, in the
   /// cameras' world. Colours are scene linear. May be empty.
   virtual const PointSet& points() const = 0;

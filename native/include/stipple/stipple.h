@@ -1113,7 +1113,7 @@ typedef struct StippleAccuracyRow {
   double seconds;             /* of an image: the median */
   double seconds_low;         /* quartiles */
   double seconds_high;
-  double psnr;                /* dB over the four channels, display values, peak 1; infinite where nothing differs */
+  double psnr;                /* dB, peak 1, as stipple_image_compare; infinite where nothing differs */
   double largest_error;       /* of a channel of a compared pixel */
   double error_99_9;          /* 99.9 % of the channels of compared pixels are no further off */
   uint64_t splat_count;       /* that the setting draws from */
@@ -1123,6 +1123,7 @@ typedef struct StippleAccuracyRow {
   double value;               /* of a volume: voxel size, metres, splat_count its voxels that are not empty; of a fit:
                                  iterations, largest_error and error_99_9 NaN; of images 0. Of volumes and fits
                                  `setting` says nothing */
+  const char* verdict_utf8;   /* what the PSNR means to who looks: "as trained", "hard to see"; lives on */
 } StippleAccuracyRow;
 
 /* Draws instances [count] from a camera at every setting, and against the reference, as a job. In: render, or NULL:
@@ -1950,7 +1951,7 @@ typedef struct StippleImageInfo {
 typedef struct StippleImageComparison {
   uint32_t struct_size;
   uint32_t reserved;
-  double psnr;        /* dB over all channels, peak 1; +infinity where equal */
+  double psnr;        /* dB, peak 1; +infinity where equal. Alpha counts where either image is transparent */
   double ssim;        /* mean over pixels and colour channels, 11x11 Gaussian window */
   double max_error;
   double mean_error;

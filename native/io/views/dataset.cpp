@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "base/error.h"
 #include "base/number_text.h"
@@ -207,7 +208,9 @@ Dataset::Dataset(const std::string& path, const DatasetOptions& options, Progres
                                           "; 1 to " + std::to_string(kMaxDownscale) +
                                           " is allowed");
   }
-  views_ = findDatasetViews(path);
+  DatasetFiles files = findDatasetFiles(path);
+  views_ = std::move(files.views);
+  notes_ = std::move(files.notes);
   for (size_t i = 0; i < views_.size(); ++i) {
     advance(progress, static_cast<double>(i) / static_cast<double>(views_.size()),
             "Opening images");

@@ -46,6 +46,8 @@ class Dataset final : public ViewSource {
   ViewPicture load(size_t view) const override;
   /// Of COLMAP's points3D, or of the file that `ply_file_path` of transforms.json names.
   const PointSet& points() const override { return points_; }
+  /// Images that the cameras' file names and that are not there.
+  std::vector<std::string> notes() const override { return notes_; }
 
   /// The view as its files say it: with the lens, and the size of the picture's file.
   const DatasetView& source(size_t view) const { return views_[view]; }
@@ -55,6 +57,7 @@ class Dataset final : public ViewSource {
   ViewPicture read(size_t view) const;
 
   std::vector<DatasetView> views_;
+  std::vector<std::string> notes_;
   std::vector<Camera> cameras_;
   ColourSpace colour_space_ = ColourSpace::kDisplay;
   PointSet points_;

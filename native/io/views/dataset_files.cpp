@@ -53,55 +53,83 @@ class MaskFolder {
   bool exists_ = false;
 };
 
-/// Files that are not there, told in one sentence at the end.
+/// Files that are not there, told in one sentence at the end: images, which views can do without,
+/// or masks and depths, without which a view would be taken for something else.
 class Missing {
  public:
-  void add(const fs::path& path) {
-    if (count_++ == 0) first_ = path.string();
-  }
-  void refuse(const std::string& dataset, size_t of) const {
-    if (count_ == 0) return;
-    fail(ErrorCode::kIo,
-         dataset + ": " + std::to_string(count_) + " of the files of " + std::to_string(of) +
-             " views " + (count_ == 1 ? "is missing: " : "are missing, the first is ") + first_);
+  void addImage(const fs::path& path) { images_.add(path); }
+  void addOther(const fs::path& path) { others_.add(path); }
+
+  /// In: files, the views that have their images; the note of those that have not is added.
+  void settle(const std::string& dataset, DatasetFiles& files) const {
+    if (others_.count > 0) {
+      fail(ErrorCode::kIo, dataset + ": " + std::to_string(others_.count) +
+                               " of the masks and depth images that it names " + others_.tail());
+    }
+    if (images_.count == 0) return;
+    const std::string sentence = dataset + ": " + std::to_string(images_.count) + " of " +
+                                 std::to_string(images_.count + files.views.size()) + " images " +
+                                 images_.tail();
+    if (files.views.size() < kFewestViewsLeft) {
+      fail(ErrorCode::kIo,
+           sentence + "; at least " + std::to_string(kFewestViewsLeft) + " must be there");
+    }
+    files.notes.push_back(sentence + "; their views are left out");
   }
 
  private:
-  size_t count_ = 0;
-  std::string first_;
+  struct Kind {
+    size_t count = 0;
+    std::string first;
+
+    void add(const fs::path& path) {
+      if (count++ == 0) first = path.string();
+    }
+    std::string tail() const {
+      return (count == 1 ? "is missing: " : "are missing, the first is ") + first;
+    }
+  };
+
+  Kind images_, others_;
 };
 
-/// The folder that the names of a COLMAP model's pictures start from.
-fs::path colmapPictures(const std::string& model, const std::string& name) {
+/// The folder that the names of a COLMAP model's pictures start from: where any of them is.
+fs::path colmapPictures(const std::string& model, const std::vector<CameraView>& cameras) {
   fs::path around = fs::absolute(model).lexically_normal();
   if (!around.has_filename()) around = around.parent_path();
   std::string looked_in;
   for (int up = 0; up <= kMaxLevelsUp; ++up) {
     for (const fs::path& folder : {around / "images", around}) {
-      if (isFile(folder / name)) return folder;
+      for (const CameraView& camera : cameras) {
+        if (isFile(folder / camera.image_path)) return folder;
+      }
       if (folder != around || up == 0)
         looked_in += (looked_in.empty() ? "" : ", ") + folder.string();
     }
     around = around.parent_path();
   }
-  fail(ErrorCode::kIo, model + ": the image '" + name +
-                           "' is missing; the model's images are looked for in " + looked_in +
-                           " and the folders around them");
+  fail(ErrorCode::kIo,
+       model + ": the image '" + cameras.front().image_path +
+           "' is missing, and all others are; the model's images are looked for in " + looked_in +
+           " and the folders around them");
 }
 
-std::vector<DatasetView> colmapViews(const std::string& path, const std::string& model) {
+DatasetFiles colmapFiles(const std::string& path, const std::string& model) {
   const std::vector<CameraView> cameras = readCameraFile(path, Distorted::kKeep);
-  const fs::path folder = colmapPictures(model, cameras.front().image_path);
+  const fs::path folder = colmapPictures(model, cameras);
   const MaskFolder masks(folder.parent_path() / "masks");
-  std::vector<DatasetView> views;
+  DatasetFiles files;
   Missing missing;
   for (const CameraView& camera : cameras) {
     const fs::path image = folder / camera.image_path;
-    if (!isFile(image)) missing.add(image);
-    views.push_back({camera, image.string(), masks.of(camera.image_path), {}});
+    if (isFile(image)) {
+      files.views.push_back({camera, image.string(), masks.of(camera.image_path), {}});
+    } else {
+      missing.addImage(image);
+    }
   }
-  missing.refuse(path, views.size());
-  return views;
+  missing.settle(path, files);
+  return files;
 }
 
 /// The name of a picture from the folder around it, without the pictures' own folder.
@@ -122,14 +150,15 @@ void addTransforms(const std::string& path, std::vector<DatasetView>& views, Mis
     }
     ++frame;
     DatasetView view{camera, {}, {}, {}};
-    if (const auto image = pictureFile(folder / camera.image_path)) {
-      view.image_path = *image;
-    } else {
-      missing.add(folder / camera.image_path);
+    const auto image = pictureFile(folder / camera.image_path);
+    if (!image) {
+      missing.addImage(folder / camera.image_path);
+      continue;
     }
+    view.image_path = *image;
     const auto named = [&](const std::string& name) -> std::string {
       if (name.empty()) return {};
-      if (!isFile(folder / name)) missing.add(folder / name);
+      if (!isFile(folder / name)) missing.addOther(folder / name);
       return (folder / name).string();
     };
     view.mask_path = named(camera.mask_path);
@@ -141,14 +170,14 @@ void addTransforms(const std::string& path, std::vector<DatasetView>& views, Mis
 
 }  // namespace
 
-std::vector<DatasetView> findDatasetViews(const std::string& path) {
-  const CameraFiles files = findCameraFiles(path);
-  if (!files.colmap.empty()) return colmapViews(path, files.colmap);
-  std::vector<DatasetView> views;
+DatasetFiles findDatasetFiles(const std::string& path) {
+  const CameraFiles cameras = findCameraFiles(path);
+  if (!cameras.colmap.empty()) return colmapFiles(path, cameras.colmap);
+  DatasetFiles files;
   Missing missing;
-  for (const std::string& file : files.transforms) addTransforms(file, views, missing);
-  missing.refuse(path, views.size());
-  return views;
+  for (const std::string& file : cameras.transforms) addTransforms(file, files.views, missing);
+  missing.settle(path, files);
+  return files;
 }
 
 }  // namespace stipple

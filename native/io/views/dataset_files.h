@@ -15,12 +15,23 @@ struct DatasetView {
   std::string depth_path;  ///< may be empty
 };
 
+/// The views of a data set whose images are there.
+struct DatasetFiles {
+  std::vector<DatasetView> views;
+  std::vector<std::string> notes;  ///< what is missing, a sentence each
+};
+
+/// So many views a data set must have left where images are missing.
+constexpr size_t kFewestViewsLeft = 3;
+
 /// Finds the picture of every camera of a data set, and its mask: where the cameras' file names
 /// one, or in a folder `masks` beside the pictures' folder, as NAME, NAME.png or with the ending
 /// .png. Pictures of transforms.json may be named without their ending. Those of COLMAP are looked
 /// for in `images` beside the model's folder and around it, and in these folders themselves.
-/// Errors: those of readCameraFile(); kIo where pictures are missing, with their number and the
-/// first of them.
-std::vector<DatasetView> findDatasetViews(const std::string& path);
+/// Views whose image is missing are left out, as who culls photographs deletes them and leaves the
+/// list of cameras as it was. Errors: those of readCameraFile(); kIo where a mask or a depth image
+/// that the file names is missing, or where missing images leave fewer than kFewestViewsLeft views,
+/// with their number and the first of them.
+DatasetFiles findDatasetFiles(const std::string& path);
 
 }  // namespace stipple

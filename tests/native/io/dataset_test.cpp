@@ -207,13 +207,13 @@ TEST_F(DatasetTest, KeepsSixteenBitsAndFloats) {
 TEST_F(DatasetTest, NamesWhatIsMissing) {
   storeScene();
   std::filesystem::remove(path("images/b.png"));
-  expectError(ErrorCode::kIo, {"1 of the files of 3 views is missing", "images/b.png"},
+  expectError(ErrorCode::kIo, {"1 of 3 images is missing", "images/b.png", "at least 3"},
               [&] { openDataset(folder()); });
   std::filesystem::remove_all(path("images"));
   expectError(ErrorCode::kIo, {"the image 'a.png' is missing", "images"},
               [&] { openDataset(folder()); });
   storeTransforms("\"camera_angle_x\": 1.0, ", frame("no/picture") + "," + frame("none"));
-  expectError(ErrorCode::kIo, {"2 of the files of 2 views are missing", "no/picture"},
+  expectError(ErrorCode::kIo, {"2 of 2 images are missing", "no/picture"},
               [&] { openDataset(folder()); });
   storeGrey("images/0.png", 0.2f);
   storeTransforms("\"camera_angle_x\": 1.0, ", frame("images/0", "\"mask_path\": \"m.png\", "));
@@ -224,6 +224,24 @@ TEST_F(DatasetTest, NamesWhatIsMissing) {
   expectError(ErrorCode::kIo, {"p.ply"}, [&] { openDataset(folder()); });
   expectError(ErrorCode::kInvalidArgument, {"downscale is 0"},
               [&] { openDataset(folder(), {.downscale = 0}); });
+}
+
+TEST_F(DatasetTest, LeavesOutViewsWhoseImagesWereDeleted) {
+  makeFolder("images");
+  for (const char* name : {"1", "2", "3"}) storeGrey("images/" + std::string(name) + ".png", 0.2f);
+  storeTransforms("\"camera_angle_x\": 1.0, ", frame("images/0") + "," + frame("images/1") + "," +
+                                                   frame("images/2") + "," + frame("images/3"));
+  const auto dataset = openDataset(folder());
+  ASSERT_EQ(dataset->count(), 3u);
+  EXPECT_EQ(dataset->name(0), "images/1");
+  ASSERT_EQ(dataset->notes().size(), 1u);
+  EXPECT_NE(dataset->notes()[0].find("1 of 4 images is missing"), std::string::npos);
+  EXPECT_NE(dataset->notes()[0].find("left out"), std::string::npos);
+
+  // Of COLMAP's, too, where the first is missing.
+  storeColmap("PINHOLE 2 1 3 3 1 0.5", {"0.png", "1.png", "2.png", "3.png"});
+  std::filesystem::remove(path("transforms.json"));
+  EXPECT_EQ(openDataset(folder())->count(), 3u);
 }
 
 TEST_F(DatasetTest, NamesPicturesOfAnotherSizeAndBrokenOnes) {

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <string>
 
 #include "base/error.h"
 #include "io/reports/fit_report.h"
@@ -93,16 +95,76 @@ TEST(PictureAccuracy, UsualSettingsFollowRaysWhereThereIsNoImagePlane) {
   const Camera flat = frontCamera(64, 64, 60, 4);
   Camera panorama = flat;
   panorama.model = CameraModel::kEquirectangular;
-  EXPECT_EQ(usualAccuracies(flat).size(), 14u);
-  const std::vector<AccuracySettings> along_rays = usualAccuracies(panorama);
+  const Instances instances = placed(5);
+  EXPECT_EQ(usualAccuracies(instances, flat).size(), 14u);
+  const std::vector<AccuracySettings> along_rays = usualAccuracies(instances, panorama);
   EXPECT_LT(along_rays.size(), 14u) << "what is the same along rays comes once";
   for (const AccuracySettings& accuracy : along_rays) {
     EXPECT_EQ(accuracy.projection, RayProjection::kRay);
   }
   PictureAccuracyOptions options;
-  options.accuracies = usualAccuracies(flat);
+  options.accuracies = usualAccuracies(instances, flat);
   EXPECT_THROW(validate(options, placed(5), panorama), Error);
   EXPECT_THROW(validate(options, Instances{}, flat), Error);
+}
+
+TEST(PictureAccuracy, SplatsWithoutHarmonicsHaveNoSettingOfTheirDegree) {
+  const Camera camera = frontCamera(64, 64, 60, 4);
+  const auto names = [&](int degree) {
+    CloudRecipe recipe;
+    recipe.count = 5;
+    recipe.degree = degree;
+    Instances made;
+    made.shares.push_back(std::make_shared<const SplatCloud>(randomCloud(recipe, 8)));
+    made.list.push_back(testing::instanceOf(*made.shares[0]));
+    std::vector<std::string> found;
+    for (const auto& accuracy : usualAccuracies(made, camera)) {
+      found.push_back(accuracyName(accuracy));
+    }
+    return found;
+  };
+  EXPECT_EQ(std::ranges::count(names(1), "final + degree 0"), 1);
+  EXPECT_EQ(std::ranges::count(names(0), "final + degree 0"), 0);
+}
+
+/// Splats in one corner of the image: where they overlap, orders differ; blocks that are spread
+/// over the image meet the corner or miss it.
+TEST(PictureAccuracy, AFewBlocksSayOfAWholeImageWhatAllPixelsSay) {
+  CloudRecipe recipe;
+  recipe.count = 400;
+  recipe.degree = 0;
+  SplatCloud cloud = randomCloud(recipe, 8);
+  const float corner[3] = {0.55f, 0.3f, 0.0f};
+  for (size_t i = 0; i < cloud.positions.size(); ++i) {
+    cloud.positions[i] = 0.25f * cloud.positions[i] + corner[i % 3];
+    cloud.scales[i] *= 0.5f;
+  }
+  Instances instances;
+  instances.shares.push_back(std::make_shared<const SplatCloud>(std::move(cloud)));
+  instances.list.push_back(testing::instanceOf(*instances.shares[0]));
+  const Camera camera = frontCamera(512, 320, 400, 4);
+  ShotSettings shot;
+  takeOutput(OutputColour::kComposited, instances, shot);
+  PictureAccuracyOptions options;
+  options.accuracies = usualAccuracies(instances, camera);
+  options.timing.repetitions = 1;
+  options.timing.most_seconds = 1e-6;  // double precision is drawn in the blocks alone
+  const auto measured = [&](uint64_t pixels) {
+    options.reference_pixels = pixels;
+    Progress progress;
+    return measurePicture(instances, camera, shot, options, progress).report;
+  };
+  const AccuracyReport all = measured(0), some = measured(4 * 64 * 64);
+  ASSERT_EQ(some.compared_pixels, 4u * 64 * 64);
+  ASSERT_EQ(all.rows.size(), some.rows.size());
+  EXPECT_TRUE(std::ranges::any_of(some.rows, [](const AccuracyRow& row) {
+    return row.is_estimated && row.name == "final + precision double";
+  }));
+  for (size_t i = 0; i < all.rows.size(); ++i) {
+    if (all.rows[i].psnr > 60) continue;  // closer to the reference than its stand-in: blocks judge
+    // The stand-in is 25 dB closer to the reference: its share of the mean square is a percent.
+    EXPECT_NEAR(some.rows[i].psnr, all.rows[i].psnr, 0.2) << all.rows[i].name;
+  }
 }
 
 TEST(VolumeAccuracy, TheFinestJudgesTheOthersAndIsLast) {

@@ -24,16 +24,23 @@ def visible_names(objects):
 
 
 def propose(obj):
-    obj[PROPOSED_KEY] = True
+    """Lets a fit's object wait for a decision."""
+    obj[PROPOSED_KEY] = 1 + max((_made_at(other) for other in bpy.data.objects if PROPOSED_KEY in other), default=0)
 
 
 def find(context):
-    """The object that waits for a decision, or None."""
-    return next((obj for obj in context.view_layer.objects if obj is not None and PROPOSED_KEY in obj), None)
+    """The object that waits for a decision, or None. No fit starts while one waits; where a file has several, as after
+    an append, the active one is meant, else the last that was made."""
+    waiting = [obj for obj in context.view_layer.objects if obj is not None and PROPOSED_KEY in obj]
+    active = context.view_layer.objects.active
+    return active if active in waiting else max(waiting, key=_made_at, default=None)
 
 
 def comparable(context):
     """The object of a fit, running or waiting, whose source can be shown in its place, or None."""
+    shown = find(context)
+    if shown is not None and shown.get(SOURCES_KEY):
+        return shown
     return next((obj for obj in context.view_layer.objects if obj is not None and obj.get(SOURCES_KEY)), None)
 
 
@@ -71,6 +78,11 @@ def discard(context, obj):
         source.hide_set(False)
     data = obj.data
     (bpy.data.pointclouds if isinstance(data, bpy.types.PointCloud) else bpy.data.meshes).remove(data)
+
+
+def _made_at(obj):
+    """Which of the waiting objects it is, in the order in which they were made; files of older versions have True."""
+    return int(obj[PROPOSED_KEY])
 
 
 def _sources(context, obj):

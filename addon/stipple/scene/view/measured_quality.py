@@ -37,6 +37,10 @@ def keep(scene, report):
     _measured[scene.name_full] = Measured(report, scene.camera.name, scene.frame_current, key_of(scene))
 
 
+def decibels(psnr):
+    return "exact" if psnr == float('inf') else f'{psnr:.1f} dB'
+
+
 def forget():
     _measured.clear()
 

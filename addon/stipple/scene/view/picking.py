@@ -13,15 +13,18 @@ from . import cameras
 class PointOperator:
     """Mix-in for operators with `points` (flat coordinates), `point_count` and `use_points`: a click for each point.
 
-    Called from a script, the points are given and nothing is clicked.
+    `marks_of` is the class that shows the clicked points (viewport/picked_points.py). Called from a script, the points
+    are given and nothing is clicked.
     """
 
     _picked = None
+    _marks = None
 
     def invoke(self, context, _event):
         if not self.use_points or self.properties.is_property_set('points'):
             return self.execute(context)
         self._picked = []
+        self._marks = self.marks_of(self._picked)
         context.window_manager.modal_handler_add(self)
         context.window.cursor_modal_set('CROSSHAIR')
         self._say(context)
@@ -40,6 +43,7 @@ class PointOperator:
         except StippleError as error:
             self.report({'WARNING'}, str(error))
             return {'RUNNING_MODAL'}
+        self._marks.redraw()
         if len(self._picked) < 3 * self.point_count:
             self._say(context)
             return {'RUNNING_MODAL'}
@@ -52,7 +56,14 @@ class PointOperator:
         context.workspace.status_text_set(f'{self.bl_label}: click point {number} of {self.point_count} on the splats '
                                           '(Esc cancels)')
 
+    def cancel(self, context):
+        """Blender itself ends the operator, for instance when the window closes."""
+        if self._picked is not None:
+            self._leave(context, None)
+        super().cancel(context)
+
     def _leave(self, context, result):
+        self._marks.close()
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
         return result
