@@ -1132,7 +1132,8 @@ StippleStatus stipple_accuracy_report_best_within(const StippleAccuracyReport* r
 /* The fastest row of at least so many dB. Errors: INVALID_ARGUMENT where none reaches them, with what is reached. */
 StippleStatus stipple_accuracy_report_cheapest_above(const StippleAccuracyReport* report, double psnr,
                                                      uint64_t* index);
-/* By ending: .json (everything), .csv (a line for each row), .svg (the plot). docs/formats.md, Accuracy report. */
+/* By ending: .json (everything), .csv (a line for each row), .svg (the plot). docs/formats.md, Accuracy report.
+ * Errors: IO; INVALID_ARGUMENT for another ending, and where a file that is no such report would be replaced. */
 StippleStatus stipple_accuracy_report_save(const StippleAccuracyReport* report, const char* path_utf8);
 /* Error against time, both logarithmic, with named settings and the front, as stipple_fit_report_draw draws; the plot
  * is 840 units wide. */
@@ -1699,8 +1700,8 @@ typedef struct StippleFitFigures {
  * A cancel, and an error of a step or a picture, end the fit with the best that it had measured: the result can be
  * read either way (stipple_fit_cloud). Checkpoints appear under their name when they are whole; a job that ends
  * early leaves one. Where one cannot be written, that is a note and the fit goes on.
- * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without pictures;
- * MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
+ * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without pictures, a
+ * checkpoint's path with a file of another kind; MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
  * transparent or masked out, cameras that see none of the points); those of reading pictures; with resume IO, FORMAT,
  * UNSUPPORTED, and INVALID_ARGUMENT for a checkpoint of other options or views (says which).
  * Threads and determinism: the same bits for any number of threads, any picture_bytes, and wherever it was
@@ -1729,8 +1730,12 @@ StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleC
 /* The same of a field as a model, which stipple_model_save writes and stipple_model_decode turns into splats at any
  * budget. UNSUPPORTED for explicit splats: stipple_model_from_cloud_start makes a model of their cloud. */
 StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model);
+/* Whether a fit may write its report and its checkpoints to these places, to be asked before it starts; NULL for what
+ * is not wanted. Nothing is written. Errors: IO where they cannot be written; INVALID_ARGUMENT where a file of another
+ * kind would be replaced. */
+StippleStatus stipple_fit_places_check(const char* report_path_utf8, const char* checkpoint_path_utf8);
 /* The story of a job that has ended: JSON at path_utf8, and its curves as SVG beside it, under the same name with
- * the ending .svg. Errors: IO; INVALID_ARGUMENT where no step was taken. */
+ * the ending .svg. Errors: IO; INVALID_ARGUMENT where no step was taken, or a file of another kind would be replaced. */
 StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_utf8);
 /* The same curves as a picture: dark on white, with axes, titles and legends.
  * In: scale 0.25..8, pixels of a unit of the SVG, whose two columns are 960 units wide; capacity, floats of pixels.
