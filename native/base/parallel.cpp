@@ -13,7 +13,8 @@
 #include <vector>
 
 #ifdef STIPPLE_SANITIZE_THREADS
-#include <sanitizer/tsan_interface.h>
+extern "C" void __tsan_acquire(void* address);
+extern "C" void __tsan_release(void* address);
 #endif
 
 namespace stipple {
