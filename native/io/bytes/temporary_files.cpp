@@ -55,7 +55,8 @@ void removeIfLeft(const fs::path& path, pid_t process) {
 /// Whether this process has not looked at the folder lately.
 bool isDue(const fs::path& folder) {
   static std::mutex mutex;
-  static std::map<fs::path, Clock::time_point> seen;
+  // Never destroyed: a job may still write when a process ends.
+  static auto& seen = *new std::map<fs::path, Clock::time_point>;
   const Clock::time_point now = Clock::now();
   std::lock_guard<std::mutex> lock(mutex);
   const auto [place, is_new] = seen.emplace(folder, now);
