@@ -29,7 +29,8 @@ def find(path=''):
 def load(path=''):
     """The library with its functions declared; loaded once per file.
 
-    Errors: LibraryError when the path is not absolute, the file is missing, cannot be loaded, or has another ABI version.
+    Errors: LibraryError when the path is not absolute, the file is missing, cannot be loaded, or has another ABI
+    version.
     """
     file = find(path)
     if not file.is_absolute():
@@ -61,8 +62,10 @@ def problem(path=''):
 
 
 def _relative(file):
-    """A path that starts at the open file or at the working folder would run whatever lies beside a file from elsewhere."""
-    return (f"The Stipple library '{file}' is not loaded: its path must be absolute; set the library's path in the add-on's "
+    """A path that starts at the open file or at the working folder would run whatever lies beside a file from
+    elsewhere."""
+    return (f"The Stipple library '{file}' is not loaded: its path must be absolute; set the library's path in the "
+            f"add-on's "
             "preferences.")
 
 
