@@ -9,6 +9,7 @@
 #include "api/plot.h"
 #include "base/parallel.h"
 #include "fit/fit_session.h"
+#include "io/assets/checkpoint.h"
 #include "io/reports/fit_report.h"
 
 using namespace stipple;
@@ -124,6 +125,14 @@ StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model) {
   return guarded([&] {
     require(model, "model");
     *model = new StippleModel{job->context, sessionOf(job).model()};
+  });
+}
+
+StippleStatus stipple_fit_places_check(const char* report_path_utf8,
+                                       const char* checkpoint_path_utf8) {
+  return guarded([&] {
+    if (report_path_utf8) requireFitReportPlace(report_path_utf8);
+    if (checkpoint_path_utf8) requireCheckpointPlace(checkpoint_path_utf8);
   });
 }
 

@@ -1,10 +1,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -55,12 +58,6 @@ void printStrategies() {
   print("strategies", stipple_strategy_count, stipple_strategy_info);
   print("parts, after a strategy and +", stipple_strategy_part_count, stipple_strategy_part_info);
   throw CLI::Success();
-}
-
-volatile std::sig_atomic_t g_interrupted = 0;
-
-void interrupt(int) {
-  g_interrupted = 1;
 }
 
 std::string timeText(double seconds) {
@@ -133,27 +130,29 @@ void printNotes(const Job& job, uint64_t& printed, uint64_t count) {
   }
 }
 
-/// Waits for the end. Ctrl-C ends the fit with its best. Returns: whether all steps were taken.
+/// Waits for the end. Ctrl-C, SIGTERM and SIGHUP end the fit with its best. Returns: whether all
+/// steps were taken. Errors: Interrupted where none was.
 bool watch(const Job& job) {
   Watch watch;
   auto progress = sized<StippleJobProgress>();
   auto figures = sized<StippleFitFigures>();
   uint64_t printed = 0;
-  const auto previous = std::signal(SIGINT, interrupt);
   for (;;) {
     check(stipple_job_poll(job.get(), &progress));
     check(stipple_fit_figures(job.get(), &figures));
     if (figures.note_count > printed) watch.clear();
     printNotes(job, printed, figures.note_count);
     if (progress.state != STIPPLE_JOB_RUNNING) break;
-    if (g_interrupted) check(stipple_job_cancel(job.get()));
+    if (notedSignal() != 0) check(stipple_job_cancel(job.get()));
     watch.show(figures);
     std::this_thread::sleep_for(kPollInterval);
   }
-  std::signal(SIGINT, previous);
   watch.clear();
   const StippleStatus status = stipple_job_wait(job.get());
-  if (status == STIPPLE_ERROR_CANCELLED && figures.iteration > 0) return false;
+  if (status == STIPPLE_ERROR_CANCELLED) {
+    if (figures.iteration > 0) return false;
+    throw Interrupted(notedSignal());
+  }
   check(status);
   return true;
 }
@@ -200,19 +199,29 @@ void requireFolder(const std::string& path) {
   }
 }
 
+/// A new folder among temporary files that nobody else can write to, since others may guess a name.
+std::filesystem::path newTemporaryFolder() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "stipple-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) {
+    throw Failure("'" + pattern + "' cannot be made: " + std::strerror(errno));
+  }
+  return pattern;
+}
+
 /// A result that cannot be written where it was wanted (a full disk) goes where temporary files go.
 void saveSomewhere(const Context& context, const Job& job, const Result& result) {
   try {
     save(context, job, result);
   } catch (const Failure& failure) {
     Result elsewhere = result;
-    const std::string name = std::filesystem::path(result.out).filename().string();
-    elsewhere.out = (std::filesystem::temp_directory_path() /
-                     ("stipple-" + std::to_string(getpid()) + "-" + name))
-                        .string();
+    std::filesystem::path folder;
     try {
+      folder = newTemporaryFolder();
+      elsewhere.out = (folder / std::filesystem::path(result.out).filename()).string();
       save(context, job, elsewhere);
-    } catch (const Failure&) {
+    } catch (const std::exception&) {
+      std::error_code ignored;
+      if (!folder.empty()) std::filesystem::remove_all(folder, ignored);
       throw failure;
     }
     throw Failure(std::string(failure.what()) + "; the result is in '" + elsewhere.out + "'");
@@ -225,7 +234,6 @@ void requirePlaces(const Arguments& arguments, const std::string& checkpoint, bo
                   " or .stipple.safetensors is expected");
   }
   requireFolder(arguments.out);
-  if (!arguments.report.empty()) requireFolder(arguments.report);
   const bool is_left = std::filesystem::exists(checkpoint);
   if (is_left && !resumes) {
     throw Failure("'" + checkpoint +
@@ -234,6 +242,9 @@ void requirePlaces(const Arguments& arguments, const std::string& checkpoint, bo
   if (!is_left && resumes) {
     throw Failure("--resume needs '" + checkpoint + "', which is not there");
   }
+  // What goes on reads its checkpoint, and says more of one that is damaged.
+  check(stipple_fit_places_check(arguments.report.empty() ? nullptr : arguments.report.c_str(),
+                                 resumes ? nullptr : checkpoint.c_str()));
 }
 
 void printFigures(const Job& job) {
@@ -254,6 +265,10 @@ void fit(const Context& context, const Arguments& arguments) {
   requirePlaces(arguments, checkpoint, options.resume != 0);
   const uint64_t budget = arguments.budget ? counted(*arguments.budget, "--budget") : 0;
   const Views views = openViews(context, arguments.dataset, arguments.downscale);
+  // From here on there is something to keep, also where a terminal or the other end of a pipe is
+  // gone.
+  const SignalHold hold;
+  std::signal(SIGPIPE, SIG_IGN);
   const auto job =
       make<Job>(stipple_fit_start, context.get(), const_cast<const StippleViews*>(views.get()),
                 const_cast<const StippleFitOptions*>(&options));

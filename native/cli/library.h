@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "cli/jobs/signals.h"
+
 namespace stipple::cli {
 
 /// What ends the tool with one line on stderr.
@@ -13,9 +15,11 @@ struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Throws Failure with the library's message unless status is STIPPLE_OK.
+/// Throws Failure with the library's message unless status is STIPPLE_OK, and Interrupted where a
+/// signal came meanwhile.
 inline void check(StippleStatus status) {
   if (status != STIPPLE_OK) throw Failure(stipple_last_error_message());
+  throwIfInterrupted();
 }
 
 template <typename T, void (*kFree)(T*)>
@@ -52,7 +56,7 @@ T sized() {
 }
 
 /// Waits for a job, with its progress on stderr: a bar on a terminal, else a line per stage.
-/// Ctrl-C cancels the job; nothing is left half written.
+/// Ctrl-C and its like (jobs/signals.h) cancel the job; nothing is left half written.
 void finish(const Job& job);
 
 }  // namespace stipple::cli

@@ -7,6 +7,9 @@ namespace {
 
 using namespace stipple::cli;
 
+/// As shells say it.
+constexpr int kSignalExit = 128;
+
 int run(int argc, char** argv) {
   if (stipple_abi_version() != STIPPLE_ABI_VERSION) {
     throw Failure("libstipple has ABI version " + std::to_string(stipple_abi_version()) +
@@ -51,8 +54,12 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  listenForSignals();
   try {
     return run(argc, argv);
+  } catch (const Interrupted& interrupted) {
+    std::fprintf(stderr, "stipple: %s\n", interrupted.what());
+    return kSignalExit + interrupted.signal;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "stipple: %s\n", error.what());
     return 1;

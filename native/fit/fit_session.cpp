@@ -1,6 +1,5 @@
 #include "fit/fit_session.h"
 
-#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -78,6 +77,15 @@ FitOptions preparedOptions(const FitOptions& options, const ViewSource& views) {
   return held;
 }
 
+/// A place that cannot be written to is a note when a checkpoint is: it may be there by then.
+void requireNothingLost(const std::string& checkpoint_path) {
+  try {
+    requireCheckpointPlace(checkpoint_path);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kIo) throw;
+  }
+}
+
 }  // namespace
 
 FitSession::FitSession(std::shared_ptr<const BackendFactory> backends,
@@ -86,6 +94,9 @@ FitSession::FitSession(std::shared_ptr<const BackendFactory> backends,
       views_(std::move(views)),
       options_(preparedOptions(options, *views_)),
       split_(splitAsTold(*views_, options_.holdout)) {
+  if (!options_.checkpoint_path.empty() && !options_.resume) {
+    requireNothingLost(options_.checkpoint_path);
+  }
   figures_.iterations = options_.iterations;
 }
 
@@ -188,8 +199,9 @@ void FitSession::saveReport(const std::string& path) const {
   head.model = ended().model().name();
   if (options_.model == FitKind::kExplicit) head.strategy = options_.strategy;
   head.settings_json = settings_json_;
+  requireFitReportPlace(path);
   writeFitReport(head, history(), path);
-  writeFitPlots(history(), std::filesystem::path(path).replace_extension(".svg").string());
+  writeFitPlots(history(), fitPlotsPath(path));
 }
 
 void FitSession::figures(const FitFigures& figures) {

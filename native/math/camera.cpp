@@ -15,7 +15,17 @@ namespace {
 constexpr uint32_t kMaxSide = 65536;
 /// Limits that keep every product of the projection inside double; pictures need far less.
 constexpr double kMaxFocal = 1e9;
+constexpr double kMaxCentre = 1e9;     // pixels
+constexpr double kMaxDistance = 1e12;  // metres; the Earth's orbit is as large
 constexpr double kMinNear = 1e-9;
+
+/// Refuses what is not finite, too.
+void requireAtMost(double value, double limit, const char* name) {
+  if (std::abs(value) <= limit) return;
+  fail(ErrorCode::kInvalidArgument, std::string(name) + " is " + numberText(value) +
+                                        "; finite numbers from " + numberText(-limit) + " to " +
+                                        numberText(limit) + " are allowed");
+}
 
 /// A pixel more than the whole sphere: sizes are rounded.
 void requireWithin(double pixels, double per_radian, double limit, const char* side) {
@@ -85,12 +95,16 @@ void validate(const Camera& camera) {
                                             " pixels; it must be positive and at most 1e9");
     }
   }
-  requireFinite(camera.cx, "camera.cx");
-  requireFinite(camera.cy, "camera.cy");
+  requireAtMost(camera.cx, kMaxCentre, "camera.cx");
+  requireAtMost(camera.cy, kMaxCentre, "camera.cy");
   for (Eigen::Index i = 0; i < 16; ++i) {
     requireFinite(camera.world_to_camera.data()[i], "camera.world_to_camera");
   }
   requireRigid(camera.world_to_camera);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    requireAtMost(camera.world_to_camera(axis, 3), kMaxDistance,
+                  "the translation of camera.world_to_camera");
+  }
   requireFinite(camera.near_plane, "camera.near_plane");
   requireFinite(camera.far_plane, "camera.far_plane");
   const bool is_orthographic = camera.model == CameraModel::kOrthographic;

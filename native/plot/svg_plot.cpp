@@ -6,6 +6,10 @@ namespace stipple {
 
 namespace {
 
+constexpr char kStart[] = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"";
+constexpr char kSheet[] =
+    "font-family=\"sans-serif\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
+
 template <typename... Values>
 std::string format(const char* pattern, Values... values) {
   char text[256];
@@ -67,12 +71,14 @@ std::string textOf(const PlotMark& mark) {
 
 }  // namespace
 
+bool isHeadOfSvgPlot(const std::string& head) {
+  return head.compare(0, sizeof(kStart) - 1, kStart) == 0 && head.find(kSheet) != std::string::npos;
+}
+
 std::string svgOf(const PlotSheet& sheet) {
-  std::string out = format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
-      "viewBox=\"0 0 %.0f %.0f\" font-family=\"sans-serif\">\n",
-      sheet.width, sheet.height, sheet.width, sheet.height);
-  out += "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
+  std::string out = kStart + format("%.0f\" height=\"%.0f\" viewBox=\"0 0 %.0f %.0f\" ",
+                                    sheet.width, sheet.height, sheet.width, sheet.height);
+  out += kSheet;
   for (const PlotMark& mark : sheet.marks) {
     switch (mark.kind) {
       case PlotMark::Kind::kStroke:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stipple.binding.errors import CancelledError, StippleError
-from stipple.binding.fit import Fit, fit_memory_bound, fit_option_table, fit_options
+from stipple.binding.fit import Fit, check_places, fit_memory_bound, fit_option_table, fit_options
 from stipple.binding.model import DecodeSettings
 from stipple.binding.strategies import check_strategy, strategies, strategy_parts
 from stipple.binding.structs import (MAX_ANCHORS, BudgetUnit, ColourSpace, FitModel, FitOptionKind, FitQuality,
@@ -110,6 +110,29 @@ def test_resumes_only_the_same_fit(context, views, tmp_path):
     other = Fit.start(context, views, options(context, checkpoint_path=path, resume=1, iterations=61))
     with pytest.raises(StippleError, match='iterations was 60; now it is 61'):
         other.wait()
+
+
+def test_no_file_of_another_kind_is_replaced(context, views, tmp_path):
+    model, report = tmp_path / 'model.safetensors', tmp_path / 'ä.json'
+    for path in (model, report):
+        path.write_bytes(b'something else')
+    with pytest.raises(StippleError,
+                       match='model.safetensors is a file of another kind, which a checkpoint would replace'):
+        Fit.start(context, views, options(context, checkpoint_path=model))
+    with pytest.raises(StippleError, match='model.safetensors is a file of another kind'):
+        check_places(context.library, checkpoint_path=model)
+    with pytest.raises(StippleError, match='ä.json is a file of another kind'):
+        check_places(context.library, report)
+    with pytest.raises(StippleError, match="no folder '/nowhere'"):
+        check_places(context.library, '/nowhere/r.json')
+    check_places(context.library, tmp_path / 'new.json', tmp_path / 'new.safetensors')
+    check_places(context.library)
+    assert sorted(tmp_path.iterdir()) == [model, report]
+    fit = Fit.start(context, views, options(context))
+    fit.wait()
+    with pytest.raises(StippleError, match='ä.json is a file of another kind'):
+        fit.save_report(report)
+    assert report.read_bytes() == b'something else'
 
 
 def test_presets_grow_with_quality(context):

@@ -22,6 +22,18 @@ def test_missing_library_is_one_clear_sentence(tmp_path):
         library.load(tmp_path / 'nowhere.so')
 
 
+def test_a_path_that_is_not_absolute_is_refused(tmp_path, monkeypatch):
+    """Such a path would load what lies beside a file from elsewhere, or in the working folder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'libstipple.so').write_text('not a library')
+    for path in ('libstipple.so', './libstipple.so', '../libstipple.so', '~/libstipple.so'):
+        with pytest.raises(LibraryError, match='its path must be absolute'):
+            library.load(path)
+        assert 'its path must be absolute' in library.problem(path)
+    monkeypatch.setenv(library.ENVIRONMENT_VARIABLE, 'libstipple.so')
+    assert 'its path must be absolute' in library.problem()
+
+
 def test_wrong_abi_version_is_refused_with_both_versions(tmp_path):
     file = build(tmp_path, 'old', 'unsigned stipple_abi_version(void) { return 99u; }\n')
     with pytest.raises(LibraryError, match=r'ABI version 99; this add-on needs version 2'):

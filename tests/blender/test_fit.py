@@ -254,9 +254,25 @@ def test_a_stopped_fit_goes_on_from_its_checkpoint(stipple, ball, fitting, tmp_p
 
 def test_begins_anew_where_it_shall_not_go_on(ball, fitting, tmp_path):
     few = settings(view_count=4, view_size=32, max_splats=400, checkpoint=str(tmp_path / 'c.safetensors'), resume=False)
-    (tmp_path / 'c.safetensors').write_bytes(b'of something else')
+    (tmp_path / 'c.safetensors').write_bytes(b'')
     fitted()
     assert not fitting.has_checkpoint(few)
+
+
+@pytest.mark.parametrize('resume', [False, True])
+def test_no_file_of_another_kind_is_replaced(ball, stipple, tmp_path, resume):
+    """A model named as the checkpoint went with the end of the fit, any file named as the report at once."""
+    mine = {tmp_path / 'c.safetensors': b'a model', tmp_path / 'scan.ply': b'ply', tmp_path / 'drawing.svg': b'<svg/>'}
+    for path, content in mine.items():
+        path.write_bytes(content)
+    settings(view_count=4, view_size=32, max_splats=400, checkpoint=str(tmp_path / 'c.safetensors'), resume=resume)
+    scenes.refuses(bpy.ops.stipple.splats_fit, 'c.safetensors')
+    settings(checkpoint='', resume=False, report=str(tmp_path / 'scan.ply'))
+    scenes.refuses(bpy.ops.stipple.splats_fit, 'scan.ply is a file of another kind')
+    settings(report=str(tmp_path / 'drawing.json'))
+    scenes.refuses(bpy.ops.stipple.splats_fit, 'drawing.svg is a file of another kind')
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == mine
+    settings(report='')
 
 
 def test_ending_at_once_puts_the_scene_back(ball, fitting):

@@ -157,13 +157,14 @@ def test_a_killed_fit_resumes_bit_for_bit(dataset, tmp_path):
     assert not checkpoint.exists()
 
 
-def test_ctrl_c_keeps_the_best(dataset, tmp_path):
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_keeps_the_best(dataset, tmp_path, number):
     out = tmp_path / 'out.ply'
     checkpoint = tmp_path / 'out.ply.checkpoint.safetensors'
     steps = ('--iterations', 100000, '--gaussians', 300, '--sh-degree', 0)
     process = start('fit', dataset, out, *steps, '--checkpoint-every', 5)
     wait_for(checkpoint)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 0, stderr
     assert '--resume goes on' in stderr
@@ -177,6 +178,57 @@ def test_ctrl_c_keeps_the_best(dataset, tmp_path):
     assert checkpoint.read_bytes() == before
 
 
+def test_a_closed_terminal_keeps_the_best(dataset, tmp_path):
+    """It sends SIGHUP, and the lines of the fit have nowhere to go any more; the shell's SIGTERM comes right behind."""
+    out = tmp_path / 'out.ply'
+    process = start('fit', dataset, out, '--iterations', 100000, '--gaussians', 300, '--sh-degree', 0,
+                    '--checkpoint-every', 5)
+    wait_for(tmp_path / 'out.ply.checkpoint.safetensors')
+    process.stdout.close()
+    process.stderr.close()
+    process.send_signal(signal.SIGHUP)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(timeout=60) == 0
+    assert json.loads(run('info', out, '--json').stdout)['count'] > 0
+
+
+def test_nohup_goes_on(dataset, tmp_path):
+    process = start('fit', dataset, tmp_path / 'out.ply', '--iterations', 300, '--gaussians', 300, '--sh-degree', 0,
+                    '--checkpoint-every', 5, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    wait_for(tmp_path / 'out.ply.checkpoint.safetensors')
+    process.send_signal(signal.SIGHUP)
+    stdout, stderr = process.communicate(timeout=60)
+    assert process.returncode == 0, stderr
+    assert figures(stdout)['iterations'] == '300'
+
+
+@pytest.mark.parametrize('number, name', [(signal.SIGINT, 'Ctrl-C'), (signal.SIGTERM, 'SIGTERM'),
+                                          (signal.SIGHUP, 'SIGHUP')])
+def test_a_signal_before_the_first_step_leaves_nothing(dataset, tmp_path, number, name):
+    """From the tool's start on, whatever it is at: one line, a status as shells have it, and no file."""
+    early = 0
+    for delay in (0.01, 0.02, 0.03, 0.05, 0.08, 0.13, 0.2, 0.3):
+        process = start('fit', dataset, tmp_path / 'out.ply', '--iterations', 100000, '--gaussians', 300, '--sh-degree',
+                        0)
+        time.sleep(delay)
+        process.send_signal(number)
+        _, stderr = process.communicate(timeout=60)
+        left = [path.name for path in tmp_path.iterdir()]
+        if process.returncode == 0:
+            assert 'the best so far is in' in stderr
+            assert sorted(left) == ['out.ply', 'out.ply.checkpoint.safetensors']
+            for leftover in left:
+                (tmp_path / leftover).unlink()
+            continue
+        assert left == []
+        if process.returncode == -number:  # before the tool has read its arguments
+            continue
+        early += 1
+        assert process.returncode == 128 + number, stderr
+        assert [line for line in stderr.splitlines() if line.startswith('stipple: ')] == [f'stipple: stopped by {name}']
+    assert early > 0
+
+
 def test_a_result_that_has_no_place_any_more_is_kept_elsewhere(dataset, tmp_path):
     folder, spare = tmp_path / 'gone', tmp_path / 'spare'
     folder.mkdir()
@@ -184,11 +236,14 @@ def test_a_result_that_has_no_place_any_more_is_kept_elsewhere(dataset, tmp_path
     process = start('fit', dataset, folder / 'out.ply', '--iterations', 100000, '--gaussians', 300, '--sh-degree', 0,
                     '--checkpoint-every', 5, environment={**os.environ, 'TMPDIR': str(spare)})
     wait_for(folder / 'out.ply.checkpoint.safetensors')
-    shutil.rmtree(folder)
+    folder.rename(tmp_path / 'moved')  # at once: a checkpoint may be on its way into it
     process.send_signal(signal.SIGINT)
     _, stderr = process.communicate(timeout=60)
     assert process.returncode == 1
-    kept, = spare.iterdir()
+    private, = spare.iterdir()  # nobody can guess its name, or write there
+    assert private.stat().st_mode & 0o777 == 0o700
+    assert str(process.pid) not in private.name
+    kept, = private.iterdir()
     assert f"the result is in '{kept}'" in stderr.strip().splitlines()[-1]
     assert json.loads(run('info', kept, '--json').stdout)['count'] > 0
 
@@ -213,7 +268,7 @@ def test_checkpoints_that_cannot_be_read_stay_as_they_are(dataset, tmp_path):
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=60)
     whole, splats = checkpoint.read_bytes(), out.read_bytes()
-    version = b'"stipple_version":"1.0"'
+    version = b'"stipple_version":"1.1"'
     assert version in whole
     for damaged, text in ((whole[:len(whole) // 2], 'holds'), (whole[:40], 'truncated'), (b'', 'holds 0 bytes'),
                           (whole.replace(version, version.replace(b'1', b'9')), 'version 9; version 1 is supported')):
@@ -221,6 +276,23 @@ def test_checkpoints_that_cannot_be_read_stay_as_they_are(dataset, tmp_path):
         line = error('fit', dataset, out, *steps, '--resume')
         assert checkpoint.name in line and text in line
         assert (checkpoint.read_bytes(), out.read_bytes()) == (damaged, splats)
+
+
+def test_no_file_of_another_kind_is_replaced(dataset, tmp_path):
+    splats = tmp_path / 'scan.ply'
+    run('fit', dataset, splats, *FEW)
+    (tmp_path / 'curves.svg').write_text('<svg>a drawing</svg>')
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    for report, named in ((splats, 'scan.ply'), (tmp_path / 'curves.json', 'curves.svg'),
+                          (tmp_path / 'curves.svg', '.json')):
+        began = time.monotonic()
+        line = error('fit', dataset, tmp_path / 'out.ply', '--iterations', 100000, '--report', report)
+        assert named in line, line
+        assert time.monotonic() - began < 20  # and not after the fit
+        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+    # A report may be made again.
+    for _ in range(2):
+        run('fit', dataset, tmp_path / 'out.ply', *FEW, '--report', tmp_path / 'r.json')
 
 
 @pytest.fixture

@@ -41,7 +41,7 @@ CARRIERS = {'math/vec.h': {'Eigen'}}
 # C and POSIX headers with a '.h' or '/' in their name; C++'s own have neither.
 SYSTEM_HEADERS = re.compile(r'(stdint|stddef|strings|dlfcn|unistd|fcntl|pthread|errno|signal|locale|fenv|xmmintrin|'
                             r'execinfo)\.h'
-                            r'|sys/(stat|mman|types|resource|wait|statvfs|ioctl)\.h|[a-z_0-9]+')
+                            r'|sys/(file|stat|mman|types|resource|wait|statvfs|ioctl)\.h|[a-z_0-9]+')
 
 SOURCE_ENDINGS = ('.cpp', '.h', '.c', '.py', '.sh', '.cmake', 'CMakeLists.txt')
 LINE_LIMIT = 600

@@ -223,6 +223,7 @@ FUNCTIONS = {
     'stipple_fit_watch_contributions': (_status, [_handle, c_uint32]),
     'stipple_fit_cloud': (_status, [_handle, c_uint64, _out_handle]),
     'stipple_fit_model': (_status, [_handle, _out_handle]),
+    'stipple_fit_places_check': (_status, [_path, _path]),
     'stipple_fit_report_save': (_status, [_handle, _path]),
     'stipple_fit_report_draw': (_status, [_handle, c_double, c_uint64, _floats, POINTER(c_uint32),
                                          POINTER(c_uint32)]),

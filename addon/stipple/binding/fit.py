@@ -32,6 +32,12 @@ def fit_options(library, model=FitModel.EXPLICIT, quality=FitQuality.BALANCED, c
     return options
 
 
+def check_places(library, report_path=None, checkpoint_path=None):
+    """Refuses places where a report or a checkpoint cannot be written, or would replace a file of another kind."""
+    check(library, library.stipple_fit_places_check(*(None if path is None else path_bytes(path)
+                                                      for path in (report_path, checkpoint_path))))
+
+
 @dataclass(frozen=True)
 class FitOption:
     """A field of StippleFitOptions as the library tells it."""

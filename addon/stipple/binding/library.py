@@ -29,9 +29,12 @@ def find(path=''):
 def load(path=''):
     """The library with its functions declared; loaded once per file.
 
-    Errors: LibraryError when the file is missing, cannot be loaded, or has another ABI version.
+    Errors: LibraryError when the path is not absolute, the file is missing, cannot be loaded, or has another ABI
+    version.
     """
     file = find(path)
+    if not file.is_absolute():
+        raise LibraryError(_relative(file))
     known = _loaded.get(file)
     if known is not None:
         return known
@@ -50,10 +53,20 @@ def problem(path=''):
     file = find(path)
     if file in _loaded:
         return ''
+    if not file.is_absolute():
+        return _relative(file)
     if not file.is_file():
         return _missing(file)
     time, why = _refused.get(file, (None, ''))
     return why if time == file.stat().st_mtime_ns else ''
+
+
+def _relative(file):
+    """A path that starts at the open file or at the working folder would run whatever lies beside a file from
+    elsewhere."""
+    return (f"The Stipple library '{file}' is not loaded: its path must be absolute; set the library's path in the "
+            f"add-on's "
+            "preferences.")
 
 
 def _missing(file):

@@ -1155,8 +1155,8 @@ StippleStatus stipple_accuracy_report_best_within(const StippleAccuracyReport* r
  * reached. */
 StippleStatus stipple_accuracy_report_cheapest_above(const StippleAccuracyReport* report, double psnr,
                                                      uint64_t* index);
-/* Writes the format that the extension says: .json (everything), .csv (a line for each row), .svg (the plot).
- * docs/formats.md, Accuracy report. */
+/* By extension: .json (everything), .csv (a line for each row), .svg (the plot). docs/formats.md, Accuracy report.
+ * Errors: IO; INVALID_ARGUMENT for another ending, and where a file that is no such report would be replaced. */
 StippleStatus stipple_accuracy_report_save(const StippleAccuracyReport* report, const char* path_utf8);
 /* Draws error against time, both logarithmic, with named settings and the front, as stipple_fit_report_draw
  * draws its plots; this one is 840 units wide. */
@@ -1733,12 +1733,12 @@ typedef struct StippleFitFigures {
   char stage[64];
 } StippleFitFigures;
 
-/* Fits splats to views, as a job. It reads the images of views as they are at the start. After a cancel, and after
- * an error of a step or an image, the result is the best state that was measured until then (stipple_fit_cloud).
- * Checkpoints appear under their name when they are whole; a job that ends early leaves one. Where one cannot be
- * written, that is a note and the fit goes on.
- * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without images;
- * MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
+/* Fits splats to views, as a job. It reads the images of views as they are at the start.
+ * A cancel, and an error of a step or an image, end the fit with the best that it had measured: the result can be
+ * read either way (stipple_fit_cloud). Checkpoints appear under their name when they are whole; a job that ends
+ * early leaves one. Where one cannot be written, that is a note and the fit goes on.
+ * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without images, a
+ * checkpoint's path with a file of another kind; MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
  * transparent or masked out, cameras that see none of the points); those of reading images; with resume IO,
  * FORMAT, UNSUPPORTED, and INVALID_ARGUMENT for a checkpoint of other options or views (says which).
  * Threads and determinism: the same bits for any number of threads, any image_bytes, and wherever it was stopped
@@ -1768,8 +1768,12 @@ StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleC
  * splats at any budget. UNSUPPORTED for explicit splats: stipple_model_from_cloud_start makes a model of their
  * cloud. */
 StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model);
-/* Writes the report of a job that has ended: JSON at path_utf8, and its curves as SVG beside it, under the same
- * name with the extension .svg. Errors: IO; INVALID_ARGUMENT where no step was taken. */
+/* Whether a fit may write its report and its checkpoints to these places, to be asked before it starts; NULL for what
+ * is not wanted. Nothing is written. Errors: IO where they cannot be written; INVALID_ARGUMENT where a file of another
+ * kind would be replaced. */
+StippleStatus stipple_fit_places_check(const char* report_path_utf8, const char* checkpoint_path_utf8);
+/* The story of a job that has ended: JSON at path_utf8, and its curves as SVG beside it, under the same name with
+ * the extension .svg. Errors: IO; INVALID_ARGUMENT where no step was taken, or a file of another kind would be replaced. */
 StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_utf8);
 /* Draws the same curves as an image: dark on white, with axes, titles and legends.
  * In: scale 0.25..8, pixels of a unit of the SVG, whose two columns are 960 units wide; capacity, floats of

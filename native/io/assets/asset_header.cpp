@@ -10,6 +10,7 @@ namespace {
 
 constexpr int kMajorVersion = 1;
 constexpr char kVersion[] = "1.0";
+constexpr char kChecksumVersion[] = "1.1";
 constexpr char kVersionKey[] = "stipple_version";
 
 /// Minor number of a version text that majorVersion() has accepted; 0 where there is none.
@@ -90,6 +91,21 @@ void addAssetExtras(SafeTensorsWriter& file, const AssetExtras& extras) {
 void setAssetKind(SafeTensorsWriter& file, const char* kind) {
   file.setMetadata(kVersionKey, kVersion);
   file.setMetadata("kind", kind);
+}
+
+void setAssetChecksum(SafeTensorsWriter& file) {
+  file.setMetadata(kVersionKey, kChecksumVersion);
+  file.addChecksum();
+}
+
+void requireAssetChecksum(const SafeTensorsReader& file) {
+  const bool needs_one =
+      minorVersion(requireText(file, kVersionKey)) >= minorVersion(kChecksumVersion);
+  if (!file.checksumIsRight(needs_one)) {
+    fail(ErrorCode::kFormat, file.path() +
+                                 " is damaged: what it holds is not what was written (its checksum "
+                                 "differs)");
+  }
 }
 
 }  // namespace stipple

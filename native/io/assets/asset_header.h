@@ -45,4 +45,11 @@ void addAssetExtras(SafeTensorsWriter& file, const AssetExtras& extras);
 /// Writes version and kind.
 void setAssetKind(SafeTensorsWriter& file, const char* kind);
 
+/// Gives an asset a checksum, and the version 1.1, from which on one without it is damaged. After
+/// setAssetKind.
+void setAssetChecksum(SafeTensorsWriter& file);
+/// Refuses an asset that is not as setAssetChecksum() had it written; older ones have no checksum.
+/// Errors: kIo, kFormat.
+void requireAssetChecksum(const SafeTensorsReader& file);
+
 }  // namespace stipple

@@ -12,16 +12,21 @@ struct Checkpoint {
   TensorTable tensors;
 };
 
-/// `.stipple.safetensors`, version 1, kind "checkpoint". The file appears under its name when it is
-/// whole; until then, and where that fails, the one before it stays.
-/// Errors: kIo.
+/// Refuses a place where a checkpoint cannot be written, or would replace a file of another kind.
+/// Errors: kIo, kInvalidArgument.
+void requireCheckpointPlace(const std::string& path);
+
+/// `.stipple.safetensors`, version 1.1, kind "checkpoint", with a checksum. The file appears under
+/// its name when it is whole; until then, and where that fails, the one before it stays.
+/// Errors: kIo; kInvalidArgument where the path has a file of another kind.
 void writeCheckpoint(const Checkpoint& checkpoint, const std::string& path);
 /// The same without a copy of the tensors.
 void writeCheckpoint(const std::string& settings_json, const TensorTable& tensors,
                      const std::string& path);
 
-/// Errors: kIo, kFormat (truncated, or no checkpoint's tensors), kUnsupported (newer major version,
-/// other kind).
+/// Checkpoints of version 1.0 have no checksum.
+/// Errors: kIo, kFormat (truncated, damaged, or no checkpoint's tensors), kUnsupported (newer major
+/// version, other kind).
 Checkpoint readCheckpoint(const std::string& path);
 
 }  // namespace stipple

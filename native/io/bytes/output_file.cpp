@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "base/error.h"
+#include "io/bytes/temporary_files.h"
 
 namespace stipple {
 
@@ -25,30 +26,34 @@ std::string reason(int error) {
   return std::generic_category().message(error);
 }
 
-/// Where the bytes finally belong: a link is followed, so that it stays a link.
-fs::path resolved(const std::string& path) {
-  if (path.empty()) fail(ErrorCode::kIo, "the path of the file to write is empty");
-  std::error_code ignored;
-  if (fs::is_symlink(path, ignored)) {
-    const fs::path target = fs::weakly_canonical(path, ignored);
-    if (!ignored) return target;
-  }
-  return path;
-}
+/// More than any system follows.
+constexpr int kMaxLinks = 40;
 
-/// Same folder, because only there a rename is atomic; same ending, because some libraries choose
-/// the format by it. Short, so that no file name becomes longer than the system allows.
 std::string temporaryName(const fs::path& target) {
   static std::atomic<unsigned> counter{0};
-  const std::string name = ".stipple-" + std::to_string(::getpid()) + "-" +
-                           std::to_string(counter.fetch_add(1)) + target.extension().string();
-  return (target.parent_path() / name).string();
+  const std::string name = temporaryFileName(::getpid(), counter.fetch_add(1));
+  // Same folder, because only there a rename is atomic; same ending, because some libraries choose
+  // the format by it. Short, so that no file name becomes longer than the system allows.
+  return (target.parent_path() / (name + target.extension().string())).string();
 }
 
 }  // namespace
 
+std::string outputTarget(const std::string& path) {
+  if (path.empty()) fail(ErrorCode::kIo, "the path of the file to write is empty");
+  fs::path target = path;
+  std::error_code error;
+  for (int links = 0; fs::is_symlink(target, error); ++links) {
+    if (links == kMaxLinks) failWriting(path, reason(ELOOP));
+    const fs::path next = fs::read_symlink(target, error);
+    if (error) failWriting(path, error.message());
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  return target.string();
+}
+
 OutputFile::OutputFile(const std::string& path) : path_(path) {
-  const fs::path target = resolved(path);
+  const fs::path target = outputTarget(path);
   struct stat status {};
   const bool exists = ::stat(target.c_str(), &status) == 0;
   // Renaming over a device or a pipe would replace it.
@@ -57,16 +62,19 @@ OutputFile::OutputFile(const std::string& path) : path_(path) {
   // A rename asks only the folder for permission; a file that is read-only stays as it is.
   if (exists && ::access(target.c_str(), W_OK) != 0) failWriting(path, reason(errno));
   const mode_t mode = exists ? status.st_mode & 0777 : 0666;
+  sweepTemporaryFiles(target.parent_path());
   int descriptor = -1;
   do {
     temporary_path_ = temporaryName(target);
     descriptor = ::open(temporary_path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
   } while (descriptor < 0 && errno == EEXIST);
   if (descriptor < 0) failWriting(path, reason(errno));
+  lock_ = lockTemporaryFile(descriptor);
   file_ = ::fdopen(descriptor, "wb");
   if (file_ == nullptr) {
     const int error = errno;
     ::close(descriptor);
+    if (lock_ >= 0) ::close(lock_);
     ::unlink(temporary_path_.c_str());
     failWriting(path, reason(error));
   }
@@ -75,6 +83,7 @@ OutputFile::OutputFile(const std::string& path) : path_(path) {
 OutputFile::~OutputFile() {
   if (file_ != nullptr) std::fclose(file_);
   if (!committed_) ::unlink(temporary_path_.c_str());
+  if (lock_ >= 0) ::close(lock_);
 }
 
 void OutputFile::write(const void* bytes, size_t count) {
@@ -119,7 +128,7 @@ void OutputFile::commit() {
   const int close_error = ::close(descriptor) != 0 ? errno : 0;
   if (sync_error != 0) failWriting(path_, reason(sync_error));
   if (close_error != 0) failWriting(path_, reason(close_error));
-  const fs::path target = resolved(path_);
+  const std::string target = outputTarget(path_);
   if (::rename(temporary_path_.c_str(), target.c_str()) != 0) failWriting(path_, reason(errno));
   committed_ = true;
 }

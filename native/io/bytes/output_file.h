@@ -8,8 +8,13 @@
 
 namespace stipple {
 
+/// Where the bytes of an output finally belong: links are followed, also to a file that is not there
+/// yet, so that they stay links. Errors: kIo for an empty path and for links that go in a circle.
+std::string outputTarget(const std::string& path);
+
 /// A file that appears under its name only when it is whole: bytes go to a temporary name in the
-/// same folder, `commit` flushes and renames, the destructor removes what was not committed.
+/// same folder, `commit` flushes and renames, the destructor removes what was not committed. What a
+/// killed process left in the folder is removed when the next one begins to write there.
 /// Errors: kIo with the path and the system's reason (folder missing, no permission, disk full).
 class OutputFile {
  public:
@@ -31,6 +36,7 @@ class OutputFile {
   std::string path_;
   std::string temporary_path_;
   std::FILE* file_ = nullptr;
+  int lock_ = -1;  ///< held as long as the temporary file has an owner
   bool committed_ = false;
 };
 

@@ -2,7 +2,9 @@
 // tensors one after another.
 #include "io/bytes/safetensors.h"
 
+#include <algorithm>
 #include <bit>
+#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -10,6 +12,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "io/bytes/checksum.h"
 #include "io/bytes/output_file.h"
 
 namespace stipple {
@@ -23,6 +26,9 @@ constexpr uint64_t kMaxHeaderBytes = 100000000;
 // A header of a multiple of 8 bytes keeps 8-byte numbers aligned in a memory map.
 constexpr size_t kAlignment = 8;
 constexpr char kMetadataKey[] = "__metadata__";
+constexpr char kChecksumKey[] = "checksum";
+constexpr size_t kChecksumDigits = 16;
+constexpr size_t kChecksumPiece = size_t{1} << 20;
 
 static_assert(std::endian::native == std::endian::little,
               "tensors are little-endian and copied as they stand");
@@ -61,6 +67,23 @@ const char* dtypeName() {
   if constexpr (std::is_same_v<T, uint8_t>) return "U8";
   if constexpr (std::is_same_v<T, uint32_t>) return "U32";
   if constexpr (std::is_same_v<T, uint64_t>) return "U64";
+}
+
+/// Where the digits of the checksum stand in a header, whose keys and texts have no quotes that are
+/// not escaped; npos where there are none.
+size_t checksumPlace(const std::string& header) {
+  const std::string key = std::string("\"") + kChecksumKey + "\":\"";
+  const size_t place = header.find(key);
+  if (place == std::string::npos || place + key.size() + kChecksumDigits > header.size()) {
+    return std::string::npos;
+  }
+  return place + key.size();
+}
+
+std::string hexadecimal(uint64_t value) {
+  char text[kChecksumDigits + 1];
+  std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(value));
+  return text;
 }
 
 SafeTensor parseTensor(const std::string& path, const std::string& name, const Json& entry,
@@ -201,6 +224,29 @@ Tensor SafeTensorsReader::readTensor(const std::string& name) const {
   return tensor;
 }
 
+bool SafeTensorsReader::checksumIsRight(bool needs_one) const {
+  const auto written = metadata_.find(kChecksumKey);
+  if (written == metadata_.end()) return !needs_one;
+  uint64_t header_bytes = 0;
+  file_.readAt(0, &header_bytes, sizeof(header_bytes));
+  std::string header(static_cast<size_t>(header_bytes), '\0');
+  file_.readAt(sizeof(header_bytes), header.data(), header.size());
+  const size_t place = checksumPlace(header);
+  if (place == std::string::npos) return false;
+  header.replace(place, kChecksumDigits, kChecksumDigits, '0');
+  Checksum sum;
+  sum.add(&header_bytes, sizeof(header_bytes));
+  sum.add(header.data(), header.size());
+  std::vector<uint8_t> piece(kChecksumPiece);
+  for (uint64_t at = sizeof(header_bytes) + header_bytes; at < file_.size();) {
+    const size_t count = static_cast<size_t>(std::min<uint64_t>(piece.size(), file_.size() - at));
+    file_.readAt(at, piece.data(), count);
+    sum.add(piece.data(), count);
+    at += count;
+  }
+  return written->second == hexadecimal(sum.value());
+}
+
 std::map<std::string, CarriedTensor> SafeTensorsReader::readOthers() const {
   std::map<std::string, CarriedTensor> others;
   for (const auto& [name, tensor] : tensors_) {
@@ -257,6 +303,11 @@ void SafeTensorsWriter::carry(const std::string& name, const CarriedTensor& tens
                    Entry{tensor.dtype, tensor.shape, tensor.bytes.data(), tensor.bytes.size()});
 }
 
+void SafeTensorsWriter::addChecksum() {
+  setMetadata(kChecksumKey, std::string(kChecksumDigits, '0'));
+  has_checksum_ = true;
+}
+
 void SafeTensorsWriter::write(const std::string& path) const {
   Json header = Json::object();
   if (!metadata_.empty()) header[kMetadataKey] = metadata_;
@@ -277,8 +328,15 @@ void SafeTensorsWriter::write(const std::string& path) const {
          path + " cannot be written: its metadata is not UTF-8: " + error.what());
   }
   text.resize((text.size() + kAlignment - 1) / kAlignment * kAlignment, ' ');
-  OutputFile file(path);
   const uint64_t length = text.size();
+  if (has_checksum_) {
+    Checksum sum;
+    sum.add(&length, sizeof(length));
+    sum.add(text.data(), text.size());
+    for (const auto& [name, entry] : entries_) sum.add(entry.data, entry.bytes);
+    text.replace(checksumPlace(text), kChecksumDigits, hexadecimal(sum.value()));
+  }
+  OutputFile file(path);
   file.write(&length, sizeof(length));
   file.write(text.data(), text.size());
   for (const auto& [name, entry] : entries_) file.write(entry.data, entry.bytes);

@@ -44,6 +44,9 @@ class SafeTensorsReader {
   std::vector<uint64_t> readUint64s(const std::string& name, uint64_t width) const;
   /// A tensor of one of the types that Tensor has, whatever its shape. Errors: kFormat.
   Tensor readTensor(const std::string& name) const;
+  /// Whether the bytes of the file are those that SafeTensorsWriter::addChecksum() saw. In: needs_one,
+  /// whether a file without a checksum is wrong. Reads the whole file. Errors: kIo.
+  bool checksumIsRight(bool needs_one) const;
   /// The tensors that nobody has read yet.
   std::map<std::string, CarriedTensor> readOthers() const;
 
@@ -73,6 +76,9 @@ class SafeTensorsWriter {
   void carryMetadata(const std::string& key, const std::string& value) {
     metadata_.emplace(key, value);
   }
+  /// Adds a number to the metadata that a change of any byte of the file, its own included, makes
+  /// wrong.
+  void addChecksum();
   /// Errors: kIo; the old file stays.
   void write(const std::string& path) const;
 
@@ -88,6 +94,7 @@ class SafeTensorsWriter {
 
   std::map<std::string, std::string> metadata_;
   std::map<std::string, Entry> entries_;
+  bool has_checksum_ = false;
 };
 
 }  // namespace stipple

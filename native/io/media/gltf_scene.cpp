@@ -14,6 +14,7 @@
 #include "io/bytes/input_file.h"
 #include "io/bytes/little_endian.h"
 #include "io/media/gltf_accessor.h"
+#include "io/media/gltf_files.h"
 #include "io/media/gltf_model.h"
 
 namespace stipple::media {
@@ -31,7 +32,10 @@ constexpr uint64_t kMaxJsonBytes = uint64_t{1} << 26;
 constexpr int kMaxJsonDepth = 256;
 constexpr size_t kReadBytes = size_t{1} << 21;
 
-[[noreturn]] void failLoading(const std::string& path, const std::string& error) {
+/// In: error, lines of tinygltf; they become one.
+[[noreturn]] void failLoading(const std::string& path, std::string error) {
+  while (!error.empty() && error.back() == '\n') error.pop_back();
+  std::replace(error.begin(), error.end(), '\n', ' ');
   fail(ErrorCode::kFormat,
        path + " is not a valid glTF file: " + (error.empty() ? "no reason is given" : error));
 }
@@ -147,6 +151,7 @@ bool GltfScene::loadBinaryBeside() {
   std::string error;
   std::string warning;
   tinygltf::TinyGLTF loader;
+  readRegularFilesOnly(loader);
   const std::string folder = std::filesystem::path(path_).parent_path().string();
   if (!loader.LoadBinaryFromMemory(model_.get(), &error, &warning, small.data(),
                                    static_cast<unsigned>(small.size()), folder)) {
@@ -163,6 +168,7 @@ bool GltfScene::loadBinaryBeside() {
 void GltfScene::load(Content content) {
   if (content == Content::kSplats && loadBinaryBeside()) return;
   tinygltf::TinyGLTF loader;
+  readRegularFilesOnly(loader);
   // Images are only kept here; those that a base colour needs are decoded later. The ranges of
   // images inside the file's own buffers are not checked by tinygltf, so they are not touched
   // yet.

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "io/bytes/output_file.h"
+#include "io/bytes/output_kind.h"
 #include "plot/svg_plot.h"
 
 namespace stipple {
@@ -14,6 +15,12 @@ namespace stipple {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr char kCsvHead[] =
+    "setting,seconds,seconds_low,seconds_high,repetitions,is_estimated,psnr,largest_error,"
+    "error_99_9,";
+/// What tells the kind of a file.
+constexpr size_t kHeadBytes = 256;
 
 /// JSON has no infinity: null.
 Json number(double value) {
@@ -78,9 +85,7 @@ std::string jsonOf(const AccuracyReport& report) {
 /// Names have no quotes or line ends; a comma is what needs quotes.
 std::string csvOf(const AccuracyReport& report) {
   const Words words = wordsOf(report.subject);
-  std::string out =
-      "setting,seconds,seconds_low,seconds_high,repetitions,is_estimated,psnr,largest_error,"
-      "error_99_9,";
+  std::string out = kCsvHead;
   out.append(words.counted).append(",visible,on_front\n");
   for (const AccuracyRow& row : report.rows) {
     char text[320];
@@ -173,6 +178,11 @@ PlotSheet accuracyPlot(const AccuracyReport& report) {
 
 void writeAccuracyReport(const AccuracyReport& report, const std::string& path) {
   const std::string text = textOf(report, path);
+  requireOutputKind(path, "the report", [](const std::string& file) {
+    const std::string head = headOfFile(file, kHeadBytes);
+    return head.find("{\n \"stipple_accuracy_report\": ") == 0 || head.find(kCsvHead) == 0 ||
+           isHeadOfSvgPlot(head);
+  });
   OutputFile file(path);
   file.write(text.data(), text.size());
   file.commit();

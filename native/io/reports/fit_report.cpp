@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "io/bytes/input_file.h"
 #include "io/bytes/output_file.h"
+#include "io/bytes/output_kind.h"
 #include "plot/svg_plot.h"
 
 namespace stipple {
@@ -20,6 +23,8 @@ using Json = nlohmann::ordered_json;
 
 /// Points of a curve: as many as a panel has pixels to show.
 constexpr size_t kCurvePoints = 300;
+/// What tells the kind of a file.
+constexpr size_t kHeadBytes = 256;
 
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -52,6 +57,18 @@ Json rows(const std::vector<FitMeasure>& measures) {
   Json list = Json::array();
   for (const FitMeasure& measure : measures) list.push_back(row(measure));
   return list;
+}
+
+void requireReportPlace(const std::string& path) {
+  requireOutputKind(path, "the report of a fit", [](const std::string& file) {
+    return headOfFile(file, kHeadBytes).find("{\n \"stipple_fit_report\": ") == 0;
+  });
+}
+
+void requirePlotsPlace(const std::string& path) {
+  requireOutputKind(path, "the curves of a report", [](const std::string& file) {
+    return isHeadOfSvgPlot(headOfFile(file, kHeadBytes));
+  });
 }
 
 void writeText(const std::string& text, const std::string& path) {
@@ -100,6 +117,19 @@ PlotLine measuredCurve(const std::vector<FitMeasure>& measures, const char* labe
 
 }  // namespace
 
+std::string fitPlotsPath(const std::string& report_path) {
+  return std::filesystem::path(report_path).replace_extension(".svg").string();
+}
+
+void requireFitReportPlace(const std::string& path) {
+  if (lowerEnding(path) == ".svg") {
+    fail(ErrorCode::kInvalidArgument,
+         path + " ends in .svg, where the curves of a report go; .json is expected");
+  }
+  requireReportPlace(path);
+  requirePlotsPlace(fitPlotsPath(path));
+}
+
 void writeFitReport(const FitReportHead& head, const FitHistory& history, const std::string& path) {
   Json settings;
   try {
@@ -138,6 +168,7 @@ void writeFitReport(const FitReportHead& head, const FitHistory& history, const 
                             {"ssim", column(history, &FitRecord::ssim)},
                             {"gaussians", std::move(counts)},
                             {"seconds", std::move(each)}};
+  requireReportPlace(path);
   writeText(report.dump(1) + "\n", path);
 }
 
@@ -194,6 +225,7 @@ std::vector<PlotPanel> fitPlots(const FitHistory& history) {
 }
 
 void writeFitPlots(const FitHistory& history, const std::string& path) {
+  requirePlotsPlace(path);
   writeText(svgOf(sheetOf(fitPlots(history))), path);
 }
 

@@ -17,7 +17,8 @@ struct FitReportHead {
 
 /// The history of a fit as JSON (docs/formats.md, "Fit report"): a head, one array per figure of
 /// the iterations, the measurements, and the result by budget. Numbers that are not finite are
-/// null. Errors: kIo; kInvalidArgument where settings_json is no JSON.
+/// null. Errors: kIo; kInvalidArgument where settings_json is no JSON, or the path has a file of
+/// another kind.
 void writeFitReport(const FitReportHead& head, const FitHistory& history, const std::string& path);
 
 /// What each measurement of a written report cost and brought, in the form of a report of accuracy:
@@ -26,6 +27,12 @@ void writeFitReport(const FitReportHead& head, const FitHistory& history, const 
 /// Errors: kIo; kFormat for a file that is no such report; kInvalidArgument for one of a fit that
 /// measured nothing.
 AccuracyReport readFitAccuracy(const std::string& path);
+
+/// Where the plots of a report lie: under its name, with the ending .svg.
+std::string fitPlotsPath(const std::string& report_path);
+/// Refuses places where a report or its plots cannot be written, or would replace a file of another
+/// kind. Errors: kIo, kInvalidArgument.
+void requireFitReportPlace(const std::string& path);
 
 /// The same as plots: loss, quality on held-out views, quality by budget, number of splats, time by
 /// part, entropy of the density where there is one.

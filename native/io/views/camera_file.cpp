@@ -326,7 +326,10 @@ void requireUsable(const std::vector<CameraView>& views, const std::string& path
     try {
       validate(camera);
     } catch (const Error& error) {
-      fail(ErrorCode::kFormat, path + ": view " + std::to_string(i) + ": " + error.what());
+      const std::string& image = views[i].image_path;
+      fail(ErrorCode::kFormat, path + ": view " + std::to_string(i) +
+                                   (image.empty() ? "" : " ('" + image.substr(0, 80) + "')") + ": " +
+                                   error.what());
     }
   }
 }

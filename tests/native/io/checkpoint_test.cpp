@@ -52,6 +52,59 @@ TEST_F(CheckpointFile, EveryTruncatedPrefixIsRefused) {
   }
 }
 
+TEST_F(CheckpointFile, AChangeOfAnyByteIsRefusedByName) {
+  writeCheckpoint(smallCheckpoint(), name());
+  const std::string bytes = load(name());
+  for (size_t at = 0; at < bytes.size(); ++at) {
+    for (const int flipped : {0x01, 0x20, 0x80, 0xff}) {
+      std::string damaged = bytes;
+      damaged[at] = static_cast<char>(damaged[at] ^ flipped);
+      try {
+        readCheckpoint(store("damaged.safetensors", damaged));
+        ADD_FAILURE() << "byte " << at << " was accepted with " << flipped;
+      } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("damaged.safetensors"), std::string::npos)
+            << error.what();
+      }
+    }
+  }
+  // Of what no reader would doubt: the last number of the last tensor.
+  std::string damaged = bytes;
+  damaged.back() ^= 1;
+  expectError(ErrorCode::kFormat, {"is damaged", "checksum"},
+              [&] { readCheckpoint(store("damaged.safetensors", damaged)); });
+}
+
+TEST_F(CheckpointFile, FindsItsChecksumWhateverTheSettingsSay) {
+  Checkpoint checkpoint = smallCheckpoint();
+  checkpoint.settings_json = "{\"checksum\":\"0123456789abcdef\"}";
+  writeCheckpoint(checkpoint, name());
+  expectSame(readCheckpoint(name()), checkpoint);
+}
+
+TEST_F(CheckpointFile, ReadsCheckpointsOfBeforeChecksums) {
+  SafeTensorsWriter file;
+  setAssetKind(file, kAssetCheckpoint);
+  const Checkpoint checkpoint = smallCheckpoint();
+  file.setMetadata("settings", checkpoint.settings_json);
+  for (const auto& [tensor_name, tensor] : checkpoint.tensors) file.add(tensor_name, tensor);
+  file.write(name());
+  EXPECT_NE(load(name()).find("\"stipple_version\":\"1.0\""), std::string::npos);
+  expectSame(readCheckpoint(name()), checkpoint);
+}
+
+TEST_F(CheckpointFile, DoesNotReplaceAModel) {
+  SafeTensorsWriter model;
+  setAssetKind(model, kAssetSurface);
+  model.write(name());
+  const std::string before = load(name());
+  expectError(ErrorCode::kInvalidArgument, {name().c_str(), "another kind", "a checkpoint"},
+              [&] { writeCheckpoint(smallCheckpoint(), name()); });
+  EXPECT_EQ(load(name()), before);
+  writeCheckpoint(smallCheckpoint(), path("new.safetensors"));
+  EXPECT_NO_THROW(writeCheckpoint(smallCheckpoint(), path("new.safetensors")));
+}
+
 TEST_F(CheckpointFile, RefusesOtherVersionsKindsAndTypes) {
   const auto stored = [&](const char* version, const char* kind) {
     SafeTensorsWriter file;

@@ -229,6 +229,10 @@ TEST_F(Colmap, NamesTheFaultOfEachLine) {
           {"camera 7", "focal", "positive"});
   refused("7 PINHOLE 640 480 500 1e300 1 1\n3 PINHOLE 10 10 1 1 1 1", good_images,
           {folder().c_str(), "view 0", "focal length is 1e+300", "at most 1e9"});
+  refused("7 PINHOLE 640 480 500 500 1e308 1\n3 PINHOLE 10 10 1 1 1 1", good_images,
+          {folder().c_str(), "view 0", "camera.cx is 1e+308"});
+  refused(kTextCameras, "11 1 0 0 0 1e200 2 3 3 a.png\n\n",
+          {"view 0 ('a.png')", "translation", "1e+200"});
   refused("7 PINHOLE 640 480 500 500 1 1", good_images, {"images.txt", "uses camera 3"});
   refused(kTextCameras, "11 0 0 0 0 1 2 3 3 a.png\n\n", {"'a.png'", "zero quaternion"});
   refused(kTextCameras, "11 1 0 0 0 inf 2 3 3 a.png\n\n", {"'a.png'", "finite"});

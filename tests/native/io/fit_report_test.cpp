@@ -192,5 +192,40 @@ TEST_F(FitReportFile, OtherFilesAreNoCosts) {
   EXPECT_THROW(readFitAccuracy(path("none.json")), Error);
 }
 
+TEST_F(FitReportFile, ReplacesAReportAndItsCurvesButNoOtherFile) {
+  const std::string name = path("r.json"), curves = fitPlotsPath(name);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_NO_THROW(requireFitReportPlace(name));
+    writeFitReport({"explicit", "", "{}"}, history(100), name);
+    writeFitPlots(history(100), curves);
+  }
+  store("r.svg", "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"10\"></svg>");
+  expectError(ErrorCode::kInvalidArgument, {"r.svg", "another kind"},
+              [&] { requireFitReportPlace(name); });
+  expectError(ErrorCode::kInvalidArgument, {"r.svg"}, [&] { writeFitPlots(history(100), curves); });
+  for (const char* other : {"transforms.json", "scan.ply", "notes"}) {
+    const std::string mine = store(other, "{\"frames\": []}");
+    expectError(ErrorCode::kInvalidArgument, {other, "another kind", "the report of a fit"}, [&] {
+      writeFitReport({"explicit", "", "{}"}, history(100), mine);
+    });
+    EXPECT_EQ(load(mine), "{\"frames\": []}");
+  }
+  expectError(ErrorCode::kInvalidArgument, {"new.svg", ".json is expected"},
+              [&] { requireFitReportPlace(path("new.svg")); });
+}
+
+TEST_F(FitReportFile, AReportOfAccuracyReplacesItsLikeAlone) {
+  AccuracyReport report;
+  report.rows.resize(1);
+  for (const char* name : {"a.json", "a.csv", "a.svg"}) {
+    writeAccuracyReport(report, path(name));
+    EXPECT_NO_THROW(writeAccuracyReport(report, path(name))) << name;
+    store(name, "mine,1,2");
+    expectError(ErrorCode::kInvalidArgument, {name, "another kind"},
+                [&] { writeAccuracyReport(report, path(name)); });
+    EXPECT_EQ(load(path(name)), "mine,1,2");
+  }
+}
+
 }  // namespace
 }  // namespace stipple

@@ -1,6 +1,7 @@
 #include "io/mesh_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <filesystem>
@@ -284,6 +285,23 @@ TEST_F(MeshFile, SaysWhatIsWrong) {
               [&] { readMeshFile(store("a.obj", "v 0 0 0")); });
   expectError(ErrorCode::kIo, {"No such file"}, [&] { readMeshFile(path("missing.glb")); });
   expectError(ErrorCode::kIo, {"folder"}, [&] { readMeshFile(folder_.string()); });
+}
+
+TEST_F(MeshFile, DoesNotWaitForPipesThatAFileNames) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  std::filesystem::create_directory(path("inner"));
+  const auto text = [](const std::string& uri) {
+    return "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"" + uri +
+           "\"}]}";
+  };
+  expectError(ErrorCode::kFormat, {"a.gltf", "pipe", "not a regular file"},
+              [&] { readMeshFile(store("a.gltf", text("pipe"))); });
+  expectError(ErrorCode::kFormat, {"a.gltf", "inner", "it is a folder"},
+              [&] { readMeshFile(store("a.gltf", text("inner"))); });
+  expectError(ErrorCode::kIo, {"pipe.glb", "not a regular file"}, [&] {
+    ASSERT_EQ(::mkfifo(path("pipe.glb").c_str(), 0600), 0);
+    readMeshFile(path("pipe.glb"));
+  });
 }
 
 TEST_F(MeshFile, SurvivesTruncationAndDamage) {

@@ -1,9 +1,13 @@
 #include "io/bytes/output_file.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <filesystem>
@@ -78,6 +82,78 @@ TEST_F(OutputFileTest, WritesThroughALinkAndKeepsIt) {
   }
   EXPECT_TRUE(fs::is_symlink(path("link.ply")));
   EXPECT_EQ(load(path("real.ply")), "new");
+}
+
+TEST_F(OutputFileTest, WritesTheFileThatADanglingLinkNames) {
+  fs::create_directory(path("there"));
+  fs::create_symlink("there/real.ply", path("link.ply"));
+  fs::create_symlink("link.ply", path("second.ply"));
+  {
+    OutputFile file(path("second.ply"));
+    file.write("new", 3);
+    file.commit();
+  }
+  EXPECT_TRUE(fs::is_symlink(path("link.ply")));
+  EXPECT_TRUE(fs::is_symlink(path("second.ply")));
+  EXPECT_EQ(load(path("there/real.ply")), "new");
+  fs::create_symlink("nowhere/real.ply", path("lost.ply"));
+  expectError(ErrorCode::kIo, {path("lost.ply").c_str(), "No such file or directory"},
+              [&] { OutputFile file(path("lost.ply")); });
+}
+
+TEST_F(OutputFileTest, RefusesLinksThatGoInACircle) {
+  fs::create_symlink("b.ply", path("a.ply"));
+  fs::create_symlink("a.ply", path("b.ply"));
+  expectError(ErrorCode::kIo, {path("a.ply").c_str(), "Too many levels of symbolic links"},
+              [&] { OutputFile file(path("a.ply")); });
+}
+
+/// Runs `work` in a process that is then killed. Returns its number.
+template <typename Work>
+pid_t killed(const Work& work) {
+  const pid_t process = ::fork();
+  if (process == 0) {
+    work();
+    ::raise(SIGKILL);
+  }
+  int status = 0;
+  EXPECT_EQ(::waitpid(process, &status, 0), process);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  return process;
+}
+
+TEST_F(OutputFileTest, TheNextStartRemovesWhatAKilledProcessLeft) {
+  killed([&] {
+    OutputFile file(path("a.ply"));
+    file.write("half", 4);
+    OutputFile given(path("b.ply"));
+    given.handOver();
+    ::raise(SIGKILL);
+  });
+  EXPECT_EQ(fileCount(), 2u);
+  OutputFile(path("a.ply")).commit();
+  EXPECT_EQ(fileCount(), 1u);
+  EXPECT_TRUE(fs::exists(path("a.ply")));
+}
+
+TEST_F(OutputFileTest, WhatALivingProcessWritesStays) {
+  fs::create_directory(path("folder"));
+  // By its number; by its lock, where the number is that of a process that has ended, as one of
+  // another machine may seem; and what is not called so is nobody's.
+  const pid_t ended = killed([] {});
+  const std::string by_number = path("folder/.stipple-" + std::to_string(::getppid()) + "-0.ply");
+  const std::string by_lock = path("folder/.stipple-" + std::to_string(ended) + "-0.ply");
+  const std::string left = path("folder/.stipple-" + std::to_string(ended) + "-1.ply");
+  const std::string other = path("folder/.stipple-" + std::to_string(ended) + "-x.ply");
+  for (const std::string& name : {by_number, by_lock, left, other}) std::ofstream(name) << "half";
+  const int lock = ::open(by_lock.c_str(), O_RDONLY);
+  ASSERT_EQ(::flock(lock, LOCK_EX), 0);
+  OutputFile(path("folder/a.ply")).commit();
+  EXPECT_TRUE(fs::exists(by_number));
+  EXPECT_TRUE(fs::exists(by_lock));
+  EXPECT_TRUE(fs::exists(other));
+  EXPECT_FALSE(fs::exists(left));
+  ::close(lock);
 }
 
 TEST_F(OutputFileTest, RefusesAMissingFolderWithPathAndReason) {

@@ -10,7 +10,7 @@ from mathutils import Matrix
 
 from ...binding import cloud_edit
 from ...binding.errors import invalid
-from ...binding.fit import Fit, fit_options
+from ...binding.fit import Fit, check_places, fit_options
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import FitModel, FitQuality, FitShell, JobState
 from .. import meshes
@@ -84,6 +84,13 @@ def _require_checkpoint(settings):
         raise invalid(f"The checkpoint cannot be written: there is no folder '{path.parent}'")
 
 
+def _check_places(native, settings):
+    """The library's judgement of the same, and of the report. A fit that goes on reads its checkpoint."""
+    report = bpy.path.abspath(settings.report) if settings.report else None
+    resumes = settings.resume and has_checkpoint(settings)
+    check_places(native.library, report, None if resumes else _checkpoint_path(settings))
+
+
 class FitTask(ViewTask):
     """cancel() while it fits ends with the best so far."""
 
@@ -92,6 +99,7 @@ class FitTask(ViewTask):
             strategies.require(strategies.text_of(settings))
         _require_checkpoint(settings)
         super().__init__(context, objects, settings)
+        _check_places(self._native, settings)
         self._path = path
         self._frame = self._frame_of_views()
         state.__init__(name=self._name(), stage='Preparing', is_running=True,

@@ -50,7 +50,7 @@ def library_problem():
 
 def _library_path():
     chosen = preferences.get()
-    return '' if chosen is None else bpy.path.abspath(chosen.library_path)
+    return '' if chosen is None else chosen.library_path
 
 
 def context():

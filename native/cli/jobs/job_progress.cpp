@@ -1,7 +1,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <string>
 #include <thread>
@@ -15,12 +14,6 @@ namespace {
 constexpr int kBarWidth = 30;
 constexpr auto kPollInterval = std::chrono::milliseconds(20);
 constexpr auto kQuietTime = std::chrono::milliseconds(500);
-
-volatile std::sig_atomic_t g_interrupted = 0;
-
-void interrupt(int) {
-  g_interrupted = 1;
-}
 
 void drawBar(const StippleJobProgress& progress) {
   const int full = static_cast<int>(progress.fraction * kBarWidth);
@@ -36,14 +29,14 @@ void drawBar(const StippleJobProgress& progress) {
 void finish(const Job& job) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const auto start = std::chrono::steady_clock::now();
-  const auto previous = std::signal(SIGINT, interrupt);
+  const SignalHold hold;
   std::string stage;
   auto progress = sized<StippleJobProgress>();
   bool drawn = false;
   for (;;) {
     check(stipple_job_poll(job.get(), &progress));
     if (progress.state != STIPPLE_JOB_RUNNING) break;
-    if (g_interrupted) check(stipple_job_cancel(job.get()));
+    if (hold.isOutermost() && notedSignal() != 0) check(stipple_job_cancel(job.get()));
     if (std::chrono::steady_clock::now() - start > kQuietTime) {
       if (terminal) {
         drawBar(progress);
@@ -55,9 +48,10 @@ void finish(const Job& job) {
     }
     std::this_thread::sleep_for(kPollInterval);
   }
-  std::signal(SIGINT, previous);
   if (drawn) std::fprintf(stderr, "\r%*s\r", kBarWidth + 52, "");
-  check(stipple_job_wait(job.get()));
+  const StippleStatus status = stipple_job_wait(job.get());
+  if (status == STIPPLE_ERROR_CANCELLED) throw Interrupted(notedSignal());
+  check(status);
 }
 
 }  // namespace stipple::cli

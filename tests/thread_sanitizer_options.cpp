@@ -1,0 +1,8 @@
+// Read by the thread sanitizer where it is linked in. Libraries of the system are not built with it,
+// so that what happens inside them, and what their locks order, cannot be seen.
+extern "C" const char* __tsan_default_suppressions();
+extern "C" const char* __tsan_default_suppressions() {
+  return "called_from_lib:libtbb.so\n"
+         "called_from_lib:libopenvdb.so\n"
+         "called_from_lib:libOpenImageIO.so\n";
+}
