@@ -3,6 +3,7 @@
 
 import inspect
 
+import bpy
 import numpy as np
 
 from . import version
@@ -36,16 +37,17 @@ def functions():
 def denoising_problem(scene, view_layer):
     """Why Cycles would refuse to denoise this view layer after it has rendered it, or ''."""
     wanted = scene.cycles.use_denoising and view_layer.cycles.use_denoising
-    if not wanted or version.CYCLES_PASSES_OVER_DENOISING or _has_denoiser(scene):
+    if not wanted or version.CYCLES_PASSES_OVER_DENOISING or _has_denoiser(scene.cycles):
         return ''
     return ('This Blender was built without OpenImageDenoise, so Cycles cannot denoise; turn Denoise off in Render > '
             'Gaussian Splats, or under Sampling.')
 
 
-def _has_denoiser(scene):
-    import _cycles
-    # Another one, OptiX, is offered where a graphics card has it.
-    return getattr(_cycles, 'with_openimagedenoise', True) or scene.cycles.denoiser == 'OPTIX'
+def _has_denoiser(settings):
+    """Whether Cycles offers one: OpenImageDenoise, or OptiX where a graphics card has it."""
+    from cycles import properties
+    offered = getattr(properties, 'enum_denoiser', None)
+    return offered is None or bool(offered(settings, bpy.context))
 
 
 def render(engine, draw, layer_name):
