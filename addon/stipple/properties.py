@@ -39,7 +39,7 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     source: StringProperty(name="Source", description="File that the splats are decoded from", subtype='FILE_PATH',
                            options=version.RELATIVE_PATH, override=_OVERRIDABLE, update=source_paths.note)
     # Holds the path in a form that Blender itself keeps right: scene/source/source_paths.py.
-    source_file: PointerProperty(type=bpy.types.Volume, options={'HIDDEN'}, override=_OVERRIDABLE)
+    source_file: PointerProperty(type=bpy.types.Image, options={'HIDDEN'}, override=_OVERRIDABLE)
     source_kind: EnumProperty(name="Source Kind", items=source_settings.KINDS, default='NONE')
     source_settings: StringProperty(options={'HIDDEN'})  # which settings it has: scene/source/source_settings.py
     source_count: IntProperty(options={'HIDDEN'})  # of a splat tree

@@ -85,6 +85,7 @@ def test_the_first_save_brings_cached_sources_along(stipple, tmp_path, cache):
     names = all_kinds(stipple, tmp_path / 'scans')
     assert len(os.listdir(cache)) == 2
     save(tmp_path / 'a' / 'shot.blend')
+    assert not any(file.is_dirty for file in bpy.data.images)  # Blender would ask to save them
     assert stored(*names) == ['//../scans/in.ply', '//stipple/tree.stipple.safetensors',
                               '//stipple/Quad Splats.stipple.safetensors']
     assert not (tmp_path / 'a' / 'shot.blend1').exists()
@@ -205,6 +206,8 @@ def take(path, names, link, where):
     for name in names:
         operator(filepath=str(path / 'Object' / name), directory=str(path / 'Object') + '/', filename=name)
     bpy.context.view_layer.update()
+    # Blender makes objects of appended data that could be one and is none.
+    assert not [obj.name for obj in bpy.data.objects if obj.name.startswith('.')]
 
 
 @pytest.mark.parametrize('is_saved', [True, False])
@@ -220,6 +223,21 @@ def test_append_and_link(stipple, tmp_path, library, link, is_saved):
     assert renders(tmp_path, 'after')
     if not link:
         assert all(name.startswith('//../lib/') for name in stored(*names))
+
+
+def test_linked_splats_that_are_made_local_need_no_library(stipple, tmp_path, library):
+    path, names = library
+    take(path, names, True, tmp_path / 'x' / 'shot.blend')
+    scenes.select(*(bpy.data.objects[name] for name in names))
+    bpy.ops.object.make_local(type='SELECT_OBDATA')
+    decodes(stipple, *names)
+    save(tmp_path / 'z' / 'other.blend')
+    assert all(file.library is None for file in bpy.data.images if file.users)
+    reopen(tmp_path / 'z' / 'other.blend')
+    os.rename(path, tmp_path / 'lib' / 'old.blend')
+    reopen(tmp_path / 'z' / 'other.blend')
+    assert all(bpy.data.objects[name].data.library is None for name in names)
+    decodes(stipple, *names)
 
 
 def test_overrides_of_linked_splats_have_their_source(stipple, tmp_path, library):
@@ -287,8 +305,8 @@ def test_external_data(stipple, tmp_path, cache):
     bpy.ops.file.unpack_all(method='WRITE_LOCAL')
     save(tmp_path / 'b' / 'shot.blend')
     reopen(tmp_path / 'b' / 'shot.blend')
-    assert all(path.startswith('//volumes/') for path in stored(*names))
-    assert all(file.packed_file is None for file in bpy.data.volumes)
+    assert all(path.startswith('//textures/') for path in stored(*names))
+    assert all(file.packed_file is None for file in bpy.data.images)
     decodes(stipple, *names)
 
 
@@ -364,7 +382,7 @@ def test_objects_that_share_a_source(stipple, tmp_path):
     copy = scenes.link(first.copy())
     copy.data = first.data.copy()
     again = imported(stipple, tmp_path / 'a')
-    assert len([v for v in bpy.data.volumes if v.users]) == 1
+    assert len([file for file in bpy.data.images if file.users]) == 1
     shutil.copy(tmp_path / 'a' / 'in.ply', tmp_path / 'a' / 'new.ply')
     scenes.select(copy)
     assert bpy.ops.stipple.relink(filepath=str(tmp_path / 'a' / 'new.ply')) == {'FINISHED'}

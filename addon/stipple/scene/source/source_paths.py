@@ -3,9 +3,9 @@
 
 Blender remaps the paths of its own datablocks when a file is saved elsewhere, saved as a copy, appended or linked, and
 *File > External Data* packs, unpacks, reports and finds their files. Text properties get none of that. So a splat
-datablock points at a Volume, which no object shows, and that Volume holds the path: it travels as an image's does, in
-every version. Its name starts with a dot, which keeps it out of lists. `stipple.source` is the same path as text, for
-scripts and for files without such a Volume.
+datablock points at an Image that holds the path and is never read as an image. Its name starts with a dot, which keeps
+it out of lists. (A Volume would not do: Blender makes objects of Volumes that are appended.) `stipple.source` is the
+same path as text, for scripts and for files without such an Image.
 """
 
 import logging
@@ -19,7 +19,7 @@ from . import source_settings
 
 MODEL_SUFFIX = '.stipple.safetensors'
 FOLDER = 'stipple'  # beside the .blend
-_MARK = 'stipple_source'  # a property of Volumes that hold a path
+_MARK = 'stipple_source'  # a property of Images that hold a path
 _LONGEST_NAME = 60
 
 log = logging.getLogger('stipple')
@@ -57,18 +57,22 @@ def is_alone(path):
 
 def stored(path):
     """A path as it is stored: relative to the .blend where that is saved, on the same root, and wanted."""
-    wanted = bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths
-    return bpy.path.relpath(path) if wanted else path
+    if not bpy.data.filepath or not bpy.context.preferences.filepaths.use_relative_paths:
+        return path
+    try:
+        return bpy.path.relpath(path)
+    except ValueError:  # another drive
+        return path
 
 
 def note(stipple, _context=None):
-    """Update function of `source`: the Volume follows the text."""
+    """Update function of `source`: the Image follows the text."""
     file = stipple.source_file
     if not stipple.source:
         stipple.source_file = None
-    elif file is None or file.filepath != stipple.source:
+    elif file is None or file.filepath != stipple.source or is_own(stipple.id_data) and not is_own(file):
         if file is None or not is_own(file) or file.users > 1 or file.packed_file is not None:
-            file = _volume_of(stipple.source)
+            file = _image_of(stipple.source)
         file.filepath = stipple.source
         stipple.source_file = file
 
@@ -128,12 +132,13 @@ def _library_of(owner, path):
     return owner.library
 
 
-def _volume_of(path):
-    """A Volume of this file for a path: the one that others with the same source have, else a new one."""
-    for file in bpy.data.volumes:
+def _image_of(path):
+    """An Image of this file for a path: the one that others with the same source have, else a new one."""
+    for file in bpy.data.images:
         if is_own(file) and file.get(_MARK) and file.filepath == path and file.packed_file is None:
             return file
-    file = bpy.data.volumes.new('.' + bpy.path.basename(path)[:_LONGEST_NAME])
+    file = bpy.data.images.new('.' + bpy.path.basename(path)[:_LONGEST_NAME], 1, 1)
+    file.source = 'FILE'
     file[_MARK] = True
     return file
 

@@ -17,13 +17,13 @@ from . import source_files, source_paths, sources, splat_data, sync
 from .source_paths import log
 
 # told: whether this Blender tells the path before it saves. before: the path until then.
-# homes: folders where this file was in this session. changed: [(Volume, its path before the save)].
+# homes: folders where this file was in this session. changed: [(Image, its path before the save)].
 _state = {'told': False, 'before': '', 'homes': [], 'changed': [], 'again': False, 'known': (0, 0)}
 _said = set()  # what is missing, by datablock and path
 
 
 def collectable(outside):
-    """[(Volume, path, is_sequence)] of this file's sources that lie where outside(path) is true, each once."""
+    """[(Image, path, is_sequence)] of this file's sources that lie where outside(path) is true, each once."""
     found = {}
     for data in source_paths.splat_datablocks():
         file = data.stipple.source_file
@@ -35,7 +35,7 @@ def collectable(outside):
 
 
 def point_at(file, path):
-    """A Volume holds the path of a copy of its file from now on."""
+    """An Image holds the path of a copy of its file from now on."""
     old = os.path.normpath(bpy.path.abspath(file.filepath))
     file.filepath = source_paths.stored(path)
     if os.path.exists(old):
@@ -43,19 +43,24 @@ def point_at(file, path):
 
 
 def follow_texts():
-    """The texts say what the Volumes hold; splats of earlier versions get a Volume."""
+    """The texts say what the Images hold; splats of earlier versions get an Image."""
     for data in source_paths.splat_datablocks():
         stipple = data.stipple
         if not source_paths.is_own(data):
             continue
-        if stipple.source_file is None:
+        file = stipple.source_file
+        if file is None:
             _adopt(data)
-        if stipple.source != source_paths.of(data):
-            stipple.source = source_paths.of(data)
+        elif not source_paths.is_own(file):  # the splats were made local
+            stipple.source = source_paths.stored(source_paths.file_of(data))
+        elif stipple.source != file.filepath:
+            stipple.source = file.filepath
 
 
 def say_missing():
     """Says each missing source once."""
+    if sources.library_problem():
+        return  # the panels say so, and more is missing than files
     for data in source_paths.splat_datablocks():
         path = source_paths.file_of(data)
         if (data.name_full, path) not in _said and sources.state(data) == 'MISSING':
@@ -98,13 +103,14 @@ def _fits(data, path):
 
 
 def _bring_home(folder):
-    """Copies sources from the cache folder to a .blend's; returns [(Volume, its path before)]. What cannot be copied
+    """Copies sources from the cache folder to a .blend's; returns [(Image, its path before)]. What cannot be copied
     stays where it is, with one message."""
     changed = []
     cache = source_paths.cache_folder()
 
     def is_cached(path):
-        return source_paths.is_under(path, cache) and not source_paths.is_under(path, os.path.dirname(folder))
+        return (source_paths.is_under(path, cache) and os.path.exists(path)
+                and not source_paths.is_under(path, os.path.dirname(folder)))
 
     for file, path, is_sequence in collectable(is_cached):
         try:
@@ -139,7 +145,7 @@ def _save_post(*arguments):
         path = next((argument for argument in arguments if isinstance(argument, str)), bpy.data.filepath)
         if path != bpy.data.filepath:  # a copy: this file keeps its own
             for name, before in changed:
-                bpy.data.volumes[name].filepath = before
+                bpy.data.images[name].filepath = before
     elif bpy.data.filepath != _state['before']:
         # Blender 3.4 tells no path beforehand, so that what is beside the file is known only now.
         if _bring_home(source_paths.folder_beside(bpy.data.filepath)):
@@ -170,7 +176,7 @@ def _save_post_fail(*_):
     """Nothing was saved: the sources stay where they were."""
     changed, _state['changed'] = _state['changed'], []
     for name, before in changed:
-        bpy.data.volumes[name].filepath = before
+        bpy.data.images[name].filepath = before
     follow_texts()
 
 
@@ -199,9 +205,9 @@ def _imported(*_):
 
 
 @persistent
-def _depsgraph_update_post(*_):
+def _depsgraph_update_post(_scene, depsgraph):
     """Earlier Blenders do not tell that something was appended or linked."""
-    if _counts() != _state['known']:
+    if depsgraph.mode == 'VIEWPORT' and _counts() != _state['known']:
         _imported()
 
 

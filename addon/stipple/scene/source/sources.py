@@ -22,7 +22,6 @@ from ...binding.errors import StippleError
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import AnchorOrder, JobState, Status
 from .. import meshes
-from ..sequence import numbered
 from . import masks, source_paths, source_settings, splat_data
 from .source_paths import MODEL_SUFFIX
 
@@ -78,14 +77,15 @@ def forget():
 
 def state(data):
     """What is with the file that a datablock's splats come from: 'FINE', 'MISSING' or 'CHANGED' since it was read.
-    Files of a series are read when they are shown, so none of them is old, and one of them is enough."""
+    Files of a series are read when they are shown: none of them is old, and one that is missing is a gap. Without their
+    folder all are missing."""
     stipple = data.stipple
     if not source_settings.of(stipple).has_source or not stipple.source:
         return 'FINE'
     path = source_paths.file_of(data)
     if stipple.is_sequence:
-        first = numbered.parse(path)
-        return 'FINE' if first is None or os.path.exists(path) or first.numbers() else 'MISSING'
+        folder = os.path.dirname(path if source_paths.is_alone(path) else os.path.dirname(path))
+        return 'FINE' if os.path.isdir(folder) else 'MISSING'
     found = stamp(path)
     if not found:
         return 'MISSING'
