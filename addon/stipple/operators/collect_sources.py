@@ -42,7 +42,7 @@ class STIPPLE_OT_collect_sources(JobOperator, bpy.types.Operator):
 
     def finish(self, _context, job):
         for name, path in job.result:
-            source_travel.point_at(bpy.data.images[name], path)
+            source_travel.point_at(bpy.data.images[name, None], path)
         source_travel.follow_texts()
         for error in self._missing:
             self.report({'WARNING'}, str(error))

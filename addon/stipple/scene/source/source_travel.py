@@ -145,7 +145,7 @@ def _save_post(*arguments):
         path = next((argument for argument in arguments if isinstance(argument, str)), bpy.data.filepath)
         if path != bpy.data.filepath:  # a copy: this file keeps its own
             for name, before in changed:
-                bpy.data.images[name].filepath = before
+                bpy.data.images[name, None].filepath = before
     elif bpy.data.filepath != _state['before']:
         # Blender 3.4 tells no path beforehand, so that what is beside the file is known only now.
         if _bring_home(source_paths.folder_beside(bpy.data.filepath)):
@@ -176,7 +176,7 @@ def _save_post_fail(*_):
     """Nothing was saved: the sources stay where they were."""
     changed, _state['changed'] = _state['changed'], []
     for name, before in changed:
-        bpy.data.images[name].filepath = before
+        bpy.data.images[name, None].filepath = before
     follow_texts()
 
 
