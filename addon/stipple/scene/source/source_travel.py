@@ -84,7 +84,7 @@ def _adopt(data):
 
 
 def _find(data, folders):
-    """Looks for a source that is not there, or is another one there, from other folders that its path may start from."""
+    """Looks for a source that is not there, or is another one there, from other folders."""
     file = data.stipple.source_file
     if not source_paths.is_own(file) or not file.filepath.startswith('//') or _fits(data, source_paths.file_of(data)):
         return
