@@ -63,7 +63,8 @@ def decodes(stipple, *names):
     """Checks that sources are there and are read: each at half its budget and back."""
     for name in names:
         data = bpy.data.objects[name].data
-        assert stipple.scene.source.sources.state(data) == 'FINE', (name, stipple.scene.source.source_paths.file_of(data))
+        assert stipple.scene.source.sources.state(data) == 'FINE', (name,
+                                                                    stipple.scene.source.source_paths.file_of(data))
         stipple.scene.source.sources.forget()
         assert stipple.scene.source.sources.full_cloud(data).info().count == COUNT
 

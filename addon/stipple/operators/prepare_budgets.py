@@ -38,7 +38,8 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
         first = numbered.parse(source_paths.file_of(data))
         numbers = first.numbers() if first is not None else []
         if first is None or first.number not in numbers:
-            raise invalid(f"The series of '{self._object.name}' has no file '{source_paths.of(data)}'; relink it first.")
+            raise invalid(f"The series of '{self._object.name}' has no file '{source_paths.of(data)}'; relink it "
+                          f"first.")
         native = sources.context()
         self._first = first.number
         stem = source_paths.place_for(self._object.name)[:-len(sources.MODEL_SUFFIX)]

@@ -74,8 +74,8 @@ def _draw_export(self, _context):
 
 
 _MENUS = (('VIEW3D_MT_add', _draw_add), ('VIEW3D_MT_object_convert', _draw_convert),
-          ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import), ('TOPBAR_MT_file_export', _draw_export),
-          ('TOPBAR_MT_file_external_data', _draw_external_data),
+          ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import),
+          ('TOPBAR_MT_file_export', _draw_export), ('TOPBAR_MT_file_external_data', _draw_external_data),
           ('DATA_PT_camera_background_image', _draw_background_images))
 
 

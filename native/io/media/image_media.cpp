@@ -145,7 +145,7 @@ std::unique_ptr<OIIO::ImageInput> openImage(const std::string& path) {
   const OIIO::ImageSpec config = keepAlpha();
   auto input = OIIO::ImageInput::open(path, &config);
   if (!input) {
-    fail(ErrorCode::kFormat, path + " is not a picture that can be read: " + OIIO::geterror());
+    fail(ErrorCode::kFormat, path + " is not an image that can be read: " + OIIO::geterror());
   }
   return input;
 }
@@ -215,7 +215,7 @@ DecodedImage decodeImageFile(const std::string& path) {
 DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std::string& name) {
   const char* file_name = nameForBytes(bytes);
   if (file_name == nullptr) {
-    fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF picture");
+    fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF image");
   }
   if (bytes[0] == 0x89) requireWholeChunks(bytes, name);
   OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());

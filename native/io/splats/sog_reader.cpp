@@ -148,7 +148,7 @@ class Reader {
     const uint64_t most = kAlwaysAllowed + bytes * kMaxSplatsPerByte;
     if (meta_.count > most) {
       fail(ErrorCode::kFormat, files_.name(files_.metaFile()) + ": 'count' is " +
-                                   std::to_string(meta_.count) + "; pictures of " +
+                                   std::to_string(meta_.count) + "; images of " +
                                    std::to_string(bytes) + " bytes can hold at most " +
                                    std::to_string(most));
     }

@@ -134,7 +134,8 @@ def file_path(data, stipple, local):
     """The file of a series' own frame, 1 to frame_duration, with its offset."""
     first = numbered.parse(source_paths.file_of(data))
     if first is None:
-        raise invalid(f"The source '{source_paths.of(data)}' of '{data.name}' has no number in its name, which a series of "
+        raise invalid(f"The source '{source_paths.of(data)}' of '{data.name}' has no number in its name, which a "
+                      f"series of "
                       'files needs.')
     number = first.number + stipple.frame_offset + local - 1
     path = first.path(max(number, 0))
