@@ -15,7 +15,7 @@ import bpy
 
 from . import cycles_engine, engine, operators, panels, preferences, properties
 from .viewport import drawing
-from .scene.source import sync
+from .scene.source import source_travel, sync
 from .scene.view import splat_engines, steady_effects
 
 _classes = (preferences.classes + properties.classes + operators.classes + panels.classes + engine.classes
@@ -27,6 +27,7 @@ def register():
         bpy.utils.register_class(cls)
     properties.register()
     panels.register()
+    source_travel.register()
     sync.register()
     steady_effects.register()
     splat_engines.register()
@@ -38,6 +39,7 @@ def unregister():
     splat_engines.unregister()
     steady_effects.unregister()
     sync.unregister()
+    source_travel.unregister()
     panels.unregister()
     properties.unregister()
     for cls in reversed(_classes):

@@ -5,15 +5,16 @@ Cycles is made to see another scene than the file's in the evaluated copies alon
 """
 
 import contextlib
+import functools
 
 import bpy
 import numpy as np
 
-from . import version
+from . import cycles_functions, version
 from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
-from .cycles_functions import CyclesRender, functions
-from .binding.structs import OutputColour
+from .binding.structs import OutputColour, Status
+from .cycles_functions import CyclesRender
 from .engine import NativeWork
 from .scene.source import sources, splat_data
 from .scene.view import cameras, effects, facts, layers, mattes
@@ -79,7 +80,7 @@ def _has_shadow_catchers():
 
 
 def _make_engine():
-    class STIPPLE_RE_cycles(NativeWork, functions(), bpy.types.RenderEngine):
+    class STIPPLE_RE_cycles(NativeWork, cycles_functions.functions(), bpy.types.RenderEngine):
         bl_idname = 'STIPPLE_CYCLES'
         bl_label = "Cycles + Stipple"
 
@@ -100,6 +101,9 @@ def _make_engine():
                 super().update(data, depsgraph)
                 return
             try:
+                refused = cycles_functions.denoising_problem(depsgraph.scene, depsgraph.view_layer)
+                if refused:
+                    raise StippleError(refused, Status.ERROR_UNAVAILABLE)
                 self._take_instances(depsgraph)
                 if self._instances:
                     facts.refuse_stereo(depsgraph.scene.render)
@@ -140,11 +144,11 @@ def _make_engine():
                 return
             world = facts.plain_world_colour(depsgraph.scene_eval.world)
             with _without_splats(depsgraph, is_kept=scene.render.use_persistent_data):
-                super().render(depsgraph)
-            if self._cancelled():
+                passes = cycles_functions.render(self, functools.partial(super().render, depsgraph), layer_name)
+            if passes is None or self._cancelled():
                 return
             try:
-                self._insert_splats(layer_name, picture, camera, world, scene.stipple.shadow_margin)
+                self._insert_splats(passes, picture, camera, world, scene.stipple.shadow_margin)
             except CancelledError:
                 return
             except StippleError as error:
@@ -154,10 +158,7 @@ def _make_engine():
             scene = depsgraph.scene
             return cameras.camera_of(self._camera_object(depsgraph).evaluated_get(depsgraph), scene.render, border)
 
-        def _insert_splats(self, layer_name, picture, camera, world, shadow_margin):
-            result = self.get_result()
-            layer = next(layer for layer in result.layers if layer.name == layer_name)
-            passes = {render_pass.name: render_pass for render_pass in layer.passes}
+        def _insert_splats(self, passes, picture, camera, world, shadow_margin):
             matte = mattes.surface(self._holdouts, camera, self._wait) if self._holdouts else None
             cycles = self._layers_of(passes, picture, world, matte)
             renderer = Renderer(sources.context())

@@ -10,7 +10,7 @@ from .binding.errors import StippleError
 from .scene import overlays
 from .scene.fit import fit_proposal, fitting, strategies
 from .scene.sequence import sequences
-from .scene.source import source_settings, sources, sync
+from .scene.source import source_paths, source_settings, sources, sync
 from .scene.view import effects, photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
@@ -37,7 +37,9 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     """On Mesh and PointCloud: splats are a cache of (source, settings)."""
 
     source: StringProperty(name="Source", description="File that the splats are decoded from", subtype='FILE_PATH',
-                           options=version.RELATIVE_PATH, override=_OVERRIDABLE)
+                           options=version.RELATIVE_PATH, override=_OVERRIDABLE, update=source_paths.note)
+    # Holds the path in a form that Blender itself keeps right: scene/source/source_paths.py.
+    source_file: PointerProperty(type=bpy.types.Image, options={'HIDDEN'}, override=_OVERRIDABLE)
     source_kind: EnumProperty(name="Source Kind", description="What kind of file the source is",
                               items=source_settings.KINDS, default='NONE')
     source_settings: StringProperty(options={'HIDDEN'})  # which settings it has: scene/source/source_settings.py

@@ -29,6 +29,8 @@ HAS_FILE_HANDLERS = VERSION >= (4, 1, 0)
 # What Cycles calls the light of the world that the camera sees.
 ENVIRONMENT_PASS = 'Environment' if VERSION >= (5, 0, 0) else 'Env'
 OBJECT_INDEX_PASS = 'Object Index' if VERSION >= (5, 0, 0) else 'IndexOB'
+# A Cycles without a denoiser leaves an image as it is that shall be denoised; before, it fails when it has drawn it.
+CYCLES_PASSES_OVER_DENOISING = VERSION >= (5, 0, 0)
 EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BLENDER_EEVEE'
 
 

@@ -38,7 +38,7 @@ def make(stipple, tmp_path, kind, count=COUNT):
             assert bpy.ops.stipple.add_budget() == {'FINISHED'}
     scenes.select(obj)
     assert obj.data.stipple.source_kind == kind
-    path = stipple.scene.source.sources.absolute_path(obj.data.stipple.source)
+    path = stipple.scene.source.source_paths.file_of(obj.data)
     assert stipple.scene.source.sources.state(obj.data) == 'FINE'
     return obj, path
 
@@ -91,7 +91,7 @@ def test_a_missing_source_is_said_and_relinked(stipple, splats, tmp_path):
     assert drawn(stipple, obj) == ['Source file is missing', 'stipple.relink', 'stipple.use_as_new_source']
     assert_equal(read(stipple, obj), before)
     assert bpy.ops.stipple.relink(filepath=moved) == {'FINISHED'}
-    assert stipple.scene.source.sources.absolute_path(obj.data.stipple.source) == moved and drawn(stipple, obj) == []
+    assert stipple.scene.source.source_paths.file_of(obj.data) == moved and drawn(stipple, obj) == []
     assert_equal(read(stipple, obj), before)
 
 
@@ -178,14 +178,14 @@ def test_relink_to_a_file_that_cannot_be_read_changes_nothing(stipple, splats, t
     if content is not None:
         (tmp_path / 'bad.ply').write_bytes(content)
     scenes.refuses(lambda: bpy.ops.stipple.relink(filepath=str(tmp_path / 'bad.ply')), text)
-    assert stipple.scene.source.sources.absolute_path(obj.data.stipple.source) == path
+    assert stipple.scene.source.source_paths.file_of(obj.data) == path
     assert_equal(read(stipple, obj), before)
 
 
 def test_relink_refuses_a_model_of_the_other_kind(stipple, tmp_path):
     obj, _ = make(stipple, tmp_path, 'TREE')
     other = scenes.make_splats(scenes.quad(), anchors=20)
-    path = stipple.scene.source.sources.absolute_path(other.data.stipple.source)
+    path = stipple.scene.source.source_paths.file_of(other.data)
     scenes.select(obj)
     scenes.refuses(lambda: bpy.ops.stipple.relink(filepath=path), 'holds splats of a mesh')
 

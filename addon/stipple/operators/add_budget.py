@@ -7,7 +7,7 @@ from bpy.props import BoolProperty
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene import geometry
-from ..scene.source import masks, source_settings, sources, splat_data, sync
+from ..scene.source import masks, source_paths, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
@@ -31,7 +31,7 @@ class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
         native, obj = sources.context(), context.object
         self._object, self._in_place = obj, geometry.is_plain(obj)
         cloud = geometry.splats_of(obj, context.evaluated_depsgraph_get())
-        path = sources.model_path_for(obj.name)
+        path = source_paths.place_for(obj.name)
 
         def work(task):
             model = Model.of_job(task.run(Model.from_cloud_start(native, cloud), 0.0, 0.9))

@@ -9,7 +9,7 @@ from ..binding.errors import invalid
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene.sequence import frames
-from ..scene.source import edits, placement, source_settings, sources, sync
+from ..scene.source import edits, placement, source_paths, source_settings, sources, sync
 
 
 class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
@@ -32,7 +32,7 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
             if obj.data.users > 1:
                 raise invalid(f"The splats of '{obj.name}' have {obj.data.users} users; make them single-user first.")
         wanted = [(target, placement.matrix_of(obj), source_settings.of(obj.data.stipple).counts_splats,
-                   sources.model_path_for(obj.name)) for target, obj in zip(edits.targets(objects), objects)]
+                   source_paths.place_for(obj.name)) for target, obj in zip(edits.targets(objects), objects)]
         native = sources.context()
 
         def work(task):

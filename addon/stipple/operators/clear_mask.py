@@ -4,7 +4,7 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene.source import edits, masks, source_settings, sources, splat_data
+from ..scene.source import edits, masks, source_paths, source_settings, sources, splat_data
 
 
 class STIPPLE_OT_clear_mask(JobOperator, bpy.types.Operator):
@@ -25,7 +25,7 @@ class STIPPLE_OT_clear_mask(JobOperator, bpy.types.Operator):
         if source_settings.of(data.stipple).as_they_are:
             self._cloud = sources.whole_cloud(data)
         else:
-            sources.model(sources.absolute_path(data.stipple.source, data))  # before anything changes
+            sources.model(source_paths.file_of(data))  # before anything changes
         return None
 
     def finish(self, context, _job):

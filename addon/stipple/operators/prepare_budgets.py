@@ -12,7 +12,7 @@ from ..binding.model import Model
 from ..binding.structs import Status
 from ..jobs import JobOperator, Task
 from ..scene.sequence import numbered, sequences
-from ..scene.source import source_settings, sources, splat_data, sync
+from ..scene.source import source_paths, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
@@ -35,13 +35,14 @@ class STIPPLE_OT_prepare_budgets(JobOperator, bpy.types.Operator):
     def start(self, context):
         self._object = context.object
         data = self._object.data
-        first = numbered.parse(sources.absolute_path(data.stipple.source, data))
+        first = numbered.parse(source_paths.file_of(data))
         numbers = first.numbers() if first is not None else []
         if first is None or first.number not in numbers:
-            raise invalid(f"The series of '{self._object.name}' has no file '{data.stipple.source}'; relink it first.")
+            raise invalid(f"The series of '{self._object.name}' has no file '{source_paths.of(data)}'; relink it "
+                          f"first.")
         native = sources.context()
         self._first = first.number
-        stem = sources.model_path_for(self._object.name)[:-len(sources.MODEL_SUFFIX)]
+        stem = source_paths.place_for(self._object.name)[:-len(sources.MODEL_SUFFIX)]
         name = os.path.basename(stem)
 
         def work(task):

@@ -10,7 +10,7 @@ from ..binding.errors import StippleError, invalid
 from ..binding.model import Model
 from ..jobs import JobOperator
 from ..scene.sequence import numbered
-from ..scene.source import formats, masks, source_settings, sources, splat_data, sync
+from ..scene.source import formats, masks, source_paths, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
@@ -41,7 +41,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
 
     def invoke(self, context, event):
         data = context.object.data
-        self.filepath = sources.absolute_path(data.stipple.source, data)
+        self.filepath = source_paths.file_of(data)
         if self.again:
             return self.run_in_window(context)
         self._asked = True
@@ -55,7 +55,8 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
 
     def start(self, context):
         data = context.object.data
-        self._data, self._path = data, sources.absolute_path(data.stipple.source if self.again else self.filepath, data)
+        self._data = data
+        self._path = source_paths.file_of(data) if self.again else source_paths.absolute(self.filepath)
         if data.stipple.is_sequence and numbered.parse(self._path) is None:
             raise invalid(f"'{self._path}' has no number in its name, which the files of a series need.")
         return _noun(data.stipple).load_start(sources.context(), self._path)
@@ -85,7 +86,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
             with sync.paused():
                 if known.counts_anchors:
                     source_settings.note_model(stipple, found)
-                stipple.source = sources.blend_path(self._path)
+                stipple.source = source_paths.stored(self._path)
                 stipple.source_stamp = sources.stamp(self._path)
                 if known.counts_splats and clears_mask:
                     stipple.source_count = count

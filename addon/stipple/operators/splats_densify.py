@@ -6,7 +6,7 @@ from bpy.props import IntProperty, StringProperty
 
 from ..jobs import JobOperator
 from ..scene.fit import densifying, fitting, strategies
-from ..scene.source import edits, masks, sources, splat_data, sync
+from ..scene.source import edits, masks, source_paths, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
@@ -53,7 +53,7 @@ class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
     def finish(self, _context, job):
         model, cloud = job.result
         obj, count = self._object, cloud.info().count
-        path = sources.save_model(model, sources.model_path_for(obj.name))
+        path = sources.save_model(model, source_paths.place_for(obj.name))
         sources.remember_model(path, model)
         # A datablock of its own: the old one may have other users, and undo goes back to it.
         data = obj.data.copy()

@@ -10,7 +10,7 @@ from .. import version
 from ..jobs import JobOperator
 from ..scene import overlays
 from ..scene.fit import fit_proposal, fit_reports, fitting
-from ..scene.source import sources, splat_data, sync
+from ..scene.source import source_paths, sources, splat_data, sync
 
 _PREVIEW_SECONDS = 1.5
 
@@ -47,7 +47,7 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
     def start(self, context):
         settings = context.scene.stipple.fit
         objects = [] if settings.views_from == 'DATASET' else fitting.seen_objects(context)
-        return fitting.FitTask(context, objects, settings, self.source_path and sources.absolute_path(self.source_path))
+        return fitting.FitTask(context, objects, settings, self.source_path and source_paths.absolute(self.source_path))
 
     @property
     def escape_text(self):

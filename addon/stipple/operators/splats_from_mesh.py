@@ -13,7 +13,7 @@ from ..jobs import JobOperator
 from ..panels.text import draw_anchors
 from ..properties import COLOR_SOURCES, ORDERS
 from ..scene import meshes
-from ..scene.source import sources, splat_data, sync
+from ..scene.source import source_paths, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
@@ -62,7 +62,7 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         decoding = model.decode_start(self._settings())
         active = context.view_layer.objects.active
         name = (active if active in self._objects else self._objects[0]).name + ' Splats'
-        path = sources.save_model(model, sources.model_path_for(name, self.source_path), bool(self.source_path))
+        path = sources.save_model(model, source_paths.place_for(name, self.source_path), bool(self.source_path))
         sources.remember_model(path, model)
         decoding.wait()
         splats = Cloud.of_job(decoding).columns()

@@ -36,7 +36,10 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         stipple = context.object.data.stipple
-        layout.prop(stipple, 'source')
+        if stipple.source_file is None:
+            layout.prop(stipple, 'source')
+        else:
+            layout.prop(stipple.source_file, 'filepath', text="Source")
         if source_settings.of(stipple).has_source:
             layout.operator('stipple.relink', icon='FILEBROWSER')
         if stipple.fit_report is not None:

@@ -63,13 +63,20 @@ def _draw_background_images(self, _context):
     self.layout.operator('stipple.cameras_import', icon='FILE_FOLDER')
 
 
+def _draw_external_data(self, _context):
+    self.layout.separator()
+    self.layout.operator_context = 'INVOKE_DEFAULT'
+    self.layout.operator('stipple.collect_sources', icon='OUTLINER_DATA_POINTCLOUD')
+
+
 def _draw_export(self, _context):
     self.layout.operator('stipple.splats_export', text="Gaussian Splats")
 
 
 _MENUS = (('VIEW3D_MT_add', _draw_add), ('VIEW3D_MT_object_convert', _draw_convert),
           ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import),
-          ('TOPBAR_MT_file_export', _draw_export), ('DATA_PT_camera_background_image', _draw_background_images))
+          ('TOPBAR_MT_file_export', _draw_export), ('TOPBAR_MT_file_external_data', _draw_external_data),
+          ('DATA_PT_camera_background_image', _draw_background_images))
 
 
 def register():

@@ -3,6 +3,7 @@
 
 import bpy
 
+from .. import cycles_functions
 from ..scene.view import facts, splat_engines
 from .text import draw_text
 
@@ -37,6 +38,10 @@ class STIPPLE_PT_render_splats(SplatRenderPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         scene = context.scene
         if context.engine == CYCLES_ENGINE:
+            if cycles_functions.denoising_problem(scene, context.view_layer):
+                box = layout.box()
+                box.label(text="This Blender cannot denoise", icon='ERROR')
+                box.operator('stipple.turn_denoising_off')
             layout.prop(scene.cycles, 'device')
             layout.prop(scene.stipple, 'shadow_margin')
             layout.label(text="Splats do not appear in reflections", icon='INFO')

@@ -8,6 +8,7 @@ import bpy
 from .. import version
 from ..binding.errors import StippleError
 from ..binding.structs import Status
+from .source import source_paths
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ def new_object(name, path, collection, voxel_size, timing=None):
     timing: makes it a sequence, of which the path is the first file; None for a single file.
     """
     volume = bpy.data.volumes.new(name)
-    volume.filepath = bpy.path.relpath(path) if bpy.data.filepath else path
+    volume.filepath = source_paths.stored(path)
     if not volume.grids.load():
         message = volume.grids.error_message or 'no grids'
         bpy.data.volumes.remove(volume)

@@ -16,7 +16,7 @@ from ...binding.structs import FitModel, FitQuality, FitShell, JobState
 from .. import meshes
 from . import fit_proposal, fit_reports, strategies
 from ..sequence import frames
-from ..source import sources
+from ..source import source_paths, sources
 from ..view import photo_cameras
 from .view_task import VIEWS_END, ViewTask
 
@@ -198,7 +198,7 @@ class FitTask(ViewTask):
 
     def _keep(self, model, decoding, report, seen=None):
         """seen: of the splats at these settings."""
-        path = sources.save_model(model, self._path or sources.model_path_for(state.name), bool(self._path))
+        path = sources.save_model(model, self._path or source_paths.place_for(state.name), bool(self._path))
         sources.remember_model(path, model)
         self.result = Result(state.name, model.decode(decoding).read(), path, decoding, model.settings(),
                              report)

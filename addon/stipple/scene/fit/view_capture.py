@@ -9,6 +9,7 @@ colours.
 """
 
 import contextlib
+import functools
 import os
 import shutil
 import tempfile
@@ -17,11 +18,11 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ... import version
+from ... import cycles_functions, version
 from ...binding.errors import StippleError, invalid
 from ...binding.image import ImageChannels
 from ...binding.structs import Status
-from ...cycles_functions import CyclesRender, functions
+from ...cycles_functions import CyclesRender
 from ..source import sources, splat_data
 from ..view import cameras
 
@@ -151,16 +152,16 @@ class Capture:
     def _register_capture(self, stack):
         passes = self._passes
 
-        class STIPPLE_RE_capture(functions(), bpy.types.RenderEngine):
+        class STIPPLE_RE_capture(cycles_functions.functions(), bpy.types.RenderEngine):
             bl_idname = _CAPTURE_ENGINE
             bl_label = "Stipple Views"
 
             def render(self, depsgraph):
-                super().render(depsgraph)
+                draw = functools.partial(super().render, depsgraph)
+                found = cycles_functions.render(self, draw, depsgraph.view_layer.name)
                 result = self.get_result()
-                width, height = result.resolution_x, result.resolution_y
-                for render_pass in result.layers[0].passes:
-                    passes[render_pass.name] = version.read_pass(render_pass, width, height)[::-1]
+                for name, render_pass in (found or {}).items():
+                    passes[name] = version.read_pass(render_pass, result.resolution_x, result.resolution_y)[::-1]
 
         bpy.utils.register_class(STIPPLE_RE_capture)
         stack.callback(bpy.utils.unregister_class, STIPPLE_RE_capture)

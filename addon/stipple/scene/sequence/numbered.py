@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from ..source import formats
-from ..source.sources import MODEL_SUFFIX
+from ..source.source_paths import MODEL_SUFFIX
 
 # The last number of a name, with what may follow it: name_0001.ply, name_0001_splats.ply.
 _LAST_NUMBER = re.compile(r'(\d+)(\D*)$')

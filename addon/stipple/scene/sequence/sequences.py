@@ -19,7 +19,7 @@ from ...binding.errors import StippleError, invalid
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import JobState, Status
 from . import numbered
-from ..source import masks, source_settings, sources
+from ..source import masks, source_paths, source_settings, sources
 
 # As Blender's own volume sequences name them.
 MODES = (('CLIP', "Clip", "Nothing before the first and after the last file"),
@@ -132,9 +132,10 @@ def path_at(data, stipple, frame):
 
 def file_path(data, stipple, local):
     """The file of a series' own frame, 1 to frame_duration, with its offset."""
-    first = numbered.parse(sources.absolute_path(stipple.source, data))
+    first = numbered.parse(source_paths.file_of(data))
     if first is None:
-        raise invalid(f"The source '{stipple.source}' of '{data.name}' has no number in its name, which a series of "
+        raise invalid(f"The source '{source_paths.of(data)}' of '{data.name}' has no number in its name, which a "
+                      f"series of "
                       'files needs.')
     number = first.number + stipple.frame_offset + local - 1
     path = first.path(max(number, 0))

@@ -7,7 +7,6 @@ Blender data.
 
 import filecmp
 import os
-import re
 import time
 import zlib
 from collections import OrderedDict
@@ -15,7 +14,7 @@ from dataclasses import replace
 
 import bpy
 
-from ... import preferences, version
+from ... import preferences
 from ...binding import cloud_edit, library
 from ...binding.cloud import Cloud
 from ...binding.context import Context
@@ -23,9 +22,9 @@ from ...binding.errors import StippleError
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import AnchorOrder, JobState, Status
 from .. import meshes
-from . import masks, source_settings, splat_data
+from . import masks, source_paths, source_settings, splat_data
+from .source_paths import MODEL_SUFFIX
 
-MODEL_SUFFIX = '.stipple.safetensors'
 _MAX_MODELS = 4
 # Splats that the viewport shows at first of a tree.
 FIRST_COUNT = 500_000
@@ -76,22 +75,18 @@ def forget():
     _contexts.clear()
 
 
-def absolute_path(source, owner=None):
-    """A source path of a datablock as the system wants it."""
-    library_of = None if owner is None else owner.library
-    override = None if owner is None else owner.override_library
-    if override is not None and override.reference.stipple.source == source:
-        library_of = override.reference.library  # a path that the override has not changed is still the library's
-    return os.path.normpath(bpy.path.abspath(source, library=library_of))
-
-
 def state(data):
     """What is with the file that a datablock's splats come from: 'FINE', 'MISSING' or 'CHANGED' since it was read.
-    Files of a series are read when they are shown, so none of them is old."""
+    Files of a series are read when they are shown: none of them is old, and one that is missing is a gap. Without their
+    folder all are missing."""
     stipple = data.stipple
-    if not source_settings.of(stipple).has_source or not stipple.source or stipple.is_sequence:
+    if not source_settings.of(stipple).has_source or not stipple.source:
         return 'FINE'
-    found = stamp(absolute_path(stipple.source, data))
+    path = source_paths.file_of(data)
+    if stipple.is_sequence:
+        folder = os.path.dirname(path if source_paths.is_alone(path) else os.path.dirname(path))
+        return 'FINE' if os.path.isdir(folder) else 'MISSING'
+    found = stamp(path)
     if not found:
         return 'MISSING'
     return 'CHANGED' if stipple.source_stamp not in ('', found) else 'FINE'
@@ -102,8 +97,13 @@ def check_unchanged(data):
     found = state(data)
     if found != 'FINE':
         what = 'is missing' if found == 'MISSING' else 'has changed since it was read'
-        raise StippleError(f"The source '{absolute_path(data.stipple.source, data)}' of '{data.name}' {what}; choose "
+        raise StippleError(f"The source '{source_paths.file_of(data)}' of '{data.name}' {what}; choose "
                            'Relink, or Use as New Source to keep the splats that are stored.', Status.ERROR_IO)
+
+
+def identity(stipple):
+    """A text that is equal for equal sources, wherever they lie."""
+    return stipple.source_stamp or stipple.source
 
 
 def stamp(path):
@@ -150,7 +150,7 @@ def is_at_hand(data, patience):
     if not source_settings.of(stipple).has_budget or stipple.is_sequence:
         return True
     try:
-        path = absolute_path(stipple.source, data)
+        path = source_paths.file_of(data)
         key = _file_key(path)
         if key in _models:
             return True
@@ -171,6 +171,17 @@ def is_reading():
     return any(_is_running(job) for job in _reading.values())
 
 
+def follow(old, new):
+    """A file was copied: what is known of it holds for the copy."""
+    status = os.stat(new)
+    for cache in (_models, _clouds):
+        for key in list(cache):
+            file = key[0] if cache is _clouds else key
+            if file[0] == old:
+                moved = (new, status.st_mtime_ns, status.st_size, *file[3:])
+                cache[(moved, key[1]) if cache is _clouds else moved] = cache.pop(key)
+
+
 def _is_running(job):
     return job.poll()[0] == JobState.RUNNING
 
@@ -187,7 +198,7 @@ def _keep_model(key, loaded):
 
 def model_of(data):
     """The model of a datablock's source, without what its mask hides; masked ones are kept like others."""
-    path, hidden = absolute_path(data.stipple.source, data), masks.key(data)
+    path, hidden = source_paths.file_of(data), masks.key(data)
     if not hidden:
         return model(path)
     key = (*_file_key(path), hidden)
@@ -201,7 +212,7 @@ def decode(data, settings):
     """The cloud of a datablock's model at these settings; kept for the next image. Errors: StippleError, also for a
     source that has changed."""
     check_unchanged(data)
-    key = (_file_key(absolute_path(data.stipple.source, data)) + (masks.key(data),), settings)
+    key = (_file_key(source_paths.file_of(data)) + (masks.key(data),), settings)
     cloud = _clouds.get(key)
     if cloud is None:
         cloud = model_of(data).decode(settings)
@@ -223,7 +234,7 @@ def decode_data(data, settings):
 
 def whole_cloud(data):
     """All splats of a datablock's source, masked ones too."""
-    path = absolute_path(data.stipple.source, data)
+    path = source_paths.file_of(data)
     if source_settings.of(data.stipple).counts_splats:
         return model(path).decode(DecodeSettings(data.stipple.source_count))
     return Cloud.load(context(), path)
@@ -314,23 +325,6 @@ def ungraded_cloud(obj):
     return splat_data.ungraded_cloud(context(), obj.data, obj.original.data)
 
 
-def model_path_for(name, given=''):
-    """Where the source of a new splat object goes: the given path, beside the saved file, else the cache folder."""
-    if given:
-        return absolute_path(given)
-    file_name = re.sub(r'[^\w.\- ]', '_', name) + MODEL_SUFFIX
-    if bpy.data.filepath:
-        return os.path.join(os.path.dirname(bpy.data.filepath), 'stipple', file_name)
-    return os.path.join(cache_folder(), file_name)
-
-
-def cache_folder():
-    chosen = preferences.get()
-    if chosen is not None and chosen.cache_folder:
-        return bpy.path.abspath(chosen.cache_folder)
-    return version.user_folder()
-
-
 def save_model(built, path, overwrite=False):
     """Writes a model and returns its path. Another file of that name stays: the new one gets a number,
     unless it is the same to the byte. Errors: StippleError for a folder that cannot be written."""
@@ -339,7 +333,7 @@ def save_model(built, path, overwrite=False):
 
 def save_cloud(cloud, name):
     """Writes splats as a source of their own, beside the other sources; returns the path."""
-    path = model_path_for(name)[:-len(MODEL_SUFFIX)] + '.ply'
+    path = source_paths.place_for(name)[:-len(MODEL_SUFFIX)] + '.ply'
     # In its own frame: the source is what the object shows, number by number.
     return _save(lambda to: cloud.save(to, frame=cloud.info().frame), path, '.ply', False)
 
@@ -347,7 +341,7 @@ def save_cloud(cloud, name):
 def attach_tree(data, path, count):
     """Notes a splat tree of this many splats as the source of a datablock; its mask stays."""
     stipple = data.stipple
-    stipple.source = blend_path(path)
+    stipple.source = source_paths.stored(path)
     stipple.source_stamp = stamp(path)
     source_settings.note_tree(stipple)
     stipple.source_count = count
@@ -359,7 +353,7 @@ def attach_tree(data, path, count):
 def attach_cloud(data, path):
     """Notes a splat file as the source of a datablock, all of it shown."""
     stipple = data.stipple
-    stipple.source = blend_path(path)
+    stipple.source = source_paths.stored(path)
     stipple.source_stamp = stamp(path)
     source_settings.note_cloud(stipple)
     stipple.is_sequence = False
@@ -418,7 +412,7 @@ def attach_model(data, path, objects, settings):
     StippleModelSettings."""
     stipple = data.stipple
     source_settings.note_model(stipple, source_settings.of_model(settings))
-    stipple.source = blend_path(path)
+    stipple.source = source_paths.stored(path)
     stipple.source_stamp = stamp(path)
     stipple.source_detail_weight = stipple.detail_weight
     stipple.source_color_from = stipple.color_from
@@ -429,11 +423,6 @@ def attach_model(data, path, objects, settings):
     stipple.source_fingerprint = meshes.fingerprint(objects)
     stipple.source_changed = False
     stipple.edited = False
-
-
-def blend_path(path):
-    """A path as it is stored: relative to the .blend where that is saved and on the same root."""
-    return bpy.path.relpath(path) if bpy.data.filepath else path
 
 
 def _file_key(path):

@@ -92,7 +92,7 @@ def _decoded(data, settings):
     sources.check_unchanged(data)
     made = sources.decode_data(data, settings).columns()
     if not masks.key(data):
-        made.seen = splat_data.kept_seen(data, data.stipple.source, made.count)
+        made.seen = splat_data.kept_seen(data, sources.identity(data.stipple), made.count)
     return made
 
 
@@ -117,7 +117,7 @@ def write(data, splats, key, grade=None):
 
 def write_decoded(data, splats):
     """Stores splats that were decoded with the present settings."""
-    splat_data.keep_seen(data, data.stipple.source, splats.seen)
+    splat_data.keep_seen(data, sources.identity(data.stipple), splats.seen)
     write(data, splats, written_key(data, sources.decode_settings(data.stipple)))
 
 
@@ -132,7 +132,7 @@ def written_key(data, settings):
     known = source_settings.of(data.stipple)
     if known.as_they_are:
         return masks.key(data)
-    parts = [data.stipple.source, settings.anchors]
+    parts = [sources.identity(data.stipple), settings.anchors]
     if known.counts_anchors:
         parts += [settings.gaussians_per_anchor, int(settings.order), settings.seed]
     if known.takes_mask:
