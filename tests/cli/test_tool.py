@@ -265,6 +265,14 @@ def test_render_refuses_what_no_lens_and_no_camera_is(scene):
     assert '.exr is expected' in refused('--depth', scene / 'z.png')
 
 
+def test_a_log_says_each_stage_once_in_every_tenth(scene):
+    said = run('render', scene / 'cube.ply', '--camera', scene / 'transforms.json', '-o', scene / 'blurred.exr',
+               '--aperture', 0.3, '--focus-distance', 1, '--accuracy', 'rays', '--blur-samples', 400).stderr.splitlines()
+    tenths = [(int(line.split('%')[0]) // 10, line.split('%')[1].strip()) for line in said]
+    assert len(tenths) > 2, 'it was over before anything is said; take more samples'
+    assert len(set(tenths)) == len(tenths), said
+
+
 def test_voxelize_writes_a_volume_with_the_bounds_of_the_splats(scene):
     run('voxelize', scene / 'cube.ply', scene / 'cube.vdb', '--resolution', 48)
     info = figures('info', scene / 'cube.vdb')

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -24,13 +25,30 @@ void drawBar(const StippleJobProgress& progress) {
   std::fflush(stderr);
 }
 
+/// What a log file gets: each stage once in every tenth of the work. Renders of many samples go back
+/// and forth between two stages hundreds of times.
+class StageLog {
+ public:
+  void show(const StippleJobProgress& progress) {
+    const int tenth = static_cast<int>(progress.fraction * 10);
+    if (tenth != tenth_) said_.clear();
+    tenth_ = tenth;
+    if (!said_.insert(progress.stage).second) return;
+    std::fprintf(stderr, "%3d %%  %s\n", static_cast<int>(progress.fraction * 100), progress.stage);
+  }
+
+ private:
+  int tenth_ = -1;
+  std::set<std::string> said_;
+};
+
 }  // namespace
 
 void finish(const Job& job) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const auto start = std::chrono::steady_clock::now();
   const SignalHold hold;
-  std::string stage;
+  StageLog log;
   auto progress = sized<StippleJobProgress>();
   bool drawn = false;
   for (;;) {
@@ -41,9 +59,8 @@ void finish(const Job& job) {
       if (terminal) {
         drawBar(progress);
         drawn = true;
-      } else if (stage != progress.stage) {
-        stage = progress.stage;
-        std::fprintf(stderr, "%s\n", progress.stage);
+      } else {
+        log.show(progress);
       }
     }
     std::this_thread::sleep_for(kPollInterval);
