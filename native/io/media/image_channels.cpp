@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "io/bytes/input_file.h"
+#include "io/bytes/limits.h"
 #include "io/media/media_calls.h"
 
 namespace stipple::media {
@@ -169,6 +171,8 @@ void stipple_media_exr_channels_read(const char* path, uint64_t limit_bytes,
                " channels of " + std::to_string(layout.planeBytes()) + " bytes in all; at most " +
                std::to_string(limit_bytes) + " bytes are allowed");
     }
+    requireAllowed(layout.planeBytes(), kImageAllowance, InputFile(name).size(), name,
+                   std::to_string(layout.channels().size()) + " channels");
     give(*sink, kMediaChannels, layout.channels());
     giveBytes(*sink, kMediaChannelNames, layout.names().data(), layout.names().size());
     std::vector<float*> planes;
