@@ -57,8 +57,12 @@ class Layout {
                            static_cast<uint32_t>(spec.full_height),
                            static_cast<uint32_t>(name.size())});
       names_ += name;
-      plane_bytes_ += sizeof(float) * static_cast<uint64_t>(spec.full_width) *
-                      static_cast<uint64_t>(spec.full_height);
+      // Rows are read at the width of what is stored, which may be wider than the image.
+      const auto area = [](int width, int height) {
+        return static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
+      };
+      plane_bytes_ += sizeof(float) * std::max(area(spec.full_width, spec.full_height),
+                                               area(spec.width, std::min(spec.height, kBandRows)));
     }
   }
 
