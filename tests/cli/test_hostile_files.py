@@ -129,11 +129,11 @@ def test_a_volume_cut_short_is_refused(tmp_path):
     whole = (tmp_path / 'whole.vdb').read_bytes()
     assert run(tmp_path, 'info', tmp_path / 'whole.vdb')[0] == 0
     # In the header, the names, the metadata, the tree and the values of both grids.
-    for length in (7, 40, 70, 200, 300, *(len(whole) * part // 12 for part in range(1, 12)), len(whole) - 1):
+    for length in (40, 300, len(whole) // 3, len(whole) * 2 // 3, len(whole) - 1):
         (tmp_path / 'cut.vdb').write_bytes(whole[:length])
         refused(tmp_path, 'info', tmp_path / 'cut.vdb', words=('cut.vdb',))
     # Lengths that lie: of names and metadata, which are written in 32 bits.
-    for at in range(0, 700, 13):
+    for at in (57, 61, 65, 90, 120, 300):
         (tmp_path / 'cut.vdb').write_bytes(whole[:at] + b'\xff\xff\xff\x7f' + whole[at + 4:])
         status, text, peak = run(tmp_path, 'info', tmp_path / 'cut.vdb')
         assert status in (0, 1) and (SANITIZED or peak < PEAK_BYTES), (at, status, text, peak >> 20)
