@@ -99,11 +99,9 @@ uint32_t MaterialReader::texture(int image, const Base& base) {
   if (images_[static_cast<size_t>(image)].empty()) {
     fail(ErrorCode::kIo, name + " is missing or cannot be read");
   }
-  uint64_t encoded_bytes = 0;
-  for (const std::vector<unsigned char>& bytes : images_) encoded_bytes += bytes.size();
   // Of one image there may be as many textures as there are materials.
   DecodedImage decoded =
-      decodeImageBytes(images_[static_cast<size_t>(image)], name, {texture_bytes_, encoded_bytes});
+      decodeImageBytes(images_[static_cast<size_t>(image)], name, {texture_bytes_, file_bytes_});
   texture_bytes_ += decoded.pixels.size() * sizeof(float);
   Image result;
   result.width = decoded.info.width;

@@ -27,7 +27,11 @@ class MaterialReader {
  public:
   MaterialReader(const GltfModel& model, const std::string& path, const GltfScene& scene,
                  TriMesh& mesh)
-      : model_(model), path_(path), images_(scene.images()), mesh_(mesh) {}
+      : model_(model),
+        path_(path),
+        images_(scene.images()),
+        file_bytes_(scene.fileBytes()),
+        mesh_(mesh) {}
 
   /// In: material, -1 for glTF's default; has_colours, whether the primitive has COLOR_0.
   MaterialUse use(int material, bool has_colours);
@@ -43,6 +47,7 @@ class MaterialReader {
   const std::string& path_;
   /// The undecoded bytes of each image; empty where the file was not found.
   const std::vector<std::vector<unsigned char>>& images_;
+  uint64_t file_bytes_;
   TriMesh& mesh_;
   std::map<std::pair<int, bool>, MaterialUse> uses_;
   std::map<std::tuple<int, std::vector<double>, int, double>, uint32_t> textures_;
