@@ -238,15 +238,17 @@ void GltfScene::load(Content content) {
 /// Copies the encoded images that lie in the file's own buffers.
 void GltfScene::readImageViews() {
   images_.resize(model_->images.size());
+  const auto name = [this](size_t i) { return path_ + ": image " + std::to_string(i); };
   uint64_t bytes = 0;
   for (size_t i = 0; i < images_.size(); ++i) {
-    if (model_->images[i].bufferView < 0) continue;
-    bytes += viewBytes(*model_, model_->images[i].bufferView,
-                       path_ + ": image " + std::to_string(i));
-    requireAllowed(bytes, kInstanceAllowance, file_bytes_, path_,
-                   "its " + std::to_string(images_.size()) + " images");
-    images_[i] =
-        readView(*model_, model_->images[i].bufferView, path_ + ": image " + std::to_string(i));
+    const int view = model_->images[i].bufferView;
+    if (view >= 0) bytes += viewBytes(*model_, view, name(i));
+  }
+  requireAllowed(bytes, kInstanceAllowance, file_bytes_, path_,
+                 std::to_string(images_.size()) + " images");
+  for (size_t i = 0; i < images_.size(); ++i) {
+    const int view = model_->images[i].bufferView;
+    if (view >= 0) images_[i] = readView(*model_, view, name(i));
   }
 }
 
