@@ -75,8 +75,9 @@ AccuracyReport reportOf(const Json& json) {
 AccuracyReport readFitAccuracy(const std::string& path) {
   const std::string text = readTextFile(path, kMaxJsonBytes);
   const std::string what = "'" + path + "' is not the report of a fit: ";
+  const Json json = parseOrderedJson(text, what + "its text");
   try {
-    return reportOf(parseOrderedJson(text, "its text"));
+    return reportOf(json);
   } catch (const Json::exception& error) {
     fail(ErrorCode::kFormat, what + error.what());
   } catch (const Error& error) {
