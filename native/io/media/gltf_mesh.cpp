@@ -85,8 +85,9 @@ class GltfReader {
     constexpr uint64_t kVertexBytes = 3 * sizeof(float);
     constexpr uint64_t kCornerBytes = sizeof(uint32_t) + (3 + 4 + 2) * sizeof(float);
     constexpr uint64_t kBeyondMeasure = uint64_t{1} << 50;
-    const int position = attribute(primitive, "POSITION");
     if (!hasSurface(primitive)) return 0;
+    const int position = attribute(primitive, "POSITION");
+    requireAccessor(model_, position, 3, what + ", POSITION");
     const uint64_t vertices = accessorCount(model_, position, what + ", POSITION");
     const uint64_t indices = primitive.indices < 0 ? vertices
                                                    : accessorCount(model_, primitive.indices,
