@@ -60,7 +60,7 @@ def timed(function, *arguments, **settings):
 
 
 def psnr(path):
-    """dB between a picture and the mesh's."""
+    """dB between an image and the mesh's."""
     result = subprocess.run([str(TOOL), 'compare', str(OUT / 'mesh.png'), str(path), '--json'],
                             check=True, capture_output=True, text=True)
     return json.loads(result.stdout)['psnr']
@@ -89,7 +89,8 @@ def main():
     mesh = bpy.data.objects['Suzanne']
     mesh.select_set(True)
     bpy.context.view_layer.objects.active = mesh
-    seconds = timed(bpy.ops.stipple.splats_from_mesh, anchors=1_000, source_path=str(OUT / 'suzanne.stipple.safetensors'))
+    seconds = timed(bpy.ops.stipple.splats_from_mesh, anchors=1_000,
+                    source_path=str(OUT / 'suzanne.stipple.safetensors'))
     say(f'mesh to density, and a first 1,000 splats: {seconds:.2f} s')
     splats = bpy.context.view_layer.objects.active
 

@@ -3,8 +3,8 @@
     python3 tests/bench.py PROGRAM [LIMITS] [--only REGEX]
 
 PROGRAM is stipple_bench, LIMITS native/bench/limits.txt. Exits with 1 where a ratio misses its limit, and where a limit
-has no ratio: a benchmark that is renamed takes its guard along. A benchmark that says why it cannot run here, such as on
-a processor without an instruction set, is shown and counts as neither."""
+has no ratio: a benchmark that is renamed takes its guard along. A benchmark that says why it cannot run here, such as
+on a processor without an instruction set, is shown and counts as neither."""
 import argparse
 import fnmatch
 import json
@@ -43,9 +43,11 @@ def read_limits(path):
 
 def measured(program, limits, only):
     """Runs the benchmarks of the limits: [Google Benchmark's rows]."""
-    names = subprocess.run([program, '--benchmark_list_tests'], capture_output=True, text=True, check=True).stdout.split()
+    names = subprocess.run([program, '--benchmark_list_tests'], capture_output=True, text=True,
+                           check=True).stdout.split()
     # Google Benchmark appends what it was told of iterations and clocks: "name/iterations:3/manual_time".
-    wanted = [name for name in names if any(fnmatch.fnmatchcase(name.split('/')[0], limit.benchmark) for limit in limits)
+    wanted = [name for name in names if any(fnmatch.fnmatchcase(name.split('/')[0], limit.benchmark)
+                                            for limit in limits)
               and (not only or re.search(only, name))]
     if not wanted:
         return []

@@ -29,7 +29,7 @@ _SHADOW_PASS = 'Shadow Catcher'
 def _without_splats(depsgraph, is_kept=True):
     """Cycles would draw splats as the points that they are stored as: while this lasts, no ray sees them.
 
-    The film is transparent meanwhile, so that the world's light comes apart from the meshes', and the picture is made
+    The film is transparent meanwhile, so that the world's light comes apart from the meshes', and the image is made
     in one piece, so that it can be read when Cycles has ended. is_kept: False where the depsgraph may be gone at the
     end.
     """

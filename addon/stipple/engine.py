@@ -16,7 +16,7 @@ from .binding.structs import JobState
 from .scene import instances
 from .scene.source import sources
 from .scene.view import cameras, effects, facts, mattes, motion, picture_options, quality, steady_effects
-from .viewport.drawing import ViewPicture
+from .viewport.drawing import ViewImage
 
 # How often a render looks whether it was cancelled.
 POLL_SECONDS = 0.01
@@ -62,7 +62,7 @@ class NativeWork:
         self._indices = np.array([0] + [entry[2].pass_index for entry in found], np.float32)
 
     def _camera_object(self, depsgraph):
-        """The original camera object of the picture. Errors: StippleError where there is none."""
+        """The original camera object of the image. Errors: StippleError where there is none."""
         return cameras.required(self.camera_override or depsgraph.scene.camera).original
 
     def _shutter(self, depsgraph, camera_object):
@@ -72,13 +72,13 @@ class NativeWork:
         return motion.sample(depsgraph.scene, depsgraph, camera_object, self._keys, self.frame_set)
 
     def _blur(self, depsgraph, camera_object, shutter):
-        return picture_options.blur(depsgraph.scene, effects.lens_of(camera_object, depsgraph), shutter)
+        return picture_options.blur(depsgraph.scene, effects.aperture_of(camera_object, depsgraph), shutter)
 
     def _passes(self, view_layer):
         return {'with_normal': view_layer.use_pass_normal, 'with_objects': view_layer.use_pass_object_index}
 
     def _accuracy(self, depsgraph, camera_object, camera, placed, shutter, meshes):
-        """How exact the picture is: the render's quality, and what its effects ask for."""
+        """How exact the image is: the render's quality, and what its effects ask for."""
         context, scene = sources.context(), depsgraph.scene
         seen = effects.look(context, scene, placed, camera, camera_object, shutter, meshes)
         rows = effects.plan(context.library, scene, depsgraph.view_layer, depsgraph, seen, camera_object)
@@ -91,7 +91,7 @@ class NativeWork:
         self.report({'WARNING'}, message)
 
     def _fail(self, error):
-        """One message; the render ends without a picture."""
+        """One message; the render ends without an image."""
         self.error_set(str(error))
         self.report({'ERROR'}, str(error))
 
@@ -151,7 +151,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
     def view_update(self, context, depsgraph):
         """Something in the scene of a 3D view has changed."""
         if getattr(self, '_view', None) is None:
-            self._view = ViewPicture()
+            self._view = ViewImage()
         self._guarded(self._view.update, depsgraph, self._warn)
 
     def view_draw(self, context, depsgraph):
@@ -179,7 +179,7 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
         return mattes.surface(self._mattes, camera, self._wait)
 
     def _deliver(self, task, picture, layer_name):
-        """Hands the picture over; Blender's first row is the bottom one."""
+        """Hands the image over; Blender's first row is the bottom one."""
         result = self.begin_result(0, 0, picture.border.width, picture.border.height, layer=layer_name)
         passes = result.layers[0].passes
         version.fill_pass(passes['Combined'], task.colour[::-1])

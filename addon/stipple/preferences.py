@@ -29,7 +29,8 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
                               "mebibytes is refused before it starts, 0 for 60 % of this machine's memory", default=0,
                               min=0)
     cache_folder: StringProperty(name="Cache Folder", description="Where sources of files that are not saved yet are "
-                                 "kept, empty for Blender's user folder", subtype='DIR_PATH', options=version.RELATIVE_PATH)
+                                 "kept, empty for Blender's user folder", subtype='DIR_PATH',
+                                 options=version.RELATIVE_PATH)
     sequence_cache: IntProperty(name="Sequence Cache", description="Mebibytes of memory in which files of splat "
                                 "sequences are kept, over all objects", default=1024, min=0)
     read_ahead: IntProperty(name="Read Ahead", description="Files of a splat sequence that are read before they are "

@@ -24,8 +24,8 @@ COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: texture
                  ('BAKED', "Baked Lighting", "Colors as lit by the scene, baked by Cycles"),
                  ('ATTRIBUTE', "Attribute", "The active color attribute"))
 
-BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats"), ('COUNT', "Count", "The budget is a number of "
-                                                                                                       "splats"))
+BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats"),
+                ('COUNT', "Count", "The budget is a number of splats"))
 SIDES = (('INSIDE', "Inside", "Keep what is inside"), ('OUTSIDE', "Outside", "Keep what is outside"))
 
 
@@ -42,8 +42,8 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     source_settings: StringProperty(options={'HIDDEN'})  # which settings it has: scene/source/source_settings.py
     source_count: IntProperty(options={'HIDDEN'})  # of a splat tree
     source_stamp: StringProperty(options={'HIDDEN'})  # of the file as it was read
-    budget_by: EnumProperty(name="Budget By", description="Whether the budget is a share or a number of splats", items=BUDGET_KINDS,
-                            options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
+    budget_by: EnumProperty(name="Budget By", description="Whether the budget is a share or a number of splats",
+                            items=BUDGET_KINDS, options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
     ratio: FloatProperty(name="Ratio", description="Share of the source's splats that the viewport shows", default=1.0,
                          min=0.0, max=1.0, subtype='FACTOR', precision=3, options=_CHANGEABLE, override=_OVERRIDABLE,
                          update=sync.on_property_change)
@@ -79,8 +79,9 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     source_color_from: StringProperty(options={'HIDDEN'})
     source_objects: CollectionProperty(type=STIPPLE_PG_source_object)
     source_fingerprint: StringProperty(options={'HIDDEN'})
-    source_changed: BoolProperty(name="Source Changed", description="The mesh differs from the one that the splats were "
-                                 "made from", options={'HIDDEN'})
+    source_changed: BoolProperty(name="Source Changed",
+                                 description="The mesh differs from the one that the splats were "
+                                             "made from", options={'HIDDEN'})
     # A series of files, one for each frame; source is its first. Names and meaning as in Blender's volumes.
     is_sequence: BoolProperty(name="Sequence", description="The source is the first of a numbered series of files, one "
                               "for each frame", options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
@@ -106,9 +107,11 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     exposure: FloatProperty(name="Exposure", description="Brightness in stops, +1 doubles the light of every splat",
                             default=0.0, min=-16.0, max=16.0, soft_min=-5.0, soft_max=5.0, step=10, precision=2,
                             options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
-    tint: FloatVectorProperty(name="Tint", description="Color that the light of every splat is multiplied by, white for "
-                              "none", size=3, default=(1.0, 1.0, 1.0), min=0.0, max=16.0, soft_max=1.0, subtype='COLOR',
-                              options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
+    tint: FloatVectorProperty(name="Tint",
+                              description="Color that the light of every splat is multiplied by, white for "
+                                          "none", size=3, default=(1.0, 1.0, 1.0), min=0.0, max=16.0, soft_max=1.0,
+                              subtype='COLOR', options=_CHANGEABLE, override=_OVERRIDABLE,
+                              update=sync.on_property_change)
     saturation: FloatProperty(name="Saturation", description="Strength of the colors: 0 makes them grey, 1 leaves "
                                                              "them as they are",
                               default=1.0, min=0.0, max=16.0, soft_max=2.0, options=_CHANGEABLE, override=_OVERRIDABLE,
@@ -133,7 +136,8 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
     rig: EnumProperty(name="Rig", description="Where the cameras of the rig are placed",
                       items=(('AUTO', "Automatic", "Inside if the scene's camera is between walls, otherwise around"),
                              ('AROUND', "Around", "The cameras are on a sphere around everything and look in"),
-                             ('INSIDE', "Inside", "The cameras are between the walls of a room and look everywhere")), options=set())
+                             ('INSIDE', "Inside", "The cameras are between the walls of a room and look everywhere")),
+                      options=set())
     view_count: IntProperty(name="Count", description="Number of views that are rendered", default=60, min=1,
                             soft_max=500, max=10000, options=set())
     view_size: IntProperty(name="Resolution", description="Pixels of the longer side of a view", default=256, min=16,
@@ -146,20 +150,23 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
     samples: IntProperty(name="Samples", description="Samples per pixel of a view", default=64, min=1, soft_max=1024,
                          options=set())
     transparent: BoolProperty(name="Transparent Film", description="On, the fit learns the objects alone; off, it "
-                                                                   "also learns the world behind them", default=True, options=set())
+                                                                   "also learns the world behind them", default=True,
+                              options=set())
     dataset: StringProperty(name="Folder", description="Folder with photographs and their cameras",
                             subtype='DIR_PATH', options=version.RELATIVE_PATH)
-    up_axis: EnumProperty(name="Up Axis", description="Which way is up in the data set; choose the same for its cameras",
+    up_axis: EnumProperty(name="Up Axis",
+                          description="Which way is up in the data set; choose the same for its cameras",
                           items=photo_cameras.UP_AXES, options=set())
     downscale: IntProperty(name="Downscale", description="Factor by which photographs are made smaller along each "
-                                                         "side before the fit learns from them", default=1, min=1, soft_max=8, max=64, options=set())
+                                                         "side before the fit learns from them", default=1, min=1,
+                           soft_max=8, max=64, options=set())
     max_splats: IntProperty(name="Splats", description="Maximum number of splats of the fit", default=100000, min=100,
                             soft_max=1000000, max=100000000, options=set())
     quality: EnumProperty(name="Quality", description="How many steps the fit takes",
-                          items=(('FAST', "Fast", "Few steps, for a first look"), ('BALANCED', "Balanced", "A number of steps that is "
-                                                                                                           "enough for most shots"),
-                                 ('FINE_DETAIL', "Fine Detail", "Many steps, for close views of fine texture")), default='BALANCED',
-                          options=set())
+                          items=(('FAST', "Fast", "Few steps, for a first look"),
+                                 ('BALANCED', "Balanced", "A number of steps that is enough for most shots"),
+                                 ('FINE_DETAIL', "Fine Detail", "Many steps, for close views of fine texture")),
+                          default='BALANCED', options=set())
     view_dependent: BoolProperty(name="View-Dependent Color", description="Colors change with the direction of the "
                                                                           "view, as those of shiny objects do. Each "
                                                                           "splat then has more numbers", default=False,
@@ -184,30 +191,35 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good fit", default=0, min=0,
                       options=set())
     shown: EnumProperty(name="Show", description="What the 3D view shows until you accept the fit; renders show the "
-                                                 "source", items=(('SPLATS', "Splats", "The 3D view shows the fit "
-                                                                                       "alone"), ('SOURCE', "Source", "The 3D view shows what is "
-                                                                                                                      "fitted"),
-                                         ('BOTH', "Both", "The 3D view shows both")), options={'SKIP_SAVE'},
+                                                 "source",
+                        items=(('SPLATS', "Splats", "The 3D view shows the fit alone"),
+                               ('SOURCE', "Source", "The 3D view shows what is fitted"),
+                               ('BOTH', "Both", "The 3D view shows both")), options={'SKIP_SAVE'},
                         update=fit_proposal.on_shown_change)
     # A bar for Blenders whose layouts have none of their own.
     progress: FloatProperty(name="Progress", subtype='PERCENTAGE', min=0.0, max=100.0, precision=0,
                             options={'HIDDEN', 'SKIP_SAVE'}, get=lambda _: 100 * fitting.state.fraction)
     report: StringProperty(name="Report", description="File for the fit's figures (.json, and curves as .svg beside "
                            "it); empty for none", subtype='FILE_PATH', options=version.RELATIVE_PATH)
-    checkpoint: StringProperty(name="Checkpoint", description="File (.safetensors) that keeps the state of a fit once a "
-                               "minute while it runs, so that it can go on after a stop or a crash; empty for none",
+    checkpoint: StringProperty(name="Checkpoint",
+                               description="File (.safetensors) that keeps the state of a fit once a "
+                                           "minute while it runs, so that it can go on after a stop or a crash; empty "
+                                           "for none",
                                subtype='FILE_PATH', options=version.RELATIVE_PATH)
     resume: BoolProperty(name="Go On", description="The fit goes on from the checkpoint if there is one; otherwise it"
-                                                   " starts from the beginning and replaces it", default=True, options=set())
+                                                   " starts from the beginning and replaces it", default=True,
+                         options=set())
 
 
 class STIPPLE_PG_overlay(bpy.types.PropertyGroup):
     """What the 3D view colours splats by."""
 
     kind: EnumProperty(name="Color By", description="Quantity that colors the splats in the 3D view, to examine "
-                                                    "density control", items=overlays.KINDS, options=set(), update=overlays.on_change)
+                                                    "density control", items=overlays.KINDS, options=set(),
+                       update=overlays.on_change)
     auto_range: BoolProperty(name="Auto Range", description="The color range goes from the lowest to the highest "
-                                                            "value that is shown, without a few extremes", default=True, options=set(), update=overlays.on_change)
+                                                            "value that is shown, without a few extremes", default=True,
+                             options=set(), update=overlays.on_change)
     low: FloatProperty(name="From", description="Value of the darkest color", default=0.0, options=set(),
                        update=overlays.on_change)
     high: FloatProperty(name="To", description="Value of the brightest color", default=1.0, options=set(),
@@ -218,16 +230,16 @@ def _on_level_change(self, _context):
     try:
         quality.take_level(sources.context().library, self)
     except StippleError:
-        pass  # without the library there is no picture, and the panels say so
+        pass  # without the library there is no image, and the panels say so
 
 
 class STIPPLE_PG_quality(bpy.types.PropertyGroup):
-    """How exact pictures are: a level, which sets every knob, and the knobs."""
+    """How exact images are: a level, which sets every knob, and the knobs."""
 
     level: EnumProperty(name="Quality", description="How exact images are", items=quality.LEVELS, default='FINAL',
                         options=set(), override=_OVERRIDABLE, update=_on_level_change)
-    order: EnumProperty(name="Order", description="How splats are ordered in depth", items=quality.ORDERS, options=set(),
-                        override=_OVERRIDABLE)
+    order: EnumProperty(name="Order", description="How splats are ordered in depth", items=quality.ORDERS,
+                        options=set(), override=_OVERRIDABLE)
     projection: EnumProperty(name="Projection", description="How splats are projected into the image", options=set(),
                              items=quality.PROJECTIONS, override=_OVERRIDABLE)
     antialiasing: EnumProperty(name="Anti-Aliasing", description="How splats that are smaller than pixels are "
@@ -237,10 +249,11 @@ class STIPPLE_PG_quality(bpy.types.PropertyGroup):
                                   max=16, options=set(), override=_OVERRIDABLE)
     sh_degree_limit: IntProperty(name="Harmonics", description="Colors change with the view up to this degree",
                                  default=4, min=0, max=4, options=set(), override=_OVERRIDABLE)
-    precision: EnumProperty(name="Precision", description="Precision of the numbers in which splats are blended", items=quality.PRECISIONS,
-                            options=set(), override=_OVERRIDABLE)
-    least_alpha: FloatProperty(name="Cut-Off", description="Splats are skipped where they cover less than this share of "
-                               "a pixel", default=1 / 255, min=1e-9, max=0.5, precision=5, options=set(),
+    precision: EnumProperty(name="Precision", description="Precision of the numbers in which splats are blended",
+                            items=quality.PRECISIONS, options=set(), override=_OVERRIDABLE)
+    least_alpha: FloatProperty(name="Cut-Off",
+                               description="Splats are skipped where they cover less than this share of "
+                                           "a pixel", default=1 / 255, min=1e-9, max=0.5, precision=5, options=set(),
                                override=_OVERRIDABLE)
     budget_share: FloatProperty(name="Share of Splats", description="Splats are merged until this share of them is "
                                                                     "left",
@@ -250,20 +263,23 @@ class STIPPLE_PG_quality(bpy.types.PropertyGroup):
 class STIPPLE_PG_scene(bpy.types.PropertyGroup):
     quality_viewport: PointerProperty(type=STIPPLE_PG_quality)
     quality_render: PointerProperty(type=STIPPLE_PG_quality)
-    compare_first: EnumProperty(name="Left", description="Setting of the first half of a comparison", items=quality.SIDES,
-                                default='VIEWPORT', options=set(), override=_OVERRIDABLE)
-    compare_second: EnumProperty(name="Right", description="Setting of the second half of a comparison", items=quality.SIDES,
-                                 default='RENDER', options=set(), override=_OVERRIDABLE)
+    compare_first: EnumProperty(name="Left", description="Setting of the first half of a comparison",
+                                items=quality.SIDES, default='VIEWPORT', options=set(), override=_OVERRIDABLE)
+    compare_second: EnumProperty(name="Right", description="Setting of the second half of a comparison",
+                                 items=quality.SIDES, default='RENDER', options=set(), override=_OVERRIDABLE)
     view_color: EnumProperty(
         name="View-Dependent Color", description="Colors change with the direction of the view. Auto uses the degree "
-                                                 "of harmonics that carries 99.9 % of the change", items=effects.CHOICES, options=set(),
+                                                 "of harmonics that carries 99.9 % of the change",
+                                                 items=effects.CHOICES, options=set(),
         override=_OVERRIDABLE)
     exact_projection: EnumProperty(
         name="Exact Projection", description="Splats are drawn along the rays of the pixels instead of as flat "
-                                             "ellipses. Auto does so where ellipses are wrong by more than a pixel", items=effects.CHOICES, options=set(), override=_OVERRIDABLE)
+                                             "ellipses. Auto does so where ellipses are wrong by more than a pixel",
+                                             items=effects.CHOICES, options=set(), override=_OVERRIDABLE)
     zoom_antialiasing: EnumProperty(
         name="Zoom Anti-Aliasing", description="Splats smaller than pixels keep their light. Auto does so where the "
-                                               "low-pass that they were trained with makes them twice as large", items=effects.CHOICES, options=set(),
+                                               "low-pass that they were trained with makes them twice as large",
+                                               items=effects.CHOICES, options=set(),
         override=_OVERRIDABLE)
     global_order: EnumProperty(
         name="Global Ordering", description="Splats of all objects are sorted together. Off draws each object as a "
@@ -272,7 +288,8 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         options=set(), override=_OVERRIDABLE)
     blur_samples: IntProperty(
         name="Blur Samples", description="Number of images that depth of field and motion blur average; 0 chooses as "
-                                         "many as the blur needs", default=0, min=0, soft_max=256, max=65536, options=set(), override=_OVERRIDABLE)
+                                         "many as the blur needs", default=0, min=0, soft_max=256, max=65536,
+                                         options=set(), override=_OVERRIDABLE)
     splat_color: EnumProperty(
         name="Splat Color", description="Space in which splats are blended over each other",
         items=(('AS_TRAINED', "As Trained", "Blend in display space, as splats are trained and web viewers show them"),
@@ -284,8 +301,9 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
                                              "nothing", default=True, options=set(),
         override=_OVERRIDABLE)
     shadow_margin: FloatProperty(
-        name="Shadow Margin", description="Splats that are nearer to the camera than a shadow catcher by more than this get "
-        "none of its shadows", default=0.5, min=0.0, soft_max=10.0, subtype='DISTANCE', options=set(),
+        name="Shadow Margin",
+        description="Splats that are nearer to the camera than a shadow catcher by more than this get "
+                    "none of its shadows", default=0.5, min=0.0, soft_max=10.0, subtype='DISTANCE', options=set(),
         override=_OVERRIDABLE)
     fit: PointerProperty(type=STIPPLE_PG_fit)
     overlay: PointerProperty(type=STIPPLE_PG_overlay)

@@ -33,7 +33,8 @@ EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BL
 
 
 def panorama_settings(camera):
-    """The owner of panorama_type, fisheye_fov and others: from 4.3 at the latest the camera itself, before Cycles' part."""
+    """The owner of panorama_type, fisheye_fov and others: from 4.3 at the latest the camera itself, before Cycles'
+    part."""
     return camera if hasattr(camera, 'panorama_type') else getattr(camera, 'cycles', None)
 
 

@@ -18,7 +18,7 @@ PictureAccuracyOptions pictureOptionsFrom(const StippleAccuracyMeasureOptions* o
   stipple_accuracy_measure_options_init(&defaults);
   const StippleAccuracyMeasureOptions given = completed(options, defaults, "options");
   PictureAccuracyOptions made;
-  made.timing = {given.repetitions, given.most_seconds};
+  made.timing = {given.repetitions, given.max_seconds};
   made.reference_pixels = given.reference_pixels;
   if (given.setting_count == 0) made.accuracies = usualAccuracies(camera);
   const StructArray<StippleAccuracy> settings(given.settings, given.setting_count,
@@ -34,7 +34,7 @@ VolumeAccuracyOptions volumeOptionsFrom(const StippleVoxelizeOptions* finest,
   StippleVolumeAccuracyOptions defaults;
   stipple_volume_accuracy_options_init(&defaults);
   const StippleVolumeAccuracyOptions given = completed(options, defaults, "options");
-  return {voxelizeOptionsFrom(finest), {given.repetitions, given.most_seconds}};
+  return {voxelizeOptionsFrom(finest), {given.repetitions, given.max_seconds}};
 }
 
 }  // namespace
@@ -48,7 +48,7 @@ void stipple_accuracy_measure_options_init(StippleAccuracyMeasureOptions* option
   options->struct_size = sizeof(StippleAccuracyMeasureOptions);
   options->repetitions = defaults.timing.repetitions;
   options->reference_pixels = defaults.reference_pixels;
-  options->most_seconds = defaults.timing.most_seconds;
+  options->max_seconds = defaults.timing.most_seconds;
 }
 
 StippleStatus stipple_accuracy_measure_start(StippleContext* context,
@@ -68,7 +68,7 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context,
     const PictureAccuracyOptions measured = pictureOptionsFrom(options, view);
     validate(measured, placed, view);
     const RenderMemory memory = measurePictureMemory(placed, view, shot, measured);
-    context->state->requirePictureMemory(memory.sum(), "measuring a picture of " + sizeText(view),
+    context->state->requirePictureMemory(memory.sum(), "measuring an image of " + sizeText(view),
                                          memory.pair_bytes);
     *job = startJob(
         context->state,
@@ -85,7 +85,7 @@ void stipple_volume_accuracy_options_init(StippleVolumeAccuracyOptions* options)
   *options = {};
   options->struct_size = sizeof(StippleVolumeAccuracyOptions);
   options->repetitions = defaults.timing.repetitions;
-  options->most_seconds = defaults.timing.most_seconds;
+  options->max_seconds = defaults.timing.most_seconds;
 }
 
 StippleStatus stipple_volume_accuracy_start(StippleContext* context,

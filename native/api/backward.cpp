@@ -130,7 +130,7 @@ PixelLayout layoutOf(uint32_t channels, const char* name) {
 void requireSides(uint32_t width, uint32_t height) {
   constexpr uint32_t kMaxSide = 65536;
   if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) {
-    fail(ErrorCode::kInvalidArgument, "the picture is " + std::to_string(width) + " x " +
+    fail(ErrorCode::kInvalidArgument, "the image is " + std::to_string(width) + " x " +
                                           std::to_string(height) +
                                           " pixels; each side must be 1 to 65536");
   }
@@ -161,18 +161,16 @@ StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer,
     if (result) complete(result, "result");
     renderer->context->requirePictureMemory(
         backwardMemoryBound(placed.list, view, settings.options, given),
-        "the backward pass of a picture of " + sizeText(view),
+        "the backward pass of an image of " + sizeText(view),
         renderMemory(placed.list, view, settings.options).pair_bytes);
-    *job = startJob(
-        renderer->context,
-        [shared = renderer->renderer, placed = std::move(placed), options = settings.options, view,
-         given, buffers = std::move(buffers), result](Progress& progress) {
-          shared->backward(
-              placed, view, options, given,
-              [&](const BackwardResult& made) { deliverGradients(made, buffers, result); },
-              progress);
-          return JobResult{};
-        });
+    *job = startJob(renderer->context, [shared = renderer->renderer, placed = std::move(placed),
+                                        options = settings.options, view, given,
+                                        buffers = std::move(buffers), result](Progress& progress) {
+      shared->backward(
+          placed, view, options, given,
+          [&](const BackwardResult& made) { deliverGradients(made, buffers, result); }, progress);
+      return JobResult{};
+    });
   });
 }
 

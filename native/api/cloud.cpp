@@ -284,7 +284,7 @@ StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
     out.frame = static_cast<uint32_t>(format.frame);
     out.name = format.name;
     out.title = format.title;
-    out.endings = format.endings;
+    out.extensions = format.endings;
     out.keeps_frame = format.keeps.frame ? 1 : 0;
     out.keeps_colour_space = format.keeps.colour_space ? 1 : 0;
     out.keeps_antialias = format.keeps.antialias ? 1 : 0;
@@ -295,8 +295,7 @@ StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
 StippleStatus stipple_format_estimate(uint64_t index, uint64_t count, uint32_t sh_degree,
                                       const StippleCloudSaveOptions* options, uint64_t* bytes) {
   return guarded([&] {
-    const int degree =
-        enumValue<int>(sh_degree, static_cast<uint32_t>(kMaxShDegree), "sh_degree");
+    const int degree = enumValue<int>(sh_degree, static_cast<uint32_t>(kMaxShDegree), "sh_degree");
     require(bytes, "bytes") =
         estimatedFileBytes(requireFormat(index), count, degree, writeOptions(options));
   });

@@ -7,7 +7,7 @@ namespace stipple::api {
 static_assert(static_cast<uint32_t>(Precision::kDouble) == STIPPLE_PRECISION_DOUBLE);
 static_assert(static_cast<uint32_t>(Antialiasing::kSamples) == STIPPLE_SAMPLING_SAMPLES);
 static_assert(static_cast<uint32_t>(AccuracyLevel::kReference) == STIPPLE_ACCURACY_REFERENCE);
-static_assert(static_cast<uint32_t>(ShotMethod::kYardstick) == STIPPLE_RENDER_YARDSTICK);
+static_assert(static_cast<uint32_t>(ShotMethod::kYardstick) == STIPPLE_RENDER_RAYS_UNLIMITED);
 static_assert(static_cast<uint32_t>(OutputColour::kComposited) == STIPPLE_OUTPUT_COMPOSITED);
 
 namespace {
@@ -48,10 +48,10 @@ Shutter shutterFrom(const StippleShutter& shutter, size_t instance_count) {
 Sampling samplingFrom(const StippleRenderOptions& given, const Instances& instances) {
   Sampling sampling;
   sampling.samples = given.samples;
-  if (given.lens) {
-    const StippleLens lens = complete(given.lens, "options->lens");
-    sampling.aperture = {lens.aperture_radius, lens.focus_distance, lens.blades, lens.rotation,
-                         lens.ratio == 0 ? 1.0 : lens.ratio};
+  if (given.aperture) {
+    const StippleAperture aperture = complete(given.aperture, "options->aperture");
+    sampling.aperture = {aperture.aperture_radius, aperture.focus_distance, aperture.blades,
+                         aperture.rotation, aperture.ratio == 0 ? 1.0 : aperture.ratio};
   }
   if (given.shutter) {
     sampling.shutter =
@@ -131,7 +131,7 @@ AccuracySettings accuracyFrom(const StippleAccuracy* given, const char* name) {
   made.sh_degree_limit = enumValue<int>(a.sh_degree_limit, 4, field("sh_degree_limit").c_str());
   made.precision = enumValue<Precision>(a.precision, 1, field("precision").c_str());
   made.samples_per_side = a.samples_per_side;
-  made.least_alpha = a.least_alpha;
+  made.least_alpha = a.min_alpha;
   made.budget_share = a.budget_share;
   validate(made, name);
   return made;
@@ -148,7 +148,7 @@ StippleAccuracy accuracyTo(const AccuracySettings& accuracy) {
   a.samples_per_side = accuracy.samples_per_side;
   a.sh_degree_limit = static_cast<uint32_t>(accuracy.sh_degree_limit);
   a.precision = static_cast<uint32_t>(accuracy.precision);
-  a.least_alpha = accuracy.least_alpha;
+  a.min_alpha = accuracy.least_alpha;
   a.budget_share = accuracy.budget_share;
   return a;
 }

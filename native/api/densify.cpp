@@ -18,7 +18,7 @@ DensifyOptions densifyOptions(const StippleDensifyOptions& given) {
   options.max_splats = given.max_splats;
   options.event_count = given.event_count;
   options.seed = given.seed;
-  options.picture_bytes = given.picture_bytes;
+  options.picture_bytes = given.image_bytes;
   return options;
 }
 
@@ -32,7 +32,7 @@ void stipple_densify_options_init(StippleDensifyOptions* options) {
   *options = {};
   options->struct_size = sizeof(StippleDensifyOptions);
   options->event_count = static_cast<uint32_t>(defaults.event_count);
-  options->picture_bytes = defaults.picture_bytes;
+  options->image_bytes = defaults.picture_bytes;
 }
 
 StippleStatus stipple_densify_start(StippleContext* context, const StippleCloud* cloud,

@@ -60,13 +60,13 @@ StippleStatus stipple_renderer_order_start(StippleRenderer* renderer,
     output.first_rows = first_rows;
     validateDrawOrder(placed.list, view, output);
     renderer->context->requireMemory(drawOrderMemoryBound(splats), "ordering these splats");
-    *job = startJob(
-        renderer->context, [shared = renderer->renderer, placed = std::move(placed), view, output,
-                            first_rows = std::move(first_rows)](Progress& progress) mutable {
-          output.first_rows = first_rows;
-          shared->order(placed, view, output, progress);
-          return JobResult{};
-        });
+    *job = startJob(renderer->context,
+                    [shared = renderer->renderer, placed = std::move(placed), view, output,
+                     first_rows = std::move(first_rows)](Progress& progress) mutable {
+                      output.first_rows = first_rows;
+                      shared->order(placed, view, output, progress);
+                      return JobResult{};
+                    });
   });
 }
 

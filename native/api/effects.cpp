@@ -30,7 +30,7 @@ EffectsSurvey surveyFrom(const StippleEffectsSurvey& given) {
   EffectsSurvey survey;
   survey.sh_degree = enumValue<int>(given.sh_degree, kMaxShDegree, "facts->survey->sh_degree");
   survey.splat_count = given.splat_count;
-  survey.looked_count = given.looked_count;
+  survey.looked_count = given.inspected_count;
   survey.seen_count = given.seen_count;
   survey.object_count = given.object_count;
   survey.mixed_count = given.mixed_count;
@@ -85,7 +85,7 @@ StippleEffectsSurvey surveyTo(const EffectsSurvey& seen) {
   StippleEffectsSurvey made = {};
   made.sh_degree = static_cast<uint32_t>(seen.sh_degree);
   made.splat_count = seen.splat_count;
-  made.looked_count = seen.looked_count;
+  made.inspected_count = seen.looked_count;
   made.seen_count = seen.seen_count;
   made.object_count = seen.object_count;
   made.mixed_count = seen.mixed_count;

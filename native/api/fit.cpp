@@ -50,8 +50,7 @@ namespace stipple::api {
 
 std::shared_ptr<const ViewSource> sourceOf(const StippleViews& views) {
   if (!views.source) {
-    fail(ErrorCode::kInvalidArgument,
-         "the views are cameras without images; a fit needs images");
+    fail(ErrorCode::kInvalidArgument, "the views are cameras without images; a fit needs images");
   }
   return views.source;
 }

@@ -1,4 +1,5 @@
 #include <cstring>
+#include <iterator>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -54,8 +55,8 @@ constexpr FieldPair kFields[] = {
     pairOf<&C::iterations, &O::iterations>("iterations"),
     pairOf<&C::max_splats, &O::max_splats>("max_splats"),
     pairOf<&C::start_splats, &O::start_splats>("start_splats"),
-    pairOf<&C::least_anchors, &O::least_anchors>("least_anchors"),
-    pairOf<&C::most_anchors, &O::most_anchors>("most_anchors"),
+    pairOf<&C::min_anchors, &O::least_anchors>("min_anchors"),
+    pairOf<&C::max_anchors, &O::most_anchors>("max_anchors"),
     pairOf<&C::gaussians_per_anchor, &O::gaussians_per_anchor>("gaussians_per_anchor"),
     pairOf<&C::sh_degree, &O::sh_degree>("sh_degree"),
     pairOf<&C::antialias, &O::antialias>("antialias"),
@@ -67,7 +68,7 @@ constexpr FieldPair kFields[] = {
     pairOf<&C::seed, &O::seed>("seed"),
     pairOf<&C::ssim_share, &O::ssim_share>("ssim_share"),
     pairOf<&C::measure_interval, &O::measure_interval>("measure_interval"),
-    pairOf<&C::picture_bytes, &O::picture_bytes>("picture_bytes"),
+    pairOf<&C::image_bytes, &O::picture_bytes>("image_bytes"),
     pairOf<&C::max_bytes, &O::max_bytes>("max_bytes"),
     pairOf<&C::checkpoint_path_utf8, &O::checkpoint_path>("checkpoint_path"),
     pairOf<&C::checkpoint_interval, &O::checkpoint_interval>("checkpoint_interval"),
@@ -115,8 +116,11 @@ StippleFitOptionInfo infoOf(size_t index) {
   info.maximum = option.maximum;
   info.default_utf8 = defaultFitText(index);
   std::memcpy(info.presets_utf8, option.presets, sizeof(info.presets_utf8));
-  info.former_name_utf8 = option.former_name;
-  info.former_unit = option.former_unit;
+  static_assert(std::size(info.alias_units) == kFitAliasCount);
+  for (size_t i = 0; i < kFitAliasCount; ++i) {
+    info.aliases_utf8[i] = option.aliases[i].name;
+    info.alias_units[i] = option.aliases[i].unit;
+  }
   return info;
 }
 

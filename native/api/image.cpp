@@ -17,7 +17,7 @@ StippleStatus stipple_image_create(StippleContext* context, uint32_t width, uint
     require(image, "image");
     if (width < 1 || height < 1 || (channels != 1 && channels != 3 && channels != 4)) {
       fail(ErrorCode::kInvalidArgument,
-           "the picture is " + std::to_string(width) + " x " + std::to_string(height) + " with " +
+           "the image is " + std::to_string(width) + " x " + std::to_string(height) + " with " +
                std::to_string(channels) +
                " channels; sides of at least 1 and 1, 3 or 4 channels are allowed");
     }

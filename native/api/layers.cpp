@@ -45,8 +45,7 @@ StippleStatus stipple_layers_create(StippleContext* context, uint32_t width, uin
     require(combined, "combined");
     require(depth, "depth");
     require(layers, "layers");
-    context->state->requireMemory(MeshLayers::memoryBound(width, height),
-                                  "the layers of a picture");
+    context->state->requireMemory(MeshLayers::memoryBound(width, height), "the layers of an image");
     const size_t pixels = size_t{width} * height;
     withThreads(context->state->thread_count, [&] {
       *layers = new StippleLayers{

@@ -1,7 +1,7 @@
-#include "data/position_bounds.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
+#include "data/position_bounds.h"
 #include "io/mesh_file.h"
 #include "io/mesh_writer.h"
 #include "math/affine.h"

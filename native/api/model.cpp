@@ -48,8 +48,8 @@ StippleModelInfo infoFrom(const SplatModel& model) {
   out.kind = kind.number;
   out.kind_label = kind.label;
   out.sh_degree = static_cast<uint32_t>(info.sh_degree);
-  out.least_anchors = settings.minimum_learned_budget;
-  out.most_anchors = settings.maximum_learned_budget;
+  out.min_anchors = settings.minimum_learned_budget;
+  out.max_anchors = settings.maximum_learned_budget;
   const bool makes_several = settings.minimum_gaussians_per_anchor > 1;
   out.gaussians_per_anchor = makes_several ? settings.default_gaussians_per_anchor : 0;
   return out;

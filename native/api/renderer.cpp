@@ -56,7 +56,7 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     const ShotPasses passes = passesFrom(buffers);
     askForPasses(passes, settings.options);
     const RenderMemory memory = Renderer::memory(placed, view, settings);
-    renderer->context->requirePictureMemory(memory.sum(), "this picture of " + sizeText(view),
+    renderer->context->requirePictureMemory(memory.sum(), "this image of " + sizeText(view),
                                             memory.pair_bytes);
     *job = startJob(renderer->context, [shared = renderer->renderer, placed = std::move(placed),
                                         settings, view, passes](Progress& progress) {

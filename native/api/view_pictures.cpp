@@ -42,12 +42,12 @@ std::vector<float> copied(const float* values, size_t count) {
   return values ? std::vector<float>(values, values + count) : std::vector<float>();
 }
 
-ViewPicture pictureFrom(const StippleViewPicture& given, const Camera& camera) {
+ViewPicture pictureFrom(const StippleViewImage& given, const Camera& camera) {
   ViewPicture picture;
   picture.width = camera.width;
   picture.height = camera.height;
   const size_t pixels = size_t{camera.width} * camera.height;
-  takeRgba(&require(given.rgba, "picture->rgba"), picture);
+  takeRgba(&require(given.rgba, "image->rgba"), picture);
   picture.weights = copied(given.weights, pixels);
   picture.depth = copied(given.depth, pixels);
   forgetEmptyDepth(picture);
@@ -134,12 +134,12 @@ StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_spac
 }
 
 StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera,
-                                const StippleViewPicture* picture, const char* name_utf8) {
+                                const StippleViewImage* image, const char* name_utf8) {
   return guarded([&] {
     require(views, "views");
     const Camera seen_by = cameraFrom(camera);
-    const StippleViewPicture given = complete(picture, "picture");
-    const Transfer transfer = enumValue<Transfer>(given.transfer, 1, "picture->transfer");
+    const StippleViewImage given = complete(image, "image");
+    const Transfer transfer = enumValue<Transfer>(given.transfer, 1, "image->transfer");
     MemoryViewSource& source = writable(*views);
     const std::string name = name_utf8 ? name_utf8 : "view " + std::to_string(views->notes.size());
     // Before the arrays are made: an absurd size is refused as such.
@@ -151,7 +151,7 @@ StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera
     }
     constexpr uint64_t kBytesPerPixel = 9 * sizeof(float);
     views->context->requireMemory(uint64_t{seen_by.width} * seen_by.height * kBytesPerPixel,
-                                  "the picture of a view");
+                                  "the image of a view");
     ViewPicture made = pictureFrom(given, seen_by);
     convertColours(made, transfer, source.colourSpace());
     ViewNote note;
@@ -198,7 +198,7 @@ StippleStatus stipple_views_info(const StippleViews* views, StippleViewsInfo* in
     if (given.source) {
       out.colour_space = static_cast<uint32_t>(given.source->colourSpace());
       out.point_count = given.source->points().size();
-      out.has_pictures = 1;
+      out.has_images = 1;
     }
     deliver(info, out, "info");
   });
@@ -228,7 +228,7 @@ StippleStatus stipple_views_read(const StippleViews* views, uint64_t index,
     const StippleViewBuffers out = complete(buffers, "buffers");
     if (!views->source) {
       fail(ErrorCode::kUnsupported,
-           "the views are cameras alone (stipple_views_load); they have no pictures");
+           "the views are cameras alone (stipple_views_load); they have no images");
     }
     const Camera& camera = views->source->camera(index);
     const size_t pixels = size_t{camera.width} * camera.height;

@@ -53,7 +53,7 @@ StippleAccuracyMeasureOptions optionsOf(const Arguments& arguments) {
   stipple_accuracy_measure_options_init(&options);
   if (arguments.repetitions) options.repetitions = *arguments.repetitions;
   if (arguments.reference_pixels) options.reference_pixels = *arguments.reference_pixels;
-  if (arguments.seconds) options.most_seconds = *arguments.seconds;
+  if (arguments.seconds) options.max_seconds = *arguments.seconds;
   return options;
 }
 
@@ -100,7 +100,7 @@ AccuracyReport measuredVolume(const Context& context, const Arguments& arguments
   StippleVolumeAccuracyOptions options;
   stipple_volume_accuracy_options_init(&options);
   if (arguments.repetitions) options.repetitions = *arguments.repetitions;
-  if (arguments.seconds) options.most_seconds = *arguments.seconds;
+  if (arguments.seconds) options.max_seconds = *arguments.seconds;
   const auto job =
       make<Job>(stipple_volume_accuracy_start, context.get(), clouds.instances(), clouds.count(),
                 &finest, const_cast<const StippleVolumeAccuracyOptions*>(&options));
@@ -119,7 +119,7 @@ AccuracyReport reportOf(const Context& context, const Arguments& arguments) {
 
 void printHead(const StippleAccuracyReportInfo& info) {
   const auto splats = static_cast<unsigned long long>(info.splat_count);
-  if (info.subject == STIPPLE_ACCURACY_OF_PICTURE) {
+  if (info.subject == STIPPLE_ACCURACY_OF_IMAGE) {
     std::printf("%u x %u pixels, %llu of them compared, %llu splats, %u threads\n", info.width,
                 info.height, static_cast<unsigned long long>(info.compared_pixels), splats,
                 info.thread_count);

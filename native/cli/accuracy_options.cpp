@@ -19,7 +19,7 @@ void addAccuracyOptions(CLI::App& command, AccuracyArguments& arguments) {
   command
       .add_option("--accuracy", arguments.level,
                   "draft; preview; final; rays (final with exact projection and order); double "
-                  "(final in double precision); reference (rays without any limit, the yardstick)")
+                  "(final in double precision); reference (rays without any limit)")
       ->check(CLI::IsMember({"draft", "preview", "final", "rays", "double", "reference"}))
       ->capture_default_str();
   command
@@ -39,7 +39,7 @@ void addAccuracyOptions(CLI::App& command, AccuracyArguments& arguments) {
   command.add_option("--degree", arguments.degree, "Harmonics above are left out, 0 to 4");
   command.add_option("--precision", arguments.precision, "Default: of the accuracy")
       ->check(CLI::IsMember({"float", "double"}));
-  command.add_option("--least-alpha", arguments.least_alpha,
+  command.add_option("--min-alpha,--least-alpha", arguments.min_alpha,
                      "Fainter splats are skipped at a pixel, above 0 and below 1");
   command.add_option("--share", arguments.share,
                      "Of the splats, above 0 to 1: they are merged into so many");
@@ -72,7 +72,7 @@ StippleAccuracy accuracyOf(const AccuracyArguments& arguments) {
   if (arguments.antialiasing == "mip") accuracy.antialiasing = STIPPLE_SAMPLING_MIP;
   if (arguments.antialiasing == "samples") accuracy.antialiasing = STIPPLE_SAMPLING_SAMPLES;
   if (arguments.degree) accuracy.sh_degree_limit = *arguments.degree;
-  if (arguments.least_alpha) accuracy.least_alpha = *arguments.least_alpha;
+  if (arguments.min_alpha) accuracy.min_alpha = *arguments.min_alpha;
   if (arguments.share) accuracy.budget_share = *arguments.share;
   check(stipple_accuracy_check(&accuracy));
   return accuracy;

@@ -14,7 +14,7 @@ struct AccuracyArguments {
   std::string level = "final";
   std::string order, projection, antialiasing, precision;
   std::optional<uint32_t> samples, degree;
-  std::optional<double> least_alpha, share;
+  std::optional<double> min_alpha, share;
 };
 
 void addAccuracyOptions(CLI::App& command, AccuracyArguments& arguments);

@@ -59,7 +59,7 @@ void addCompare(CLI::App& app, const Context& context) {
     const FileKind kind = fileKind(arguments->a);
     if (kind != fileKind(arguments->b) || (kind != FileKind::kImage && kind != FileKind::kSplats)) {
       throw Failure("'" + arguments->a + "' and '" + arguments->b +
-                    "' cannot be compared; two pictures or two splat files are expected");
+                    "' cannot be compared; two images or two splat files are expected");
     }
     const Report report = kind == FileKind::kImage
                               ? compareImages(context, arguments->a, arguments->b)

@@ -13,12 +13,12 @@ namespace {
 
 struct Arguments {
   std::string in, out, dataset, strategy = "adaptive";
-  std::optional<int64_t> gaussians;
+  std::optional<int64_t> max_splats;
   int64_t events = 1;
   int64_t downscale = 1;
   int64_t holdout = 0;
   uint64_t seed = 0;
-  double picture_mib = 1024;
+  double image_mib = 1024;
 };
 
 uint64_t countOf(const Cloud& cloud) {
@@ -35,11 +35,13 @@ void densify(const Context& context, const Arguments& arguments) {
   StippleDensifyOptions options;
   stipple_densify_options_init(&options);
   options.strategy_utf8 = arguments.strategy.c_str();
-  if (arguments.gaussians) options.max_splats = counted(*arguments.gaussians, "--gaussians");
+  if (arguments.max_splats) {
+    options.max_splats = counted(*arguments.max_splats, "--max-splats");
+  }
   options.event_count = counted32(arguments.events, "--events");
   options.holdout = counted32(arguments.holdout, "--holdout", 0);
   options.seed = arguments.seed;
-  options.picture_bytes = bytesOfMebibytes(arguments.picture_mib);
+  options.image_bytes = bytesOfMebibytes(arguments.image_mib);
   const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
   const Views views = openViews(context, arguments.dataset, arguments.downscale);
   const auto job =
@@ -70,7 +72,7 @@ void addDensify(CLI::App& app, const Context& context) {
       ->required();
   command->add_option("--strategy", to.strategy, "How splats are added and removed")
       ->capture_default_str();
-  command->add_option("--gaussians", to.gaussians,
+  command->add_option("--max-splats,--gaussians", to.max_splats,
                       "Maximum number of splats; default: twice as many as there are");
   command->add_option("--events", to.events, "How often splats multiply and go")
       ->capture_default_str();
@@ -79,7 +81,7 @@ void addDensify(CLI::App& app, const Context& context) {
   command->add_option("--holdout", to.holdout, "Every N-th view is left out; 0: none")
       ->capture_default_str();
   command
-      ->add_option("--picture-memory", to.picture_mib,
+      ->add_option("--image-memory,--picture-memory", to.image_mib,
                    "MiB of images that are kept; others are read again whenever they are wanted")
       ->capture_default_str();
   command->add_option("--seed", to.seed)->capture_default_str();

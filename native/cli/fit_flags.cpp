@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <vector>
 
@@ -91,16 +92,18 @@ void FitFlags::addTo(CLI::App& command) {
       command.add_flag_function(names, store, helpOf(info))->group(groupOf(info));
       continue;
     }
-    if (*info.former_name_utf8 && info.former_unit == 1) {
-      names += "," + flagName(info.former_name_utf8);
+    std::string scaled;
+    for (size_t j = 0; j < std::size(info.aliases_utf8) && *info.aliases_utf8[j]; ++j) {
+      const bool is_scaled = info.alias_units[j] != 1;
+      (is_scaled ? scaled : names) += "," + flagName(info.aliases_utf8[j]);
+      if (is_scaled && flag.scaled_name.empty()) flag.scaled_name = flagName(info.aliases_utf8[j]);
     }
     CLI::Option* option = command.add_option(names, flag.text, helpOf(info));
     option->group(groupOf(info))->type_name(typeOf(info));
     if (info.kind == STIPPLE_FIT_OPTION_CHOICE) option->check(CLI::IsMember(wordsOf(info)));
     if (!isPreset(info) && *info.default_utf8) option->default_str(info.default_utf8);
-    if (*info.former_name_utf8 && info.former_unit != 1) {
-      flag.former_name = flagName(info.former_name_utf8);
-      command.add_option(flag.former_name, flag.former_text)->group("");  // hidden, and understood
+    if (!scaled.empty()) {  // hidden, and understood
+      command.add_option(scaled.substr(1), flag.scaled_text)->group("");
     }
   }
   command
@@ -141,11 +144,11 @@ StippleFitOptions FitFlags::options(const std::string& checkpoint) const {
     const auto set = [&](const std::string& name, const std::optional<std::string>& text) {
       if (text) check(stipple_fit_options_set(&options, name.c_str(), text->c_str()));
     };
-    set(each.former_name, each.former_text);
+    set(each.scaled_name, each.scaled_text);
     set(each.name, each.text);
   }
-  if (!flag("least_anchors").isGiven()) {
-    options.least_anchors = std::min(options.least_anchors, options.most_anchors);
+  if (!flag("min_anchors").isGiven()) {
+    options.min_anchors = std::min(options.min_anchors, options.max_anchors);
   }
   options.checkpoint_path_utf8 = checkpoint.c_str();
   return options;

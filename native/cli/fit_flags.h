@@ -25,11 +25,11 @@ class FitFlags {
     StippleFitOptionInfo info;
     std::string name;  ///< with --
     std::optional<std::string> text;
-    /// Where the option's former name counted in another unit.
-    std::string former_name;
-    std::optional<std::string> former_text;
+    /// The first other name of the option that counts in another unit, and what was given for any.
+    std::string scaled_name;
+    std::optional<std::string> scaled_text;
 
-    bool isGiven() const { return text || former_text; }
+    bool isGiven() const { return text || scaled_text; }
   };
 
   const Flag& flag(const char* name) const;

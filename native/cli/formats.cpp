@@ -40,7 +40,7 @@ std::string formatOfEnding(const std::string& path) {
   std::string found;
   size_t longest = 0;
   for (const StippleFormatInfo& format : splatFormats()) {
-    for (const std::string& ending : words(format.endings)) {
+    for (const std::string& ending : words(format.extensions)) {
       if (ending.size() > longest && name.ends_with(ending)) {
         found = format.name;
         longest = ending.size();
@@ -58,7 +58,7 @@ std::string splatEndings(bool written) {
   std::vector<std::string> endings;
   for (const StippleFormatInfo& format : splatFormats()) {
     if (written && format.can_write == 0) continue;
-    for (const std::string& ending : words(format.endings)) endings.push_back(ending);
+    for (const std::string& ending : words(format.extensions)) endings.push_back(ending);
   }
   std::string text;
   for (size_t i = 0; i < endings.size(); ++i) {

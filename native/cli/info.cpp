@@ -229,7 +229,7 @@ void addInfo(CLI::App& app, const Context& context) {
   CLI::App* command = app.add_subcommand("info", "What a file holds");
   command
       ->add_option("file", arguments->path,
-                   "Splats, mesh, model, cameras, a data set's folder, volume or picture")
+                   "Splats, mesh, model, cameras, a data set's folder, volume or image")
       ->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback(

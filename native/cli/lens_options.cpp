@@ -61,7 +61,7 @@ void addLensOptions(CLI::App& command, LensArguments& arguments) {
 
 LensSettings::LensSettings(const Context& context, const CameraArguments& camera_arguments,
                            const LensArguments& arguments, StippleCamera& camera)
-    : lens_(sized<StippleLens>()),
+    : aperture_(sized<StippleAperture>()),
       shutter_(sized<StippleShutter>()),
       samples_(arguments.samples.value_or(0)) {
   takeModel(arguments, camera);
@@ -71,11 +71,11 @@ LensSettings::LensSettings(const Context& context, const CameraArguments& camera
   if (arguments.aperture_radius != 0 && arguments.focus_distance == 0) {
     throw Failure("--aperture needs --focus-distance, in metres");
   }
-  lens_.aperture_radius = arguments.aperture_radius;
-  lens_.focus_distance = arguments.focus_distance;
-  lens_.blades = arguments.blades;
-  lens_.rotation = arguments.rotation * kPi / 180;
-  lens_.ratio = arguments.ratio;
+  aperture_.aperture_radius = arguments.aperture_radius;
+  aperture_.focus_distance = arguments.focus_distance;
+  aperture_.blades = arguments.blades;
+  aperture_.rotation = arguments.rotation * kPi / 180;
+  aperture_.ratio = arguments.ratio;
   if (!arguments.moves_to) return;
   CameraArguments last = camera_arguments;
   last.view = *arguments.moves_to;
@@ -87,7 +87,7 @@ LensSettings::LensSettings(const Context& context, const CameraArguments& camera
 }
 
 void LensSettings::putInto(StippleRenderOptions& options) const {
-  if (lens_.aperture_radius != 0) options.lens = &lens_;
+  if (aperture_.aperture_radius != 0) options.aperture = &aperture_;
   if (!cameras_.empty()) options.shutter = &shutter_;
   options.samples = samples_;
 }

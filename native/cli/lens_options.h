@@ -38,7 +38,7 @@ class LensSettings {
   void putInto(StippleRenderOptions& options) const;
 
  private:
-  StippleLens lens_;
+  StippleAperture aperture_;
   StippleShutter shutter_;
   std::vector<double> cameras_;
   uint32_t samples_;

@@ -46,18 +46,20 @@ void printAsJson() {
   std::printf("[");
   const char* separator = "";
   // The texts are names of the library's own, without anything that JSON would escape.
+  // "endings" is what "extensions" was called before; programs that read it go on working.
   const std::vector<StippleFormatInfo> formats = splatFormats();
   for (size_t i = 0; i < formats.size(); ++i) {
     const StippleFormatInfo& format = formats[i];
     const std::string keeps = joined(kept(format), "\", \"");
     std::printf(
-        "%s{\"name\": \"%s\", \"title\": \"%s\", \"endings\": \"%s\", \"can_read\": %s, "
-        "\"can_write\": %s, \"max_sh_degree\": %u, \"frame\": \"%s\", \"keeps\": [%s], "
+        "%s{\"name\": \"%s\", \"title\": \"%s\", \"extensions\": \"%s\", \"endings\": \"%s\", "
+        "\"can_read\": %s, \"can_write\": %s, \"max_sh_degree\": %u, \"frame\": \"%s\", \"keeps\": "
+        "[%s], "
         "\"bytes_per_splat\": %.1f}",
-        separator, format.name, format.title, format.endings, format.can_read ? "true" : "false",
-        format.can_write ? "true" : "false", static_cast<unsigned>(format.max_sh_degree),
-        frameName(format.frame).c_str(), keeps.empty() ? "" : ('"' + keeps + '"').c_str(),
-        bytesOfSplat(i));
+        separator, format.name, format.title, format.extensions, format.extensions,
+        format.can_read ? "true" : "false", format.can_write ? "true" : "false",
+        static_cast<unsigned>(format.max_sh_degree), frameName(format.frame).c_str(),
+        keeps.empty() ? "" : ('"' + keeps + '"').c_str(), bytesOfSplat(i));
     separator = ", ";
   }
   std::printf("]\n");
@@ -75,7 +77,7 @@ void addFormats(CLI::App& app) {
     for (size_t i = 0; i < formats.size(); ++i) {
       const StippleFormatInfo& format = formats[i];
       std::printf("%-32s %-16s %-16s harmonics to degree %u, frame %s", format.title,
-                  format.endings, access(format), static_cast<unsigned>(format.max_sh_degree),
+                  format.extensions, access(format), static_cast<unsigned>(format.max_sh_degree),
                   frameName(format.frame).c_str());
       const std::string keeps = joined(kept(format), ", ");
       if (!keeps.empty()) std::printf(", keeps %s", keeps.c_str());

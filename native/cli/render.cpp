@@ -70,7 +70,7 @@ class Pass {
 
 void render(const Context& context, const Arguments& arguments) {
   if (fileKind(arguments.out) != FileKind::kImage) {
-    throw Failure("'" + arguments.out + "' is not a picture; .png or .exr is expected");
+    throw Failure("'" + arguments.out + "' is not an image; .png or .exr is expected");
   }
   StippleCamera camera = cameraOf(context, arguments.camera);
   const LensSettings lens(context, arguments.camera, arguments.lens, camera);
@@ -124,7 +124,7 @@ void addRender(CLI::App& app, const Context& context) {
                    "Write composited (display) or scene linear values as they are, whatever the "
                    "format")
       ->check(CLI::IsMember({"display", "linear"}));
-  command->add_option("--lowpass", arguments->low_pass, "Default: as the file says")
+  command->add_option("--low-pass,--lowpass", arguments->low_pass, "Default: as the file says")
       ->check(CLI::IsMember({"classic", "mip", "none"}));
   command->add_option("--blend", arguments->blend, "as-trained, or scene-linear")
       ->check(CLI::IsMember({"as-trained", "scene-linear"}))
@@ -142,7 +142,7 @@ void addRender(CLI::App& app, const Context& context) {
   command->add_option("--depth", arguments->depth, "Also the depths, metres, into this .exr");
   command->add_option("--normal", arguments->normal,
                       "Also the normals, in the world, into this .exr");
-  command->add_option("--index", arguments->index,
+  command->add_option("--object-index,--index", arguments->index,
                       "Also which file shows, from 1 on, 0 where none does, into this .exr");
   command->add_option("-o,--out", arguments->out, ".png or .exr")->required();
   command->callback([arguments, &context] { render(context, *arguments); });

@@ -52,7 +52,7 @@ void holdToMemory(FitOptions& options, const ViewSource& views) {
   options.picture_bytes = std::min(options.picture_bytes, limit / 2);
   const auto refuse = [&](uint64_t needed, const std::string& what) {
     fail(ErrorCode::kMemoryLimit, "options->max_bytes is " + std::to_string(limit) + "; " + what +
-                                      " and the pictures at work take about " +
+                                      " and the images at work take about " +
                                       std::to_string(needed));
   };
   if (options.model == FitKind::kField) {

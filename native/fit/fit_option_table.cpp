@@ -60,7 +60,7 @@ const FitOption kTable[] = {
      .models = kOfExplicit,
      .stored_of = kOfExplicit,
      .not_above = &FitOptions::max_splats,
-     .former_name = "start"},
+     .aliases = {{"start"}}},
     {.name = "max_splats",
      .kind = FitOptionKind::kCount,
      .member = member<&FitOptions::max_splats>(),
@@ -70,8 +70,8 @@ const FitOption kTable[] = {
      .minimum = 1,
      .maximum = kMaxSplats,
      .presets = {{"50000", "150000", "500000"}, {"50000", "150000", "500000"}},
-     .former_name = "gaussians"},
-    {.name = "least_anchors",
+     .aliases = {{"gaussians"}}},
+    {.name = "min_anchors",
      .kind = FitOptionKind::kCount,
      .member = member<&FitOptions::least_anchors>(),
      .help = "This is the smallest budget of anchors that is trained.",
@@ -80,8 +80,10 @@ const FitOption kTable[] = {
      .minimum = 1,
      .maximum = kMaxAnchors,
      .not_above = &FitOptions::most_anchors,
-     .presets = {{"1024", "1024", "1024"}, {"1024", "1024", "1024"}}},
-    {.name = "most_anchors",
+     .presets = {{"1024", "1024", "1024"}, {"1024", "1024", "1024"}},
+     .stored_name = "least_anchors",
+     .aliases = {{"least_anchors"}}},
+    {.name = "max_anchors",
      .kind = FitOptionKind::kCount,
      .member = member<&FitOptions::most_anchors>(),
      .help = "This is the largest budget of anchors that is trained.",
@@ -90,7 +92,8 @@ const FitOption kTable[] = {
      .minimum = 1,
      .maximum = kMaxAnchors,
      .presets = {{"8192", "16384", "32768"}, {"8192", "16384", "32768"}},
-     .former_name = "anchors"},
+     .stored_name = "most_anchors",
+     .aliases = {{"most_anchors"}, {"anchors"}}},
     {.name = "gaussians_per_anchor",
      .kind = FitOptionKind::kCount,
      .member = member<&FitOptions::gaussians_per_anchor>(),
@@ -170,22 +173,20 @@ const FitOption kTable[] = {
      .member = member<&FitOptions::measure_interval>(),
      .help = "The result is measured after every so many steps; 0: after a twentieth of the fit, "
              "at least 100."},
-    {.name = "picture_bytes",
+    {.name = "image_bytes",
      .kind = FitOptionKind::kBytes,
      .member = member<&FitOptions::picture_bytes>(),
      .help = "Images up to this size stay in memory; others are read again whenever they are "
              "wanted.",
      .stored_of = kOfNoModel,
-     .former_name = "picture_memory",
-     .former_unit = kMebibyte},
+     .aliases = {{"image_memory", kMebibyte}, {"picture_bytes"}, {"picture_memory", kMebibyte}}},
     {.name = "max_bytes",
      .kind = FitOptionKind::kBytes,
      .member = member<&FitOptions::max_bytes>(),
      .help = "The whole fit takes about this memory at most: fewer splats and images are kept; 0: "
              "no limit.",
      .stored_of = kOfNoModel,
-     .former_name = "memory",
-     .former_unit = kMebibyte},
+     .aliases = {{"memory", kMebibyte}}},
     {.name = "checkpoint_path",
      .kind = FitOptionKind::kText,
      .member = member<&FitOptions::checkpoint_path>(),
@@ -196,7 +197,7 @@ const FitOption kTable[] = {
      .member = member<&FitOptions::checkpoint_interval>(),
      .help = "A checkpoint is saved after every so many steps; 0: by time alone.",
      .stored_of = kOfNoModel,
-     .former_name = "checkpoint_every"},
+     .aliases = {{"checkpoint_every"}}},
     {.name = "checkpoint_seconds",
      .kind = FitOptionKind::kNumber,
      .member = member<&FitOptions::checkpoint_seconds>(),
@@ -226,9 +227,12 @@ const FitOption* findFitOption(std::string_view name, double* unit) {
     return true;
   };
   for (const FitOption& option : kTable) {
-    const bool is_former = *option.former_name && is(option.former_name);
-    if (!is_former && !is(option.name)) continue;
-    if (unit) *unit = is_former ? option.former_unit : 1;
+    double found = is(option.name) ? 1 : 0;
+    for (const FitOptionAlias& alias : option.aliases) {
+      if (*alias.name && is(alias.name)) found = alias.unit;
+    }
+    if (found == 0) continue;
+    if (unit) *unit = found;
     return &option;
   }
   return nullptr;

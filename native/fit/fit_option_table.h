@@ -36,11 +36,19 @@ struct FitMember {
   void (*set)(FitOptions&, const FitValue&) = nullptr;
 };
 
+constexpr size_t kFitAliasCount = 3;
+
+/// Another name of an option: a former one, or one that counts in another unit.
+struct FitOptionAlias {
+  const char* name = "";  ///< empty: there is none
+  double unit = 1;        ///< how much 1 is under this name
+};
+
 /// An option of a fit: the one place that says what it is. Checks, presets, the settings of
 /// checkpoints and reports, what a resumed fit must share, the flags and help of the tool and
 /// stipple_fit_option_info are made from it.
 struct FitOption {
-  /// In settings and in StippleFitOptions; the tool has it with - for _.
+  /// In StippleFitOptions and in settings; the tool has it with - for _.
   const char* name;
   FitOptionKind kind;
   FitMember member;
@@ -58,16 +66,18 @@ struct FitOption {
   bool is_stored_as_word = false;
   /// As texts; null: the preset leaves it as it is.
   const char* presets[kFitKindCount][kFitQualityCount] = {};
-  /// What it was once called, and how much 1 was then; settings and flags may still say so.
-  const char* former_name = "";
-  double former_unit = 1;
+  /// Settings keep this name, where it is not that of the option: checkpoints compare settings as
+  /// texts.
+  const char* stored_name = "";
+  /// Names that settings and flags may also use, first those of today.
+  FitOptionAlias aliases[kFitAliasCount] = {};
 };
 
 /// All options, in the order in which settings have them.
 std::span<const FitOption> fitOptionTable();
 
-/// The option of this name, or null. Accepts former names, - for _, and -- in front, as flags
-/// have them. Out: unit, 1, or how much 1 of the former name is.
+/// The option of this name, or null. Accepts other names of options, - for _, and -- in front, as
+/// flags have them. Out: unit: how much 1 is under the name.
 const FitOption* findFitOption(std::string_view name, double* unit = nullptr);
 
 /// "fast, balanced, fine" and so on: in what presets are chosen.

@@ -85,7 +85,8 @@ std::string settingsJson(const FitSettings& settings) {
   };
   for (const FitOption& option : fitOptionTable()) {
     if (!isStored(option, settings.options.model)) continue;
-    add(option.name, jsonOf(option, option.member.get(settings.options)));
+    add(*option.stored_name ? option.stored_name : option.name,
+        jsonOf(option, option.member.get(settings.options)));
   }
   add(kViewCount, std::to_string(settings.view_count));
   add(kViewsKey, quoted(settings.views_key));

@@ -188,8 +188,8 @@ void writeImageFile(const Image& image, const std::string& path, bool keep_value
   const std::string ending = lowerEnding(path);
   if (ending == ".png") return writePng(image, path, keep_values);
   if (ending == ".exr") return writeExr(image, path, keep_values);
-  fail(ErrorCode::kUnsupported, path + " cannot be written as a picture: its ending is '" + ending +
-                                    "'; .png and .exr are supported");
+  fail(ErrorCode::kUnsupported, path + " cannot be written as an image: its extension is '" +
+                                    ending + "'; .png and .exr are supported");
 }
 
 }  // namespace stipple

@@ -44,7 +44,7 @@ fs::path findLibrary() {
 
 [[noreturn]] void failUnavailable(const std::string& why) {
   fail(ErrorCode::kUnavailable, std::string(kFileName) +
-                                    ", which reads and writes pictures, meshes, volumes and packed "
+                                    ", which reads and writes images, meshes, volumes and packed "
                                     "splats, cannot be loaded: " +
                                     why);
 }

@@ -78,8 +78,8 @@ TriMesh readMeshFile(const std::string& path) {
     const InputFile file(path);
     const std::string ending = lowerEnding(path);
     if (ending != ".gltf" && ending != ".glb") {
-      fail(ErrorCode::kUnsupported, path + " cannot be read as a mesh: its ending is '" + ending +
-                                        "'; .gltf and .glb are supported");
+      fail(ErrorCode::kUnsupported, path + " cannot be read as a mesh: its extension is '" +
+                                        ending + "'; .gltf and .glb are supported");
     }
     if (file.size() == 0) fail(ErrorCode::kFormat, path + " is empty");
   }

@@ -54,8 +54,8 @@ void writeMeshFile(const TriMesh& mesh, const std::string& path) {
   } else if (ending == ".glb") {
     writeGlb(mesh, path);
   } else {
-    fail(ErrorCode::kUnsupported, path + " cannot be written as a mesh: its ending is '" + ending +
-                                      "'; .ply and .glb are supported");
+    fail(ErrorCode::kUnsupported, path + " cannot be written as a mesh: its extension is '" +
+                                      ending + "'; .ply and .glb are supported");
   }
 }
 

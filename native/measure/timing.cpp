@@ -18,7 +18,7 @@ void validate(const Timing& timing) {
     char seconds[32];
     std::snprintf(seconds, sizeof(seconds), "%.3g", timing.most_seconds);
     fail(ErrorCode::kInvalidArgument,
-         std::string("options->most_seconds is ") + seconds + " s; more than 0 is allowed");
+         std::string("options->max_seconds is ") + seconds + " s; more than 0 is allowed");
   }
 }
 

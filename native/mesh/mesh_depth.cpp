@@ -153,8 +153,7 @@ void drawMeshDepth(std::span<const MeshInstance> instances, const Camera& camera
   const size_t pixel_count = static_cast<size_t>(camera.width) * camera.height;
   if (depth.size() != pixel_count) {
     fail(ErrorCode::kInvalidArgument, "depth has room for " + std::to_string(depth.size()) +
-                                          " pixels; the picture has " +
-                                          std::to_string(pixel_count));
+                                          " pixels; the image has " + std::to_string(pixel_count));
   }
   for (size_t i = 0; i < instances.size(); ++i) {
     const std::string name = "instance " + std::to_string(i) + ": matrix";

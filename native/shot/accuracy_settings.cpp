@@ -30,9 +30,9 @@ constexpr AccuracyKnob kKnobs[] = {
      "No bound: view-dependent colour above this degree is left out, splat by splat at most what "
      "its own coefficients there sum up to."},
     {"precision", "Precision", true,
-     "Float: within 1e-4 of the largest colour of the same picture in double, where no threshold "
+     "Float: within 1e-4 of the largest colour of the same image in double, where no threshold "
      "falls on the other side. Double: rounding of the result, 6e-8."},
-    {"least_alpha", "Contribution Cut-off", true,
+    {"min_alpha", "Contribution Cut-off", true,
      "Each splat below the cut-off x takes at most x of the pixel's colour with it; N of them in a "
      "pixel at most 1 - (1 - x)^N of the largest colour."},
     {"budget_share", "Share of Splats", false,
@@ -66,7 +66,7 @@ void requireKnobs(const AccuracySettings& a, const std::string& name) {
            "1 to 16 is allowed");
   }
   if (!(a.least_alpha > 0 && a.least_alpha < 1)) {
-    refuse(field("least_alpha") + " is " + numberText(a.least_alpha),
+    refuse(field("min_alpha") + " is " + numberText(a.least_alpha),
            "a number above 0 and below 1 is allowed");
   }
   if (!(a.budget_share > 0 && a.budget_share <= 1)) {

@@ -86,8 +86,9 @@ void requireDerivative(const ShotSettings& settings, const Instances& instances)
     refuse(methodText(settings.method) + "; derivatives have 0 (tiled) only");
   }
   if (isSampled(settings.sampling)) {
-    refuse("options has an aperture, a shutter or samples; derivatives are those of one sharp "
-           "image");
+    refuse(
+        "options has an aperture, a shutter or samples; derivatives are those of one sharp "
+        "image");
   }
   if (settings.options.surface.depth || settings.splat_light) {
     refuse("options has a surface or a splat_light; derivatives are those of splats alone");
@@ -98,7 +99,7 @@ void requireDerivative(const ShotSettings& settings, const Instances& instances)
   }
   if (settings.linearise) {
     refuse(
-        "options->output_colour is 0 (scene linear), which converts the composited picture; "
+        "options->output_colour is 0 (scene linear), which converts the composited image; "
         "derivatives are those of 1 (composited)");
   }
 }

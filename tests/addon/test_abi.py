@@ -81,10 +81,11 @@ def c_functions(header):
 
 def ctype_of(text, enums):
     """The ctypes type that a C type of the header must have."""
-    plain = {'void': None, 'constchar*': c_char_p, 'constchar**': POINTER(c_char_p), 'uint32_t': c_uint32, 'uint64_t': c_uint64,
-             'constfloat*': POINTER(c_float), 'float*': POINTER(c_float), 'constdouble*': POINTER(c_double),
-             'double*': POINTER(c_double), 'double': c_double, 'float': c_float, 'uint32_t*': POINTER(c_uint32),
-             'uint64_t*': POINTER(c_uint64), 'uint8_t*': POINTER(c_uint8), 'constuint8_t*': POINTER(c_uint8)}
+    plain = {'void': None, 'constchar*': c_char_p, 'constchar**': POINTER(c_char_p), 'uint32_t': c_uint32,
+             'uint64_t': c_uint64, 'constfloat*': POINTER(c_float), 'float*': POINTER(c_float),
+             'constdouble*': POINTER(c_double), 'double*': POINTER(c_double), 'double': c_double, 'float': c_float,
+             'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'uint8_t*': POINTER(c_uint8),
+             'constuint8_t*': POINTER(c_uint8)}
     if text in plain:
         return plain[text]
     if text in enums:
@@ -128,13 +129,13 @@ def test_structs_match(header, c_layout):
 
 def test_field_kinds_match(header):
     """Sizes alone do not tell a float from an integer, or what a pointer points to."""
-    kinds = {'uint32_t': c_uint32, 'uint64_t': c_uint64, 'int64_t': ctypes.c_int64, 'double': c_double, 'float': c_float,
-             'char': ctypes.c_char,
+    kinds = {'uint32_t': c_uint32, 'uint64_t': c_uint64, 'int64_t': ctypes.c_int64, 'double': c_double,
+             'float': c_float, 'char': ctypes.c_char,
              'const float*': POINTER(c_float), 'float*': POINTER(c_float), 'const uint32_t*': POINTER(c_uint32),
              'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
              'const StippleCloud*': c_void_p, 'const StippleGrade*': POINTER(structs.StippleGrade),
              'const StippleMesh*': c_void_p, 'const char*': c_char_p,
-             'const double*': POINTER(c_double), 'const StippleLens*': POINTER(structs.StippleLens),
+             'const double*': POINTER(c_double), 'const StippleAperture*': POINTER(structs.StippleAperture),
              'const StippleShutter*': POINTER(structs.StippleShutter),
              'const StippleAccuracy*': POINTER(structs.StippleAccuracy),
              'const StippleEffectsSurvey*': POINTER(structs.StippleEffectsSurvey),

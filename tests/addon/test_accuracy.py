@@ -52,11 +52,12 @@ def test_levels_are_what_they_say(library, renderer, cloud):
     final = drawn(renderer, cloud, accuracy(library))
     assert np.array_equal(final, drawn(renderer, cloud))
     reference = drawn(renderer, cloud, accuracy(library, AccuracyLevel.REFERENCE))
-    assert np.array_equal(reference, drawn(renderer, cloud, method=RenderMethod.YARDSTICK))
+    assert np.array_equal(reference, drawn(renderer, cloud, method=RenderMethod.RAYS_UNLIMITED))
     errors = [np.abs(drawn(renderer, cloud, accuracy(library, level)) - reference).mean()
               for level in (AccuracyLevel.DRAFT, AccuracyLevel.PREVIEW, AccuracyLevel.FINAL)]
     assert errors[0] > errors[1] > errors[2] > 0
-    assert [accuracy_level_name(library, level) for level in AccuracyLevel] == ['draft', 'preview', 'final', 'reference']
+    assert [accuracy_level_name(library, level) for level in AccuracyLevel] == ['draft', 'preview', 'final',
+                                                                                'reference']
 
 
 def test_double_is_the_reference_of_the_tiled_renderer(library, renderer, cloud):
@@ -68,14 +69,15 @@ def test_double_is_the_reference_of_the_tiled_renderer(library, renderer, cloud)
 def test_every_combination_draws_what_its_double_draws(library, renderer, cloud):
     combinations = itertools.product(SplatOrder, Projection, (1 / 255, 0.05, 1e-6), (0, 4), (1.0, 0.5),
                                      (Sampling.AS_TRAINED, Sampling.MIP, Sampling.SAMPLES))
-    for order, projection, least_alpha, degree, share, sampling in combinations:
-        knobs = dict(order=order, projection=projection, least_alpha=least_alpha, sh_degree_limit=degree,
-                     budget_share=share, antialiasing=sampling, samples_per_side=2 if sampling == Sampling.SAMPLES else 1)
+    for order, projection, min_alpha, degree, share, sampling in combinations:
+        knobs = dict(order=order, projection=projection, min_alpha=min_alpha, sh_degree_limit=degree,
+                     budget_share=share, antialiasing=sampling,
+                     samples_per_side=2 if sampling == Sampling.SAMPLES else 1)
         picture = drawn(renderer, cloud, accuracy(library, **knobs))
         double = drawn(renderer, cloud, accuracy(library, precision=Precision.DOUBLE, **knobs))
         assert np.isfinite(picture).all() and picture[..., 3].min() >= 0 and picture[..., 3].max() <= 1, knobs
         # A splat whose alpha is at the cut-off to float32 may be in one of the two alone.
-        assert np.abs(picture - double).max() < 1e-4 + least_alpha, knobs
+        assert np.abs(picture - double).max() < 1e-4 + min_alpha, knobs
         assert np.abs(picture - double).mean() < 2e-5, knobs
 
 
@@ -103,8 +105,8 @@ def test_share_is_the_cloud_merged_to_so_many(library, context, renderer, cloud)
     (dict(samples_per_side=0), 'samples_per_side is 0; 1 to 16 is allowed'),
     (dict(samples_per_side=17), 'samples_per_side is 17; 1 to 16 is allowed'),
     (dict(samples_per_side=4), 'samples_per_side is 4 without antialiasing by samples'),
-    (dict(least_alpha=0), 'least_alpha is 0; a number above 0 and below 1 is allowed'),
-    (dict(least_alpha=float('nan')), 'least_alpha is nan; a number above 0'),
+    (dict(min_alpha=0), 'min_alpha is 0; a number above 0 and below 1 is allowed'),
+    (dict(min_alpha=float('nan')), 'min_alpha is nan; a number above 0'),
     (dict(budget_share=0), 'budget_share is 0; a number above 0 and up to 1 is allowed'),
     (dict(budget_share=1.5), 'budget_share is 1.5; a number above 0 and up to 1'),
 ])
@@ -214,7 +216,7 @@ def test_reports_are_written_by_ending(report, tmp_path):
     assert len(lines) == len(report.rows) + 1 and lines[1].startswith('"draft",')
     svg = (tmp_path / 'report.svg').read_text()
     assert svg.startswith('<svg') and 'milliseconds' in svg and '>preview<' in svg
-    with pytest.raises(StippleError, match=r'has no ending of a report; \.json, \.csv and \.svg are allowed'):
+    with pytest.raises(StippleError, match=r'has no extension of a report; \.json, \.csv and \.svg are allowed'):
         report.save(tmp_path / 'report.txt')
     picture = report.draw(1.0)
     assert picture.shape == (520, 840, 4) and picture.min() < 0.3 and (picture[..., 3] == 1).all()
@@ -223,7 +225,7 @@ def test_reports_are_written_by_ending(report, tmp_path):
 def test_a_large_picture_is_compared_in_blocks(library, context, renderer, cloud):
     double = accuracy(library, precision=Precision.DOUBLE)
     job = AccuracyMeasurement.start(context, [(cloud, np.eye(4))], camera_of(8), settings=[accuracy(library), double],
-                                    reference_pixels=8192, repetitions=2, most_seconds=0.02)
+                                    reference_pixels=8192, repetitions=2, max_seconds=0.02)
     job.wait()
     report = job.report()
     assert report.info.compared_pixels == 8192  # two blocks of 64 x 64, of 320 x 240 pixels
@@ -256,7 +258,7 @@ def test_measuring_refuses_what_it_cannot_measure(library, context, renderer, cl
             AccuracyMeasurement.start(context, instances, camera_of())
     placed = [(cloud, np.eye(4))]
     for fields, text in ((dict(repetitions=0), 'repetitions is 0; 1 to 1000'),
-                         (dict(most_seconds=0), 'most_seconds is 0 s; more than 0 is allowed')):
+                         (dict(max_seconds=0), 'max_seconds is 0 s; more than 0 is allowed')):
         with pytest.raises(StippleError, match=text):
             AccuracyMeasurement.start(context, placed, camera_of(), **fields)
     with pytest.raises(StippleError, match=r'render->accuracy is set'):
@@ -268,7 +270,7 @@ def test_measuring_refuses_what_it_cannot_measure(library, context, renderer, cl
 
 
 def test_measuring_stops_when_it_is_cancelled(library, context, cloud):
-    job = AccuracyMeasurement.start(context, [(cloud, np.eye(4))], camera_of(20), repetitions=1000, most_seconds=1000)
+    job = AccuracyMeasurement.start(context, [(cloud, np.eye(4))], camera_of(20), repetitions=1000, max_seconds=1000)
     job.cancel()
     with pytest.raises(CancelledError):
         job.wait()

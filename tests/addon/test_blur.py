@@ -31,8 +31,8 @@ def cloud(context):
 
 def draw(context, cloud, camera, blur=None, method=RenderMethod.TILED, output=OutputColour.SCENE_LINEAR, **wanted):
     renderer = Renderer(context)
-    task = renderer.start([(cloud, np.eye(4))], camera, renderer.options(method=method, output_colour=output), blur=blur,
-                          **wanted)
+    task = renderer.start([(cloud, np.eye(4))], camera, renderer.options(method=method, output_colour=output),
+                          blur=blur, **wanted)
     task.job.wait()
     return task
 

@@ -73,8 +73,9 @@ def test_panoramas_are_looked_at_and_follow_rays(context, cloud):
 
 def test_bad_facts_are_refused(context):
     library = context.library
-    for field, value, text in (('view_colour', 3, 'facts->view_colour is 3; 0 to 2'), ('motion_blur', 2, 'motion_blur is 2'),
-                               ('camera_model', 99, 'camera_model is 99'), ('view_share', 2.0, 'view_share is 2'),
+    for field, value, text in (('view_colour', 3, 'facts->view_colour is 3; 0 to 2'),
+                               ('motion_blur', 2, 'motion_blur is 2'), ('camera_model', 99, 'camera_model is 99'),
+                               ('view_share', 2.0, 'view_share is 2'),
                                ('largest_widening', 0.5, 'largest_widening is 0.5; 1 to')):
         with pytest.raises(StippleError, match=text.replace('>', '.')):
             effects.plan(library, effects.facts(library, **{field: value}))
@@ -90,7 +91,8 @@ def test_bad_facts_are_refused(context):
 def test_objects_are_drawn_together_or_apart(context):
     random = np.random.default_rng(4)
     cloud = Cloud.create(context, SplatArrays(random.uniform(-1, 1, (50, 3)), np.tile([1.0, 0, 0, 0], (50, 1)),
-                                              np.full((50, 3), 0.3), np.full(50, 0.9), random.uniform(-1, 1, (50, 1, 3))))
+                                              np.full((50, 3), 0.3), np.full(50, 0.9),
+                                              random.uniform(-1, 1, (50, 1, 3))))
     renderer = Renderer(context)
 
     def picture(placed, order, **given):

@@ -12,8 +12,8 @@ from stipple.binding.errors import CancelledError, StippleError
 from stipple.binding.fit import Fit, fit_memory_bound, fit_option_table, fit_options
 from stipple.binding.model import DecodeSettings
 from stipple.binding.strategies import check_strategy, strategies, strategy_parts
-from stipple.binding.structs import (MAX_ANCHORS, BudgetUnit, ColourSpace, FitModel, FitOptionKind, FitQuality, FitShell,
-                                     StippleCamera, StippleFitOptions, Transfer)
+from stipple.binding.structs import (MAX_ANCHORS, BudgetUnit, ColourSpace, FitModel, FitOptionKind, FitQuality,
+                                     FitShell, StippleCamera, StippleFitOptions, Transfer)
 from stipple.binding.views import Views
 
 
@@ -78,15 +78,16 @@ def test_a_cancel_keeps_the_best(context, views):
 
 
 def test_a_field_decodes_at_any_budget(context, views):
-    fit = Fit.start(context, views, options(context, model=FitModel.FIELD, iterations=30, least_anchors=16, most_anchors=64,
-                                            gaussians_per_anchor=4))
+    fit = Fit.start(context, views, options(context, model=FitModel.FIELD, iterations=30, min_anchors=16,
+                                            max_anchors=64, gaussians_per_anchor=4))
     fit.wait()
     assert fit.result(32).info().count == 128
     model = fit.model()
     info = model.info()
-    assert (info.kind_label, info.most_anchors, info.gaussians_per_anchor) == (b'learned field', 64, 4)
+    assert (info.kind_label, info.max_anchors, info.gaussians_per_anchor) == (b'learned field', 64, 4)
     settings = model.settings()
-    assert (settings.budget_unit, settings.maximum_learned_budget, settings.default_budget) == (BudgetUnit.ANCHORS, 64, 64)
+    assert (settings.budget_unit, settings.maximum_learned_budget, settings.default_budget) == (BudgetUnit.ANCHORS, 64,
+                                                                                                64)
     assert settings.minimum_gaussians_per_anchor == settings.maximum_gaussians_per_anchor == 4
     # A field is drawn from as it has learned, in one order.
     assert (settings.has_order, settings.has_seed, settings.takes_mask, settings.has_time) == (0, 1, 0, 0)
@@ -95,8 +96,8 @@ def test_a_field_decodes_at_any_budget(context, views):
 
 @pytest.mark.parametrize('shell', FitShell)
 def test_a_field_has_a_shell_where_it_is_asked_for(context, views, shell):
-    fit = Fit.start(context, views, options(context, model=FitModel.FIELD, iterations=10, least_anchors=16,
-                                            most_anchors=256, shell=shell))
+    fit = Fit.start(context, views, options(context, model=FitModel.FIELD, iterations=10, min_anchors=16,
+                                            max_anchors=256, shell=shell))
     fit.wait()
     farthest = np.abs(fit.result().read().positions).max()
     assert farthest > 5 if shell == FitShell.ON else farthest < 2  # Auto: views have alpha
@@ -116,18 +117,19 @@ def test_presets_grow_with_quality(context):
     assert [o.iterations for o in chosen[:3]] == sorted({o.iterations for o in chosen[:3]})
     assert chosen[0].max_splats < chosen[2].max_splats
     assert chosen[3].model == FitModel.FIELD
-    assert chosen[3].most_anchors < chosen[5].most_anchors
+    assert chosen[3].max_anchors < chosen[5].max_anchors
 
 
 def test_every_field_is_an_option_and_every_option_a_field(context):
-    fields = [name.removesuffix('_utf8') for name, _ in StippleFitOptions._fields_ if name not in ('struct_size', 'reserved')]
+    fields = [name.removesuffix('_utf8') for name,
+              _ in StippleFitOptions._fields_ if name not in ('struct_size', 'reserved')]
     table = fit_option_table(context.library)
     assert sorted(option.name for option in table) == sorted(fields)
 
 
 def test_defaults_and_presets_are_those_of_the_table(context):
     table = fit_option_table(context.library)
-    assert next(option for option in table if option.name == 'most_anchors').maximum == MAX_ANCHORS
+    assert next(option for option in table if option.name == 'max_anchors').maximum == MAX_ANCHORS
 
     def text(option, value):
         if option.kind == FitOptionKind.CHOICE:

@@ -84,7 +84,8 @@ def test_parts_lend_their_names_to_channels_without_one(channels_of, tmp_path):
 def test_what_lies_outside_the_data_is_zero(channels_of, tmp_path):
     ramps(tmp_path / 'a.exr', '-d', 'float', names='R,G,B')
     whole = channels_of(tmp_path / 'a.exr')['G']
-    tool(tmp_path / 'a.exr', '--cut', '10x7+5+3', '--origin', '+5+3', '--fullsize', '48x33+0+0', '-o', tmp_path / 'b.exr')
+    tool(tmp_path / 'a.exr', '--cut', '10x7+5+3', '--origin', '+5+3', '--fullsize', '48x33+0+0', '-o',
+         tmp_path / 'b.exr')
     part = channels_of(tmp_path / 'b.exr')['G']
     expected = np.zeros_like(whole)
     expected[3:10, 5:15] = whole[3:10, 5:15]

@@ -24,7 +24,7 @@ def test_missing_library_is_one_clear_sentence(tmp_path):
 
 def test_wrong_abi_version_is_refused_with_both_versions(tmp_path):
     file = build(tmp_path, 'old', 'unsigned stipple_abi_version(void) { return 99u; }\n')
-    with pytest.raises(LibraryError, match=r'ABI version 99; this add-on needs version 1'):
+    with pytest.raises(LibraryError, match=r'ABI version 99; this add-on needs version 2'):
         library.load(file)
 
 
@@ -35,7 +35,7 @@ def test_another_library_is_refused(tmp_path):
 
 
 def test_library_that_lacks_a_function_is_refused(tmp_path):
-    file = build(tmp_path, 'partial', 'unsigned stipple_abi_version(void) { return 1u; }\n')
+    file = build(tmp_path, 'partial', 'unsigned stipple_abi_version(void) { return 2u; }\n')
     with pytest.raises(LibraryError, match='lacks a function'):
         library.load(file)
 

@@ -107,7 +107,8 @@ def test_cameras_inside_stand_at_free_places(library):
     cameras = RigSearch.create(library, low, high, 25, ViewRig.INSIDE, seed=2).cameras(Balls(room, ball))
     directions, wanted, index = sphere(25, 2), [], 0
     while len(wanted) < 25:
-        place = low + (0.1 + 0.8 * np.array([radical_inverse(index + 1 + 7919 * 2, base) for base in (2, 3, 5)])) * (high - low)
+        place = low + (0.1 + 0.8 * np.array([radical_inverse(index + 1 + 7919 * 2, base)
+                                             for base in (2, 3, 5)])) * (high - low)
         probes = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)
                            if abs(x) + abs(y) + abs(z) in (1, 3)], float)
         probes /= np.linalg.norm(probes, axis=1, keepdims=True)
@@ -135,7 +136,8 @@ def test_a_room_is_told_by_the_viewer_in_it(library):
 
 
 def test_messages(library):
-    for arguments, text in (((LOW, HIGH, 0), '0 views'), ((HIGH, LOW, 2), 'bounds_min'), ((LOW, LOW * np.nan, 2), 'bounds_max')):
+    for arguments, text in (((LOW, HIGH, 0), '0 views'), ((HIGH, LOW, 2), 'bounds_min'),
+                            ((LOW, LOW * np.nan, 2), 'bounds_max')):
         with pytest.raises(StippleError, match=text):
             RigSearch.create(library, *arguments)
     with pytest.raises(StippleError, match='angle is 4'):

@@ -44,7 +44,7 @@ def test_pictures_and_points_come_back(context):
     np.testing.assert_array_equal(with_space.points()[0], positions)
     np.testing.assert_array_equal(with_space.points()[1], colours)
     info = with_space.info()
-    assert (info.view_count, info.point_count, info.has_pictures) == (2, 5, 1)
+    assert (info.view_count, info.point_count, info.has_images) == (2, 5, 1)
 
 
 def test_a_data_set_is_read_from_its_folder(context, tmp_path):

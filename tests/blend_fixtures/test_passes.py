@@ -1,4 +1,5 @@
-"""Depth, normals and indices of splats, composited with a Cycles render in background Blender, against a stored picture.
+"""Depth, normals and indices of splats, composited with a Cycles render in background Blender, against a stored
+picture.
 
 The stored picture was looked at: a yellow bar passes through both rings, before them where it is nearer; the half
 transparent ring is shaded by its normals, the other is not.

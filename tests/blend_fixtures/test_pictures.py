@@ -24,7 +24,8 @@ SCENES = ('suzanne', 'instances', 'terrain')
 # the silhouette are soft over about one anchor spacing, so the towers with their hard edges lose most. The floors leave
 # 0.7 dB or more for Blender versions that subdivide, bevel and antialias a little differently.
 MESH_FLOOR_DB = {'suzanne': 25.3, 'instances': 20.0, 'terrain': 25.3}
-# The same splats by the same camera: only rounding may differ, between processors and Blender versions (3.4.1, 4.3.2 and
+# The same splats by the same camera: only rounding may differ, between processors and Blender versions (3.4.1, 4.3.2
+# and
 # 5.2.2 agree to 86 dB). One step of 8 bits everywhere would be 48 dB; another seed gives 46 dB at most.
 STORED_FLOOR_DB = 50.0
 BLENDER_SECONDS = 150  # a run takes a few; the limit is for a machine that does much else
@@ -90,7 +91,8 @@ def test_a_moved_camera_does_not_look_like_the_mesh(scene):
 def test_picture_is_the_stored_one(scene):
     name, out = scene
     if name == 'instances' and blender_version() >= (5, 0):
-        pytest.skip('Blender 5 orders the triangles of a bevel in another way, so samples differ: 37 dB from 3.4 and 4.3')
+        pytest.skip('Blender 5 orders the triangles of a bevel in another way, so samples differ: 37 dB from 3.4 and '
+                    '4.3')
     assert compare(FIXTURES / 'reference' / f'{name}_stipple.png', out / 'plain.png')['psnr'] >= STORED_FLOOR_DB
 
 

@@ -54,9 +54,9 @@ def readme_block(language):
 
 def test_files_are_there_and_hold_what_they_say(quickstart, environment):
     out, _ = quickstart
-    kinds = {'mesh.png': 'picture', 'splats_2000.png': 'picture', 'splats_10000.png': 'picture', 'splats_50000.png': 'picture',
-             'volume.png': 'picture', 'suzanne.ply': 'splats', 'suzanne.vdb': 'volume', 'transforms.json': 'data set',
-             'suzanne.stipple.safetensors': 'surface model'}
+    kinds = {'mesh.png': 'picture', 'splats_2000.png': 'picture', 'splats_10000.png': 'picture',
+             'splats_50000.png': 'picture', 'volume.png': 'picture', 'suzanne.ply': 'splats', 'suzanne.vdb': 'volume',
+             'transforms.json': 'data set', 'suzanne.stipple.safetensors': 'surface model'}
     for name, kind in kinds.items():
         info = subprocess.run(['stipple', 'info', str(out / name), '--json'], env=environment, capture_output=True,
                               text=True)
@@ -84,6 +84,7 @@ def test_readme_example_for_blender_runs(environment, tmp_path):
 
 def test_readme_example_for_the_tool_runs(quickstart, environment):
     out, _ = quickstart
-    result = subprocess.run(['bash', '-euc', readme_block('sh')], cwd=out, env=environment, capture_output=True, text=True)
+    result = subprocess.run(['bash', '-euc', readme_block('sh')], cwd=out, env=environment, capture_output=True,
+                            text=True)
     assert result.returncode == 0, result.stderr
     assert (out / 'many.png').is_file() and (out / 'many.vdb').is_file()

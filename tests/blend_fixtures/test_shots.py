@@ -1,4 +1,5 @@
-"""Many splat objects, and a keyframed budget, rendered in background Blender under both engines, against stored pictures.
+"""Many splat objects, and a keyframed budget, rendered in background Blender under both engines, against stored
+pictures.
 
 The stored pictures were looked at: the two rings pass through each other link by link, the blue one half transparent;
 200 trees of different sizes stand in ten rows; a tree stands around a ball, made of 60, 400 and 6,000 splats.

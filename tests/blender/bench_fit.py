@@ -52,7 +52,8 @@ def test_suzanne(stipple, tmp_path, model):
     seconds, busy = time.perf_counter() - start, time.process_time() - busy
     figures = fitting.state.figures
     result = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
-    cloud = stipple.scene.source.sources.decode_data(result.data, stipple.scene.source.sources.decode_settings(result.data.stipple))
+    cloud = stipple.scene.source.sources.decode_data(result.data,
+                                                     stipple.scene.source.sources.decode_settings(result.data.stipple))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     poses = rigs.poses('AROUND', bpy.context.scene, depsgraph, rigs.bounds_of([obj], depsgraph), HELD_OUT, seed=5)
     renderer = binding.Renderer(stipple.scene.source.sources.context())
@@ -69,8 +70,10 @@ def test_suzanne(stipple, tmp_path, model):
             foreground.append(psnr((got - wanted)[inside]))
             if 'STIPPLE_FIT_PICTURES' in os.environ and i < 2:
                 save(os.path.join(os.environ['STIPPLE_FIT_PICTURES'], f'{model.lower()}_{i}.png'), wanted, got)
-    print(f'\nSuzanne, {model}: {seconds:.1f} s in all (target {TARGET_SECONDS} s, ratio {TARGET_SECONDS / seconds:.2f}x), '
-          f'{busy:.1f} s of the processor; {figures.seconds:.1f} s of them {figures.iteration} steps; {cloud.info().count:,} splats; '
+    print(f'\nSuzanne, {model}: {seconds:.1f} s in all (target {TARGET_SECONDS} s, ratio '
+          f'{TARGET_SECONDS / seconds:.2f}x), '
+          f'{busy:.1f} s of the processor; {figures.seconds:.1f} s of them {figures.iteration} steps; '
+          f'{cloud.info().count:,} splats; '
           f'held-out views over black {np.mean(black):.2f} dB (target {TARGET_PSNR} dB), foreground '
           f'{np.mean(foreground):.2f} dB; trainer measured {figures.best_psnr:.2f} dB', flush=True)
 
@@ -79,6 +82,7 @@ def save(path, wanted, got):
     """Both pictures and ten times their difference, side by side."""
     picture = np.concatenate([wanted, got, np.clip(np.abs(got - wanted) * 10, 0, 1)], axis=1)[::-1]
     image = bpy.data.images.new('compared', picture.shape[1], picture.shape[0])
-    image.pixels.foreach_set(np.concatenate([picture, np.ones_like(picture[..., :1])], 2).astype(np.float32).reshape(-1))
+    image.pixels.foreach_set(np.concatenate([picture, np.ones_like(picture[..., :1])],
+                                            2).astype(np.float32).reshape(-1))
     image.filepath_raw, image.file_format = path, 'PNG'
     image.save()

@@ -4,8 +4,9 @@
 
     STIPPLE_BENCH_FOLDER=/somewhere python3 tests/blender/run.py tests/blender/bench_large.py -s [-k 3]
 
-Not a test of the suite: its name keeps it out. It takes 8 GiB on disk and 9 GiB of main memory. Clouds and results that are in
-the folder already are used again, so remove the folder for new ones; without a folder all go with the end of the run.
+Not a test of the suite: its name keeps it out. It takes 8 GiB on disk and 9 GiB of main memory. Clouds and results that
+are in the folder already are used again, so remove the folder for new ones; without a folder all go with the end of the
+run.
 """
 
 import json
@@ -33,8 +34,8 @@ CHUNK = 500_000
 def scan(stipple, count):
     """Splats with the sizes, shapes and opacities of a captured scan, on hilly ground of 20 m with balls, in haze.
 
-    Quantiles of a scan of a motorcyclist (150,000 splats): opacity 0.04, 0.17, 0.85 at 10, 50, 90 %; longest axis 1.4 of the
-    distance to the sixth neighbour, times e^(0.7 normal); middle axis 0.24 and shortest 0.05 of the longest.
+    Quantiles of a scan of a motorcyclist (150,000 splats): opacity 0.04, 0.17, 0.85 at 10, 50, 90 %; longest axis 1.4
+    of the distance to the sixth neighbour, times e^(0.7 normal); middle axis 0.24 and shortest 0.05 of the longest.
     """
     arrays = stipple.binding.cloud.SplatArrays(
         np.empty((count, 3), np.float32), np.empty((count, 4), np.float32), np.empty((count, 3), np.float32),
@@ -110,7 +111,8 @@ def animate(folder, name, blend, engine):
     if result.exists():
         return
     begin = time.perf_counter()
-    text, work, peak = wait([bpy.app.binary_path, '--background', '--factory-startup', '--addons', 'stipple', blend, '-E', engine,
+    text, work, peak = wait([bpy.app.binary_path, '--background', '--factory-startup', '--addons', 'stipple', blend,
+                             '-E', engine,
                        '-o', str(folder / f'{name}_####'), '-s', '1', '-e', str(large_steps.FRAMES), '-a'])
     seconds = time.perf_counter() - begin
     times = [60 * float(m) + float(s) for m, s in re.findall(r'^ ?Time: (\d+):([\d.]+) \(Saving', text, re.MULTILINE)]
@@ -136,7 +138,8 @@ def test_scan(stipple, tmp_path, millions):
     folder.mkdir(parents=True, exist_ok=True)
     cloud, blend, reduced = (str(folder / name) for name in ('scan.ply', 'scan.blend', 'budget.blend'))
     if not Path(cloud).exists():
-        stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), scan(stipple, millions * 1_000_000)).save(cloud)
+        stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(),
+                                           scan(stipple, millions * 1_000_000)).save(cloud)
     load = os.getloadavg()[0]
     run(folder, 'import', 'import', (blend,), cloud=cloud, blend=blend)
     run(folder, 'budget', 'budget', (reduced,), blend=blend, reduced=reduced)
@@ -162,7 +165,8 @@ ROWS = (
     ('Rendered shading by Stipple, first coarse picture', 'view_points', 'rendered view'),
     ('the fine one after it', 'view_points', 'fine view'), ('F12, Stipple', 'render_stipple', 'first'),
     ('F12, Stipple, all splats by budget', 'render_budget', 'first'), ('F12, Cycles + Stipple', 'render_both', 'first'),
-    ('F12, Cycles without the splats', 'render_cycles', 'first'), ('ten frames of `-b -a`, Stipple', 'series_STIPPLE', 'all'),
+    ('F12, Cycles without the splats', 'render_cycles', 'first'),
+    ('ten frames of `-b -a`, Stipple', 'series_STIPPLE', 'all'),
     ('ten frames of `-b -a`, Cycles + Stipple', 'series_STIPPLE_CYCLES', 'all'))
 
 

@@ -73,8 +73,8 @@ def test_shell(stipple, tmp_path, scene):
     chosen = list(bpy.context.selected_objects)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
     settings = bpy.context.scene.stipple.fit
-    for name, value in {'model': 'FIELD', 'quality': 'FAST', 'rig': rig, 'view_count': VIEW_COUNT, 'view_size': VIEW_SIZE,
-                        'samples': SAMPLES, 'max_splats': SPLATS, 'transparent': False}.items():
+    for name, value in {'model': 'FIELD', 'quality': 'FAST', 'rig': rig, 'view_count': VIEW_COUNT,
+                        'view_size': VIEW_SIZE, 'samples': SAMPLES, 'max_splats': SPLATS, 'transparent': False}.items():
         setattr(settings, name, value)
     row = []
     for shell in ('AUTO', 'OFF'):
@@ -84,7 +84,8 @@ def test_shell(stipple, tmp_path, scene):
         assert bpy.ops.stipple.splats_fit() == {'FINISHED'}
         busy = time.process_time() - before
         obj = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
-        cloud = stipple.scene.source.sources.decode_data(obj.data, stipple.scene.source.sources.decode_settings(obj.data.stipple))
+        cloud = stipple.scene.source.sources.decode_data(obj.data,
+                                                         stipple.scene.source.sources.decode_settings(obj.data.stipple))
         row.append((shell, cloud))
         farthest = np.abs(cloud.read().positions).max()
         print(f'\n{scene.__name__}, shell {shell}: held out {fitting.state.figures.best_psnr:.2f} dB, splats as far as '
@@ -113,6 +114,7 @@ def save(stipple, name, objects, rig, fits):
         pictures.append(np.clip(task.colour[..., :3], 0, 1))
     picture = np.concatenate(pictures, axis=1)[::-1]
     image = bpy.data.images.new('compared', picture.shape[1], picture.shape[0])
-    image.pixels.foreach_set(np.concatenate([picture, np.ones_like(picture[..., :1])], 2).astype(np.float32).reshape(-1))
+    image.pixels.foreach_set(np.concatenate([picture, np.ones_like(picture[..., :1])],
+                                            2).astype(np.float32).reshape(-1))
     image.filepath_raw, image.file_format = os.path.join(os.environ['STIPPLE_FIT_PICTURES'], f'{name}.png'), 'PNG'
     image.save()

@@ -75,5 +75,5 @@ def test_sorted_against_unsorted(stipple, monkeypatch, count, degree):
     view.close()
     ratio = best['sorted'] / best['unsorted']
     print(f"\n{count:,} splats of degree {degree} at {SIZE[0]}x{SIZE[1]} on {gpu.platform.renderer_get()}: sorted "
-          f"{best['sorted'] * 1e3:.0f} ms, unsorted {best['unsorted'] * 1e3:.0f} ms, ratio {ratio:.2f} (limit {LIMIT}); "
-          f"first picture's data {first * 1e3:.0f} ms, taking an order {take * 1e3:.1f} ms", flush=True)
+          f"{best['sorted'] * 1e3:.0f} ms, unsorted {best['unsorted'] * 1e3:.0f} ms, ratio {ratio:.2f} (limit "
+          f"{LIMIT}); first picture's data {first * 1e3:.0f} ms, taking an order {take * 1e3:.1f} ms", flush=True)

@@ -29,7 +29,8 @@ def build(window):
 
 def panel(window):
     area = window.area
-    return tour_steps.keep('densify_panel', area.x + area.width - SIDEBAR_PX, area.y + area.height - SHOWN_PX, SIDEBAR_PX, SHOWN_PX)
+    return tour_steps.keep('densify_panel', area.x + area.width - SIDEBAR_PX, area.y + area.height - SHOWN_PX,
+                           SIDEBAR_PX, SHOWN_PX)
 
 
 steps = [build, fit_tour_steps.open_tab, panel]

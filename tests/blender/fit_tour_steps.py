@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps of make_pictures.py for docs/fitting_in_blender.md: from a mesh to a field and its budgets, then from pictures of a
-data set; window.py runs them."""
+"""Steps of make_pictures.py for docs/fitting_in_blender.md: from a mesh to a field and its budgets, then from pictures
+of a data set; window.py runs them."""
 
 import sys
 from pathlib import Path
@@ -37,7 +37,8 @@ def state():
 
 
 def few_tabs(window, opened='STIPPLE_PT_fit_advanced'):
-    """Leaves one tab before ours in the sidebar, which Blender itself has, and so a place to click on. Opens a panel of ours."""
+    """Leaves one tab before ours in the sidebar, which Blender itself has, and so a place to click on. Opens a panel of
+    ours."""
     others = [panel for panel in bpy.types.Panel.__subclasses__()
               if getattr(panel, 'bl_space_type', '') == 'VIEW_3D' and getattr(panel, 'bl_region_type', '') == 'UI'
               and getattr(panel, 'is_registered', False) and getattr(panel, 'bl_category', '') != 'Stipple']
@@ -64,7 +65,8 @@ def build(window):
         bpy.data.objects.remove(obj)
     few_tabs(window)
     scenes.suzanne()
-    camera = scenes.camera(location=(0.0, -4.3, 0.2), rotation=(1.524, 0.0, 0.0), width=PICTURE_SIDE, height=PICTURE_SIDE)
+    camera = scenes.camera(location=(0.0, -4.3, 0.2), rotation=(1.524, 0.0, 0.0), width=PICTURE_SIDE,
+                           height=PICTURE_SIDE)
     camera.hide_set(True)
     window.space.shading.type = 'SOLID'
     window.space.shading.color_type = 'TEXTURE'
@@ -180,5 +182,5 @@ def through_a_camera(window):
     return 'fit_photo_view'
 
 
-steps = [build, open_tab, panel, start, running, ended, proposal, report, accept, budgets, budget, photographs, import_cameras, start, ended,
-         through_a_camera]
+steps = [build, open_tab, panel, start, running, ended, proposal, report, accept, budgets, budget, photographs,
+         import_cameras, start, ended, through_a_camera]

@@ -132,7 +132,8 @@ def measure_views(window):
 
 
 def move_slider(window):
-    """Moves around BUDGET: the first, which does not know yet how long a splat takes, the median, and the rest after."""
+    """Moves around BUDGET: the first, which does not know yet how long a splat takes, the median, and the rest
+    after."""
     settings, sync = the_splats().data.stipple, sys.modules['stipple'].scene.source.sync
     moves = {'slider': [], 'slider drawn': []}
     for move in range(1, MOVES + 1):
@@ -158,8 +159,8 @@ def look_through_the_engine(window):
     window.space.shading.type = 'RENDERED'
     with measured('rendered view'):
         draw(window)
-    view_picture = sys.modules['stipple.viewport.view_picture']
-    picture = next(thing for thing in gc.get_objects() if isinstance(thing, view_picture.ViewPicture))
+    view_image = sys.modules['stipple.viewport.view_image']
+    picture = next(thing for thing in gc.get_objects() if isinstance(thing, view_image.ViewImage))
     with measured('fine view'):
         while not (picture._shown is not None and picture._shown.is_fine):
             time.sleep(0.02)

@@ -26,7 +26,8 @@ IMAGES = Path(__file__).resolve().parent.parent.parent / 'docs' / 'images'
 
 
 @pytest.mark.parametrize('steps,size', ((picture_steps, (screen.WIDTH, screen.HEIGHT)), (tour_steps, (1600, 1300)),
-                                        (fit_tour_steps, (1600, 1000)), (densify_tour_steps, (1400, 1100))), ids=lambda value: getattr(value, '__name__', ''))
+                                        (fit_tour_steps, (1600, 1000)), (densify_tour_steps, (1400, 1100))),
+                         ids=lambda value: getattr(value, '__name__', ''))
 def test_pictures_of_windows(tmp_path, steps, size):
     shots, _ = screen.run_steps(Path(steps.__file__), tmp_path, bpy.app.binary_path, timeout=1500, size=size,
                                 options=('--enable-event-simulate',))

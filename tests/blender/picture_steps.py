@@ -32,7 +32,8 @@ def build(window):
     head = splats_of('suzanne.blend')
     head.location, head.rotation_euler.z = (0.6, -0.4, 1.6), 0.6
     bpy.ops.mesh.primitive_cone_add(location=(-1.3, -1.0, 0.6), depth=1.8, radius1=0.6)
-    bpy.ops.mesh.primitive_torus_add(location=head.location, major_radius=1.35, minor_radius=0.13, rotation=(0.5, 0.3, 0))
+    bpy.ops.mesh.primitive_torus_add(location=head.location, major_radius=1.35, minor_radius=0.13,
+                                     rotation=(0.5, 0.3, 0))
     bpy.ops.object.shade_smooth()
     scenes.select(head)
     view = window.region_data

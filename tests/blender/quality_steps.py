@@ -97,4 +97,5 @@ def finish(_window):
     (Path(sys.argv[sys.argv.index('--') + 2]) / 'facts.json').write_text(json.dumps(facts))
 
 
-steps = [build, fresh, measure, measured, figures, compared('WIPE'), is_shown, compared('ERROR'), settled, plotted, finish]
+steps = [build, fresh, measure, measured, figures, compared('WIPE'), is_shown, compared('ERROR'), settled, plotted,
+         finish]

@@ -35,7 +35,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--blender', default=os.environ.get('STIPPLE_BLENDER', 'blender'))
     parser.add_argument('--library', type=Path,
-                        default=os.environ.get('STIPPLE_LIBRARY', PROJECT / 'build' / 'release' / 'lib' / 'libstipple.so'))
+                        default=os.environ.get('STIPPLE_LIBRARY',
+                                               PROJECT / 'build' / 'release' / 'lib' / 'libstipple.so'))
     parser.add_argument('--addon', type=Path, default=PROJECT / 'addon' / 'stipple')
     options, arguments = parser.parse_known_args()
     blender = shutil.which(options.blender)

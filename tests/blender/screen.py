@@ -17,7 +17,8 @@ WIDTH, HEIGHT = 1280, 800
 
 def run_steps(steps_file, folder, blender, timeout=300, size=(WIDTH, HEIGHT), arguments=(),
               options=()):
-    """Runs the steps of a file (window.py) in a Blender with these options, and returns {name: picture [H,W,3] uint8} and what Blender has written."""
+    """Runs the steps of a file (window.py) in a Blender with these options, and returns {name: picture [H,W,3] uint8}
+    and what Blender has written."""
     if shutil.which('Xvfb') is None:
         pytest.skip('Xvfb is not installed: nothing can be shown in a window')
     with Screen(folder, size) as screen:

@@ -28,7 +28,8 @@ def write(stipple, folder, frames=range(1, 11), name='swarm_{:04d}.ply', count=C
     """Writes the files; returns their folder."""
     folder.mkdir(exist_ok=True)
     for frame in frames:
-        cloud = stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), arrays_of(stipple, frame, count))
+        cloud = stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(),
+                                                   arrays_of(stipple, frame, count))
         cloud.save(str(folder / name.format(frame)), frame=stipple.binding.structs.Frame.RFU)
     return folder
 

@@ -255,7 +255,8 @@ def test_a_dragged_slider_writes_what_fits_and_completes_at_rest(stipple, budget
 
 
 def test_a_slider_does_not_wait_for_its_tree_to_be_read(stipple, budgeted, monkeypatch):
-    """After a file is opened: the first move leaves the reading to the library's thread, and what it asked for follows."""
+    """After a file is opened: the first move leaves the reading to the library's thread, and what it asked for
+    follows."""
     sync, sources = stipple.scene.source.sync, stipple.scene.source.sources
     sources.forget()
     monkeypatch.setattr(sources.Model, 'load', None)  # reading on Blender's own thread

@@ -49,8 +49,8 @@ def set_render(width, height, aspect_x=1.0, aspect_y=1.0):
 
 
 @pytest.mark.parametrize('kind,fit,size,aspect,shift', list(itertools.product(
-    ('PERSP', 'ORTHO'), ('AUTO', 'HORIZONTAL', 'VERTICAL'), ((320, 180), (200, 300)), ((1.0, 1.0), (1.0, 1.5), (2.0, 1.0)),
-    ((0.0, 0.0), (0.3, -0.2)))))
+    ('PERSP', 'ORTHO'), ('AUTO', 'HORIZONTAL', 'VERTICAL'), ((320, 180), (200, 300)),
+    ((1.0, 1.0), (1.0, 1.5), (2.0, 1.0)), ((0.0, 0.0), (0.3, -0.2)))))
 def test_projection_equals_blenders(stipple, kind, fit, size, aspect, shift):
     obj = make_camera(type=kind, sensor_fit=fit, sensor_width=36.0, sensor_height=20.0, lens=42.0, ortho_scale=7.0,
                       shift_x=shift[0], shift_y=shift[1])
@@ -99,7 +99,8 @@ def test_resolution_percentage_truncates_as_blender_does(stipple):
 def test_an_unknown_panorama_is_one_clear_error(stipple):
     obj = make_camera(type='PANO')
     stipple.version.panorama_settings(obj.data).panorama_type = 'MIRRORBALL'
-    with pytest.raises(Exception, match=r"Panoramic camera 'camera' is of type MIRRORBALL; allowed are EQUIRECTANGULAR"):
+    with pytest.raises(Exception,
+                       match=r"Panoramic camera 'camera' is of type MIRRORBALL; allowed are EQUIRECTANGULAR"):
         stipple.scene.view.cameras.camera_of(obj, set_render(64, 64))
 
 

@@ -52,7 +52,8 @@ def test_where_the_scene_stands_does_not_matter(stipple, ball):
         obj.scale, obj.location = (3, 3, 3), (5, -2, 1)
     splats.data = start
     there = stipple.scene.source.splat_data.read(densify(ball, splats, max_splats=100000).data)
-    # Pixels differ by rounding, and with them a splat at the threshold; cameras in another place would see another half.
+    # Pixels differ by rounding, and with them a splat at the threshold; cameras in another place would see another
+    # half.
     assert abs(here.count - there.count) <= 0.05 * here.count
     assert here.count > start.stipple.source_count
 

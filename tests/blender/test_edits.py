@@ -121,7 +121,8 @@ def test_a_mask_survives_undo_saving_and_use_elsewhere(stipple, imported, tmp_pa
     assert kept < 500
     bpy.ops.ed.undo()
     obj = bpy.data.objects[name]
-    assert stipple.scene.source.splat_data.count(obj.data) == 500 and stipple.scene.source.masks.counts(obj.data) is None
+    assert stipple.scene.source.splat_data.count(obj.data) == 500
+    assert stipple.scene.source.masks.counts(obj.data) is None
     bpy.ops.ed.redo()
     obj = bpy.data.objects[name]
     assert stipple.scene.source.splat_data.count(obj.data) == kept
@@ -172,7 +173,8 @@ def test_apply_moves_the_splats_and_keeps_the_mask(stipple, imported):
     select(imported, box(size=0.9))
     bpy.ops.stipple.crop_by_box()
     kept = read(stipple, imported).positions
-    matrix = Matrix.Translation((1, 0, 0)) @ Euler((0.2, 0.3, 0.4)).to_matrix().to_4x4() @ Matrix.Diagonal((1, 2, -1, 1))
+    matrix = Matrix.Translation((1, 0, 0)) @ Euler((0.2, 0.3, 0.4)).to_matrix().to_4x4() @ Matrix.Diagonal((1, 2, -1,
+                                                                                                            1))
     imported.matrix_world = matrix
     scenes.select(imported)
     assert bpy.ops.stipple.apply_transform() == {'FINISHED'}
@@ -208,7 +210,8 @@ def test_level_to_ground_finds_the_floor_and_moves_what_is_selected(stipple, tmp
     # Strangers within 0.5 % of the extent of the floor's height pull it a little.
     np.testing.assert_allclose(m[2, :3], (0, 0, 1), atol=2e-3)
     assert abs(m[2, 3]) < 5e-3
-    np.testing.assert_allclose(np.array(camera.matrix_world.inverted() @ obj.matrix_world), np.array(between), atol=1e-5)
+    np.testing.assert_allclose(np.array(camera.matrix_world.inverted() @ obj.matrix_world), np.array(between),
+                               atol=1e-5)
     np.testing.assert_allclose(np.array(child.matrix_world), m, atol=1e-6)
 
 
@@ -271,7 +274,8 @@ def test_splats_of_meshes_and_edited_ones_say_what_to_do(stipple, tmp_path):
     bpy.ops.stipple.use_as_new_source()
     select(obj, box((0.5, 0, 0), size=0.5))
     assert bpy.ops.stipple.crop_by_box() == {'FINISHED'}
-    collection, field = (obj.data.vertices, 'co') if obj.type == 'MESH' else (obj.data.attributes['position'].data, 'vector')
+    collection, field = (obj.data.vertices, 'co') if obj.type == 'MESH' else (obj.data.attributes['position'].data,
+                                                                              'vector')
     values = np.empty(len(collection) * 3, np.float32)
     collection.foreach_get(field, values)
     collection.foreach_set(field, values + 1)

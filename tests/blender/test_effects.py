@@ -87,21 +87,22 @@ def test_the_shutter_is_open_when_blender_says(stipple, shot, position, expected
 
 
 def test_lenses_are_blenders(stipple, shot, camera):
-    lenses = module(stipple, 'scene.view.lenses')
+    lenses = module(stipple, 'scene.view.apertures')
     data = camera.data
     data.type, data.lens = 'PERSP', 50.0
     dof = data.dof
-    dof.use_dof, dof.aperture_fstop, dof.focus_distance, dof.aperture_blades, dof.aperture_ratio = True, 2.5, 3.0, 5, 2.0
-    lens = lenses.lens_of(camera, bpy.context.evaluated_depsgraph_get())
+    dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 2.5, 3.0
+    dof.aperture_blades, dof.aperture_ratio = 5, 2.0
+    lens = lenses.aperture_of(camera, bpy.context.evaluated_depsgraph_get())
     assert (lens.aperture_radius, lens.focus_distance, lens.blades, lens.ratio) == (pytest.approx(0.01), 3.0, 5, 2.0)
     target = scenes.link(bpy.data.objects.new('target', None))
     target.location = (5.0, 1.0, 2.0)  # four metres before the camera, to its side
     dof.focus_object, dof.aperture_blades = target, 2
     bpy.context.view_layer.update()
-    lens = lenses.lens_of(camera, bpy.context.evaluated_depsgraph_get())
+    lens = lenses.aperture_of(camera, bpy.context.evaluated_depsgraph_get())
     assert lens.focus_distance == pytest.approx(4.0) and lens.blades == 0
     dof.use_dof = False
-    assert lenses.lens_of(camera, bpy.context.evaluated_depsgraph_get()) is None
+    assert lenses.aperture_of(camera, bpy.context.evaluated_depsgraph_get()) is None
 
 
 def test_choices_change_the_picture(stipple, shot, camera, tmp_path):
@@ -209,7 +210,8 @@ def test_an_animation_keeps_what_auto_has_switched_on(stipple, camera, tmp_path,
         bpy.ops.render.render(animation=True)
         return [scenes.picture_pixels(tmp_path / f'{name}_000{frame}.exr') for frame in (1, 2, 3)]
 
-    on, off, auto, again = (frames(*given) for given in (('ON', 'on'), ('OFF', 'off'), ('AUTO', 'auto'), ('AUTO', 'again')))
+    on, off, auto, again = (frames(*given) for given in (('ON', 'on'), ('OFF', 'off'), ('AUTO', 'auto'),
+                                                         ('AUTO', 'again')))
     assert all(np.abs(a - b).max() > 1e-3 for a, b in zip(on, off))
     for found in (auto, again):  # each animation begins anew
         for picture, expected in zip(found, (off[0], on[1], on[2])):

@@ -200,7 +200,8 @@ def test_export_of_a_selection_a_collection_and_all_that_is_visible(stipple, tmp
     scenes.select(c, a)
     both = exported(apply_transform=False)
     np.testing.assert_array_equal(both.positions[:30], stipple.scene.source.splat_data.read(c.data).positions)
-    np.testing.assert_allclose(both.positions[30:], stipple.scene.source.splat_data.read(a.data).positions + (0, 0, 5), atol=1e-5)
+    np.testing.assert_allclose(both.positions[30:], stipple.scene.source.splat_data.read(a.data).positions + (0, 0, 5),
+                               atol=1e-5)
 
 
 def test_budgets_of_an_export(stipple, tmp_path):
@@ -219,7 +220,8 @@ def test_the_size_is_estimated_well(stipple, tmp_path):
     for name, degree in (('out.ply', 3), ('out.ply', 1), ('out.compressed.ply', 3), ('out.splat', 3)):
         bpy.ops.stipple.splats_export(filepath=str(tmp_path / name), max_degree=degree)
         size = (tmp_path / name).stat().st_size
-        assert abs(formats.estimated_bytes(formats.of_path(name), 20000, 3, sh_degree_limit=degree) - size) < 0.01 * size
+        assert abs(formats.estimated_bytes(formats.of_path(name), 20000, 3,
+                                           sh_degree_limit=degree) - size) < 0.01 * size
 
     class Settings:
         collection, use_selection, budget, max_degree, filepath, ascii = '', True, 'VIEWPORT', 3, 'x.ply', False
@@ -231,10 +233,10 @@ def test_the_size_is_estimated_well(stipple, tmp_path):
 def test_dialogs_and_file_handlers_know_the_formats_of_the_library(stipple):
     formats = stipple.scene.source.formats
     known = formats.all_formats()
-    assert {'.ply', '.ksplat', 'meta.json'} <= set(formats.read_endings())
-    assert set(formats.read_endings()) - set(formats.write_endings()) == {'.ksplat'}
+    assert {'.ply', '.ksplat', 'meta.json'} <= set(formats.read_extensions())
+    assert set(formats.read_extensions()) - set(formats.write_extensions()) == {'.ksplat'}
     # What can be dropped is known before the library is.
-    assert sorted(formats.DROPPED_ENDINGS) == sorted(e for e in formats.read_endings() if e.startswith('.'))
+    assert sorted(formats.DROPPED_ENDINGS) == sorted(e for e in formats.read_extensions() if e.startswith('.'))
     assert formats.of_path('/a/B.PLY').name == 'ply' and formats.of_path('a.txt') is None
     handler = getattr(bpy.types, 'STIPPLE_FH_splats', None)
     assert (handler is not None) == (bpy.app.version >= (4, 1, 0))

@@ -108,7 +108,8 @@ def test_a_field_decodes_at_any_budget(stipple, ball):
         data.gaussians_per_anchor = chosen
         data.order = 'PROGRESSIVE' if chosen == 5 else 'SYSTEMATIC'
         data.seed = chosen
-        assert stipple.scene.source.splat_data.count(obj.data) == 700 * splats_each and not stipple.scene.source.sync.problems
+        assert stipple.scene.source.splat_data.count(obj.data) == 700 * splats_each
+        assert not stipple.scene.source.sync.problems
         assert stipple.scene.source.sources.count_of(obj.data, 'RENDER') == 700 * splats_each
     scenes.select(obj)
     scenes.refuses(bpy.ops.stipple.delete_floaters, 'decoded from a learned field')
@@ -184,7 +185,8 @@ def test_photographs_are_fitted_where_their_cameras_stand(stipple, ball, tmp_pat
     assert obj.name == 'photos Fit' and obj.hide_get() is False
     bpy.context.view_layer.update()
     # Half a metre up in the data set's world, wherever that points.
-    centre = obj.matrix_world @ Vector(np.median(stipple.scene.source.splat_data.read(obj.data).positions, axis=0).tolist())
+    centre = obj.matrix_world @ Vector(np.median(stipple.scene.source.splat_data.read(obj.data).positions,
+                                                 axis=0).tolist())
     assert (centre - 0.5 * (obj.matrix_world @ Vector((0, 0, 1)))).length < 0.2
     assert (obj.matrix_world @ Vector(up) - Vector((0, 0, 1))).length < 1e-5
     cameras = [other for other in bpy.data.objects if other.type == 'CAMERA']

@@ -27,7 +27,8 @@ def red_pixels(picture):
 
 def test_views_are_counted_while_they_are_rendered(shots):
     _, facts, _ = shots
-    assert facts['said_while_rendering'].startswith('Rendering view ') and facts['said_while_rendering'].endswith('of 12')
+    assert facts['said_while_rendering'].startswith('Rendering view ')
+    assert facts['said_while_rendering'].endswith('of 12')
 
 
 def test_the_preview_shows_while_it_runs(shots):

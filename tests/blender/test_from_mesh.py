@@ -137,7 +137,8 @@ def test_other_node_trees_are_baked(stipple):
     mat = scenes.material('checker', obj=quad)
     tree = mat.node_tree
     coordinates, checker = tree.nodes.new('ShaderNodeTexCoord'), tree.nodes.new('ShaderNodeTexChecker')
-    checker.inputs['Color1'].default_value, checker.inputs['Color2'].default_value = (0.9, 0.1, 0.1, 1), (0.1, 0.1, 0.9, 1)
+    checker.inputs['Color1'].default_value, checker.inputs['Color2'].default_value = (0.9, 0.1, 0.1, 1), (0.1, 0.1, 0.9,
+                                                                                                          1)
     checker.inputs['Scale'].default_value = 1.0
     offset = tree.nodes.new('ShaderNodeVectorMath')
     offset.operation = 'ADD'

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Many objects in one picture: sorted together, instances in the memory of one, linked and overridden data, frame ranges."""
+"""Many objects in one picture: sorted together, instances in the memory of one, linked and overridden data, frame
+ranges."""
 
 import os
 import subprocess
@@ -146,7 +147,8 @@ def test_200_instances_take_the_memory_of_one(stipple):
 
 
 def test_a_picture_of_200_instances_holds_no_copies(stipple, camera):
-    """What the renderer says that it needs at most: 112 bytes for each splat that is projected, far from 236 of a copy."""
+    """What the renderer says that it needs at most: 112 bytes for each splat that is projected, far from 236 of a
+    copy."""
     obj, size = large_cloud(stipple, 4000)
     scatter(obj, [(float(i % 20), float(i // 20), 0.0) for i in range(200)])
     bpy.context.scene.camera.location.z = 30

@@ -57,12 +57,13 @@ def spread(alpha):
     y, x = np.mgrid[:alpha.shape[0], :alpha.shape[1]]
     total = alpha.sum()
     mx, my = (alpha * x).sum() / total, (alpha * y).sum() / total
-    return np.array([mx, my, np.sqrt((alpha * (x - mx) ** 2).sum() / total), np.sqrt((alpha * (y - my) ** 2).sum() / total)])
+    return np.array([mx, my, np.sqrt((alpha * (x - mx) ** 2).sum() / total),
+                     np.sqrt((alpha * (y - my) ** 2).sum() / total)])
 
 
 def is_alike(pictures, share=0.06, size=0.35):
-    """Pictures of the two balls. What is left: splats' soft rims, and Cycles' noise, of which blocks of 4 x 4 pixels have a
-    quarter."""
+    """Pictures of the two balls. What is left: splats' soft rims, and Cycles' noise, of which blocks of 4 x 4 pixels
+    have a quarter."""
     ours, theirs = (picture[..., 3] for picture in pictures)
     np.testing.assert_allclose(spread(ours), spread(theirs), atol=size)
     height, width = ours.shape
@@ -134,7 +135,8 @@ def curves_of(obj):
     action = obj.animation_data.action
     if hasattr(action, 'fcurves'):
         return list(action.fcurves)
-    return [curve for layer in action.layers for strip in layer.strips for bag in strip.channelbags for curve in bag.fcurves]
+    return [curve for layer in action.layers for strip in layer.strips for bag in strip.channelbags
+            for curve in bag.fcurves]
 
 
 @pytest.mark.parametrize('kind, settings', [

@@ -117,7 +117,8 @@ def test_objects_share_one_scale_and_those_that_tell_nothing_are_grey(overlays, 
     splats(stipple, 'Elsewhere', location=(0, 9, 0))
     overlay, entries, _ = shown(overlays, 'AGE')
     assert (overlay.scale.low, overlay.scale.high) == (0, 6)
-    np.testing.assert_allclose(overlay.colours(entries['Young'])[3], overlays.map_colours(np.array([0.5]))[0], atol=1e-6)
+    np.testing.assert_allclose(overlay.colours(entries['Young'])[3], overlays.map_colours(np.array([0.5]))[0],
+                               atol=1e-6)
     assert (overlay.colours(entries['Elsewhere']) == np.float32(overlays.UNKNOWN)).all()
     assert shown(overlays, 'SCORE')[0].scale is None
 

@@ -12,8 +12,8 @@ PEERS = Path(__file__).resolve().parent.parent / 'peers'
 
 
 def render(script, folder, *options):
-    command = [bpy.app.binary_path, '-b', '--factory-startup', '--python-exit-code', '1', '-P', str(PEERS / script), '--',
-               str(folder), *options]
+    command = [bpy.app.binary_path, '-b', '--factory-startup', '--python-exit-code', '1', '-P', str(PEERS / script),
+               '--', str(folder), *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
 

@@ -54,7 +54,8 @@ def test_cameras_see_what_the_data_set_says(stipple, tmp_path):
     for i, obj in enumerate(collection.objects):
         ours = stipple.scene.view.cameras.camera_of(obj, scene.render)
         # Blender keeps lens and matrix in single floats.
-        np.testing.assert_allclose(project(ours, POINTS), project(views.camera(i), POINTS), atol=TOLERANCE, rtol=TOLERANCE)
+        np.testing.assert_allclose(project(ours, POINTS), project(views.camera(i), POINTS), atol=TOLERANCE,
+                                   rtol=TOLERANCE)
         [background] = obj.data.background_images
         assert obj.data.show_background_images
         assert bpy.path.abspath(background.image.filepath) == str(tmp_path / 'images' / obj.name)

@@ -32,7 +32,16 @@ def test_the_settings_a_file_starts_with_are_those_of_final(stipple, walls):
     for settings in (walls.quality_render, walls.quality_viewport):
         assert settings.level == 'FINAL' and not quality.is_changed(library, settings)
     made = quality.accuracy_of(library, walls.quality_render)
-    assert made.least_alpha == 1 / 255 and made.budget_share == 1.0 and made.sh_degree_limit == 4
+    assert made.min_alpha == 1 / 255 and made.budget_share == 1.0 and made.sh_degree_limit == 4
+
+
+def test_the_cut_off_is_kept_under_its_former_name(stipple, walls):
+    quality = module(stipple, 'scene.view.quality')
+    library = module(stipple, 'scene.source.sources').context().library
+    walls.quality_render.least_alpha = 0.25
+    assert quality.accuracy_of(library, walls.quality_render).min_alpha == 0.25
+    assert quality.is_changed(library, walls.quality_render)
+    assert all(hasattr(walls.quality_render, quality.property_of(name)) for name in quality.KNOBS)
 
 
 def test_a_level_sets_every_setting(stipple, walls):
@@ -124,17 +133,17 @@ def test_measuring_without_splats_is_one_error(stipple, camera):
 
 def test_the_view_obeys_its_own_level(stipple, walls):
     """A resting picture as the viewport's column has it; a turning one is never slow."""
-    view_picture = module(stipple, 'viewport.view_picture')
+    view_image = module(stipple, 'viewport.view_image')
     facts = module(stipple, 'scene.view.facts')
     from test_viewport import made_pictures
     whole = facts.Border(0, 0, 60, 60)
-    final = made_pictures(view_picture, None, whole)
+    final = made_pictures(view_image, None, whole)
     walls.quality_render.level = 'DRAFT'
-    np.testing.assert_array_equal(made_pictures(view_picture, None, whole)[1], final[1])
+    np.testing.assert_array_equal(made_pictures(view_image, None, whole)[1], final[1])
     walls.quality_viewport.level = 'DRAFT'
-    draft = made_pictures(view_picture, None, whole)
+    draft = made_pictures(view_image, None, whole)
     assert np.abs(draft[1] - final[1]).max() > 0.01
     walls.quality_viewport.level = 'REFERENCE'
-    coarse, fine = made_pictures(view_picture, None, whole)
+    coarse, fine = made_pictures(view_image, None, whole)
     np.testing.assert_array_equal(coarse, final[0])
     assert 0 < np.abs(fine - final[1]).mean() < np.abs(draft[1] - final[1]).mean()

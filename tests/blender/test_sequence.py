@@ -383,9 +383,9 @@ def background(tmp_path, engine, *arguments, script=''):
     scene.render.filepath = str(tmp_path / 'out_')
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
     (tmp_path / 'enable.py').write_text("import bpy\nbpy.ops.preferences.addon_enable(module='stipple')\n" + script)
-    done = subprocess.run([bpy.app.binary_path, '--background', '--factory-startup', str(tmp_path / 'a.blend'), '--python',
-                           str(tmp_path / 'enable.py'), *arguments], env=os.environ, timeout=120, capture_output=True,
-                          text=True)
+    done = subprocess.run([bpy.app.binary_path, '--background', '--factory-startup', str(tmp_path / 'a.blend'),
+                           '--python', str(tmp_path / 'enable.py'), *arguments], env=os.environ, timeout=120,
+                          capture_output=True, text=True)
     return done.returncode, done.stdout + done.stderr
 
 

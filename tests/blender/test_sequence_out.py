@@ -33,7 +33,8 @@ def test_a_series_becomes_a_volume_sequence(stipple, swarm, tmp_path):
     settings.frame_start, settings.sequence_mode = 3, 'REPEAT'
     out = tmp_path / 'out'
     out.mkdir()
-    assert bpy.ops.stipple.splats_to_volume(filepath=str(out / 'v.vdb'), voxel_size=0.1, frames='SERIES') == {'FINISHED'}
+    assert bpy.ops.stipple.splats_to_volume(filepath=str(out / 'v.vdb'), voxel_size=0.1,
+                                            frames='SERIES') == {'FINISHED'}
     assert names(out) == [f'v_000{i}.vdb' for i in (1, 2, 3, 4)]
     volume = bpy.data.objects['v'].data
     assert volume.is_sequence and (volume.frame_start, volume.frame_duration, volume.frame_offset,
@@ -81,7 +82,8 @@ def test_scene_range_keeps_motion_speed_and_budget(stipple, swarm, tmp_path):
     assert [p.name for p in sorted(tmp_path.glob('v_*'))] == [f'v_000{i}.vdb' for i in range(2, 9)]
     volume = bpy.data.objects['v'].data
     assert (volume.frame_start, volume.frame_duration, volume.frame_offset) == (2, 8, 1)
-    info = stipple.binding.volume.Volume.load(stipple.scene.source.sources.context(), str(tmp_path / 'v_0005.vdb')).info()
+    info = stipple.binding.volume.Volume.load(stipple.scene.source.sources.context(),
+                                              str(tmp_path / 'v_0005.vdb')).info()
     middle = [(a + b) / 2 for a, b in zip(info.bounds_min, info.bounds_max)]
     assert abs(middle[0] - 2) < 0.3 and abs(middle[2] - 4) < 0.3
 

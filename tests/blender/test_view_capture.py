@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Views of the scene for fitting: where cameras stand, what the pictures hold, and that nothing of the scene changes."""
+"""Views of the scene for fitting: where cameras stand, what the pictures hold, and that nothing of the scene
+changes."""
 
 import importlib
 import math
@@ -172,8 +173,8 @@ def test_views_leave_the_scene_as_it_was(rigs, capture):
     scene = bpy.context.scene
     scene.render.resolution_percentage, scene.render.use_border = 50, True
     scene.render.image_settings.file_format = 'JPEG'
-    owners = [scene.render, scene.render.image_settings, scene.cycles, scene.eevee, scene.display.shading, scene, bpy.context.view_layer, walls,
-              ball]
+    owners = [scene.render, scene.render.image_settings, scene.cycles, scene.eevee, scene.display.shading, scene,
+              bpy.context.view_layer, walls, ball]
     bounds = rigs.bounds_of([ball], depsgraph())
     pose = rigs.poses('AROUND', scene, depsgraph(), bounds, 3, angle=math.radians(60))[0]
     for engine in ENGINES:

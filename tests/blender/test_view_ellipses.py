@@ -22,7 +22,7 @@ PSNR = 50.0
 def drawing(stipple):
     graphics.require()
     name = stipple.__name__
-    return importlib.import_module(f'{name}.viewport.splat_drawing'), importlib.import_module(f'{name}.viewport.view_ellipses')
+    return tuple(importlib.import_module(f'{name}.viewport.{module}') for module in ('splat_drawing', 'view_ellipses'))
 
 
 def random_arrays(stipple, count=4000, degree=3, size=0.03, seed=0, **flags):
@@ -32,7 +32,8 @@ def random_arrays(stipple, count=4000, degree=3, size=0.03, seed=0, **flags):
         return rng.standard_normal(shape).astype(np.float32)
 
     positions = normal(count, 3)
-    positions *= (rng.random((count, 1)) ** (1 / 3) / np.linalg.norm(positions, axis=1, keepdims=True)).astype(np.float32)
+    positions *= (rng.random((count, 1)) ** (1 / 3) / np.linalg.norm(positions, axis=1,
+                                                                     keepdims=True)).astype(np.float32)
     scales = (size * np.exp(0.5 * normal(count, 1) + 0.7 * normal(count, 3))).astype(np.float32)
     opacities = (0.02 + 0.97 * rng.random(count)).astype(np.float32)
     sh = (0.3 * normal(count, (degree + 1) ** 2, 3)).astype(np.float32)

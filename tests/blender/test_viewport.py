@@ -97,7 +97,8 @@ def test_clouds_are_kept_until_their_splats_change(viewed, square):
 
 
 def test_the_largest_objects_become_points_until_the_rest_is_few_enough(viewport):
-    entries = [SimpleNamespace(key=name, count=count) for name, count in (('a', 100), ('b', 500), ('c', 300), ('d', 50))]
+    entries = [SimpleNamespace(key=name, count=count) for name,
+               count in (('a', 100), ('b', 500), ('c', 300), ('d', 50))]
 
     def split(most):
         return tuple(''.join(entry.key for entry in part) for part in viewport.split(entries, most))
@@ -108,7 +109,8 @@ def test_the_largest_objects_become_points_until_the_rest_is_few_enough(viewport
     assert split(0) == ('', 'abcd')
 
 
-@pytest.mark.parametrize('kind', ({'type': 'PERSP', 'lens': 35.0, 'shift_x': 0.1}, {'type': 'ORTHO', 'ortho_scale': 3.0}),
+@pytest.mark.parametrize('kind', ({'type': 'PERSP', 'lens': 35.0, 'shift_x': 0.1},
+                                  {'type': 'ORTHO', 'ortho_scale': 3.0}),
                          ids=('perspective', 'orthographic'))
 def test_a_border_is_a_part_of_the_whole_picture(stipple, square, kind):
     scenes.camera((0.3, 0.2, 6), width=120, height=80, **kind)
@@ -119,7 +121,8 @@ def test_a_border_is_a_part_of_the_whole_picture(stipple, square, kind):
     renderer = stipple.binding.renderer.Renderer(sources.context())
 
     def picture(of):
-        task = renderer.start([(sources.cloud_from_object(square), np.eye(4))], of, renderer.options(), with_depth=False)
+        task = renderer.start([(sources.cloud_from_object(square), np.eye(4))], of, renderer.options(),
+                              with_depth=False)
         task.job.wait()
         return task.colour
 
@@ -145,17 +148,18 @@ def test_clipping_planes_leave_what_lies_below(stipple, square):
     assert cloud_edit.clipped(cloud, [(0.0, 0.0, 0.0, 1.0)]).info().count == 0
 
 
-def made_pictures(view_picture, viewed, borders):
+def made_pictures(view_image, viewed, borders):
     """What a rendered view's jobs make of the scene, coarse and fine, without a window: [H,W,4], top row first."""
-    picture = view_picture.ViewPicture()
+    picture = view_image.ViewImage()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     picture.update(depsgraph, print)
-    camera = importlib.import_module(view_picture.__name__.replace('viewport.view_picture', 'scene.view.cameras')).camera_of(
+    camera = importlib.import_module(view_image.__name__.replace('viewport.view_image',
+                                                                 'scene.view.cameras')).camera_of(
         bpy.context.scene.camera, bpy.context.scene.render, None)
     found = []
     for coarse in (2, 1):
         picture._key = coarse
-        picture._start(bpy.context.scene, depsgraph, view_picture.ViewCamera(camera, borders), picture._instances,
+        picture._start(bpy.context.scene, depsgraph, view_image.ViewCamera(camera, borders), picture._instances,
                        picture._mattes.placed, np.zeros((0, 4)), coarse)
         while picture._task.is_running():
             pass
@@ -166,7 +170,7 @@ def made_pictures(view_picture, viewed, borders):
 
 def test_meshes_and_holdouts_hide_splats_in_rendered_views(stipple, viewed, square):
     """A quad before the left half of splats; then holdouts alone; then nothing."""
-    view_picture = importlib.import_module(f'{stipple.__name__}.viewport.view_picture')
+    view_image = importlib.import_module(f'{stipple.__name__}.viewport.view_image')
     facts = importlib.import_module(f'{stipple.__name__}.scene.view.facts')
     scene = bpy.context.scene
     scenes.camera((0, 0, 6), width=60, height=60, type='ORTHO', ortho_scale=3.0)
@@ -176,7 +180,7 @@ def test_meshes_and_holdouts_hide_splats_in_rendered_views(stipple, viewed, squa
 
     def alphas():
         bpy.context.view_layer.update()
-        coarse, fine = made_pictures(view_picture, viewed, whole)
+        coarse, fine = made_pictures(view_image, viewed, whole)
         assert coarse.shape == (30, 30, 4) and fine.shape == (60, 60, 4)
         np.testing.assert_allclose(coarse[15, [10, 20], 3], fine[30, [20, 40], 3], atol=0.05)
         return fine[30, 20, 3], fine[30, 40, 3]
@@ -194,9 +198,9 @@ def test_meshes_and_holdouts_hide_splats_in_rendered_views(stipple, viewed, squa
 
 def test_averages_of_rendered_views_are_those_of_renders(stipple, viewed, square, tmp_path, monkeypatch):
     """Out of focus behind the edge of a mesh, which is drawn once for all averages."""
-    view_picture = importlib.import_module(f'{stipple.__name__}.viewport.view_picture')
+    view_image = importlib.import_module(f'{stipple.__name__}.viewport.view_image')
     facts = importlib.import_module(f'{stipple.__name__}.scene.view.facts')
-    monkeypatch.setattr(view_picture, '_texture', lambda pixels: pixels)
+    monkeypatch.setattr(view_image, '_texture', lambda pixels: pixels)
     scene = bpy.context.scene
     camera = scenes.camera((0, 0, 6), width=60, height=60, lens=50.0)
     scenes.quad('before', offset=(-1.0, 0.0, 1.0))
@@ -206,13 +210,15 @@ def test_averages_of_rendered_views_are_those_of_renders(stipple, viewed, square
     scene.stipple.exact_projection = scene.stipple.zoom_antialiasing = 'OFF'
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seen = view_picture.ViewCamera(stipple.scene.view.cameras.camera_of(camera, scene.render, None),
-                                   facts.Border(0, 0, 60, 60), stipple.scene.view.lenses.lens_of(camera, depsgraph))
-    picture = view_picture.ViewPicture()
+    seen = view_image.ViewCamera(stipple.scene.view.cameras.camera_of(camera, scene.render, None),
+                                   facts.Border(0, 0, 60, 60),
+                                 stipple.scene.view.apertures.aperture_of(camera, depsgraph))
+    picture = view_image.ViewImage()
     picture.update(depsgraph, print)
     picture._key = 'still'
     meshes = []
-    monkeypatch.setattr(stipple.scene.view.mattes, 'start_samples', lambda *given, start=stipple.scene.view.mattes.start_samples:
+    monkeypatch.setattr(stipple.scene.view.mattes, 'start_samples', lambda *given,
+                        start=stipple.scene.view.mattes.start_samples:
                         meshes.append(given) or start(*given))
     drawn = {}
     while picture._shown is None or not picture._is_done(seen):
@@ -232,11 +238,11 @@ def test_averages_of_rendered_views_are_those_of_renders(stipple, viewed, square
 
 
 def test_rendered_views_read_a_mesh_again_only_when_it_changes(stipple, viewed, square, monkeypatch):
-    view_picture = importlib.import_module(f'{stipple.__name__}.viewport.view_picture')
+    view_image = importlib.import_module(f'{stipple.__name__}.viewport.view_image')
     quad = scenes.quad('before')
     read, reader = [], stipple.scene.view.mattes.read
     monkeypatch.setattr(stipple.scene.view.mattes, 'read', lambda obj: read.append(obj.name) or reader(obj))
-    kept = view_picture.ViewMattes()
+    kept = view_image.ViewMattes()
 
     def update():
         bpy.context.view_layer.update()

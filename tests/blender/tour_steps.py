@@ -15,9 +15,9 @@ import scenes  # noqa: E402
 import series  # noqa: E402
 
 # Blender's own panels of a mesh come first and would fill the picture.
-LEFT_OUT = ('DATA_PT_vertex_groups', 'DATA_PT_shape_keys', 'DATA_PT_uv_texture', 'DATA_PT_vertex_colors', 'DATA_PT_face_maps',
-            'DATA_PT_mesh_attributes', 'DATA_PT_normals', 'DATA_PT_texture_space', 'DATA_PT_remesh', 'DATA_PT_customdata',
-            'DATA_PT_custom_props_mesh')
+LEFT_OUT = ('DATA_PT_vertex_groups', 'DATA_PT_shape_keys', 'DATA_PT_uv_texture', 'DATA_PT_vertex_colors',
+            'DATA_PT_face_maps', 'DATA_PT_mesh_attributes', 'DATA_PT_normals', 'DATA_PT_texture_space',
+            'DATA_PT_remesh', 'DATA_PT_customdata', 'DATA_PT_custom_props_mesh')
 OPENED = 'STIPPLE_PT_grade'  # starts closed, and is what the picture is of
 
 
@@ -80,7 +80,8 @@ def in_a_series(window):
     stipple = sys.modules['stipple']
     for frame in range(1, 11):
         arrays = series.arrays_of(stipple, frame)
-        stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(), arrays).save(str(files / f'swarm_{frame:04d}.ply'))
+        stipple.binding.cloud.Cloud.create(stipple.scene.source.sources.context(),
+                                           arrays).save(str(files / f'swarm_{frame:04d}.ply'))
     with window.context():
         bpy.ops.stipple.splats_import(filepath=str(files / 'swarm_0001.ply'), as_sequence=True, up_axis='Z')
     bpy.context.scene.frame_set(4)

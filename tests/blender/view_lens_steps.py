@@ -22,8 +22,8 @@ def folder():
     return Path(sys.argv[sys.argv.index('--') + 2])
 
 
-def view_picture():
-    kind = import_module(f'{addon().__name__}.viewport.view_picture').ViewPicture
+def view_image():
+    kind = import_module(f'{addon().__name__}.viewport.view_image').ViewImage
     return next((thing for thing in gc.get_objects() if type(thing) is kind), None)
 
 
@@ -56,7 +56,7 @@ def build(window):
 
 def watch(window):
     """From now on every picture that is shown is noted."""
-    window.picture = view_picture()
+    window.picture = view_image()
     if window.picture is None:
         return False
     bpy.types.SpaceView3D.draw_handler_add(note_drawn, (window.picture,), 'WINDOW', 'POST_PIXEL')
@@ -137,7 +137,7 @@ def mirror_ball(window):
 
 
 def refused(window):
-    picture = import_module(f'{addon().__name__}.viewport.view_picture')
+    picture = import_module(f'{addon().__name__}.viewport.view_image')
     with window.context():
         try:
             picture.view_camera(bpy.context, bpy.context.evaluated_depsgraph_get())

@@ -79,7 +79,7 @@ def written_formats():
     for form in json.loads(tool('formats', '--json')):
         if not form['can_write']:
             continue
-        ending = form['endings'].split()[0]
+        ending = form['extensions'].split()[0]
         degree = min(DEGREE, form['max_sh_degree'])
         versions = (3, 4) if form['name'] == 'spz' else (0,)
         for version in versions:
@@ -112,7 +112,8 @@ def number(value):
 
 def row(figures):
     cells = [figures['title'], f"{figures['bytes']:.3g}", str(figures['degree'])]
-    for name, factor in (('position', 1000), ('rotation', 180 / np.pi), ('scale_ratio', 100), ('opacity', 1), ('sh', 1)):
+    for name, factor in (('position', 1000), ('rotation', 180 / np.pi), ('scale_ratio', 100), ('opacity', 1),
+                         ('sh', 1)):
         cells.append(' / '.join(number(figures[f'{kind}_{name}'] * factor) for kind in ('max', 'mean')))
     return '| ' + ' | '.join(cells) + ' |'
 

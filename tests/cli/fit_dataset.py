@@ -32,7 +32,8 @@ def dataset(tmp_path_factory):
     """Twelve pictures of a cloud from a ring around it, as NeRF-synthetic has them."""
     folder = tmp_path_factory.mktemp('dataset')
     conversions.write_ply(folder / 'truth.ply', conversions.make_cloud(5), conversions.DEGREE)
-    low, high = (json.loads(run('info', folder / 'truth.ply', '--json').stdout)[f'bounds_{end}'] for end in ('min', 'max'))
+    low, high = (json.loads(run('info', folder / 'truth.ply', '--json').stdout)[f'bounds_{end}']
+                 for end in ('min', 'max'))
     middle = [(a + b) / 2 for a, b in zip(low, high)]
     distance = 2 * max(b - a for a, b in zip(low, high))
     frames = []

@@ -32,15 +32,18 @@ def test_levels_and_knobs_change_the_picture(view, tmp_path):
     assert figures('compare', final, double)['psnr'] > 90
     rays = picture(view, tmp_path / 'knobs.exr', '--order', 'pixel', '--projection', 'ray')
     assert figures('compare', rays, tmp_path / 'rays.exr')['max_error'] == 0
-    for knob in (('--share', '0.3'), ('--samples', '2'), ('--least-alpha', '0.2')):
+    for knob in (('--share', '0.3'), ('--samples', '2'), ('--min-alpha', '0.2')):
         other = picture(view, tmp_path / 'knob.exr', *knob)
         assert figures('compare', final, other)['max_error'] > 1e-3, knob
+    former = picture(view, tmp_path / 'former.exr', '--least-alpha', '0.2')
+    assert figures('compare', former, other)['max_error'] == 0
 
 
 def test_a_report_is_printed_and_written(view, tmp_path):
     splats, camera = view
     out = run('accuracy', splats, '--camera', camera, '--width', 48, '--height', 36, '--repetitions', 2, '-o',
-              tmp_path / 'r.json', '-o', tmp_path / 'r.csv', '-o', tmp_path / 'r.svg', '--within', 1e9, '--above', 20).stdout
+              tmp_path / 'r.json', '-o', tmp_path / 'r.csv', '-o', tmp_path / 'r.svg', '--within', 1e9, '--above',
+              20).stdout
     lines = out.splitlines()
     assert lines[0].startswith('48 x 36 pixels, 1728 of them compared, 400 splats')
     assert any(line.startswith('preview ') for line in lines)
@@ -81,13 +84,14 @@ def test_what_is_measured_needs_what_it_needs(view, tmp_path):
     assert 'is not the report of a fit' in error('accuracy', '--fit', camera, *out)
     assert '--resolution is 0; 1 to 65536' in error('accuracy', splats, '--resolution', 0, *out)
     assert 'repetitions is 0; 1 to 1000' in error('accuracy', splats, '--resolution', 9, '--repetitions', 0, *out)
-    assert 'no voxel size fills this volume within' in error('accuracy', splats, '--resolution', 9, '--within', 1e-9, *out)
+    assert 'no voxel size fills this volume within' in error('accuracy', splats, '--resolution', 9, '--within', 1e-9,
+                                                             *out)
 
 
 @pytest.mark.parametrize('options, text', [
     (('--samples', 0), 'samples_per_side is 0; 1 to 16 is allowed'),
     (('--degree', 5), 'sh_degree_limit is 5; 0 to 4 is allowed'),
-    (('--least-alpha', 1.5), 'least_alpha is 1.5; a number above 0 and below 1 is allowed'),
+    (('--min-alpha', 1.5), 'min_alpha is 1.5; a number above 0 and below 1 is allowed'),
     (('--share', 0), 'budget_share is 0; a number above 0 and up to 1 is allowed'),
     (('--accuracy', 'reference', '--precision', 'float'), 'level is reference with a knob below it'),
     (('--samples', 4, '--antialiasing', 'mip'), 'samples_per_side is 4 without antialiasing by samples'),
@@ -109,5 +113,5 @@ def test_a_choice_that_nothing_meets_says_what_is_needed(view, tmp_path):
     arguments = ('accuracy', splats, '--camera', camera, '--width', 16, '--height', 12, '--repetitions', 1, '-o',
                  tmp_path / 'r.json')
     assert 'the fastest, ' in error(*arguments, '--within', 1e-7)
-    assert 'no ending of a report' in error(*arguments[:-1], tmp_path / 'r.txt')
+    assert 'no extension of a report' in error(*arguments[:-1], tmp_path / 'r.txt')
     assert not (tmp_path / 'r.txt').exists()

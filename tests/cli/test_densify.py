@@ -21,9 +21,18 @@ def test_adds_splats_up_to_the_cap(dataset, coarse, tmp_path):  # noqa: F811
     out = tmp_path / 'out.ply'
     before = count(coarse)
     seen = figures(run('densify', coarse, out, '--dataset', dataset, '--strategy', 'adaptive(threshold=1e-7)',
-                       '--gaussians', before + 7, '--events', 2).stdout)
+                       '--max-splats', before + 7, '--events', 2).stdout)
     assert int(seen['gaussians_before']) == before
     assert int(seen['gaussians']) == count(out) == before + 7
+
+
+def test_flags_are_understood_by_what_they_were_called(dataset, coarse, tmp_path):  # noqa: F811
+    for name, cap, memory in (('former', '--gaussians', '--picture-memory'),
+                              ('present', '--max-splats', '--image-memory')):
+        run('densify', coarse, tmp_path / f'{name}.ply', '--dataset', dataset, '--strategy', 'adaptive(threshold=1e-7)',
+            cap, count(coarse) + 5, memory, 1)
+    assert (tmp_path / 'former.ply').read_bytes() == (tmp_path / 'present.ply').read_bytes()
+    assert '--max-splats,--gaussians' in run('densify', '--help').stdout
 
 
 def test_the_same_command_gives_the_same_file(dataset, coarse, tmp_path):  # noqa: F811
@@ -40,7 +49,7 @@ def test_the_same_command_gives_the_same_file(dataset, coarse, tmp_path):  # noq
     (('{coarse}', 'out.ply', '--dataset', 'missing'), 'missing'),
     (('{coarse}', 'out.ply', '--dataset', '{dataset}', '--strategy', 'best'), "strategy is 'best'; there is adaptive"),
     (('{coarse}', 'out.ply', '--dataset', '{dataset}', '--events', 0), '--events is 0'),
-    (('{coarse}', 'out.ply', '--dataset', '{dataset}', '--gaussians', 1), 'at most 1 splats are asked for'),
+    (('{coarse}', 'out.ply', '--dataset', '{dataset}', '--max-splats', 1), 'at most 1 splats are asked for'),
 ])
 def test_one_line_says_what_is_wrong(dataset, coarse, tmp_path, arguments, text):  # noqa: F811
     given = [str(a).replace('{dataset}', str(dataset)).replace('{coarse}', str(coarse)) for a in arguments]

@@ -29,7 +29,8 @@ def test_fits_splats_and_reports(dataset, tmp_path):
 
 def test_the_report_tells_what_iterations_cost(dataset, tmp_path):
     run('fit', dataset, tmp_path / 'out.ply', *FEW, '--report', tmp_path / 'r.json')
-    lines = run('accuracy', '--fit', tmp_path / 'r.json', '-o', tmp_path / 'cost.json', '--above', 10).stdout.splitlines()
+    lines = run('accuracy', '--fit', tmp_path / 'r.json', '-o', tmp_path / 'cost.json', '--above',
+                10).stdout.splitlines()
     report, fit = (json.loads((tmp_path / name).read_text()) for name in ('cost.json', 'r.json'))
     assert report['subject'] == 'fit'
     assert [row['iteration'] for row in report['settings']] == [row['iteration'] for row in fit['measures']]
@@ -61,10 +62,12 @@ def test_lists_strategies_and_parts():
 
 def test_every_option_of_the_library_is_a_flag_with_a_help():
     lines = run('fit', '--help').stdout
-    for name in ('model', 'strategy', 'start-splats,--start', 'max-splats,--gaussians', 'least-anchors', 'most-anchors,--anchors',
-                 'gaussians-per-anchor', 'sh-degree', 'antialias', 'density-gradient,--no-density-gradient', 'jitter,--no-jitter',
-                 'shell', 'iterations', 'background', 'holdout', 'seed', 'ssim-share', 'measure-interval', 'picture-bytes',
-                 'max-bytes', 'checkpoint-interval,--checkpoint-every', 'checkpoint-seconds', 'resume'):
+    for name in ('model', 'strategy', 'start-splats,--start', 'max-splats,--gaussians',
+                 'min-anchors,--least-anchors', 'max-anchors,--most-anchors,--anchors',
+                 'gaussians-per-anchor', 'sh-degree', 'antialias', 'density-gradient,--no-density-gradient',
+                 'jitter,--no-jitter', 'shell', 'iterations', 'background', 'holdout', 'seed', 'ssim-share',
+                 'measure-interval', 'image-bytes,--picture-bytes', 'max-bytes',
+                 'checkpoint-interval,--checkpoint-every', 'checkpoint-seconds', 'resume'):
         assert f'  --{name}' in lines, name
     assert 'checkpoint-path' not in lines  # the tool says where it lies
     assert 'Default: 500 (fast), 2000 (balanced), 4000 (fine). Range: 1 to 10000000.' in lines
@@ -72,14 +75,16 @@ def test_every_option_of_the_library_is_a_flag_with_a_help():
 
 @pytest.mark.parametrize('former, present', [
     (('--gaussians', 200), ('--max-splats', 200)), (('--start', 50), ('--start-splats', 50)),
-    (('--checkpoint-every', 5), ('--checkpoint-interval', 5)), (('--picture-memory', 1), ('--picture-bytes', '1MiB')),
-    (('--memory', 1), ('--max-bytes', '1024KiB')),
-    (('--model', 'field', '--anchors', 32, '--no-jitter'), ('--model', 'field', '--most-anchors', 32, '--no-jitter'))],
+    (('--checkpoint-every', 5), ('--checkpoint-interval', 5)), (('--picture-memory', 1), ('--image-bytes', '1MiB')),
+    (('--picture-bytes', '1MiB'), ('--image-memory', 1)), (('--memory', 1), ('--max-bytes', '1024KiB')),
+    (('--model', 'field', '--least-anchors', 8, '--most-anchors', 32),
+     ('--model', 'field', '--min-anchors', 8, '--max-anchors', 32)),
+    (('--model', 'field', '--anchors', 32, '--no-jitter'), ('--model', 'field', '--max-anchors', 32, '--no-jitter'))],
     ids=lambda flags: flags[-2])
 def test_flags_are_understood_by_what_they_were_called(dataset, tmp_path, former, present):
     for name, flags in (('former', former), ('present', present)):
-        run('fit', dataset, tmp_path / f'{name}.ply', '--iterations', 20, '--sh-degree', 0, '--report', tmp_path / f'{name}.json',
-            *flags)
+        run('fit', dataset, tmp_path / f'{name}.ply', '--iterations', 20, '--sh-degree', 0, '--report',
+            tmp_path / f'{name}.json', *flags)
     assert (tmp_path / 'former.ply').read_bytes() == (tmp_path / 'present.ply').read_bytes()
     settings = [json.loads((tmp_path / f'{name}.json').read_text())['settings'] for name in ('former', 'present')]
     assert settings[0] == settings[1]
@@ -117,7 +122,8 @@ def test_a_field_decodes_at_any_budget(dataset, tmp_path):
 def test_a_field_has_a_shell_where_it_is_asked_for(dataset, tmp_path):
     farthest = {}
     for shell in ('on', 'off'):
-        run('fit', dataset, tmp_path / f'{shell}.ply', '--model', 'field', '--iterations', 20, '--anchors', 256, '--shell', shell)
+        run('fit', dataset, tmp_path / f'{shell}.ply', '--model', 'field', '--iterations', 20, '--anchors', 256,
+            '--shell', shell)
         bounds = json.loads(run('info', tmp_path / f'{shell}.ply', '--json').stdout)
         farthest[shell] = max(map(abs, bounds['bounds_min'] + bounds['bounds_max']))
     assert farthest['on'] > 3 * farthest['off']

@@ -93,7 +93,8 @@ def test_deep_json_is_refused(tmp_path, name, text):
 def test_deep_json_in_binary_files_is_refused(tmp_path):
     deep = f'{{"asset":{{"version":"2.0"}},"extras":{nested()}}}'
     refused(tmp_path, 'info', glb(tmp_path / 'a.glb', deep), words=('a.glb', 'nested'))
-    splats = deep.replace('"extras"', '"x":"KHR_gaussian_splatting","extensionsUsed":["KHR_gaussian_splatting"],"extras"')
+    splats = deep.replace('"extras"',
+                          '"x":"KHR_gaussian_splatting","extensionsUsed":["KHR_gaussian_splatting"],"extras"')
     refused(tmp_path, 'info', glb(tmp_path / 'b.glb', splats, b'1234'), words=('b.glb', 'nested'))
     refused(tmp_path, 'info', safetensors(tmp_path / 'a.stipple.safetensors', f'{{"a":{nested()}}}'),
             words=('a.stipple.safetensors', 'nested'))
@@ -104,7 +105,8 @@ def test_deep_json_in_binary_files_is_refused(tmp_path):
 
 def test_deep_json_as_report_of_a_fit_is_refused(tmp_path):
     (tmp_path / 'r.json').write_text(f'{{"stipple_fit_report":{nested()}}}')
-    refused(tmp_path, 'accuracy', '--fit', tmp_path / 'r.json', '--out', tmp_path / 'out.json', words=('r.json', 'nested'))
+    refused(tmp_path, 'accuracy', '--fit', tmp_path / 'r.json', '--out', tmp_path / 'out.json',
+            words=('r.json', 'nested'))
 
 
 def test_brackets_packed_in_a_zip_are_refused(tmp_path):
@@ -164,7 +166,8 @@ def test_an_accessor_without_data_is_refused(tmp_path, name):
     document['materials'] = [{'pbrMetallicRoughness': {'baseColorTexture': {'index': 0}}}]
     document['textures'], document['images'] = [{'source': 0}], [{'uri': 'a.png'}]
     png(tmp_path / 'a.png', 4, 4)
-    refused(tmp_path, 'info', glb(tmp_path / 'a.glb', document, bytes(36)), words=('a.glb', 'at most' if name == 'POSITION' else '67108864'))
+    refused(tmp_path, 'info', glb(tmp_path / 'a.glb', document, bytes(36)),
+            words=('a.glb', 'at most' if name == 'POSITION' else '67108864'))
 
 
 def test_images_made_of_one_again_and_again_are_refused(tmp_path):
@@ -173,7 +176,8 @@ def test_images_made_of_one_again_and_again_are_refused(tmp_path):
     data += b'\0' * (-len(data) % 4)
     binary = data + struct.pack('<9f', 0, 0, 0, 1, 0, 0, 0, 1, 0)
     count = 200
-    document = scene(1, [{'attributes': {'POSITION': 0, 'TEXCOORD_0': 1}, 'material': number} for number in range(count)],
+    document = scene(1, [{'attributes': {'POSITION': 0, 'TEXCOORD_0': 1}, 'material': number}
+                         for number in range(count)],
                      3, binary)
     document['bufferViews'] = [{'buffer': 0, 'byteOffset': len(data), 'byteLength': 36},
                                {'buffer': 0, 'byteOffset': 0, 'byteLength': len(data)}]

@@ -81,7 +81,8 @@ def test_coarser_levels_are_cuts_of_the_tree(splats, tmp_path):
     for level, count in enumerate(COUNTS[1:], 1):
         tool('convert', splats / 'scene' / f'{level}_0' / 'meta.json', tmp_path / 'level.ply')
         tool('decode', splats / 'tree.stipple.safetensors', tmp_path / 'cut.ply', '--anchors', count)
-        have, wanted = (conversions.read_ply(tmp_path / name, conversions.DEGREE)[:, :3] for name in ('level.ply', 'cut.ply'))
+        have, wanted = (conversions.read_ply(tmp_path / name, conversions.DEGREE)[:, :3]
+                        for name in ('level.ply', 'cut.ply'))
         gaps = np.linalg.norm(have[:, None] - wanted[None], axis=2)
         assert sorted(gaps.argmin(axis=1)) == list(range(count))
         assert gaps.min(axis=1).max() < 1e-4  # SOG's steps, above
@@ -125,9 +126,11 @@ def test_refusals_say_what_is_allowed_and_leave_the_scene(splats, tmp_path):
     before = files(splats / 'scene')
     # 1,728 is 4^5 and more.
     for levels in (0, -1, 7):
-        assert f'--levels is {levels}; 1 to 6 is allowed for 1728 splats' in error('convert', cloud, scene, f'--levels={levels}')
+        assert f'--levels is {levels}; 1 to 6 is allowed for 1728 splats' in error('convert', cloud, scene,
+                                                                                   f'--levels={levels}')
     assert 'cloud.sog' in error('convert', cloud, splats / 'cloud.sog', '--levels', 2)
-    assert "'" + str(tmp_path / 'none') + "' is not a folder" in error('convert', cloud, tmp_path / 'none' / 'lod-meta.json')
+    assert "'" + str(tmp_path / 'none') + "' is not a folder" in error('convert', cloud,
+                                                                       tmp_path / 'none' / 'lod-meta.json')
     assert files(splats / 'scene') == before
 
 
@@ -138,4 +141,5 @@ def test_one_splat_is_one_level(tmp_path):
     tool('decode', tmp_path / 'one.ply', tmp_path / 'one.stipple.safetensors')
     tool('convert', tmp_path / 'one.stipple.safetensors', tmp_path / 'scene' / 'lod-meta.json', '--levels', 1)
     assert info(tmp_path / 'scene' / 'lod-meta.json')['count'] == 1
-    assert '1 to 1 is allowed for 1 splat' in error('convert', tmp_path / 'one.ply', tmp_path / 'lod-meta.json', '--levels', 2)
+    assert '1 to 1 is allowed for 1 splat' in error('convert', tmp_path / 'one.ply', tmp_path / 'lod-meta.json',
+                                                    '--levels', 2)

@@ -177,7 +177,8 @@ def test_the_khronos_validator_finds_planted_faults(ply, tmp_path):
     length = struct.unpack('<I', data[12:16])[0]
     planted = data[:20] + data[20:20 + length].replace(b'"count":3000', b'"count":9000', 1) + data[20 + length:]
     gltf.write_bytes(planted)
-    assert any(issue['code'] != 'MESH_PRIMITIVE_INVALID_ATTRIBUTE' for issue in gltf_issues(gltf) if issue['severity'] == 0)
+    assert any(issue['code'] != 'MESH_PRIMITIVE_INVALID_ATTRIBUTE' for issue in gltf_issues(gltf)
+               if issue['severity'] == 0)
 
 
 def test_glb_is_splats_or_a_mesh_by_its_content(ply, tmp_path):

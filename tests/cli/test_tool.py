@@ -209,6 +209,21 @@ def test_render_draws_files_apart(scene, four_each):
     run('render', *alone, '-o', scene / 'alone.exr', '--objects', 'apart')
 
 
+def test_render_understands_what_its_flags_were_called(scene):
+    for name, index, low_pass in (('former', '--index', '--lowpass'), ('present', '--object-index', '--low-pass')):
+        run('render', scene / 'cube.ply', '--camera', scene / 'transforms.json', '-o', scene / f'{name}.exr',
+            index, scene / f'{name}_index.exr', low_pass, 'none')
+    for end in ('.exr', '_index.exr'):
+        assert figures('compare', scene / f'former{end}', scene / f'present{end}')['max_error'] == 0
+    assert all(names in run('render', '--help').stdout for names in ('--object-index,--index', '--low-pass,--lowpass'))
+
+
+def test_formats_are_listed_for_programs_with_the_former_key_too(scene):
+    formats = json.loads(run('formats', '--json').stdout)
+    assert all(form['endings'] == form['extensions'] for form in formats)
+    assert {'.ply', '.spz'} <= {extension for form in formats for extension in form['extensions'].split()}
+
+
 def test_render_looks_through_lenses_and_all_around(scene):
     view = ('--camera', scene / 'transforms.json')
     run('render', scene / 'cube.ply', *view, '-o', scene / 'sharp.exr')
@@ -216,13 +231,14 @@ def test_render_looks_through_lenses_and_all_around(scene):
     run('render', scene / 'cube.ply', *view, '-o', scene / 'focus.exr', '--aperture', 0.02, '--focus-distance', 3,
         '--blades', 6)
     run('render', scene / 'cube.ply', *view, '-o', scene / 'blurred.exr', '--aperture', 0.3, '--focus-distance', 1,
-        '--blur-samples', 16, '--depth', scene / 'z.exr', '--normal', scene / 'n.exr', '--index', scene / 'i.exr')
+        '--blur-samples', 16, '--depth', scene / 'z.exr', '--normal', scene / 'n.exr', '--object-index',
+        scene / 'i.exr')
     near, far = (figures('compare', scene / 'sharp.exr', scene / name)['psnr'] for name in ('focus.exr', 'blurred.exr'))
     assert near > far + 5 and far < 30
     assert [figures('info', scene / name)['channels'] for name in ('z.exr', 'n.exr', 'i.exr')] == [1, 3, 1]
     for model in ('equirectangular', 'fisheye-equidistant', 'fisheye-equisolid'):
-        run('render', scene / 'cube.ply', *view, '--camera-model', model, '--accuracy', 'rays', '--width', 64, '--height',
-            32, '-o', scene / 'all.exr')
+        run('render', scene / 'cube.ply', *view, '--camera-model', model, '--accuracy', 'rays', '--width', 64,
+            '--height', 32, '-o', scene / 'all.exr')
     assert figures('info', scene / 'all.exr')['width'] == 64
     write_camera(scene / 'two.json')
     document = json.loads((scene / 'two.json').read_text())
@@ -295,7 +311,8 @@ def test_mesh_is_closed_and_as_large_as_the_cube(scene):
     assert 1.0 < made['volume'] < (1 + 4 * made['voxel_size']) ** 3
     assert figures('info', scene / 'cube_mesh.glb')['triangles'] == made['triangles']
     run('voxelize', scene / 'cube.ply', scene / 'for_mesh.vdb', '--resolution', 40)
-    assert figures('mesh', scene / 'for_mesh.vdb', scene / 'cube_mesh.ply', '--largest')['triangles'] == made['triangles']
+    assert figures('mesh', scene / 'for_mesh.vdb', scene / 'cube_mesh.ply',
+                   '--largest')['triangles'] == made['triangles']
     assert (scene / 'cube_mesh.ply').read_bytes().startswith(b'ply\n')
     assert 'opacity is 1.5' in error('mesh', scene / 'for_mesh.vdb', scene / 'no.ply', '--threshold', 1.5)
     assert '.ply and .glb' in error('mesh', scene / 'for_mesh.vdb', scene / 'no.obj')

@@ -26,7 +26,8 @@ class GuideError(Exception):
 def blocks(text):
     """[(caption match or None, language, code)] of a page, in its order."""
     found = []
-    for block in re.finditer(r'^(?P<above>[^\n]*)\n\n```(?P<language>\w+)\n(?P<code>.*?)^```$', text, flags=re.M | re.S):
+    for block in re.finditer(r'^(?P<above>[^\n]*)\n\n```(?P<language>\w+)\n(?P<code>.*?)^```$', text,
+                             flags=re.M | re.S):
         found.append((CAPTION.match(block['above']), block['language'], block['code']))
     return found
 

@@ -1,5 +1,5 @@
-"""docs/guides/add_a_splat_format.md, followed literally: the tool writes the format, tells it by its content and reads it
-back."""
+"""docs/guides/add_a_splat_format.md, followed literally: the tool writes the format, tells it by its content and reads
+it back."""
 import json
 
 import conversion_table as conversions

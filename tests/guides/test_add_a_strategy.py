@@ -1,5 +1,5 @@
-"""docs/guides/add_a_strategy.md, followed literally: the part and the strategy fit splats from the tool, and the add-on's
-list has them."""
+"""docs/guides/add_a_strategy.md, followed literally: the part and the strategy fit splats from the tool, and the
+add-on's list has them."""
 import json
 import subprocess
 import sys

@@ -11,8 +11,10 @@ def page(folder, text):
 
 
 def test_blocks_are_applied_where_they_belong(tmp_path):
-    guide = page(tmp_path, 'Text.\n\nNew file `new.cpp`:\n\n```cpp\nnew\n```\n\nIn `there.cpp`, below `second`:\n\n```cpp\n'
-                           'third\n```\n\nIn `there.cpp`, above `second`:\n\n```cpp\nhalf\n```\n\nRun.\n\n```sh\nstipple a\n```\n')
+    guide = page(tmp_path,
+                 'Text.\n\nNew file `new.cpp`:\n\n```cpp\nnew\n```\n\nIn `there.cpp`, below `second`:\n\n```cpp\n'
+                           'third\n```\n\nIn `there.cpp`, above '
+                           '`second`:\n\n```cpp\nhalf\n```\n\nRun.\n\n```sh\nstipple a\n```\n')
     guide.follow()
     assert (tmp_path / 'tree/new.cpp').read_text() == 'new\n'
     assert (tmp_path / 'tree/there.cpp').read_text() == 'first\nhalf\n  second\nthird\nlast\n'

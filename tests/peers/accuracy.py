@@ -1,9 +1,11 @@
 """Renews what docs/results/accuracy.md says of the three scenes of blend-fixtures/, and its plots.
 
-    /usr/bin/python3 tests/peers/accuracy.py [--build build/release] [--work FOLDER] [--only suzanne|instances|terrain|volume]
+    /usr/bin/python3 tests/peers/accuracy.py [--build build/release] [--work FOLDER] [--only
+    suzanne|instances|terrain|volume]
 
 Makes splats of each scene in background Blender, measures its view by `stipple accuracy`, and voxel sizes of the first,
-and writes the tables between the marks of the page and the plots into docs/images. Run it on a machine that does nothing else.
+and writes the tables between the marks of the page and the plots into docs/images. Run it on a machine that does
+nothing else.
 """
 import argparse
 import csv
@@ -42,8 +44,9 @@ def measure(subject, build, work):
     """Rows of the report, as the CSV has them, and the sentence above its table."""
     scene = SCENES[0] if subject == VOLUME else subject
     what = ['--resolution', str(VOXELS)] if subject == VOLUME else ['--camera', work / f'{scene}.json']
-    out = subprocess.run([build / 'bin' / 'stipple', 'accuracy', work / f'{scene}.ply', *what, '-o', work / f'{subject}.csv',
-                          '-o', ROOT / 'docs' / 'images' / f'accuracy_{subject}.svg', '--seconds', '15'], check=True,
+    out = subprocess.run([build / 'bin' / 'stipple', 'accuracy', work / f'{scene}.ply', *what, '-o',
+                          work / f'{subject}.csv', '-o', ROOT / 'docs' / 'images' / f'accuracy_{subject}.svg',
+                          '--seconds', '15'], check=True,
                          capture_output=True, text=True).stdout
     return list(csv.DictReader((work / f'{subject}.csv').open())), out.splitlines()[0]
 
@@ -60,7 +63,8 @@ def table(rows):
         estimated = ' (estimated)' if row['is_estimated'] == '1' else ''
         front = 'best for its time' if row['on_front'] == '1' else ''
         lines.append(f"| {row['setting']} | {milliseconds(row)}{estimated} | {float(row['psnr']):.1f} | "
-                     f"{float(row['largest_error']):.2g} | {float(row['error_99_9']):.2g} | {int(row[counted]):,} | {front} |")
+                     f"{float(row['largest_error']):.2g} | {float(row['error_99_9']):.2g} | {int(row[counted]):,} | "
+                     f"{front} |")
     return '\n'.join(lines)
 
 
@@ -76,7 +80,8 @@ def main():
     for subject in (options.only,) if options.only else (*SCENES, VOLUME):
         export(SCENES[0] if subject == VOLUME else subject, options.build, work)
         rows, head = measure(subject, options.build, work)
-        made = f'<!-- {subject} -->\n{head}.\n\n{table(rows)}\n\n![{subject}](../images/accuracy_{subject}.svg)\n<!-- end -->'
+        made = (f'<!-- {subject} -->\n{head}.\n\n{table(rows)}\n\n'
+                f'![{subject}](../images/accuracy_{subject}.svg)\n<!-- end -->')
         page, count = re.subn(rf'<!-- {subject} -->.*?<!-- end -->', lambda _: made, page, flags=re.S)
         if count != 1:
             sys.exit(f'{PAGE} has {count} places for {subject}; 1 is expected')

@@ -110,9 +110,11 @@ def main():
                 print(f'{name:9} {count:5} iterations: {seconds[name, count]:7.1f} s, held out '
                       f'{psnr[name, count]:.2f} dB, {splat_count(result)} splats', flush=True)
     if len(counts) > 1:
-        step = {name: (seconds[name, counts[-1]] - seconds[name, counts[0]]) / (counts[-1] - counts[0]) for name in fits}
+        step = {name: (seconds[name, counts[-1]] - seconds[name, counts[0]]) / (counts[-1] - counts[0])
+                for name in fits}
         print(f"An iteration at equal count: Stipple {1e3 * step['Level']:.1f} ms, OpenSplat "
-              f"{1e3 * step['OpenSplat']:.1f} ms: {step['OpenSplat'] / step['Level']:.0f} times as fast; goal {GOAL}, aim {AIM}")
+              f"{1e3 * step['OpenSplat']:.1f} ms: {step['OpenSplat'] / step['Level']:.0f} times as fast; goal {GOAL}, "
+              f"aim {AIM}")
     for count in counts:
         print(f"PSNR at {count}: {psnr['Stipple', count] - psnr['OpenSplat', count]:+.2f} dB; goal: not lower")
     print(f"{counts[-1]} iterations: {seconds['Stipple', counts[-1]]:.1f} s; goal: the peer's PSNR in less than "

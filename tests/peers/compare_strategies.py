@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits data sets with every strategy, keeps what came out, and writes docs/results/strategies.md, its lines and its plot.
+"""Fits data sets with every strategy, keeps what came out, and writes docs/results/strategies.md, its lines and its
+plot.
 
     compare_strategies.py STIPPLE FOLDER DOCS [--seeds 3] [--iterations 3000] [--strategies a,b] [--scenes a,b]
         [--photos DATASET] [--again] [--table]
 
-FOLDER holds a folder with transforms.json for each scene, and results.jsonl: a line for each fit that is done. All of them are
-written to DOCS, too; copied back as results.jsonl, a run goes on from there on another machine. With --again the lines of
+FOLDER holds a folder with transforms.json for each scene, and results.jsonl: a line for each fit that is done. All of
+them are written to DOCS, too; copied back as results.jsonl, a run goes on from there on another machine. With --again
+the lines of
 --strategies are dropped first, and measured anew.
 
-Held-out views judge and choose nothing: budgets and strategies are chosen by `training_psnr`, that of views that a fit learns from.
+Held-out views judge and choose nothing: budgets and strategies are chosen by `training_psnr`, that of views that a fit
+learns from.
 """
 
 import argparse
@@ -32,7 +35,8 @@ UNSCALED = ('adaptive', 'improved')   # also for 30,000 iterations, on the first
 THIRD = 3                             # of adaptive's count, which the best strategies get once more
 HALF = {'improved': 2}                # published as better with half of adaptive's count
 BEST = 5                              # so many of them, beside adaptive itself
-COMBINED = ('absolute+long_axis_split',)  # and what parts make of them: the best of seven that short runs tried on one scene
+COMBINED = ('absolute+long_axis_split',)  # and what parts make of them: the best of seven that short runs tried on one
+                                          # scene
 
 
 def strategies(stipple):
@@ -44,8 +48,8 @@ def strategies(stipple):
 def fit(stipple, dataset, folder, job):
     """One fit as a process of its own: its figures."""
     report, result = folder / 'report.json', folder / 'result.stipple.safetensors'
-    command = [stipple, 'fit', dataset, result, '--iterations', job['iterations'], '--seed', job['seed'], '--holdout', 8,
-               '--downscale', job['downscale'], '--report', report]
+    command = [stipple, 'fit', dataset, result, '--iterations', job['iterations'], '--seed', job['seed'], '--holdout',
+               8, '--downscale', job['downscale'], '--report', report]
     if job['strategy'] == 'learned_density':
         command += ['--model', 'field']
     else:
@@ -62,9 +66,9 @@ def fit(stipple, dataset, folder, job):
         raise RuntimeError(f'{job["strategy"]} on {job["scene"]}: {message.decode().splitlines()[-1]}')
     story = json.loads(report.read_text())
     best = max(story['by_budget'], key=lambda row: row['training_psnr'])  # held-out views judge, and choose nothing
-    return {**job, 'training_psnr': best['training_psnr'], 'psnr': best['psnr'], 'ssim': best['ssim'], 'gaussians': best['gaussians'], 'seconds': seconds,
-            'processor_seconds': usage.ru_utime + usage.ru_stime, 'megabytes': usage.ru_maxrss / 1024,
-            'load': os.getloadavg()[0]}
+    return {**job, 'training_psnr': best['training_psnr'], 'psnr': best['psnr'], 'ssim': best['ssim'],
+            'gaussians': best['gaussians'], 'seconds': seconds, 'processor_seconds': usage.ru_utime + usage.ru_stime,
+            'megabytes': usage.ru_maxrss / 1024, 'load': os.getloadavg()[0]}
 
 
 class Results:
@@ -88,7 +92,8 @@ class Results:
 
 
 def best(results, scene, iterations):
-    """Strategies of explicit splats with the highest PSNR of training views on a scene, by the first seed, and adaptive."""
+    """Strategies of explicit splats with the highest PSNR of training views on a scene, by the first seed, and
+    adaptive."""
     rows = [row for row in results.find(scene=scene, seed=0, kind='full', iterations=iterations)
             if row['strategy'] not in ('learned_density', 'adaptive') and 'training_psnr' in row]
     return ['adaptive', *(row['strategy'] for row in sorted(rows, key=lambda row: -row['training_psnr'])[:BEST])]
@@ -130,7 +135,8 @@ def table(results, scene, kind, iterations):
     for name, found in sorted(by_name.items(), key=lambda item: -statistics.mean(row['psnr'] for row in item[1])):
         lines.append('| ' + ' | '.join((
             f'`{name}`', str(len(found)), spread([row['psnr'] for row in found], '{:.2f}'),
-            spread([row['ssim'] for row in found], '{:.4f}'), f'{statistics.mean(row["gaussians"] for row in found):,.0f}',
+            spread([row['ssim'] for row in found], '{:.4f}'),
+            f'{statistics.mean(row["gaussians"] for row in found):,.0f}',
             spread([row['processor_seconds'] for row in found], '{:.0f}'),
             f'{statistics.mean(row["megabytes"] for row in found):.0f}')) + ' |')
     return lines if by_name else []
@@ -141,18 +147,24 @@ def write_page(results, given):
     head = (f'`bash tests/peers/strategies.sh` writes this page: fits of {given.iterations:,} iterations with at most '
             f'{MOST_SPLATS:,} splats, up to {seeds} seed{"s" if seeds > 1 else ""} (mean ± standard deviation), every '
             f'eighth view held out, images of {464 // DOWNSCALE} × {256 // DOWNSCALE}. All fits together took '
-            f'{sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on {os.cpu_count()} cores. '
-            f'Their clocks add up to {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours; the mean load of the '
-            f'machine was {statistics.mean(row["load"] for row in results.rows):.1f}, and above 2 fits ran side by side.')
+            f'{sum(row["processor_seconds"] for row in results.rows) / 3600:.1f} processor hours on {os.cpu_count()} '
+            f'cores. '
+            f'Their clocks add up to {sum(row["seconds"] for row in results.rows) / 3600:.1f} hours; the mean load of '
+            f'the '
+            f'machine was {statistics.mean(row["load"] for row in results.rows):.1f}, and above 2 fits ran side by '
+            f'side.')
     lines = ['# What every strategy reaches', '', *textwrap.wrap(head, 120), '',
              '![Processor seconds and PSNR of every strategy](../images/strategies.svg)', '',
              '[What these figures say](densification.md). [Every fit, a line each](strategies.jsonl).', '']
     if any('training_psnr' not in row for row in results.rows):
-        lines += textwrap.wrap('Fits without `training_psnr` there were chosen by held-out views, and are not measured again: the '
-                               "best state of each, the budget of a field, and which strategies get a third of `adaptive`'s "
+        lines += textwrap.wrap('Fits without `training_psnr` there were chosen by held-out views, and are not measured '
+                               'again: the '
+                               "best state of each, the budget of a field, and which strategies get a third of "
+                               "`adaptive`'s "
                                'count.', 120) + ['']
     for scene in given.scenes:
-        lines += [f'## {SCENES.get(scene, scene).capitalize()}', '', *table(results, scene, 'full', given.iterations), '']
+        lines += [f'## {SCENES.get(scene, scene).capitalize()}', '', *table(results, scene, 'full', given.iterations),
+                  '']
         for kind, share in (('half', 'half'), ('third', 'a third')):
             fewer = table(results, scene, kind, given.iterations)
             if fewer:

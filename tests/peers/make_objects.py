@@ -4,8 +4,8 @@
 
     blender -b --factory-startup -P make_objects.py -- FOLDER [--views 60] [--size 160]
 
-One data set per object as nerfstudio has them, FOLDER/head, cage and heap: a smooth body, thin rods around an emptiness,
-and many small things that hide each other. PNG with alpha, and points as make_photos.py makes them.
+One data set per object as nerfstudio has them, FOLDER/head, cage and heap: a smooth body, thin rods around an
+emptiness, and many small things that hide each other. PNG with alpha, and points as make_photos.py makes them.
 """
 
 import argparse

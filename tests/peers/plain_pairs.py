@@ -12,7 +12,8 @@ from pathlib import Path
 
 
 def seconds(program, pictures):
-    return float(subprocess.run([program, '--seconds', str(pictures)], check=True, capture_output=True, text=True).stdout)
+    return float(subprocess.run([program, '--seconds', str(pictures)], check=True, capture_output=True,
+                                text=True).stdout)
 
 
 def interval(ratios):

@@ -4,8 +4,9 @@
 
     presets.py STIPPLE DATASET... [--iterations 250 500 ...] [--gaussians 5000 ...] [--model explicit]
 
-Per fit: held-out PSNR over black, splats, seconds, those of the processor. Then the mean over the data sets, and what the rule
-chooses: of iterations, and then of counts, the last doubling that still brings Fast 2 dB, Balanced 0.5 dB, Fine Detail 0.2 dB.
+Per fit: held-out PSNR over black, splats, seconds, those of the processor. Then the mean over the data sets, and what
+the rule chooses: of iterations, and then of counts, the last doubling that still brings Fast 2 dB, Balanced 0.5 dB,
+Fine Detail 0.2 dB.
 """
 
 import argparse
@@ -27,10 +28,12 @@ def fit(program, dataset, model, iterations, count, strategy):
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / 'report.json'
         out = Path(folder) / ('fit.ply' if model == 'explicit' else 'fit.stipple.safetensors')
-        most = ('--gaussians', str(count), '--strategy', strategy) if model == 'explicit' else ('--anchors', str(max(1, count // 4)))
+        most = ('--gaussians', str(count), '--strategy', strategy) if model == 'explicit' else ('--anchors',
+                                                                                                str(max(1, count // 4)))
         before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-        subprocess.run([program, 'fit', dataset, out, '--model', model, '--iterations', str(iterations), '--holdout', '6',
-                        '--report', report, *most], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        subprocess.run([program, 'fit', dataset, out, '--model', model, '--iterations', str(iterations), '--holdout',
+                        '6', '--report', report, *most], check=True, stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL)
         seconds, after = time.monotonic() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
         busy = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         best = json.loads(report.read_text())['by_budget'][-1]
@@ -65,10 +68,12 @@ def main():
     for count in given.gaussians:
         for iterations in given.iterations:
             rows = [fit(given.stipple, d, given.model, iterations, count, given.strategy) for d in given.datasets]
-            cells = [f'{psnr:.2f} dB, {splats:,}, {seconds:.0f} s ({busy:.0f} s)' for seconds, busy, splats, psnr in rows]
+            cells = [f'{psnr:.2f} dB, {splats:,}, {seconds:.0f} s ({busy:.0f} s)' for seconds, busy, splats,
+                     psnr in rows]
             psnr, busy = (sum(row[i] for row in rows) / len(rows) for i in (3, 1))
             means[count, iterations] = psnr
-            print(f'| {iterations:,} | {count:,} | ' + ' | '.join(cells) + f' | {psnr:.2f} dB, ({busy:.0f} s) |', flush=True)
+            print(f'| {iterations:,} | {count:,} | ' + ' | '.join(cells) + f' | {psnr:.2f} dB, ({busy:.0f} s) |',
+                  flush=True)
     for name, least in RULE.items():
         many = given.gaussians[-1]
         iterations = last_worth(given.iterations, {i: means[many, i] for i in given.iterations}, least)

@@ -7,7 +7,7 @@
 #include "splat/random_scene.h"
 #include "shot/sampled_render.h"
 
-// How the error of a sampled picture falls with its samples: the table of docs/effects.md. Prints
+// How the error of a sampled picture falls with its samples: the table of docs/results/effects.md. Prints
 // root mean square errors of colour and alpha against 16,384 samples, and the slope, beside those
 // of as many random points.
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws processor seconds and PSNR of strategies as SVG: a panel for each scene, a mark for the mean of each strategy."""
+"""Draws processor seconds and PSNR of strategies as SVG: a panel for each scene, a mark for the mean of each
+strategy."""
 
 import math
 import statistics
@@ -18,7 +19,8 @@ def ticks(low, high, count=5):
 
 def panel(rows, title, names, left, top):
     width, height = PANEL
-    means = {name: [(row['processor_seconds'], row['psnr']) for row in rows if row['strategy'] == name] for name in names}
+    means = {name: [(row['processor_seconds'], row['psnr']) for row in rows if row['strategy'] == name]
+             for name in names}
     means = {name: tuple(statistics.mean(values) for values in zip(*found)) for name, found in means.items() if found}
     seconds, quality = zip(*means.values())
     x_low, x_high = math.log10(min(seconds)) - 0.05, math.log10(max(seconds)) + 0.05
@@ -29,7 +31,8 @@ def panel(rows, title, names, left, top):
                 top + (y_high - y) / (y_high - y_low) * height)
 
     parts = [f'<rect x="{left}" y="{top}" width="{width}" height="{height}" fill="none" stroke="#888"/>',
-             f'<text x="{left + width / 2}" y="{top - 10}" text-anchor="middle" font-weight="bold">{escape(title)}</text>']
+             f'<text x="{left + width / 2}" y="{top - 10}" text-anchor="middle" '
+             f'font-weight="bold">{escape(title)}</text>']
     for value in ticks(10 ** x_low, 10 ** x_high):
         if value <= 0:
             continue
@@ -59,7 +62,8 @@ def plot(rows, scenes):
         left = MARGIN[0] + index % columns * (PANEL[0] + MARGIN[0])
         top = MARGIN[1] + index // columns * (PANEL[1] + MARGIN[1] + GAP)
         parts += panel([row for row in rows if row['scene'] == scene], scenes[scene], names, left, top)
-        parts.append(f'<text x="{left + PANEL[0] / 2}" y="{top + PANEL[1] + 34}" text-anchor="middle">processor seconds</text>'
+        parts.append(f'<text x="{left + PANEL[0] / 2}" y="{top + PANEL[1] + 34}" text-anchor="middle">processor '
+                     f'seconds</text>'
                      f'<text transform="translate({left - 40},{top + PANEL[1] / 2}) rotate(-90)" text-anchor="middle">'
                      'PSNR of held-out views, dB</text>')
     for index, name in enumerate(names):

@@ -32,19 +32,20 @@ THIRD_PARTY = {
 }
 # A format's library is known to the files of that format only (benchmarks may measure against some).
 FORMAT_FILES = {'OpenVDB': r'native/(io/media/volume_|bench/)', 'tinygltf': r'native/io/media/gltf_',
-                'OpenImageIO': r'native/(io/media/image_|bench/)', 'zlib': r'native/io/media/zlib_', 'zstd': r'native/io/media/zstd_',
-                'libwebp': r'native/io/media/webp_'}
+                'OpenImageIO': r'native/(io/media/image_|bench/)', 'zlib': r'native/io/media/zlib_',
+                'zstd': r'native/io/media/zstd_', 'libwebp': r'native/io/media/webp_'}
 
 # Headers of ours whose purpose is to hand a package's types to every folder.
 CARRIERS = {'math/vec.h': {'Eigen'}}
 
 # C and POSIX headers with a '.h' or '/' in their name; C++'s own have neither.
-SYSTEM_HEADERS = re.compile(r'(stdint|stddef|strings|dlfcn|unistd|fcntl|pthread|errno|signal|locale|fenv|xmmintrin|execinfo)\.h'
+SYSTEM_HEADERS = re.compile(r'(stdint|stddef|strings|dlfcn|unistd|fcntl|pthread|errno|signal|locale|fenv|xmmintrin|'
+                            r'execinfo)\.h'
                             r'|sys/(stat|mman|types|resource|wait|statvfs|ioctl)\.h|[a-z_0-9]+')
 
 SOURCE_ENDINGS = ('.cpp', '.h', '.c', '.py', '.sh', '.cmake', 'CMakeLists.txt')
 LINE_LIMIT = 600
-PROSE_WIDTH = 120  # characters of a line of documentation
+PROSE_WIDTH = 120  # characters of a line of documentation, and of Python
 FILE_LIMIT = 40  # of one folder
 LONGER_ALLOWED = {'native/include/stipple/stipple.h'}  # one public header: it is the manual
 
@@ -203,11 +204,12 @@ BOUNDARY_MACHINERY = {'errors.cpp', 'guard.h', 'handles.h', 'job.cpp', 'job.h'}
 FUNCTION_LIMIT = 40  # lines of a function of native/api
 # What a conversion has no use for: it measures no time, draws no numbers and sorts nothing.
 NO_CONVERSION_INCLUDES = {'chrono', 'numeric', 'random', 'execution'}
-NO_CONVERSION_CALLS = re.compile(r'\b(parallelFor|parallelSum|sort|stable_sort|nth_element|partial_sort|accumulate|reduce|transform|'
-                                 r'inner_product|count_if|min_element|max_element)\s*[(<]')
+NO_CONVERSION_CALLS = re.compile(r'\b(parallelFor|parallelSum|sort|stable_sort|nth_element|partial_sort|accumulate|'
+                                 r'reduce|transform|inner_product|count_if|min_element|max_element)\s*[(<]')
 # What the signature of a conversion has: a type of the header, a raw pointer to numbers, or the name of the caller's
 # argument. A check of an argument, require… or fail…, may have neither.
-C_SIGNATURE = re.compile(r'\bStipple[A-Z]\w*|\b(float|double|uint8_t|uint32_t|uint64_t|T|To)\s*\*|\bconst char\s*\*\s*name\b')
+C_SIGNATURE = re.compile(r'\bStipple[A-Z]\w*|\b(float|double|uint8_t|uint32_t|uint64_t|T|To)\s*\*|\bconst '
+                         r'char\s*\*\s*name\b')
 # Of things that come by the thousand. Instances, views, levels, rows and formats come by the dozen.
 MANY_THINGS = re.compile(r'splat|pixel|voxel|vert|triangle|anchor|point|brick|density|position|width|height|rgba', re.I)
 
@@ -275,7 +277,8 @@ def _what_is_wrong(head, body, is_machinery):
     loops = list(_loop_heads(body))
     if is_exported and loops:
         yield f'{name} is exported and has a loop'
-    yield from (f'{name} has a loop over {loop.strip()}' for loop in loops if not is_exported and MANY_THINGS.search(loop))
+    yield from (f'{name} has a loop over {loop.strip()}' for loop in loops if not is_exported
+                and MANY_THINGS.search(loop))
     call = NO_CONVERSION_CALLS.search(body)
     if call:
         yield f'{name} calls {call.group(1)}'
@@ -299,9 +302,10 @@ def boundary_violations(root):
 def c99_violations(header, scratch):
     """What a C99 compiler says about a header that is included on its own."""
     source = pathlib.Path(scratch) / 'only_the_header.c'
-    source.write_text(f'#include "{pathlib.Path(header).resolve()}"\nint main(void) {{ return 0; }}\n', encoding='utf-8')
-    compiler = subprocess.run([os.environ.get('CC', 'cc'), '-std=c99', '-pedantic-errors', '-Wall', '-Wextra', '-Werror',
-                               '-fsyntax-only', str(source)], capture_output=True, text=True)
+    source.write_text(f'#include "{pathlib.Path(header).resolve()}"\nint main(void) {{ return 0; }}\n',
+                      encoding='utf-8')
+    compiler = subprocess.run([os.environ.get('CC', 'cc'), '-std=c99', '-pedantic-errors', '-Wall', '-Wextra',
+                               '-Werror', '-fsyntax-only', str(source)], capture_output=True, text=True)
     return compiler.stderr.splitlines() if compiler.returncode else []
 
 
@@ -318,7 +322,8 @@ def exported_symbols(library):
 
 
 def export_violations(library):
-    return [f'{library} exports {name}' for name in sorted(exported_symbols(library)) if not name.startswith('stipple_')]
+    return [f'{library} exports {name}' for name in sorted(exported_symbols(library))
+            if not name.startswith('stipple_')]
 
 
 def declared_functions(header):
@@ -353,5 +358,16 @@ def wide_prose(root):
         if name == 'README.md' or name.startswith('docs/') and name.endswith('.md'):
             for number, line in enumerate((pathlib.Path(root) / name).read_text(encoding='utf-8').splitlines(), 1):
                 if len(line) > PROSE_WIDTH and not line.lstrip().startswith('|') and len(line.split()) > 1:
+                    found.append(f'{name}:{number}: {len(line)} characters, at most {PROSE_WIDTH} are allowed')
+    return found
+
+
+def wide_python(root):
+    """Lines of the add-on and the tests that are wider than a window."""
+    found = []
+    for name in project_files(root):
+        if name.startswith(('addon/', 'tests/')) and name.endswith('.py'):
+            for number, line in enumerate((pathlib.Path(root) / name).read_text(encoding='utf-8').splitlines(), 1):
+                if len(line) > PROSE_WIDTH:
                     found.append(f'{name}:{number}: {len(line)} characters, at most {PROSE_WIDTH} are allowed')
     return found

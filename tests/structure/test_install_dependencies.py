@@ -31,7 +31,8 @@ def machine(tmp_path):
     def run(missing, apt='exit 0', user=0):
         (tmp_path / LOG).write_text('')
         program('id', f'echo {user}')
-        program('dpkg-query', f'for last; do :; done; case " {" ".join(missing)} " in *" $last "*) exit 1;; esac; echo installed')
+        program('dpkg-query',
+                f'for last; do :; done; case " {" ".join(missing)} " in *" $last "*) exit 1;; esac; echo installed')
         if apt is not None:
             program('apt-get', f'echo "$@" >> {tmp_path / LOG}\n{apt}')
         result = subprocess.run(['bash', str(SCRIPT)], env={'PATH': str(programs)}, stdin=subprocess.DEVNULL,
@@ -70,7 +71,8 @@ def test_a_failed_installation_is_an_error(machine):
     assert [call.split()[0] for call in calls] == ['install', 'install', 'update', 'install']
 
 
-@pytest.mark.parametrize('apt, user, reason', [(None, 0, 'apt-get is not on this machine'), ('exit 0', 1000, 'run this as root')])
+@pytest.mark.parametrize('apt, user, reason', [(None, 0, 'apt-get is not on this machine'),
+                                               ('exit 0', 1000, 'run this as root')])
 def test_what_stands_in_the_way_is_said_in_one_line(machine, apt, user, reason):
     result, calls = machine(['libtbb-dev'], apt, user)
     assert result.returncode == 1 and calls == []

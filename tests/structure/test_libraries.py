@@ -58,7 +58,8 @@ def test_every_function_of_the_header_is_exported():
 
 def test_a_function_that_is_only_declared_is_found(tmp_path):
     header = tmp_path / 'header.h'
-    header.write_text('/* stipple_old(int) is gone */\nint stipple_x(void);\nconst char* stipple_y(int a,\n   int b);\n')
+    header.write_text('/* stipple_old(int) is gone */\nint stipple_x(void);\nconst char* stipple_y(int a,\n   int '
+                      'b);\n')
     library = build_library(tmp_path, 'int stipple_x(void) { return 1; }')
     assert rules.declared_functions(header) == {'stipple_x', 'stipple_y'}
     assert [line.split()[0] for line in rules.missing_exports(header, library)] == ['stipple_y']

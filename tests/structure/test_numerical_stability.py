@@ -37,7 +37,8 @@ def test_the_table_of_effects_has_every_case():
 def numbers(page):
     """(row, column, value) of every figure like 8.0e-07 in the tables of the page."""
     rows = [line.split('|')[1:-1] for line in page.splitlines() if line.startswith('| ')]
-    return [(row[0].strip() + ', ' + row[1].strip(), column, float(cell)) for row in rows for column, cell in enumerate(row)
+    return [(row[0].strip() + ', ' + row[1].strip(), column, float(cell)) for row in rows for column,
+            cell in enumerate(row)
             if re.fullmatch(r'\s*(0|\d\.\de[+-]\d+)\s*', cell)]
 
 

@@ -41,12 +41,14 @@ def test_the_docs_name_every_limit_with_its_number():
     header = LIMITS.read_text()
     pairs = re.findall(r'^constexpr Allowance (\w+) = \{(.+), (\d+)\};', header, re.M)
     numbers = re.findall(r'^constexpr (?:uint64_t|size_t) (kMax\w+) = (.+);', header, re.M)
-    expected = {name: f'{whole(always) // MEBIBYTE} MiB, and {int(per_byte)} bytes per byte of' for name, always, per_byte in pairs}
+    expected = {name: f'{whole(always) // MEBIBYTE} MiB, and {int(per_byte)} bytes per byte of' for name, always,
+                per_byte in pairs}
     for name, text in numbers:
         value = whole(text)
         expected[name] = f'{value // MEBIBYTE} MiB' if name.endswith('Bytes') else str(value)
     rows = {re.search(r'`(k\w+)`', row).group(1): row.split('|')[2].strip()
-            for row in (ROOT / 'docs' / 'formats.md').read_text().splitlines() if re.match(r'\| .*`k(Max\w+|\w+Allowance)`', row)}
+            for row in (ROOT / 'docs' / 'formats.md').read_text().splitlines()
+            if re.match(r'\| .*`k(Max\w+|\w+Allowance)`', row)}
     assert len(expected) >= 8 and rows.keys() == expected.keys()
     for name, text in expected.items():
         assert rows[name].startswith(text), (name, rows[name], text)

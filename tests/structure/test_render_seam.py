@@ -4,7 +4,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Functions of one kind of processor, and what makes its implementations.
-OF_A_PROCESSOR = re.compile(r'\b(renderTiled\w*|renderBackward\w*|renderAccurate|orderForDrawing|makeCpu\w+|CpuViewPass)\b')
+OF_A_PROCESSOR = re.compile(r'\b(renderTiled\w*|renderBackward\w*|renderAccurate|orderForDrawing|makeCpu\w+|'
+                            r'CpuViewPass)\b')
 #: Files that are that kind of processor, or say that there is one.
 MAY = re.compile(r'train/loop/(cpu_\w+|backend_factory|view_pass|render_backend)\.(cpp|h)$')
 

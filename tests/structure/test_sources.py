@@ -122,7 +122,8 @@ def test_no_folder_is_crowded():
 
 
 def test_a_crowded_folder_is_found(tmp_path):
-    plant(tmp_path, {f'native/splat/file{i}.cpp': '' for i in range(41)} | {f'native/data/file{i}.cpp': '' for i in range(40)})
+    plant(tmp_path, {f'native/splat/file{i}.cpp': '' for i in range(41)} | {f'native/data/file{i}.cpp': ''
+                                                                            for i in range(40)})
     assert rules.crowded_folders(tmp_path) == ['native/splat: 41 files, at most 40 are allowed']
 
 
@@ -134,14 +135,18 @@ _LONG = 'StippleStatus stipple_long(const StippleCloud* cloud) {\n' + '  cloud;\
 
 
 @pytest.mark.parametrize('text, reason', [
-    ('double entropyOf(const OctreeDensity& density) { return 0; }', 'entropyOf is neither an exported function nor a conversion'),
-    ('namespace {\nclass Timing {\n public:\n  void run() { go(); }\n};\n}', 'run is neither an exported function nor a conversion'),
+    ('double entropyOf(const OctreeDensity& density) { return 0; }',
+     'entropyOf is neither an exported function nor a conversion'),
+    ('namespace {\nclass Timing {\n public:\n  void run() { go(); }\n};\n}',
+     'run is neither an exported function nor a conversion'),
     ('#include <chrono>', 'chrono: a conversion has no use for it'),
     (_LONG, 'stipple_long has 41 lines, at most 40 are allowed'),
-    ('StippleStatus stipple_f(void) { return guarded([&] { for (auto& row : rows) row.f(); }); }', 'stipple_f is exported and has a loop'),
+    ('StippleStatus stipple_f(void) { return guarded([&] { for (auto& row : rows) row.f(); }); }',
+     'stipple_f is exported and has a loop'),
     ('StippleStatus stipple_f(void) { while (next()) {} }', 'stipple_f is exported and has a loop'),
     ('Cloud from(const StippleCloud& c) { for (size_t i = 0; i < splats.size(); ++i) f(i); }', 'from has a loop over'),
-    ('void give(const std::vector<float>& pixels, float* to) { for (float p : pixels) *to++ = p; }', 'give has a loop over'),
+    ('void give(const std::vector<float>& pixels, float* to) { for (float p : pixels) *to++ = p; }',
+     'give has a loop over'),
     ('Cloud from(const StippleCloud& c) { parallelFor(n, 1, f); }', 'from calls parallelFor'),
     ('Rows rowsFrom(const StippleRow* rows) { std::sort(rows, rows + 3); }', 'rowsFrom calls sort'),
 ])
@@ -158,8 +163,10 @@ def test_marshalling_is_accepted(tmp_path):
         constexpr float* StippleRow::*kMembers[] = {&StippleRow::x};
         Row rowFrom(const StippleRow& row, const char* name) { for (auto m : kMembers) copy(row.*m); return {}; }
         void requireSides(uint32_t width) { if (width < 1) fail("for (pixel)"); }
-        template <typename T> void copyTo(const std::vector<T>& values, T* out) { std::copy(values.begin(), values.end(), out); } }
-        extern "C" { StippleStatus stipple_row(const StippleRow* row) { return guarded([&] { rowFrom(*row, "row"); }); } }
+        template <typename T> void copyTo(const std::vector<T>& values, T* out) {
+          std::copy(values.begin(), values.end(), out); } }
+        extern "C" { StippleStatus stipple_row(const StippleRow* row) {
+          return guarded([&] { rowFrom(*row, "row"); }); } }
         """, 'native/api/guard.h': 'inline void anything() { work(); }\n',
                      'native/shot/elsewhere.cpp': 'void work() { for (auto& pixel : pixels) f(pixel); }\n'})
     assert rules.boundary_violations(tmp_path) == []
@@ -169,7 +176,8 @@ def test_the_public_header_is_c99(tmp_path):
     assert rules.c99_violations(HEADER, tmp_path) == []
 
 
-@pytest.mark.parametrize('text', ['int stipple_f(int& x);', 'enum E : unsigned { A };', 'typedef struct S { bool yes; } S;', 'uint32_t stipple_g(void);'])
+@pytest.mark.parametrize('text', ['int stipple_f(int& x);', 'enum E : unsigned { A };',
+                                  'typedef struct S { bool yes; } S;', 'uint32_t stipple_g(void);'])
 def test_a_header_that_is_not_c99_is_found(tmp_path, text):
     header = tmp_path / 'header.h'
     header.write_text(text + '\n', encoding='utf-8')
@@ -190,7 +198,8 @@ def test_links_between_pages_lead_somewhere():
 
 
 def test_a_broken_link_is_found(tmp_path):
-    plant(tmp_path, {'docs/a.md': '[b](b.md) [c](c.md#part) ![p](p.png) [web](https://example.org) [here](#top)\n', 'docs/b.md': ''})
+    plant(tmp_path, {'docs/a.md': '[b](b.md) [c](c.md#part) ![p](p.png) [web](https://example.org) [here](#top)\n',
+                     'docs/b.md': ''})
     assert rules.broken_links(tmp_path) == ['docs/a.md: c.md#part', 'docs/a.md: p.png']
 
 
@@ -203,3 +212,13 @@ def test_a_wide_line_of_documentation_is_found(tmp_path):
     plant(tmp_path, {'docs/deep/a.md': f'# A\n\n{wide}\n{table}\n{link}\n', 'README.md': f'{"x " * 61}\n',
                      'tests/notes.md': wide, 'docs/b.md': 'x' * 60 + ' ' + 'y' * 59})
     assert [line.split(': ')[0] for line in rules.wide_prose(tmp_path)] == ['README.md:1', 'docs/deep/a.md:3']
+
+
+def test_lines_of_python_fit_a_window():
+    assert rules.wide_python(ROOT) == []
+
+
+def test_a_wide_line_of_python_is_found(tmp_path):
+    plant(tmp_path, {'addon/stipple/a.py': 'x = 1\n' + 'y' * 121 + '\n', 'tests/b.py': '#' * 120,
+                     'docs/c.py': '#' * 121})
+    assert rules.wide_python(tmp_path) == ['addon/stipple/a.py:2: 121 characters, at most 120 are allowed']

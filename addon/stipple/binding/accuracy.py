@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How exact pictures are, and what that costs."""
+"""How exact images are, and what that costs."""
 
 from ctypes import byref, c_uint32, c_uint64
 from dataclasses import dataclass
@@ -52,17 +52,17 @@ def accuracy_level_name(library, level):
 
 
 def accuracy_verdict(library, psnr):
-    """What a PSNR means to who looks."""
+    """What a PSNR means to someone who looks."""
     return library.stipple_accuracy_verdict(psnr).decode()
 
 
 @dataclass(frozen=True)
 class AccuracyRow:
-    """What one setting costs, and how far its picture is from the reference."""
+    """What one setting costs, and how far its image is from the reference."""
 
     name: str              # 'preview', 'final + projection ray'
     setting: StippleAccuracy
-    seconds: float         # of a picture: median
+    seconds: float         # of an image: median
     seconds_low: float     # quartiles
     seconds_high: float
     psnr: float            # dB; infinite where nothing differs
@@ -108,11 +108,11 @@ class AccuracyReport(Handle):
         return self.rows[index.value]
 
     def save(self, path):
-        """By ending: .json, .csv or .svg."""
+        """Writes .json, .csv or .svg, as the extension says."""
         self._check(self.library.stipple_accuracy_report_save(self.pointer, path_bytes(path)))
 
     def draw(self, scale):
-        """The plot as a picture [H,W,4], display sRGB, row 0 = top; scale 1 is 840 pixels wide."""
+        """The plot as an image [H,W,4], display sRGB, row 0 = top; scale 1 is 840 pixels wide."""
         width, height = c_uint32(), c_uint32()
         draw = self.library.stipple_accuracy_report_draw
         self._check(draw(self.pointer, scale, 0, None, byref(width), byref(height)))

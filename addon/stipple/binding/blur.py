@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lens and shutter of a picture: what its colours are averages over."""
+"""Aperture and shutter, over which the colours of an image are averaged."""
 
 from ctypes import pointer
 
@@ -7,23 +7,24 @@ import numpy as np
 
 from .errors import invalid
 from .handle import contiguous, pointer_to
-from .structs import StippleLens, StippleShutter
+from .structs import StippleAperture, StippleShutter
 
 
 class Blur:
-    """What spreads a picture's light, as in StippleRenderOptions.
+    """What spreads an image's light, as in StippleRenderOptions.
 
     aperture_radius and focus_distance in metres, rotation in radians. cameras [steps,4,4] world to camera and instances
     [steps,count,4,4] object to world, evenly over the open time, or None for what stands still; curve [n] how far the
-    shutter is open, or None. samples: pictures that are averaged, or 0 for as many as the library thinks right.
+    shutter is open, or None. samples: images that are averaged, or 0 for as many as the library thinks right.
     """
 
     def __init__(self, aperture_radius=0.0, focus_distance=1.0, blades=0, rotation=0.0, ratio=1.0, cameras=None,
                  instances=None, curve=None, samples=0):
         self.samples = samples
-        self.lens = None
+        self.aperture = None
         if aperture_radius:
-            self.lens = StippleLens(aperture_radius=aperture_radius, focus_distance=focus_distance, blades=blades,
+            self.aperture = StippleAperture(aperture_radius=aperture_radius, focus_distance=focus_distance,
+                                            blades=blades,
                                     rotation=rotation, ratio=ratio)
         self.cameras, self.instances, self.curve = (
             None if array is None else contiguous(array, np.float64) for array in (cameras, instances, curve))
@@ -41,8 +42,8 @@ class Blur:
     def put_into(self, options):
         """A copy of the options, with this blur, which must outlive its use."""
         options = type(options).from_buffer_copy(options)
-        if self.lens is not None:
-            options.lens = pointer(self.lens)
+        if self.aperture is not None:
+            options.aperture = pointer(self.aperture)
         if self.shutter is not None:
             options.shutter = pointer(self.shutter)
         options.samples = self.samples

@@ -9,11 +9,12 @@ import numpy as np
 from .errors import invalid
 from .handle import Handle, contiguous, matrix16, new_handle, path_bytes, pointer_to
 from .job import Job
-from .structs import (Antialias, ColourSpace, Frame, SplatQuantity, StippleCloudArrays, StippleCloudBuffers, StippleCloudColumnBuffers,
-                      StippleCloudColumns, StippleCloudComparison, StippleCloudInfo, StippleCloudSaveOptions)
+from .structs import (Antialias, ColourSpace, Frame, SplatQuantity, StippleCloudArrays, StippleCloudBuffers,
+                      StippleCloudColumnBuffers, StippleCloudColumns, StippleCloudComparison, StippleCloudInfo,
+                      StippleCloudSaveOptions)
 
-# Floats of a splat in each attribute that Blender stores. 'base' is the harmonics of degree 0 and the opacity; those above
-# are columns of their own, named by number from 0 on.
+# Floats of a splat in each attribute that Blender stores. 'base' is the harmonics of degree 0 and the opacity; those
+# above are columns of their own, named by number from 0 on.
 COLUMN_WIDTHS = {'positions': 3, 'rotations': 4, 'scales': 3, 'base': 4}
 _REST_WIDTH = 3
 
@@ -21,7 +22,8 @@ SAVE_OPTIONS = ('ascii', 'sh_degree_limit', 'format_version', 'frame')
 
 
 def save_options(library, **options_given):
-    """StippleCloudSaveOptions with some of its fields, such as ascii=1. Errors: StippleError for one that is unknown."""
+    """StippleCloudSaveOptions with some of its fields, such as ascii=1. Errors: StippleError for one that is
+    unknown."""
     options = StippleCloudSaveOptions()
     library.stipple_cloud_save_options_init(byref(options))
     for name, value in options_given.items():
@@ -66,7 +68,8 @@ class SplatArrays:
 
 
 class CloudColumns:
-    """The splats of a native cloud, read an attribute at a time: what a SplatArrays tells, in a fraction of its memory."""
+    """The splats of a native cloud, read an attribute at a time: what a SplatArrays tells, in a fraction of its
+    memory."""
 
     def __init__(self, cloud):
         self._cloud = cloud
@@ -105,7 +108,8 @@ class Cloud(Handle):
         positions = contiguous(arrays.positions)
         count = len(positions)
         fields = {'positions': (positions, (count, 3)), 'rotations': (contiguous(arrays.rotations), (count, 4)),
-                  'scales': (contiguous(arrays.scales), (count, 3)), 'opacities': (contiguous(arrays.opacities), (count,)),
+                  'scales': (contiguous(arrays.scales), (count, 3)),
+                  'opacities': (contiguous(arrays.opacities), (count,)),
                   'sh': (contiguous(arrays.sh), (count, (arrays.sh_degree + 1) ** 2, 3))}
         for name, (array, shape) in fields.items():
             if array.shape != shape:
@@ -117,8 +121,8 @@ class Cloud(Handle):
 
     @classmethod
     def from_columns(cls, context, columns, rest, colour_space, antialias, frame):
-        """The cloud of attributes as Blender stores them; columns: those of COLUMN_WIDTHS, rest: [[N,3]] in order. Arrays are
-        flat or not, and are copied."""
+        """The cloud of attributes as Blender stores them; columns: those of COLUMN_WIDTHS, rest: [[N,3]] in order.
+        Arrays are flat or not, and are copied."""
         arrays = {name: contiguous(columns[name]) for name in COLUMN_WIDTHS}
         count = arrays['positions'].size // 3
         rest = [contiguous(values) for values in rest]
@@ -203,12 +207,12 @@ class Cloud(Handle):
         self._check(self.library.stipple_cloud_pack(self.pointer, pointer_to(geometry), len(geometry)))
 
     def save(self, path, **options_given):
-        """Writes by the ending; options_given: fields of StippleCloudSaveOptions, such as ascii=1."""
+        """Writes by the extension; options_given: fields of StippleCloudSaveOptions, such as ascii=1."""
         options = save_options(self.library, **options_given)
         self._check(self.library.stipple_cloud_save(self.pointer, path_bytes(path), byref(options)))
 
     def transformed(self, matrix):
-        """The cloud moved by any 4x4 matrix that can be inverted; harmonics turn along."""
+        """The cloud moved by any 4x4 matrix that can be inverted; harmonics are rotated too."""
         return Cloud(self.library, new_handle(self.library, 'stipple_cloud_transform', self.pointer, matrix16(matrix)))
 
     def compare(self, other):

@@ -73,8 +73,8 @@ FUNCTIONS = {
     'stipple_mesh_info': (_status, [_handle, _to(s.StippleMeshInfo)]),
     'stipple_mesh_depth_start': (_status, [_handle, _to(s.StippleMeshInstance), c_uint64, _to(s.StippleCamera), _floats,
                                            _out_handle]),
-    'stipple_mesh_matte_start': (_status, [_handle, _to(s.StippleMeshInstance), c_uint64, _to(s.StippleCamera), c_uint32,
-                                           _floats, _floats, _out_handle]),
+    'stipple_mesh_matte_start': (_status, [_handle, _to(s.StippleMeshInstance), c_uint64, _to(s.StippleCamera),
+                                           c_uint32, _floats, _floats, _out_handle]),
     'stipple_mesh_read': (_status, [_handle, _to(s.StippleMeshBuffers)]),
     'stipple_mesh_topology': (_status, [_handle, _to(s.StippleMeshTopology)]),
     'stipple_mesh_save': (_status, [_handle, _path]),
@@ -118,11 +118,11 @@ FUNCTIONS = {
     'stipple_views_count': (_status, [_handle, POINTER(c_uint64)]),
     'stipple_views_camera': (_status, [_handle, c_uint64, _to(s.StippleCamera)]),
     'stipple_camera_resize': (_status, [_to(s.StippleCamera), c_uint32, c_uint32]),
-    # views with pictures
+    # views with images
     'stipple_views_open_options_init': (None, [_to(s.StippleViewsOpenOptions)]),
     'stipple_views_open': (_status, [_handle, _path, _to(s.StippleViewsOpenOptions), _out_handle]),
     'stipple_views_create': (_status, [_handle, c_uint32, _out_handle]),
-    'stipple_views_add': (_status, [_handle, _to(s.StippleCamera), _to(s.StippleViewPicture), c_char_p]),
+    'stipple_views_add': (_status, [_handle, _to(s.StippleCamera), _to(s.StippleViewImage), c_char_p]),
     'stipple_views_set_points': (_status, [_handle, _to(s.StippleViewPoints)]),
     'stipple_views_info': (_status, [_handle, _to(s.StippleViewsInfo)]),
     'stipple_views_view_info': (_status, [_handle, c_uint64, _to(s.StippleViewInfo)]),
@@ -195,7 +195,8 @@ FUNCTIONS = {
                                                   _to(s.StippleRenderOptions), _to(s.StippleBackwardInput),
                                                   _to(s.StippleSplatGradients), _to(s.StippleBackwardResult),
                                                   _out_handle]),
-    'stipple_renderer_backward_memory_bound': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
+    'stipple_renderer_backward_memory_bound': (_status,
+                                               [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                          _to(s.StippleBackwardInput), _to(s.StippleSplatGradients),
                                                          POINTER(c_uint64)]),
     'stipple_image_loss_options_init': (None, [_to(s.StippleImageLossOptions)]),
@@ -247,7 +248,7 @@ FUNCTIONS = {
     'stipple_volume_to_mesh_options_init': (None, [_to(s.StippleVolumeToMeshOptions)]),
     'stipple_volume_to_mesh_start': (_status, [_handle, _to(s.StippleVolumeToMeshOptions), _out_handle]),
     'stipple_volume_to_mesh_memory_bound': (_status, [_handle, _to(s.StippleVolumeToMeshOptions), POINTER(c_uint64)]),
-    # pictures
+    # images
     'stipple_image_create': (_status, [_handle, c_uint32, c_uint32, c_uint32, c_uint32, _floats, _out_handle]),
     'stipple_image_load': (_status, [_handle, _path, _out_handle]),
     'stipple_image_free': (None, [_handle]),

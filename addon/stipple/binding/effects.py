@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which effects a picture needs, and why."""
+"""Which effects an image needs, and why."""
 
 import math
 from ctypes import byref, pointer

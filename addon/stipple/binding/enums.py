@@ -120,7 +120,7 @@ class RenderMethod(IntEnum):
     TILED = 0
     REFERENCE = 1
     RAYS = 2
-    YARDSTICK = 3
+    RAYS_UNLIMITED = 3
 
 
 class AccuracyLevel(IntEnum):
@@ -131,7 +131,7 @@ class AccuracyLevel(IntEnum):
 
 
 class AccuracySubject(IntEnum):
-    PICTURE = 0
+    IMAGE = 0
     VOLUME = 1
     FIT = 2
 

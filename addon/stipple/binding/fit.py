@@ -46,7 +46,7 @@ class FitOption:
     maximum: float
     default: str
     presets: tuple        # texts by model and quality, None where the preset leaves it alone
-    former_name: str
+    aliases: tuple        # (name, how much 1 is under it), other names of it
 
 
 def fit_option_table(library):
@@ -62,11 +62,12 @@ def _fit_option(library, index):
     choices = info.choices_utf8.decode()
     presets = [None if text is None else text.decode() for text in info.presets_utf8]
     qualities = len(FitQuality)
-    return FitOption(info.name_utf8.decode(), FitOptionKind(info.kind), info.help_utf8.decode(), _models_of(info.models),
-                     _models_of(info.fixed_models), tuple(choices.split(',')) if choices else (), info.minimum,
-                     info.maximum, info.default_utf8.decode(),
-                     tuple(tuple(presets[qualities * model:qualities * (model + 1)]) for model in FitModel),
-                     info.former_name_utf8.decode())
+    return FitOption(info.name_utf8.decode(), FitOptionKind(info.kind), info.help_utf8.decode(),
+                     _models_of(info.models), _models_of(info.fixed_models),
+                     tuple(choices.split(',')) if choices else (), info.minimum, info.maximum,
+                     info.default_utf8.decode(), tuple(tuple(presets[qualities * model:qualities * (model + 1)])
+                                                       for model in FitModel),
+                     tuple((name.decode(), unit) for name, unit in zip(info.aliases_utf8, info.alias_units) if name))
 
 
 def _models_of(bits):
@@ -121,11 +122,11 @@ class Fit(Job):
         return Model(self.library, new_handle(self.library, 'stipple_fit_model', self.pointer))
 
     def save_report(self, path):
-        """JSON at path, and its curves under the same name with the ending .svg."""
+        """JSON at path, and its curves under the same name with the extension .svg."""
         self._check(self.library.stipple_fit_report_save(self.pointer, path_bytes(path)))
 
     def draw_report(self, scale):
-        """The same curves as a picture [H,W,4], display sRGB, row 0 = top; scale 1 is 960 pixels wide."""
+        """The same curves as an image [H,W,4], display sRGB, row 0 = top; scale 1 is 960 pixels wide."""
         width, height = c_uint32(), c_uint32()
         draw = self.library.stipple_fit_report_draw
         self._check(draw(self.pointer, scale, 0, None, byref(width), byref(height)))

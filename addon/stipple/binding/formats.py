@@ -13,7 +13,7 @@ from .structs import Frame, StippleFormatInfo
 class SplatFormat:
     name: str           # one word
     title: str          # for people
-    endings: tuple      # of file names, lower case, the usual one first
+    extensions: tuple      # of file names, lower case, the usual one first
     can_read: bool
     can_write: bool
     max_sh_degree: int  # that it holds
@@ -30,7 +30,7 @@ def splat_formats(library):
     for index in range(count.value):
         info = StippleFormatInfo()
         check(library, library.stipple_format_info(index, byref(info)))
-        formats.append(SplatFormat(info.name.decode(), info.title.decode(), tuple(info.endings.decode().split()),
+        formats.append(SplatFormat(info.name.decode(), info.title.decode(), tuple(info.extensions.decode().split()),
                                    bool(info.can_read), bool(info.can_write), info.max_sh_degree, Frame(info.frame),
                                    frozenset(what for what in kept if getattr(info, f'keeps_{what}'))))
     return formats

@@ -12,7 +12,7 @@ from .renderer import instance_array
 from .structs import (StippleBackwardInput, StippleBackwardResult, StippleImageLoss, StippleImageLossOptions,
                       StippleSplatGradients)
 
-# Statistic of a splat: shape after the number of splats, and the picture that it needs.
+# Statistic of a splat: shape after the number of splats, and the image that it needs.
 STATISTICS = {'contributions': ((), 'residual'), 'blending_weights': ((), None), 'edge_weights': ((), 'edge_weights'),
               'screen_gradients': ((2,), None), 'absolute_screen_gradients': ((2,), None),
               'screen_gradient_norms': ((), None), 'errors': ((), 'errors'), 'largest_errors': ((), 'errors')}
@@ -44,15 +44,15 @@ class GradientsTask:
 class Backward:
     """The call's structs, with the arrays that they point into."""
 
-    def __init__(self, instances, camera, colour_gradient, statistics, pictures):
+    def __init__(self, instances, camera, colour_gradient, statistics, images):
         shape = (camera.height, camera.width)
         channels = {'colour_gradient': (4,), 'residual': (3,)}
         given = {name: contiguous(values) for name, values in
-                 dict(pictures, colour_gradient=colour_gradient).items() if values is not None}
+                 dict(images, colour_gradient=colour_gradient).items() if values is not None}
         for name, values in given.items():
             wanted = shape + channels.get(name, ())
             if values.shape != wanted:
-                raise invalid(f'Picture {name} has shape {values.shape}; allowed is {wanted}.')
+                raise invalid(f'Image {name} has shape {values.shape}; allowed is {wanted}.')
         unknown = set(statistics) - set(STATISTICS)
         if unknown:
             raise invalid(f"Statistic '{min(unknown)}' is not known; allowed are {', '.join(STATISTICS)}.")
@@ -76,9 +76,9 @@ class Backward:
 
 def start_backward(renderer, instances, camera, options, colour_gradient, statistics=(), residual=None,
                    residual_weights=None, edge_weights=None, errors=None, depth_gradient=None):
-    """Starts the derivative of a loss by instances [(cloud, matrix)], from its derivative by the picture that
-    `renderer` draws of the same arguments, [H,W,4]. statistics: names of STATISTICS; pictures: see stipple.h.
-    options must ask for composited colours. Clouds and pictures need not outlive the start."""
+    """Starts the derivative of a loss by instances [(cloud, matrix)], from its derivative by the image that
+    `renderer` draws of the same arguments, [H,W,4]. statistics: names of STATISTICS; images: see stipple.h.
+    options must ask for composited colours. Clouds and images need not outlive the start."""
     call = Backward(instances, camera, colour_gradient, statistics,
                     {'residual': residual, 'residual_weights': residual_weights, 'edge_weights': edge_weights,
                      'errors': errors, 'depth_gradient': depth_gradient})
@@ -89,9 +89,9 @@ def start_backward(renderer, instances, camera, options, colour_gradient, statis
     return GradientsTask(job, call.arrays, call.result)
 
 
-def backward_memory_bound(renderer, instances, camera, colour_gradient, statistics=(), **pictures):
+def backward_memory_bound(renderer, instances, camera, colour_gradient, statistics=(), **images):
     """Bytes that the same start_backward would allocate at most, beside its arrays."""
-    call = Backward(instances, camera, colour_gradient, statistics, pictures)
+    call = Backward(instances, camera, colour_gradient, statistics, images)
     size = c_uint64()
     check(renderer.library, renderer.library.stipple_renderer_backward_memory_bound(
         renderer.pointer, call.placed, len(instances), byref(camera), byref(call.input), call.gradients, byref(size)))
@@ -99,11 +99,11 @@ def backward_memory_bound(renderer, instances, camera, colour_gradient, statisti
 
 
 def image_loss(context, rendered, target, weights=None, ssim_share=0.2, with_gradient=True):
-    """(loss, l1, ssim, gradient) of pictures [H,W,3 or 4] as composited; gradient [as rendered] or None."""
+    """(loss, l1, ssim, gradient) of images [H,W,3 or 4] as composited; gradient [as rendered] or None."""
     rendered, target = contiguous(rendered), contiguous(target)
-    for name, picture in (('rendered', rendered), ('target', target)):
-        if picture.ndim != 3 or picture.shape[:2] != rendered.shape[:2]:
-            raise invalid(f'Picture {name} has shape {picture.shape}; allowed is {rendered.shape[:2]} by 3 or 4.')
+    for name, image in (('rendered', rendered), ('target', target)):
+        if image.ndim != 3 or image.shape[:2] != rendered.shape[:2]:
+            raise invalid(f'Image {name} has shape {image.shape}; allowed is {rendered.shape[:2]} by 3 or 4.')
     weights = None if weights is None else contiguous(weights)
     if weights is not None and weights.shape != rendered.shape[:2]:
         raise invalid(f'Weights have shape {weights.shape}; allowed is {rendered.shape[:2]}.')

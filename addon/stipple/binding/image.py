@@ -56,7 +56,8 @@ class ImageChannels(Handle):
                    new_handle(context.library, 'stipple_image_channels_load', context.pointer, path_bytes(path)))
 
     def names(self):
-        return [self._info(i).name_utf8.decode() for i in range(self.library.stipple_image_channels_count(self.pointer))]
+        return [self._info(i).name_utf8.decode()
+                for i in range(self.library.stipple_image_channels_count(self.pointer))]
 
     def read(self, index):
         """[height,width] float32 of a channel, by its place in names(); row 0 is the top."""

@@ -66,7 +66,7 @@ class Layers(Handle):
         return Surface(depth, opacity=opacity)
 
     def compose(self, colour, depth, transmittance):
-        """(combined [H,W,4], depth [H,W]) of meshes, splats and world, as new arrays, from the splats' picture."""
+        """(combined [H,W,4], depth [H,W]) of meshes, splats and world, as new arrays, from the splats' image."""
         colour, depth = np.array(colour, np.float32, order='C'), np.array(depth, np.float32, order='C')
         kept = self._array(colour, 4), self._array(depth), self._array(transmittance)
         self._check(self.library.stipple_layers_compose(self.pointer, *map(pointer_to, kept)))

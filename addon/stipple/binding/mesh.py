@@ -93,7 +93,8 @@ class Mesh(Handle):
     def read(self):
         """(positions [V,3], triangles [T,3]) as new arrays."""
         info = self.info()
-        positions, triangles = np.empty((info.vertex_count, 3), np.float32), np.empty((info.triangle_count, 3), np.uint32)
+        positions, triangles = np.empty((info.vertex_count, 3), np.float32), np.empty((info.triangle_count, 3),
+                                                                                      np.uint32)
         buffers = StippleMeshBuffers(vertex_capacity=info.vertex_count, triangle_capacity=info.triangle_count,
                                      positions=pointer_to(positions), triangles=pointer_to(triangles))
         self._check(self.library.stipple_mesh_read(self.pointer, byref(buffers)))

@@ -48,7 +48,7 @@ def _unsigned(value, name, least):
 
 
 def refine_start(cloud, full, iterations=100, view_count=32, view_size=800, view_rig=ViewRig.AUTOMATIC, seed=0):
-    """A job that makes the reduced Cloud, fitted to pictures of the full one."""
+    """A job that makes the reduced Cloud, fitted to images of the full one."""
     options = StippleRefineOptions()
     cloud.library.stipple_refine_options_init(byref(options))
     options.iterations = _unsigned(iterations, 'Iterations', 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of splats."""
+"""Images of splats."""
 
 from ctypes import byref, c_double, c_uint32, c_uint64, pointer
 
@@ -20,16 +20,16 @@ def instance_array(instances):
     array = (StippleInstance * max(len(instances), 1))()
     for entry, (cloud, matrix, *holdout) in zip(array, instances):
         grade = getattr(cloud, 'grade', None)
-        entry.__init__(cloud=cloud.pointer, matrix=matrix16(matrix), grade=pointer(grade) if grade is not None else None,
-                       holdout=any(holdout))
+        entry.__init__(cloud=cloud.pointer, matrix=matrix16(matrix),
+                       grade=pointer(grade) if grade is not None else None, holdout=any(holdout))
     return array
 
 
 class Surface:
     """Something else between the splats, a mesh: arrays as in StippleRenderOptions, row 0 = top.
 
-    depth [H,W] metres; colour [H,W,4] premultiplied, or None for a matte, of opacity [H,W]; with a colour, opacity is what
-    it hides, its alpha and what it holds out, or None for its alpha. light [H,W,3] factors of the splats, or None.
+    depth [H,W] metres; colour [H,W,4] premultiplied, or None for a matte, of opacity [H,W]; with a colour, opacity is
+    what it hides, its alpha and what it holds out, or None for its alpha. light [H,W,3] factors of the splats, or None.
     """
 
     def __init__(self, depth, colour=None, light=None, opacity=None):
@@ -58,7 +58,7 @@ def _layer(name, array, shape):
 
 
 class RenderTask:
-    """A picture that is being made: poll, cancel or wait through `job`, then read the arrays."""
+    """An image that is being made: poll, cancel or wait through `job`, then read the arrays."""
 
     def __init__(self, job, colour, depth, transmittance=None, normal=None, objects=None):
         self.job = job
@@ -78,7 +78,7 @@ class Renderer(Handle):
     def options(self, blend_space=BlendSpace.AS_TRAINED, output_colour=OutputColour.SCENE_LINEAR,
                 low_pass=LowPass.FROM_CLOUD, method=RenderMethod.TILED, background=None, accuracy=None,
                 object_order=ObjectOrder.TOGETHER):
-        """background: three values in output_colour's space, or None for a transparent picture. accuracy: a
+        """background: three values in output_colour's space, or None for a transparent image. accuracy: a
         StippleAccuracy, or None for final."""
         options = StippleRenderOptions()
         self.library.stipple_render_options_init(byref(options))
@@ -94,10 +94,10 @@ class Renderer(Handle):
 
     def start(self, instances, camera, options, with_depth=True, median_depth=False, surface=None,
               with_transmittance=False, blur=None, with_normal=False, with_objects=False):
-        """Starts the picture of instances, as of instance_array; clouds must outlive the start only.
+        """Starts the image of instances, as of instance_array; clouds must outlive the start only.
 
-        median_depth: where light is half gone, instead of the mean depth of what is seen. surface: a Surface that stands
-        between the splats. blur: a Blur, lens and shutter.
+        median_depth: where light is half gone, instead of the mean depth of what is seen. surface: a Surface that
+        stands between the splats. blur: a Blur, aperture and shutter.
         """
         shape = (camera.height, camera.width)
         for layer in (surface, blur):
@@ -118,7 +118,7 @@ class Renderer(Handle):
         return RenderTask(job, colour, depth, transmittance, normal, objects)
 
     def sample_count(self, instances, camera, options, blur):
-        """How many pictures a Blur is averaged from."""
+        """How many images a Blur is averaged from."""
         count, options = c_uint32(), blur.put_into(options)
         self._check(self.library.stipple_renderer_sample_count(self.pointer, instance_array(instances), len(instances),
                                                                byref(camera), byref(options), byref(count)))

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Structs of stipple.h, field by field, and its enumerations; tests/addon compares them with the header."""
 
-from ctypes import POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p, sizeof
+from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p,
+                    sizeof)
 
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, BudgetUnit, CameraModel, ColourSpace, ENUMS,
                     Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, Frame, JobState,
-                    LowPass, MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling, Side,
-                    SplatOrder, SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
+                    LowPass, MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling,
+                    Side, SplatOrder, SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 MAX_ANCHORS = 1 << 28
 NO_INDEX = 0xFFFFFFFF
 DRAW_GEOMETRY_FLOATS = 12
@@ -39,7 +40,8 @@ class StippleJobProgress(_Sized):
 class StippleCloudArrays(_Sized):
     _fields_ = [('struct_size', c_uint32), ('sh_degree', c_uint32), ('colour_space', c_uint32),
                 ('antialias', c_uint32), ('count', c_uint64), ('positions', _floats), ('rotations', _floats),
-                ('scales', _floats), ('opacities', _floats), ('sh', _floats), ('frame', c_uint32), ('reserved', c_uint32)]
+                ('scales', _floats), ('opacities', _floats), ('sh', _floats), ('frame', c_uint32),
+                ('reserved', c_uint32)]
 
 
 class StippleCloudInfo(_Sized):
@@ -73,7 +75,7 @@ class StippleCloudSaveOptions(_Sized):
 class StippleFormatInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('can_read', c_uint32), ('can_write', c_uint32),
                 ('max_sh_degree', c_uint32), ('frame', c_uint32), ('reserved', c_uint32),
-                ('name', c_char_p), ('title', c_char_p), ('endings', c_char_p), ('keeps_frame', c_uint32),
+                ('name', c_char_p), ('title', c_char_p), ('extensions', c_char_p), ('keeps_frame', c_uint32),
                 ('keeps_colour_space', c_uint32), ('keeps_antialias', c_uint32), ('reserved_keeps', c_uint32)]
 
 
@@ -154,7 +156,7 @@ class StippleRefineOptions(_Sized):
 class StippleModelInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('leaf_level', c_uint32), ('leaf_count', c_uint64),
                 ('sample_count', c_uint64), ('bounds_min', c_float * 3), ('bounds_max', c_float * 3),
-                ('kind', c_uint32), ('sh_degree', c_uint32), ('least_anchors', c_uint64), ('most_anchors', c_uint64),
+                ('kind', c_uint32), ('sh_degree', c_uint32), ('min_anchors', c_uint64), ('max_anchors', c_uint64),
                 ('gaussians_per_anchor', c_uint32), ('reserved', c_uint32), ('kind_label', c_char_p)]
 
 
@@ -182,7 +184,7 @@ class StippleViewsOpenOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('downscale', c_uint32), ('cache_bytes', c_uint64)]
 
 
-class StippleViewPicture(_Sized):
+class StippleViewImage(_Sized):
     _fields_ = [('struct_size', c_uint32), ('transfer', c_uint32), ('rgba', _floats), ('weights', _floats),
                 ('depth', _floats), ('normals', _floats)]
 
@@ -194,7 +196,7 @@ class StippleViewPoints(_Sized):
 
 class StippleViewsInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('colour_space', c_uint32), ('view_count', c_uint64),
-                ('point_count', c_uint64), ('has_pictures', c_uint32), ('reserved', c_uint32)]
+                ('point_count', c_uint64), ('has_images', c_uint32), ('reserved', c_uint32)]
 
 
 class StippleViewInfo(_Sized):
@@ -216,7 +218,7 @@ class StippleInstance(_Sized):
 class StippleAccuracy(_Sized):
     _fields_ = [('struct_size', c_uint32), ('level', c_uint32), ('order', c_uint32), ('projection', c_uint32),
                 ('antialiasing', c_uint32), ('samples_per_side', c_uint32), ('sh_degree_limit', c_uint32),
-                ('precision', c_uint32), ('least_alpha', c_double), ('budget_share', c_double)]
+                ('precision', c_uint32), ('min_alpha', c_double), ('budget_share', c_double)]
 
 
 class StippleAccuracyKnobInfo(_Sized):
@@ -224,7 +226,7 @@ class StippleAccuracyKnobInfo(_Sized):
                 ('bound_utf8', c_char_p)]
 
 
-class StippleLens(_Sized):
+class StippleAperture(_Sized):
     _fields_ = [('struct_size', c_uint32), ('blades', c_uint32), ('aperture_radius', c_double),
                 ('focus_distance', c_double), ('rotation', c_double), ('ratio', c_double)]
 
@@ -240,13 +242,13 @@ class StippleRenderOptions(_Sized):
                 ('object_order', c_uint32), ('background', c_double * 3), ('surface_width', c_uint32),
                 ('surface_height', c_uint32), ('surface_depth', _floats), ('surface_colour', _floats),
                 ('matte_opacity', _floats), ('splat_light', _floats), ('accuracy', POINTER(StippleAccuracy)),
-                ('lens', POINTER(StippleLens)), ('shutter', POINTER(StippleShutter)), ('samples', c_uint32),
+                ('aperture', POINTER(StippleAperture)), ('shutter', POINTER(StippleShutter)), ('samples', c_uint32),
                 ('reserved_sampling', c_uint32)]
 
 
 class StippleAccuracyMeasureOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('repetitions', c_uint32), ('reference_pixels', c_uint64),
-                ('most_seconds', c_double), ('settings', POINTER(StippleAccuracy)), ('setting_count', c_uint64)]
+                ('max_seconds', c_double), ('settings', POINTER(StippleAccuracy)), ('setting_count', c_uint64)]
 
 
 class StippleAccuracyReportInfo(_Sized):
@@ -256,7 +258,7 @@ class StippleAccuracyReportInfo(_Sized):
 
 
 class StippleVolumeAccuracyOptions(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('repetitions', c_uint32), ('most_seconds', c_double)]
+    _fields_ = [('struct_size', c_uint32), ('repetitions', c_uint32), ('max_seconds', c_double)]
 
 
 class StippleAccuracyRow(_Sized):
@@ -289,7 +291,7 @@ class StippleRenderBuffers(_Sized):
 
 class StippleEffectsSurvey(_Sized):
     _fields_ = [('struct_size', c_uint32), ('sh_degree', c_uint32), ('splat_count', c_uint64),
-                ('looked_count', c_uint64), ('seen_count', c_uint64), ('object_count', c_uint64),
+                ('inspected_count', c_uint64), ('seen_count', c_uint64), ('object_count', c_uint64),
                 ('mixed_count', c_uint64), ('view_change', c_double * 5), ('affine_error_px', c_double),
                 ('error_ahead_px', c_double), ('field_of_view', c_double), ('widening', c_double)]
 
@@ -340,7 +342,8 @@ class StippleGroundPlane(_Sized):
 
 class StippleBackwardInput(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour_gradient', _floats), ('residual', _floats),
-                ('residual_weights', _floats), ('edge_weights', _floats), ('errors', _floats), ('depth_gradient', _floats)]
+                ('residual_weights', _floats), ('edge_weights', _floats), ('errors', _floats),
+                ('depth_gradient', _floats)]
 
 
 class StippleSplatGradients(_Sized):
@@ -352,8 +355,8 @@ class StippleSplatGradients(_Sized):
 
 
 class StippleBackwardResult(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('camera', c_double * 6), ('background', c_double * 3),
-                ('visible_count', c_uint64)]
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('camera', c_double * 6),
+                ('background', c_double * 3), ('visible_count', c_uint64)]
 
 
 class StippleImageLossOptions(_Sized):
@@ -368,11 +371,11 @@ class StippleImageLoss(_Sized):
 
 class StippleFitOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('model', c_uint32), ('strategy_utf8', c_char_p), ('iterations', c_uint64),
-                ('max_splats', c_uint64), ('start_splats', c_uint64), ('least_anchors', c_uint64),
-                ('most_anchors', c_uint64), ('gaussians_per_anchor', c_uint32), ('sh_degree', c_uint32),
+                ('max_splats', c_uint64), ('start_splats', c_uint64), ('min_anchors', c_uint64),
+                ('max_anchors', c_uint64), ('gaussians_per_anchor', c_uint32), ('sh_degree', c_uint32),
                 ('antialias', c_uint32), ('background', c_uint32), ('density_gradient', c_uint32), ('jitter', c_uint32),
                 ('holdout', c_uint32), ('resume', c_uint32), ('seed', c_uint64), ('ssim_share', c_double),
-                ('picture_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
+                ('image_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
                 ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double), ('max_bytes', c_uint64),
                 ('shell', c_uint32), ('reserved', c_uint32)]
 
@@ -384,16 +387,16 @@ class StippleRigSearchOptions(_Sized):
 
 
 class StippleRayHits(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('count', c_uint64), ('distances', POINTER(c_double)),
-                ('normals', POINTER(c_double)), ('objects', POINTER(c_uint32)), ('object_count', c_uint64),
-                ('object_sizes', POINTER(c_double))]
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('count', c_uint64),
+                ('distances', POINTER(c_double)), ('normals', POINTER(c_double)), ('objects', POINTER(c_uint32)),
+                ('object_count', c_uint64), ('object_sizes', POINTER(c_double))]
 
 
 class StippleFitOptionInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('kind', c_uint32), ('models', c_uint32), ('fixed_models', c_uint32),
                 ('name_utf8', c_char_p), ('help_utf8', c_char_p), ('choices_utf8', c_char_p), ('minimum', c_double),
                 ('maximum', c_double), ('default_utf8', c_char_p), ('presets_utf8', c_char_p * 6),
-                ('former_name_utf8', c_char_p), ('former_unit', c_double)]
+                ('aliases_utf8', c_char_p * 3), ('alias_units', c_double * 3)]
 
 
 class StippleFitFigures(_Sized):
@@ -416,7 +419,7 @@ class StippleStrategySetting(_Sized):
 
 class StippleDensifyOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('event_count', c_uint32), ('strategy_utf8', c_char_p),
-                ('max_splats', c_uint64), ('seed', c_uint64), ('picture_bytes', c_uint64), ('holdout', c_uint32),
+                ('max_splats', c_uint64), ('seed', c_uint64), ('image_bytes', c_uint64), ('holdout', c_uint32),
                 ('reserved', c_uint32)]
 
 

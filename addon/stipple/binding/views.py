@@ -7,7 +7,7 @@ import numpy as np
 
 from .errors import check, invalid
 from .handle import Handle, contiguous, new_handle, path_bytes, pointer_to
-from .structs import (ColourSpace, StippleCamera, StippleViewBuffers, StippleViewInfo, StippleViewPicture,
+from .structs import (ColourSpace, StippleCamera, StippleViewBuffers, StippleViewInfo, StippleViewImage,
                       StippleViewPoints, StippleViewsInfo, StippleViewsOpenOptions, Transfer)
 
 
@@ -22,7 +22,7 @@ class Views(Handle):
 
     @classmethod
     def open(cls, context, path, downscale=1):
-        """A photo data set with its pictures."""
+        """A photo data set with its images."""
         options = StippleViewsOpenOptions()
         context.library.stipple_views_open_options_init(byref(options))
         options.downscale = downscale
@@ -41,7 +41,7 @@ class Views(Handle):
         arrays = {'rgba': (rgba, (*size, 4)), 'weights': (weights, size), 'depth': (depth, size),
                   'normals': (normals, (*size, 3))}
         kept = _shaped('View', arrays)
-        picture = StippleViewPicture(transfer=int(transfer), **{key: pointer_to(array) for key, array in kept.items()})
+        picture = StippleViewImage(transfer=int(transfer), **{key: pointer_to(array) for key, array in kept.items()})
         self._check(self.library.stipple_views_add(self.pointer, byref(camera), byref(picture),
                                                    None if name is None else name.encode()))
 
@@ -107,5 +107,5 @@ def _shaped(what, arrays):
 
 
 def resize_camera(library, camera, width, height):
-    """Changes a camera's picture size in place."""
+    """Changes a camera's image size in place."""
     check(library, library.stipple_camera_resize(byref(camera), width, height))

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One file per verb: read, native call or job, write, report."""
 
-from . import (accuracy_compare, accuracy_measure, add_budget, apply_transform, cameras_import, clear_mask, crop_by_box, crop_by_mesh, delete_floaters,
-               effects_look, effects_measure,
+from . import (accuracy_compare, accuracy_measure, add_budget, apply_transform, cameras_import, clear_mask, crop_by_box,
+               crop_by_mesh, delete_floaters, effects_look, effects_measure,
                level_to_ground, merge_splats, prepare_budgets, relink, revert_to_source, scale_budget, set_scale,
-               show_report, show_setting, splats_densify, splats_export, splats_fit, splats_from_mesh, splats_import, splats_to_mesh,
-               splats_to_volume, update_from_source, upgrade_to_point_cloud, use_as_new_source, use_standard_view)
+               show_report, show_setting, splats_densify, splats_export, splats_fit, splats_from_mesh, splats_import,
+               splats_to_mesh, splats_to_volume, update_from_source, upgrade_to_point_cloud, use_as_new_source,
+               use_standard_view)
 
-_modules = (splats_from_mesh, splats_fit, splats_densify, splats_import, splats_export, splats_to_volume, splats_to_mesh,
-            update_from_source, use_as_new_source, revert_to_source, upgrade_to_point_cloud, use_standard_view, crop_by_box,
-            crop_by_mesh, delete_floaters, clear_mask, merge_splats, apply_transform, add_budget, scale_budget, level_to_ground, set_scale,
-            prepare_budgets, relink, cameras_import, show_report, show_setting, effects_look, effects_measure,
-            accuracy_measure, accuracy_compare)
+_modules = (splats_from_mesh, splats_fit, splats_densify, splats_import, splats_export, splats_to_volume,
+            splats_to_mesh, update_from_source, use_as_new_source, revert_to_source, upgrade_to_point_cloud,
+            use_standard_view, crop_by_box, crop_by_mesh, delete_floaters, clear_mask, merge_splats, apply_transform,
+            add_budget, scale_budget, level_to_ground, set_scale, prepare_budgets, relink, cameras_import, show_report,
+            show_setting, effects_look, effects_measure, accuracy_measure, accuracy_compare)
 classes = tuple(cls for module in _modules for cls in module.classes)

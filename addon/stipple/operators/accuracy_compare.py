@@ -31,7 +31,8 @@ class STIPPLE_OT_accuracy_compare(JobOperator, bpy.types.Operator):
                                                             "second to its right"),
                                            ('ERROR', "Error × 10", "The image shows ten times the difference of the "
                                                                    "two settings")))
-    wipe: FloatProperty(name="Line", description="Position of the line between the two settings", default=0.5, min=0.0, max=1.0, subtype='FACTOR')
+    wipe: FloatProperty(name="Line", description="Position of the line between the two settings", default=0.5, min=0.0,
+                        max=1.0, subtype='FACTOR')
 
     def invoke(self, context, _event):
         return self.run_in_window(context)

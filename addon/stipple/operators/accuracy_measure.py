@@ -20,9 +20,10 @@ class STIPPLE_OT_accuracy_measure(JobOperator, bpy.types.Operator):
     bl_label = "Measure This View"
     bl_options = {'REGISTER'}
 
-    repetitions: IntProperty(name="Repetitions", description="Number of timings of each setting", default=7, min=1, max=1000)
-    most_seconds: FloatProperty(name="Time", description="Seconds after which no further round of timings begins", default=60.0,
-                                min=0.1, subtype='TIME_ABSOLUTE', unit='TIME_ABSOLUTE')
+    repetitions: IntProperty(name="Repetitions", description="Number of timings of each setting", default=7, min=1,
+                             max=1000)
+    most_seconds: FloatProperty(name="Time", description="Seconds after which no further round of timings begins",
+                                default=60.0, min=0.1, subtype='TIME_ABSOLUTE', unit='TIME_ABSOLUTE')
     filepath: StringProperty(name="Report", description="File for the report (.json, .csv or .svg); empty for none",
                              subtype='FILE_PATH')
 
@@ -42,7 +43,7 @@ class STIPPLE_OT_accuracy_measure(JobOperator, bpy.types.Operator):
         render = Renderer(sources.context()).options(blend_space=view.picture.blend_space,
                                                      background=view.picture.background)
         return AccuracyMeasurement.start(sources.context(), view.placed, view.camera, render,
-                                         repetitions=self.repetitions, most_seconds=self.most_seconds)
+                                         repetitions=self.repetitions, max_seconds=self.most_seconds)
 
     def finish(self, context, job):
         report = job.report()

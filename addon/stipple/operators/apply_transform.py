@@ -41,7 +41,8 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
                 task.advance(i / len(wanted), 'Moving splats')
                 cloud, tree = cloud_edit.merge([(target.cloud, matrix)], frames.WORLD), None
                 if has_budget:
-                    job = task.run(Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted), (i + 1) / len(wanted))
+                    job = task.run(Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted),
+                                   (i + 1) / len(wanted))
                     tree = sources.save_model(Model.of_job(job), path)
                 moved.append((target, cloud, tree))
             return moved

@@ -23,12 +23,13 @@ class STIPPLE_OT_cameras_import(bpy.types.Operator, ImportHelper):
     filename_ext = '.json'
     filter_glob: StringProperty(default='*.json;cameras.bin;cameras.txt;images.bin;images.txt', options={'HIDDEN'})
     backgrounds: BoolProperty(name="Background Images", default=True, description="Show each camera's photo behind its "
-                              "view. Photos of a lens that distorts are shown as they are: they fit the view in the middle "
-                              "and drift off towards the edges, while fitting takes the distortion out")
+                              "view. Photos of a lens that distorts are shown as they are: they fit the view in the "
+                              "middle and drift off towards the edges, while fitting takes the distortion out")
     up_axis: EnumProperty(name="Up Axis", description="The up direction of the data set; choose the same for splats "
                                                       "that were fitted to it", items=photo_cameras.UP_AXES)
-    set_resolution: BoolProperty(name="Set Resolution", description="Give the scene the first photo's resolution, so that "
-                                 "the camera's view has its frame", default=True)
+    set_resolution: BoolProperty(name="Set Resolution",
+                                 description="Give the scene the first photo's resolution, so that "
+                                             "the camera's view has its frame", default=True)
 
     def execute(self, context):
         path = bpy.path.abspath(self.filepath)

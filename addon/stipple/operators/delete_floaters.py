@@ -26,8 +26,8 @@ class STIPPLE_OT_delete_floaters(JobOperator, bpy.types.Operator):
     by_connectivity: BoolProperty(name="Isolated", default=True)
     radius: FloatProperty(name="Gap", description="Splats within this distance belong to one group, in the file's "
                                                   "units; 0 derives it from their distances", default=0.0, min=0.0)
-    min_group: IntProperty(name="Smallest Group", description="Groups of fewer splats are hidden, 0 for a thousandth of "
-                           "all", default=0, min=0)
+    min_group: IntProperty(name="Smallest Group",
+                           description="Groups of fewer splats are hidden, 0 for a thousandth of all", default=0, min=0)
 
     @classmethod
     def poll(cls, context):

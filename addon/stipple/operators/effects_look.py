@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Look at the splats of the present view: what effects does a picture of them need?"""
+"""Look at the splats of the present view: what effects does an image of them need?"""
 
 import bpy
 

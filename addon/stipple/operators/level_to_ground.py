@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turns and moves what is selected so that the active splats' floor is the ground of the world."""
+"""Rotates and moves what is selected so that the active splats' floor is the ground of the world."""
 
 import bpy
 from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty
@@ -22,8 +22,8 @@ class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.O
     use_points: BoolProperty(name="Pick Points", description="Three points of the floor, instead of a search for it",
                              default=False)
     points: FloatVectorProperty(name="Points", size=9, options={'SKIP_SAVE', 'HIDDEN'})
-    max_tilt: FloatProperty(name="Maximum Tilt", description="Maximum angle between the floor and level now", default=0.785398,
-                            min=0.0174533, max=1.570796, subtype='ANGLE')
+    max_tilt: FloatProperty(name="Maximum Tilt", description="Maximum angle between the floor and level now",
+                            default=0.785398, min=0.0174533, max=1.570796, subtype='ANGLE')
     seed: IntProperty(name="Seed", description="Another seed may find another plane", default=0, min=0)
 
     @classmethod
@@ -36,7 +36,8 @@ class STIPPLE_OT_level_to_ground(picking.PointOperator, JobOperator, bpy.types.O
             self._found, self._doubtful = 'three points', False
         else:
             cloud = sources.cloud_from_object(context.object)
-            plane = cloud_edit.ground_plane(cloud, placement.matrix_of(context.object), max_tilt=self.max_tilt, seed=self.seed)
+            plane = cloud_edit.ground_plane(cloud, placement.matrix_of(context.object), max_tilt=self.max_tilt,
+                                            seed=self.seed)
             self._matrix = cloud_edit.matrix_of(plane)
             self._found = f'{plane.inlier_count:,} of {plane.considered_count:,} splats'
             self._doubtful = plane.inlier_count < 0.03 * plane.considered_count

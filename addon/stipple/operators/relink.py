@@ -23,8 +23,10 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
 
     filename_ext = formats.USUAL_ENDING
     filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
-    other_count: BoolProperty(name="Accept Another Count", description="Take a file of another number of splats, too; a "
-                              "mask, which says for each splat whether it is hidden, is cleared then", default=False)
+    other_count: BoolProperty(name="Accept Another Count",
+                              description="Take a file of another number of splats, too; a "
+                                          "mask, which says for each splat whether it is hidden, is cleared then",
+                              default=False)
 
     again: BoolProperty(name="Again", description="Read the present source again, without asking for a file",
                         default=False, options={'HIDDEN', 'SKIP_SAVE'})
@@ -43,7 +45,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
         if self.again:
             return self.run_in_window(context)
         self._asked = True
-        self.filter_glob = formats.glob((*formats.read_endings(), sources.MODEL_SUFFIX))
+        self.filter_glob = formats.glob((*formats.read_extensions(), sources.MODEL_SUFFIX))
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context):
@@ -73,7 +75,8 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
         if not known.counts_anchors and not stipple.is_sequence and not edited:
             before = _count_before(data)
             if count != before and not self.other_count:
-                raise invalid(f"'{self._path}' has {count:,} splats; the source of '{data.name}' had {before:,}. Choose "
+                raise invalid(f"'{self._path}' has {count:,} splats; the source of '{data.name}' had {before:,}. "
+                              f"Choose "
                               'another file, or Accept Another Count.')
             clears_mask = count != before
         names = ('source', 'source_stamp', 'source_count', *source_settings.PROPERTIES)

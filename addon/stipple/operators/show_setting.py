@@ -4,8 +4,8 @@
 import bpy
 from bpy.props import EnumProperty
 
-TABS = (('RENDER', "Render", ""), ('VIEW_LAYER', "View Layer", ""), ('DATA', "Object Data", "The switch is in the camera's "
-                                                                                            "data"))
+TABS = (('RENDER', "Render", ""), ('VIEW_LAYER', "View Layer", ""),
+        ('DATA', "Object Data", "The switch is in the camera's data"))
 
 
 class STIPPLE_OT_show_setting(bpy.types.Operator):

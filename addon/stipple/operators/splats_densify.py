@@ -21,7 +21,8 @@ class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
                              "the fit's settings")
     events: IntProperty(name="Events", description="How often splats multiply and are removed; between two events all"
                                                    " views are drawn again", default=1, min=1, soft_max=20, max=1000)
-    max_splats: IntProperty(name="Splats", description="Maximum number of splats; 0 is twice as many as there are", default=0, min=0, max=100000000)
+    max_splats: IntProperty(name="Splats", description="Maximum number of splats; 0 is twice as many as there are",
+                            default=0, min=0, max=100000000)
 
     @classmethod
     def poll(cls, context):

@@ -27,22 +27,26 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     bl_options = {'REGISTER', 'PRESET'}
 
     filename_ext = formats.USUAL_ENDING
-    check_extension = None  # several endings are right
+    check_extension = None  # several extensions are right
     filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
     collection: StringProperty(name="Collection", description="Export the splats of this collection", default="",
                                options={'HIDDEN'})
-    use_selection: BoolProperty(name="Selected Only", description="Export selected splats only, instead of all that are "
-                                "visible", default=True)
+    use_selection: BoolProperty(name="Selected Only",
+                                description="Export selected splats only, instead of all that are "
+                                            "visible", default=True)
     budget: EnumProperty(name="Budget", items=BUDGETS)
     apply_transform: BoolProperty(name="Apply Transform", description="Write the splats where their objects put them,"
                                                                       " with their harmonics rotated; otherwise in "
                                                                       "the active object's own space", default=True)
     apply_grade: BoolProperty(name="Apply Grade", description="Write colors and opacities with the Color Grade of each "
-                              "object, which the file then has for good; otherwise as they were before it", default=True)
+                              "object, which the file then has for good; otherwise as they were before it",
+                              default=True)
     up_axis: EnumProperty(name="Up Axis", description="The up direction of the file, where the transform is applied",
-                          items=(('AUTO', "By Format", "The frame that files of this format usually have"),) + UP_AXES[1:])
-    max_degree: IntProperty(name="Harmonics", description="Highest degree of the colors' harmonics that is written, 0 for "
-                            "colors that do not change with the view", default=4, min=0, max=4)
+                          items=(('AUTO', "By Format", "The frame that files of this format usually have"),)
+                          + UP_AXES[1:])
+    max_degree: IntProperty(name="Harmonics",
+                            description="Highest degree of the colors' harmonics that is written, 0 for "
+                                        "colors that do not change with the view", default=4, min=0, max=4)
     frames: EnumProperty(name="Frames", items=frames_out.FRAMES, options={'SKIP_SAVE'})
     ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger (.ply)", default=False)
 
@@ -53,7 +57,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     def invoke(self, context, event):
         if not self.filepath:
             self.filepath = exporting.default_name(context) + self.filename_ext
-        self.filter_glob = formats.glob(formats.write_endings())
+        self.filter_glob = formats.glob(formats.write_extensions())
         return ExportHelper.invoke(self, context, event)
 
     def execute(self, context):
@@ -66,8 +70,8 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         path = bpy.path.abspath(self.filepath)
         form = formats.of_path(path)
         if form is None or not form.can_write:
-            raise invalid(f"'{path}' has an ending that is no splat format to write; allowed are "
-                          f"{', '.join(formats.write_endings())}.")
+            raise invalid(f"'{path}' has an extension that is no splat format to write; allowed are "
+                          f"{', '.join(formats.write_extensions())}.")
         objects = exporting.chosen(context, self.collection, self.use_selection)
         options = {'ascii': self.ascii, 'sh_degree_limit': self.max_degree}
         if self.apply_transform and self.up_axis != 'AUTO':

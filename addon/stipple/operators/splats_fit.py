@@ -24,7 +24,8 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
     bl_options = {'UNDO'}
 
     source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
-                                "beside the .blend file", subtype='FILE_PATH', options={'SKIP_SAVE'} | version.RELATIVE_PATH)
+                                "beside the .blend file", subtype='FILE_PATH',
+                                options={'SKIP_SAVE'} | version.RELATIVE_PATH)
 
     _preview = ''
     _shown_at = 0.0

@@ -32,7 +32,8 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
     hide_source: BoolProperty(name="Hide Source", description="Hide the meshes in the viewport and in renders",
                               default=True)
     source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
-                                "beside the .blend file", subtype='FILE_PATH', options={'SKIP_SAVE'} | version.RELATIVE_PATH)
+                                "beside the .blend file", subtype='FILE_PATH',
+                                options={'SKIP_SAVE'} | version.RELATIVE_PATH)
 
     @classmethod
     def poll(cls, context):

@@ -42,7 +42,7 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
         if self.directory and self.files:  # dropped into a window
             return self.run_in_window(context)
         self._asked = True
-        self.filter_glob = formats.glob((*formats.read_endings(), sources.MODEL_SUFFIX))
+        self.filter_glob = formats.glob((*formats.read_extensions(), sources.MODEL_SUFFIX))
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context):
@@ -93,9 +93,9 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
     def _object(self, path, splats, model, frame_count):
         name = os.path.basename(path)
         form = formats.of_path(path)
-        endings = form.endings if form else (sources.MODEL_SUFFIX, os.path.splitext(name)[1])
-        ending = next((e for e in endings if name.lower().endswith(e)), '')
-        name = name[:len(name) - len(ending)]
+        extensions = form.extensions if form else (sources.MODEL_SUFFIX, os.path.splitext(name)[1])
+        extension = next((e for e in extensions if name.lower().endswith(e)), '')
+        name = name[:len(name) - len(extension)]
         if frame_count > 1:
             name = os.path.basename(numbered.parse(path).prefix).rstrip('_-. ') or name
         data = splat_data.new_data(name)

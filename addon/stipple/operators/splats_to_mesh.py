@@ -11,7 +11,8 @@ from ..scene.source import placement, proxies, sources, splat_data
 
 
 class STIPPLE_OT_splats_to_mesh(JobOperator, bpy.types.Operator):
-    """Make a closed mesh around the selected splats, for shadows, physics and snapping. It is not a textured reconstruction"""
+    """Make a closed mesh around the selected splats, for shadows, physics and snapping. It is not a textured
+    reconstruction"""
 
     bl_idname = 'stipple.splats_to_mesh'
     bl_label = "Splats to Mesh"
@@ -19,12 +20,13 @@ class STIPPLE_OT_splats_to_mesh(JobOperator, bpy.types.Operator):
 
     resolution: IntProperty(name="Resolution", description="Voxels along the longest side, where Voxel Size is 0",
                             default=128, soft_min=8, soft_max=1024)
-    voxel_size: FloatProperty(name="Voxel Size", description="Side of a voxel, 0 to take the resolution. Details smaller "
-                              "than two voxels are lost", default=0.0, soft_min=0.0, subtype='DISTANCE', unit='LENGTH',
-                              precision=4)
+    voxel_size: FloatProperty(name="Voxel Size",
+                              description="Side of a voxel, 0 to take the resolution. Details smaller "
+                                          "than two voxels are lost", default=0.0, soft_min=0.0, subtype='DISTANCE',
+                              unit='LENGTH', precision=4)
     threshold: FloatProperty(name="Threshold", description="How opaque a voxel has to be to lie inside the mesh: a "
-                                                           "low value includes haze, a high one only what is solid", default=0.5, min=0.001, max=0.999,
-                             subtype='FACTOR', precision=3)
+                                                           "low value includes haze, a high one only what is solid",
+                             default=0.5, min=0.001, max=0.999, subtype='FACTOR', precision=3)
     adaptivity: FloatProperty(name="Adaptivity", description="Make larger faces where the surface is flat", default=0.0,
                               min=0.0, max=1.0, subtype='FACTOR')
     largest_only: BoolProperty(name="Largest Piece Only", description="Leave out floating pieces and hollows inside",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Render: which effects the picture has, why, and what they cost."""
+"""Render: which effects the image has, why, and what they cost."""
 
 import bpy
 

@@ -90,7 +90,8 @@ class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):
         layout = self.layout
         layout.enabled = not fitting.state.is_running
         chosen = strategies.text_of(context.scene.stipple.fit)
-        draw_text(layout, context, f"Splits, copies and removes splats of '{context.object.name}' where the views above "
+        draw_text(layout, context,
+                  f"Splits, copies and removes splats of '{context.object.name}' where the views above "
                   f"ask for it, as the strategy in Advanced says: {chosen}")
         layout.operator('stipple.splats_densify', icon='OUTLINER_DATA_POINTCLOUD')
 

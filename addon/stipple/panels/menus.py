@@ -68,8 +68,8 @@ def _draw_export(self, _context):
 
 
 _MENUS = (('VIEW3D_MT_add', _draw_add), ('VIEW3D_MT_object_convert', _draw_convert),
-          ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import), ('TOPBAR_MT_file_export', _draw_export),
-          ('DATA_PT_camera_background_image', _draw_background_images))
+          ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import),
+          ('TOPBAR_MT_file_export', _draw_export), ('DATA_PT_camera_background_image', _draw_background_images))
 
 
 def register():

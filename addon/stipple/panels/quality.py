@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Render: how exact pictures are, in the viewport and in renders, side by side."""
+"""Render: how exact images are, in the viewport and in renders, side by side."""
 
 import bpy
 
@@ -53,7 +53,7 @@ class STIPPLE_PT_quality_knobs(SplatRenderPanel, bpy.types.Panel):
             box.label(text=knob.label)
             row = box.row(align=True)
             for name, label, _ in quality.COLUMNS:
-                row.prop(quality.column(context.scene, name), knob.name, text="")
+                row.prop(quality.column(context.scene, name), quality.property_of(knob.name), text="")
             draw_text(box, context, knob.bound, is_quiet=True)
 
 
@@ -71,9 +71,11 @@ class STIPPLE_PT_quality_table(SplatRenderPanel, bpy.types.Panel):
         column = layout.column(align=True)
         for row in measured.report.rows:
             column.label(text=_sentence(row.name), icon='KEYTYPE_KEYFRAME_VEC' if row.is_on_front else 'BLANK1')
-            for text in (f"{_time(row)}, {row.psnr:.1f} dB, \N{LESS-THAN OR EQUAL TO} {row.error_99_9:.2g}", _verdict(row)):
+            for text in (f"{_time(row)}, {row.psnr:.1f} dB, \N{LESS-THAN OR EQUAL TO} {row.error_99_9:.2g}",
+                         _verdict(row)):
                 _draw_quiet(column, text)
-        draw_text(layout, context, "Marked: no other setting is as fast and as good. Time, PSNR, and what 99.9 % of the "
+        draw_text(layout, context,
+                  "Marked: no other setting is as fast and as good. Time, PSNR, and what 99.9 % of the "
                   "pixels are within", 'KEYTYPE_KEYFRAME_VEC')
         line = layout.row(align=True)
         for by, text in (('TIME', "Best Within..."), ('QUALITY', "Cheapest Above...")):

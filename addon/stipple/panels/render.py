@@ -104,7 +104,8 @@ def _draw_limit(layout, context, name):
 
 
 # Cycles has panels of its own.
-_SIMPLIFY = (('RENDER_PT_simplify_viewport', _draw_max_splats), ('CYCLES_RENDER_PT_simplify_viewport', _draw_max_splats),
+_SIMPLIFY = (('RENDER_PT_simplify_viewport', _draw_max_splats),
+             ('CYCLES_RENDER_PT_simplify_viewport', _draw_max_splats),
              ('RENDER_PT_simplify_render', _draw_max_splats_render),
              ('CYCLES_RENDER_PT_simplify_render', _draw_max_splats_render))
 

@@ -9,8 +9,8 @@ _MARGIN = 4
 
 
 def draw_text(layout, context, text, icon='NONE', is_quiet=False, columns=1):
-    """A sentence, whole, in as many lines as it takes. is_quiet: grey and narrow, as notes are. columns: that the layout
-    is one of, side by side."""
+    """A sentence, whole, in as many lines as it takes. is_quiet: grey and narrow, as notes are. columns: that the
+    layout is one of, side by side."""
     width = int(context.region.width / context.preferences.system.ui_scale / _LETTER_PX) // columns - _MARGIN
     characters = max(16, width if icon == 'NONE' else width - _MARGIN)
     column = layout.column(align=True)

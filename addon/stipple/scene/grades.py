@@ -46,7 +46,8 @@ def write(data, splats, settings):
 def write_again(data, settings):
     """Grades the stored splats anew. Errors: StippleError where colours were painted over the present grade."""
     if colours_are_edited(data):
-        raise StippleError(f"The colors of '{data.name}' were edited by hand under a grade; choose Use as New Source to "
+        raise StippleError(f"The colors of '{data.name}' were edited by hand under a grade; choose Use as New Source "
+                           f"to "
                            'keep them, or Revert to Source, before the grade is changed.',
                            Status.ERROR_INVALID_ARGUMENT)
     write(data, splat_data.read_ungraded(data), settings)

@@ -18,7 +18,8 @@ def seen_by_camera(entry, depsgraph):
 
 
 def holds_out(entry, depsgraph):
-    """Whether an entry is a holdout: by itself or by its collections. Cycles does not ask the object that is instanced."""
+    """Whether an entry is a holdout: by itself or by its collections. Cycles does not ask the object that is
+    instanced."""
     return _owner(entry).holdout_get(view_layer=depsgraph.view_layer_eval)
 
 

@@ -2,9 +2,9 @@
 """Drawing in the 3D view, the door to it.
 
 Under Solid, Material Preview and the Rendered shading of other engines splats are drawn over Blender's
-picture as sorted ellipses; in Wireframe, and above a number of splats that the user sets, as coloured
+image as sorted ellipses; in Wireframe, and above a number of splats that the user sets, as coloured
 points. From Blender 5.3 on splats are data that Blender draws by itself. The engine Stipple shows a
-ViewPicture instead.
+ViewImage instead.
 """
 
 import logging
@@ -17,9 +17,9 @@ from ..binding.errors import StippleError
 from ..scene import overlays
 from ..scene.source import sources, sync
 from ..scene.view import viewed
-from .view_picture import ViewPicture
+from .view_image import ViewImage
 
-__all__ = ('ViewPicture', 'register', 'unregister')
+__all__ = ('ViewImage', 'register', 'unregister')
 
 POLL_SECONDS = 0.01
 # 3D views that keep their order of splats; more than a screen usually has.

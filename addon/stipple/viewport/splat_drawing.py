@@ -2,7 +2,7 @@
 """Splats of a view as sorted ellipses, drawn by the graphics card.
 
 A view keeps the order of its last sort and draws with it while the next one is made by the native
-library's own thread: turning a view never waits. Nothing here knows of Blender's objects.
+library's own thread: rotating a view never waits. Nothing here knows of Blender's objects.
 """
 
 import weakref
@@ -90,7 +90,7 @@ class SplatView:
 
     def update(self, shown, camera, wait=False):
         """Starts a sort where the view has changed, takes the one that has ended. wait: for tests and the first
-        picture of a scene. Returns whether a sort is still on its way. Errors: StippleError."""
+        image of a scene. Returns whether a sort is still on its way. Errors: StippleError."""
         self._take()
         if not shown:
             self._order, self._key = None, None
@@ -189,7 +189,8 @@ def _instances(keys, shown, camera, clip_planes):
     world_to_camera = np.array(camera.world_to_camera, np.float64).reshape(4, 4)
     if len(clip_planes):
         # A plane is a row: plane . (camera to world . p) for points p of the camera's frame.
-        texels[0, :len(clip_planes)] = np.asarray(clip_planes, np.float64)[:CLIP_PLANES] @ np.linalg.inv(world_to_camera)
+        texels[0, :len(clip_planes)] = np.asarray(clip_planes,
+                                                  np.float64)[:CLIP_PLANES] @ np.linalg.inv(world_to_camera)
     flat = texels[1:].reshape(-1, INSTANCE_TEXELS, 4)
     for i, key in enumerate(keys):
         entry = now.get(key)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One 3D view's splats as sorted ellipses over Blender's own picture.
+"""One 3D view's splats as sorted ellipses over Blender's own image.
 
 Blender's overlay target encodes sRGB by itself, so blending in it would be linear: splats are blended
-in display space in a picture of their own, against the scene's depth, and laid over the view as a whole.
+in display space in an image of their own, against the scene's depth, and laid over the view as a whole.
 """
 
 import gpu
@@ -37,7 +37,8 @@ class ViewEllipses:
             self._target = Target(width, height)
         with self._target.bound(depth, with_selection):
             self._sorted.draw(shaders, shown, camera, region_data.window_matrix,
-                              cameras.step_back(region_data.window_matrix), viewed.clip_planes(region_data), with_selection)
+                              cameras.step_back(region_data.window_matrix), viewed.clip_planes(region_data),
+                              with_selection)
         self._target.show(shaders, (x, y), _outline_colour(context) if with_selection else None)
         return is_sorting
 
@@ -53,7 +54,7 @@ class ViewEllipses:
 
 
 class Target:
-    """A picture of splats alone: premultiplied display values, and where selected splats cover it."""
+    """An image of splats alone: premultiplied display values, and where selected splats cover it."""
 
     def __init__(self, width, height):
         self.size = (width, height)

@@ -17,8 +17,8 @@ _AXES = (("X", (1.0, 0.0, 0.0)), ("Y", (0.0, 1.0, 0.0)), ("Z", (0.0, 0.0, 1.0)),
 
 
 def draw(scale, kind, width, unit):
-    """In the pixels of a region `width` wide. scale: overlays.Scale, None where nothing is known; unit: pixels of the user
-    interface that count as one."""
+    """In the pixels of a region `width` wide. scale: overlays.Scale, None where nothing is known; unit: pixels of the
+    user interface that count as one."""
     left, bottom = (width - WIDTH * unit) / 2, EDGE * unit
     if scale is None:
         _text(f"{_TITLES[kind]}: not known of these splats", left, bottom, unit)

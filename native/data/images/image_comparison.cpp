@@ -107,14 +107,14 @@ double ssimOfChannel(const std::vector<double>& a, const std::vector<double>& b,
 
 ImageComparison compare(const Image& a, const Image& b) {
   if (a.width != b.width || a.height != b.height || a.channels != b.channels) {
-    fail(ErrorCode::kInvalidArgument, "the pictures differ in size: " + sizeOf(a) + " and " +
+    fail(ErrorCode::kInvalidArgument, "the images differ in size: " + sizeOf(a) + " and " +
                                           sizeOf(b) +
                                           "; they must have the same width, height "
                                           "and channels");
   }
-  if (a.pixels.empty()) fail(ErrorCode::kInvalidArgument, "the pictures have no pixels");
-  requireFinite(a.pixels.data(), a.pixels.size(), a.channels, "first picture: pixel");
-  requireFinite(b.pixels.data(), b.pixels.size(), b.channels, "second picture: pixel");
+  if (a.pixels.empty()) fail(ErrorCode::kInvalidArgument, "the images have no pixels");
+  requireFinite(a.pixels.data(), a.pixels.size(), a.channels, "first image: pixel");
+  requireFinite(b.pixels.data(), b.pixels.size(), b.channels, "second image: pixel");
   const std::vector<double> x = displayValues(a);
   const std::vector<double> y = displayValues(b);
   ImageComparison result;

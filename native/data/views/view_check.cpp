@@ -123,13 +123,13 @@ void checkPictures(const ViewSource& views, const ViewCheckOptions& options, Pro
                       : masked.size() == looked_at      ? "masked out"
                                                         : "black, transparent or masked out";
     fail(ErrorCode::kInvalidArgument,
-         "all " + std::to_string(looked_at) + " pictures that were looked at are " + how +
+         "all " + std::to_string(looked_at) + " images that were looked at are " + how +
              " everywhere (" + views.name(0) + " is the first); at least one must show something");
   }
   const auto warn = [&warnings](const std::vector<std::string>& names, const char* how) {
     if (names.empty()) return;
     warnings.push_back(std::to_string(names.size()) +
-                       (names.size() == 1 ? " picture is " : " pictures are ") + how +
+                       (names.size() == 1 ? " image is " : " images are ") + how +
                        " everywhere: " + listed(names));
   };
   warn(black, "black");
@@ -171,7 +171,7 @@ void validateView(const Camera& camera, const ViewPicture& picture, const std::s
   }
   if (picture.width != camera.width || picture.height != camera.height) {
     fail(ErrorCode::kInvalidArgument,
-         name + ": the picture is " + sizeText(picture.width, picture.height) +
+         name + ": the image is " + sizeText(picture.width, picture.height) +
              " pixels, its camera's is " + sizeText(camera.width, camera.height) + " pixels");
   }
   checkArray(picture, name, "colour", picture.colour, 3, false, ValueRange::kAny);

@@ -130,8 +130,8 @@ Camera undistortedCamera(const Camera& seen_by, const Lens& lens) {
   const double width = (left + right) * seen_by.fx, height = (top + bottom) * seen_by.fy;
   if (!(width > 0) || !(height > 0) || !std::isfinite(width * height)) {
     fail(ErrorCode::kUnsupported,
-         "the camera's distortion cannot be taken out: its model folds the picture over at its "
-         "principal point, or that point lies outside of the picture");
+         "the camera's distortion cannot be taken out: its model folds the image over at its "
+         "principal point, or that point lies outside of the image");
   }
   // As many pixels as the lens's picture has, so that neither detail nor memory changes much.
   const double scale =

@@ -103,7 +103,7 @@ class ReleasedCues {
     } else {
       if (camera.width != width_ || camera.height != height_) {
         fail(ErrorCode::kInvalidArgument,
-             "metropolis(released=1) averages pictures of one size; there are " +
+             "metropolis(released=1) averages images of one size; there are " +
                  std::to_string(width_) + " x " + std::to_string(height_) + " and " +
                  std::to_string(camera.width) + " x " + std::to_string(camera.height));
       }

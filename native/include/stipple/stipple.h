@@ -14,7 +14,7 @@
  *
  * Conventions
  *   World: right-handed, metres, Z up. Camera: OpenCV frame (x right, y down, z forward), pixel
- *   centres at +0.5, first row of a picture = top. Matrices: 16 numbers, row-major, column vectors.
+ *   centres at +0.5, the first row of an image is its top. Matrices: 16 numbers, row-major, column vectors.
  *   Rotations: w,x,y,z. Scales: linear standard deviations. Opacity: 0..1.
  *   Results never depend on the number of threads.
  */
@@ -30,7 +30,7 @@ extern "C" {
 /* ---- version ----------------------------------------------------------------------------------- */
 
 /* Raised when a function or struct changes in a way that old callers cannot use. */
-#define STIPPLE_ABI_VERSION 1u
+#define STIPPLE_ABI_VERSION 2u
 
 /* The ABI version of the loaded library; compare with STIPPLE_ABI_VERSION before any other call. */
 uint32_t stipple_abi_version(void);
@@ -43,11 +43,11 @@ typedef enum StippleStatus {
   STIPPLE_OK = 0,
   STIPPLE_ERROR_INVALID_ARGUMENT = 1,
   STIPPLE_ERROR_OUT_OF_MEMORY = 2,
-  STIPPLE_ERROR_MEMORY_LIMIT = 3,     /* would need more than the context's memory limit; a picture: or
-                                         than the machine has */
+  STIPPLE_ERROR_MEMORY_LIMIT = 3,     /* the call would need more than the context's memory limit; drawing an
+                                         image, or more than the machine has */
   STIPPLE_ERROR_IO = 4,               /* the system refused: missing, no permission, disk full */
-  STIPPLE_ERROR_FORMAT = 5,           /* a file's content is wrong */
-  STIPPLE_ERROR_UNSUPPORTED = 6,      /* right, but not something this version can do */
+  STIPPLE_ERROR_FORMAT = 5,           /* the content of a file is wrong */
+  STIPPLE_ERROR_UNSUPPORTED = 6,      /* the request is right, but this version cannot do it */
   STIPPLE_ERROR_UNAVAILABLE = 7,      /* a part of the library cannot be loaded on this machine */
   STIPPLE_ERROR_CANCELLED = 8,
   STIPPLE_ERROR_BUFFER_TOO_SMALL = 9,
@@ -111,8 +111,8 @@ StippleStatus stipple_job_cancel(StippleJob* job);
 StippleStatus stipple_job_wait(StippleJob* job);
 /* Cancels a job that runs and waits for it: the caller's buffers are free afterwards. */
 void stipple_job_free(StippleJob* job);
-/* The result of a finished job, as a new handle. INVALID_ARGUMENT when the job made another kind of
- * thing, or has not ended well. */
+/* These give the result of a finished job as a new handle. Errors: INVALID_ARGUMENT where the job made another
+ * kind of thing, or has not ended well. */
 StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model);
 StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud);
 StippleStatus stipple_job_volume(const StippleJob* job, StippleVolume** volume);
@@ -130,8 +130,8 @@ typedef enum StippleAntialias {
   STIPPLE_ANTIALIAS_MIP = 1
 } StippleAntialias;
 
-/* Which way x, y and z of a cloud's positions point: Left or Right, Up or Down, Front or Back. Files keep
- * their frame; writers turn positions, rotations and harmonics where a format demands another. */
+/* Which way x, y and z of a cloud's positions point: Left or Right, Up or Down, Front or Back. Files keep their
+ * frame; writers rotate positions, rotations and harmonics where a format demands another. */
 typedef enum StippleFrame {
   STIPPLE_FRAME_UNKNOWN = 0, /* counts as RDF where a format demands a frame */
   STIPPLE_FRAME_LDB = 1,
@@ -199,8 +199,8 @@ void stipple_cloud_free(StippleCloud* cloud);
 StippleStatus stipple_cloud_info(const StippleCloud* cloud, StippleCloudInfo* info);
 /* Errors: BUFFER_TOO_SMALL when capacity < count. */
 StippleStatus stipple_cloud_read(const StippleCloud* cloud, const StippleCloudBuffers* buffers);
-/* Splats as Blender keeps them, each attribute in an array of its own. Harmonics above degree 0, in the order of
- * StippleCloudArrays: as many as the degree has, (degree+1)^2 - 1. */
+/* Splats as Blender keeps them, each attribute in an array of its own. rest has the harmonics above degree 0 in
+ * the order of StippleCloudArrays, (degree+1)^2 - 1 of them. */
 typedef struct StippleCloudColumns {
   uint32_t struct_size;
   uint32_t sh_degree;      /* 0..4 */
@@ -229,15 +229,16 @@ typedef struct StippleCloudColumnBuffers {
   float* rest[24];
 } StippleCloudColumnBuffers;
 
-/* As stipple_cloud_create and stipple_cloud_read, with the same errors. The cloud is the same from columns as from
- * arrays. Threads: all. Cost: O(N); one pass over memory. */
+/* These do what stipple_cloud_create and stipple_cloud_read do, with the same errors. The cloud is the same from
+ * columns as from arrays. Threads: all. Cost: O(N); one pass over memory. */
 StippleStatus stipple_cloud_create_from_columns(StippleContext* context, const StippleCloudColumns* columns,
                                                 StippleCloud** cloud);
 StippleStatus stipple_cloud_read_columns(const StippleCloud* cloud, const StippleCloudColumnBuffers* buffers);
-/* Reads a splat file of any format that stipple_format_info lists. The format is told by its content. */
+/* Reads a splat file of any format that stipple_format_info lists. The content of the file tells its format. */
 StippleStatus stipple_cloud_load(StippleContext* context, const char* path_utf8, StippleCloud** cloud);
-/* The same as a job (stipple_job_cloud), for reading ahead: a file that is missing or broken is an error of the
- * job. Errors, of both: IO, FORMAT, UNSUPPORTED; MEMORY_LIMIT where the splats take more than the limit. */
+/* This reads a file as a job (stipple_job_cloud), for reading ahead: a file that is missing or broken is an error
+ * of the job.
+ * Errors of both: IO, FORMAT, UNSUPPORTED; MEMORY_LIMIT where the splats take more than the limit. */
 StippleStatus stipple_cloud_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);
 
 typedef struct StippleCloudSaveOptions {
@@ -249,8 +250,8 @@ typedef struct StippleCloudSaveOptions {
   uint32_t reserved;
 } StippleCloudSaveOptions;
 void stipple_cloud_save_options_init(StippleCloudSaveOptions* options);
-/* Writes by the ending of the path (stipple_format_info), under a temporary name that is then renamed.
- * A format's limits apply: docs/formats.md has what each loses. */
+/* Writes the format that the extension of the path says (stipple_format_info). The file has a temporary name
+ * until it is whole. The limits of the format apply: docs/formats.md says what each loses. */
 StippleStatus stipple_cloud_save(const StippleCloud* cloud, const char* path_utf8,
                                  const StippleCloudSaveOptions* options);
 
@@ -273,8 +274,8 @@ typedef struct StippleFormatInfo {
   uint32_t reserved;
   const char* name;        /* one word: "ply" */
   const char* title;       /* for people: "3DGS PLY" */
-  const char* endings;     /* of file names, lower case, separated by blanks; the usual one first */
-  /* What a file says of its splats beside their numbers, 1 or 0 each. */
+  const char* extensions;  /* of file names, lower case, separated by blanks; the usual one comes first */
+  /* What a file says of its splats beside their numbers; each is 1 or 0. */
   uint32_t keeps_frame;         /* which way the axes point, also where that is another than *frame* */
   uint32_t keeps_colour_space;  /* else linear colours are written as display colours */
   uint32_t keeps_antialias;     /* the low-pass filter that the splats were made for */
@@ -283,25 +284,27 @@ typedef struct StippleFormatInfo {
 StippleStatus stipple_format_count(uint64_t* count);
 /* index 0..count-1. */
 StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info);
-/* About how many bytes a file of so many splats takes, all of its files together. In: index as of
- * stipple_format_info; sh_degree 0..4 of the cloud, which the format and the options may lower; options as of
- * stipple_cloud_save, or NULL. Out: bytes, 0 where the format is not written. What packs its numbers (SPZ, SOG)
- * and text depend on the scene: within about a quarter; the others within 1 %. Cost: none. */
+/* Estimates how many bytes `count` splats take in this format, all files together.
+ * In: index as of stipple_format_info; sh_degree 0..4 of the cloud, which the format and the options may lower;
+ * options as of stipple_cloud_save, or NULL.
+ * Out: bytes, 0 where the format is not written. The sizes of formats that pack their numbers (SPZ, SOG) and of
+ * text depend on the scene: the estimate is within about a quarter of them, and within 1 % of the others.
+ * Cost: none. */
 StippleStatus stipple_format_estimate(uint64_t index, uint64_t count, uint32_t sh_degree,
                                       const StippleCloudSaveOptions* options, uint64_t* bytes);
-/* The format of an existing file by its content; by its ending where the format has no first bytes of its
- * own. A glTF file is one of splats only where it names KHR_gaussian_splatting.
+/* Tells the format of an existing file by its content, or by its extension where the format has no first bytes of
+ * its own. A glTF file is one of splats only where it names KHR_gaussian_splatting.
  * Out: index, or *count* of stipple_format_count where the file is of no splat format. */
 StippleStatus stipple_format_of_file(const char* path_utf8, uint64_t* index);
 
-/* The cloud moved by an affine matrix: covariances become M C M^T, harmonics turn (and mirror) with the
- * orthogonal part of M's polar decomposition; the frame's label stays. Pictures equal those of an instance with that matrix, except
- * that colours above degree 0 do not follow uneven scale and shear. Errors: INVALID_ARGUMENT for a matrix
- * that is singular or not affine. */
+/* Moves a cloud by an affine matrix: covariances become M C M^T, and harmonics are rotated (and mirrored) by the
+ * orthogonal part of M's polar decomposition; the label of the frame stays. Images equal those of an instance with
+ * that matrix, except that colours above degree 0 do not follow uneven scale and shear.
+ * Errors: INVALID_ARGUMENT for a matrix that is singular or not affine. */
 StippleStatus stipple_cloud_transform(const StippleCloud* cloud, const double matrix[16],
                                       StippleCloud** moved);
 
-/* What an artist sets of a cloud's look. */
+/* What an artist sets of the look of a cloud. */
 typedef struct StippleGradeSettings {
   uint32_t struct_size;
   uint32_t reserved;
@@ -321,17 +324,17 @@ typedef struct StippleGrade {
   double offset[3];  /* entries up to 1e9 */
   double opacity;    /* 0..1 */
 } StippleGrade;
-/* Changes nothing. */
+/* Fills in the grade that changes nothing. */
 void stipple_grade_init(StippleGrade* grade);
-/* The map of settings, for colours stored in a StippleColourSpace. With f = 2^exposure tint for each channel:
- * scene linear colours become f colour; display colours g colour + 0.055 (g - 1), g = f^(1/2.4), exactly what f
- * does to their light where they lie above the foot of the sRGB curve (0.04045) before and after. Below it the
- * value is off by up to 0.055 |g - 1|. Then luma + saturation (colour - luma), on the stored values.
+/* Gives the map of settings, for colours stored in a StippleColourSpace. With f = 2^exposure tint for each
+ * channel: scene linear colours become f colour; display colours g colour + 0.055 (g - 1), g = f^(1/2.4), exactly
+ * what f does to their light where they lie above the foot of the sRGB curve (0.04045) before and after. Below it
+ * the value is off by up to 0.055 |g - 1|. Then luma + saturation (colour - luma), on the stored values.
  * Errors: INVALID_ARGUMENT for a setting outside its range. docs/methods/colour_grade.md. */
 StippleStatus stipple_grade_from_settings(const StippleGradeSettings* settings, uint32_t colour_space,
                                           StippleGrade* grade);
-/* The cloud with the grade in its harmonics and opacities. Pictures equal those of an instance with that grade,
- * up to rounding. Cost: O(N). */
+/* Gives the cloud with the grade in its harmonics and opacities. Images equal those of an instance with that
+ * grade, up to rounding. Cost: O(N). */
 StippleStatus stipple_cloud_grade(const StippleCloud* cloud, const StippleGrade* grade, StippleCloud** graded);
 
 typedef struct StippleCloudComparison {
@@ -350,8 +353,8 @@ typedef struct StippleCloudComparison {
   double mean_opacity;
   double mean_sh;
 } StippleCloudComparison;
-/* Splat i of a against splat i of b, in the frame of a. Formats that reorder splats (SOG, compressed
- * PLY) give pairs of different splats: compare pictures of such clouds instead. */
+/* Compares splat i of a with splat i of b, in the frame of a. Formats that reorder splats (SOG, compressed PLY)
+ * give pairs of different splats: compare images of such clouds instead. */
 StippleStatus stipple_cloud_compare(const StippleCloud* a, const StippleCloud* b,
                                     StippleCloudComparison* result);
 
@@ -382,7 +385,7 @@ typedef struct StippleMeshPart {
   const float* positions;           /* [V,3] object space, metres */
   const uint32_t* triangles;        /* [T,3] vertex indices */
   const float* corner_normals;      /* [T,3,3] object space, or NULL: face normals */
-  const float* corner_uvs;          /* [T,3,2] v = 0 at the bottom of the picture, or NULL */
+  const float* corner_uvs;          /* [T,3,2] v = 0 at the bottom of the image, or NULL */
   const float* corner_colours;      /* [T,3,4] scene linear, straight alpha, or NULL */
   const uint32_t* triangle_materials; /* [T] indices given by stipple_mesh_add_material; NULL: grey */
   double matrix[16];                /* object to world; invertible */
@@ -436,8 +439,8 @@ typedef struct StippleMeshTopology {
 } StippleMeshTopology;
 /* Cost: O(T log T). */
 StippleStatus stipple_mesh_topology(const StippleMesh* mesh, StippleMeshTopology* topology);
-/* Writes positions and triangles by the ending: .ply, or .glb (Z up becomes Y up; STIPPLE_ERROR_UNAVAILABLE without
- * libstipple_media.so). */
+/* Writes positions and triangles in the format that the extension says: .ply, or .glb (Z up becomes Y up).
+ * Errors: UNAVAILABLE without libstipple_media.so for .glb. */
 StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8);
 
 /* ---- density and anchors ----------------------------------------------------------------------- */
@@ -495,9 +498,9 @@ typedef struct StippleModelFromMeshOptions {
 } StippleModelFromMeshOptions;
 void stipple_model_from_mesh_options_init(StippleModelFromMeshOptions* options);
 
-/* From where an existing cloud is looked at. */
+/* Where the views of an existing cloud are. */
 typedef enum StippleViewRig {
-  STIPPLE_RIG_AUTOMATIC = 0, /* around; both in turn where the cloud surrounds its own middle */
+  STIPPLE_RIG_AUTOMATIC = 0, /* around; alternately around and inside where the cloud surrounds its own middle */
   STIPPLE_RIG_AROUND = 1,    /* from a sphere around the cloud */
   STIPPLE_RIG_INSIDE = 2     /* from places near the middle, looking out */
 } StippleViewRig;
@@ -505,11 +508,11 @@ typedef enum StippleViewRig {
 typedef struct StippleModelFromCloudOptions {
   uint32_t struct_size;
   uint32_t view_rig;    /* StippleViewRig, default automatic */
-  uint32_t view_count;  /* pictures that tell which splats are seen, 0..4096, default 10; 0: all count as seen */
+  uint32_t view_count;  /* images that tell which splats are seen, 0..4096, default 10; 0: all splats count as seen */
   uint32_t view_size;   /* pixels per side, 1..65536, default 400 */
   uint64_t seed;        /* of the views */
   double footprint;     /* metres: standard deviation of the low-pass through which errors are judged; 0, the
-                           default: half a pixel where the cloud fills a picture of 800 */
+                           default: half a pixel where the cloud fills an image of 800 */
 } StippleModelFromCloudOptions;
 void stipple_model_from_cloud_options_init(StippleModelFromCloudOptions* options);
 
@@ -528,11 +531,11 @@ typedef struct StippleModelInfo {
   float bounds_max[3];
   uint32_t kind;          /* StippleModelKind */
   uint32_t sh_degree;     /* of the splats that it makes */
-  uint64_t least_anchors; /* field: budgets that it was trained for, else 0 */
-  uint64_t most_anchors;
+  uint64_t min_anchors;   /* field: the budgets that it was trained for; else 0 */
+  uint64_t max_anchors;
   uint32_t gaussians_per_anchor; /* field: splats that it makes of an anchor; else 0 */
   uint32_t reserved;
-  const char* kind_label; /* of the kind, for people, such as "learned field"; lives as long as the library */
+  const char* kind_label; /* what people call the kind, such as "learned field"; it lives as long as the library */
 } StippleModelInfo;
 
 /* What the budget of a model (StippleDecodeOptions.anchor_count) counts. */
@@ -541,15 +544,15 @@ typedef enum StippleBudgetUnit {
   STIPPLE_BUDGET_SPLATS = 1   /* splats of its own; the largest budget is all of them, bit for bit */
 } StippleBudgetUnit;
 
-/* Which settings a model has: whoever offers them to people asks this, and need not know the kinds. What a model does
- * not have may be given and does not matter. */
+/* Which settings a model has. Whoever offers them to people asks this, and need not know the kinds. A setting
+ * that a model does not have may be given and does not matter. */
 typedef struct StippleModelSettings {
   uint32_t struct_size;
   uint32_t budget_unit;             /* StippleBudgetUnit */
-  uint64_t minimum_budget;          /* budgets that it takes */
+  uint64_t minimum_budget;          /* the smallest budget that it takes */
   uint64_t maximum_budget;
   uint64_t default_budget;          /* that shows it well */
-  uint64_t minimum_learned_budget;  /* budgets that it was learned for; 0: all are alike to it */
+  uint64_t minimum_learned_budget;  /* the smallest budget that it was learned for; 0: all budgets are alike to it */
   uint64_t maximum_learned_budget;
   uint32_t minimum_gaussians_per_anchor; /* K; where both are equal there is no choice */
   uint32_t maximum_gaussians_per_anchor;
@@ -576,35 +579,37 @@ typedef struct StippleDecodeOptions {
 } StippleDecodeOptions;
 void stipple_decode_options_init(StippleDecodeOptions* options);
 
-/* Surface samples, density and decoder of a mesh, as a job (stipple_job_model). */
+/* Makes the surface samples, density and decoder of a mesh, as a job (stipple_job_model). */
 StippleStatus stipple_model_from_mesh_start(StippleContext* context, const StippleMesh* mesh,
                                             const StippleModelFromMeshOptions* options,
                                             StippleJob** job);
-/* The merge tree of an existing cloud, as a job (stipple_job_model). Decoded at P it gives exactly P splats,
- * those of the whole cloud bit for bit where P is its count; P + 1 replaces one splat by the two that it was
- * merged from. order and seed of the decode options do not matter. Same result for any number of threads.
- * Errors: INVALID_ARGUMENT for an empty cloud; MEMORY_LIMIT. Cost: a few microseconds per splat, and the
- * pictures (docs/methods/reduction.md). */
+/* Makes the merge tree of an existing cloud, as a job (stipple_job_model). Decoded at P it gives exactly P splats:
+ * those of the whole cloud bit for bit where P is its count. At P + 1 one splat is replaced by the two that it was
+ * merged from. order and seed of the decode options do not matter. The result is the same for any number of
+ * threads.
+ * Errors: INVALID_ARGUMENT for an empty cloud; MEMORY_LIMIT.
+ * Cost: a few microseconds per splat, and the drawing of the images (docs/methods/reduction.md). */
 StippleStatus stipple_model_from_cloud_start(StippleContext* context, const StippleCloud* cloud,
                                              const StippleModelFromCloudOptions* options,
                                              StippleJob** job);
-/* An asset file (docs/formats.md). Tensors and metadata of a newer minor version are kept with the model as it
- * was loaded and saved with it; models made from it do not have them. Errors: UNSUPPORTED for a newer major
- * version; FORMAT with what is wrong. */
+/* Reads an asset file (docs/formats.md). Tensors and metadata of a newer minor version are kept with the model as
+ * it was loaded and saved with it; models made from it do not have them.
+ * Errors: UNSUPPORTED for a newer major version; FORMAT with what is wrong. */
 StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8, StippleModel** model);
-/* The same as a job (stipple_job_model). */
+/* This does the same as a job (stipple_job_model). */
 StippleStatus stipple_model_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);
 StippleStatus stipple_model_save(const StippleModel* model, const char* path_utf8);
 void stipple_model_free(StippleModel* model);
 StippleStatus stipple_model_info(const StippleModel* model, StippleModelInfo* info);
-/* Which settings it has, and their ranges. settings->struct_size must be set. */
+/* Tells which settings a model has, and their ranges. settings->struct_size must be set. */
 StippleStatus stipple_model_settings(const StippleModel* model, StippleModelSettings* settings);
 /* Errors: UNSUPPORTED for a model that is not sampled, such as a hierarchy. */
 StippleStatus stipple_model_density(const StippleModel* model, StippleDensity** density);
-/* P anchors, P*K splats. Fast enough to follow a slider (docs/methods/surface_splats.md has figures). */
+/* Decodes P anchors to P*K splats. This is fast enough to follow a slider (docs/results/surfaces.md has
+ * figures). */
 StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecodeOptions* options,
                                    StippleCloud** cloud);
-/* The same as a job (stipple_job_cloud). */
+/* This does the same as a job (stipple_job_cloud). */
 StippleStatus stipple_model_decode_start(const StippleModel* model, const StippleDecodeOptions* options,
                                          StippleJob** job);
 StippleStatus stipple_model_decode_memory_bound(const StippleModel* model,
@@ -613,7 +618,7 @@ StippleStatus stipple_model_decode_memory_bound(const StippleModel* model,
 typedef struct StippleRefineOptions {
   uint32_t struct_size;
   uint32_t iterations;  /* steps, 0..1,000,000, default 100; 0 gives the cloud as it is */
-  uint32_t view_count;  /* pictures of the full cloud, 1..4096, default 32 */
+  uint32_t view_count;  /* images of the full cloud, 1..4096, default 32 */
   uint32_t view_size;   /* pixels per side, 1..65536, default 800 */
   uint32_t view_rig;    /* StippleViewRig, default automatic */
   uint32_t reserved;
@@ -621,27 +626,29 @@ typedef struct StippleRefineOptions {
 } StippleRefineOptions;
 void stipple_refine_options_init(StippleRefineOptions* options);
 
-/* Fits a reduced cloud (a decoded model) to pictures of the full one, as a job (stipple_job_cloud): position,
- * rotation, scale, opacity and harmonics move, the count and the order stay. Same result for any number of
- * threads. Errors: INVALID_ARGUMENT for an empty cloud or clouds of different colour space; MEMORY_LIMIT before
- * anything is allocated, where the pictures (12 bytes per pixel of every view) and the passes would need more
- * than the context's limit. Cost: one drawing of `full` per view, one drawing and one backward pass of `cloud`
- * per iteration. */
+/* Fits a reduced cloud (a decoded model) to images of the full one, as a job (stipple_job_cloud): positions,
+ * rotations, scales, opacities and harmonics change; the count and the order stay. The result is the same for any
+ * number of threads.
+ * Errors: INVALID_ARGUMENT for an empty cloud or clouds of different colour space; MEMORY_LIMIT before anything is
+ * allocated, where the images (12 bytes per pixel of every view) and the passes would need more than the context's
+ * limit.
+ * Cost: one drawing of `full` per view, one drawing and one backward pass of `cloud` per iteration. */
 StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const StippleCloud* full,
                                          const StippleRefineOptions* options, StippleJob** job);
 
 /* ---- cameras ----------------------------------------------------------------------------------- */
 
-/* The last three see directions, not a plane: their pictures are made along rays only (STIPPLE_RENDER_RAYS,
- * STIPPLE_RENDER_YARDSTICK), their depths are distances from the camera, near and far planes are spheres, and
- * splats come in the order of their distances. With a the angle between ray and axis: */
+/* The last three models see directions, not a plane: their images are drawn along rays only
+ * (STIPPLE_RENDER_RAYS, STIPPLE_RENDER_RAYS_UNLIMITED), their depths are distances from the camera, their near
+ * and far planes are spheres, and splats come in the order of their distances. With a the angle between ray and
+ * axis: */
 typedef enum StippleCameraModel {
   STIPPLE_CAMERA_PERSPECTIVE = 0,
   STIPPLE_CAMERA_ORTHOGRAPHIC = 1,
   /* Longitude (x - cx) / fx to the right and latitude (cy - y) / fy upwards; at most 360 by 180 degrees. */
   STIPPLE_CAMERA_EQUIRECTANGULAR = 2,
   STIPPLE_CAMERA_FISHEYE_EQUIDISTANT = 3, /* a = r, r = |((x - cx) / fx, (y - cy) / fy)| */
-  STIPPLE_CAMERA_FISHEYE_EQUISOLID = 4    /* r = 2 sin(a / 2): equal areas of the picture are equal solid angles */
+  STIPPLE_CAMERA_FISHEYE_EQUISOLID = 4    /* r = 2 sin(a / 2): equal areas of the image are equal solid angles */
 } StippleCameraModel;
 
 typedef struct StippleCamera {
@@ -654,20 +661,21 @@ typedef struct StippleCamera {
   double world_to_camera[16]; /* rigid */
   double near_plane;          /* metres */
   double far_plane;
-  /* Fisheyes: full angle, radians, up to 2 pi; pixels beyond it are empty, the background too. 0: all that the
-   * model holds, 2 pi. Others: 0. */
+  /* Of fisheyes: the full angle, radians, up to 2 pi; pixels beyond it are empty, and have no background either.
+   * 0: all that the model holds, 2 pi. Of other models: 0. */
   double field_of_view;
 } StippleCamera;
 
 /* Reads the cameras of transforms.json (nerfstudio, NeRF-synthetic) or a COLMAP model. path_utf8: a file, or a
- * folder with transforms.json, else with transforms_train.json (and _test, _val), else with images.bin or images.txt
- * in it or in sparse/0. Distorted cameras are STIPPLE_ERROR_UNSUPPORTED: stipple_views_open gives pinholes. */
+ * folder with transforms.json, else with transforms_train.json (and _test, _val), else with images.bin or
+ * images.txt in it or in sparse/0.
+ * Errors: UNSUPPORTED for distorted cameras; stipple_views_open makes pinholes of them. */
 StippleStatus stipple_views_load(StippleContext* context, const char* path_utf8, StippleViews** views);
 void stipple_views_free(StippleViews* views);
 StippleStatus stipple_views_count(const StippleViews* views, uint64_t* count);
 /* A file without sizes gives width and height 0: set them, with stipple_camera_resize, before use. */
 StippleStatus stipple_views_camera(const StippleViews* views, uint64_t index, StippleCamera* camera);
-/* The same view at another size: intrinsics scale with it. A camera of size 0 x 0 keeps its angle of view
+/* Gives the same view another size: intrinsics scale with it. A camera of size 0 x 0 keeps its angle of view
  * over the width. */
 StippleStatus stipple_camera_resize(StippleCamera* camera, uint32_t width, uint32_t height);
 
@@ -706,29 +714,31 @@ typedef struct StippleRayHits {
 /* Errors: INVALID_ARGUMENT for options out of range. */
 StippleStatus stipple_rig_search_create(const StippleRigSearchOptions* options, StippleRigSearch** search);
 void stipple_rig_search_free(StippleRigSearch* search);
-/* What is to be asked now. In: capacity, rays that there is room for. Out: rays [count,7]: origin, direction (unit) and
- * the farthest distance that counts (infinity: any), or NULL: only the number is wanted; count, 0: the cameras are
- * known. Errors: BUFFER_TOO_SMALL, with count set. */
+/* Gives the rays that are to be cast now.
+ * In: capacity, rays that there is room for.
+ * Out: rays [count,7]: origin, direction (unit) and the farthest distance that counts (infinity: any), or NULL:
+ * only the number is wanted; count, 0: the cameras are known.
+ * Errors: BUFFER_TOO_SMALL, with count set. */
 StippleStatus stipple_rig_search_rays(const StippleRigSearch* search, uint64_t capacity, double* rays, uint64_t* count);
-/* In: what these rays met, in their order. Errors: INVALID_ARGUMENT for another number of answers, and where no place is
- * left for a camera. The same answers give the same cameras. */
+/* Takes what these rays met, in their order. Errors: INVALID_ARGUMENT for another number of answers, and where
+ * no place is left for a camera. The same answers give the same cameras. */
 StippleStatus stipple_rig_search_answer(StippleRigSearch* search, const StippleRayHits* hits);
 /* index 0..view_count-1. Errors: INVALID_ARGUMENT while rays are to be asked. */
 StippleStatus stipple_rig_search_camera(const StippleRigSearch* search, uint64_t index, StippleCamera* camera);
 
-/* ---- views with pictures ------------------------------------------------------------------------ */
+/* ---- views with images ------------------------------------------------------------------------ */
 
-/* What splats are fitted to: photographs from files, or renders that are handed in. */
+/* Splats are fitted to views: photographs from files, or renders that are handed in. */
 
-/* One picture; arrays are read during the call. Row 0 = top; the size is that of the camera. */
-typedef struct StippleViewPicture {
+/* The image of a view. Its arrays are read during the call. Row 0 is the top; the size is that of the camera. */
+typedef struct StippleViewImage {
   uint32_t struct_size;
   uint32_t transfer;     /* StippleTransfer of rgba; it is converted to the views' colour space */
   const float* rgba;     /* [H,W,4] premultiplied, alpha 0..1 */
   const float* weights;  /* [H,W] >= 0, what a pixel counts (a mask). NULL: 1 */
   const float* depth;    /* [H,W] planar z, metres; 0, and 1e10 and more: unknown. NULL: unknown */
   const float* normals;  /* [H,W,3] unit, world; 0: unknown. NULL: unknown */
-} StippleViewPicture;
+} StippleViewImage;
 
 /* Where surfaces are known to be, in the world of the cameras. */
 typedef struct StippleViewPoints {
@@ -743,10 +753,10 @@ typedef struct StippleViewPoints {
 
 typedef struct StippleViewsInfo {
   uint32_t struct_size;
-  uint32_t colour_space;  /* StippleColourSpace, in which the pictures are composited */
+  uint32_t colour_space;  /* StippleColourSpace, in which the images are composited */
   uint64_t view_count;
   uint64_t point_count;
-  uint32_t has_pictures;  /* 0: cameras alone (stipple_views_load) */
+  uint32_t has_images;    /* 0: there are cameras alone (stipple_views_load) */
   uint32_t reserved;
 } StippleViewsInfo;
 
@@ -762,12 +772,12 @@ typedef enum StippleViewSplit {
 typedef struct StippleViewInfo {
   uint32_t struct_size;
   uint32_t split;             /* StippleViewSplit */
-  uint32_t source_width;      /* pixels of the file's picture; 0 where it was handed in */
+  uint32_t source_width;      /* pixels of the image in its file; 0 where it was handed in */
   uint32_t source_height;
-  uint32_t is_distorted;      /* 1: the file's picture is; the distortion is taken out when it is read */
+  uint32_t is_distorted;      /* 1: the image in the file is distorted; that is taken out when it is read */
   uint32_t reserved;
   const char* name;
-  const char* image_path;     /* of the picture's file; empty where there is none */
+  const char* image_path;     /* the file of the image; empty where there is none */
   const char* camera_model;   /* as its source calls it: "OPENCV" */
 } StippleViewInfo;
 
@@ -785,45 +795,47 @@ typedef struct StippleViewBuffers {
 typedef struct StippleViewsOpenOptions {
   uint32_t struct_size;
   uint32_t downscale;    /* 1..64, default 1: pixels of the file along each side of a pixel, averaged by area */
-  uint64_t cache_bytes;  /* decoded pictures that stay in memory, default 1 GiB; at most a quarter of the
-                            context's limit. The others are read again when they are wanted */
+  uint64_t cache_bytes;  /* decoded images that stay in memory, default 1 GiB; at most a quarter of the context's
+                            limit. Other images are read again when they are wanted */
 } StippleViewsOpenOptions;
 void stipple_views_open_options_init(StippleViewsOpenOptions* options);
 
-/* Opens a photo data set: a COLMAP model with its pictures, transforms.json of nerfstudio, or a NeRF-synthetic
- * folder (path_utf8 as in stipple_views_load); options may be NULL. Lens distortion is taken out of pictures as
- * they are read: cameras are pinholes. The colour space is that of the first picture: display of 8 and 16 bits,
- * scene linear of float. Masks give the weights. docs/formats.md, Data sets.
- * Errors: IO where pictures are missing, with the first of them; FORMAT; UNSUPPORTED for camera models that are not
- * known; MEMORY_LIMIT where the largest picture cannot be read within it. No picture is decoded.
- * Cost: a look at every file's header where the cameras say no size. */
+/* Opens a photo data set: a COLMAP model with its images, transforms.json of nerfstudio, or a NeRF-synthetic
+ * folder (path_utf8 as in stipple_views_load); options may be NULL. Lens distortion is taken out of images as they
+ * are read: cameras are pinholes. The colour space is that of the first image: display of 8 and 16 bits, scene
+ * linear of float. Masks give the weights. docs/formats.md, Data sets.
+ * Errors: IO where images are missing, with the first of them; FORMAT; UNSUPPORTED for camera models that are not
+ * known; MEMORY_LIMIT where the largest image cannot be read within it. No image is decoded.
+ * Cost: one header is read per file where the cameras say no size. */
 StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
                                  const StippleViewsOpenOptions* options, StippleViews** views);
-/* No views yet. In: colour_space, a StippleColourSpace: that of the splats to be. */
+/* Makes a set that has no views yet. In: colour_space, a StippleColourSpace: that of the splats to be. */
 StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_space, StippleViews** views);
-/* Copies the picture (0..1 as 16 bits). name_utf8 may be NULL: "view" and its number. Jobs under way do not see
- * what is added. Errors: INVALID_ARGUMENT, by name and pixel, for values that are not finite or
- * out of range, and for views that were not made by stipple_views_create; MEMORY_LIMIT. */
+/* Adds a view, and copies its image (0..1 as 16 bits). name_utf8 may be NULL: the view is then called "view" and
+ * its number. Jobs under way do not see what is added.
+ * Errors: INVALID_ARGUMENT, by name and pixel, for values that are not finite or out of range, and for views that
+ * were not made by stipple_views_create; MEMORY_LIMIT. */
 StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera,
-                                const StippleViewPicture* picture, const char* name_utf8);
-/* Takes the place of earlier points. Errors: as stipple_views_add. */
+                                const StippleViewImage* image, const char* name_utf8);
+/* Sets the points, in the place of earlier ones. Errors: as of stipple_views_add. */
 StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoints* points);
 StippleStatus stipple_views_info(const StippleViews* views, StippleViewsInfo* info);
 StippleStatus stipple_views_view_info(const StippleViews* views, uint64_t index, StippleViewInfo* info);
-/* Reads the picture from its file where it has one. Its size is that of stipple_views_camera.
- * Errors: BUFFER_TOO_SMALL; UNSUPPORTED for cameras alone; IO and FORMAT, by the file's name. */
+/* Reads the image of a view, from its file where it has one. Its size is that of stipple_views_camera. Errors:
+ * BUFFER_TOO_SMALL; UNSUPPORTED for cameras alone; IO and FORMAT, by the file's name. */
 StippleStatus stipple_views_read(const StippleViews* views, uint64_t index, const StippleViewBuffers* buffers);
-/* Either pointer may be NULL. capacity: points that each has room for. Out: [N,3], as StippleViewPoints. */
+/* Reads the points. Either pointer may be NULL. capacity: points that each has room for. Out: [N,3], as in
+ * StippleViewPoints. */
 StippleStatus stipple_views_read_points(const StippleViews* views, uint64_t capacity, float* positions,
                                         float* colours);
 
 /* ---- accuracy ---------------------------------------------------------------------------------- */
 
-/* What of a picture trades exactness for time. A level sets every knob; the knobs may then be changed one by
- * one. stipple_accuracy_knob_info says how far off each may be, in words for people:
+/* How exact an image is, and how long it may take. A level sets every knob; the knobs may then be changed one
+ * by one. stipple_accuracy_knob_info says how far off each may be, in words for people:
  *   order           unbounded: where splats cross, centre shows one of them in front as a whole
  *   projection      unbounded: affine grows with the angle that a splat fills and its distance from the axis
- *   least_alpha     each splat below x takes at most x of a pixel's colour with it, N of them 1 - (1 - x)^N
+ *   min_alpha       each splat below x takes at most x of a pixel's colour with it, N of them 1 - (1 - x)^N
  *   sh_degree_limit unbounded: at most the sum of what the left out harmonics can add to a splat's colour
  *   antialiasing    no error but another filter: mip and samples show what as-trained aliases
  *   precision       float: within 1e-4 of the largest colour where no threshold falls on the other side; double:
@@ -835,13 +847,13 @@ typedef enum StippleAccuracyLevel {
   STIPPLE_ACCURACY_DRAFT = 0,    /* a quarter of the splats, colours of degree 1 */
   STIPPLE_ACCURACY_PREVIEW = 1,  /* half of the splats, colours of degree 2 */
   STIPPLE_ACCURACY_FINAL = 2,    /* all of them, as splats are trained */
-  STIPPLE_ACCURACY_REFERENCE = 3 /* the yardstick: exact rays and order, no limit, in double */
+  STIPPLE_ACCURACY_REFERENCE = 3 /* what the others are compared with: exact rays and order, no limit, in double */
 } StippleAccuracyLevel;
 
 typedef enum StippleSplatOrder {
   STIPPLE_ORDER_CENTRE = 0, /* by the view z of the centres */
   STIPPLE_ORDER_PIXEL = 1   /* by where behind each pixel a splat is densest: right where splats cross, nothing
-                               pops when the camera turns */
+                               pops when the camera rotates */
 } StippleSplatOrder;
 
 typedef enum StippleProjection {
@@ -852,8 +864,8 @@ typedef enum StippleProjection {
 typedef enum StippleSampling {
   STIPPLE_SAMPLING_AS_TRAINED = 0, /* low_pass of the render options */
   STIPPLE_SAMPLING_MIP = 1,        /* 0.1 px^2 with compensation: right when zoomed out */
-  STIPPLE_SAMPLING_SAMPLES = 2     /* the picture at samples_per_side times the size, averaged by area as it is
-                                      composited */
+  STIPPLE_SAMPLING_SAMPLES = 2     /* the image is drawn at samples_per_side times the size, and averaged by area
+                                      as it is composited */
 } StippleSampling;
 
 typedef enum StipplePrecision {
@@ -871,40 +883,42 @@ typedef struct StippleAccuracy {
   uint32_t samples_per_side; /* 1..16; above 1 with STIPPLE_SAMPLING_SAMPLES alone */
   uint32_t sh_degree_limit;  /* 0..4; with the render options' the smaller counts */
   uint32_t precision;        /* StipplePrecision */
-  double least_alpha;        /* fainter splats are skipped; above 0 and below 1; 1/255 as splats are trained */
-  double budget_share;       /* of each cloud's splats, above 0 to 1: below 1 it is merged into the nearest cloud of
-                                that size, once (about 3 us per splat and core pair), and kept by the renderer */
+  double min_alpha;          /* fainter splats are skipped; above 0 and below 1; 1/255 as splats are trained */
+  double budget_share;       /* the share of the splats of each cloud, above 0 to 1. Below 1 each cloud is
+                                merged, once, into the nearest cloud of that size (about 3 us per splat on two
+                                cores); the renderer keeps it */
 } StippleAccuracy;
-/* Sets every knob as a level has it. In: level, a StippleAccuracyLevel. Errors: INVALID_ARGUMENT. */
+/* Sets every knob to what a level has. In: level, a StippleAccuracyLevel. Errors: INVALID_ARGUMENT. */
 StippleStatus stipple_accuracy_init(uint32_t level, StippleAccuracy* accuracy);
-/* Whether a picture can be drawn so. Errors: INVALID_ARGUMENT, with the knob, its value and what is allowed. */
+/* Checks whether an image can be drawn with these knobs. Errors: INVALID_ARGUMENT, with the knob, its value and
+ * what is allowed. */
 StippleStatus stipple_accuracy_check(const StippleAccuracy* accuracy);
 
 /* Texts in English; they live as long as the library. */
 typedef struct StippleAccuracyKnobInfo {
   uint32_t struct_size;
-  uint32_t has_bound;        /* 1: the error has the bound that the text states; 0: it has none */
+  uint32_t has_bound;        /* 1: the error has the bound that the text states; 0: it has no bound */
   const char* name_utf8;     /* the field of StippleAccuracy */
   const char* label_utf8;
-  const char* bound_utf8;    /* how far off it may be, and what it costs: one or two sentences */
+  const char* bound_utf8;    /* how far off the image may be, and what that costs: one or two sentences */
 } StippleAccuracyKnobInfo;
 StippleStatus stipple_accuracy_knob_count(uint64_t* count);
 StippleStatus stipple_accuracy_knob_info(uint64_t index, StippleAccuracyKnobInfo* info);
 /* "draft", "preview", "final", "reference"; NULL for others. Lives as long as the library. */
 const char* stipple_accuracy_level_name(uint32_t level);
-/* What a PSNR means to who looks: "looks identical" from 45 dB on, "hard to see" from 38, "visible side by side"
- * from 30, else "obvious"; never NULL. Lives as long as the library. */
+/* Says what a PSNR means to someone who looks: "looks identical" from 45 dB on, "hard to see" from 38, "visible
+ * side by side" from 30, else "obvious"; never NULL. Lives as long as the library. */
 const char* stipple_accuracy_verdict(double psnr);
 
 /* ---- rendering --------------------------------------------------------------------------------- */
 
 typedef struct StippleInstance {
   uint32_t struct_size;
-  uint32_t holdout; /* 1: in pictures it hides what is behind it and leaves a hole in colour, alpha and depth;
-                       not for backward passes */
+  uint32_t holdout; /* 1: the instance hides what is behind it in images and leaves a hole in colour, alpha and
+                       depth; not for backward passes */
   const StippleCloud* cloud;
   double matrix[16]; /* object to world; invertible */
-  const StippleGrade* grade; /* read during the call; NULL: none. Costs nothing where it changes nothing */
+  const StippleGrade* grade; /* read during the call; NULL: none. A grade that changes nothing costs nothing */
   double time; /* seconds, finite, 0 where nothing moves; the splats of a cloud are the same at every time */
 } StippleInstance;
 
@@ -927,43 +941,45 @@ typedef enum StippleOutputColour {
 
 typedef enum StippleRenderMethod {
   STIPPLE_RENDER_TILED = 0,
-  STIPPLE_RENDER_REFERENCE = 1, /* the same in double precision, every splat at every pixel: small pictures only */
+  STIPPLE_RENDER_REFERENCE = 1, /* the same in double precision, every splat at every pixel: for small images */
   /* Along the rays of the pixels, in the order in which splats are densest there: exact at wide angles and for
    * splats that are close or cross each other. Double precision, many times as slow as the first. */
   STIPPLE_RENDER_RAYS = 2,
-  /* The same without any limit: no alpha is held below 1, no pixel ends early, and nothing above 1e-9 is left out. */
-  STIPPLE_RENDER_YARDSTICK = 3
+  /* As STIPPLE_RENDER_RAYS, without any limit: no alpha is held below 1, no pixel ends early, and nothing above
+   * 1e-9 is left out. The accuracy level reference draws so. */
+  STIPPLE_RENDER_RAYS_UNLIMITED = 3
 } StippleRenderMethod;
 
 typedef enum StippleObjectOrder {
   STIPPLE_OBJECTS_TOGETHER = 0, /* the splats of all instances are sorted together, by depth */
-  /* Each instance is drawn as a whole, its own splats by depth. Instances come by the mean depth of their splats'
-   * centres (of all, in view or not), the farthest at the back; of equal ones the first in the list is in front.
-   * Where no two share a range of depth that is the same picture. Not for backward passes, nor, with more than one
-   * instance, with a surface, order pixel, STIPPLE_RENDER_RAYS and STIPPLE_RENDER_YARDSTICK, which order single
-   * splats: STIPPLE_ERROR_UNSUPPORTED. */
+  /* Each instance is drawn as a whole, its own splats by depth. Instances come by the mean depth of their
+   * splats' centres (of all, in view or not), the farthest at the back; of equal ones the first in the list is
+   * in front. Where no two instances share a range of depth, the image is the same either way. Not for backward
+   * passes, nor, with more than one instance, with a surface, order pixel, STIPPLE_RENDER_RAYS and
+   * STIPPLE_RENDER_RAYS_UNLIMITED, which order single splats: STIPPLE_ERROR_UNSUPPORTED. */
   STIPPLE_OBJECTS_APART = 1
 } StippleObjectOrder;
 
-/* The opening of the camera's lens, as Cycles has it: what is not in focus becomes a picture of it. */
-typedef struct StippleLens {
+/* The aperture of a camera, as Cycles has it: a point that is not in focus is spread over the shape of the
+ * aperture. */
+typedef struct StippleAperture {
   uint32_t struct_size;
-  uint32_t blades;        /* 3..64: a regular polygon with its corners on the circle; 0: round */
+  uint32_t blades;        /* 3..64: a regular polygon with its corners on the circle; 0: a circle */
   double aperture_radius; /* metres, 0 or more */
   double focus_distance;  /* metres, as depths are: there everything is sharp */
   double rotation;        /* of the polygon, radians, counterclockwise as the camera sees it */
-  double ratio;           /* the opening is that much narrower than high; 0: 1 */
-} StippleLens;
+  double ratio;           /* height over width; 0: 1 */
+} StippleAperture;
 
-/* What moves while the shutter is open: matrices at steps spread evenly over that time, the first at its begin,
- * the last at its end. Between steps rotations turn evenly (slerp), what is left of the matrices goes straight.
- * Read during the call. */
+/* What moves while the shutter is open: matrices at steps that are spread evenly over that time, the first when
+ * it opens, the last when it closes. Between steps rotations are interpolated at an even speed (slerp), and the
+ * rest of the matrices linearly. All arrays are read during the call. */
 typedef struct StippleShutter {
   uint32_t struct_size;
   uint32_t step_count;        /* 2..1025 */
   const double* cameras;      /* [steps,16] world_to_camera; NULL: the camera stands still */
   const double* instances;    /* [steps,count,16] object to world; NULL: they stand still */
-  const double* curve;        /* [curve_count] 0 or more: how far it is open, evenly over the time; NULL: evenly */
+  const double* curve;        /* [curve_count] 0 or more: how far it is open, at even steps; NULL: fully, always */
   uint64_t curve_count;       /* 2 or more, with curve */
 } StippleShutter;
 
@@ -993,18 +1009,19 @@ typedef struct StippleRenderOptions {
   /* [H,W,3] >= 0, factors of all that is not the surface, in output_colour's space: shadows that fall on
    * splats. NULL: 1. */
   const float* splat_light;
-  /* How exact the picture is, and what that costs. Read during the call. NULL: as final. Otherwise method must be
-   * STIPPLE_RENDER_TILED. Not for backward passes. */
+  /* How exact the image is, and how long it takes. Read during the call. NULL: as the level final. With it,
+   * method must be STIPPLE_RENDER_TILED. Not for backward passes. */
   const StippleAccuracy* accuracy;
-  /* Averages of pictures. With any of these, colours and transmittance are the mean of `samples` pictures from
-   * points of the lens, moments and places in the pixel, in scene linear light; depths and counts are those of
-   * one more picture from the middle of all. The points are those of a fixed low-discrepancy sequence: the same
-   * bits for any number of threads. A surface takes part in every picture as it is: hand it in as it is to
-   * appear, blurred. Cost: that of so many pictures; memory: 50 bytes per pixel more. */
-  const StippleLens* lens;       /* read during the call; NULL or radius 0: everything is sharp */
-  const StippleShutter* shutter; /* read during the call; NULL: nothing moves */
-  uint32_t samples;              /* 1..65536; 1: the middle of all. 0: 1 without lens and shutter, else a power of
-                                    two from 16 to 256 by how far they spread the splats */
+  /* What an image is averaged over. With any of these, colours and transmittance are the mean of `samples` images,
+   * each from its own point of the aperture, moment of the shutter and place in the pixel, in scene linear light;
+   * depths and counts are those of one more image from the middle of all. The points come from a fixed
+   * low-discrepancy sequence, so that any number of threads gives the same bits. A surface takes part in every
+   * image as it is: hand it in blurred, as it is to appear.
+   * Cost: that of `samples` images, and 50 bytes more per pixel. */
+  const StippleAperture* aperture; /* read during the call; NULL or radius 0: everything is sharp */
+  const StippleShutter* shutter;   /* read during the call; NULL: nothing moves */
+  uint32_t samples;                /* 1..65536; 1: the middle of all. 0: 1 without aperture and shutter, else a
+                                      power of two from 16 to 256, by how far they spread the splats */
   uint32_t reserved_sampling;
 } StippleRenderOptions;
 void stipple_render_options_init(StippleRenderOptions* options);
@@ -1018,8 +1035,8 @@ typedef struct StippleRenderBuffers {
   float* median_depth;  /* [H,W] planar z where transmittance passes 1/2; 1e10 where it does not */
   uint32_t* counts;     /* [H,W] splats blended */
   float* transmittance; /* [H,W] share of the light from behind everything that passes, through holes too */
-  /* [H,W,3] in the world: mean of the splats' shortest axes as far as they turn to the camera, by weight, made unit
-   * again; 0 where no splat shows. Costs one more blending of the splats. */
+  /* [H,W,3] in the world: mean of the splats' shortest axes, on the side that faces the camera, by weight, made
+   * unit again; 0 where no splat shows. Costs one more blending of the splats. */
   float* normal;
   /* [H,W] 1 + the instance whose splats weigh most together; 0 where none shows and where the surface weighs as
    * much. Costs one more blending for every three instances that meet in a tile of 16 x 16 pixels. */
@@ -1028,16 +1045,16 @@ typedef struct StippleRenderBuffers {
 
 StippleStatus stipple_renderer_create(StippleContext* context, StippleRenderer** renderer);
 void stipple_renderer_free(StippleRenderer* renderer);
-/* Renders instances [count] together. Clouds of different colour spaces in one picture:
- * UNSUPPORTED with STIPPLE_BLEND_AS_TRAINED. count 0 gives an empty picture.
- * Errors of the start: INVALID_ARGUMENT for a camera, matrix, surface or option outside its range;
- * MEMORY_LIMIT, with the numbers, before anything is allocated. */
+/* Renders instances [count] together, as a job; with count 0 the image is empty.
+ * Errors of the start: INVALID_ARGUMENT for a camera, matrix, surface or option outside its range; UNSUPPORTED
+ * with STIPPLE_BLEND_AS_TRAINED for clouds of different colour spaces; MEMORY_LIMIT, with the numbers, before
+ * anything is allocated. */
 StippleStatus stipple_renderer_render_start(StippleRenderer* renderer, const StippleInstance* instances,
                                             uint64_t count, const StippleCamera* camera,
                                             const StippleRenderOptions* options,
                                             const StippleRenderBuffers* buffers, StippleJob** job);
-/* How many pictures stipple_renderer_render_start would average: samples, or what 0 stands for.
- * Errors: INVALID_ARGUMENT, as the start's. Cost: at most 2048 splats are looked at. */
+/* Tells how many images stipple_renderer_render_start would average: samples, or what 0 stands for. Errors:
+ * INVALID_ARGUMENT, as the start's. Cost: at most 2048 splats are read. */
 StippleStatus stipple_renderer_sample_count(const StippleRenderer* renderer, const StippleInstance* instances,
                                             uint64_t count, const StippleCamera* camera,
                                             const StippleRenderOptions* options, uint32_t* samples);
@@ -1051,21 +1068,23 @@ typedef struct StippleAccuracyReport StippleAccuracyReport; /* a view, a volume 
 
 /* What the rows of a report are settings of. */
 typedef enum StippleAccuracySubject {
-  STIPPLE_ACCURACY_OF_PICTURE = 0, /* judged by the reference */
+  STIPPLE_ACCURACY_OF_IMAGE = 0, /* judged by the reference */
   STIPPLE_ACCURACY_OF_VOLUME = 1,  /* by voxel size */
   STIPPLE_ACCURACY_OF_FIT = 2      /* by iterations */
 } StippleAccuracySubject;
 
 typedef struct StippleAccuracyMeasureOptions {
   uint32_t struct_size;
-  uint32_t repetitions;       /* 1..1000, default 7: timings of each setting, in turns, so that what else the
-                                 machine does meets all alike */
-  /* Pixels that are compared with the reference, default 65536; 0: all. Where the picture has more, blocks of
-   * 64 x 64 at its full size, spread evenly over it: the reference draws nothing else. Times are of whole pictures. */
+  uint32_t repetitions;       /* 1..1000, default 7: timings of each setting, which alternate, so that what else
+                                 the machine does affects all alike */
+  /* Pixels that are compared with the reference, default 65536; 0: all. Where the image has more, blocks of 64 x
+   * 64 pixels of it, spread evenly, are compared, and the reference draws nothing else. Times are of whole
+   * images. */
   uint64_t reference_pixels;
-  /* Default 60. No further turn begins after so many seconds of them. Of a setting in double precision whose picture
-   * would take a twentieth of it, only the compared pixels are drawn, and its time follows from those. */
-  double most_seconds;
+  /* Default 60. No further round of timings begins after this many seconds. Where an image of a setting in
+   * double precision would take more than a twentieth of them, only the compared pixels are drawn, and its time
+   * follows from those. */
+  double max_seconds;
   const StippleAccuracy* settings; /* [setting_count]; NULL: the levels, and final with each knob moved alone. The
                                       reference is always there too, as the last row */
   uint64_t setting_count;
@@ -1074,7 +1093,7 @@ void stipple_accuracy_measure_options_init(StippleAccuracyMeasureOptions* option
 
 typedef struct StippleAccuracyReportInfo {
   uint32_t struct_size;
-  uint32_t width;             /* pixels of the picture */
+  uint32_t width;             /* pixels of the image */
   uint32_t height;
   uint32_t thread_count;
   uint64_t compared_pixels;
@@ -1091,18 +1110,18 @@ typedef struct StippleAccuracyRow {
   uint32_t is_on_front;       /* 1: no other setting is as fast and as good (Pareto) */
   const char* name_utf8;      /* "preview", "final + projection ray"; lives as long as the report */
   StippleAccuracy setting;
-  double seconds;             /* of a picture: the median */
+  double seconds;             /* of an image: the median */
   double seconds_low;         /* quartiles */
   double seconds_high;
   double psnr;                /* dB over the four channels, display values, peak 1; infinite where nothing differs */
   double largest_error;       /* of a channel of a compared pixel */
-  double error_99_9;          /* 99.9 % of them are no further off */
+  double error_99_9;          /* 99.9 % of the channels of compared pixels are no further off */
   uint64_t splat_count;       /* that the setting draws from */
   uint64_t visible_count;     /* of them in view */
   uint32_t repetitions;
-  uint32_t is_estimated;      /* 1: seconds follow from the compared pixels; the picture was not drawn whole */
+  uint32_t is_estimated;      /* 1: seconds follow from the compared pixels; the image was not drawn whole */
   double value;               /* of a volume: voxel size, metres, splat_count its voxels that are not empty; of a fit:
-                                 iterations, largest_error and error_99_9 NaN; of pictures 0. Of volumes and fits
+                                 iterations, largest_error and error_99_9 NaN; of images 0. Of volumes and fits
                                  `setting` says nothing */
 } StippleAccuracyRow;
 
@@ -1115,9 +1134,10 @@ StippleStatus stipple_accuracy_measure_start(StippleContext* context, const Stip
                                              uint64_t count, const StippleCamera* camera,
                                              const StippleRenderOptions* render,
                                              const StippleAccuracyMeasureOptions* options, StippleJob** job);
-/* What the iterations of a fit cost and brought, from the report that stipple_fit_report_save has written: a row for
- * each measurement; nothing is fitted again. Errors: IO; FORMAT for another file; UNSUPPORTED for a newer report;
- * INVALID_ARGUMENT where nothing was measured. */
+/* Tells what the iterations of a fit cost and brought, from the report that stipple_fit_report_save has written: a
+ * row for each measurement; nothing is fitted again.
+ * Errors: IO; FORMAT for another file; UNSUPPORTED for a newer report; INVALID_ARGUMENT where nothing was
+ * measured. */
 StippleStatus stipple_fit_accuracy_report(const char* path_utf8, StippleAccuracyReport** report);
 /* The result of a job of measuring that has ended well. */
 StippleStatus stipple_job_accuracy_report(const StippleJob* job, StippleAccuracyReport** report);
@@ -1126,17 +1146,19 @@ StippleStatus stipple_accuracy_report_info(const StippleAccuracyReport* report, 
 /* In: index 0..row_count-1. */
 StippleStatus stipple_accuracy_report_row(const StippleAccuracyReport* report, uint64_t index,
                                           StippleAccuracyRow* row);
-/* The row with the highest PSNR among those of at most so many seconds. Errors: INVALID_ARGUMENT where none is that
- * fast, with what the fastest needs. */
+/* Gives the row with the highest PSNR among those that take at most `seconds`. Errors: INVALID_ARGUMENT where
+ * none is that fast, with what the fastest needs. */
 StippleStatus stipple_accuracy_report_best_within(const StippleAccuracyReport* report, double seconds,
                                                   uint64_t* index);
-/* The fastest row of at least so many dB. Errors: INVALID_ARGUMENT where none reaches them, with what is reached. */
+/* Gives the fastest row of at least `psnr` dB. Errors: INVALID_ARGUMENT where none reaches them, with what is
+ * reached. */
 StippleStatus stipple_accuracy_report_cheapest_above(const StippleAccuracyReport* report, double psnr,
                                                      uint64_t* index);
-/* By ending: .json (everything), .csv (a line for each row), .svg (the plot). docs/formats.md, Accuracy report. */
+/* Writes the format that the extension says: .json (everything), .csv (a line for each row), .svg (the plot).
+ * docs/formats.md, Accuracy report. */
 StippleStatus stipple_accuracy_report_save(const StippleAccuracyReport* report, const char* path_utf8);
-/* Error against time, both logarithmic, with named settings and the front, as stipple_fit_report_draw draws; the plot
- * is 840 units wide. */
+/* Draws error against time, both logarithmic, with named settings and the front, as stipple_fit_report_draw
+ * draws its plots; this one is 840 units wide. */
 StippleStatus stipple_accuracy_report_draw(const StippleAccuracyReport* report, double scale, uint64_t capacity,
                                            float* pixels, uint32_t* width, uint32_t* height);
 
@@ -1149,20 +1171,22 @@ typedef struct StippleMeshInstance {
   double matrix[16]; /* object to world, on top of that of its parts; invertible */
 } StippleMeshInstance;
 
-/* How far meshes are: planar z of the nearest triangle, either side, that the ray through each pixel's centre
- * meets between the near and far plane. Out: depth [H,W] metres, row 0 = top, 1e10 where there is none; it must
- * stay valid until the job has ended. As a matte for stipple_renderer_render_start.
- * Same bits for any number of threads. Cost: O(vertices + pixels of the triangles' bounding boxes); 24 bytes
- * per vertex of the largest mesh.
+/* Measures how far meshes are: planar z of the nearest triangle, from either side, that the ray through each
+ * pixel's centre meets between the near and far plane.
+ * Out: depth [H,W] metres, row 0 = top, 1e10 where there is none; it must stay valid until the job has ended. As a
+ * matte for stipple_renderer_render_start. Same bits for any number of threads.
+ * Cost: O(vertices + pixels of the triangles' bounding boxes); 24 bytes per vertex of the largest mesh.
  * Errors of the start: INVALID_ARGUMENT for a camera or matrix outside its range; MEMORY_LIMIT. */
 StippleStatus stipple_mesh_depth_start(StippleContext* context, const StippleMeshInstance* instances,
                                        uint64_t count, const StippleCamera* camera, float* depth,
                                        StippleJob** job);
 
-/* The same with smooth edges: each pixel is hidden as far as its samples_per_side x samples_per_side samples are.
+/* This does the same with smooth edges: each pixel is hidden as far as its samples_per_side x samples_per_side
+ * samples are.
  * Out: depth [H,W] metres, that of the nearest sample, 1e10 where none hits; opacity [H,W], the share of samples
- * that do. Both must stay valid until the job has ended. In: samples_per_side, 1 to 16; the picture that many times
- * as large may have 65,536 pixels a side. Cost: as many pixels; 64 MB of samples are held at a time.
+ * that do. Both must stay valid until the job has ended.
+ * In: samples_per_side, 1 to 16; an image that is that many times as large may have 65,536 pixels a side.
+ * Cost: as many pixels; 64 MB of samples are held at a time.
  * Errors of the start: INVALID_ARGUMENT for a camera, matrix or number of samples outside its range; MEMORY_LIMIT. */
 StippleStatus stipple_mesh_matte_start(StippleContext* context, const StippleMeshInstance* instances,
                                        uint64_t count, const StippleCamera* camera, uint32_t samples_per_side,
@@ -1170,15 +1194,17 @@ StippleStatus stipple_mesh_matte_start(StippleContext* context, const StippleMes
 
 /* ---- layers of another renderer ---------------------------------------------------------------------- */
 
-/* What another renderer drew of everything but the splats, as a surface between them, and the picture of both.
+/* What another renderer drew of everything but the splats, as a surface between them, and the image of both.
  * Colours are premultiplied and scene linear. All arrays of one handle share one order of rows, whichever that is.
  * Order of calls: hold_out, take_world and light_before as far as each is needed; then what is read. A handle is
  * used by one thread at a time. Same bits for any number of threads. Cost of each: O(pixels). */
 typedef struct StippleLayers StippleLayers;
 
-/* In: passes of a film that was transparent. combined [H,W,4]; depth [H,W] metres of one sample of each pixel, 1e10
- * or NaN where nothing is; shadow [H,W,3], factors of the light of what is behind a shadow catcher, or NULL without
- * one. Colours that are not finite count as black. Errors: INVALID_ARGUMENT for a side of 0; MEMORY_LIMIT. */
+/* Makes the layers of passes whose film was transparent.
+ * In: combined [H,W,4]; depth [H,W] metres of one sample of each pixel, 1e10 or NaN where nothing is; shadow
+ * [H,W,3], factors of the light of what is behind a shadow catcher, or NULL without one. Colours that are not
+ * finite count as black.
+ * Errors: INVALID_ARGUMENT for a side of 0; MEMORY_LIMIT. */
 StippleStatus stipple_layers_create(StippleContext* context, uint32_t width, uint32_t height, const float* combined,
                                     const float* depth, const float* shadow, StippleLayers** layers);
 void stipple_layers_free(StippleLayers* layers);
@@ -1202,7 +1228,8 @@ typedef struct StippleLayersInfo {
 } StippleLayersInfo;
 StippleStatus stipple_layers_info(const StippleLayers* layers, StippleLayersInfo* info);
 
-/* What is wanted; NULL: not. As the surface_, matte_ and splat_light fields of StippleRenderOptions. */
+/* What is wanted; NULL: it is not. The arrays are those of the surface_, matte_ and splat_light fields of
+ * StippleRenderOptions. */
 typedef struct StippleLayersBuffers {
   uint32_t struct_size;
   uint32_t reserved;
@@ -1213,16 +1240,16 @@ typedef struct StippleLayersBuffers {
   float* opacity; /* [H,W] how much meshes and holdouts hide */
 } StippleLayersBuffers;
 StippleStatus stipple_layers_surface(const StippleLayers* layers, const StippleLayersBuffers* buffers);
-/* Meshes and holdouts as a matte, with shadow catchers that are `margin` metres nearer than they are: nothing behind
- * a catcher is left. In: catcher_depth [H,W]. Out: depth, opacity [H,W]. */
+/* Gives meshes and holdouts as a matte, with shadow catchers `margin` metres nearer than they are: nothing
+ * behind a catcher is left. In: catcher_depth [H,W]. Out: depth, opacity [H,W]. */
 StippleStatus stipple_layers_matte(const StippleLayers* layers, const float* catcher_depth, float margin,
                                    float* depth, float* opacity);
-/* The picture of meshes, splats and world. In and out: colour [H,W,4] and depth [H,W] of splats that were drawn with
- * the surface between them. In: transmittance [H,W] of that picture. */
+/* Makes the image of meshes, splats and world. In and out: colour [H,W,4] and depth [H,W] of splats that were
+ * drawn with the surface between them. In: transmittance [H,W] of that image. */
 StippleStatus stipple_layers_compose(const StippleLayers* layers, float* colour, float* depth,
                                      const float* transmittance);
 
-/* ---- effects that a picture needs ---------------------------------------------------------------- */
+/* ---- effects that an image needs ---------------------------------------------------------------- */
 
 #define STIPPLE_EFFECT_COUNT 12u
 
@@ -1242,33 +1269,34 @@ typedef enum StippleEffect {
   STIPPLE_EFFECT_GLOBAL_ORDER = 11      /* splats of several objects sorted together */
 } StippleEffect;
 
-/* Of the effects that no switch of a scene decides. */
+/* The choice of an effect that no switch of a scene decides. */
 typedef enum StippleEffectChoice {
   STIPPLE_EFFECT_AUTO = 0,
   STIPPLE_EFFECT_ON = 1,
   STIPPLE_EFFECT_OFF = 2
 } StippleEffectChoice;
 
-/* What splats and a camera say. "Unusual" is what 1 % of what is seen exceeds, each splat weighing as much as it
- * covers, times its opacity. */
+/* What splats and a camera tell about effects. An "unusual" splat is beyond 99 % of what is seen, where each
+ * splat counts by the area that it covers, times its opacity. */
 typedef struct StippleEffectsSurvey {
   uint32_t struct_size;
   uint32_t sh_degree;      /* the largest of the clouds */
   uint64_t splat_count;
-  uint64_t looked_count;   /* 131,072 at most, evenly over all */
-  uint64_t seen_count;     /* of those, in the picture */
+  uint64_t inspected_count;   /* splats that were inspected: 131,072 at most, evenly over all */
+  uint64_t seen_count;     /* how many of those are in the image */
   uint64_t object_count;   /* instances with splats */
   uint64_t mixed_count;    /* instances whose range of depths meets that of another: all depths are read */
   double view_change[5];   /* [degree] root mean square over all directions of what its harmonics add to a colour */
-  double affine_error_px;  /* by which the affine projection moves what shows of an unusual splat; a bound */
-  double error_ahead_px;   /* what it would be in the middle of the picture */
+  double affine_error_px;  /* how far the affine projection moves what shows of an unusual splat; a bound */
+  double error_ahead_px;   /* what it would be in the middle of the image */
   double field_of_view;    /* radians, across the wider diagonal; 0 for models that are not perspective */
   double widening;         /* area of the splats with the low-pass that they were made for over that without */
 } StippleEffectsSurvey;
 
-/* Looks at splats. In: instances [count], as for a render. Out: survey. Errors: INVALID_ARGUMENT as of a render.
- * Threads and determinism: blocks; the same result for any number of threads. Cost: O(131,072), tens of
- * milliseconds; with several instances also a pass over all positions. */
+/* Inspects splats.
+ * In: instances [count], as for a render. Out: survey. Errors: INVALID_ARGUMENT as of a render.
+ * Threads and determinism: the call returns when all is done; the result is the same for any number of threads.
+ * Cost: O(131,072), tens of milliseconds; with several instances also a pass over all positions. */
 StippleStatus stipple_effects_survey(StippleContext* context, const StippleInstance* instances, uint64_t count,
                                      const StippleCamera* camera, StippleEffectsSurvey* survey);
 
@@ -1296,7 +1324,7 @@ typedef struct StippleEffectFacts {
   double largest_error_px;    /* of the affine projection before the exact one is needed; default 1 */
   double largest_widening;    /* before anti-aliasing for all zooms is needed, >= 1; default 2 */
   double seconds[12];         /* [effect] measured by the caller; NaN, the default: not measured */
-  const StippleEffectsSurvey* survey; /* NULL: nobody has looked; Auto then keeps what the picture might need */
+  const StippleEffectsSurvey* survey; /* NULL: there was no survey; Auto then keeps what the image might need */
 } StippleEffectFacts;
 void stipple_effect_facts_init(StippleEffectFacts* facts);
 
@@ -1309,15 +1337,15 @@ typedef struct StippleEffectRow {
   char reason[256];   /* one sentence in UTF-8, without a full stop */
 } StippleEffectRow;
 
-/* From facts to the effects that a picture needs, one row of each. In: capacity, rows that there is room for;
- * rows[0].struct_size must be set and is that of all. Errors: INVALID_ARGUMENT for a fact outside its range, BUFFER_TOO_SMALL.
- * Cost: none. */
+/* Decides which effects an image needs, and gives one row for each.
+ * In: capacity, rows that there is room for; rows[0].struct_size must be set and is that of all.
+ * Errors: INVALID_ARGUMENT for a fact outside its range, BUFFER_TOO_SMALL. Cost: none. */
 StippleStatus stipple_effects_plan(const StippleEffectFacts* facts, StippleEffectRow* rows, uint64_t capacity);
 
 /* ---- drawing by a graphics card ------------------------------------------------------------------ */
 
-/* A view that turns is drawn with splats projected by the card, blended back to front in an order that a
- * worker makes. Geometry goes to the card once per cloud, order and colours once per order. */
+/* A view that moves is drawn by the graphics card: it projects the splats and blends them back to front, in an
+ * order that a worker makes. Geometry goes to the card once per cloud, order and colours once per order. */
 
 /* Floats per splat of stipple_cloud_pack: x, y, z, opacity | w, x, y, z | scales, 0. */
 #define STIPPLE_DRAW_GEOMETRY_FLOATS 12u
@@ -1326,8 +1354,8 @@ StippleStatus stipple_effects_plan(const StippleEffectFacts* facts, StippleEffec
 /* Rows are numbered in float32, exactly up to here. */
 #define STIPPLE_MAX_DRAW_ROWS 16777216u
 
-/* Geometry of all splats of a cloud for a float texture. In: capacity, splats that geometry [N,12] has room
- * for. Errors: BUFFER_TOO_SMALL. Cost: O(N), memory bandwidth. */
+/* Packs the geometry of all splats of a cloud for a float texture. In: capacity, splats that geometry [N,12] has
+ * room for. Errors: BUFFER_TOO_SMALL. Cost: O(N), memory bandwidth. */
 StippleStatus stipple_cloud_pack(const StippleCloud* cloud, float* geometry, uint64_t capacity);
 
 /* Must stay valid until the job has ended. N counts the splats of all instances. */
@@ -1369,25 +1397,26 @@ typedef enum StippleSide {
   STIPPLE_SIDE_OUTSIDE = 1
 } StippleSide;
 
-/* By the centres of splats. cloud_to_box: affine and invertible, into the frame in which the box is the cube
- * from -1 to 1. Out: mask; kept_count, or NULL. */
+/* Selects splats by their centres. cloud_to_box: affine and invertible, into the frame in which the box is the
+ * cube from -1 to 1. Out: mask; kept_count, or NULL. */
 StippleStatus stipple_cloud_select_box(const StippleCloud* cloud, const double cloud_to_box[16], uint32_t side,
                                        uint8_t* mask, uint64_t mask_count, uint64_t* kept_count);
-/* By the winding number of a mesh (>= 1/2 is inside): closed or nearly closed, faces either way, parts may
- * overlap. cloud_to_mesh: affine and invertible, into the world of the mesh. mask and kept_count must stay
- * valid until the job has ended; they are written at its end. */
+/* Selects splats by the winding number of a mesh at their centres (>= 1/2 is inside): closed or nearly closed,
+ * faces either way, parts may overlap. cloud_to_mesh: affine and invertible, into the world of the mesh. mask
+ * and kept_count must stay valid until the job has ended; they are written at its end. */
 StippleStatus stipple_cloud_select_mesh_start(const StippleCloud* cloud, const double cloud_to_mesh[16],
                                               const StippleMesh* mesh, uint32_t side, uint8_t* mask,
                                               uint64_t mask_count, uint64_t* kept_count, StippleJob** job);
 
 typedef struct StippleFloaterOptions {
   uint32_t struct_size;
-  uint32_t by_opacity;       /* 1: the rule is on (default), 0: off; each looks at what those before left */
+  uint32_t by_opacity;       /* 1: the rule is on (default), 0: off; each rule reads what those before it left */
   uint32_t by_size;
   uint32_t by_connectivity;
   double min_opacity;        /* 0..1, default 0.02; fainter splats go */
   double max_size;           /* metres, largest standard deviation; 0 (default): from the cloud's own sizes */
-  double radius;             /* metres; splats this near hang together; 0 (default): from their distances */
+  double radius;             /* metres; splats this near to each other are connected; 0 (default): from their
+                                distances */
   uint64_t min_group_count;  /* smaller groups go, the largest stays; 0 (default): N / 1000, 10 to 1000 */
 } StippleFloaterOptions;
 void stipple_floater_options_init(StippleFloaterOptions* options);
@@ -1411,25 +1440,27 @@ StippleStatus stipple_cloud_select_floaters_start(const StippleCloud* cloud,
                                                   const StippleFloaterOptions* options, uint8_t* mask,
                                                   uint64_t mask_count, StippleFloaterReport* report,
                                                   StippleJob** job);
-/* The splats whose mask is not 0, in their order, bit for bit. */
+/* Gives the splats whose mask is not 0, in their order, bit for bit. */
 StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask, uint64_t mask_count,
                                  StippleCloud** kept);
-/* Plain thinning, for clouds that have no tree: exactly count splats, 0 to all, chosen by random numbers keyed by
- * (seed, index) alone, in their order, each axis longer by the cube root of all / count, so that their volume stays; bit
- * for bit where all stay. A smaller count is a part of a larger one, and frames of a series whose splats keep their
- * places thin alike. A tree's cut (stipple_model_from_cloud_start) looks better. Errors: INVALID_ARGUMENT
- * where count is above the cloud's. Cost: O(N). */
+/* Thins a cloud that has no tree: exactly count splats, 0 to all, stay, chosen by random numbers keyed by (seed,
+ * index) alone, in their order, each axis longer by the cube root of all / count, so that their volume stays; bit
+ * for bit where all stay. A smaller count is a part of a larger one, and frames of a series whose splats keep
+ * their places thin alike. A tree's cut (stipple_model_from_cloud_start) looks better.
+ * Errors: INVALID_ARGUMENT where count is above the cloud's. Cost: O(N). */
 StippleStatus stipple_cloud_thin(const StippleCloud* cloud, uint64_t count, uint64_t seed,
                                  StippleCloud** thinned);
-/* The hierarchy of a cloud without the splats whose mask is 0: no budget shows any of them, and its largest
- * budget is what is left, bit for bit. mask [mask_count], mask_count = leaf_count of the model. Errors:
- * UNSUPPORTED for a model whose settings have no takes_mask; INVALID_ARGUMENT for a mask that keeps nothing.
+/* Gives the hierarchy of a cloud without the splats whose mask is 0: no budget shows any of them, and its largest
+ * budget is what is left, bit for bit. mask [mask_count], mask_count = leaf_count of the model.
+ * Errors: UNSUPPORTED for a model whose settings have no takes_mask; INVALID_ARGUMENT for a mask that keeps
+ * nothing.
  * Cost: O(N). */
 StippleStatus stipple_model_keep(const StippleModel* model, const uint8_t* mask, uint64_t mask_count,
                                  StippleModel** kept);
-/* One cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity keeps
- * every bit) with its grade baked in, harmonics padded to the highest degree. frame: StippleFrame that the matrices lead to, the label
- * of the result. Errors: UNSUPPORTED where colour spaces or antialias flags differ. */
+/* Makes one cloud of instances [count >= 1], each moved by its matrix (stipple_cloud_transform; the identity keeps
+ * every bit) with its grade baked in, harmonics padded to the highest degree. frame: StippleFrame that the
+ * matrices lead to, the label of the result.
+ * Errors: UNSUPPORTED where colour spaces or antialias flags differ. */
 StippleStatus stipple_cloud_merge(const StippleInstance* instances, uint64_t count, uint32_t frame,
                                   StippleCloud** merged);
 
@@ -1448,31 +1479,31 @@ typedef struct StippleGroundPlane {
   uint32_t reserved;
   double normal[3];            /* unit, upwards; points p of the plane have normal . p = offset */
   double offset;
-  double matrix[16];           /* rigid: levels the plane to z = 0 by the smallest turn */
-  uint64_t considered_count;   /* splats that were looked at, at most 50,000 */
+  double matrix[16];           /* rigid: levels the plane to z = 0 by the smallest rotation */
+  uint64_t considered_count;   /* splats that were inspected, at most 50,000 */
   uint64_t inlier_count;       /* of those, in the plane */
   double tolerance;            /* as used */
 } StippleGroundPlane;
 
-/* The plane that most of the surface lies in with little below it, by random samples (the same for a seed).
- * cloud_to_world: the frame of `up` and of the result. Errors: INVALID_ARGUMENT where no plane is found. */
+/* Finds the plane in which most of the surface lies, with little below it, by random samples (the same for a
+ * seed). cloud_to_world: the frame of `up` and of the result. Errors: INVALID_ARGUMENT where no plane is found. */
 StippleStatus stipple_cloud_ground_plane(const StippleCloud* cloud, const double cloud_to_world[16],
                                          const StippleGroundPlaneOptions* options, StippleGroundPlane* plane);
-/* Rigid matrix that levels the plane through three points [3,3] to z = 0, `up` upwards. */
+/* Gives the rigid matrix that levels the plane through three points [3,3] to z = 0, with `up` upwards. */
 StippleStatus stipple_level_points(const double points[9], const double up[3], double matrix[16]);
-/* Uniform scale about the origin that makes the distance of two points [2,3] the given length, metres. */
+/* Gives the uniform scale about the origin that makes the distance of two points [2,3] the given length, metres. */
 StippleStatus stipple_scale_points(const double points[6], double length, double matrix[16]);
 
 /* ---- differentiable rendering ------------------------------------------------------------------- */
 
-/* The derivative of a scalar loss by the picture, and what statistics need. Pictures of the camera's
- * size, row 0 = top; NULL where not wanted. Values are finite and at most 1e4 in size. */
+/* The derivative of a scalar loss by the image, and what statistics need. Each array is an image of the camera's
+ * size, row 0 = top; it is NULL where it is not wanted. Values are finite and at most 1e4 in size. */
 typedef struct StippleBackwardInput {
   uint32_t struct_size;
   uint32_t reserved;
   const float* colour_gradient;  /* [H,W,4] dL/d(premultiplied R,G,B,alpha); needed. With a background alpha
                                     is constant, so its derivative counts for nothing */
-  const float* residual;         /* [H,W,3] picture minus target, for contributions */
+  const float* residual;         /* [H,W,3] image minus target, for contributions */
   const float* residual_weights; /* [H,W] >= 0, weight of each pixel in contributions; NULL: 1 */
   const float* edge_weights;     /* [H,W] for edge_weights */
   const float* errors;           /* [H,W] >= 0, for errors and largest_errors */
@@ -1493,7 +1524,7 @@ typedef struct StippleSplatGradients {
   float* opacities;           /* [N] */
   float* sh;                  /* [N,(degree+1)^2,3] */
   /* Statistics, each only where its buffer is given; N numbers unless stated. They cost time. */
-  float* contributions;       /* L1 error of the picture minus the error without the splat: sum over pixels and
+  float* contributions;       /* L1 error of the image minus the error without the splat: sum over pixels and
                                  channels of w (|R| - |R - dC|), R = residual; < 0: it is useful */
   float* blending_weights;    /* sum over pixels of T alpha */
   float* edge_weights;        /* sum of edge weight times T alpha */
@@ -1513,17 +1544,18 @@ typedef struct StippleBackwardResult {
   uint64_t visible_count;
 } StippleBackwardResult;
 
-/* Derivatives of a loss by everything that stipple_renderer_render_start draws of the same arguments, as a
- * job. The clamps of alpha at 0.99 and of colours at 0 pass no derivative; where a splat ends (alpha =
- * 1/255), where a pixel ends and the order of blending are taken as fixed.
- * In: gradients [count], one per instance; result may be NULL. The pictures and buffers must stay valid
- * until the job has ended.
+/* Gives the derivatives of a loss by everything that stipple_renderer_render_start draws of the same arguments, as
+ * a job. The clamps of alpha at 0.99 and of colours at 0 pass no derivative; where a splat ends (alpha = 1/255),
+ * where a pixel ends and the order of blending are taken as fixed.
+ * In: gradients [count], one per instance; result may be NULL. The images and buffers must stay valid until the
+ * job has ended.
  * Errors of the start: those of drawing; INVALID_ARGUMENT for a method other than TILED, an output that is
- * converted after compositing (choose STIPPLE_OUTPUT_COMPOSITED), for a statistic without its picture;
- * BUFFER_TOO_SMALL; MEMORY_LIMIT before anything is allocated. Of the job: INVALID_ARGUMENT for a value
+ * converted after compositing (choose STIPPLE_OUTPUT_COMPOSITED), and for a statistic without the image that it
+ * needs; BUFFER_TOO_SMALL; MEMORY_LIMIT before anything is allocated. Of the job: INVALID_ARGUMENT for a value
  * outside its range. Nothing is written unless the job ends well.
- * Threads and determinism: the same bits for any number of threads. Cost: about twice drawing, and up to
- * half as much again with every statistic. docs/methods/rasterization.md, docs/methods/leave_one_out.md. */
+ * Threads and determinism: the same bits for any number of threads.
+ * Cost: about twice drawing, and up to half as much again with every statistic. docs/methods/rasterization.md,
+ * docs/methods/leave_one_out.md. */
 StippleStatus stipple_renderer_backward_start(StippleRenderer* renderer, const StippleInstance* instances,
                                               uint64_t count, const StippleCamera* camera,
                                               const StippleRenderOptions* options,
@@ -1552,16 +1584,17 @@ typedef struct StippleImageLoss {
   uint32_t reserved;
   double loss; /* (1 - lambda) l1 + lambda (1 - ssim) */
   double l1;   /* weighted mean of |rendered - target| over pixels and colour channels */
-  double ssim; /* 11x11 Gaussian window of sigma 1.5, which reads zeros outside the picture */
+  double ssim; /* 11x11 Gaussian window of sigma 1.5, which reads zeros outside the image */
 } StippleImageLoss;
 
-/* The loss of trained splats and its exact gradient, on this thread and the context's others.
- * In: rendered, target [H,W,channels] as composited, about 0..1 (at most 1e6 in size), row 0 = top; weights
- * [H,W] >= 0, or NULL: 1. Out: value; gradient [H,W,rendered_channels] dL/d(rendered), or NULL: not wanted,
- * for less than half the time; it may not overlap the pictures.
- * Errors: INVALID_ARGUMENT for sides outside 1..65536 and for values outside their range; the gradient's
- * buffer then has no meaning. The same bits for any number of threads. Cost: about 20 ns a pixel and core;
- * 0.5 MB a thread. docs/methods/loss.md. */
+/* Gives the loss of trained splats and its exact gradient, on this thread and the others of the context.
+ * In: rendered, target [H,W,channels] as composited, about 0..1 (at most 1e6 in size), row 0 = top; weights [H,W]
+ * >= 0, or NULL: 1.
+ * Out: value; gradient [H,W,rendered_channels] dL/d(rendered), or NULL: not wanted, for less than half the time;
+ * it may not overlap the images.
+ * Errors: INVALID_ARGUMENT for sides outside 1..65536 and for values outside their range; the gradient's buffer
+ * then has no meaning. The same bits for any number of threads.
+ * Cost: about 20 ns a pixel and core; 0.5 MB a thread. docs/methods/loss.md. */
 StippleStatus stipple_image_loss(StippleContext* context, uint32_t width, uint32_t height,
                                  const float* rendered, const float* target, const float* weights,
                                  const StippleImageLossOptions* options, StippleImageLoss* value,
@@ -1584,12 +1617,13 @@ typedef enum StippleFitQuality {
 typedef enum StippleFitBackground {
   STIPPLE_FIT_BACKGROUND_BLACK = 0,
   STIPPLE_FIT_BACKGROUND_WHITE = 1,
-  STIPPLE_FIT_BACKGROUND_RANDOM = 2 /* another colour in every step: coverage shows whatever the colours */
+  STIPPLE_FIT_BACKGROUND_RANDOM = 2 /* another colour in every step: coverage then shows, whatever the colours
+                                       are */
 } StippleFitBackground;
 
 /* Whether a field has a shell for what is far away, out to 64 times the size of the scene. */
 typedef enum StippleFitShell {
-  STIPPLE_FIT_SHELL_AUTO = 0, /* where points or depth are known and pictures are opaque: close behind the walls where
+  STIPPLE_FIT_SHELL_AUTO = 0, /* where points or depth are known and images are opaque: close behind the walls where
                                  depth ends at them, else far out */
   STIPPLE_FIT_SHELL_ON = 1,
   STIPPLE_FIT_SHELL_OFF = 2
@@ -1606,9 +1640,10 @@ typedef struct StippleFitOptions {
   uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
   uint64_t max_splats;         /* explicit: hard cap, 1..2^28 */
   uint64_t start_splats;       /* explicit; 0, the default: as many as points are known */
-  uint64_t least_anchors;      /* field: budgets of training, 1..STIPPLE_MAX_ANCHORS; default 1,024 to what the
-                                  quality says: 8,192, 16,384 or 32,768 */
-  uint64_t most_anchors;
+  uint64_t min_anchors;      /* field: the budgets of training, from min_anchors to max_anchors,
+                                1..STIPPLE_MAX_ANCHORS; default 1,024 to what the quality says: 8,192, 16,384 or
+                                32,768 */
+  uint64_t max_anchors;
   uint32_t gaussians_per_anchor; /* field: 4, the default, to 32. At an equal number of splats fewer per anchor
                                   are better and cost more: anchors are what the network works for */
   uint32_t sh_degree;          /* 0..4; 0: colour does not depend on the view */
@@ -1622,28 +1657,29 @@ typedef struct StippleFitOptions {
                                   options */
   uint64_t seed;
   double ssim_share;           /* 0..1 of the loss beside L1, default 0.2 */
-  uint64_t picture_bytes;      /* of pictures kept in memory, default 1 GiB; others are loaded when wanted */
-  uint64_t measure_interval;   /* iterations between looks at held-out views; 0, the default: a twentieth of
-                                  the fit, at least 100 */
+  uint64_t image_bytes;        /* images kept in memory, default 1 GiB; others are loaded when wanted */
+  uint64_t measure_interval;   /* iterations between measurements; 0, the default: a twentieth of the fit, at
+                                  least 100 */
   const char* checkpoint_path_utf8; /* NULL, the default: none are written */
   uint64_t checkpoint_interval; /* iterations; 0, the default: by time alone */
   double checkpoint_seconds;   /* default 60; 0: by iterations alone */
-  uint64_t max_bytes;          /* of the whole fit, about; 0, the default: none. Lowers max_splats and
-                                  picture_bytes as far as it needs */
+  uint64_t max_bytes;          /* the memory of the whole fit, about; 0, the default: no limit. It lowers
+                                  max_splats and image_bytes as far as needed */
   uint32_t shell;              /* field: StippleFitShell, default auto */
   uint32_t reserved;
 } StippleFitOptions;
 void stipple_fit_options_init(StippleFitOptions* options);
 /* Sets model, iterations, counts, degree and antialias as a user's choice of quality asks for; the others stay.
- * In: options->struct_size set. docs/methods/fitting.md has what each costs. */
+ * In: options->struct_size set. docs/results/fitting.md says what each costs. */
 StippleStatus stipple_fit_options_preset(StippleFitOptions* options, uint32_t model, uint32_t quality);
 
 /* Sets an option by its name and a text, as a flag of the tool and a file of settings have them: "iterations" and
- * "500", "background" and "white" (or "2"), "picture_bytes" and "512MiB". A text that is kept as such (strategy,
+ * "500", "background" and "white" (or "2"), "image_bytes" and "512MiB". A text that is kept as such (strategy,
  * checkpoint_path) stays the caller's and must live as long as the options are used; "" is none.
- * In: options->struct_size set; name_utf8: a name of stipple_fit_option_info, or what the option was formerly called;
- * - counts as _, and -- in front as nothing. Errors: INVALID_ARGUMENT for another name, and for a value out of range
- * (says which is allowed, with the name as it was given). */
+ * In: options->struct_size set; name_utf8: the name of an option or one of its aliases (stipple_fit_option_info);
+ * - counts as _, and -- in front as nothing.
+ * Errors: INVALID_ARGUMENT for another name, and for a value out of range (says which is allowed, with the name as
+ * it was given). */
 StippleStatus stipple_fit_options_set(StippleFitOptions* options, const char* name_utf8, const char* value_utf8);
 
 /* What an option of a fit holds. */
@@ -1660,7 +1696,7 @@ typedef enum StippleFitOptionKind {
 typedef struct StippleFitOptionInfo {
   uint32_t struct_size;
   uint32_t kind;               /* StippleFitOptionKind */
-  uint32_t models;             /* bits 1 << StippleFitModel: whom it concerns; other models ignore it */
+  uint32_t models;             /* bits 1 << StippleFitModel: the models that it concerns; others ignore it */
   uint32_t fixed_models;       /* bits: a fit of this model that goes on needs it as it was */
   const char* name_utf8;       /* of the field, without _utf8 */
   const char* help_utf8;       /* one sentence */
@@ -1670,8 +1706,8 @@ typedef struct StippleFitOptionInfo {
   const char* default_utf8;    /* as stipple_fit_options_set takes it */
   const char* presets_utf8[6]; /* what stipple_fit_options_preset sets: [3 * StippleFitModel + StippleFitQuality];
                                   NULL: it is left alone */
-  const char* former_name_utf8; /* what it was formerly called; empty: nothing else */
-  double former_unit;          /* how much 1 was under that name */
+  const char* aliases_utf8[3]; /* other names in settings and flags, former ones too; "" where there is none */
+  double alias_units[3];       /* how much 1 is under each: 1048576 of "image_memory" */
 } StippleFitOptionInfo;
 StippleStatus stipple_fit_option_count(uint64_t* count);
 /* index 0..count-1, in the order in which settings have them. */
@@ -1696,56 +1732,59 @@ typedef struct StippleFitFigures {
   char stage[64];
 } StippleFitFigures;
 
-/* Fits splats to views, as a job. It reads the pictures of views as they are at the start.
- * A cancel, and an error of a step or a picture, end the fit with the best that it had measured: the result can be
- * read either way (stipple_fit_cloud). Checkpoints appear under their name when they are whole; a job that ends
- * early leaves one. Where one cannot be written, that is a note and the fit goes on.
- * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without pictures;
+/* Fits splats to views, as a job. It reads the images of views as they are at the start. After a cancel, and after
+ * an error of a step or an image, the result is the best state that was measured until then (stipple_fit_cloud).
+ * Checkpoints appear under their name when they are whole; a job that ends early leaves one. Where one cannot be
+ * written, that is a note and the fit goes on.
+ * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without images;
  * MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
- * transparent or masked out, cameras that see none of the points); those of reading pictures; with resume IO, FORMAT,
- * UNSUPPORTED, and INVALID_ARGUMENT for a checkpoint of other options or views (says which).
- * Threads and determinism: the same bits for any number of threads, any picture_bytes, and wherever it was
- * stopped and resumed in between. docs/methods/fitting.md. */
+ * transparent or masked out, cameras that see none of the points); those of reading images; with resume IO,
+ * FORMAT, UNSUPPORTED, and INVALID_ARGUMENT for a checkpoint of other options or views (says which).
+ * Threads and determinism: the same bits for any number of threads, any image_bytes, and wherever it was stopped
+ * and resumed in between. docs/methods/fitting.md. */
 StippleStatus stipple_fit_start(StippleContext* context, const StippleViews* views, const StippleFitOptions* options,
                                 StippleJob** job);
-/* Bytes that it allocates, about: pictures up to picture_bytes, the model at its largest, its best state and a
- * checkpoint. */
+/* Estimates the bytes that a fit allocates: images up to image_bytes, the model at its largest, its best state
+ * and a checkpoint. */
 StippleStatus stipple_fit_memory_bound(const StippleViews* views, const StippleFitOptions* options,
                                        uint64_t* bytes);
 /* Never waits. In: figures->struct_size set. */
 StippleStatus stipple_fit_figures(const StippleJob* job, StippleFitFigures* figures);
-/* One sentence on something that the user should know (a view that shows nothing, a checkpoint that could not be
- * written). The text lives as long as the job. */
+/* Gives one sentence on something that the user should know (a view that shows nothing, a checkpoint that could
+ * not be written). The text lives as long as the job. */
 StippleStatus stipple_fit_note(const StippleJob* job, uint64_t index, const char** text);
-/* The splats as they are now, for looking at while the job runs. Never waits: gives the newest copy, and asks the
- * job for another after the step that it is at. Out: cloud, NULL where there is none yet. */
+/* Gives the splats as they are now, to be shown while the job runs. It never waits: it gives the newest copy,
+ * and asks the job for another after the present step. Out: cloud, NULL where there is none yet. */
 StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud);
-/* Whether previews tell what each splat contributes (stipple_cloud_quantity): 1, or 0, as a fit begins. It then draws
- * 8 views for every preview; steps are the same either way. */
+/* Sets whether previews tell what each splat contributes (stipple_cloud_quantity): 1, or 0, as at the begin of a
+ * fit. With 1 the fit draws 8 views for every preview; its steps are the same either way. */
 StippleStatus stipple_fit_watch_contributions(StippleJob* job, uint32_t watched);
-/* The result of a job that has ended, however it ended: the state that did best on views it learned from, decoded at a
- * budget (anchors of a field; 0: the largest; explicit splats have one size). INVALID_ARGUMENT where no step was
- * taken. */
+/* Gives the result of a job that has ended, however it ended: the state that did best on views it learned from,
+ * decoded at a budget (anchors of a field; 0: the largest; explicit splats have one size). INVALID_ARGUMENT
+ * where no step was taken. */
 StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud);
-/* The same of a field as a model, which stipple_model_save writes and stipple_model_decode turns into splats at any
- * budget. UNSUPPORTED for explicit splats: stipple_model_from_cloud_start makes a model of their cloud. */
+/* Gives the result of a field as a model, which stipple_model_save writes and stipple_model_decode turns into
+ * splats at any budget. UNSUPPORTED for explicit splats: stipple_model_from_cloud_start makes a model of their
+ * cloud. */
 StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model);
-/* The story of a job that has ended: JSON at path_utf8, and its curves as SVG beside it, under the same name with
- * the ending .svg. Errors: IO; INVALID_ARGUMENT where no step was taken. */
+/* Writes the report of a job that has ended: JSON at path_utf8, and its curves as SVG beside it, under the same
+ * name with the extension .svg. Errors: IO; INVALID_ARGUMENT where no step was taken. */
 StippleStatus stipple_fit_report_save(const StippleJob* job, const char* path_utf8);
-/* The same curves as a picture: dark on white, with axes, titles and legends.
- * In: scale 0.25..8, pixels of a unit of the SVG, whose two columns are 960 units wide; capacity, floats of pixels.
- * Out: pixels [height,width,4] display sRGB 0..1, opaque, row 0 = top, or NULL: only the size is wanted; width, height.
+/* Draws the same curves as an image: dark on white, with axes, titles and legends.
+ * In: scale 0.25..8, pixels of a unit of the SVG, whose two columns are 960 units wide; capacity, floats of
+ * pixels.
+ * Out: pixels [height,width,4] display sRGB 0..1, opaque, row 0 = top, or NULL: only the size is wanted; width,
+ * height.
  * Errors: INVALID_ARGUMENT where no step was taken; BUFFER_TOO_SMALL, with the size set.
  * Threads and determinism: the same bits everywhere. Cost: about 0.1 s at scale 2. */
 StippleStatus stipple_fit_report_draw(const StippleJob* job, double scale, uint64_t capacity, float* pixels,
                                       uint32_t* width, uint32_t* height);
 
-/* What can be shown of each splat, to look at density control. */
+/* What can be shown of each splat, to follow density control. */
 typedef enum StippleSplatQuantity {
-  STIPPLE_QUANTITY_SCORE = 0,       /* [N] how much it asked to multiply at the last event, in the strategy's units: most
-                                       count in thresholds, where 1 multiplies */
-  STIPPLE_QUANTITY_AGE = 1,         /* [N] iterations since it was made; of densified clouds, events */
+  STIPPLE_QUANTITY_SCORE = 0,       /* [N] how much it asked to multiply at the last event, in the units of the
+                                       strategy: usually thresholds, where 1 multiplies */
+  STIPPLE_QUANTITY_AGE = 1,         /* [N] iterations since it was made; of densified clouds, events since then */
   STIPPLE_QUANTITY_SPLIT_AXIS = 2,  /* [N,3] the longest axis, in the cloud's frame, times 1 - second axis / longest: 0
                                        for a round splat, length 1 for a needle */
   STIPPLE_QUANTITY_CONTRIBUTION = 3 /* [N] pixels that it fills: blending weights, summed; mean of up to 16 views, 8
@@ -1759,14 +1798,14 @@ typedef enum StippleSplatQuantity {
 StippleStatus stipple_cloud_quantity(const StippleCloud* cloud, uint32_t quantity, uint64_t capacity, float* values,
                                      uint64_t* count);
 
-/* A way of adding and removing splats, or a part of one. The texts live as long as the library. */
+/* A strategy, which adds and removes splats, or a part of one. The texts live as long as the library. */
 typedef struct StippleStrategyInfo {
   uint32_t struct_size;
   uint32_t model;            /* StippleFitModel that it is for */
   const char* name_utf8;     /* as StippleFitOptions::strategy_utf8 takes it */
   const char* summary_utf8;  /* one sentence for artists */
   const char* label_utf8;    /* for people: "Long Axis Split" */
-  const char* decides_utf8;  /* what it decides, in words with commas between; empty of fields */
+  const char* decides_utf8;  /* what it decides, in words with commas between; empty for fields */
   uint32_t bit;              /* of a part, 0..30: files keep under it that the part was chosen, and no other part
                                 ever gets it. STIPPLE_NO_INDEX of a strategy */
   uint32_t setting_count;    /* of stipple_strategy_setting */
@@ -1788,31 +1827,33 @@ typedef struct StippleStrategySetting {
 } StippleStrategySetting;
 /* In: name_utf8 of a strategy or a part; index 0..setting_count-1. */
 StippleStatus stipple_strategy_setting(const char* name_utf8, uint64_t index, StippleStrategySetting* setting);
-/* Whether explicit splats take this strategy. Errors: INVALID_ARGUMENT for a name or setting that is not there, a
- * part that does not go with another (says which, and what both decide), a strategy of fields. */
+/* Checks whether explicit splats take this strategy. Errors: INVALID_ARGUMENT for a name or setting that is not
+ * there, a part that does not go with another (says which, and what both decide), a strategy of fields. */
 StippleStatus stipple_strategy_check(const char* strategy_utf8);
 
 typedef struct StippleDensifyOptions {
   uint32_t struct_size;
-  uint32_t event_count;        /* 1..1000, default 1: how often splats multiply and go */
-  const char* strategy_utf8;   /* how; NULL: "adaptive" */
+  uint32_t event_count;        /* 1..1000, default 1: how often splats are added and removed */
+  const char* strategy_utf8;   /* how they are; NULL: "adaptive" */
   uint64_t max_splats;         /* hard cap; 0, the default: twice as many as there are */
   uint64_t seed;
-  uint64_t picture_bytes;      /* of pictures kept in memory, default 1 GiB; others are loaded when wanted */
+  uint64_t image_bytes;        /* images kept in memory, default 1 GiB; others are loaded when wanted */
   uint32_t holdout;            /* every so many-th view by name is left out, default 0: none. A split that the data
                                   set names wins where it is not 0 */
   uint32_t reserved;
 } StippleDensifyOptions;
 void stipple_densify_options_init(StippleDensifyOptions* options);
 
-/* Density control of a finished cloud, as a job (stipple_job_cloud): its splats are copied, split and removed as a
- * strategy says, with what views tell of them; nothing takes a step and no opacity is reset. Splats that stay come
- * first, in their order and bit for bit, then new ones. A fit of the result moves them to their places.
- * In: views: of the cloud's colour space and frame, with pictures; transparent ones stand before black.
- * Errors of the start: INVALID_ARGUMENT for an empty cloud, views without pictures or of another colour space, a
- * strategy that is not there (says which are), options out of range; MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for
- * views that show nothing; those of reading pictures. Threads and determinism: the same bits for any number of threads. Cost: for
- * each event one drawing and one backward pass per view. docs/methods/densification.md. */
+/* Does the density control of a finished cloud, as a job (stipple_job_cloud): its splats are copied, split and
+ * removed as a strategy says, by what views tell of them; no parameter takes a step and no opacity is reset.
+ * Splats that stay come first, in their order and bit for bit, then new ones. A fit of the result moves them to
+ * their places.
+ * In: views: of the cloud's colour space and frame, with images; transparent ones stand before black.
+ * Errors of the start: INVALID_ARGUMENT for an empty cloud, views without images or of another colour space, a
+ * strategy that is not there (says which are), options out of range; MEMORY_LIMIT. Of the job: INVALID_ARGUMENT
+ * for views that show nothing; those of reading images.
+ * Threads and determinism: the same bits for any number of threads.
+ * Cost: for each event one drawing and one backward pass per view. docs/methods/densification.md. */
 StippleStatus stipple_densify_start(StippleContext* context, const StippleCloud* cloud, const StippleViews* views,
                                     const StippleDensifyOptions* options, StippleJob** job);
 
@@ -1840,7 +1881,7 @@ typedef struct StippleVolumeInfo {
   double max_density;     /* per metre */
 } StippleVolumeInfo;
 
-/* Extinction and scene linear colour, as a job (stipple_job_volume). */
+/* Fills a volume with extinction and scene linear colour, as a job (stipple_job_volume). */
 StippleStatus stipple_voxelize_start(StippleContext* context, const StippleInstance* instances,
                                      uint64_t count, const StippleVoxelizeOptions* options,
                                      StippleJob** job);
@@ -1849,22 +1890,23 @@ StippleStatus stipple_voxelize_memory_bound(StippleContext* context, const Stipp
                                             uint64_t* bytes);
 typedef struct StippleVolumeAccuracyOptions {
   uint32_t struct_size;
-  uint32_t repetitions; /* 1..1000, default 5: timings of each voxel size, in turns */
-  double most_seconds;  /* default 60; no further turn begins after so many seconds of them */
+  uint32_t repetitions; /* 1..1000, default 5: timings of each voxel size, which alternate */
+  double max_seconds;   /* default 60; no further round of timings begins after this many seconds */
 } StippleVolumeAccuracyOptions;
 void stipple_volume_accuracy_options_init(StippleVolumeAccuracyOptions* options);
-/* What the voxel size of a volume costs, as a job (stipple_job_accuracy_report): voxels of the size that `finest` says
- * (NULL: its defaults), then 1.5, 2, 3, 4, 6 and 8 times as large; the finest is the last row and judges the others.
- * Compared is how the volumes look along their three axes, blended front to back at the pixels of the finest, in
- * display values. A cancel waits for the volume that is being filled. Errors of the start: INVALID_ARGUMENT; of the
- * job: those of stipple_voxelize_start. Threads and determinism: errors are the same for any number of threads.
+/* Measures what the voxel size of a volume costs, as a job (stipple_job_accuracy_report): voxels of the size that
+ * `finest` says (NULL: its defaults), then 1.5, 2, 3, 4, 6 and 8 times as large; the finest is the last row and
+ * judges the others. It compares how the volumes look along their three axes, blended front to back at the pixels
+ * of the finest, in display values. A cancel waits for the volume that is being filled.
+ * Errors of the start: INVALID_ARGUMENT; of the job: those of stipple_voxelize_start.
+ * Threads and determinism: errors are the same for any number of threads.
  * Cost: about 1.5 repetitions times that of the finest. docs/accuracy_and_time.md. */
 StippleStatus stipple_volume_accuracy_start(StippleContext* context, const StippleInstance* instances,
                                             uint64_t count, const StippleVoxelizeOptions* finest,
                                             const StippleVolumeAccuracyOptions* options, StippleJob** job);
 void stipple_volume_free(StippleVolume* volume);
 StippleStatus stipple_volume_info(const StippleVolume* volume, StippleVolumeInfo* info);
-/* OpenVDB file with the grids `density` and `color`. */
+/* Writes an OpenVDB file with the grids `density` and `color`. */
 StippleStatus stipple_volume_save(const StippleVolume* volume, const char* path_utf8);
 StippleStatus stipple_volume_load(StippleContext* context, const char* path_utf8, StippleVolume** volume);
 
@@ -1877,18 +1919,19 @@ typedef struct StippleVolumeToMeshOptions {
 } StippleVolumeToMeshOptions;
 void stipple_volume_to_mesh_options_init(StippleVolumeToMeshOptions* options);
 
-/* The closed surface of a volume's density, for shadows and collisions, as a job (stipple_job_mesh). Every edge
- * has two triangles, which run against each other. Colours are not read. Same result for any number of threads.
- * Errors of the start: INVALID_ARGUMENT, MEMORY_LIMIT; of the job: INVALID_ARGUMENT for an empty volume and,
- * with the largest value, for a threshold that no voxel reaches; UNAVAILABLE where libstipple_media cannot be
- * loaded. A cancel waits for the surface itself, which is one call of OpenVDB. docs/methods/proxy_mesh.md. */
+/* Makes the closed surface of a volume's density, for shadows and collisions, as a job (stipple_job_mesh). Every
+ * edge has two triangles, which run against each other. Colours are not read. Same result for any number of
+ * threads.
+ * Errors of the start: INVALID_ARGUMENT, MEMORY_LIMIT; of the job: INVALID_ARGUMENT for an empty volume and, with
+ * the largest value, for a threshold that no voxel reaches; UNAVAILABLE where libstipple_media cannot be loaded. A
+ * cancel waits for the surface itself, which is one call of OpenVDB. docs/methods/proxy_mesh.md. */
 StippleStatus stipple_volume_to_mesh_start(const StippleVolume* volume,
                                            const StippleVolumeToMeshOptions* options, StippleJob** job);
 StippleStatus stipple_volume_to_mesh_memory_bound(const StippleVolume* volume,
                                                   const StippleVolumeToMeshOptions* options,
                                                   uint64_t* bytes);
 
-/* ---- pictures ---------------------------------------------------------------------------------- */
+/* ---- images ---------------------------------------------------------------------------------- */
 
 typedef enum StippleTransfer {
   STIPPLE_TRANSFER_LINEAR = 0, /* scene linear Rec.709 */
@@ -1922,10 +1965,10 @@ void stipple_image_free(StippleImage* image);
 StippleStatus stipple_image_info(const StippleImage* image, StippleImageInfo* info);
 /* capacity: floats that pixels has room for. */
 StippleStatus stipple_image_read(const StippleImage* image, float* pixels, uint64_t capacity);
-/* By ending: .exr scene linear premultiplied, .png display sRGB straight alpha; values are converted
- * between the two unless keep_values is 1. */
+/* Writes the format that the extension says: .exr, scene linear and premultiplied, or .png, display sRGB with
+ * straight alpha; values are converted between the two unless keep_values is 1. */
 StippleStatus stipple_image_save(const StippleImage* image, const char* path_utf8, uint32_t keep_values);
-/* Same size and channels; compared in display space. */
+/* Compares two images of the same size and channels in display space. */
 StippleStatus stipple_image_compare(const StippleImage* a, const StippleImage* b,
                                     StippleImageComparison* result);
 

@@ -146,7 +146,7 @@ std::unique_ptr<OIIO::ImageInput> openImage(const std::string& path) {
   const OIIO::ImageSpec config = keepAlpha();
   auto input = OIIO::ImageInput::open(path, &config);
   if (!input) {
-    fail(ErrorCode::kFormat, path + " is not a picture that can be read: " + OIIO::geterror());
+    fail(ErrorCode::kFormat, path + " is not an image that can be read: " + OIIO::geterror());
   }
   return input;
 }
@@ -221,7 +221,7 @@ DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std
                               const ImagesSoFar& others) {
   const char* file_name = nameForBytes(bytes);
   if (file_name == nullptr) {
-    fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF picture");
+    fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF image");
   }
   requireWholeChunks(
       bytes.size(),

@@ -20,8 +20,7 @@ constexpr int kMethod = 4;
 void readSize(const char* name, const uint8_t* bytes, uint64_t byte_count, int* width,
               int* height) {
   if (WebPGetInfo(bytes, byte_count, width, height) == 0) {
-    fail(ErrorCode::kFormat,
-         std::string(name) + " is not a WebP picture, or its header is damaged");
+    fail(ErrorCode::kFormat, std::string(name) + " is not a WebP image, or its header is damaged");
   }
 }
 
@@ -61,7 +60,7 @@ void stipple_media_webp_decode(const char* name, const uint8_t* bytes, uint64_t 
     int height = 0;
     readSize(name, bytes, byte_count, &width, &height);
     if (WebPDecodeRGBAInto(bytes, byte_count, rgba, rgba_bytes, width * 4) == nullptr) {
-      fail(ErrorCode::kFormat, std::string(name) + " (a WebP picture of " + std::to_string(width) +
+      fail(ErrorCode::kFormat, std::string(name) + " (a WebP image of " + std::to_string(width) +
                                    " x " + std::to_string(height) + ", " +
                                    std::to_string(byte_count) + " bytes) is truncated or damaged");
     }
@@ -93,7 +92,7 @@ void stipple_media_webp_encode(const char* name, const uint8_t* rgba, uint32_t w
           error == VP8_ENC_ERROR_OUT_OF_MEMORY || error == VP8_ENC_ERROR_BITSTREAM_OUT_OF_MEMORY;
       fail(no_memory ? ErrorCode::kOutOfMemory : ErrorCode::kUnsupported,
            std::string(name) + " of " + std::to_string(width) + " x " + std::to_string(height) +
-               " cannot be made a WebP picture (libwebp's error " + std::to_string(error) +
+               " cannot be made a WebP image (libwebp's error " + std::to_string(error) +
                "); at most 16383 x 16383 is allowed");
     }
     giveBytes(*sink, kMediaWebpBytes, memory.writer.mem, memory.writer.size);

@@ -31,11 +31,11 @@ struct Words {
 Words wordsOf(AccuracySubject subject) {
   switch (subject) {
     case AccuracySubject::kVolume:
-      return {"volume", "voxels", "voxel_size", "volume", "the finest"};
+      return {"volume", "voxels", "voxel_size", "a volume", "the finest"};
     case AccuracySubject::kFit:
-      return {"fit", "splats", "iteration", "fit", "views"};
+      return {"fit", "splats", "iteration", "a fit", "views"};
     default:
-      return {"picture", "splats", nullptr, "picture", "reference"};
+      return {"picture", "splats", nullptr, "an image", "reference"};
   }
 }
 
@@ -104,7 +104,7 @@ std::string textOf(const AccuracyReport& report, const std::string& path) {
   if (endsWith(path, ".csv")) return csvOf(report);
   if (endsWith(path, ".svg")) return svgOf(accuracyPlot(report));
   fail(ErrorCode::kInvalidArgument,
-       "'" + path + "' has no ending of a report; .json, .csv and .svg are allowed");
+       "'" + path + "' has no extension of a report; .json, .csv and .svg are allowed");
 }
 
 std::string titleOf(const AccuracyReport& report) {
@@ -139,7 +139,7 @@ PlotSheet accuracyPlot(const AccuracyReport& report) {
   const double factor = report.subject == AccuracySubject::kFit ? 1 : 1e3;
   PlotPanel panel;
   panel.title = titleOf(report);
-  panel.x_label = std::string(factor == 1 ? "seconds" : "milliseconds") + " of a " + words.made;
+  panel.x_label = std::string(factor == 1 ? "seconds" : "milliseconds") + " of " + words.made;
   panel.y_label = std::string("error against ") + words.judge + " (RMS, 1 = white)";
   panel.x_is_logarithmic = true;
   panel.y_is_logarithmic = true;

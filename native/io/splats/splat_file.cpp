@@ -109,7 +109,7 @@ SplatCloud readSplatFile(const std::string& path, Progress* progress) {
   // A file that is named after a format and is not of it gets that reader's words.
   const SplatFormat* named = splatFormatOfEnding(path);
   if (named != nullptr && named->read != nullptr) return named->read(path, progress);
-  fail(ErrorCode::kFormat, path + " is not a splat file that can be read: its ending is '" +
+  fail(ErrorCode::kFormat, path + " is not a splat file that can be read: its extension is '" +
                                lowerEnding(path) +
                                "' and its first bytes are those of no format; " +
                                listOfFormats(false) + " can be read");
@@ -119,7 +119,7 @@ void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress) {
   const SplatFormat* format = splatFormatOfEnding(path);
   if (format == nullptr || format->write == nullptr) {
-    fail(ErrorCode::kUnsupported, path + " cannot be written as splats: its ending is '" +
+    fail(ErrorCode::kUnsupported, path + " cannot be written as splats: its extension is '" +
                                       lowerEnding(path) + "'; " + listOfFormats(true) +
                                       " can be written");
   }

@@ -105,7 +105,7 @@ class FrameReader {
     if (const std::optional<CameraModel> wide = wideModel(model)) {
       view.camera.model = *wide;
       if (distorted_ != Distorted::kRefuse) {
-        failHere("has the camera model " + model + "; splats are not fitted to its pictures",
+        failHere("has the camera model " + model + "; splats are not fitted to its images",
                  ErrorCode::kUnsupported);
       }
     } else if (model == "ORTHOGRAPHIC") {

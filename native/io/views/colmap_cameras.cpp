@@ -64,31 +64,31 @@ Cameras readBinaryCameras(const std::string& path) {
 std::vector<ColmapImage> readBinaryImages(const std::string& path) {
   ColmapBytes file(path);
   std::vector<ColmapImage> images;
-  const auto count = file.take<uint64_t>("the number of pictures");
+  const auto count = file.take<uint64_t>("the number of images");
   for (uint64_t i = 0; i < count; ++i) {
     ColmapImage image;
-    file.skip(sizeof(uint32_t), "a picture's number");
-    for (double& value : image.rotation) value = file.take<double>("a picture's rotation");
-    for (double& value : image.translation) value = file.take<double>("a picture's translation");
-    image.camera = file.take<uint32_t>("a picture's camera");
-    while (const char letter = file.take<char>("a picture's name")) {
+    file.skip(sizeof(uint32_t), "an image's number");
+    for (double& value : image.rotation) value = file.take<double>("an image's rotation");
+    for (double& value : image.translation) value = file.take<double>("an image's translation");
+    image.camera = file.take<uint32_t>("an image's camera");
+    while (const char letter = file.take<char>("an image's name")) {
       image.name.push_back(letter);
       if (image.name.size() > kMaxNameBytes) {
-        fail(ErrorCode::kFormat, path + ": the picture's name before byte " +
+        fail(ErrorCode::kFormat, path + ": the image's name before byte " +
                                      std::to_string(file.offset()) + " is longer than " +
                                      std::to_string(kMaxNameBytes) + " bytes");
       }
     }
-    const auto points = file.take<uint64_t>("a picture's number of points");
+    const auto points = file.take<uint64_t>("an image's number of points");
     constexpr uint64_t kPointBytes = 24;
     // Compared by division, because the product of a damaged number may not fit.
     if (points > file.left() / kPointBytes) {
-      fail(ErrorCode::kFormat, path + ": picture '" + image.name + "' claims " +
+      fail(ErrorCode::kFormat, path + ": image '" + image.name + "' claims " +
                                    std::to_string(points) + " points of 24 bytes at byte " +
                                    std::to_string(file.offset()) + "; " +
                                    std::to_string(file.left()) + " bytes are left");
     }
-    file.skip(points * kPointBytes, "a picture's points");
+    file.skip(points * kPointBytes, "an image's points");
     images.push_back(std::move(image));
   }
   return images;
@@ -122,14 +122,14 @@ std::vector<ColmapImage> readTextImages(const std::string& path) {
   std::vector<ColmapImage> images;
   while (file.next(true)) {
     ColmapImage image;
-    file.number<uint64_t>("the picture's number");
-    for (double& value : image.rotation) value = file.number<double>("the picture's rotation");
+    file.number<uint64_t>("the image's number");
+    for (double& value : image.rotation) value = file.number<double>("the image's rotation");
     for (double& value : image.translation) {
-      value = file.number<double>("the picture's translation");
+      value = file.number<double>("the image's translation");
     }
-    image.camera = file.number<uint32_t>("the picture's camera");
+    image.camera = file.number<uint32_t>("the image's camera");
     image.name = std::string(file.rest());
-    if (image.name.empty()) file.failHere("has no name of a picture");
+    if (image.name.empty()) file.failHere("has no name of an image");
     images.push_back(std::move(image));
     // The points of the picture, an empty line where it has none.
     file.next(false);
@@ -158,7 +158,7 @@ class ViewMaker {
   void intrinsics(const ColmapImage& image, CameraView& view) const {
     const auto found = cameras_.find(image.camera);
     if (found == cameras_.end()) {
-      fail(ErrorCode::kFormat, images_path_ + ": picture '" + image.name + "' uses camera " +
+      fail(ErrorCode::kFormat, images_path_ + ": image '" + image.name + "' uses camera " +
                                    std::to_string(image.camera) + ", which " + cameras_path_ +
                                    " does not hold");
     }
@@ -180,7 +180,7 @@ class ViewMaker {
     if (distorted_ == Distorted::kRefuse && view.lens.isDistorted()) {
       fail(ErrorCode::kUnsupported,
            name + "is distorted (model " + from.model->name +
-               "); undistort the pictures first (colmap image_undistorter makes PINHOLE cameras)");
+               "); undistort the images first (colmap image_undistorter makes PINHOLE cameras)");
     }
     Camera& camera = view.camera;
     camera.width = static_cast<uint32_t>(from.width);
@@ -193,7 +193,7 @@ class ViewMaker {
   }
 
   void pose(const ColmapImage& image, Camera& camera) const {
-    const std::string name = images_path_ + ": picture '" + image.name + "' ";
+    const std::string name = images_path_ + ": image '" + image.name + "' ";
     double squares = 0;
     bool finite = true;
     for (const double value : image.rotation) {
@@ -256,7 +256,7 @@ std::vector<CameraView> readColmapCameras(const std::string& folder, Distorted d
   const std::vector<ColmapImage> images =
       binary ? readBinaryImages(images_path) : readTextImages(images_path);
   if (images.empty()) {
-    fail(ErrorCode::kFormat, images_path + " holds no pictures; at least one is needed");
+    fail(ErrorCode::kFormat, images_path + " holds no images; at least one is needed");
   }
   std::vector<CameraView> views;
   for (const ColmapImage& image : images) views.push_back(maker.make(image));

@@ -210,7 +210,7 @@ Dataset::Dataset(const std::string& path, const DatasetOptions& options, Progres
   views_ = findDatasetViews(path);
   for (size_t i = 0; i < views_.size(); ++i) {
     advance(progress, static_cast<double>(i) / static_cast<double>(views_.size()),
-            "Opening pictures");
+            "Opening images");
     takeSizeOfPicture(views_[i]);
   }
   cameras_ = givenCameras(views_, options.downscale);

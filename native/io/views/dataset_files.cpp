@@ -84,8 +84,8 @@ fs::path colmapPictures(const std::string& model, const std::string& name) {
     }
     around = around.parent_path();
   }
-  fail(ErrorCode::kIo, model + ": the picture '" + name +
-                           "' is missing; the model's pictures are looked for in " + looked_in +
+  fail(ErrorCode::kIo, model + ": the image '" + name +
+                           "' is missing; the model's images are looked for in " + looked_in +
                            " and the folders around them");
 }
 
@@ -118,7 +118,7 @@ void addTransforms(const std::string& path, std::vector<DatasetView>& views, Mis
   for (const CameraView& camera : readCameraFile(path, Distorted::kKeep)) {
     if (camera.image_path.empty()) {
       fail(ErrorCode::kFormat,
-           path + ": frame " + std::to_string(frame) + " has no 'file_path'; it has no picture");
+           path + ": frame " + std::to_string(frame) + " has no 'file_path'; it has no image");
     }
     ++frame;
     DatasetView view{camera, {}, {}, {}};

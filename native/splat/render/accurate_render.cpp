@@ -29,7 +29,7 @@ void requireSamples(const RenderAccuracy& accuracy, const Camera& camera) {
   const uint64_t side = std::max(camera.width, camera.height);
   if (side * n > 65536) {
     fail(ErrorCode::kInvalidArgument, "samples_per_side is " + std::to_string(n) +
-                                          ", which makes a picture of " + std::to_string(side) +
+                                          ", which makes an image of " + std::to_string(side) +
                                           " pixels " + std::to_string(side * n) +
                                           " samples wide; at most 65536 is allowed");
   }

@@ -36,7 +36,7 @@ void validateOptions(const RenderOptions& options) {
              "; 0 or 1 is allowed");
   }
   if (!(options.least_alpha > 0 && options.least_alpha < 1)) {
-    fail(ErrorCode::kInvalidArgument, "least_alpha is " + std::to_string(options.least_alpha) +
+    fail(ErrorCode::kInvalidArgument, "min_alpha is " + std::to_string(options.least_alpha) +
                                           "; a number above 0 and below 1 is allowed");
   }
   for (const double value : options.background) requireFinite(value, "background");
@@ -114,7 +114,7 @@ void placeUnread(std::span<const SplatInstance> instances, const Camera& camera,
     scene.clouds.push_back(placed);
   }
   if (scene.splat_count > std::numeric_limits<uint32_t>::max()) {
-    fail(ErrorCode::kUnsupported, "the picture holds " + std::to_string(scene.splat_count) +
+    fail(ErrorCode::kUnsupported, "the image holds " + std::to_string(scene.splat_count) +
                                       " splats; at most 4294967295 can be drawn together");
   }
   orderObjects(options, scene);

@@ -42,7 +42,7 @@ void validateSurface(const SurfaceLayer& surface, const Camera& camera) {
   if (surface.width != camera.width || surface.height != camera.height) {
     fail(ErrorCode::kInvalidArgument,
          "the surface is " + std::to_string(surface.width) + " x " +
-             std::to_string(surface.height) + " pixels; it must have the picture's " +
+             std::to_string(surface.height) + " pixels; it must have the image's " +
              std::to_string(camera.width) + " x " + std::to_string(camera.height));
   }
   const size_t count = static_cast<size_t>(surface.width) * surface.height;

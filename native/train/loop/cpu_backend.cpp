@@ -111,7 +111,7 @@ class CpuBackend final : public RenderBackend {
 
   ImageLossValue loss(uint32_t target, const ImageLossOptions& options,
                       std::span<const float> weights) override {
-    pass_.requireStage(Stage::kDrawn, "a loss needs a picture; call forward first");
+    pass_.requireStage(Stage::kDrawn, "a loss needs an image; call forward first");
     if (target >= targets_.size()) {
       fail(ErrorCode::kInvalidArgument, "target is " + std::to_string(target) + "; there are " +
                                             std::to_string(targets_.size()));
@@ -121,7 +121,7 @@ class CpuBackend final : public RenderBackend {
     if (wanted.width != drawn.width || wanted.height != drawn.height) {
       fail(ErrorCode::kInvalidArgument,
            "target " + std::to_string(target) + " is " + std::to_string(wanted.width) + " x " +
-               std::to_string(wanted.height) + " pixels; the picture is " +
+               std::to_string(wanted.height) + " pixels; the image is " +
                std::to_string(drawn.width) + " x " + std::to_string(drawn.height));
     }
     return pass_.loss(wanted.pixels, weights, options);
@@ -189,7 +189,7 @@ class CpuBackend final : public RenderBackend {
   }
 
   std::vector<float> picture() const override {
-    pass_.requireStage(Stage::kDrawn, "there is no picture; call forward first");
+    pass_.requireStage(Stage::kDrawn, "there is no image; call forward first");
     return pass_.drawn().colour;
   }
 

@@ -54,7 +54,7 @@ void CpuViewPass::forward(const SplatCloud& cloud, const Camera& camera,
 
 ImageLossValue CpuViewPass::loss(std::span<const float> target, std::span<const float> weights,
                                  const ImageLossOptions& options) {
-  requireStage(Stage::kDrawn, "a loss needs a picture; call forward first");
+  requireStage(Stage::kDrawn, "a loss needs an image; call forward first");
   const size_t pixel_count = size_t{drawn_.width} * drawn_.height;
   requireCount(target.size(), pixel_count * 3, "the target");
   if (!weights.empty()) requireCount(weights.size(), pixel_count, "weights");
@@ -73,7 +73,7 @@ ImageLossValue CpuViewPass::loss(std::span<const float> target, std::span<const 
 }
 
 void CpuViewPass::setLossGradient(std::span<const float> gradient) {
-  requireStage(Stage::kDrawn, "a derivative needs a picture; call forward first");
+  requireStage(Stage::kDrawn, "a derivative needs an image; call forward first");
   target_ = weights_ = {};
   loss_gradient_ = gradient;
   loss_value_ = 0;
@@ -82,7 +82,7 @@ void CpuViewPass::setLossGradient(std::span<const float> gradient) {
 
 BackwardSummary CpuViewPass::backward(const StatisticRequest& request, double transmittance_weight,
                                       Progress* progress) {
-  requireStage(Stage::kLoss, "derivatives need a loss of the picture; call loss first");
+  requireStage(Stage::kLoss, "derivatives need a loss of the image; call loss first");
   const size_t pixel_count = size_t{drawn_.width} * drawn_.height;
   BackwardInput input;
   input.colour_gradient = loss_gradient_;
@@ -115,7 +115,7 @@ BackwardSummary CpuViewPass::backward(const StatisticRequest& request, double tr
 }
 
 std::span<const float> CpuViewPass::image() {
-  requireStage(Stage::kDrawn, "there is no picture; call forward first");
+  requireStage(Stage::kDrawn, "there is no image; call forward first");
   return drawn_.colour;
 }
 
@@ -214,7 +214,7 @@ std::span<const float> CpuViewPass::residual() {
 double CpuViewPass::meanTransmittance() const {
   if (drawn_.transmittance.empty()) {
     fail(ErrorCode::kInvalidArgument,
-         "the loss has the mean transmittance; the picture must be drawn with it");
+         "the loss has the mean transmittance; the image must be drawn with it");
   }
   double sum = 0;
   for (const float value : drawn_.transmittance) sum += static_cast<double>(value);

@@ -423,7 +423,7 @@ ImageLossValue ImageLoss::evaluate(uint32_t width, uint32_t height, PictureView 
       options.with_structure_errors ? static_cast<size_t>(width) * height : 0);
   if (width == 0 || height == 0) return value;
   if (!rendered.values || !target.values) {
-    fail(ErrorCode::kInvalidArgument, "the rendered and the target picture must not be null");
+    fail(ErrorCode::kInvalidArgument, "the rendered and the target image must not be null");
   }
   const Tiling tiling(width, height);
   const double weight_sum = weights ? workspace_->sumWeights(weights, width, height)
@@ -447,8 +447,8 @@ ImageLossValue ImageLoss::evaluate(uint32_t width, uint32_t height, PictureView 
     workspace.runTiles(task, begin, end);
   });
   if (!workspace.all_usable) {
-    requireUsable(task, rendered, "rendered picture");
-    requireUsable(task, target, "target picture");
+    requireUsable(task, rendered, "rendered image");
+    requireUsable(task, target, "target image");
   }
   double error = 0, magnitude = 0;
   for (size_t i = 0; i < workspace.row_sums.size(); i += 2) {

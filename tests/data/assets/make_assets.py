@@ -46,9 +46,11 @@ def logarithms(rows):
 
 def surface():
     samples = 5
-    tensors = {'surface.positions': f32(numbers(samples, 3, 1)), 'surface.normals': f32(numpy.zeros((samples, 3), '<f4')),
-               'surface.colours': f32(numbers(samples, 3, 2)), 'surface.opacities': f32(numbers(samples, 1, 10)[:, 0]),
-               'surface.areas': f32(numbers(samples, 1, 20)[:, 0]), 'surface.weights': f32(numbers(samples, 1, 30)[:, 0]),
+    tensors = {'surface.positions': f32(numbers(samples, 3, 1)),
+               'surface.normals': f32(numpy.zeros((samples, 3), '<f4')), 'surface.colours': f32(numbers(samples, 3, 2)),
+               'surface.opacities': f32(numbers(samples, 1, 10)[:, 0]),
+               'surface.areas': f32(numbers(samples, 1, 20)[:, 0]),
+               'surface.weights': f32(numbers(samples, 1, 30)[:, 0]),
                'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
     tensors['surface.normals'][1][:, 2] = 1
     for level, (cells, rows) in enumerate(LEVELS):
@@ -75,7 +77,8 @@ def hierarchy():
         tensors[f'tree.{stem}.sh'] = f32(numbers(rows, 3 * (degree + 1)**2, first + 13))
     write('hierarchy_1.0.stipple.safetensors',
           {'stipple_version': '1.0', 'kind': 'hierarchy', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
-           'frame': 'RUB', 'sh_degree': str(degree), 'settings': '{"views": 16}', 'provenance': 'written by hand'}, tensors)
+           'frame': 'RUB', 'sh_degree': str(degree), 'settings': '{"views": 16}', 'provenance': 'written by hand'},
+          tensors)
 
 
 def field():
@@ -88,9 +91,9 @@ def field():
         tensors[f'octree.log_p.{level}'] = f32(logarithms(rows))
     write('field_1.0.stipple.safetensors',
           {'stipple_version': '1.0', 'kind': 'field', 'colour_space': 'srgb_rec709_display', 'antialias': 'classic',
-           'frame': 'right-handed, z up, metres', 'root_cube': '[-1.5, 0.25, 2.0, 4.0]', 'levels': '2', 'field_level': '7',
-           'K': '16', 'sh_degree': '2', 'least_anchors': '100', 'most_anchors': '5000', 'jitter': 'none',
-           'settings': '{"iterations": 700}', 'provenance': 'written by hand'}, tensors)
+           'frame': 'right-handed, z up, metres', 'root_cube': '[-1.5, 0.25, 2.0, 4.0]', 'levels': '2',
+           'field_level': '7', 'K': '16', 'sh_degree': '2', 'least_anchors': '100', 'most_anchors': '5000',
+           'jitter': 'none', 'settings': '{"iterations": 700}', 'provenance': 'written by hand'}, tensors)
 
 
 def whole_field():
@@ -104,9 +107,10 @@ def whole_field():
         tensors[f'octree.log_p.{level}'] = f32(logarithms(rows))
     write('whole_field_1.0.stipple.safetensors',
           {'stipple_version': '1.0', 'kind': 'field', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
-           'frame': 'right-handed, z up, metres', 'root_cube': '[-1.5, 0.25, 2.0, 4.0]', 'levels': '2', 'field_level': '5',
-           'K': '4', 'sh_degree': '0', 'least_anchors': '100', 'most_anchors': '5000', 'jitter': 'leaf', 'draws': 'nested',
-           'seed': '77', 'settings': '{"iterations": 700}', 'provenance': 'written by hand'}, tensors)
+           'frame': 'right-handed, z up, metres', 'root_cube': '[-1.5, 0.25, 2.0, 4.0]', 'levels': '2',
+           'field_level': '5', 'K': '4', 'sh_degree': '0', 'least_anchors': '100', 'most_anchors': '5000',
+           'jitter': 'leaf', 'draws': 'nested', 'seed': '77', 'settings': '{"iterations": 700}',
+           'provenance': 'written by hand'}, tensors)
 
 
 if __name__ == '__main__':

@@ -390,7 +390,7 @@ TEST_F(Backward, RefusesSmallBuffersAndTooMuchMemoryBeforeItStarts) {
   STIPPLE_ASSERT_OK(stipple_renderer_create(context, &renderer));
   EXPECT_EQ(run(renderer, cloud_, wanted, nullptr), STIPPLE_ERROR_MEMORY_LIMIT);
   EXPECT_THAT(stipple_last_error_message(),
-              HasSubstr("the backward pass of a picture of 64 x 48 pixels would need up to " +
+              HasSubstr("the backward pass of an image of 64 x 48 pixels would need up to " +
                         std::to_string(full) + " bytes, "));
   EXPECT_THAT(
       stipple_last_error_message(),
@@ -471,7 +471,7 @@ TEST_F(Loss, RefusesBadInputByName) {
     EXPECT_THAT(stipple_last_error_message(), HasSubstr(part));
   };
   refused(evaluate(0, 0, grey, grey, options()),
-          "the picture is 0 x 0 pixels; each side must be 1");
+          "the image is 0 x 0 pixels; each side must be 1");
   StippleImageLossOptions given = options();
   given.rendered_channels = 2;
   refused(evaluate(2, 2, grey, grey, given), "options->rendered_channels is 2; 3 or 4 is allowed");
@@ -484,7 +484,7 @@ TEST_F(Loss, RefusesBadInputByName) {
   std::vector<float> broken = grey;
   broken[5] = std::numeric_limits<float>::quiet_NaN();
   refused(evaluate(2, 2, broken, grey, options()),
-          "rendered picture: channel 1 of the pixel in row 0");
+          "rendered image: channel 1 of the pixel in row 0");
   refused(
       stipple_image_loss(context_, 2, 2, grey.data(), nullptr, nullptr, nullptr, &value_, nullptr),
       "target is NULL");

@@ -240,7 +240,7 @@ TEST_F(BadInput, APictureThatNeedsTooMuchMemoryIsRefusedWithItsNumbers) {
   EXPECT_EQ(draw(renderer, copies.data(), 1000, camera, sized<StippleRenderBuffers>()),
             STIPPLE_ERROR_MEMORY_LIMIT);
   const std::string message = stipple_last_error_message();
-  EXPECT_THAT(message, HasSubstr("this picture of 3000 x 3000 pixels would need up to "));
+  EXPECT_THAT(message, HasSubstr("this image of 3000 x 3000 pixels would need up to "));
   // 2^25 pairs of 4 bytes are held at once, and one huge page.
   EXPECT_THAT(message, HasSubstr("136314880 of them for pairs of splat and tile"));
   EXPECT_THAT(message, HasSubstr("; the memory limit is 209715200"));

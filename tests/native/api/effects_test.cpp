@@ -78,10 +78,10 @@ TEST_F(EffectsApi, CallersWithoutThemGetWhatTheyGot) {
 
 TEST_F(EffectsApi, OneSampleIsThePictureAndManyAreItsMean) {
   const std::vector<float> plain = colours();
-  auto lens = sized<StippleLens>();
+  auto lens = sized<StippleAperture>();
   lens.aperture_radius = 0.3;
   lens.focus_distance = 1.5;
-  options_.lens = &lens;
+  options_.aperture = &lens;
   options_.samples = 1;
   EXPECT_EQ(colours(), plain);
   options_.samples = 64;
@@ -132,13 +132,13 @@ TEST_F(EffectsApi, NormalsAndObjectsAreThereForTheAsking) {
   auto buffers = sized<StippleRenderBuffers>();
   buffers.normal = normal.data();
   buffers.object_index = objects.data();
-  auto lens = sized<StippleLens>();
+  auto lens = sized<StippleAperture>();
   lens.aperture_radius = 0.3;
   lens.focus_distance = 1.5;
   std::vector<uint32_t> sharp;
   for (const uint32_t samples : {0u, 8u}) {
     options_.samples = samples;
-    options_.lens = samples > 0 ? &lens : nullptr;
+    options_.aperture = samples > 0 ? &lens : nullptr;
     ASSERT_EQ(draw(buffers), STIPPLE_OK) << message_;
     const size_t centre = 24 * 64 + 32;
     EXPECT_EQ(objects[centre], 1u);
@@ -153,14 +153,14 @@ TEST_F(EffectsApi, NormalsAndObjectsAreThereForTheAsking) {
 }
 
 TEST_F(EffectsApi, LensesAndShuttersThatAreNoneAreRefused) {
-  auto lens = sized<StippleLens>();
+  auto lens = sized<StippleAperture>();
   lens.aperture_radius = 0.1;
-  options_.lens = &lens;
+  options_.aperture = &lens;
   EXPECT_EQ(refusal(), "the lens's focus distance is 0; 1e-6 to 1e15 m is allowed");
   lens.focus_distance = 1;
   lens.blades = 2;
   EXPECT_EQ(refusal(), "the lens's number of blades is 2; 0 (round) or 3 to 64 is allowed");
-  options_.lens = nullptr;
+  options_.aperture = nullptr;
   auto shutter = sized<StippleShutter>();
   shutter.step_count = 1;
   options_.shutter = &shutter;

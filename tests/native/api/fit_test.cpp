@@ -246,16 +246,16 @@ TEST_F(FitTest, PresetsOfFieldsDoubleTheirAnchorsAndMakeFourSplatsOfEach) {
   for (const uint32_t quality : {STIPPLE_FIT_FAST, STIPPLE_FIT_BALANCED, STIPPLE_FIT_FINE_DETAIL}) {
     STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, quality));
     EXPECT_EQ(options_.gaussians_per_anchor, 4u) << quality;
-    EXPECT_EQ(options_.most_anchors, anchors *= 2) << quality;
-    EXPECT_EQ(options_.least_anchors, 1024u) << quality;
+    EXPECT_EQ(options_.max_anchors, anchors *= 2) << quality;
+    EXPECT_EQ(options_.min_anchors, 1024u) << quality;
   }
 }
 
 TEST_F(FitTest, AFieldIsAModelOfAnyBudget) {
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.iterations = 40;
-  options_.least_anchors = 16;
-  options_.most_anchors = 64;
+  options_.min_anchors = 16;
+  options_.max_anchors = 64;
   options_.gaussians_per_anchor = 4;
   StippleJob* job = start();
   STIPPLE_ASSERT_OK(stipple_job_wait(job));
@@ -274,8 +274,8 @@ TEST_F(FitTest, AFieldIsAModelOfAnyBudget) {
   auto info = sized<StippleModelInfo>();
   STIPPLE_ASSERT_OK(stipple_model_info(model, &info));
   EXPECT_EQ(info.kind, uint32_t{STIPPLE_MODEL_FIELD});
-  EXPECT_EQ(info.least_anchors, 16u);
-  EXPECT_EQ(info.most_anchors, 64u);
+  EXPECT_EQ(info.min_anchors, 16u);
+  EXPECT_EQ(info.max_anchors, 64u);
   EXPECT_EQ(info.gaussians_per_anchor, 4u);
   StippleDensity* density = nullptr;
   STIPPLE_EXPECT_OK(stipple_model_density(model, &density));
@@ -319,8 +319,8 @@ TEST_F(FitTest, AFieldIsAModelOfAnyBudget) {
 TEST_F(FitTest, AFieldHasAShellWhereItIsAskedFor) {
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.iterations = 20;
-  options_.least_anchors = 16;
-  options_.most_anchors = 256;
+  options_.min_anchors = 16;
+  options_.max_anchors = 256;
   for (const uint32_t shell :
        {STIPPLE_FIT_SHELL_AUTO, STIPPLE_FIT_SHELL_ON, STIPPLE_FIT_SHELL_OFF}) {
     options_.shell = shell;
@@ -338,8 +338,8 @@ TEST_F(FitTest, AFieldHasAShellWhereItIsAskedFor) {
 TEST_F(FitTest, AFieldResumesBitForBit) {
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.iterations = 60;
-  options_.least_anchors = 16;
-  options_.most_anchors = 64;
+  options_.min_anchors = 16;
+  options_.max_anchors = 64;
   options_.gaussians_per_anchor = 4;
   StippleJob* whole = start();
   STIPPLE_ASSERT_OK(stipple_job_wait(whole));
@@ -428,8 +428,8 @@ TEST_F(FitTest, RefusesOptionsOutOfRange) {
   options_.resume = 1;
   refused("no checkpoint_path is given");
   options_.model = STIPPLE_FIT_FIELD;
-  options_.least_anchors = options_.most_anchors + 1;
-  refused("options->least_anchors is");
+  options_.min_anchors = options_.max_anchors + 1;
+  refused("options->min_anchors is");
   options_.model = STIPPLE_FIT_FIELD;
   options_.gaussians_per_anchor = 3;
   refused("options->gaussians_per_anchor is 3; 4 to 32 is allowed");
@@ -447,14 +447,14 @@ TEST_F(FitTest, SetsOptionsByTheirNames) {
   STIPPLE_EXPECT_OK(set("iterations", "77"));
   STIPPLE_EXPECT_OK(set("--max-splats", "88"));
   STIPPLE_EXPECT_OK(set("background", "white"));
-  STIPPLE_EXPECT_OK(set("picture_bytes", "1.5MiB"));
+  STIPPLE_EXPECT_OK(set("image_bytes", "1.5MiB"));
   STIPPLE_EXPECT_OK(set("ssim_share", "0.25"));
   const std::string strategy = "mcmc";
   STIPPLE_EXPECT_OK(set("strategy", strategy.c_str()));
   EXPECT_EQ(options_.iterations, 77u);
   EXPECT_EQ(options_.max_splats, 88u);
   EXPECT_EQ(options_.background, uint32_t{STIPPLE_FIT_BACKGROUND_WHITE});
-  EXPECT_EQ(options_.picture_bytes, 3u << 19);
+  EXPECT_EQ(options_.image_bytes, 3u << 19);
   EXPECT_EQ(options_.ssim_share, 0.25);
   EXPECT_EQ(options_.strategy_utf8, strategy.c_str());
   STIPPLE_EXPECT_OK(set("strategy", ""));

@@ -66,7 +66,7 @@ class FitViewsTest : public ApiTest {
       for (size_t i = 0; i < rgba.size(); ++i) {
         if (brightness == 0) rgba[i] = i % 4 == 3 ? 1.0f : 0.0f;
       }
-      auto picture = sized<StippleViewPicture>();
+      auto picture = sized<StippleViewImage>();
       picture.transfer = STIPPLE_TRANSFER_SRGB;
       picture.rgba = rgba.data();
       const std::string name = std::to_string(100 + v);

@@ -325,7 +325,7 @@ TEST_F(Pipeline, PicturesAlongRaysAreNearTheTiledOne) {
   StippleRenderOptions options;
   stipple_render_options_init(&options);
   const auto tiled = render(context_, cloud, options, frontCamera());
-  for (const uint32_t method : {STIPPLE_RENDER_RAYS, STIPPLE_RENDER_YARDSTICK}) {
+  for (const uint32_t method : {STIPPLE_RENDER_RAYS, STIPPLE_RENDER_RAYS_UNLIMITED}) {
     options.method = method;
     const auto exact = render(context_, cloud, options, frontCamera());
     double squares = 0;

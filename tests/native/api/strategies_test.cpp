@@ -93,8 +93,8 @@ TEST_F(StrategiesTest, BelongToTheirModel) {
 TEST_F(StrategiesTest, LearnedDensityIsTheDensityGradientOfAField) {
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.iterations = 30;
-  options_.least_anchors = 16;
-  options_.most_anchors = 64;
+  options_.min_anchors = 16;
+  options_.max_anchors = 64;
   options_.gaussians_per_anchor = 4;
   std::vector<float> results[3];
   for (int k = 0; k < 3; ++k) {
@@ -144,7 +144,7 @@ TEST_F(StrategiesTest, AMemoryCapLowersTheCountUntilTheFitIsBelowIt) {
 
 TEST_F(StrategiesTest, AMemoryCapBelowOneSplatOrTheFieldIsRefused) {
   options_.max_bytes = 100;
-  refused(STIPPLE_ERROR_MEMORY_LIMIT, "options->max_bytes is 100; one splat and the pictures");
+  refused(STIPPLE_ERROR_MEMORY_LIMIT, "options->max_bytes is 100; one splat and the images");
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.max_bytes = 1000000;
   refused(STIPPLE_ERROR_MEMORY_LIMIT, "options->max_bytes is 1000000; 8192 anchors");

@@ -153,7 +153,7 @@ TEST_F(SurfaceApi, OfAnOlderCallerIsNone) {
 TEST_F(SurfaceApi, IsRefusedInOneSentence) {
   StippleRenderOptions other = options_;
   other.surface_width = 63;
-  EXPECT_EQ(refusal(other), "the surface is 63 x 48 pixels; it must have the picture's 64 x 48");
+  EXPECT_EQ(refusal(other), "the surface is 63 x 48 pixels; it must have the image's 64 x 48");
   other = options_;
   other.splat_light = light_.data();
   light_[7] = -1.0f;

@@ -26,8 +26,8 @@ class ViewsTest : public ApiTest {
     stipple_views_free(views_);
     ApiTest::TearDown();
   }
-  StippleViewPicture picture(const float* rgba, uint32_t transfer = STIPPLE_TRANSFER_SRGB) const {
-    auto made = sized<StippleViewPicture>();
+  StippleViewImage picture(const float* rgba, uint32_t transfer = STIPPLE_TRANSFER_SRGB) const {
+    auto made = sized<StippleViewImage>();
     made.transfer = transfer;
     made.rgba = rgba;
     return made;
@@ -43,7 +43,7 @@ constexpr double kKept = 7.7e-6;
 
 TEST_F(ViewsTest, GivesBackThePictureThatWasAdded) {
   const float depth[2] = {2.5f, 1e10f}, weights[2] = {0.0f, 1.0f};
-  StippleViewPicture given = picture(rgba_);
+  StippleViewImage given = picture(rgba_);
   given.depth = depth;
   given.weights = weights;
   STIPPLE_ASSERT_OK(stipple_views_add(views_, &camera_, &given, "left"));
@@ -52,7 +52,7 @@ TEST_F(ViewsTest, GivesBackThePictureThatWasAdded) {
   auto info = sized<StippleViewsInfo>();
   STIPPLE_ASSERT_OK(stipple_views_info(views_, &info));
   EXPECT_EQ(info.view_count, 2u);
-  EXPECT_EQ(info.has_pictures, 1u);
+  EXPECT_EQ(info.has_images, 1u);
   EXPECT_EQ(info.colour_space, uint32_t{STIPPLE_COLOUR_DISPLAY});
   auto view = sized<StippleViewInfo>();
   STIPPLE_ASSERT_OK(stipple_views_view_info(views_, 0, &view));
@@ -77,7 +77,7 @@ TEST_F(ViewsTest, GivesBackThePictureThatWasAdded) {
 }
 
 TEST_F(ViewsTest, BringsLinearPicturesIntoTheViewsColourSpace) {
-  const StippleViewPicture given = picture(rgba_, STIPPLE_TRANSFER_LINEAR);
+  const StippleViewImage given = picture(rgba_, STIPPLE_TRANSFER_LINEAR);
   STIPPLE_ASSERT_OK(stipple_views_add(views_, &camera_, &given, nullptr));
   std::vector<float> rgba(8);
   auto buffers = sized<StippleViewBuffers>();
@@ -96,7 +96,7 @@ TEST_F(ViewsTest, RefusesWhatCannotBeAPictureAndKeepsTheRest) {
   float bad[8];
   std::copy(rgba_, rgba_ + 8, bad);
   bad[5] = std::numeric_limits<float>::quiet_NaN();
-  StippleViewPicture given = picture(bad);
+  StippleViewImage given = picture(bad);
   EXPECT_EQ(stipple_views_add(views_, &camera_, &given, "n.exr"), STIPPLE_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(stipple_last_error_message(),
                "n.exr: pixel (1, 0) has colour nan; a finite number is needed");
@@ -117,7 +117,7 @@ TEST_F(ViewsTest, RefusesWhatCannotBeAPictureAndKeepsTheRest) {
 }
 
 TEST_F(ViewsTest, SaysWhatABufferNeeds) {
-  const StippleViewPicture given = picture(rgba_);
+  const StippleViewImage given = picture(rgba_);
   STIPPLE_ASSERT_OK(stipple_views_add(views_, &camera_, &given, nullptr));
   std::vector<float> rgba(4);
   auto buffers = sized<StippleViewBuffers>();
@@ -136,7 +136,7 @@ TEST_F(ViewsTest, RefusesAPictureAboveTheMemoryLimit) {
   StippleViews* views = nullptr;
   STIPPLE_ASSERT_OK(stipple_views_create(small, STIPPLE_COLOUR_LINEAR, &views));
   camera_.width = camera_.height = 60000;
-  const StippleViewPicture given = picture(rgba_);
+  const StippleViewImage given = picture(rgba_);
   EXPECT_EQ(stipple_views_add(views, &camera_, &given, nullptr), STIPPLE_ERROR_MEMORY_LIMIT);
   stipple_views_free(views);
   stipple_context_free(small);
@@ -194,7 +194,7 @@ TEST_F(DatasetFolder, OpensWithItsPictures) {
   auto info = sized<StippleViewsInfo>();
   STIPPLE_ASSERT_OK(stipple_views_info(views, &info));
   EXPECT_EQ(info.view_count, 1u);
-  EXPECT_EQ(info.has_pictures, 1u);
+  EXPECT_EQ(info.has_images, 1u);
   auto view = sized<StippleViewInfo>();
   STIPPLE_ASSERT_OK(stipple_views_view_info(views, 0, &view));
   EXPECT_STREQ(view.name, "a.png");
@@ -213,7 +213,7 @@ TEST_F(DatasetFolder, OpensWithItsPictures) {
   EXPECT_EQ(rgba[middle], 128.0f / 255.0f);
   EXPECT_EQ(rgba[middle + 3], 1.0f);
   // Views of files do not grow.
-  const StippleViewPicture given = picture(rgba_);
+  const StippleViewImage given = picture(rgba_);
   EXPECT_EQ(stipple_views_add(views, &camera_, &given, nullptr), STIPPLE_ERROR_INVALID_ARGUMENT);
   stipple_views_free(views);
 }
@@ -254,7 +254,7 @@ TEST_F(DatasetFolder, CamerasAloneHaveNoPictures) {
   STIPPLE_ASSERT_OK(stipple_views_load(context_, folder_.c_str(), &views));
   auto info = sized<StippleViewsInfo>();
   STIPPLE_ASSERT_OK(stipple_views_info(views, &info));
-  EXPECT_EQ(info.has_pictures, 0u);
+  EXPECT_EQ(info.has_images, 0u);
   auto buffers = sized<StippleViewBuffers>();
   EXPECT_EQ(stipple_views_read(views, 0, &buffers), STIPPLE_ERROR_UNSUPPORTED);
   stipple_views_free(views);

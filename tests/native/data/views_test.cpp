@@ -72,7 +72,7 @@ TEST(MemoryViewSource, GivesBackWhatWasAdded) {
 TEST(MemoryViewSource, RefusesPicturesOfAnotherSizeThanTheirCamera) {
   MemoryViewSource views(ColourSpace::kDisplay);
   EXPECT_EQ(messageOf([&] { views.add(cameraOf(3, 2), pictureOf(2, 3, 0), "a.png"); }),
-            "a.png: the picture is 2 x 3 pixels, its camera's is 3 x 2 pixels");
+            "a.png: the image is 2 x 3 pixels, its camera's is 3 x 2 pixels");
   ViewPicture cut = pictureOf(3, 2, 0);
   cut.depth.resize(5);
   EXPECT_EQ(messageOf([&] { views.add(cameraOf(3, 2), cut, "a.png"); }),
@@ -156,7 +156,7 @@ TEST(ViewCheck, RefusesNoViewsAndViewsThatShowNothing) {
   ViewPicture clear = pictureOf(2, 2, 0);
   clear.alpha.assign(4, 0.0f);
   EXPECT_EQ(messageOf([&] { checkViews(views); }),
-            "all 1 pictures that were looked at are black everywhere (e is the first); at least "
+            "all 1 images that were looked at are black everywhere (e is the first); at least "
             "one must show something");
   views.add(cameraOf(2, 2), clear, "f");
   EXPECT_NE(messageOf([&] { checkViews(views); }).find("black, transparent or masked out"),
@@ -177,9 +177,9 @@ TEST(ViewCheck, WarnsOfPicturesThatShowNothing) {
   views.add(cameraOf(2, 2), pictureOf(2, 2, 1), "good");
   const std::vector<std::string> warnings = checkViews(views);
   ASSERT_EQ(warnings.size(), 3u);
-  EXPECT_EQ(warnings[0], "5 pictures are black everywhere: dark0, dark1, dark2 and 2 more");
-  EXPECT_EQ(warnings[1], "1 picture is transparent everywhere: clear");
-  EXPECT_EQ(warnings[2], "1 picture is masked out everywhere: masked");
+  EXPECT_EQ(warnings[0], "5 images are black everywhere: dark0, dark1, dark2 and 2 more");
+  EXPECT_EQ(warnings[1], "1 image is transparent everywhere: clear");
+  EXPECT_EQ(warnings[2], "1 image is masked out everywhere: masked");
 }
 
 TEST(ViewCheck, SaysThatOneViewIsFew) {

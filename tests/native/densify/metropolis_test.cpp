@@ -292,7 +292,7 @@ TEST(Metropolis, ReleasedReadsPixelsAtTheWorldsPlaces) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_THAT(error.what(),
-                HasSubstr("averages pictures of one size; there are 10 x 1000 and 100 x 100"));
+                HasSubstr("averages images of one size; there are 10 x 1000 and 100 x 100"));
   }
 }
 

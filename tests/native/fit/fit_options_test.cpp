@@ -28,8 +28,12 @@ TEST(FitOptionTable, SaysOfEveryOptionWhatItIs) {
   for (const FitOption& option : fitOptionTable()) {
     SCOPED_TRACE(option.name);
     EXPECT_TRUE(names.insert(option.name).second);
-    const bool is_renamed = *option.former_name != '\0';
-    EXPECT_TRUE(!is_renamed || names.insert(option.former_name).second);
+    bool has_end = false;
+    for (const FitOptionAlias& alias : option.aliases) {
+      EXPECT_TRUE(!*alias.name || (!has_end && names.insert(alias.name).second));
+      EXPECT_GT(alias.unit, 0);
+      has_end = !*alias.name;
+    }
     const std::string help = option.help;
     EXPECT_GT(help.size(), 20u);
     EXPECT_EQ(help.back(), '.');
@@ -88,7 +92,15 @@ TEST(FitOptionTable, FindsOptionsByWhatTheyAreAndWereCalled) {
   EXPECT_STREQ(findFitOption("--max-splats", &unit)->name, "max_splats");
   EXPECT_EQ(unit, 1);
   EXPECT_STREQ(findFitOption("gaussians")->name, "max_splats");
-  EXPECT_STREQ(findFitOption("anchors")->name, "most_anchors");
+  EXPECT_STREQ(findFitOption("anchors")->name, "max_anchors");
+  EXPECT_STREQ(findFitOption("most_anchors")->name, "max_anchors");
+  EXPECT_STREQ(findFitOption("least_anchors")->name, "min_anchors");
+  EXPECT_STREQ(findFitOption("picture_bytes", &unit)->name, "image_bytes");
+  EXPECT_EQ(unit, 1);
+  for (const char* scaled : {"picture_memory", "--image-memory"}) {
+    EXPECT_STREQ(findFitOption(scaled, &unit)->name, "image_bytes");
+    EXPECT_EQ(unit, 1 << 20);
+  }
   EXPECT_STREQ(findFitOption("start")->name, "start_splats");
   EXPECT_STREQ(findFitOption("checkpoint_every")->name, "checkpoint_interval");
   EXPECT_STREQ(findFitOption("--memory", &unit)->name, "max_bytes");
@@ -98,9 +110,9 @@ TEST(FitOptionTable, FindsOptionsByWhatTheyAreAndWereCalled) {
 }
 
 TEST(FitOptionTable, ReadsBytesWithTheirUnits) {
-  const FitOption& option = *findFitOption("picture_bytes");
+  const FitOption& option = *findFitOption("image_bytes");
   const auto read = [&](const char* text, double unit = 1) {
-    return std::get<uint64_t>(fitValueFrom(option, text, "picture_bytes", unit));
+    return std::get<uint64_t>(fitValueFrom(option, text, "image_bytes", unit));
   };
   EXPECT_EQ(read("123"), 123u);
   EXPECT_EQ(read("2KiB"), 2048u);
@@ -137,7 +149,7 @@ TEST(FitOptions, AreRefusedWhereTheyDoNotGoTogether) {
   options.model = FitKind::kField;  // it has no start
   requireFitOptions(options);
   options.least_anchors = options.most_anchors + 1;
-  EXPECT_NE(messageOf([&] { requireFitOptions(options); }).find("options->least_anchors is"),
+  EXPECT_NE(messageOf([&] { requireFitOptions(options); }).find("options->min_anchors is"),
             std::string::npos);
   options = defaultFitOptions();
   options.model = static_cast<FitKind>(77);

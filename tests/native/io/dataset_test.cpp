@@ -210,7 +210,7 @@ TEST_F(DatasetTest, NamesWhatIsMissing) {
   expectError(ErrorCode::kIo, {"1 of the files of 3 views is missing", "images/b.png"},
               [&] { openDataset(folder()); });
   std::filesystem::remove_all(path("images"));
-  expectError(ErrorCode::kIo, {"the picture 'a.png' is missing", "images"},
+  expectError(ErrorCode::kIo, {"the image 'a.png' is missing", "images"},
               [&] { openDataset(folder()); });
   storeTransforms("\"camera_angle_x\": 1.0, ", frame("no/picture") + "," + frame("none"));
   expectError(ErrorCode::kIo, {"2 of the files of 2 views are missing", "no/picture"},

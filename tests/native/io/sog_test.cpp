@@ -414,7 +414,7 @@ TEST_F(Sog, RefusesBytesThatMeanNothing) {
   scene.files["shN_labels.webp"] = SogScene::webp({{1, 0, 0, 255}, {65, 0, 0, 255}});
   refused(scene, {"shN_labels.webp", "vector 65", "splat 1", "65"});
   scene.files["shN_labels.webp"] = "RIFF";
-  refused(scene, {"shN_labels.webp", "not a WebP picture"});
+  refused(scene, {"shN_labels.webp", "not a WebP image"});
 }
 
 TEST_F(Sog, EveryTruncatedPrefixIsRefused) {

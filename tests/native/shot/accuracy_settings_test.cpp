@@ -48,7 +48,7 @@ TEST(AccuracySettings, KnobsOutsideTheirRangeAreRefusedByName) {
   };
   refused([](AccuracySettings& a) { a.samples_per_side = 0; }, "given->samples_per_side is 0");
   refused([](AccuracySettings& a) { a.samples_per_side = 2; }, "without antialiasing by samples");
-  refused([](AccuracySettings& a) { a.least_alpha = 1; }, "given->least_alpha is 1");
+  refused([](AccuracySettings& a) { a.least_alpha = 1; }, "given->min_alpha is 1");
   refused([](AccuracySettings& a) { a.budget_share = 0; }, "given->budget_share is 0");
   refused([](AccuracySettings& a) { a.level = AccuracyLevel::kReference; }, "with a knob below it");
 }

@@ -112,11 +112,11 @@ TEST(BackwardFromDrawing, RefusesAnotherPictureThanTheLast) {
   broken.scales[2] = -1.0f;
   const SplatInstance bad{&broken};
   EXPECT_THROW(drawn.draw({&bad, 1}), Error);
-  EXPECT_NE(drawn.refusal(drawn.input()).find("keeps no picture"), std::string::npos);
+  EXPECT_NE(drawn.refusal(drawn.input()).find("keeps no image"), std::string::npos);
   // Nor does one that does not keep.
   drawn.workspace.keepForBackward(false);
   drawn.draw({&instance, 1});
-  EXPECT_NE(drawn.refusal(drawn.input()).find("keeps no picture"), std::string::npos);
+  EXPECT_NE(drawn.refusal(drawn.input()).find("keeps no image"), std::string::npos);
 }
 
 TEST(BackwardFromDrawing, RefusesSplatsThatChangedAndLeavesTheResultAlone) {

@@ -134,7 +134,7 @@ TEST(BadInput, PicturesOfAnotherSizeAreRefusedByName) {
       (call.*array).resize((call.*array).size() + static_cast<size_t>(change), 1.0f);
       EXPECT_THAT(backwardMessage(call),
                   HasSubstr(std::string(name) + " holds " + std::to_string((call.*array).size()) +
-                            " values; the picture has 30 pixels of "));
+                            " values; the image has 30 pixels of "));
     }
   }
 }

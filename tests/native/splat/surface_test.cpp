@@ -305,7 +305,7 @@ TEST(Surface, RefusesOtherSizesAndNumbersThatAreNone) {
   Surface surface(scene.camera, 3.0f, {0.5f, 0.5f, 0.5f, 0.5f});
   SurfaceLayer other = surface.layer();
   other.height = 8;
-  EXPECT_EQ(messageOf(other), "the surface is 9 x 8 pixels; it must have the picture's 9 x 9");
+  EXPECT_EQ(messageOf(other), "the surface is 9 x 8 pixels; it must have the image's 9 x 9");
   surface.depth[11] = kNan;
   EXPECT_THAT(messageOf(surface.layer()), HasSubstr("depth at pixel (2, 1) is nan"));
   surface.depth[11] = -kInfinity;

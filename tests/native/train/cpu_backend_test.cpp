@@ -286,7 +286,7 @@ TEST(CpuBackend, RefusesPassesOutOfOrderAndPicturesThatDoNotFit) {
   backend->forward(camera(), overGrey());
   EXPECT_THAT(messageOf([&] { backend->loss(2, {}); }), HasSubstr("target is 2; there are 2"));
   EXPECT_THAT(messageOf([&] { backend->loss(small, {}); }),
-              HasSubstr("target 0 is 6 x 4 pixels; the picture is 47 x 35"));
+              HasSubstr("target 0 is 6 x 4 pixels; the image is 47 x 35"));
   EXPECT_THAT(messageOf([&] { backend->backward({}); }), HasSubstr("call loss first"));
   backend->loss(picture, {});
   StatisticRequest request;

@@ -299,12 +299,12 @@ TEST(ImageLoss, RefusesBadInputByName) {
     p.target.at(2, 13, 271) = bad;
     EXPECT_NE(messageOf([&] {
                 evaluate(p.rendered, p.target);
-              }).find("target picture: channel 2 of the pixel in row 13, column 271 is "),
+              }).find("target image: channel 2 of the pixel in row 13, column 271 is "),
               std::string::npos);
     p.rendered.at(0, 3, 1) = bad;
     EXPECT_NE(messageOf([&] {
                 evaluate(p.rendered, p.target);
-              }).find("rendered picture: channel 0 of the pixel in row 3, column 1 is "),
+              }).find("rendered image: channel 0 of the pixel in row 3, column 1 is "),
               std::string::npos);
   }
   std::vector<float> weights(300 * 20, 1.0f);

@@ -13,7 +13,7 @@ from .view_task import VIEWS_END, ViewTask
 
 # Share of the whole in the progress bar until the splats are there; then comes their tree.
 _SPLATS_END = 0.8
-# Of a matrix that turns, moves and scales alike: how far its axes may be from that, relative.
+# Of a matrix that rotates, moves and scales alike: how far its axes may be from that, relative.
 _EVENNESS = 1e-4
 
 
@@ -38,7 +38,7 @@ class DensifyTask(ViewTask):
         views.add(self._placed(seen.camera), seen.linear, name=name)
 
     def _placed(self, camera):
-        """The same picture, seen from the object's own space: its splats keep their numbers."""
+        """The same image, seen from the object's own space: its splats keep their numbers."""
         to_camera = np.array(camera.world_to_camera).reshape(4, 4) @ self._matrix
         to_camera[:3] /= self._scale
         for i, value in enumerate(to_camera.ravel()):
@@ -60,10 +60,10 @@ class DensifyTask(ViewTask):
 
 
 def _even_scale(matrix, name):
-    """Of a matrix that turns, moves and scales alike along all axes."""
+    """Of a matrix that rotates, moves and scales alike along all axes."""
     linear = matrix[:3, :3]
     scale = np.cbrt(np.linalg.det(linear))
     if scale <= 0 or np.abs(linear @ linear.T / scale ** 2 - np.eye(3)).max() > _EVENNESS:
         raise invalid(f"'{name}' is scaled unevenly or mirrored; choose Apply Transform first, then its splats and the "
-                      'pictures agree.')
+                      'images agree.')
     return scale

@@ -10,7 +10,7 @@ _REPORT_KEY = 'stipple_report'
 
 
 def keep(data, name, pixels):
-    """Gives splat data the picture of its report, packed. In: pixels [H,W,4], display sRGB, row 0 = top."""
+    """Gives splat data the image of its report, packed. In: pixels [H,W,4], display sRGB, row 0 = top."""
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(f'{name} Report', width, height, alpha=False)
     image.pixels.foreach_set(np.ascontiguousarray(pixels[::-1]).reshape(-1))

@@ -56,7 +56,7 @@ class Result:
     path: str           # of the asset file
     decoding: object    # DecodeSettings of these splats
     settings: object    # StippleModelSettings of the asset
-    report: object      # picture of the fit's curves, [H,W,4]
+    report: object      # image of the fit's curves, [H,W,4]
 
 
 _CHECKPOINT_SUFFIX = '.safetensors'
@@ -147,8 +147,8 @@ class FitTask(ViewTask):
                               resume=int(resumes), **chosen)
         if settings.model == 'FIELD':
             most = max(1, settings.max_splats // options.gaussians_per_anchor)
-            options.most_anchors = min(options.most_anchors, most)
-            options.least_anchors = min(options.least_anchors, options.most_anchors)
+            options.max_anchors = min(options.max_anchors, most)
+            options.min_anchors = min(options.min_anchors, options.max_anchors)
         self.job = Fit.start(self._native, views, options)
         try:
             while True:

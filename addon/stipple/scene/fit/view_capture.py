@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene as cameras see it, picture by picture: what splats are fitted to.
+"""The scene as cameras see it, image by image: what splats are fitted to.
 
-Cycles hands its passes over in memory. EEVEE and Workbench write one uncompressed picture at a time, into memory that has
-a path where the system has such (Linux: memfd), else into a folder of their own. In background mode Blender leaves no other
-way to depth, normals and scene linear colours at the samples of a render: the Viewer node keeps its first size there, the
-Render Result has none (3.4, 4.3, 5.2), and GPUOffScreen.draw_view3d() gives the viewport's picture in display colours.
+Cycles hands its passes over in memory. EEVEE and Workbench write one uncompressed image at a time, into memory that has
+a path where the system has such (Linux: memfd), else into a folder of their own. In background mode Blender leaves no
+other way to depth, normals and scene linear colours at the samples of a render: the Viewer node keeps its first size
+there, the Render Result has none (3.4, 4.3, 5.2), and GPUOffScreen.draw_view3d() gives the viewport's image in display
+colours.
 """
 
 import contextlib
@@ -51,7 +52,7 @@ class CaptureSettings:
     engine: str = 'CYCLES'    # a key of ENGINES
     size: int = 256           # pixels of the longer side
     samples: int = 64         # per pixel; Workbench takes none
-    transparent: bool = True  # False: the world is part of the pictures
+    transparent: bool = True  # False: the world is part of the images
 
 
 class Capture:
@@ -84,7 +85,7 @@ class Capture:
         self._left.close()
 
     def pose(self, name, pose):
-        """A view from a pose of view_rigs: a square picture."""
+        """A view from a pose of view_rigs: a square image."""
         camera, render = self._camera.data, self._scene.render
         camera.type, camera.sensor_fit = 'PERSP', 'HORIZONTAL'
         camera.shift_x = camera.shift_y = 0.0
@@ -175,14 +176,14 @@ class Capture:
                 bpy.ops.render.render(write_still=True, scene=scene.name)
                 self._read_file()
         if 'Combined' not in self._passes:
-            raise StippleError(f"Blender rendered no picture for view '{name}'; its messages are in the console.",
+            raise StippleError(f"Blender rendered no image for view '{name}'; its messages are in the console.",
                                Status.ERROR_IO)
         return self._captured(name, cameras.camera_of(camera_object, scene.render))
 
     def _read_file(self):
         try:
             self._passes.update(layers_of(ImageChannels.load(sources.context(), self._path)))
-            os.truncate(self._path, 0)  # an old picture never passes for a new one
+            os.truncate(self._path, 0)  # an old image never passes for a new one
         except StippleError as error:
             raise StippleError(f'A rendered view cannot be read: {error}', error.status) from None
         except OSError as error:
@@ -192,7 +193,8 @@ class Capture:
         linear = np.ascontiguousarray(self._passes['Combined'], np.float32)
         if not np.isfinite(linear).all():
             row, column = np.argwhere(~np.isfinite(linear).all(axis=2))[0]
-            raise invalid(f"View '{name}' has a colour that is not finite at pixel ({column}, {row}); a material or light "
+            raise invalid(f"View '{name}' has a colour that is not finite at pixel ({column}, {row}); a material or "
+                          f"light "
                           'of the scene makes it.')
         # An opaque film covers every pixel; of Workbench's half floats some say 0.9985.
         linear[..., 3] = np.clip(linear[..., 3], 0, 1) if self._settings.transparent else 1
@@ -219,7 +221,7 @@ def layers_of(channels):
 
 
 def _picture_path(stack):
-    """A path that Blender can write a picture to; what is there ends with the stack."""
+    """A path that Blender can write an image to; what is there ends with the stack."""
     if hasattr(os, 'memfd_create'):
         memory = os.memfd_create('stipple-view')
         stack.callback(os.close, memory)

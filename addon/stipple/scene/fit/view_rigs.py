@@ -68,7 +68,8 @@ def poses(rig, scene, depsgraph, bounds, count, seed=0, angle=0.0):
 
 def _pose(camera):
     matrix = np.linalg.inv(np.array(camera.world_to_camera).reshape(4, 4)) @ _OPENCV_TO_OPENGL
-    return Pose(Matrix(matrix.tolist()), 2 * math.atan(0.5 * camera.width / camera.fx), camera.near_plane, camera.far_plane)
+    return Pose(Matrix(matrix.tolist()), 2 * math.atan(0.5 * camera.width / camera.fx), camera.near_plane,
+                camera.far_plane)
 
 
 class _Caster:

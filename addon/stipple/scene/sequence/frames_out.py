@@ -13,7 +13,8 @@ from . import sequences
 from ..source import placement, source_settings, sources, splat_data, sync
 
 FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
-          ('SERIES', "Whole Series", "Each file of the active object's series once, all objects placed as they are now"),
+          ('SERIES', "Whole Series",
+           "Each file of the active object's series once, all objects placed as they are now"),
           ('SCENE', "Scene Range", "Each frame of the scene's range: timing, budgets and motion as animated"))
 
 
@@ -51,7 +52,8 @@ class FrameOut:
 
 def gather(context, objects, frames, budget, apply_grade=True):
     """[FrameOut] of splat objects, the active one first; frames: a key of FRAMES but 'CURRENT'; budget: 'VIEWPORT',
-    'RENDER' or 'FULL'; apply_grade: with the objects' grades. Reads no file. Errors: StippleError for a gap in a series."""
+    'RENDER' or 'FULL'; apply_grade: with the objects' grades. Reads no file. Errors: StippleError for a gap in a
+    series."""
     if frames == 'SCENE':
         return _of_scene(context, objects, budget, apply_grade)
     data = objects[0].data

@@ -50,7 +50,7 @@ class Numbered:
 
 def parse(path):
     """A path with a number in its name as a Numbered, or None."""
-    stem, suffix = split_ending(path)
+    stem, suffix = split_extension(path)
     if stem.endswith(('/', os.sep)):
         stem, suffix = stem[:-1], '/' + suffix
     folder, name = os.path.split(stem)
@@ -60,9 +60,10 @@ def parse(path):
     return Numbered(os.path.join(folder, name[:match.start()]), match[1], match[2] + suffix)
 
 
-def split_ending(path):
-    """(path without its ending, ending): the longest ending of a splat format, else the part after the last dot."""
-    fits = [e for e in (*formats.read_endings(), MODEL_SUFFIX) if path.lower().endswith(e)]
+def split_extension(path):
+    """(path without its extension, extension): the longest extension of a splat format, else the part after the last
+    dot."""
+    fits = [e for e in (*formats.read_extensions(), MODEL_SUFFIX) if path.lower().endswith(e)]
     length = max(map(len, fits), default=len(os.path.splitext(path)[1]))
     return path[:len(path) - length], path[len(path) - length:]
 
@@ -70,10 +71,10 @@ def split_ending(path):
 def frame_path(path, number):
     """The path of one frame of a series that is named after path: a.ply becomes a_0001.ply, a/meta.json
     a_0001/meta.json."""
-    stem, ending = split_ending(path)
+    stem, extension = split_extension(path)
     if stem.endswith(('/', os.sep)):
-        return f'{stem[:-1]}_{number:04d}/{ending}'
-    return f'{stem}_{number:04d}{ending}'
+        return f'{stem[:-1]}_{number:04d}/{extension}'
+    return f'{stem}_{number:04d}{extension}'
 
 
 def grouped(paths):

@@ -85,7 +85,8 @@ def write(edited):
 
 
 def show(data, cloud=None):
-    """Writes the splats of a datablock anew after its mask has changed. cloud: the whole source, where it is at hand."""
+    """Writes the splats of a datablock anew after its mask has changed. cloud: the whole source, where it is at
+    hand."""
     settings = sources.decode_settings(data.stipple)
     if source_settings.of(data.stipple).as_they_are and cloud is not None:
         splats = sources.masked(cloud, data)
@@ -109,7 +110,8 @@ def _check(obj):
     known = source_settings.of(data.stipple)
     if not known.takes_mask:
         made = 'decoded from a learned field' if known.is_learned else 'made from meshes'
-        raise invalid(f"'{obj.name}' is {made}, so there are no splats of a file to hide; choose Use as New Source first, "
+        raise invalid(f"'{obj.name}' is {made}, so there are no splats of a file to hide; choose Use as New Source "
+                      f"first, "
                       'which keeps the present ones.')
     if data.stipple.edited or sync.is_edited(data):
         raise invalid(f"'{obj.name}' was edited by hand; choose Use as New Source or Revert to Source first.")

@@ -26,24 +26,25 @@ def all_formats():
     return _known[library]
 
 
-def read_endings():
+def read_extensions():
     """Of file names that can be read, in lower case."""
-    return [ending for form in all_formats() if form.can_read for ending in form.endings]
+    return [extension for form in all_formats() if form.can_read for extension in form.extensions]
 
 
-def write_endings():
-    return [ending for form in all_formats() if form.can_write for ending in form.endings]
+def write_extensions():
+    return [extension for form in all_formats() if form.can_write for extension in form.extensions]
 
 
 def of_path(path):
     """The format whose ending a path has (the longest that fits), or None."""
-    fits = [(len(ending), form) for form in all_formats() for ending in form.endings if path.lower().endswith(ending)]
+    fits = [(len(extension), form) for form in all_formats() for extension in form.extensions
+            if path.lower().endswith(extension)]
     return max(fits, key=lambda fit: fit[0])[1] if fits else None
 
 
-def glob(endings):
+def glob(extensions):
     """What file dialogs filter by."""
-    return ';'.join('*' + ending for ending in endings)
+    return ';'.join('*' + extension for extension in extensions)
 
 
 def estimated_bytes(form, count, degree, **options):

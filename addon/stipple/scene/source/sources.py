@@ -144,8 +144,8 @@ def model(path):
 
 
 def is_at_hand(data, patience):
-    """Whether decoding a datablock's source would not have to read its file first. Where it would, reading begins in the
-    library's own thread, for the next call; patience: seconds that are waited for it."""
+    """Whether decoding a datablock's source would not have to read its file first. Where it would, reading begins in
+    the library's own thread, for the next call; patience: seconds that are waited for it."""
     stipple = data.stipple
     if not source_settings.of(stipple).has_budget or stipple.is_sequence:
         return True
@@ -198,7 +198,7 @@ def model_of(data):
 
 
 def decode(data, settings):
-    """The cloud of a datablock's model at these settings; kept for the next picture. Errors: StippleError, also for a
+    """The cloud of a datablock's model at these settings; kept for the next image. Errors: StippleError, also for a
     source that has changed."""
     check_unchanged(data)
     key = (_file_key(absolute_path(data.stipple.source, data)) + (masks.key(data),), settings)

@@ -85,8 +85,8 @@ def degree(data):
 
 
 def write(data, splats, ungraded=None):
-    """Replaces the splats of a datablock (SplatArrays or CloudColumns). ungraded: the same splats before their grade, to
-    be kept beside them."""
+    """Replaces the splats of a datablock (SplatArrays or CloudColumns). ungraded: the same splats before their grade,
+    to be kept beside them."""
     if isinstance(data, bpy.types.Mesh) and data.is_editmode:
         raise StippleError(f"'{data.name}' is in Edit Mode; leave it before its splats are written.",
                            Status.ERROR_INVALID_ARGUMENT)
@@ -138,8 +138,8 @@ def read_seen(data, kind):
 
 
 def keep_seen(data, source, seen):
-    """Keeps what was seen of all splats of a source, for when its whole budget is shown again. As text: from Blender 4 on,
-    bytes end at the first zero."""
+    """Keeps what was seen of all splats of a source, for when its whole budget is shown again. As text: from Blender 4
+    on, bytes end at the first zero."""
     for kind, name in SEEN_NAMES.items():
         if kind in seen:
             values = np.ascontiguousarray(seen[kind], np.float32).tobytes()
@@ -243,8 +243,8 @@ def _cloud(native, data, original, prefix):
 
 
 def _columns(data, prefix):
-    """(number of splats, values by COLUMN_WIDTHS' names, those of the harmonics above degree 0), flat, to be used before
-    anything is written."""
+    """(number of splats, values by COLUMN_WIDTHS' names, those of the harmonics above degree 0), flat, to be used
+    before anything is written."""
     n, rest = count(data), 0
     while data.attributes.get(f'{prefix}:sh_{rest}') is not None:
         rest += 1

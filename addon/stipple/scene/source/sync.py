@@ -108,7 +108,8 @@ def regrade(data, grade):
 
 
 def write(data, splats, key, grade=None):
-    """Stores splats (SplatArrays or CloudColumns), which are not graded, together with what they were made from. grade: None for the present one."""
+    """Stores splats (SplatArrays or CloudColumns), which are not graded, together with what they were made from. grade:
+    None for the present one."""
     grades.write(data, splats, grades.settings_of(data.stipple) if grade is None else grade)
     data[FINGERPRINT_KEY] = splat_data.fingerprint(data)
     data[WRITTEN_KEY] = key
@@ -200,7 +201,8 @@ def _complete_later():
 
 
 def complete():
-    """The slider rests: all splats of the budget. A timer's function: it returns when to be called again, None to end."""
+    """The slider rests: all splats of the budget. A timer's function: it returns when to be called again, None to
+    end."""
     if sources.is_reading():
         return REST_SECONDS
     if not _state['rendering']:
@@ -211,7 +213,7 @@ def try_sync(obj, depsgraph, mode, most=None, share=None):
     """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once.
 
     In background a render has no panel, and an engine of Blender's own draws what is stored: there the process ends
-    with one line and status 1 instead, before a wrong picture is written.
+    with one line and status 1 instead, before a wrong image is written.
     """
     name = obj.data.name
     try:

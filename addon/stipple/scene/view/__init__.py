@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a picture is asked for: cameras, effects, layers, quality."""
+"""What an image is asked for: cameras, effects, layers, quality."""

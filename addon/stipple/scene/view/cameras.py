@@ -18,7 +18,7 @@ _OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def camera_of(camera_object, render, border=None):
-    """The camera of a render, over the whole picture or a pixel border of it.
+    """The camera of a render, over the whole image or a pixel border of it.
 
     Errors: StippleError for a missing camera and for those that have no model here.
     """
@@ -37,7 +37,7 @@ def required(camera_object):
 
 
 def from_parts(camera, matrix_world, width, height, aspect_x=1.0, aspect_y=1.0, border=None, name=''):
-    """The same from a camera datablock, its matrix and a picture size in pixels."""
+    """The same from a camera datablock, its matrix and an image size in pixels."""
     if camera.type == 'PANO':
         return _panorama(camera, matrix_world, width, height, aspect_x, aspect_y, border, name or camera.name)
     if camera.type not in {'PERSP', 'ORTHO'}:
@@ -57,12 +57,12 @@ def from_parts(camera, matrix_world, width, height, aspect_x=1.0, aspect_y=1.0, 
         model = CameraModel.ORTHOGRAPHIC
     cx = 0.5 * width - camera.shift_x * fitted
     cy = 0.5 * height + camera.shift_y * fitted / pixel_height
-    return _within(border, width, height, camera, matrix_world, model=int(model), fx=focal, fy=focal / pixel_height, cx=cx,
-                   cy=cy)
+    return _within(border, width, height, camera, matrix_world, model=int(model), fx=focal, fy=focal / pixel_height,
+                   cx=cx, cy=cy)
 
 
 def _within(border, width, height, camera, matrix_world, cx, cy, **given):
-    """The StippleCamera of a border of a picture, or of all of it."""
+    """The StippleCamera of a border of an image, or of all of it."""
     if border is None:
         border = Border(0, 0, width, height)
     return StippleCamera(width=border.width, height=border.height, cx=cx - border.x,
@@ -72,14 +72,14 @@ def _within(border, width, height, camera, matrix_world, cx, cy, **given):
 
 
 def _fitted_side(camera, width, height):
-    """The side of the picture that the sensor's size is of."""
+    """The side of the image that the sensor's size is of."""
     if camera.sensor_fit == 'AUTO':
         return 'HORIZONTAL' if width >= height else 'VERTICAL'
     return camera.sensor_fit
 
 
 def _panorama(camera, matrix_world, width, height, aspect_x, aspect_y, border, name):
-    """Cycles' panoramas, which fill the picture whatever its proportions are."""
+    """Cycles' panoramas, which fill the image whatever its proportions are."""
     settings = version.panorama_settings(camera)
     kind = getattr(settings, 'panorama_type', None)
     if kind == 'EQUIRECTANGULAR':
@@ -88,14 +88,14 @@ def _panorama(camera, matrix_world, width, height, aspect_x, aspect_y, border, n
             raise StippleError(f"Panoramic camera '{name}' sees {np.degrees(across):g} by {np.degrees(up):g} degrees; "
                                'more than 0 is needed.', Status.ERROR_INVALID_ARGUMENT)
         fx, fy = width / across, height / up
-        return _within(border, width, height, camera, matrix_world, model=int(CameraModel.EQUIRECTANGULAR), fx=fx, fy=fy,
-                       cx=-settings.longitude_min * fx, cy=settings.latitude_max * fy)
+        return _within(border, width, height, camera, matrix_world, model=int(CameraModel.EQUIRECTANGULAR), fx=fx,
+                       fy=fy, cx=-settings.longitude_min * fx, cy=settings.latitude_max * fy)
     if kind == 'FISHEYE_EQUIDISTANT':
         return _within(border, width, height, camera, matrix_world, model=int(CameraModel.FISHEYE_EQUIDISTANT),
-                       fx=width / settings.fisheye_fov, fy=height / settings.fisheye_fov, cx=0.5 * width, cy=0.5 * height,
-                       field_of_view=_held_angle(settings.fisheye_fov, name))
+                       fx=width / settings.fisheye_fov, fy=height / settings.fisheye_fov, cx=0.5 * width,
+                       cy=0.5 * height, field_of_view=_held_angle(settings.fisheye_fov, name))
     if kind == 'FISHEYE_EQUISOLID':
-        # Millimetres of the sensor that the picture's sides are of.
+        # Millimetres of the sensor that the image's sides are of.
         wide, high = aspect_x * width, aspect_y * height
         if _fitted_side(camera, wide, high) == 'HORIZONTAL':
             sensor = camera.sensor_width, camera.sensor_width * high / wide
@@ -110,16 +110,17 @@ def _panorama(camera, matrix_world, width, height, aspect_x, aspect_y, border, n
 
 
 def _held_angle(angle, name):
-    """A fisheye's field of view, radians. Errors: StippleError above a full turn: nothing is there twice."""
+    """A fisheye's field of view, radians. Errors: StippleError above a full circle: nothing is there twice."""
     # Blender keeps single precision.
     if angle > 2 * np.pi * (1 + 1e-6):
-        raise StippleError(f"Fisheye camera '{name}' has a field of view of {np.degrees(angle):g} degrees; at most 360 are "
+        raise StippleError(f"Fisheye camera '{name}' has a field of view of {np.degrees(angle):g} degrees; at most 360 "
+                           f"are "
                            'allowed.', Status.ERROR_INVALID_ARGUMENT)
     return min(angle, 2 * np.pi)
 
 
 def from_view(region_data, width, height):
-    """The camera of a 3D view, at a picture size that has the view's proportions."""
+    """The camera of a 3D view, at an image size that has the view's proportions."""
     window = np.array(region_data.window_matrix, np.float64)
     view = np.array(region_data.view_matrix, np.float64)
     perspective = window[3, 2] != 0
@@ -172,8 +173,8 @@ def looked_through(context):
 
 
 def panorama_of_view(context, region, camera_object, depsgraph):
-    """(StippleCamera, Border) of a panoramic camera that a view looks through: over the region, as the picture in the
-    camera's frame goes on, and what of the region the picture fills, or None where it lies outside.
+    """(StippleCamera, Border) of a panoramic camera that a view looks through: over the region, as the image in the
+    camera's frame goes on, and what of the region the image fills, or None where it lies outside.
 
     Errors: StippleError for types that have no model here.
     """
@@ -191,7 +192,7 @@ def panorama_of_view(context, region, camera_object, depsgraph):
 
 
 def _camera_frame(context, region, camera_object):
-    """(left, right, bottom, top) of the camera's picture in the region's pixels."""
+    """(left, right, bottom, top) of the camera's image in the region's pixels."""
     matrix = np.array(camera_object.matrix_world.normalized(), np.float64)
     corners = np.ones((4, 4))
     corners[:, :3] = [tuple(corner) for corner in camera_object.data.view_frame(scene=context.scene)]
@@ -201,7 +202,7 @@ def _camera_frame(context, region, camera_object):
 
 
 def part_of(camera, border, coarse=1):
-    """The camera of a part of its picture, with one pixel for coarse x coarse of its own."""
+    """The camera of a part of its image, with one pixel for coarse x coarse of its own."""
     part = StippleCamera.from_buffer_copy(camera)
     part.width, part.height = max(border.width // coarse, 1), max(border.height // coarse, 1)
     x, y = part.width / border.width, part.height / border.height
@@ -218,7 +219,7 @@ def step_back(window_matrix):
 
 
 def world_to_camera(matrix_world):
-    """[4,4] rigid; a camera's scale does not change its picture."""
+    """[4,4] rigid; a camera's scale does not change its image."""
     matrix = np.array(matrix_world, np.float64)
     axes = matrix[:3, :3]
     matrix[:3, :3] = axes / np.linalg.norm(axes, axis=0)

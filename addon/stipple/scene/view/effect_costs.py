@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each effect of a picture takes: its time with it less that without it, for the present view."""
+"""What each effect of an image takes: its time with it less that without it, for the present view."""
 
 import statistics
 import time
@@ -10,9 +10,9 @@ from ...jobs import Task
 from ..source import sources
 from . import effects, mattes, picture_options, quality
 
-# Pictures with and without, in turns; the median of the differences counts where it is above half their range.
+# Images with and without, alternately; the median of the differences counts where it is above half their range.
 REPETITIONS = 3
-# A blurred picture's time is that of its samples: so many are drawn, the rest is counted.
+# A blurred image's time is that of its samples: so many are drawn, the rest is counted.
 BLUR_SAMPLES = 8
 # No further turn of an effect begins after its share of this.
 MOST_SECONDS = 60.0
@@ -41,7 +41,7 @@ def start(scene, view):
             order = ObjectOrder.APART
         options = renderer.options(blend_space=view.picture.blend_space, background=background, accuracy=accuracy,
                                    object_order=order)
-        blur = picture_options.blur(scene, None if left_out == Effect.DEPTH_OF_FIELD else view.lens,
+        blur = picture_options.blur(scene, None if left_out == Effect.DEPTH_OF_FIELD else view.aperture,
                                     None if left_out == Effect.MOTION_BLUR else view.shutter)
         scale = 1.0
         if blur is not None:
@@ -68,7 +68,8 @@ def start(scene, view):
             if has_meshes and left_out != Effect.MESH_OCCLUSION:
                 surface = mattes.surface(view.meshes, view.camera, task.run)
             begun_picture = time.perf_counter()
-            passes = {name for effect, name in picture_options.PASSES.items() if effect in active and effect != left_out}
+            passes = {name for effect, name in picture_options.PASSES.items() if effect in active
+                      and effect != left_out}
             task.run(renderer.start(view.placed, view.camera, chosen[0], surface=surface, blur=chosen[1],
                                     **{name: name in passes for name in picture_options.PASSES.values()}).job)
             return begun_picture - begin + chosen[2] * (time.perf_counter() - begun_picture)

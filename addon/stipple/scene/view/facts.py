@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a scene asks of a picture: size, border, background, passes, colour."""
+"""What a scene asks of an image: size, border, background, passes, colour."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from ...binding.structs import BlendSpace, Status
 
 @dataclass(frozen=True)
 class Border:
-    """A rectangle of pixels, from the bottom left corner of the whole picture."""
+    """A rectangle of pixels, from the bottom left corner of the whole image."""
 
     x: int
     y: int
@@ -49,10 +49,10 @@ def picture_facts(scene, view_layer):
 
 
 def refuse_stereo(render):
-    """Errors: StippleError where a picture of several views is wanted."""
+    """Errors: StippleError where an image of several views is wanted."""
     if render.use_multiview:
         count = sum(view.use for view in render.views)
-        raise StippleError(f'Stereoscopy is on with {count} views; splats are rendered in pictures of one view, with '
+        raise StippleError(f'Stereoscopy is on with {count} views; splats are rendered in images of one view, with '
                            'Output Properties > Stereoscopy off.', Status.ERROR_UNSUPPORTED)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Cycles drew of everything but the splats, as a surface between the splats, and the picture of both.
+"""What Cycles drew of everything but the splats, as a surface between the splats, and the image of both.
 
 Arrays are float32 and scene linear, colours premultiplied; rows as Blender has them, bottom row first. The library
 has the first row at the top: what goes to its renderer and comes back is turned over.
@@ -10,7 +10,7 @@ from ...binding.renderer import Surface
 
 
 class CyclesLayers:
-    """Passes of a picture whose film was transparent."""
+    """Passes of an image whose film was transparent."""
 
     def __init__(self, context, combined, depth, shadow=None):
         """combined [H,W,4]; depth [H,W] of one sample of each pixel; shadow [H,W,3] factors of what is behind a shadow
@@ -22,7 +22,8 @@ class CyclesLayers:
         self._layers.take_world(seen, plain)
 
     def hold_out(self, matte):
-        """Before take_world. matte: a Surface of the holdouts, of which Cycles' passes show nothing but what they leave of the rest."""
+        """Before take_world. matte: a Surface of the holdouts, of which Cycles' passes show nothing but what they leave
+        of the rest."""
         self._layers.hold_out(matte.depth[::-1], matte.opacity[::-1])
 
     def surface(self):
@@ -33,7 +34,7 @@ class CyclesLayers:
         return bool(self._layers.info().has_shadows)
 
     def matte(self):
-        """The meshes as a matte: what is left of a picture is the splats' part of it."""
+        """The meshes as a matte: what is left of an image is the splats' part of it."""
         return _turned_over(self._layers.matte())
 
     def matte_of(self, catchers, margin):

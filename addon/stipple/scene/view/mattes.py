@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that hide the splats behind them and are not in the picture themselves."""
+"""Meshes that hide the splats behind them and are not in the image themselves."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..source import placement, sources, splat_data
 
 # Samples of a pixel along each side.
 SIDE = 4
-LONGEST_SIDE = 65536  # of a native picture, pixels
+LONGEST_SIDE = 65536  # of a native image, pixels
 
 
 def gather(depsgraph, wanted='ALL'):

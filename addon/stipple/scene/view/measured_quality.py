@@ -21,7 +21,7 @@ class Measured:
     report: object     # binding.accuracy.AccuracyReport
     camera_name: str
     frame: int
-    key: str           # of what the picture was of
+    key: str           # of what the image was of
 
 
 # By scene.
@@ -42,7 +42,7 @@ def forget():
 
 
 def key_of(scene):
-    """A text that is equal while a measured picture would be the same."""
+    """A text that is equal while a measured image would be the same."""
     return repr((facts.picture_size(scene.render), scene.stipple.splat_color, scene.stipple.max_splats_render))
 
 

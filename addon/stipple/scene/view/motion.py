@@ -39,10 +39,10 @@ def is_wanted(scene, view_layer):
 
 
 def sample(scene, depsgraph, camera_object, keys, set_frame):
-    """The Shutter of a picture. keys: of instances.gather_keyed, in the order of the picture's instances.
+    """The Shutter of an image. keys: of instances.gather_keyed, in the order of the image's instances.
 
-    set_frame: called with (frame, sub-frame) to evaluate the depsgraph there; it is back at the scene's own frame at the
-    end, whatever happens.
+    set_frame: called with (frame, sub-frame) to evaluate the depsgraph there; it is back at the scene's own frame at
+    the end, whatever happens.
     """
     frame, subframe = scene.frame_current, scene.frame_subframe
     count = max([_steps(camera_object)] + [_steps(scene_object) for scene_object in _objects(keys)])

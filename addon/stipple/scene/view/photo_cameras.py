@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cameras of photo data sets as Blender cameras, with their pictures behind them."""
+"""Cameras of photo data sets as Blender cameras, with their images behind them."""
 
 import os
 
@@ -35,7 +35,7 @@ def chosen_frame(path, up_axis):
 
 
 def open_views(context, path):
-    """(views, None), or, where pictures are missing, (cameras alone, the error)."""
+    """(views, None), or, where images are missing, (cameras alone, the error)."""
     try:
         return Views.open(context, path), None
     except StippleError as error:
@@ -67,8 +67,8 @@ def add(views, collection, to_world, with_backgrounds):
 
 
 def set_optics(data, camera):
-    """The inverse of cameras.from_parts() for a picture of the camera's proportions with square pixels. Sizes of 0, of
-    cameras whose pictures are not known, count as those of a square."""
+    """The inverse of cameras.from_parts() for an image of the camera's proportions with square pixels. Sizes of 0, of
+    cameras whose images are not known, count as those of a square."""
     width, height = camera.width or 1, camera.height or 1
     cx, cy = (camera.cx, camera.cy) if camera.width else (0.5, 0.5)
     data.sensor_fit = 'HORIZONTAL'

@@ -80,7 +80,7 @@ def point_at(depsgraph, region, region_data, x, y):
 
 
 def point_of_pixel(placed, camera, x, y):
-    """The same for instances of instances.gather and a place in a camera's picture, pixels from its top left."""
+    """The same for instances of instances.gather and a place in a camera's image, pixels from its top left."""
     camera.cx, camera.cy, camera.width, camera.height = camera.cx - x + 0.5, camera.cy - y + 0.5, 1, 1
     renderer = Renderer(sources.context())
     task = renderer.start(placed, camera, renderer.options(), median_depth=True)

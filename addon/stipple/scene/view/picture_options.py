@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Effects of a picture as what the native renderer is given."""
+"""Effects of an image as what the native renderer is given."""
 
 from ...binding.blur import Blur
 from ...binding.structs import CameraModel, Effect
@@ -13,12 +13,12 @@ def is_panoramic(camera):
     return camera.model not in (CameraModel.PERSPECTIVE, CameraModel.ORTHOGRAPHIC)
 
 
-def blur(scene, lens, shutter):
-    """The Blur of depth of field (a Lens or None) and motion (a Shutter or None); None where all is sharp."""
+def blur(scene, aperture, shutter):
+    """The Blur of depth of field (an Aperture or None) and motion (a Shutter or None); None where all is sharp."""
     moves = shutter is not None and shutter.moves
-    if lens is None and not moves:
+    if aperture is None and not moves:
         return None
-    given = {} if lens is None else vars(lens)
+    given = {} if aperture is None else vars(aperture)
     if moves:
         given = {**given, 'cameras': shutter.cameras, 'instances': shutter.instances, 'curve': shutter.curve}
     return Blur(samples=scene.stipple.blur_samples, **given)

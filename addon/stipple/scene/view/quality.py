@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How exact pictures are to be: settings of a scene's viewport and render column as StippleAccuracy."""
+"""How exact images are to be: settings of a scene's viewport and render column as StippleAccuracy."""
 
 import struct
 
@@ -24,8 +24,10 @@ PRECISIONS = (('FLOAT', "Single", "Single precision, as splats are trained"),
               ('DOUBLE', "Double", "Double precision"))
 # Knobs that are enumerations, and what their values are called in the native library.
 _ENUMS = {'order': SplatOrder, 'projection': Projection, 'antialiasing': Sampling, 'precision': Precision}
-_NUMBERS = ('samples_per_side', 'sh_degree_limit', 'least_alpha', 'budget_share')
+_NUMBERS = ('samples_per_side', 'sh_degree_limit', 'min_alpha', 'budget_share')
 KNOBS = tuple(_ENUMS) + _NUMBERS
+# Knobs that .blend files keep under another name.
+_PROPERTIES = {'min_alpha': 'least_alpha'}
 _knobs = {}
 COLUMNS = (('VIEWPORT', "Viewport", "Rendered shading of the engine Stipple"), ('RENDER', "Render", "Final renders"))
 # What can be compared.
@@ -35,6 +37,11 @@ SIDES = COLUMNS + (('REFERENCE', "Reference", "The level that others are compare
 def column(scene, name):
     """The settings of 'VIEWPORT' or 'RENDER'."""
     return scene.stipple.quality_viewport if name == 'VIEWPORT' else scene.stipple.quality_render
+
+
+def property_of(knob):
+    """The property of a column of settings that keeps a knob of StippleAccuracy."""
+    return _PROPERTIES.get(knob, knob)
 
 
 def accuracy_of(library, settings, rows=None, needs_rays=False):
@@ -47,7 +54,7 @@ def accuracy_of(library, settings, rows=None, needs_rays=False):
     knobs = {name: int(enum[getattr(settings, name)]) for name, enum in _ENUMS.items()}
     for name in _NUMBERS:
         # What rounds to the stored number is meant: Blender keeps single precision.
-        value, exact = getattr(settings, name), getattr(made, name)
+        value, exact = getattr(settings, property_of(name)), getattr(made, name)
         knobs[name] = exact if value == _single(exact) else value
     if rows is not None and level != AccuracyLevel.REFERENCE:
         knobs.update(_for_effects(knobs, rows, level))
@@ -87,25 +94,25 @@ def store(settings, accuracy):
 
 
 def is_same(one, other):
-    """Whether two StippleAccuracy draw the same picture."""
+    """Whether two StippleAccuracy draw the same image."""
     return all(_single(getattr(one, name)) == _single(getattr(other, name)) for name in ('level', *KNOBS))
 
 
 def is_changed(library, settings):
     """Whether any knob differs from the level's. Errors: StippleError."""
     made = native.accuracy(library, AccuracyLevel[settings.level])
-    return any(getattr(settings, name) != value for name, value in _values(made))
+    return any(getattr(settings, property_of(name)) != value for name, value in _values(made))
 
 
 def key_of(settings):
     """A text that is equal for equal settings."""
-    return repr([getattr(settings, name) for name in ('level', *KNOBS)])
+    return repr([getattr(settings, property_of(name)) for name in ('level', *KNOBS)])
 
 
 def _take(settings, accuracy):
     for name, value in _values(accuracy):
-        if getattr(settings, name) != value:
-            setattr(settings, name, value)
+        if getattr(settings, property_of(name)) != value:
+            setattr(settings, property_of(name), value)
 
 
 def _values(accuracy):

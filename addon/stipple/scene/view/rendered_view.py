@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture that a render of the present frame would make: its splats, camera and settings, for measuring it."""
+"""The image that a render of the present frame would make: its splats, camera and settings, for measuring it."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ class RenderedView:
     picture: object       # facts.PictureFacts
     meshes: list          # as of mattes.gather
     shutter: object       # motion.Shutter, or None
-    lens: object          # lenses.Lens, or None
+    aperture: object          # apertures.Aperture, or None
     rows: list            # [EffectRow]
     seen: object          # effects.Look
 
@@ -41,5 +41,5 @@ def gather(context, mode='RENDER'):
     meshes = mattes.gather(depsgraph, wanted)
     seen = effects.look(sources.context(), scene, placed, camera, scene.camera, shutter, len(meshes))
     rows = effects.plan(sources.context().library, scene, view_layer, depsgraph, seen)
-    lens = effects.lens_of(scene.camera, depsgraph)
-    return RenderedView(placed, camera, facts.picture_facts(scene, view_layer), meshes, shutter, lens, rows, seen)
+    aperture = effects.aperture_of(scene.camera, depsgraph)
+    return RenderedView(placed, camera, facts.picture_facts(scene, view_layer), meshes, shutter, aperture, rows, seen)

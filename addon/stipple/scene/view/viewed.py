@@ -85,8 +85,8 @@ def shown(viewed, space, depsgraph):
 
 
 def shows(space, depsgraph, owner, obj):
-    """Whether a view shows an object: local view, local collections, object types. owner: the original object itself, or
-    the instancer that it belongs to."""
+    """Whether a view shows an object: local view, local collections, object types. owner: the original object itself,
+    or the instancer that it belongs to."""
     # Before point clouds had an entry of their own in the popover, they always showed.
     of_type = space.show_object_viewport_mesh if obj.type == 'MESH' else getattr(
         space, 'show_object_viewport_pointcloud', True)
@@ -161,7 +161,8 @@ def _written_state(data):
 def note_changes(depsgraph):
     """Notices which datablocks an evaluation has changed."""
     for update in depsgraph.updates:
-        if update.is_updated_geometry and isinstance(update.id, (bpy.types.Object, bpy.types.Mesh, bpy.types.PointCloud)):
+        if update.is_updated_geometry and isinstance(update.id,
+                                                     (bpy.types.Object, bpy.types.Mesh, bpy.types.PointCloud)):
             name = update.id.original.name_full
             _geometry_versions[name] = _geometry_versions.get(name, 0) + 1
 

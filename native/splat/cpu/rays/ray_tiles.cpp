@@ -351,7 +351,7 @@ RenderResult renderRayTilesWith(RayTileKernel kernel, std::span<const SplatInsta
                                 const Camera& camera, const RenderOptions& options,
                                 const RayOptions& rays, Progress* progress) {
   if (!rays.areas.empty()) {
-    fail(ErrorCode::kInvalidArgument, "areas are given; single precision draws whole pictures");
+    fail(ErrorCode::kInvalidArgument, "areas are given; single precision draws whole images");
   }
   const PlacedScene scene = placeScene(instances, camera, options);
   requireOrder(scene, rays);

@@ -35,7 +35,7 @@ void requireSize(std::span<const float> values, size_t pixel_count, size_t chann
   if (values.empty() && may_be_empty) return;
   if (values.size() == pixel_count * channels) return;
   fail(ErrorCode::kInvalidArgument, std::string(what) + " holds " + std::to_string(values.size()) +
-                                        " values; the picture has " + std::to_string(pixel_count) +
+                                        " values; the image has " + std::to_string(pixel_count) +
                                         " pixels of " + std::to_string(channels));
 }
 
@@ -298,7 +298,7 @@ void requireSame(const RenderWorkspace::Arrays& drawn) {
   }
   if (is_same && fingerprintOf(scene, drawn.visible) == drawn.kept.fingerprint) return;
   fail(ErrorCode::kInvalidArgument,
-       "the splats changed after their picture was drawn; draw them again, then go backward");
+       "the splats changed after their image was drawn; draw them again, then go backward");
 }
 
 uint64_t resultBytes(const SplatCloud* cloud, const BackwardInput& input) {
@@ -372,18 +372,17 @@ void renderBackwardWith(const BackwardKernel& kernel, BackProjector project, Ren
   const KeptPicture& kept = arrays.kept;
   if (kept.number == 0) {
     fail(ErrorCode::kInvalidArgument,
-         "the workspace keeps no picture; call keepForBackward(true) before one is drawn into it");
+         "the workspace keeps no image; call keepForBackward(true) before one is drawn into it");
   }
   if (picture.number != kept.number) {
-    fail(ErrorCode::kInvalidArgument,
-         "picture " + std::to_string(picture.number) +
-             " is not what the workspace drew last, which is picture " +
-             std::to_string(kept.number));
+    fail(ErrorCode::kInvalidArgument, "image " + std::to_string(picture.number) +
+                                          " is not what the workspace drew last, which is image " +
+                                          std::to_string(kept.number));
   }
   requireSizes(kept, input);
   if (!input.depth_gradient.empty() && !kept.with_depth) {
     fail(ErrorCode::kInvalidArgument,
-         "depth_gradient is given for a picture that was drawn without depth");
+         "depth_gradient is given for an image that was drawn without depth");
   }
   requireSame(arrays);
   requireMemory(backwardMemoryBound(drawn, input), memory_limit_bytes, arrays.scene.splat_count);

@@ -457,18 +457,18 @@ void drawTiles(TileKernel kernel, Projector projector, std::span<const SplatInst
   static std::atomic<uint64_t> pictures{0};
   if (kept && hasLayer(options)) {
     fail(ErrorCode::kUnsupported,
-         "the picture has a surface; pictures that a backward pass goes on from can have none");
+         "the image has a surface; images that a backward pass goes on from can have none");
   }
   if (kept && options.least_alpha != kMinAlpha) {
-    fail(ErrorCode::kUnsupported, "least_alpha is " + std::to_string(options.least_alpha) +
-                                      "; pictures that a backward pass goes on from have 1/255");
+    fail(ErrorCode::kUnsupported, "min_alpha is " + std::to_string(options.least_alpha) +
+                                      "; images that a backward pass goes on from have 1/255");
   }
   auto& [scene, visible, lists, last, passes] = workspace.arrays();
   last.number = 0;  // also where this fails on the way
   placeSceneUnread(instances, camera, options, scene);
   if (kept && scene.has_holdouts) {
     fail(ErrorCode::kUnsupported,
-         "an instance is a holdout; pictures that a backward pass goes on from can have none");
+         "an instance is a holdout; images that a backward pass goes on from can have none");
   }
   advance(progress, 0.0, "Projecting splats");
   findVisibleSplats(projector, scene, progress, visible);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The opening of a camera's lens, from Blender's depth of field settings, as Cycles has it."""
+"""The aperture of a camera, from Blender's depth of field settings, as Cycles has it."""
 
 from dataclasses import dataclass
 
@@ -10,16 +10,16 @@ LEAST_FSTOP = 1e-5
 
 
 @dataclass(frozen=True)
-class Lens:
+class Aperture:
     aperture_radius: float  # metres
     focus_distance: float   # metres, along the view
     blades: int             # 0: round
     rotation: float         # radians
-    ratio: float            # the opening is that much narrower than high
+    ratio: float            # height over width
 
 
-def lens_of(camera_object, depsgraph):
-    """The Lens of a camera at the depsgraph's time, or None where all is sharp."""
+def aperture_of(camera_object, depsgraph):
+    """The Aperture of a camera at the depsgraph's time, or None where all is sharp."""
     evaluated = camera_object.evaluated_get(depsgraph)
     camera = evaluated.data
     if not camera.dof.use_dof:
@@ -29,7 +29,7 @@ def lens_of(camera_object, depsgraph):
     # The opening's diameter is the focal length over the f-stop; orthographic cameras have none and count as one metre.
     length = 1.0 if camera.type == 'ORTHO' else 1e-3 * camera.lens
     blades = dof.aperture_blades if dof.aperture_blades >= 3 else 0
-    return Lens(length / (2 * stop), focus_distance(evaluated, depsgraph), blades, dof.aperture_rotation,
+    return Aperture(length / (2 * stop), focus_distance(evaluated, depsgraph), blades, dof.aperture_rotation,
                 dof.aperture_ratio)
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The engine Stipple's picture of a 3D view, by the native renderer.
+"""The engine Stipple's image of a 3D view, by the native renderer.
 
-A view that changes gets a coarse picture, one that rests a fine one, and through a camera with depth of field then
-averages of more and more pictures, until they are as many as a render has. All are made by jobs; the view shows the
-last picture until the next is there, so turning it never waits for more than a moment.
+A view that changes gets a coarse image, one that rests a fine one, and through a camera with depth of field then
+averages of more and more images, until they are as many as a render has. All are made by jobs; the view shows the
+last image until the next is there, so rotating it never waits for more than a moment.
 """
 
 import dataclasses
@@ -20,20 +20,20 @@ from ..scene import instances
 from ..scene.source import sources
 from ..scene.view import cameras, effects, facts, mattes, picture_options, quality, viewed
 
-# Coarse pictures have one pixel for this many of the region's along each side: the least, the first and the most.
+# Coarse images have one pixel for this many of the region's along each side: the least, the first and the most.
 # Beyond the most, ordering the splats takes the time and not their pixels.
 COARSE = (2, 4, 8)
-# Seconds that a coarse picture should take: above, the next is coarser; far below, finer.
+# Seconds that a coarse image should take: above, the next is coarser; far below, finer.
 COARSE_SECONDS = 0.04
-# Seconds that a redraw waits for a coarse picture before it shows the last one instead.
+# Seconds that a redraw waits for a coarse image before it shows the last one instead.
 PATIENCE = 0.02
-# Samples of meshes' edges along each side of a pixel of a fine picture; a coarse one has one.
+# Samples of meshes' edges along each side of a pixel of a fine image; a coarse one has one.
 MATTE_SIDE = 2
-# Levels of quality that coarse pictures have too; others take their time.
+# Levels of quality that coarse images have too; others take their time.
 QUICK_LEVELS = {'DRAFT', 'PREVIEW'}
 # Seconds without a change after which a view rests.
 REST_SECONDS = 0.15
-# An average is of so many times the pictures of the one shown before it: all of them together take a third longer
+# An average is of so many times the images of the one shown before it: all of them together take a third longer
 # than the last alone.
 MORE_SAMPLES = 4
 
@@ -44,7 +44,7 @@ class ViewCamera:
 
     camera: object       # StippleCamera over the region
     border: object       # facts.Border, the part of it that is drawn, or None for nothing
-    lens: object = None  # lenses.Lens, or None where all is sharp
+    aperture: object = None  # apertures.Aperture, or None where all is sharp
 
     @property
     def is_panoramic(self):
@@ -55,14 +55,15 @@ def view_camera(context, depsgraph):
     """The ViewCamera of a 3D view. Errors: StippleError for panoramas that have no model here."""
     region, data = context.region, context.region_data
     through = cameras.looked_through(context)
-    lens = effects.lens_of(through, depsgraph) if through is not None else None
+    aperture = effects.aperture_of(through, depsgraph) if through is not None else None
     if through is not None and through.data.type == 'PANO':
-        return ViewCamera(*cameras.panorama_of_view(context, region, through, depsgraph), lens)
-    if lens is not None:
-        # From where the picture is drawn.
+        return ViewCamera(*cameras.panorama_of_view(context, region, through, depsgraph), aperture)
+    if aperture is not None:
+        # From where the image is drawn.
         behind = cameras.step_back(data.window_matrix)
-        lens = dataclasses.replace(lens, focus_distance=lens.focus_distance + behind)
-    return ViewCamera(cameras.from_view(data, region.width, region.height), cameras.view_border(context, region), lens)
+        aperture = dataclasses.replace(aperture, focus_distance=aperture.focus_distance + behind)
+    return ViewCamera(cameras.from_view(data, region.width, region.height), cameras.view_border(context, region),
+                      aperture)
 
 
 class ViewMattes:
@@ -87,8 +88,8 @@ class ViewMattes:
         self._read = used
 
 
-class ViewPicture:
-    """The picture of one 3D view: coarse at once, fine when the view rests."""
+class ViewImage:
+    """The image of one 3D view: coarse at once, fine when the view rests."""
 
     def __init__(self):
         self._instances = []
@@ -101,8 +102,8 @@ class ViewPicture:
         self._changed = 0.0    # when that was last another
         self._task = None      # _Making, or None
         self._shown = None     # _Shown, or None
-        self._sample_count = None  # pictures of the last average of what the view shows, where it is known
-        self._surface = None   # Surface of the meshes that hide splats in fine pictures of it, or None
+        self._sample_count = None  # images of the last average of what the view shows, where it is known
+        self._surface = None   # Surface of the meshes that hide splats in fine images of it, or None
 
     def update(self, depsgraph, warn):
         """Takes what the view shows now. Errors: StippleError."""
@@ -112,7 +113,7 @@ class ViewPicture:
         self._version += 1
 
     def draw(self, engine, context, depsgraph):
-        """Draws, and asks for another call while a finer picture is on its way. Errors: StippleError."""
+        """Draws, and asks for another call while a finer image is on its way. Errors: StippleError."""
         space, scene = context.space_data, depsgraph.scene
         seen = view_camera(context, depsgraph)
         if seen.border is None:
@@ -122,8 +123,8 @@ class ViewPicture:
         # Nothing projects meshes into panoramas: there they hide nothing, as in renders.
         hiding = [] if not entries or seen.is_panoramic else [
             entry for entry in self._mattes.placed if viewed.shows(space, depsgraph, *entry[:2])]
-        key = (self._version, tuple(id(entry) for entry in entries + hiding), bytes(seen.camera), seen.border, seen.lens,
-               planes.tobytes(), facts.blend_space(scene), scene.render.film_transparent,
+        key = (self._version, tuple(id(entry) for entry in entries + hiding), bytes(seen.camera), seen.border,
+               seen.aperture, planes.tobytes(), facts.blend_space(scene), scene.render.film_transparent,
                quality.key_of(scene.stipple.quality_viewport), effects.choices_of(scene), scene.stipple.blur_samples)
         now = time.perf_counter()
         if key != self._key:
@@ -146,7 +147,7 @@ class ViewPicture:
 
     def _is_done(self, seen):
         """Whether nothing finer than what is shown follows."""
-        if not self._shown.is_fine or seen.lens is None:
+        if not self._shown.is_fine or seen.aperture is None:
             return self._shown.is_fine
         return self._sample_count is not None and self._shown.samples >= self._sample_count
 
@@ -156,8 +157,8 @@ class ViewPicture:
             self._task = None
 
     def _start(self, scene, depsgraph, seen, entries, hiding, planes, coarse, samples=1):
-        """Starts the picture of the border's pixels with one pixel for coarse x coarse of them, the average of so many
-        pictures at most."""
+        """Starts the image of the border's pixels with one pixel for coarse x coarse of them, the average of so many
+        images at most."""
         if self._renderer is None:
             self._renderer = Renderer(sources.context())
         background = None if scene.render.film_transparent else facts.world_colour(scene.world)
@@ -167,7 +168,7 @@ class ViewPicture:
                                          object_order=effects.object_order(scene, placed))
         blur = None
         if samples > 1:
-            blur = picture_options.blur(scene, seen.lens, None)
+            blur = picture_options.blur(scene, seen.aperture, None)
             if self._sample_count is None:
                 self._sample_count = self._renderer.sample_count(placed, part, options, blur)
             blur.samples = samples = min(samples, self._sample_count)
@@ -182,7 +183,7 @@ class ViewPicture:
         self._task = _Making(begin, meshes, self._surface, self._key, seen.border, coarse, samples)
 
     def _accuracy(self, scene, depsgraph, seen, coarse):
-        """How exact a picture is. While the view turns nothing slow is done, whatever a resting one asks for."""
+        """How exact an image is. While the view rotates nothing slow is done, whatever a resting one asks for."""
         settings, library = scene.stipple.quality_viewport, self._renderer.library
         if coarse > 1 and settings.level not in QUICK_LEVELS:
             # Panoramas are not there but along rays.
@@ -206,7 +207,7 @@ class ViewPicture:
         return placed
 
     def _take(self, patience=0.0):
-        """Shows the picture in the making if it is done, or gets done within some seconds."""
+        """Shows the image in the making if it is done, or gets done within some seconds."""
         if self._task is None:
             return
         until = time.perf_counter() + patience
@@ -223,7 +224,7 @@ class ViewPicture:
         self._shown = _Shown(_texture(task.colour), task.key, task.is_fine, task.border, task.samples)
 
     def _adapt(self, seconds):
-        """Chooses how coarse the next picture is by what the last one took."""
+        """Chooses how coarse the next image is by what the last one took."""
         if seconds > COARSE_SECONDS:
             self._coarse = min(2 * self._coarse, COARSE[2])
         elif seconds < COARSE_SECONDS / 6:
@@ -232,10 +233,10 @@ class ViewPicture:
 
 
 class _Making:
-    """A picture that a job makes, after another has drawn the depth of meshes where there are any."""
+    """An image that a job makes, after another has drawn the depth of meshes where there are any."""
 
     def __init__(self, begin, meshes, surface, key, border, coarse, samples):
-        """begin: starts the picture's job behind a Surface, or None. meshes: of mattes.start_samples, or None for those
+        """begin: starts the image's job behind a Surface, or None. meshes: of mattes.start_samples, or None for those
         of `surface`."""
         self._begin, self._meshes = begin, meshes
         self.surface = surface if coarse == 1 else None
