@@ -26,7 +26,8 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
     threads: IntProperty(name="Threads", description="Processor threads that native work may use, 0 for all", default=0,
                          min=0, max=1024)
     memory_limit: IntProperty(name="Memory Limit", description="Work that would need more memory than this many "
-                              "mebibytes is refused before it starts, 0 for no limit", default=0, min=0)
+                              "mebibytes is refused before it starts, 0 for 60 % of this machine's memory", default=0,
+                              min=0)
     cache_folder: StringProperty(name="Cache Folder", description="Where sources of files that are not saved yet are "
                                  "kept, empty for Blender's user folder", subtype='DIR_PATH',
                                  options=version.RELATIVE_PATH)

@@ -23,7 +23,9 @@ StippleStatus stipple_context_create(const StippleContextOptions* options,
     }
     auto state = std::make_shared<ContextState>();
     state->thread_count = given.thread_count;
-    if (given.memory_limit_bytes != 0) state->memory_limit_bytes = given.memory_limit_bytes;
+    state->memory_limit_bytes = given.memory_limit_bytes != 0
+                                    ? given.memory_limit_bytes
+                                    : stipple::MemoryLimit::ofThisMachine();
     *context = new StippleContext{std::move(state)};
   });
 }

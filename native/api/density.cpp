@@ -79,8 +79,9 @@ StippleStatus stipple_density_sample(const StippleDensity* density,
     sampling.order = enumValue<AnchorOrder>(given.order, 1, "options->order");
     sampling.seed = given.seed;
     sampling.with_ranks = out.ranks != nullptr;
-    density->context->requireMemory(sampleMemoryBound(given.count, sampling.with_ranks),
-                                    "sampling these anchors");
+    density->context->requireBudget(given.count, "anchors", [&](uint64_t count) {
+      return sampleMemoryBound(count, sampling.with_ranks);
+    });
     withThreads(density->context->thread_count, [&] {
       const AnchorSet anchors = sampleAnchors(*density->density, sampling);
       if (out.positions) anchorPositions(anchors, density->density->root(), out.positions);

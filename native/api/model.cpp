@@ -149,7 +149,7 @@ StippleStatus stipple_model_decode(const StippleModel* model, const StippleDecod
     const SplatModel& source = *require(model, "model").model;
     require(cloud, "cloud");
     const ModelRequest request = requestFrom(options);
-    model->context->requireMemory(source.memoryBound(request), "this budget");
+    source.requireMemory(request, *model->context);
     withThreads(model->context->thread_count, [&] {
       *cloud = new StippleCloud{model->context,
                                 std::make_shared<const SplatCloud>(source.decode(request))};
@@ -163,7 +163,7 @@ StippleStatus stipple_model_decode_start(const StippleModel* model,
     const std::shared_ptr<const SplatModel> source = require(model, "model").model;
     require(job, "job");
     const ModelRequest request = requestFrom(options);
-    model->context->requireMemory(source->memoryBound(request), "this budget");
+    source->requireMemory(request, *model->context);
     *job = startJob(model->context, [source, request](Progress& progress) -> JobResult {
       return std::make_shared<const SplatCloud>(source->decode(request, &progress));
     });

@@ -20,6 +20,28 @@ uint64_t machineMemory() {
 
 }  // namespace
 
+uint64_t MemoryLimit::ofThisMachine() {
+  constexpr uint64_t kPercent = 60;
+  const uint64_t machine = machineMemory();
+  return machine == UINT64_MAX ? machine : machine / 100 * kPercent;
+}
+
+void MemoryLimit::requireBudget(uint64_t budget, const char* unit,
+                                const std::function<uint64_t(uint64_t)>& bytes_of) const {
+  const uint64_t bytes = bytes_of(budget);
+  if (bytes <= memory_limit_bytes) return;
+  uint64_t fits = 0;
+  for (uint64_t above = budget; above - fits > 1;) {
+    const uint64_t middle = fits + (above - fits) / 2;
+    (bytes_of(middle) <= memory_limit_bytes ? fits : above) = middle;
+  }
+  fail(ErrorCode::kMemoryLimit,
+       "this budget of " + std::to_string(budget) + " " + unit + " would need up to " +
+           std::to_string(bytes) + " bytes; the memory limit is " +
+           std::to_string(memory_limit_bytes) + ", and at most " + std::to_string(fits) + " " +
+           unit + " fit");
+}
+
 void MemoryLimit::requireMemory(uint64_t bytes, const char* what) const {
   if (bytes > memory_limit_bytes) {
     fail(ErrorCode::kMemoryLimit, std::string(what) + " would need up to " + std::to_string(bytes) +

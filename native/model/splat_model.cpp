@@ -56,4 +56,13 @@ uint64_t SplatModel::memoryBound(const ModelRequest& request) const {
   return density() ? sampleMemoryBound(request.budget, false) + splats : splats;
 }
 
+void SplatModel::requireMemory(const ModelRequest& request, const MemoryLimit& limit) const {
+  const bool in_anchors = settings().budget_unit == BudgetUnit::kAnchors;
+  limit.requireBudget(request.budget, in_anchors ? "anchors" : "splats", [&](uint64_t budget) {
+    ModelRequest smaller = request;
+    smaller.budget = budget;
+    return memoryBound(smaller);
+  });
+}
+
 }  // namespace stipple

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "base/memory_limit.h"
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
 #include "decode/decoder.h"
@@ -74,6 +75,8 @@ class SplatModel {
   SplatCloud decode(const ModelRequest& request, Progress* progress = nullptr) const;
   /// Bytes that decode() holds at most, without the model itself.
   uint64_t memoryBound(const ModelRequest& request) const;
+  /// Refuses a request beyond the limit, with the budget that fits. Errors: kMemoryLimit.
+  void requireMemory(const ModelRequest& request, const MemoryLimit& limit) const;
 
  protected:
   virtual const Decoder& decoder() const = 0;

@@ -94,6 +94,16 @@ def test_settings_of_a_later_version_are_left_out(splats, source):
     assert source.source_settings.of(stipple) == now
 
 
+@pytest.mark.parametrize('text', ['[' * 100_000, '{"a":' * 100_000, 'x', '[]', '3', '{"has_seed": [1]}'])
+def test_a_text_without_settings_counts_as_none(splats, source, text):
+    """As a .blend from elsewhere may hold it."""
+    stipple = splats.data.stipple
+    stipple.source_settings = ''
+    none = source.source_settings.of(stipple)
+    stipple.source_settings = text
+    assert source.source_settings.of(stipple) == none
+
+
 def test_splats_that_stand_still_are_not_made_again_as_time_passes(splats, source):
     key = splats.data[source.sync.WRITTEN_KEY]
     bpy.context.scene.frame_set(30)

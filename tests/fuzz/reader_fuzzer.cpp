@@ -2,6 +2,7 @@
 // Error; anything else (a crash, a sanitizer's report, an exception of another kind, minutes,
 // gigabytes) is found. Environment: STIPPLE_FUZZ_READER, the name of the reader;
 // STIPPLE_FUZZ_FOLDER, an empty folder to work in.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -11,7 +12,11 @@
 
 #include "base/error.h"
 #include "io/media_library.h"
+#include "json_mutation.h"
 #include "readers.h"
+
+/// libFuzzer's own mutation of bytes.
+extern "C" size_t LLVMFuzzerMutate(uint8_t* bytes, size_t size, size_t most_size);
 
 namespace {
 
@@ -43,6 +48,21 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
   // Loading it takes longer than any input may.
   stipple::mediaTable();
   return 0;
+}
+
+/// Half of the inputs of a reader of JSON stay JSON, of which one value is another.
+extern "C" size_t LLVMFuzzerCustomMutator(uint8_t* bytes, size_t size, size_t most_size,
+                                          unsigned seed) {
+  static const stipple::fuzz::JsonPlace kPlace = chosenReader().json;
+  if (kPlace != stipple::fuzz::JsonPlace::kNowhere && seed % 2 == 0) {
+    const std::string made = stipple::fuzz::withMutatedJson(
+        std::string(reinterpret_cast<const char*>(bytes), size), kPlace, seed);
+    if (!made.empty() && made.size() <= most_size) {
+      std::copy(made.begin(), made.end(), bytes);
+      return made.size();
+    }
+  }
+  return LLVMFuzzerMutate(bytes, size, most_size);
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {

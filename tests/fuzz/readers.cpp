@@ -15,6 +15,7 @@
 #include "io/assets/hierarchy_asset.h"
 #include "io/assets/surface_asset.h"
 #include "io/glb_builder.h"
+#include "io/image_channels.h"
 #include "io/image_file.h"
 #include "io/ksplat_builder.h"
 #include "io/mesh_file.h"
@@ -25,6 +26,8 @@
 #include "io/views/camera_file.h"
 #include "io/views/colmap_points.h"
 #include "io/views/ply_points.h"
+#include "io/volume_file.h"
+#include "io/webp_image.h"
 
 namespace stipple::fuzz {
 
@@ -112,7 +115,8 @@ void addSplatReaders(std::vector<Reader>& all) {
                          format.read((folder / ("input" + ending)).string(), nullptr);
                      keepsPromises([&] { validate(cloud, "cloud"); });
                    },
-                   [&format](const fs::path& folder) { return splatSeeds(format, folder); }});
+                   [&format](const fs::path& folder) { return splatSeeds(format, folder); },
+                   ending == ".glb" ? JsonPlace::kGlbChunk : JsonPlace::kNowhere});
   }
 }
 
@@ -123,7 +127,8 @@ void addSceneReaders(std::vector<Reader>& all) {
                  [](const fs::path&) {
                    return std::vector<std::string>{SogScene::first().files["meta.json"],
                                                    SogScene::second().files["meta.json"]};
-                 }});
+                 },
+                 JsonPlace::kWholeFile});
   const auto writeLevels = [](const fs::path& folder) {
     const SplatCloud fine = randomCloud(40, 1, 1), coarse = randomCloud(9, 0, 2);
     writeSogLevels({&fine, &coarse}, &coarse, (folder / "lod-meta.json").string(),
@@ -134,7 +139,8 @@ void addSceneReaders(std::vector<Reader>& all) {
                  [writeLevels](const fs::path& folder) {
                    writeLevels(folder);
                    return std::vector<std::string>{load(folder / "lod-meta.json")};
-                 }});
+                 },
+                 JsonPlace::kWholeFile});
 }
 
 // ---- Meshes -------------------------------------------------------------------------------------
@@ -184,6 +190,98 @@ std::vector<std::string> meshSeeds(const fs::path& folder) {
           file.glb(scene("{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":2},\"material\":1,"
                          "\"mode\":6}")),
           file.glb(scene("{\"attributes\":{\"POSITION\":5},\"indices\":4,\"mode\":6}"))};
+}
+
+// ---- Images and volumes -------------------------------------------------------------------------
+
+/// Grey, RGB and RGBA, larger than one block of scan lines.
+std::vector<std::string> exrSeeds(const fs::path& folder) {
+  std::vector<std::string> made;
+  for (const uint32_t channels : {1u, 3u, 4u}) {
+    Image image;
+    image.width = 5;
+    image.height = 33;
+    image.channels = channels;
+    image.transfer = Transfer::kLinear;
+    for (size_t i = 0; i < image.pixelCount() * channels; ++i) {
+      image.pixels.push_back(0.01f * static_cast<float>(i % 97));
+    }
+    writeImageFile(image, (folder / "seed.exr").string());
+    made.push_back(load(folder / "seed.exr"));
+  }
+  return made;
+}
+
+void readExr(const fs::path& path) {
+  const std::vector<ImageChannel> channels = readImageChannels(path.string());
+  keepsPromises([&] {
+    for (const ImageChannel& channel : channels) {
+      if (channel.values.size() != size_t{channel.width} * channel.height) {
+        fail(ErrorCode::kInternal, "a channel has another size than it says");
+      }
+    }
+  });
+  readImageFile(path.string());
+}
+
+std::vector<std::string> webpSeeds(const fs::path&) {
+  RgbaBytes image{7, 5, {}};
+  for (size_t i = 0; i < image.pixelCount() * 4; ++i) {
+    image.bytes.push_back(static_cast<uint8_t>(i * 37));
+  }
+  const std::vector<uint8_t> bytes = encodeWebp(image, "seed");
+  const std::vector<uint8_t> blank =
+      encodeWebp({64, 64, std::vector<uint8_t>(64 * 64 * 4, 255)}, "seed");
+  return {{bytes.begin(), bytes.end()}, {blank.begin(), blank.end()}};
+}
+
+void readWebp(const fs::path& path) {
+  const std::string bytes = load(path);
+  constexpr uint64_t kMostPixels = 1 << 20;
+  const RgbaBytes image = decodeWebp({bytes.begin(), bytes.end()}, kMostPixels, path.string());
+  keepsPromises([&] {
+    if (image.bytes.size() != image.pixelCount() * 4) {
+      fail(ErrorCode::kInternal, "an image has another size than it says");
+    }
+  });
+}
+
+std::vector<std::string> volumeSeeds(const fs::path& folder) {
+  std::vector<std::string> made;
+  for (const size_t bricks : {size_t{1}, size_t{3}}) {
+    SparseVolume volume;
+    volume.voxel_size = 0.25;
+    volume.origin = {1, 2, 3};
+    for (size_t b = 0; b < bricks; ++b) {
+      volume.bricks.push_back({static_cast<int32_t>(b) * 128, -8, 8});
+    }
+    for (size_t v = 0; v < bricks * kBrickVoxelCount; ++v) {
+      volume.density.push_back(v % 3 == 0 ? 0.0f : 0.5f + static_cast<float>(v % 7));
+      for (int c = 0; c < 3; ++c) volume.colour.push_back(0.1f * static_cast<float>(c + 1));
+    }
+    writeVolumeFile(volume, (folder / "seed.vdb").string());
+    made.push_back(load(folder / "seed.vdb"));
+  }
+  return made;
+}
+
+void readVolume(const fs::path& path) {
+  const SparseVolume volume = readVolumeFile(path.string());
+  keepsPromises([&] {
+    if (volume.density.size() != volume.brickCount() * kBrickVoxelCount ||
+        volume.colour.size() != volume.density.size() * 3) {
+      fail(ErrorCode::kInternal, "a volume has other arrays than its bricks need");
+    }
+  });
+}
+
+void addMediaReaders(std::vector<Reader>& all) {
+  all.push_back({"exr", nullptr, storeAs("input.exr"),
+                 [](const fs::path& folder) { readExr(folder / "input.exr"); }, exrSeeds});
+  all.push_back({"webp", nullptr, storeAs("input.webp"),
+                 [](const fs::path& folder) { readWebp(folder / "input.webp"); }, webpSeeds});
+  all.push_back({"volume", nullptr, storeAs("input.vdb"),
+                 [](const fs::path& folder) { readVolume(folder / "input.vdb"); }, volumeSeeds});
 }
 
 // ---- Asset files --------------------------------------------------------------------------------
@@ -383,21 +481,23 @@ std::vector<Reader> makeReaders() {
   std::vector<Reader> all;
   addSplatReaders(all);
   addSceneReaders(all);
+  addMediaReaders(all);
   all.push_back({"mesh", nullptr, storeAs("input.glb"),
                  [](const fs::path& folder) {
                    const TriMesh mesh = readMeshFile((folder / "input.glb").string());
                    keepsPromises([&] { validateArrays(mesh); });
                  },
-                 meshSeeds});
+                 meshSeeds, JsonPlace::kGlbChunk});
   const char* asset = "input.stipple.safetensors";
   all.push_back({"surface", nullptr, storeAs(asset),
-                 [asset](const fs::path& folder) { readSurface(folder / asset); }, surfaceSeeds});
+                 [asset](const fs::path& folder) { readSurface(folder / asset); }, surfaceSeeds,
+                 JsonPlace::kSafetensorsHeader});
   all.push_back({"hierarchy", nullptr, storeAs(asset),
                  [asset](const fs::path& folder) { readHierarchy(folder / asset); },
-                 hierarchySeeds});
+                 hierarchySeeds, JsonPlace::kSafetensorsHeader});
   all.push_back({"transforms", nullptr, storeAs("transforms.json"),
                  [](const fs::path& folder) { readCameras(folder / "transforms.json"); },
-                 transformsSeeds});
+                 transformsSeeds, JsonPlace::kWholeFile});
   all.push_back({"colmap", nullptr, storePair("cameras.bin", "images.bin"),
                  [](const fs::path& folder) { readCameras(folder); }, colmapSeeds});
   all.push_back({"colmap-points", nullptr, storeAs("points3D.bin"),

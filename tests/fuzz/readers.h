@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "json_mutation.h"
+
 namespace stipple::fuzz {
 
 /// A reader to be fuzzed: a row of the table in readers.cpp.
@@ -18,10 +20,12 @@ struct Reader {
   std::function<void(const std::filesystem::path& folder)> read;
   /// Small valid inputs, made in the folder. Each is an input of its own.
   std::function<std::vector<std::string>(const std::filesystem::path& folder)> seeds;
+  /// Where its files hold JSON, whose values are changed one by one.
+  JsonPlace json = JsonPlace::kNowhere;
 };
 
-/// Every reader of files from elsewhere, but those of pictures (OpenImageIO) and volumes (OpenVDB),
-/// which are the libraries' own.
+/// Every reader of files from elsewhere, but those of images in 8 and 16 bits (OpenImageIO), which
+/// are the library's own.
 const std::vector<Reader>& readers();
 
 /// Writes a whole file.

@@ -12,7 +12,7 @@ class Context(Handle):
     free_function = 'stipple_context_free'
 
     def __init__(self, library, threads=0, memory_limit_bytes=0):
-        """threads 0: as many as the machine has. memory_limit_bytes 0: no limit."""
+        """threads 0: as many as the machine has. memory_limit_bytes 0: 60 % of its memory."""
         if not 0 <= threads <= 1024:
             raise invalid(f'Threads is {threads}; allowed are 0 (automatic) to 1024.')
         options = StippleContextOptions()

@@ -78,7 +78,8 @@ typedef struct StippleJob StippleJob;           /* long work in the background *
 typedef struct StippleContextOptions {
   uint32_t struct_size;
   uint32_t thread_count;        /* 0: as many as the machine has; at most 1024 */
-  uint64_t memory_limit_bytes;  /* 0: no limit. Large calls refuse before they allocate */
+  uint64_t memory_limit_bytes;  /* 0: 60 % of the machine's memory, UINT64_MAX: no limit. Large calls
+                                   refuse before they allocate */
 } StippleContextOptions;
 
 void stipple_context_options_init(StippleContextOptions* options);

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "io/bytes/json_text.h"
 
 namespace stipple {
 
@@ -16,13 +17,14 @@ constexpr char kEnd[] = "end";
 }  // namespace
 
 std::string settingsWithTime(const std::string& settings_json, const AssetTime& time) {
-  nlohmann::json settings = nlohmann::json::parse(settings_json);
+  nlohmann::json settings =
+      parseJson(settings_json, "the settings", ErrorCode::kInvalidArgument);
   settings[kTime] = {{kBegin, time.begin}, {kEnd, time.end}};
   return settings.dump();
 }
 
 std::optional<AssetTime> timeOfSettings(const std::string& settings_json, const std::string& path) {
-  const nlohmann::json settings = nlohmann::json::parse(settings_json, nullptr, false);
+  const nlohmann::json settings = parseJson(settings_json, path + ": the text of its settings");
   if (!settings.is_object()) {
     fail(ErrorCode::kFormat, path + ": its settings are not an object of JSON");
   }

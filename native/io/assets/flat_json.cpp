@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "io/bytes/json_text.h"
 
 namespace stipple {
 
@@ -21,7 +22,7 @@ FlatJsonValue valueOf(const std::string& name, const Json& value) {
 }  // namespace
 
 std::vector<std::pair<std::string, FlatJsonValue>> readFlatJson(const std::string& text) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parseOrderedJson(text, "a text of settings");
   if (!json.is_object()) fail(ErrorCode::kFormat, "a JSON object is expected");
   std::vector<std::pair<std::string, FlatJsonValue>> entries;
   for (const auto& [name, value] : json.items()) entries.emplace_back(name, valueOf(name, value));

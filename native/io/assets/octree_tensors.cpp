@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/assets/asset_header.h"
+#include "io/bytes/json_text.h"
 
 namespace stipple {
 
@@ -19,11 +20,7 @@ std::string levelName(const char* stem, size_t level) {
 
 /// JSON text of the metadata. Errors: kFormat.
 Json parseText(const SafeTensorsReader& file, const char* key) {
-  const Json value = Json::parse(requireText(file, key), nullptr, false);
-  if (value.is_discarded()) {
-    fail(ErrorCode::kFormat, file.path() + " has metadata '" + key + "' that is not valid JSON");
-  }
-  return value;
+  return parseJson(requireText(file, key), file.path() + ": the metadata '" + key + "'");
 }
 
 void readRoot(const SafeTensorsReader& file, OctreeTensors& octree) {

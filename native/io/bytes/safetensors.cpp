@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "io/bytes/checksum.h"
+#include "io/bytes/json_text.h"
 #include "io/bytes/output_file.h"
 
 namespace stipple {
@@ -123,6 +124,24 @@ SafeTensor parseTensor(const std::string& path, const std::string& name, const J
   return tensor;
 }
 
+/// Refuses tensors that share bytes: each is read into an array of its own, so that the size of the
+/// file would not bound what they take.
+void requireSeparate(const std::map<std::string, SafeTensor>& tensors, const std::string& path) {
+  std::vector<const SafeTensor*> in_order;
+  for (const auto& [name, tensor] : tensors) {
+    if (tensor.bytes > 0) in_order.push_back(&tensor);
+  }
+  std::sort(in_order.begin(), in_order.end(),
+            [](const SafeTensor* a, const SafeTensor* b) { return a->offset < b->offset; });
+  for (size_t i = 1; i < in_order.size(); ++i) {
+    if (in_order[i]->offset < in_order[i - 1]->offset + in_order[i - 1]->bytes) {
+      fail(ErrorCode::kFormat, path + " has two tensors that share the bytes from " +
+                                   std::to_string(in_order[i]->offset) +
+                                   "; each tensor has bytes of its own");
+    }
+  }
+}
+
 }  // namespace
 
 SafeTensorsReader::SafeTensorsReader(const std::string& path) : file_(path) {
@@ -139,12 +158,7 @@ SafeTensorsReader::SafeTensorsReader(const std::string& path) : file_(path) {
   }
   std::string text(static_cast<size_t>(header_bytes), '\0');
   file_.readAt(8, text.data(), text.size());
-  Json header;
-  try {
-    header = Json::parse(text);
-  } catch (const Json::exception& error) {
-    fail(ErrorCode::kFormat, path + " has a header that is not valid JSON: " + error.what());
-  }
+  const Json header = parseJson(text, path + ": its header");
   if (!header.is_object()) fail(ErrorCode::kFormat, path + " has a header that is no JSON object");
   const uint64_t data_start = 8 + header_bytes;
   for (const auto& [name, entry] : header.items()) {
@@ -160,6 +174,7 @@ SafeTensorsReader::SafeTensorsReader(const std::string& path) : file_(path) {
       metadata_[key] = value.get<std::string>();
     }
   }
+  requireSeparate(tensors_, path);
 }
 
 const SafeTensor& SafeTensorsReader::require(const std::string& name, const char* dtype,

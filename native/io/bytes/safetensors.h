@@ -27,8 +27,8 @@ struct CarriedTensor {
   std::vector<uint8_t> bytes;
 };
 
-/// Opens a safetensors file and checks its header: every tensor lies inside the file and has the
-/// bytes that its shape and type ask for.
+/// Opens a safetensors file and checks its header: every tensor lies inside the file, apart from
+/// all others, and has the bytes that its shape and type ask for.
 /// Errors: kIo, kFormat.
 class SafeTensorsReader {
  public:

@@ -14,9 +14,6 @@ namespace stipple::media {
 
 namespace {
 
-// An accessor without a buffer view is all zeros, so no file size bounds it.
-constexpr size_t kMaxZeroElements = size_t{1} << 26;
-
 [[noreturn]] void failHere(const std::string& what) {
   fail(ErrorCode::kFormat, what);
 }
@@ -202,10 +199,6 @@ void requireAccessor(const GltfModel& model, int index, size_t width, const std:
   const size_t bytes = componentBytes(accessor.componentType, what);
   if (accessor.bufferView >= 0) {
     rangeOf(model, accessor.bufferView, accessor.byteOffset, accessor.count, bytes * width, what);
-  } else if (accessor.count > kMaxZeroElements) {
-    failHere(what + " claims " + std::to_string(accessor.count) +
-             " elements without data; at most " + std::to_string(kMaxZeroElements) +
-             " are allowed");
   }
 }
 
@@ -270,10 +263,14 @@ std::vector<uint32_t> readIndices(const GltfModel& model, int index, const std::
   return values;
 }
 
+size_t viewBytes(const GltfModel& model, int view, const std::string& what) {
+  rangeOf(model, view, 0, 0, 1, what);
+  return model.bufferViews[static_cast<size_t>(view)].byteLength;
+}
+
 std::vector<unsigned char> readView(const GltfModel& model, int view, const std::string& what) {
   const Range range = rangeOf(model, view, 0, 0, 1, what);
-  const size_t length = model.bufferViews[static_cast<size_t>(view)].byteLength;
-  return std::vector<unsigned char>(range.first, range.first + length);
+  return std::vector<unsigned char>(range.first, range.first + viewBytes(model, view, what));
 }
 
 }  // namespace stipple::media

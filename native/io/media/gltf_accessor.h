@@ -46,7 +46,8 @@ class FloatSource {
 /// Elements of an accessor. Errors: kFormat if there is no such accessor.
 size_t accessorCount(const GltfModel& model, int accessor, const std::string& what);
 
-/// Refuses accessors that readFloats refuses, before anything is allocated.
+/// Refuses accessors that readFloats refuses, before anything is allocated. One without a buffer
+/// view is all zeros: the caller bounds its count.
 void requireAccessor(const GltfModel& model, int accessor, size_t width, const std::string& what);
 
 /// Components per element of an accessor. Errors: kFormat if there is no such accessor.
@@ -54,6 +55,9 @@ size_t accessorWidth(const GltfModel& model, int accessor, const std::string& wh
 
 /// Vertex indices of a primitive.
 std::vector<uint32_t> readIndices(const GltfModel& model, int accessor, const std::string& what);
+
+/// How many bytes a buffer view has, all inside its buffer.
+size_t viewBytes(const GltfModel& model, int view, const std::string& what);
 
 /// The bytes of a buffer view.
 std::vector<unsigned char> readView(const GltfModel& model, int view, const std::string& what);

@@ -99,7 +99,10 @@ uint32_t MaterialReader::texture(int image, const Base& base) {
   if (images_[static_cast<size_t>(image)].empty()) {
     fail(ErrorCode::kIo, name + " is missing or cannot be read");
   }
-  DecodedImage decoded = decodeImageBytes(images_[static_cast<size_t>(image)], name);
+  // Of one image there may be as many textures as there are materials.
+  DecodedImage decoded =
+      decodeImageBytes(images_[static_cast<size_t>(image)], name, {texture_bytes_, file_bytes_});
+  texture_bytes_ += decoded.pixels.size() * sizeof(float);
   Image result;
   result.width = decoded.info.width;
   result.height = decoded.info.height;

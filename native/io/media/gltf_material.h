@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "data/meshes/tri_mesh.h"
+#include "io/media/gltf_scene.h"
 
 namespace stipple::media {
 
@@ -24,10 +25,13 @@ struct MaterialUse {
 /// Turns glTF materials into ours: factor, texture, alpha mode folded into one colour source.
 class MaterialReader {
  public:
-  /// In: images, the undecoded bytes of each image; empty where the file was not found.
-  MaterialReader(const GltfModel& model, const std::string& path,
-                 const std::vector<std::vector<unsigned char>>& images, TriMesh& mesh)
-      : model_(model), path_(path), images_(images), mesh_(mesh) {}
+  MaterialReader(const GltfModel& model, const std::string& path, const GltfScene& scene,
+                 TriMesh& mesh)
+      : model_(model),
+        path_(path),
+        images_(scene.images()),
+        file_bytes_(scene.fileBytes()),
+        mesh_(mesh) {}
 
   /// In: material, -1 for glTF's default; has_colours, whether the primitive has COLOR_0.
   MaterialUse use(int material, bool has_colours);
@@ -41,10 +45,13 @@ class MaterialReader {
 
   const GltfModel& model_;
   const std::string& path_;
+  /// The undecoded bytes of each image; empty where the file was not found.
   const std::vector<std::vector<unsigned char>>& images_;
+  uint64_t file_bytes_;
   TriMesh& mesh_;
   std::map<std::pair<int, bool>, MaterialUse> uses_;
   std::map<std::tuple<int, std::vector<double>, int, double>, uint32_t> textures_;
+  uint64_t texture_bytes_ = 0;  ///< of all textures so far
 };
 
 }  // namespace stipple::media

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
+#include "io/bytes/limits.h"
 #include "io/media/gltf_accessor.h"
 #include "io/media/gltf_material.h"
 #include "io/media/gltf_model.h"
@@ -29,6 +31,12 @@ Mat4d zUp() {
   Mat4d matrix;
   matrix << 1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1;
   return matrix;
+}
+
+/// How many corners the triangles of a primitive with so many indices have.
+uint64_t cornerCount(uint64_t index_count, int mode) {
+  if (mode == TINYGLTF_MODE_TRIANGLES) return index_count / 3 * 3;
+  return index_count < 3 ? 0 : (index_count - 2) * 3;
 }
 
 /// Corners of the triangles of a primitive, three per triangle.
@@ -57,9 +65,10 @@ class GltfReader {
       : path_(path),
         scene_(path, kKnownExtensions, GltfScene::Content::kMesh),
         model_(scene_.model()),
-        materials_(model_, path_, scene_.images(), mesh_) {}
+        materials_(model_, path_, scene_, mesh_) {}
 
   TriMesh read() {
+    requireAllowedUses();
     scene_.visitMeshes(zUp(), [this](size_t mesh, const Mat4d& matrix) { addMesh(mesh, matrix); });
     if (mesh_.triangles.empty()) {
       fail(ErrorCode::kFormat, path_ + " holds no triangles in its scene; at least one is needed");
@@ -71,11 +80,66 @@ class GltfReader {
   }
 
  private:
+  /// Bytes of what a primitive becomes at each of its uses; lying counts stand for themselves.
+  uint64_t bytesOf(const tinygltf::Primitive& primitive, const std::string& what) const {
+    constexpr uint64_t kVertexBytes = 3 * sizeof(float);
+    constexpr uint64_t kCornerBytes = sizeof(uint32_t) + (3 + 4 + 2) * sizeof(float);
+    constexpr uint64_t kBeyondMeasure = uint64_t{1} << 50;
+    if (!hasSurface(primitive)) return 0;
+    const int position = attribute(primitive, "POSITION");
+    requireAccessor(model_, position, 3, what + ", POSITION");
+    const uint64_t vertices = accessorCount(model_, position, what + ", POSITION");
+    const uint64_t indices = primitive.indices < 0 ? vertices
+                                                   : accessorCount(model_, primitive.indices,
+                                                                   what + ", indices");
+    if (vertices > kBeyondMeasure || indices > kBeyondMeasure) return kBeyondMeasure;
+    const uint64_t corners = cornerCount(indices, modeOf(primitive));
+    return vertices * kVertexBytes + corners * kCornerBytes + corners / 3 * sizeof(uint32_t);
+  }
+
+  /// Refuses a scene that shows its meshes more often than its size allows.
+  void requireAllowedUses() const {
+    std::map<size_t, uint64_t> bytes_of_mesh;
+    uint64_t bytes = 0;
+    uint64_t uses = 0;
+    scene_.visitMeshes(Mat4d::Identity(), [&](size_t mesh, const Mat4d&) {
+      const auto [entry, is_new] = bytes_of_mesh.emplace(mesh, 0);
+      const auto& primitives = model_.meshes[mesh].primitives;
+      for (size_t p = 0; is_new && p < primitives.size(); ++p) {
+        entry->second += bytesOf(primitives[p], nameOf(mesh, p));
+        requireInstances(entry->second, std::to_string(p + 1) + " primitives of mesh " +
+                                            std::to_string(mesh));
+      }
+      bytes += entry->second;
+      requireInstances(bytes, std::to_string(++uses) + " uses of its meshes");
+    });
+  }
+
+  void requireInstances(uint64_t bytes, const std::string& what) const {
+    requireAllowed(bytes, kInstanceAllowance, scene_.fileBytes(), path_, what);
+  }
+
+  std::string nameOf(size_t mesh, size_t primitive) const {
+    return path_ + ": mesh " + std::to_string(mesh) + ", primitive " + std::to_string(primitive);
+  }
+
+  static int modeOf(const tinygltf::Primitive& primitive) {
+    return primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+  }
+
+  /// Points and lines have no surface.
+  static bool hasSurface(const tinygltf::Primitive& primitive) {
+    const int mode = modeOf(primitive);
+    return mode >= TINYGLTF_MODE_TRIANGLES && mode <= TINYGLTF_MODE_TRIANGLE_FAN &&
+           attribute(primitive, "POSITION") >= 0;
+  }
+
   void addMesh(size_t index, const Mat4d& matrix) {
     const tinygltf::Mesh& mesh = model_.meshes[index];
     for (size_t p = 0; p < mesh.primitives.size(); ++p) {
-      addPrimitive(mesh.primitives[p], matrix,
-                   path_ + ": mesh " + std::to_string(index) + ", primitive " + std::to_string(p));
+      if (hasSurface(mesh.primitives[p])) {
+        addPrimitive(mesh.primitives[p], matrix, nameOf(index, p));
+      }
     }
   }
 
@@ -86,11 +150,7 @@ class GltfReader {
 
   void addPrimitive(const tinygltf::Primitive& primitive, const Mat4d& matrix,
                     const std::string& what) {
-    const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
-    // Points and lines have no surface.
-    if (mode < TINYGLTF_MODE_TRIANGLES || mode > TINYGLTF_MODE_TRIANGLE_FAN) return;
     const int position = attribute(primitive, "POSITION");
-    if (position < 0) return;
     const std::vector<float> positions = readFloats(model_, position, 3, what + ", POSITION");
     const size_t count = positions.size() / 3;
     requireFiniteHere(positions, 3, what + ", POSITION");
@@ -112,7 +172,7 @@ class GltfReader {
       indices.resize(count);
       for (size_t i = 0; i < count; ++i) indices[i] = static_cast<uint32_t>(i);
     }
-    std::vector<uint32_t> corners = triangleCorners(indices, mode);
+    std::vector<uint32_t> corners = triangleCorners(indices, modeOf(primitive));
     // A mirroring transform turns the triangles inside out; this turns them back.
     if (matrix.topLeftCorner<3, 3>().determinant() < 0) {
       for (size_t t = 0; t + 2 < corners.size(); t += 3) std::swap(corners[t + 1], corners[t + 2]);
@@ -146,8 +206,8 @@ class GltfReader {
       return;
     }
     any_normals_ = true;
+    requireCount(accessor, count, what + ", NORMAL");
     const std::vector<float> normals = readFloats(model_, accessor, 3, what + ", NORMAL");
-    requireCount(normals.size() / 3, count, what + ", NORMAL");
     const Mat3d linear = matrix.topLeftCorner<3, 3>();
     // The cofactor matrix is the inverse transpose up to a factor, and exists for flat scales too.
     Mat3d cofactor;
@@ -177,8 +237,8 @@ class GltfReader {
     }
     any_colours_ = true;
     const size_t width = accessorWidth(model_, accessor, what + ", COLOR_0") == 3 ? 3 : 4;
+    requireCount(accessor, count, what + ", COLOR_0");
     const std::vector<float> colours = readFloats(model_, accessor, width, what + ", COLOR_0");
-    requireCount(colours.size() / width, count, what + ", COLOR_0");
     requireFiniteHere(colours, width, what + ", COLOR_0");
     for (const uint32_t corner : corners) {
       float rgba[4] = {1, 1, 1, 1};
@@ -200,8 +260,8 @@ class GltfReader {
     if (accessor < 0) {
       fail(ErrorCode::kFormat, what + " has a textured material but no " + name);
     }
+    requireCount(accessor, count, what + ", " + name);
     const std::vector<float> uvs = readFloats(model_, accessor, 2, what + ", " + name);
-    requireCount(uvs.size() / 2, count, what + ", " + name);
     requireFiniteHere(uvs, 2, what + ", " + name);
     const double* m = use.uv_matrix;
     for (const uint32_t corner : corners) {
@@ -213,7 +273,9 @@ class GltfReader {
     }
   }
 
-  static void requireCount(size_t seen, size_t expected, const std::string& what) {
+  /// Before anything is allocated for the accessor.
+  void requireCount(int accessor, size_t expected, const std::string& what) const {
+    const size_t seen = accessorCount(model_, accessor, what);
     if (seen != expected) {
       fail(ErrorCode::kFormat, what + " has " + std::to_string(seen) + " elements; " +
                                    std::to_string(expected) + " vertices need one each");

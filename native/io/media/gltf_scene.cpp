@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/parallel.h"
 #include "io/bytes/input_file.h"
+#include "io/bytes/json_text.h"
+#include "io/bytes/limits.h"
 #include "io/bytes/little_endian.h"
 #include "io/media/gltf_accessor.h"
 #include "io/media/gltf_files.h"
@@ -28,8 +31,10 @@ constexpr uint32_t kGlbMagic = 0x46546c67;
 constexpr uint32_t kJsonChunk = 0x4e4f534a;
 constexpr uint32_t kBinaryChunk = 0x004e4942;
 constexpr uint64_t kMaxJsonBytes = uint64_t{1} << 26;
-// Text is made from parsed JSON by recursion.
-constexpr int kMaxJsonDepth = 256;
+// A loaded object takes up to 3 KB (a material), any other value 160 bytes; the objects of real
+// files take 30 characters or more.
+constexpr uint64_t kValuesOfObject = 16;
+constexpr uint64_t kAlwaysAllowedValues = uint64_t{1} << 20;
 constexpr size_t kReadBytes = size_t{1} << 21;
 
 /// In: error, lines of tinygltf; they become one.
@@ -38,6 +43,32 @@ constexpr size_t kReadBytes = size_t{1} << 21;
   std::replace(error.begin(), error.end(), '\n', ' ');
   fail(ErrorCode::kFormat,
        path + " is not a valid glTF file: " + (error.empty() ? "no reason is given" : error));
+}
+
+/// Refuses JSON of which the loader would make much more than its text takes.
+void requireSmallScene(std::string_view text, const std::string& path) {
+  requireSmallJson(text, path);
+  const JsonSize size = sizeOfJson(text);
+  const uint64_t cost = size.values + size.objects * (kValuesOfObject - 1);
+  const uint64_t allowed = kAlwaysAllowedValues + text.size();
+  if (cost > allowed) {
+    fail(ErrorCode::kFormat, path + " describes " + std::to_string(size.objects) +
+                                 " objects in " + std::to_string(text.size()) +
+                                 " bytes of JSON; at most " +
+                                 std::to_string(allowed / kValuesOfObject) + " are allowed");
+  }
+}
+
+/// The JSON of a GLB file, its first part; as much as there is of it.
+std::string jsonPart(const InputFile& file) {
+  std::array<uint8_t, kGlbHeadBytes> head;
+  if (file.size() < head.size()) return "";
+  file.readAt(0, head.data(), head.size());
+  std::string text(static_cast<size_t>(std::min<uint64_t>(
+                       loadLittleEndian<uint32_t>(&head[12]), file.size() - head.size())),
+                   '\0');
+  file.readAt(head.size(), text.data(), text.size());
+  return text;
 }
 
 Mat4d localMatrix(const tinygltf::Node& node) {
@@ -117,13 +148,9 @@ bool GltfScene::loadBinaryBeside() {
   }
   std::string text(static_cast<size_t>(json_bytes), '\0');
   file.readAt(head.size(), text.data(), text.size());
-  bool deep = false;
-  const auto judge = [&deep](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
-    deep = deep || depth > kMaxJsonDepth;
-    return !deep;
-  };
-  nlohmann::json root = nlohmann::json::parse(text, judge, false);
-  if (deep || !root.is_object() || !root.contains("buffers") || !root["buffers"].is_array() ||
+  requireSmallScene(text, path_);
+  nlohmann::json root = parseJson(text, path_);
+  if (!root.is_object() || !root.contains("buffers") || !root["buffers"].is_array() ||
       root["buffers"].empty()) {
     return false;
   }
@@ -150,13 +177,16 @@ bool GltfScene::loadBinaryBeside() {
   storeLittleEndian(kBinaryChunk, small_chunk + 4);
   std::string error;
   std::string warning;
+  GltfFiles files(path_);
   tinygltf::TinyGLTF loader;
-  readRegularFilesOnly(loader);
+  files.serve(loader);
   const std::string folder = std::filesystem::path(path_).parent_path().string();
   if (!loader.LoadBinaryFromMemory(model_.get(), &error, &warning, small.data(),
                                    static_cast<unsigned>(small.size()), folder)) {
+    files.requireAllowed();
     failLoading(path_, error);
   }
+  file_bytes_ = file.size() + files.differentBytes();
   model_->has_binary = true;
   model_->binary.resize(static_cast<size_t>(used));
   parallelFor(model_->binary.size(), kReadBytes, [&](size_t begin, size_t end) {
@@ -167,8 +197,9 @@ bool GltfScene::loadBinaryBeside() {
 
 void GltfScene::load(Content content) {
   if (content == Content::kSplats && loadBinaryBeside()) return;
+  GltfFiles files(path_);
   tinygltf::TinyGLTF loader;
-  readRegularFilesOnly(loader);
+  files.serve(loader);
   // Images are only kept here; those that a base colour needs are decoded later. The ranges of
   // images inside the file's own buffers are not checked by tinygltf, so they are not touched
   // yet.
@@ -185,17 +216,42 @@ void GltfScene::load(Content content) {
       &images_);
   std::string error;
   std::string warning;
-  char magic[4] = {};
-  std::ifstream(path_, std::ios::binary).read(magic, sizeof(magic));
-  const bool loaded = std::string(magic, sizeof(magic)) == "glTF"
-                          ? loader.LoadBinaryFromFile(model_.get(), &error, &warning, path_)
-                          : loader.LoadASCIIFromFile(model_.get(), &error, &warning, path_);
+  const InputFile file(path_);
+  std::array<uint8_t, sizeof(uint32_t)> magic = {};
+  file.readAt(0, magic.data(), std::min<size_t>(magic.size(), file.size()));
+  const bool is_binary = loadLittleEndian<uint32_t>(magic.data()) == kGlbMagic;
+  bool loaded = false;
+  if (is_binary) {
+    requireSmallScene(jsonPart(file), path_);
+    loaded = loader.LoadBinaryFromFile(model_.get(), &error, &warning, path_);
+  } else {
+    const std::string text = readTextFile(path_, std::numeric_limits<unsigned>::max());
+    requireSmallScene(text, path_);
+    loaded = loader.LoadASCIIFromString(
+        model_.get(), &error, &warning, text.data(), static_cast<unsigned>(text.size()),
+        std::filesystem::path(path_).parent_path().string());
+  }
+  files.requireAllowed();
   if (!loaded) failLoading(path_, error);
+  // The loader reads a binary file through `files`, too.
+  file_bytes_ = files.differentBytes() + (is_binary ? 0 : file.size());
+  readImageViews();
+}
+
+/// Copies the encoded images that lie in the file's own buffers.
+void GltfScene::readImageViews() {
   images_.resize(model_->images.size());
+  const auto name = [this](size_t i) { return path_ + ": image " + std::to_string(i); };
+  uint64_t bytes = 0;
   for (size_t i = 0; i < images_.size(); ++i) {
-    if (model_->images[i].bufferView < 0) continue;
-    images_[i] =
-        readView(*model_, model_->images[i].bufferView, path_ + ": image " + std::to_string(i));
+    const int view = model_->images[i].bufferView;
+    if (view >= 0) bytes += viewBytes(*model_, view, name(i));
+  }
+  requireAllowed(bytes, kInstanceAllowance, file_bytes_, path_,
+                 std::to_string(images_.size()) + " images");
+  for (size_t i = 0; i < images_.size(); ++i) {
+    const int view = model_->images[i].bufferView;
+    if (view >= 0) images_[i] = readView(*model_, view, name(i));
   }
 }
 

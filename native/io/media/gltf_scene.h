@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <set>
@@ -25,6 +26,8 @@ class GltfScene {
   GltfScene& operator=(const GltfScene&) = delete;
 
   const GltfModel& model() const { return *model_; }
+  /// Bytes of the file and of those that it names: what limits are compared with.
+  uint64_t fileBytes() const { return file_bytes_; }
   /// The files of the pictures, still encoded.
   const std::vector<std::vector<unsigned char>>& images() const { return images_; }
 
@@ -37,12 +40,14 @@ class GltfScene {
 
   void load(Content content);
   bool loadBinaryBeside();
+  void readImageViews();
   std::vector<int> rootNodes() const;
   void visitNode(int index, const Mat4d& parent, int depth, Walk& walk) const;
 
   std::string path_;
   std::unique_ptr<GltfModel> model_;
   std::vector<std::vector<unsigned char>> images_;
+  uint64_t file_bytes_ = 0;
 };
 
 }  // namespace stipple::media

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "data/clouds/splat_cloud.h"
+#include "io/bytes/limits.h"
 #include "io/media/gltf_accessor.h"
 #include "io/media/gltf_model.h"
 #include "io/media/gltf_scene.h"
@@ -18,8 +19,6 @@ namespace stipple::media {
 
 namespace {
 
-// A file may show one splat mesh at several nodes; more than this many are made to exhaust memory.
-constexpr uint64_t kMaxUses = 64;
 constexpr int kMaxDegree = 3;
 constexpr size_t kBlock = 1024;
 
@@ -54,16 +53,6 @@ class SplatReader {
                                    "extension " +
                                    kGltfSplats);
     }
-    uint64_t uses = 0;
-    std::set<std::pair<uint32_t, uint32_t>> different;
-    for (const Part& part : parts_) {
-      if (different.insert({part.info.mesh, part.info.primitive}).second) uses += kMaxUses;
-    }
-    if (parts_.size() > uses) {
-      fail(ErrorCode::kUnsupported, path_ + " shows its splats at " +
-                                        std::to_string(parts_.size()) + " nodes; at most " +
-                                        std::to_string(uses) + " are supported");
-    }
     std::vector<StippleMediaSplatPart> infos;
     for (const Part& part : parts_) infos.push_back(part.info);
     give(sink, kMediaSplatParts, infos);
@@ -84,7 +73,19 @@ class SplatReader {
     }
     readKind(part);
     readShape(part);
+    bytes_ += bytesOf(part);
     parts_.push_back(std::move(part));
+    requireAllowed(bytes_, kInstanceAllowance, scene_.fileBytes(), path_,
+                   std::to_string(parts_.size()) + " uses of its splats");
+  }
+
+  /// Bytes of what is handed over of a part.
+  uint64_t bytesOf(const Part& part) const {
+    if (part.info.packing != kMediaSplatsInArrays) {
+      return viewBytes(model_, part.packed_view, part.what + ", " + kGltfSpz);
+    }
+    const size_t floats = 11 + shCoefficientCount(static_cast<int>(part.info.sh_degree)) * 3;
+    return part.info.count * floats * sizeof(float);
   }
 
   [[noreturn]] static void failUnsupported(const Part& part, const std::string& key,
@@ -246,6 +247,7 @@ class SplatReader {
   GltfScene scene_;
   const GltfModel& model_;
   std::vector<Part> parts_;
+  uint64_t bytes_ = 0;  ///< of all parts
 };
 
 }  // namespace

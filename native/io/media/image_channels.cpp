@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "io/bytes/input_file.h"
+#include "io/bytes/limits.h"
 #include "io/media/media_calls.h"
 
 namespace stipple::media {
@@ -55,8 +57,12 @@ class Layout {
                            static_cast<uint32_t>(spec.full_height),
                            static_cast<uint32_t>(name.size())});
       names_ += name;
-      plane_bytes_ += sizeof(float) * static_cast<uint64_t>(spec.full_width) *
-                      static_cast<uint64_t>(spec.full_height);
+      // Rows are read at the width of what is stored, which may be wider than the image.
+      const auto area = [](int width, int height) {
+        return static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
+      };
+      plane_bytes_ += sizeof(float) * std::max(area(spec.full_width, spec.full_height),
+                                               area(spec.width, std::min(spec.height, kBandRows)));
     }
   }
 
@@ -169,6 +175,8 @@ void stipple_media_exr_channels_read(const char* path, uint64_t limit_bytes,
                " channels of " + std::to_string(layout.planeBytes()) + " bytes in all; at most " +
                std::to_string(limit_bytes) + " bytes are allowed");
     }
+    requireAllowed(layout.planeBytes(), kImageAllowance, InputFile(name).size(), name,
+                   std::to_string(layout.channels().size()) + " channels");
     give(*sink, kMediaChannels, layout.channels());
     giveBytes(*sink, kMediaChannelNames, layout.names().data(), layout.names().size());
     std::vector<float*> planes;

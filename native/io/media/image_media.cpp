@@ -4,6 +4,7 @@
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -14,6 +15,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "io/bytes/input_file.h"
+#include "io/bytes/limits.h"
 #include "io/media/media_calls.h"
 
 namespace stipple::media {
@@ -79,13 +82,21 @@ using Allocate = std::function<float*(size_t count)>;
 
 /// Decodes the pixels [height, width, channels] to where `allocate` says.
 StippleMediaImage decodeInto(OIIO::ImageInput& input, const std::string& name,
-                             const Allocate& allocate) {
+                             const ImagesSoFar& others, const Allocate& allocate) {
   const OIIO::ImageSpec spec = input.spec();
   const StippleMediaImage info = describe(spec, name);
   const int64_t window[2] = {info.width, info.height};
   const std::vector<int> channels = chooseChannels(spec);
   const int first = *std::min_element(channels.begin(), channels.end());
   const int last = *std::max_element(channels.begin(), channels.end());
+  const auto read_channels = static_cast<size_t>(last - first + 1);
+  const auto data_floats =
+      static_cast<uint64_t>(spec.width) * static_cast<uint64_t>(spec.height) * read_channels;
+  const uint64_t pixel_floats = uint64_t{info.width} * info.height * channels.size();
+  requireAllowed(others.pixel_bytes + std::max(data_floats, pixel_floats) * sizeof(float),
+                 kImageAllowance, others.encoded_bytes, name,
+                 "an image of " + std::to_string(info.width) + " x " +
+                     std::to_string(info.height) + " pixels");
   const auto read = [&](float* pixels) {
     if (!input.read_image(0, 0, first, last + 1, OIIO::TypeDesc::FLOAT, pixels)) {
       fail(ErrorCode::kFormat, name + " cannot be decoded: " + input.geterror());
@@ -104,7 +115,6 @@ StippleMediaImage decodeInto(OIIO::ImageInput& input, const std::string& name,
     return info;
   }
 
-  const size_t read_channels = static_cast<size_t>(last - first + 1);
   const size_t width = static_cast<size_t>(spec.width);
   const size_t height = static_cast<size_t>(spec.height);
   std::vector<float> pixels(width * height * read_channels);
@@ -124,15 +134,6 @@ StippleMediaImage decodeInto(OIIO::ImageInput& input, const std::string& name,
     }
   }
   return info;
-}
-
-DecodedImage decode(OIIO::ImageInput& input, const std::string& name) {
-  DecodedImage image;
-  image.info = decodeInto(input, name, [&image](size_t count) {
-    image.pixels.resize(count);
-    return image.pixels.data();
-  });
-  return image;
 }
 
 OIIO::ImageSpec keepAlpha() {
@@ -163,21 +164,29 @@ const char* nameForBytes(const std::vector<unsigned char>& bytes) {
   return nullptr;
 }
 
-// Refuses a PNG of which a chunk says that it goes on beyond the end: its reader would ask for that
-// much memory, up to 2 GiB, before it looks.
-void requireWholeChunks(const std::vector<unsigned char>& bytes, const std::string& name) {
-  constexpr size_t kSignature = 8;
-  constexpr size_t kAround = 12;  // length, type and checksum of a chunk
-  for (size_t at = kSignature; at + kAround <= bytes.size();) {
-    size_t length = 0;
-    for (size_t i = 0; i < 4; ++i) length = length << 8 | bytes[at + i];
-    const size_t left = bytes.size() - at - kAround;
+/// Copies bytes of a file from an offset, all inside it.
+using ReadAt = std::function<void(uint64_t offset, uint8_t* out, size_t count)>;
+
+/// Refuses a PNG of which a chunk says that it goes on beyond the end: its reader would ask for
+/// that much memory, up to 2 GiB, before it looks. Other files are fine. In: size, of the file.
+void requireWholeChunks(uint64_t size, const ReadAt& read_at, const std::string& name) {
+  constexpr uint64_t kSignature = 8;
+  constexpr uint64_t kAround = 12;  // length, type and checksum of a chunk
+  std::array<uint8_t, 8> head;
+  if (size < head.size()) return;
+  read_at(0, head.data(), head.size());
+  if (std::memcmp(head.data(), "\x89PNG", 4) != 0) return;
+  for (uint64_t at = kSignature; at + kAround <= size;) {
+    read_at(at, head.data(), head.size());
+    uint64_t length = 0;
+    for (size_t i = 0; i < 4; ++i) length = length << 8 | head[i];
+    const uint64_t left = size - at - kAround;
     if (length > left) {
       fail(ErrorCode::kFormat, name + " cannot be decoded: a part of it says that it has " +
                                    std::to_string(length) + " bytes, and " + std::to_string(left) +
                                    " are left");
     }
-    if (std::memcmp(&bytes[at + 4], "IEND", 4) == 0) return;
+    if (std::memcmp(&head[4], "IEND", 4) == 0) return;
     at += kAround + length;
   }
 }
@@ -208,16 +217,16 @@ OIIO::ImageSpec specFor(const StippleMediaImage& image, OIIO::TypeDesc type) {
 
 }  // namespace
 
-DecodedImage decodeImageFile(const std::string& path) {
-  return decode(*openImage(path), path);
-}
-
-DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std::string& name) {
+DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std::string& name,
+                              const ImagesSoFar& others) {
   const char* file_name = nameForBytes(bytes);
   if (file_name == nullptr) {
     fail(ErrorCode::kUnsupported, name + " is not a PNG, JPEG, WebP, BMP or GIF image");
   }
-  if (bytes[0] == 0x89) requireWholeChunks(bytes, name);
+  requireWholeChunks(
+      bytes.size(),
+      [&bytes](uint64_t at, uint8_t* out, size_t count) { std::copy_n(&bytes[at], count, out); },
+      name);
   OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
   OIIO::ImageSpec config = keepAlpha();
   // The readers look for the bytes in the configuration, not in open's own argument.
@@ -225,13 +234,22 @@ DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std
   config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
   const auto input = OIIO::ImageInput::open(file_name, &config, &memory);
   if (!input) fail(ErrorCode::kFormat, name + " cannot be decoded: " + OIIO::geterror());
-  return decode(*input, name);
+  DecodedImage image;
+  image.info = decodeInto(*input, name, others, [&image](size_t count) {
+    image.pixels.resize(count);
+    return image.pixels.data();
+  });
+  return image;
 }
 
 void stipple_media_image_read(const char* path, StippleMediaImage* image,
                               const StippleMediaSink* sink, StippleMediaStatus* status) {
   guard(path, status, [&] {
-    *image = decodeInto(*openImage(path), path, [sink](size_t count) {
+    const InputFile file(path);
+    requireWholeChunks(
+        file.size(),
+        [&file](uint64_t at, uint8_t* out, size_t count) { file.readAt(at, out, count); }, path);
+    *image = decodeInto(*openImage(path), path, {0, file.size()}, [sink](size_t count) {
       return static_cast<float*>(
           stipple::media::allocate(*sink, kMediaPixels, count * sizeof(float)));
     });

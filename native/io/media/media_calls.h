@@ -87,9 +87,14 @@ struct DecodedImage {
   StippleMediaImage info{};
   std::vector<float> pixels;
 };
-DecodedImage decodeImageFile(const std::string& path);
+/// What images are counted together where their pixels are compared with kImageAllowance.
+struct ImagesSoFar {
+  uint64_t pixel_bytes = 0;    ///< of those before this one
+  uint64_t encoded_bytes = 0;  ///< of all files
+};
 /// In: name, what messages call it.
-DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std::string& name);
+DecodedImage decodeImageBytes(const std::vector<unsigned char>& bytes, const std::string& name,
+                              const ImagesSoFar& others);
 
 /// The triangles of a glTF or GLB file.
 TriMesh readGltf(const std::string& path);

@@ -16,7 +16,10 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "data/sparse_volume.h"
+#include "io/bytes/input_file.h"
+#include "io/bytes/limits.h"
 #include "io/media/media_calls.h"
+#include "io/media/volume_header.h"
 
 namespace stipple::media {
 
@@ -28,6 +31,7 @@ constexpr size_t kVoxels = kBrickVoxelCount;
 constexpr size_t kBricksPerTask = 256;
 // 512 M voxels are 8 GiB of density and colour.
 constexpr openvdb::Index64 kMaxVoxels = openvdb::Index64{1} << 29;
+constexpr openvdb::Index64 kVoxelBytes = 4 * sizeof(float);
 
 // Some programs keep transforms as float32.
 constexpr double kFrameTolerance = 1e-6;
@@ -108,26 +112,62 @@ void writeVolume(const char* path, const StippleMediaVolume& volume) {
   archive.writeFile(path, {density, colour});
 }
 
-/// The grid of this name and type, its active tiles turned into leaves.
-template <typename Grid>
-typename Grid::Ptr takeGrid(openvdb::io::File& file, const char* name) {
-  const std::string path = file.filename();
-  if (!file.hasGrid(name)) {
-    fail(ErrorCode::kFormat, path + " has no grid '" + name + "'; density and color are needed");
+/// An OpenVDB file, of which every length is known to lie inside it before OpenVDB believes it.
+class CheckedFile {
+ public:
+  explicit CheckedFile(const char* path)
+      : file_(path), header_(readVolumeHeader(file_)), stream_(path, std::ios::binary) {
+    // OpenVDB reads on after the end of a file, and takes what lies in memory for lengths.
+    stream_.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+    openvdb::io::setVersion(stream_, {header_.library_major, header_.library_minor},
+                            header_.file_version);
   }
-  const auto grid = openvdb::gridPtrCast<Grid>(file.readGrid(name));
-  if (!grid) {
-    fail(ErrorCode::kFormat,
-         path + ": the grid '" + name + "' is not of the type " + Grid::gridType());
+
+  /// The grid of this name and type, its active tiles turned into leaves.
+  template <typename Grid>
+  typename Grid::Ptr take(const char* name) {
+    const auto found = header_.grids.find(name);
+    if (found == header_.grids.end()) {
+      fail(ErrorCode::kFormat,
+           file_.path() + " has no grid '" + name + "'; density and color are needed");
+    }
+    const std::string what = file_.path() + ": the grid '" + name + "'";
+    const VolumeGridPlace& place = found->second;
+    if (place.type != Grid::gridType()) {
+      fail(ErrorCode::kFormat, what + " is not of the type " + Grid::gridType());
+    }
+    const auto grid = Grid::create();
+    try {
+      grid->setSaveFloatAsHalf(place.is_half);
+      openvdb::io::setDataCompression(stream_, place.compression);
+      stream_.seekg(static_cast<std::streamoff>(place.transform));
+      grid->readTransform(stream_);
+      grid->readTopology(stream_);
+      stream_.seekg(static_cast<std::streamoff>(place.blocks));
+      grid->readBuffers(stream_);
+    } catch (const std::ios_base::failure&) {
+      fail(ErrorCode::kFormat, what + " is truncated or damaged: it needs bytes beyond the " +
+                                   std::to_string(file_.size()) + " of the file");
+    } catch (const std::bad_alloc&) {
+      fail(ErrorCode::kFormat, what + " is damaged: it needs more memory than there is");
+    }
+    const openvdb::Index64 voxels = grid->activeVoxelCount();
+    if (voxels > kMaxVoxels) {
+      fail(ErrorCode::kMemoryLimit,
+           what + " holds " + std::to_string(voxels) + " active voxels; at most " +
+               std::to_string(kMaxVoxels) + " can be read");
+    }
+    requireAllowed(voxels * kVoxelBytes, kVoxelAllowance, file_.size(), file_.path(),
+                   "the " + std::to_string(voxels) + " active voxels of the grid '" + name + "'");
+    grid->tree().voxelizeActiveTiles();
+    return grid;
   }
-  if (grid->activeVoxelCount() > kMaxVoxels) {
-    fail(ErrorCode::kMemoryLimit,
-         path + ": the grid '" + name + "' holds " + std::to_string(grid->activeVoxelCount()) +
-             " active voxels; at most " + std::to_string(kMaxVoxels) + " can be read");
-  }
-  grid->tree().voxelizeActiveTiles();
-  return grid;
-}
+
+ private:
+  InputFile file_;
+  VolumeHeader header_;
+  std::ifstream stream_;
+};
 
 /// Copies the leaves of a tree to the places of their bricks; a brick without a leaf stays zero.
 template <typename Tree>
@@ -177,10 +217,9 @@ Frame frameOf(const openvdb::math::Transform& transform, const char* path) {
 
 void readVolume(const char* path, double* voxel_size, double* origin,
                 const StippleMediaSink& sink) {
-  openvdb::io::File file(path);
-  file.open(false);
-  const auto density = takeGrid<openvdb::FloatGrid>(file, kDensityName);
-  const auto colour = takeGrid<openvdb::Vec3SGrid>(file, kColourName);
+  CheckedFile file(path);
+  const auto density = file.take<openvdb::FloatGrid>(kDensityName);
+  const auto colour = file.take<openvdb::Vec3SGrid>(kColourName);
   const Frame frame = frameOf(density->transform(), path);
   const Frame other = frameOf(colour->transform(), path);
   const double largest = std::max({std::abs(frame.origin[0]), std::abs(frame.origin[1]),

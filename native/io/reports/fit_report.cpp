@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "io/bytes/input_file.h"
+#include "io/bytes/json_text.h"
 #include "io/bytes/output_file.h"
 #include "io/bytes/output_kind.h"
 #include "plot/svg_plot.h"
@@ -131,13 +132,8 @@ void requireFitReportPlace(const std::string& path) {
 }
 
 void writeFitReport(const FitReportHead& head, const FitHistory& history, const std::string& path) {
-  Json settings;
-  try {
-    settings = Json::parse(head.settings_json);
-  } catch (const Json::exception& error) {
-    fail(ErrorCode::kInvalidArgument,
-         std::string("the settings of the report are not valid JSON: ") + error.what());
-  }
+  Json settings = parseOrderedJson(head.settings_json, "the text of the report's settings",
+                                   ErrorCode::kInvalidArgument);
   Json report;
   report["stipple_fit_report"] = 1;
   report["model"] = head.model;

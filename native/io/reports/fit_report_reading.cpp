@@ -5,6 +5,8 @@
 
 #include "base/error.h"
 #include "io/bytes/input_file.h"
+#include "io/bytes/json_text.h"
+#include "io/bytes/limits.h"
 #include "io/reports/fit_report.h"
 
 namespace stipple {
@@ -12,9 +14,6 @@ namespace stipple {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-/// Ten million iterations of all figures.
-constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
 
 /// The seconds of all parts of an iteration, summed up to each: [iterations + 1].
 std::vector<double> secondsUpTo(const Json& report) {
@@ -74,10 +73,11 @@ AccuracyReport reportOf(const Json& json) {
 }  // namespace
 
 AccuracyReport readFitAccuracy(const std::string& path) {
-  const std::string text = readTextFile(path, kMaxFileBytes);
+  const std::string text = readTextFile(path, kMaxJsonBytes);
   const std::string what = "'" + path + "' is not the report of a fit: ";
+  const Json json = parseOrderedJson(text, what + "its text");
   try {
-    return reportOf(Json::parse(text));
+    return reportOf(json);
   } catch (const Json::exception& error) {
     fail(ErrorCode::kFormat, what + error.what());
   } catch (const Error& error) {

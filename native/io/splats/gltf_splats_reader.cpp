@@ -10,10 +10,12 @@
 #include "data/clouds/cloud_transform.h"
 #include "data/clouds/splat_frame.h"
 #include "io/bytes/input_file.h"
+#include "io/bytes/limits.h"
 #include "io/media_library.h"
 #include "io/splats/cloud_parts.h"
 #include "io/splats/gltf_splat_names.h"
 #include "io/splats/gltf_splats.h"
+#include "io/splats/splat_check.h"
 #include "io/splats/spz_file.h"
 
 namespace stipple {
@@ -22,7 +24,7 @@ namespace {
 
 constexpr size_t kGrain = 4096;
 // The JSON of a real splat file is a few kilobytes; a mesh file's may be longer.
-constexpr uint64_t kMaxJsonBytes = uint64_t{1} << 26;
+constexpr uint64_t kLookedAtBytes = uint64_t{1} << 26;
 constexpr size_t kGlbHead = 20;
 constexpr char kGlbMagic[] = "glTF";
 
@@ -116,14 +118,15 @@ bool startsAsGltfSplats(const SplatFileStart& start) {
     std::memcpy(&length, start.bytes.data() + 12, sizeof(length));
     json = std::min<uint64_t>(json, kGlbHead + uint64_t{length});
   }
-  std::string text(static_cast<size_t>(std::min(json, kMaxJsonBytes)), '\0');
+  std::string text(static_cast<size_t>(std::min(json, kLookedAtBytes)), '\0');
   file.readAt(0, text.data(), text.size());
   return text.find(std::string(1, '"') + kGltfSplats + '"') != text.npos;
 }
 
 SplatCloud readGltfSplats(const std::string& path, Progress* progress) {
   // Names a missing or unreadable file in the words of every reader.
-  if (InputFile(path).size() == 0) fail(ErrorCode::kFormat, path + " is empty");
+  const uint64_t file_bytes = InputFile(path).size();
+  if (file_bytes == 0) fail(ErrorCode::kFormat, path + " is empty");
   Delivery delivery;
   const MediaSink sink(
       [&delivery](uint32_t array, uint64_t bytes) { return delivery.take(array, bytes); });
@@ -132,7 +135,13 @@ SplatCloud readGltfSplats(const std::string& path, Progress* progress) {
     media.gltf_splats_read(path.c_str(), sink.get(), status);
   });
   advance(progress, 0.5, "Reading splats");
+  // The packed parts may lie in a file beside it.
+  uint64_t packed_bytes = file_bytes;
+  for (const ByteVector& packed : delivery.packed) {
+    packed_bytes = std::max<uint64_t>(packed_bytes, packed.size());
+  }
   std::vector<SplatCloud> parts;
+  uint64_t bytes = 0;
   for (size_t p = 0; p < delivery.clouds.size(); ++p) {
     const StippleMediaSplatPart& info = delivery.infos[p];
     const std::string what = path + ": mesh " + std::to_string(info.mesh) + ", primitive " +
@@ -140,6 +149,8 @@ SplatCloud readGltfSplats(const std::string& path, Progress* progress) {
     SplatCloud& cloud = delivery.clouds[p];
     if (info.packing == kMediaSplatsInSpz) {
       cloud = unpacked(std::move(delivery.packed[p]), info, what);
+      bytes += cloudBytes(cloud.size(), cloud.sh_degree);
+      requireAllowed(bytes, kSplatAllowance, packed_bytes, path, "the splats of its SPZ parts");
     } else {
       cloud.sh_degree = static_cast<int>(info.sh_degree);
       cloud.antialias = static_cast<Antialias>(info.antialias);

@@ -17,6 +17,8 @@ bool startsAsSog(const SplatFileStart& start);
 /// beside it, or the folder of that.
 /// Errors: kIo, kFormat (file, key or splat, what is seen and allowed), kUnsupported.
 SplatCloud readSog(const std::string& path, Progress* progress);
+/// The same, one of many. Out: stored_bytes, of its images in their files.
+SplatCloud readSogPart(const std::string& path, uint64_t& stored_bytes);
 
 struct SogOptions {
   /// Rounds of moving the palette of harmonics; each takes as long as the last, and the first few

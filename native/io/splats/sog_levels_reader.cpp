@@ -6,10 +6,13 @@
 
 #include "base/error.h"
 #include "io/bytes/input_file.h"
+#include "io/bytes/json_text.h"
+#include "io/bytes/limits.h"
 #include "io/splats/cloud_parts.h"
 #include "io/splats/sog_file.h"
 #include "io/splats/sog_level_names.h"
 #include "io/splats/sog_levels.h"
+#include "io/splats/splat_check.h"
 
 namespace stipple {
 
@@ -18,8 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr uint64_t kMaxMetaBytes = uint64_t{1} << 28;
-constexpr int kMaxDepth = 200;
 constexpr char kFinest[] = "0";
 
 struct Range {
@@ -39,12 +40,12 @@ class Reader {
     std::vector<SplatCloud> parts;
     size_t done = 0;
     for (auto& [file, ranges] : ranges_) {
-      parts.push_back(chosen(readSog(filePath(names_[file]), nullptr), file, ranges));
+      parts.push_back(chosen(readScene(names_[file]), file, ranges));
       advance(progress_, static_cast<double>(++done) / static_cast<double>(ranges_.size() + 1),
               "Reading splats");
     }
     if (meta_.contains("environment") && !meta_["environment"].is_null()) {
-      parts.push_back(readSog(filePath(nameOf(meta_["environment"], "environment")), nullptr));
+      parts.push_back(readScene(nameOf(meta_["environment"], "environment")));
     }
     if (parts.empty()) failHere("names no splats of its finest level");
     for (const SplatCloud& part : parts) {
@@ -63,12 +64,22 @@ class Reader {
     fail(ErrorCode::kFormat, path_ + " " + what);
   }
 
+  /// One file of the scene. Several may lead to the same images, whose bytes count once.
+  SplatCloud readScene(const std::string& name) {
+    const std::string path = filePath(name);
+    uint64_t bytes = 0;
+    SplatCloud cloud = readSogPart(path, bytes);
+    const fs::path place = fs::weakly_canonical(path);
+    stored_bytes_[place.filename() == kSogMetaName ? place.parent_path() : place] = bytes;
+    cloud_bytes_ += cloudBytes(cloud.size(), cloud.sh_degree);
+    uint64_t stored = 0;
+    for (const auto& entry : stored_bytes_) stored += entry.second;
+    requireAllowed(cloud_bytes_, kSplatAllowance, stored, path_, "the splats of its files");
+    return cloud;
+  }
+
   void parse() {
-    try {
-      meta_ = Json::parse(readTextFile(path_, kMaxMetaBytes));
-    } catch (const Json::exception& error) {
-      failHere(std::string("is not valid JSON: ") + error.what());
-    }
+    meta_ = parseJson(readTextFile(path_, kMaxJsonBytes), path_);
     if (!meta_.is_object()) failHere("is not a JSON object");
     if (meta_.contains("version") && meta_["version"] != 1) {
       fail(ErrorCode::kUnsupported,
@@ -85,7 +96,7 @@ class Reader {
       failHere("names a file twice in 'filenames'");
     }
     if (!meta_.contains("tree")) failHere("has no 'tree'");
-    walk(meta_["tree"], 0);
+    walk(meta_["tree"]);
     checkCounts();
   }
 
@@ -114,9 +125,9 @@ class Reader {
     return object[key].get<uint64_t>();
   }
 
-  void walk(const Json& node, int depth) {
+  /// As deep as JSON may be nested.
+  void walk(const Json& node) {
     if (!node.is_object()) failHere("has a 'tree' with a node that is not an object");
-    if (depth > kMaxDepth) failHere("has a 'tree' deeper than " + std::to_string(kMaxDepth));
     if (node.contains("lods") && node["lods"].is_object() && node["lods"].contains(kFinest)) {
       const Json& chunk = node["lods"][kFinest];
       const uint64_t file = wholeNumber(chunk, "file");
@@ -129,7 +140,7 @@ class Reader {
     }
     if (!node.contains("children")) return;
     if (!node["children"].is_array()) failHere("has a 'tree' whose 'children' are no list");
-    for (const Json& child : node["children"]) walk(child, depth + 1);
+    for (const Json& child : node["children"]) walk(child);
   }
 
   void checkCounts() {
@@ -177,6 +188,8 @@ class Reader {
   Progress* progress_;
   Json meta_;
   std::vector<std::string> names_;
+  std::map<fs::path, uint64_t> stored_bytes_;    ///< of the images at each place
+  uint64_t cloud_bytes_ = 0;                     ///< of all that was read
   std::map<size_t, std::vector<Range>> ranges_;  ///< of the finest level, per file
 };
 

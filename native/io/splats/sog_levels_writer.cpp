@@ -10,6 +10,8 @@
 
 #include "base/error.h"
 #include "io/bytes/input_file.h"
+#include "io/bytes/json_text.h"
+#include "io/bytes/limits.h"
 #include "io/bytes/output_file.h"
 #include "io/splats/cloud_parts.h"
 #include "io/splats/sog_file.h"
@@ -25,7 +27,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr int kMaxDepth = 40;
-constexpr uint64_t kMaxMetaBytes = uint64_t{1} << 28;
 // A splat is drawn to about three standard deviations.
 constexpr double kExtent = 3.0;
 constexpr char kStage[] = "Writing splats";
@@ -245,12 +246,21 @@ class Writer {
     }
   }
 
+  /// Null where it cannot be read.
+  Json oldMeta() const {
+    try {
+      return parseOrderedJson(readTextFile(path_, kMaxJsonBytes), path_);
+    } catch (const Error&) {
+      return nullptr;
+    }
+  }
+
   /// Folders that a lod-meta.json which is there names; none where it cannot be read.
   std::vector<fs::path> oldFolders() const {
     std::vector<fs::path> folders;
     std::error_code ignored;
     if (!fs::exists(path_, ignored)) return folders;
-    const Json old = Json::parse(readTextFile(path_, kMaxMetaBytes), nullptr, false);
+    const Json old = oldMeta();
     if (!old.is_object() || !old.contains("filenames") || !old["filenames"].is_array()) {
       return folders;
     }

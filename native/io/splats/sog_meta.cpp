@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "io/bytes/json_text.h"
 #include "io/splats/ply/ply_file.h"
 
 namespace stipple {
@@ -299,12 +300,7 @@ class MetaReader {
 }  // namespace
 
 SogMeta parseSogMeta(const std::string& text, const std::string& name) {
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const Json::exception& error) {
-    fail(ErrorCode::kFormat, name + " is not valid JSON: " + error.what());
-  }
+  const Json json = parseJson(text, name);
   return MetaReader(name, json).read();
 }
 

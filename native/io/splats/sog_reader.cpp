@@ -12,10 +12,12 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "io/bytes/input_file.h"
+#include "io/bytes/limits.h"
 #include "io/bytes/zip_file.h"
 #include "io/splats/sog_file.h"
 #include "io/splats/sog_level_names.h"
 #include "io/splats/sog_meta.h"
+#include "io/splats/splat_check.h"
 #include "io/webp_image.h"
 
 namespace stipple {
@@ -24,7 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMaxMetaBytes = uint64_t{1} << 24;
 constexpr size_t kGrain = 4096;
 constexpr uint64_t kPaletteRow = 64;
 constexpr uint64_t kMaxPalette = 65536;
@@ -32,11 +33,6 @@ constexpr uint64_t kMaxPalette = 65536;
 constexpr float kFlatness = 1e-3f;
 // A table of all 16-bit codes pays off from this many splats on.
 constexpr uint64_t kCodes = 65536;
-
-// Real pictures take several bytes per splat, so a file that claims more splats than this per byte
-// is made to exhaust memory. Small scenes of equal splats are let through.
-constexpr uint64_t kMaxSplatsPerByte = 64;
-constexpr uint64_t kAlwaysAllowed = 65536;
 
 // Of a cloud's bytes over those of its pictures, real scenes have 7 to 15.
 constexpr uint64_t kMostEarly = 32;
@@ -101,8 +97,12 @@ class Reader {
     }
   }
 
+  /// Bytes of the scene's images as they are stored.
+  uint64_t storedBytes() const { return stored_bytes_; }
+
   SplatCloud read() {
-    decodePictures(checkCount());
+    stored_bytes_ = checkCount();
+    decodePictures(stored_bytes_);
     advance(progress_, 0.5, "Reading splats");
     cloud_.antialias = meta_.antialias;
     cloud_.colour_space = meta_.colour_space;
@@ -127,7 +127,7 @@ class Reader {
   enum Picture { kMeansLow, kMeansHigh, kScales, kRotations, kColours, kLabels, kCentroids };
 
   SogMeta readMeta() const {
-    const std::vector<uint8_t> bytes = files_.read(files_.metaFile(), kMaxMetaBytes);
+    const std::vector<uint8_t> bytes = files_.read(files_.metaFile(), kMaxSogMetaBytes);
     return parseSogMeta(std::string(bytes.begin(), bytes.end()), files_.name(files_.metaFile()));
   }
 
@@ -145,13 +145,9 @@ class Reader {
   uint64_t checkCount() const {
     uint64_t bytes = 0;
     for (const std::string& name : pictureNames()) bytes += files_.storedBytes(name);
-    const uint64_t most = kAlwaysAllowed + bytes * kMaxSplatsPerByte;
-    if (meta_.count > most) {
-      fail(ErrorCode::kFormat, files_.name(files_.metaFile()) + ": 'count' is " +
-                                   std::to_string(meta_.count) + "; images of " +
-                                   std::to_string(bytes) + " bytes can hold at most " +
-                                   std::to_string(most));
-    }
+    // Version 1 tells the degree only by a picture.
+    const int degree = meta_.hasHarmonics() && meta_.bands == 0 ? 3 : meta_.bands;
+    requireAllowedSplats(meta_.count, degree, bytes, files_.name(files_.metaFile()));
     return bytes;
   }
 
@@ -326,6 +322,7 @@ class Reader {
   Files files_;
   Progress* progress_;
   SogMeta meta_;
+  uint64_t stored_bytes_ = 0;
   std::vector<RgbaBytes> pictures_;
   std::array<std::vector<float>, 3> positions_;
   DefaultInitVector<float> palette_;  ///< [palette_count, (bands+1)^2 - 1, 3]
@@ -347,6 +344,13 @@ bool startsAsSog(const SplatFileStart& start) {
 
 SplatCloud readSog(const std::string& path, Progress* progress) {
   return Reader(path, progress).read();
+}
+
+SplatCloud readSogPart(const std::string& path, uint64_t& stored_bytes) {
+  Reader reader(path, nullptr);
+  SplatCloud cloud = reader.read();
+  stored_bytes = reader.storedBytes();
+  return cloud;
 }
 
 }  // namespace stipple

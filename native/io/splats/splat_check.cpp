@@ -1,6 +1,9 @@
 #include "io/splats/splat_check.h"
 
+#include <algorithm>
+
 #include "base/error.h"
+#include "io/bytes/limits.h"
 
 namespace stipple {
 
@@ -18,6 +21,19 @@ void RowCheck::require() const {
   if (valid_.load(std::memory_order_relaxed)) return;
   validate(cloud_, what_);
   fail(ErrorCode::kInternal, std::string(what_) + " was doubted without a reason");
+}
+
+uint64_t cloudBytes(uint64_t count, int sh_degree) {
+  constexpr uint64_t kBesideHarmonics = 11;  // position, rotation, scale, opacity
+  return count * (kBesideHarmonics + shCoefficientCount(sh_degree) * 3) * sizeof(float);
+}
+
+void requireAllowedSplats(uint64_t count, int sh_degree, uint64_t file_bytes,
+                          const std::string& name) {
+  // No file has as many; the product of what a damaged one claims may not fit.
+  const uint64_t counted = std::min(count, uint64_t{1} << 48);
+  requireAllowed(cloudBytes(counted, sh_degree), kSplatAllowance, file_bytes, name,
+                 "the " + std::to_string(count) + " splats that it claims");
 }
 
 void requireValidSplats(const SplatCloud& cloud, const std::string& path) {

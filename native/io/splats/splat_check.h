@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <string>
 
 #include "data/clouds/splat_cloud.h"
@@ -26,6 +27,14 @@ class RowCheck {
   const char* what_;
   std::atomic<bool> valid_{true};
 };
+
+/// Bytes of so many splats of a degree as the arrays of a cloud.
+uint64_t cloudBytes(uint64_t count, int sh_degree);
+
+/// Refuses a count of splats that is more than a file of so many bytes may have, before they are
+/// allocated. In: name, of the file. Errors: kFormat with both numbers.
+void requireAllowedSplats(uint64_t count, int sh_degree, uint64_t file_bytes,
+                          const std::string& name);
 
 /// Refuses a cloud with values that no splat can have, as a fault of the file that it was read
 /// from. Errors: kFormat with the file, the splat, the value seen and what is allowed.

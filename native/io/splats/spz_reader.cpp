@@ -11,6 +11,7 @@
 #include "io/bytes/compression.h"
 #include "io/bytes/input_file.h"
 #include "io/bytes/little_endian.h"
+#include "io/splats/splat_check.h"
 #include "io/splats/spz_file.h"
 #include "math/half_float.h"
 
@@ -101,6 +102,7 @@ class Reader {
   /// A lying count is refused before anything is allocated for it. In: bytes that the splats unpack
   /// to, and how many of them a byte of the file can hold.
   void requireRoom(uint64_t unpacked, uint64_t ratio) const {
+    requireAllowedSplats(header_.count, header_.degree, file_bytes_, what_);
     const uint64_t possible = file_bytes_ * ratio;
     if (unpacked > possible) {
       failHere("claims " + std::to_string(header_.count) + " splats, " + std::to_string(unpacked) +

@@ -13,6 +13,8 @@
 
 #include "base/error.h"
 #include "io/bytes/input_file.h"
+#include "io/bytes/json_text.h"
+#include "io/bytes/limits.h"
 #include "io/views/colmap_cameras.h"
 
 namespace stipple {
@@ -23,7 +25,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 // A thousand frames take about a megabyte.
-constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
 // How far a stored rotation may be from orthonormal: three decimal digits in the file.
 constexpr double kRotationTolerance = 5e-3;
 
@@ -265,12 +266,7 @@ class FrameReader {
 };
 
 Json readJson(const std::string& path) {
-  const std::string text = readTextFile(path, kMaxFileBytes);
-  try {
-    return Json::parse(text);
-  } catch (const Json::exception& error) {
-    fail(ErrorCode::kFormat, path + " is not valid JSON: " + error.what());
-  }
+  return parseJson(readTextFile(path, kMaxJsonBytes), path);
 }
 
 /// What the name of a transforms_*.json says of its views.

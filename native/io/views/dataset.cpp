@@ -92,13 +92,13 @@ void requireFinitePixels(const Image& image, const std::string& path) {
 
 /// Reads a picture of the size that its camera has.
 Image readOfSize(const std::string& path, const Camera& camera, ImageHeader* header) {
-  Image image = readImageFile(path, header);
-  if (image.width != camera.width || image.height != camera.height) {
-    fail(ErrorCode::kFormat, path + " is " + sizeText(image.width, image.height) +
+  const ImageHeader seen = readImageHeader(path);
+  if (seen.width != camera.width || seen.height != camera.height) {
+    fail(ErrorCode::kFormat, path + " is " + sizeText(seen.width, seen.height) +
                                  " pixels; its camera is said to be " +
                                  sizeText(camera.width, camera.height) + " pixels");
   }
-  return image;
+  return readImageFile(path, header);
 }
 
 /// One channel as [H,W], which is the first of them.

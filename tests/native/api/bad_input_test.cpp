@@ -248,7 +248,7 @@ TEST_F(BadInput, APictureThatNeedsTooMuchMemoryIsRefusedWithItsNumbers) {
   stipple_context_free(context);
 }
 
-TEST_F(BadInput, APictureLargerThanTheMachineIsRefusedEvenWithoutALimit) {
+TEST_F(BadInput, APictureLargerThanTheMachineIsRefusedWithoutALimitOfTheCallers) {
   StippleCamera camera = frontCamera();
   camera.width = camera.height = 65536;
   const StippleInstance instance = placed(cloud_);
@@ -264,7 +264,7 @@ TEST_F(BadInput, APictureLargerThanTheMachineIsRefusedEvenWithoutALimit) {
   }();
   if (status == STIPPLE_OK) GTEST_SKIP() << "this machine has more than " << bytes << " bytes";
   EXPECT_EQ(status, STIPPLE_ERROR_MEMORY_LIMIT);
-  EXPECT_THAT(stipple_last_error_message(), HasSubstr("; this machine has "));
+  EXPECT_THAT(stipple_last_error_message(), HasSubstr("; the memory limit is "));
 }
 
 }  // namespace

@@ -124,6 +124,16 @@ TEST_F(Boundary, RefusesABudgetAboveTheMemoryLimitBeforeItAllocates) {
   options.anchor_count = STIPPLE_MAX_ANCHORS;
   StippleCloud* cloud = nullptr;
   EXPECT_EQ(stipple_model_decode(model, &options, &cloud), STIPPLE_ERROR_MEMORY_LIMIT);
+  const std::string message = stipple_last_error_message();
+  const std::string mark = "the memory limit is 67108864, and at most ";
+  ASSERT_NE(message.find(mark), std::string::npos) << message;
+  options.anchor_count = std::stoull(message.substr(message.find(mark) + mark.size()));
+  STIPPLE_EXPECT_OK(stipple_model_decode(model, &options, &cloud));
+  stipple_cloud_free(cloud);
+  ++options.anchor_count;
+  EXPECT_EQ(stipple_model_decode(model, &options, &cloud), STIPPLE_ERROR_MEMORY_LIMIT)
+      << "more would have fitted than it said";
+  options.anchor_count = STIPPLE_MAX_ANCHORS;
   uint64_t bound = 0;
   STIPPLE_EXPECT_OK(stipple_model_decode_memory_bound(model, &options, &bound));
   EXPECT_GT(bound, uint64_t{STIPPLE_MAX_ANCHORS} * 56) << "less than the splats themselves";

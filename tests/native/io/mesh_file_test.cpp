@@ -265,7 +265,7 @@ TEST_F(MeshFile, SaysWhatIsWrong) {
   refuse(scene("\"attributes\":{\"POSITION\":0},\"indices\":1"), {"vertex 3 of 3"});
   refuse(scene("\"attributes\":{\"POSITION\":2}"), {"POSITION", "vertex 1", "nan"});
   refuse(scene("\"attributes\":{\"POSITION\":3}"), {"1000000000000", "36 bytes"});
-  refuse(scene("\"attributes\":{\"POSITION\":4}"), {"1000000000000", "without data"});
+  refuse(scene("\"attributes\":{\"POSITION\":4}"), {"1 primitives of mesh 0", "would take"});
   refuse(scene("\"attributes\":{\"POSITION\":77}"), {"77"});
   refuse(scene("\"attributes\":{\"POSITION\":1}"), {"components; 3"});
   refuse(scene("\"attributes\":{\"POSITION\":0},\"material\":5"), {"material 5"});

@@ -187,7 +187,7 @@ TEST_F(SogLevels, SaysWhatIsWrong) {
   refused(twice, {"overlap at splat 0"});
   Json deep = lone["tree"];
   for (int i = 0; i < 300; ++i) deep = {{"children", {deep}}};
-  refused({{"filenames", good["filenames"]}, {"tree", deep}}, {"deeper than 200"});
+  refused({{"filenames", good["filenames"]}, {"tree", deep}}, {"nested 60", "at most 256"});
   refused({{"filenames", good["filenames"]}, {"tree", Json::object()}}, {"no splats"});
   const std::string text = good.dump();
   for (size_t length = 0; length < text.size(); length += 7) {

@@ -92,12 +92,14 @@ TEST_F(SurfaceAssetFile, PassesOverUnknownTensorsAndMinorVersions) {
   writeSurfaceAsset(asset, path("a"));
   std::string bytes = load(path("a"));
   bytes.replace(bytes.find("\"1.0\""), 5, "\"1.9\"");
-  // A tensor of a type from the future in front of the others; eight bytes hold the header's
-  // length.
-  const std::string extra = "\"new\":{\"dtype\":\"F4\",\"shape\":[9],\"data_offsets\":[0,1]},";
-  bytes.insert(9, extra);
+  // A tensor of a type from the future in front of the others, with a byte behind them; eight bytes
+  // hold the header's length.
   uint64_t length = 0;
   std::memcpy(&length, bytes.data(), 8);
+  const size_t data = bytes.size() - 8 - static_cast<size_t>(length);
+  const std::string extra = "\"new\":{\"dtype\":\"F4\",\"shape\":[9],\"data_offsets\":[" +
+                            std::to_string(data) + "," + std::to_string(data + 1) + "]},";
+  bytes.insert(9, extra).push_back('\1');
   length += extra.size();
   std::memcpy(bytes.data(), &length, 8);
   EXPECT_EQ(readSurfaceAsset(store("b", bytes)).cells, asset.cells);

@@ -73,19 +73,33 @@ def of(stipple):
                   stipple.learned_most)
 
 
+def _stored(text):
+    """The settings that a text holds; None where it holds none. A .blend from elsewhere may hold any text, nested to
+    any depth too."""
+    try:
+        values = json.loads(text)
+        # Settings of a later version that this one does not have are left out.
+        known = SourceSettings.__dataclass_fields__
+        chosen = {name: value for name, value in values.items() if name in known}
+        if not all(isinstance(value, (bool, int, float)) for value in chosen.values()):
+            return None
+        return SourceSettings(**chosen)
+    except (ValueError, RecursionError, AttributeError, TypeError):
+        return None
+
+
 @lru_cache(maxsize=256)
 def _known(kind, stored, gaussians, least, most):
     if kind == 'NONE':
         return _NOTHING
     if kind == 'CLOUD':
         return _CLOUD
-    if stored:
-        # Settings of a later version that this one does not have are left out.
-        known = SourceSettings.__dataclass_fields__
-        return SourceSettings(**{name: value for name, value in json.loads(stored).items() if name in known})
+    settings = _stored(stored)
+    if settings is not None:
+        return settings
     if kind == 'TREE':
         return _TREE
-    # Files of versions that did not store settings.
+    # Files of versions that did not store settings, and texts that hold none.
     return SourceSettings(True, True, False, False, most or 20_000, least, most, gaussians or 1,
                           gaussians or _MAX_GAUSSIANS, gaussians or 1, not gaussians, True)
 
