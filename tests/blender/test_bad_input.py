@@ -82,7 +82,7 @@ def test_vertices_that_are_no_numbers(unchanged, value):
     assert 'finite' in message or 'nan' in message.lower() or 'inf' in message.lower()
 
 
-def test_missing_texture_file(unchanged, tmp_path):
+def test_missing_texture_file(stipple, tmp_path):
     image = scenes.half_image()
     image.filepath_raw, image.file_format = str(tmp_path / 'gone.png'), 'PNG'
     image.save()
@@ -91,18 +91,43 @@ def test_missing_texture_file(unchanged, tmp_path):
     image.reload()
     quad = scenes.quad()
     scenes.image_material('textured', image, quad)
-    call = from_mesh(quad)
-    unchanged()
-    message = scenes.refuses(call, "Image 'halves' of material 'textured' cannot be read")
-    assert 'gone.png' in message
+    assert 'gone.png' in takes_viewport_colour(stipple, quad, "Image 'halves' of material 'textured' cannot be read")
 
 
-def test_missing_uv_map(unchanged):
+def test_missing_uv_map(stipple):
     quad = scenes.quad('Bare', with_uv=False)
     scenes.image_material('textured', scenes.half_image(), quad)
-    call = from_mesh(quad)
-    unchanged()
-    scenes.refuses(call, "Object 'Bare' has no UV map, which image 'halves' needs")
+    takes_viewport_colour(stipple, quad, "Object 'Bare' has no UV map, which image 'halves' needs")
+
+
+def test_missing_attribute_of_a_material(stipple):
+    quad = scenes.quad('Bare')
+    material = scenes.material('painted', obj=quad)
+    node = material.node_tree.nodes.new('ShaderNodeVertexColor')
+    node.layer_name = 'Paint'
+    material.node_tree.links.new(node.outputs['Color'], scenes.principled(material).inputs['Base Color'])
+    takes_viewport_colour(stipple, quad, "Object 'Bare' has no color attribute 'Paint'")
+
+
+def takes_viewport_colour(stipple, quad, problem):
+    """Splats are made all the same, in the viewport colour of the material; returns the note that says so."""
+    quad.data.materials[0].diffuse_color = (0.1, 0.7, 0.2, 1.0)
+    other = scenes.quad('Other', offset=(0.0, 0.0, 3.0))
+    scenes.material('plain', (0.1, 0.7, 0.2), other)
+    notes = []
+    scenes.select(quad, other)
+    stipple.scene.meshes.native_mesh(stipple.scene.source.sources.context(), [quad, other],
+                                     bpy.context.evaluated_depsgraph_get(), 'MATERIAL', notes)
+    name = quad.data.materials[0].name
+    assert len(notes) == 1 and notes[0].startswith(problem), notes
+    assert notes[0].endswith(f"The viewport color of '{name}' takes its place.")
+    assert bpy.ops.stipple.splats_from_mesh(anchors=400) == {'FINISHED'}
+    splats = stipple.scene.source.splat_data.read(bpy.context.object.data)
+    assert splats.count == 400
+    # All are of one colour: that of the other material.
+    colours = splats.sh.reshape(splats.count, -1)[:, :3]
+    assert np.ptp(colours, axis=0).max() < 1e-5
+    return notes[0]
 
 
 def test_missing_colour_attribute(unchanged):

@@ -53,7 +53,8 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         if not self._objects:
             raise invalid('No mesh is selected; select at least one object with faces.')
         native = sources.context()
-        mesh = meshes.native_mesh(native, self._objects, context.evaluated_depsgraph_get(), self.color_from)
+        self._notes = []
+        mesh = meshes.native_mesh(native, self._objects, context.evaluated_depsgraph_get(), self.color_from, self._notes)
         return Model.from_mesh_start(native, mesh, self.detail_weight, self.seed)
 
     def finish(self, context, job):
@@ -76,6 +77,8 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         sync.write_decoded(obj.data, splats)
         context.collection.objects.link(obj)
         self._select(context, obj)
+        for note in self._notes:
+            self.report({'WARNING'}, note)
         self.report({'INFO'}, f"{splats.count:,} splats in '{obj.name}'")
 
     def draw(self, _context):

@@ -34,8 +34,10 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
         if not self._sources:
             raise invalid(f"The meshes that '{self._object.name}' was made from are gone; at least one is needed.")
         native = sources.context()
+        self._notes = []
         with meshes.shown(context, self._sources):
-            mesh = meshes.native_mesh(native, self._sources, context.evaluated_depsgraph_get(), stipple.color_from)
+            mesh = meshes.native_mesh(native, self._sources, context.evaluated_depsgraph_get(), stipple.color_from,
+                                      self._notes)
         return Model.from_mesh_start(native, mesh, stipple.detail_weight, stipple.seed)
 
     def finish(self, _context, job):
@@ -47,6 +49,8 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
         with sync.paused():
             sources.attach_model(data, path, self._sources, model.settings())
         sync.write_decoded(data, splats)
+        for note in self._notes:
+            self.report({'WARNING'}, note)
         self.report({'INFO'}, f"{splats.count:,} splats from {len(self._sources)} source objects")
 
 

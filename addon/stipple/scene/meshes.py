@@ -40,13 +40,15 @@ def source_objects(objects):
             or obj.instance_type != 'NONE']
 
 
-def native_mesh(context, objects, depsgraph, color_from):
+def native_mesh(context, objects, depsgraph, color_from, notes=None):
     """All triangles of the objects and of what they instance, with colours, as one native mesh.
 
-    Errors: StippleError that names the object: no faces, NaN vertices, a texture, UV map or colour attribute missing.
+    Where a material's texture, UV map or colour attribute is missing, its viewport colour takes the place; notes gets
+    the sentences that say so. Errors: StippleError that names the object: no faces, NaN vertices, no colour attribute
+    where color_from asks for it.
     """
     mesh = Mesh.create(context)
-    materials = _Materials(mesh)
+    materials = _Materials(mesh, [] if notes is None else notes)
     placed, shapes = [], {}
     try:
         _collect(objects, depsgraph, color_from, placed, shapes)
@@ -230,14 +232,18 @@ def _with_colours(read, kinds, materials, color_from, baked):
         material_name = read.materials[slot].name if len(kinds) and read.materials[slot] else 'none'
         if kind.kind == 'CONSTANT':
             chosen[mask] = materials.constant(kind.rgba)
-        elif kind.kind == 'CORNER':
-            values = _attribute(read, kind.attribute)
-            colours = values if colours is None else np.where(mask[:, None, None], values, colours)
-            chosen[mask] = materials.corner()
-        elif kind.kind == 'TEXTURE':
-            values = _uv(read, kind.uv_map, kind.image.name)
-            uvs = values if uvs is None else np.where(mask[:, None, None], values, uvs)
-            chosen[mask] = materials.texture(kind.image, material_name, kind.with_alpha)
+        elif kind.kind in {'CORNER', 'TEXTURE'}:
+            try:
+                if kind.kind == 'CORNER':
+                    values = _attribute(read, kind.attribute)
+                    colours = values if colours is None else np.where(mask[:, None, None], values, colours)
+                    chosen[mask] = materials.corner()
+                else:
+                    values = _uv(read, kind.uv_map, kind.image.name)
+                    chosen[mask] = materials.texture(kind.image, material_name, kind.with_alpha)
+                    uvs = values if uvs is None else np.where(mask[:, None, None], values, uvs)
+            except StippleError as problem:
+                chosen[mask] = materials.fallback(read.materials[slot], problem)
         else:
             uvs = baked.uvs if uvs is None else np.where(mask[:, None, None], baked.uvs, uvs)
             if kind.kind not in baked_materials:
@@ -267,12 +273,20 @@ def _attribute(read, name):
 class _Materials:
     """Native materials and textures, each made once."""
 
-    def __init__(self, mesh):
+    def __init__(self, mesh, notes):
         self._mesh = mesh
+        self._notes = notes
         self._indices = {}
 
     def constant(self, rgba):
         return self._once(('constant', rgba), lambda: self._mesh.add_material(base_colour=rgba))
+
+    def fallback(self, material, problem):
+        """The viewport colour of a material whose own colours are missing; the problem is noted once."""
+        note = f"{str(problem).rstrip('.')}. The viewport color of '{material.name}' takes its place."
+        if note not in self._notes:
+            self._notes.append(note)
+        return self.constant(tuple(material.diffuse_color))
 
     def corner(self):
         return self._once('corner', lambda: self._mesh.add_material(MaterialColour.CORNER))
