@@ -168,6 +168,17 @@ def test_merge_joins_the_masked_clouds_in_the_active_objects_frame(stipple, tmp_
     assert stipple.scene.source.masks.counts(first.data) is None
 
 
+@pytest.mark.parametrize('budget, count', [('VIEWPORT', 50), ('RENDER', 80), ('FULL', 200)])
+def test_merge_takes_the_budget_that_is_asked_for(stipple, tmp_path, budget, count):
+    first = import_arrays(stipple, tmp_path, make_arrays(stipple, count=200, degree=0), 'a')
+    assert bpy.ops.stipple.add_budget() == {'FINISHED'}
+    first.data.stipple.ratio, first.data.stipple.ratio_render = 0.25, 0.4
+    second = import_arrays(stipple, tmp_path, make_arrays(stipple, count=40, degree=0), 'b')
+    scenes.select(first, second)
+    assert bpy.ops.stipple.merge_splats(budget=budget) == {'FINISHED'}
+    assert stipple.scene.source.splat_data.count(first.data) == count + 40
+
+
 def test_apply_moves_the_splats_and_keeps_the_mask(stipple, imported):
     before = read(stipple, imported)
     select(imported, box(size=0.9))

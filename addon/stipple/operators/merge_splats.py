@@ -3,12 +3,12 @@
 
 import bpy
 import numpy as np
+from bpy.props import EnumProperty
 
 from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene import grades
-from ..scene.source import edits, masks, placement, sources, splat_data, sync
+from ..scene.source import edits, exporting, masks, placement, sources, splat_data, sync
 
 
 class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
@@ -17,6 +17,9 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
     bl_idname = 'stipple.merge_splats'
     bl_label = "Merge Splats"
     bl_options = {'REGISTER', 'UNDO'}
+
+    budget: EnumProperty(name="Budget", description="How many splats of each object are joined",
+                         items=exporting.BUDGETS)
 
     @classmethod
     def poll(cls, context):
@@ -36,7 +39,8 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
         for obj in self._objects:
             edits.refuse_sequence(obj)
         inverse = np.linalg.inv(placement.matrix_of(active))
-        clouds = [grades.apply(sources.full_cloud(obj.data), obj.data.stipple) for obj in self._objects]
+        depsgraph = context.evaluated_depsgraph_get()
+        clouds = [exporting.cloud_at(obj.evaluated_get(depsgraph), self.budget) for obj in self._objects]
         matrices = [np.eye(4)] + [inverse @ placement.matrix_of(obj) for obj in others]
         frame = clouds[0].info().frame
 

@@ -14,11 +14,6 @@ from ..preferences import UP_AXES
 from ..scene.sequence import frames, frames_out, numbered
 from ..scene.source import exporting, formats, sources
 
-BUDGETS = (('VIEWPORT', "Viewport", "The splats that are shown now"),
-           ('RENDER', "Render", "The splats that renders show"),
-           ('FULL', "Full", "All splats of the source that are not hidden"))
-
-
 class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     """Export splats to a file"""
 
@@ -34,7 +29,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     use_selection: BoolProperty(name="Selected Only",
                                 description="Export selected splats only, instead of all that are "
                                             "visible", default=True)
-    budget: EnumProperty(name="Budget", description="How many splats are written", items=BUDGETS)
+    budget: EnumProperty(name="Budget", description="How many splats are written", items=exporting.BUDGETS)
     apply_transform: BoolProperty(name="Apply Transform", description="Write the splats where their objects put them,"
                                                                       " with their harmonics rotated; otherwise in "
                                                                       "the active object's own space", default=True)

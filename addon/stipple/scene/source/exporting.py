@@ -15,6 +15,11 @@ from ..sequence import frames, sequences
 from . import formats, placement, source_settings, sources, splat_data, sync
 
 
+BUDGETS = (('VIEWPORT', "Viewport", "The splats that are shown now"),
+           ('RENDER', "Render", "The splats that renders show"),
+           ('FULL', "Full", "All splats of the source that are not hidden"))
+
+
 def any_splats(context):
     return any(splat_data.is_splat_object(obj) for obj in context.scene.objects)
 
@@ -43,9 +48,9 @@ def placed_clouds(context, objects, budget, apply_transform, apply_grade=True):
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
     if apply_transform or len(objects) > 1:
-        placed = [(_cloud(obj, budget, apply_grade), placement.matrix_of(obj)) for obj in evaluated]
+        placed = [(cloud_at(obj, budget, apply_grade), placement.matrix_of(obj)) for obj in evaluated]
     else:
-        placed = [(_cloud(obj, budget, apply_grade), np.array(obj.matrix_world)) for obj in evaluated]
+        placed = [(cloud_at(obj, budget, apply_grade), np.array(obj.matrix_world)) for obj in evaluated]
     return in_frame(placed, apply_transform)
 
 
@@ -81,7 +86,8 @@ def joined(placed):
     return cloud_edit.merge(instances, frame)
 
 
-def _cloud(obj, budget, apply_grade):
+def cloud_at(obj, budget, apply_grade=True):
+    """The splats of an evaluated object at one of BUDGETS."""
     data = obj.original.data
     cloud = None
     if not (budget == 'VIEWPORT' or not source_settings.of(data.stipple).has_source or data.stipple.edited
