@@ -13,6 +13,14 @@ def test_every_operator_is_registered():
     assert set(OPERATORS) <= set(dir(bpy.ops.stipple))
 
 
+def test_tooltips_are_one_paragraph(stipple):
+    for cls in stipple.operators.classes:
+        if issubclass(cls, bpy.types.Operator):
+            noun, _, verb = cls.bl_idname.partition('.')
+            description = getattr(getattr(bpy.ops, noun), verb).get_rna_type().description
+            assert description and '\n' not in description and '  ' not in description, cls.bl_idname
+
+
 def test_settings_live_on_meshes_and_point_clouds():
     for owner in (bpy.types.Mesh, bpy.types.PointCloud):
         assert 'stipple' in owner.bl_rna.properties

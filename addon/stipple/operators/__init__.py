@@ -16,3 +16,8 @@ _modules = (splats_from_mesh, splats_fit, splats_densify, splats_import, splats_
             show_setting, effects_look, effects_measure, accuracy_measure, accuracy_compare, collect_sources,
             turn_denoising_off)
 classes = tuple(cls for module in _modules for cls in module.classes)
+
+# A tooltip is the docstring, whose lines are broken for who reads the code.
+for _cls in classes:
+    if _cls.__doc__ and 'bl_description' not in _cls.__dict__:
+        _cls.bl_description = ' '.join(_cls.__doc__.split())
