@@ -152,7 +152,7 @@ TEST(PictureAccuracy, AFewBlocksSayOfAWholeImageWhatAllPixelsSay) {
   const auto measured = [&](uint64_t pixels) {
     options.reference_pixels = pixels;
     Progress progress;
-    return measurePicture(instances, camera, shot, options, progress).report;
+    return measurePicture(CountedImages(), instances, camera, shot, options, progress).report;
   };
   const AccuracyReport all = measured(0), some = measured(4 * 64 * 64);
   ASSERT_EQ(some.compared_pixels, 4u * 64 * 64);
