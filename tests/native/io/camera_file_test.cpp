@@ -141,7 +141,7 @@ TEST_F(CameraFile, SaysWhatIsWrong) {
          {"transforms.json: view 0", "1e+300", "at most 1e9"});
   refuse(one("\"fl_x\": 500, \"cx\": 1e308, \"w\": 640, \"h\": 480"),
          {"transforms.json: view 0", "camera.cx is 1e+308", "-1e+12 to 1e+12"});
-  refuse(one("\"fl_x\": 500, \"cy\": -1e10, \"w\": 640, \"h\": 480"), {"camera.cy is -1e+10"});
+  refuse(one("\"fl_x\": 500, \"cy\": -1e13, \"w\": 640, \"h\": 480"), {"camera.cy is -1e+13"});
   refuse(one("\"fl_x\": \"5\", \"w\": 640, \"h\": 480"), {"fl_x", "number"});
   refuse(one("\"fl_x\": 5, \"w\": 64000000, \"h\": 480"), {"w = 64000000", "65536"});
   refuse(one("\"camera_angle_x\": 3.2"), {"camera_angle_x = 3.2", "pi"});
