@@ -44,9 +44,10 @@ inline bool hasImagePlane(const Camera& camera) {
 void requireImagePlane(const Camera& camera, const char* who);
 
 /// Refuses cameras that cannot make a picture: sizes of 0 or above 65,536, a focal length that is
-/// not positive or above 1e9, an axis beyond 1e9 pixels, numbers that are not finite, a matrix that
-/// is not a rotation and a translation up to 1e12 m, near >= far, a near plane below 1e-9 m unless
-/// orthographic, a field of view above 360 degrees, or 360 by 180 of an equirectangular picture.
+/// not positive or above 1e9, an axis beyond 1e12 pixels, numbers that are not finite, a matrix
+/// that is not a rotation and a translation up to 1e24 m, near >= far, a near plane below 1e-9 m
+/// unless orthographic, a field of view above 360 degrees, or 360 by 180 of an equirectangular
+/// picture.
 void validate(const Camera& camera);
 
 /// Centre of the camera in the world (perspective), metres.
