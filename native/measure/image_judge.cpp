@@ -38,13 +38,13 @@ double meanSquare(const std::vector<float>& values) {
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
 }
 
-uint64_t pixelsOf(const std::vector<PixelArea>& areas) {
+}  // namespace
+
+uint64_t pixelsOf(std::span<const PixelArea> areas) {
   uint64_t count = 0;
   for (const PixelArea& area : areas) count += uint64_t{area.width} * area.height;
   return count;
 }
-
-}  // namespace
 
 ImageJudge::ImageJudge(uint32_t width, uint32_t height, bool is_display,
                        std::vector<PixelArea> blocks)

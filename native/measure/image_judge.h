@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "data/accuracy_report.h"
@@ -8,6 +9,9 @@
 #include "splat/render/render.h"
 
 namespace stipple {
+
+/// Gives the number of pixels in areas that do not overlap.
+uint64_t pixelsOf(std::span<const PixelArea> areas);
 
 /// Says how far images of a view are from its reference, as `compare` of two images would. The
 /// reference of a large image takes minutes, so it is drawn in blocks of pixels alone. What differs

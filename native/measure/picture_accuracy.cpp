@@ -54,12 +54,6 @@ std::vector<PixelArea> spreadBlocks(const Camera& camera, uint64_t pixels) {
   return blocks;
 }
 
-uint64_t pixelsOf(std::span<const PixelArea> areas) {
-  uint64_t count = 0;
-  for (const PixelArea& area : areas) count += uint64_t{area.width} * area.height;
-  return count;
-}
-
 bool hasHarmonics(const Instances& instances) {
   return std::any_of(instances.list.begin(), instances.list.end(), [](const auto& instance) {
     return instance.cloud && instance.cloud->sh_degree > 0;

@@ -64,7 +64,7 @@ class ViewPass {
 
   /// [H,W,4] drawn last.
   virtual std::span<const float> image() = 0;
-  /// Of the last backward pass; empty where it was not asked for.
+  /// Gives a statistic of the last backward pass; empty where it was not asked for.
   virtual std::span<const float> statistic(Statistic statistic) = 0;
   /// Exchanges the derivatives, shaped as the cloud, for the arrays of `gradients`. A second call
   /// gives the memory back, which the next pass uses again.

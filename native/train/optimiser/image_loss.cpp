@@ -349,7 +349,7 @@ struct ImageLoss::Workspace {
     idle.push_back(scratch);
   }
 
-  /// Of all weights; refuses those that are negative, too large or not finite.
+  /// Gives the sum of all weights; refuses those that are negative, too large or not finite.
   double sumWeights(const float* weights, size_t width, size_t height) {
     weight_sums.resize(height);
     const auto isWeight = [](float weight) {
