@@ -20,6 +20,7 @@ ATTRIBUTE_FIELDS = {'FLOAT': 'value', 'FLOAT_VECTOR': 'vector', 'FLOAT_COLOR': '
 # Path properties say since 4.5 whether they may start with // (the .blend's folder).
 RELATIVE_PATH = {'PATH_SUPPORTS_BLEND_RELATIVE'} if VERSION >= (4, 5, 0) else set()
 FLAT_COLOR_SHADER = 'FLAT_COLOR' if VERSION >= (4, 0, 0) else '3D_FLAT_COLOR'
+UNIFORM_COLOR_SHADER = 'UNIFORM_COLOR' if VERSION >= (4, 0, 0) else '3D_UNIFORM_COLOR'
 UNIFORM_COLOR_2D_SHADER = 'UNIFORM_COLOR' if VERSION >= (4, 0, 0) else '2D_UNIFORM_COLOR'
 # Voxels by which Cycles and EEVEE draw an OpenVDB grid too far along each axis: older ones put a voxel's corner
 # where its centre belongs (measured with one splat: 3.4.1 and 4.3.2 half a voxel, 5.2.2 nothing).

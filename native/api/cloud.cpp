@@ -284,7 +284,7 @@ StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
     out.frame = static_cast<uint32_t>(format.frame);
     out.name = format.name;
     out.title = format.title;
-    out.extensions = format.endings;
+    out.extensions = format.extensions;
     out.keeps_frame = format.keeps.frame ? 1 : 0;
     out.keeps_colour_space = format.keeps.colour_space ? 1 : 0;
     out.keeps_antialias = format.keeps.antialias ? 1 : 0;

@@ -220,6 +220,8 @@ StippleStatus stipple_cloud_ground_plane(const StippleCloud* cloud, const double
     out.considered_count = found.considered_count;
     out.inlier_count = found.inlier_count;
     out.tolerance = found.tolerance;
+    Eigen::Map<Vec3d>(out.extent_min) = found.extent_min;
+    Eigen::Map<Vec3d>(out.extent_max) = found.extent_max;
     deliver(plane, out, "plane");
   });
 }

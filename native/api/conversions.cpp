@@ -7,7 +7,7 @@ namespace stipple::api {
 static_assert(static_cast<uint32_t>(Precision::kDouble) == STIPPLE_PRECISION_DOUBLE);
 static_assert(static_cast<uint32_t>(Antialiasing::kSamples) == STIPPLE_SAMPLING_SAMPLES);
 static_assert(static_cast<uint32_t>(AccuracyLevel::kReference) == STIPPLE_ACCURACY_REFERENCE);
-static_assert(static_cast<uint32_t>(ShotMethod::kYardstick) == STIPPLE_RENDER_RAYS_UNLIMITED);
+static_assert(static_cast<uint32_t>(ShotMethod::kRaysUnlimited) == STIPPLE_RENDER_RAYS_UNLIMITED);
 static_assert(static_cast<uint32_t>(OutputColour::kComposited) == STIPPLE_OUTPUT_COMPOSITED);
 
 namespace {
@@ -162,6 +162,8 @@ ShotSettings shotFrom(const StippleRenderOptions* options, const Instances& inst
   settings.options = optionsFrom(given);
   const auto output = enumValue<OutputColour>(given.output_colour, 1, "options->output_colour");
   settings.splat_light = given.splat_light;
+  settings.background_image = given.background_image;
+  settings.solid_depth = enumValue<uint32_t>(given.solid_depth, 1, "options->solid_depth") == 1;
   if (given.accuracy) takeAccuracy(accuracyFrom(given.accuracy, "options->accuracy"), settings);
   settings.sampling = samplingFrom(given, instances);
   takeOutput(output, instances, settings);

@@ -80,6 +80,14 @@ StippleStatus stipple_layers_take_world(StippleLayers* layers, const float* seen
   });
 }
 
+StippleStatus stipple_layers_take_shadow(StippleLayers* layers, const float* shadow) {
+  return guarded([&] {
+    StippleLayers& handle = require(layers, "layers");
+    const std::span<const float> light = pixelValues(handle, shadow, 3, "shadow");
+    withLayers(handle, [&] { handle.layers.takeShadow(light); });
+  });
+}
+
 StippleStatus stipple_layers_light_before(StippleLayers* layers, const float* before,
                                           const float* whole) {
   return guarded([&] {

@@ -54,7 +54,7 @@ StippleStatus stipple_renderer_render_start(StippleRenderer* renderer,
     validate(view);
     validate(settings, view);
     const ShotPasses passes = passesFrom(buffers);
-    askForPasses(passes, settings.options);
+    askForPasses(passes, settings);
     const RenderMemory memory = renderer->renderer->memory(placed, view, settings);
     renderer->context->requirePictureMemory(memory.sum(), "this image of " + sizeText(view),
                                             memory.pair_bytes);

@@ -24,8 +24,8 @@ namespace {
 constexpr size_t kSplats = 1000000;
 constexpr int kDegree = 3;
 
-std::string scratchPath(const std::string& ending) {
-  return "/dev/shm/stipple_bench_" + std::to_string(::getpid()) + ending;
+std::string scratchPath(const std::string& extension) {
+  return "/dev/shm/stipple_bench_" + std::to_string(::getpid()) + extension;
 }
 
 SplatCloud makeCloud(int degree) {
@@ -115,7 +115,7 @@ enum class Packing {
 
 struct Case {
   const char* name;
-  const char* ending;
+  const char* extension;
   SplatWriteOptions options;
   Packing packing;
   int degree;  ///< of the cloud that is written
@@ -123,7 +123,7 @@ struct Case {
 
 /// Reading against fread, and unpacking where the format packs.
 void readCase(benchmark::State& state, const Case& which) {
-  const std::string path = scratchPath(which.ending);
+  const std::string path = scratchPath(which.extension);
   writeSplatFile(cloudOf(which.degree), path, which.options);
   const SplatCloud decoded = readSplatFile(path);
   const size_t bytes = readPlainly(path).size();
@@ -172,7 +172,7 @@ void readCase(benchmark::State& state, const Case& which) {
 /// Writing against fwrite, and packing the same where the format packs.
 void writeCase(benchmark::State& state, const Case& which) {
   const SplatCloud& cloud = cloudOf(which.degree);
-  const std::string path = scratchPath(which.ending);
+  const std::string path = scratchPath(which.extension);
   writeSplatFile(cloud, path, which.options);
   const PlainBytes bytes = readPlainly(path);
   std::vector<Stream> streams;

@@ -34,7 +34,7 @@ FitHistory history(size_t iterations) {
   return made;
 }
 
-/// At twice the size of its sheet, as Blender shows it. No target: the ratio is a yardstick.
+/// At twice the size of its sheet, as Blender shows it. No target: the ratio shows changes.
 void report(benchmark::State& state) {
   const FitHistory told = history(30000);
   const Image like = imageOf(sheetOf(fitPlots(told)), 2);

@@ -82,7 +82,7 @@ struct Points {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>,
                                                  Points, 3, uint32_t>;
 
-/// No target: the ratio is a yardstick for changes; the aim is absolute (a slider at 50,000).
+/// No target: the ratio shows changes; the aim is absolute (a slider at 50,000).
 /// Anchors sampled and decoded, against building a tree over them and asking it for every anchor's
 /// nearest neighbour.
 void decode(benchmark::State& state) {

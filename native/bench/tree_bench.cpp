@@ -21,7 +21,7 @@ constexpr size_t kNeighbours = 8;  ///< as many as the tree begins with
 /// A slider that is dragged shows a cut within this time, on one thread.
 constexpr double kDragMilliseconds = 50;
 
-/// No target: the ratio is a yardstick for changes.
+/// No target: the ratio shows changes.
 void build(benchmark::State& state, const SplatCase& c) {
   const SplatCloud& cloud = cloudOf(c);
   const std::vector<double> places(cloud.positions.begin(), cloud.positions.end());

@@ -122,9 +122,11 @@ AccuracyReport reportOf(const Context& context, const Arguments& arguments) {
 void printHead(const StippleAccuracyReportInfo& info) {
   const auto splats = static_cast<unsigned long long>(info.splat_count);
   if (info.subject == STIPPLE_ACCURACY_OF_IMAGE) {
-    std::printf("%u x %u pixels, %llu of them compared, %llu splats, %u threads\n", info.width,
-                info.height, static_cast<unsigned long long>(info.compared_pixels), splats,
-                info.thread_count);
+    std::printf(
+        "%u x %u pixels, %llu of them compared with the reference itself, %llu splats, "
+        "%u threads\n",
+        info.width, info.height, static_cast<unsigned long long>(info.compared_pixels), splats,
+        info.thread_count);
   } else if (info.subject == STIPPLE_ACCURACY_OF_VOLUME) {
     std::printf("%llu pixels of three sides compared, %llu splats, %u threads\n",
                 static_cast<unsigned long long>(info.compared_pixels), splats, info.thread_count);

@@ -19,10 +19,10 @@ void addDensify(CLI::App& app, const Context& context);
 void addCompare(CLI::App& app, const Context& context);
 void addAccuracy(CLI::App& app, const Context& context);
 
-/// What a file holds, told by its ending.
+/// What a file holds, told by its extension.
 enum class FileKind { kSplats, kMesh, kModel, kViews, kVolume, kImage };
 FileKind fileKind(const std::string& path);
 /// True for .safetensors.
-bool hasModelEnding(const std::string& path);
+bool hasModelExtension(const std::string& path);
 
 }  // namespace stipple::cli

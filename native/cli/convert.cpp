@@ -36,7 +36,7 @@ struct Source {
 
 Source sourceOf(const Context& context, const std::string& path) {
   Source source;
-  if (!hasModelEnding(path)) {
+  if (!hasModelExtension(path)) {
     source.cloud = make<Cloud>(stipple_cloud_load, context.get(), path.c_str());
   } else {
     source.hierarchy = make<Model>(stipple_model_load, context.get(), path.c_str());
@@ -97,11 +97,11 @@ void saveLevels(const Context& context, Source source, const std::vector<uint64_
 }
 
 void convert(const Context& context, const Arguments& arguments) {
-  if (!hasSplatEnding(arguments.out)) {
-    throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
+  if (!hasSplatExtension(arguments.out)) {
+    throw Failure("'" + arguments.out + "' is not a splat file; " + splatExtensions(true) +
                   " is expected");
   }
-  const bool streamed = formatOfEnding(arguments.out) == "sog_levels";
+  const bool streamed = formatOfExtension(arguments.out) == "sog_levels";
   if (arguments.levels_given && !streamed) {
     throw Failure("--levels is of streamed scenes; '" + arguments.out +
                   "' is not named lod-meta.json");

@@ -123,9 +123,9 @@ void decode(const Context& context, const Arguments& arguments) {
   options.time = arguments.time;
   // A glTF file that is there may hold a mesh; what is written over it holds splats.
   const FileKind out_kind =
-      hasSplatEnding(arguments.out) ? FileKind::kSplats : fileKind(arguments.out);
+      hasSplatExtension(arguments.out) ? FileKind::kSplats : fileKind(arguments.out);
   if (out_kind != FileKind::kSplats && out_kind != FileKind::kModel) {
-    throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
+    throw Failure("'" + arguments.out + "' is not a splat file; " + splatExtensions(true) +
                   " or .stipple.safetensors is expected");
   }
   const Model model = modelFrom(context, arguments);

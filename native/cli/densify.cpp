@@ -28,8 +28,8 @@ uint64_t countOf(const Cloud& cloud) {
 }
 
 void densify(const Context& context, const Arguments& arguments) {
-  if (!hasSplatEnding(arguments.out)) {
-    throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
+  if (!hasSplatExtension(arguments.out)) {
+    throw Failure("'" + arguments.out + "' is not a splat file; " + splatExtensions(true) +
                   " is expected");
   }
   StippleDensifyOptions options;

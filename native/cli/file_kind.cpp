@@ -10,12 +10,12 @@ namespace stipple::cli {
 
 namespace {
 
-std::string endingOf(const std::string& path) {
+std::string extensionOf(const std::string& path) {
   const size_t dot = path.find_last_of("./");
-  std::string ending = dot == std::string::npos || path[dot] == '/' ? "" : path.substr(dot);
-  std::transform(ending.begin(), ending.end(), ending.begin(),
+  std::string extension = dot == std::string::npos || path[dot] == '/' ? "" : path.substr(dot);
+  std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
+  return extension;
 }
 
 bool isColmapFile(const std::string& path) {
@@ -26,30 +26,30 @@ bool isColmapFile(const std::string& path) {
 
 }  // namespace
 
-bool hasModelEnding(const std::string& path) {
-  return endingOf(path) == ".safetensors";
+bool hasModelExtension(const std::string& path) {
+  return extensionOf(path) == ".safetensors";
 }
 
 FileKind fileKind(const std::string& path) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) return FileKind::kViews;
-  const std::string ending = endingOf(path);
+  const std::string extension = extensionOf(path);
   // A glTF file holds meshes, splats or both; splats go first, because fewer programs show them.
-  if (ending == ".glb" || ending == ".gltf") {
+  if (extension == ".glb" || extension == ".gltf") {
     uint64_t index = 0;
     uint64_t count = 0;
     check(stipple_format_count(&count));
     const bool splats = stipple_format_of_file(path.c_str(), &index) == STIPPLE_OK && index < count;
     return splats ? FileKind::kSplats : FileKind::kMesh;
   }
-  if (hasSplatEnding(path)) return FileKind::kSplats;
-  if (hasModelEnding(path)) return FileKind::kModel;
-  if (ending == ".json" || isColmapFile(path)) return FileKind::kViews;
-  if (ending == ".vdb") return FileKind::kVolume;
+  if (hasSplatExtension(path)) return FileKind::kSplats;
+  if (hasModelExtension(path)) return FileKind::kModel;
+  if (extension == ".json" || isColmapFile(path)) return FileKind::kViews;
+  if (extension == ".vdb") return FileKind::kVolume;
   for (const char* image : {".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}) {
-    if (ending == image) return FileKind::kImage;
+    if (extension == image) return FileKind::kImage;
   }
-  throw Failure("'" + path + "' ends with '" + ending + "'; " + splatEndings(false) +
+  throw Failure("'" + path + "' ends with '" + extension + "'; " + splatExtensions(false) +
                 ", .glb, .gltf, .stipple.safetensors, .json, .vdb, .png, .exr, .jpg, .tif "
                 "or .hdr is expected");
 }

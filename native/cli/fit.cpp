@@ -166,7 +166,7 @@ struct Result {
 };
 
 void save(const Context& context, const Job& job, const Result& result) {
-  const bool is_asset = !hasSplatEnding(result.out);
+  const bool is_asset = !hasSplatExtension(result.out);
   if (result.model == STIPPLE_FIT_FIELD && is_asset) {
     const auto field = make<Model>(stipple_fit_model, job.get());
     check(stipple_model_save(field.get(), result.out.c_str()));
@@ -229,8 +229,8 @@ void saveSomewhere(const Context& context, const Job& job, const Result& result)
 }
 
 void requirePlaces(const Arguments& arguments, const std::string& checkpoint, bool resumes) {
-  if (!hasSplatEnding(arguments.out) && fileKind(arguments.out) != FileKind::kModel) {
-    throw Failure("'" + arguments.out + "' is not a splat file; " + splatEndings(true) +
+  if (!hasSplatExtension(arguments.out) && fileKind(arguments.out) != FileKind::kModel) {
+    throw Failure("'" + arguments.out + "' is not a splat file; " + splatExtensions(true) +
                   " or .stipple.safetensors is expected");
   }
   requireFolder(arguments.out);
@@ -299,7 +299,9 @@ void addFit(CLI::App& app, const Context& context) {
   command->add_option("out", to.out, "Splats (.ply and others), or a model (.stipple.safetensors).")
       ->required();
   to.flags.addTo(*command);
-  command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts.");
+  // While the command line is read: newer releases of CLI11 ask for missing arguments before they call back.
+  command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts.")
+      ->trigger_on_parse();
   command->add_option("--downscale", to.downscale, "Images are made smaller by this factor.")
       ->capture_default_str();
   command->add_option("--budget", to.budget,

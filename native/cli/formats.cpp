@@ -33,37 +33,37 @@ std::vector<StippleFormatInfo> splatFormats() {
   return formats;
 }
 
-std::string formatOfEnding(const std::string& path) {
+std::string formatOfExtension(const std::string& path) {
   std::string name = path.substr(path.find_last_of('/') + 1);
   std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   std::string found;
   size_t longest = 0;
   for (const StippleFormatInfo& format : splatFormats()) {
-    for (const std::string& ending : words(format.extensions)) {
-      if (ending.size() > longest && name.ends_with(ending)) {
+    for (const std::string& extension : words(format.extensions)) {
+      if (extension.size() > longest && name.ends_with(extension)) {
         found = format.name;
-        longest = ending.size();
+        longest = extension.size();
       }
     }
   }
   return found;
 }
 
-bool hasSplatEnding(const std::string& path) {
-  return !formatOfEnding(path).empty();
+bool hasSplatExtension(const std::string& path) {
+  return !formatOfExtension(path).empty();
 }
 
-std::string splatEndings(bool written) {
-  std::vector<std::string> endings;
+std::string splatExtensions(bool written) {
+  std::vector<std::string> extensions;
   for (const StippleFormatInfo& format : splatFormats()) {
     if (written && format.can_write == 0) continue;
-    for (const std::string& ending : words(format.extensions)) endings.push_back(ending);
+    for (const std::string& extension : words(format.extensions)) extensions.push_back(extension);
   }
   std::string text;
-  for (size_t i = 0; i < endings.size(); ++i) {
-    if (i > 0) text += i + 1 == endings.size() ? " or " : ", ";
-    text += endings[i];
+  for (size_t i = 0; i < extensions.size(); ++i) {
+    if (i > 0) text += i + 1 == extensions.size() ? " or " : ", ";
+    text += extensions[i];
   }
   return text;
 }

@@ -53,6 +53,13 @@ void anchorPositions(const AnchorSet& anchors, const RootCube& root, float* out)
   });
 }
 
+uint64_t anchorSetBytes(uint64_t count) {
+  // 3 + 1 floats and a leaf code. Large arrays are rounded up to pages of 2 MiB.
+  constexpr uint64_t kPage = uint64_t{2} << 20;
+  const uint64_t rounding = count * 3 * sizeof(float) < 4 * kPage ? 0 : 3 * kPage;
+  return count * (4 * sizeof(float) + sizeof(uint64_t)) + rounding;
+}
+
 uint64_t sampleMemoryBound(uint64_t count, bool with_ranks) {
   // Result: 3 + 1 floats and a leaf code. Two frontiers of at most one cell an anchor (code, count,
   // log q), and the places of the leaves.

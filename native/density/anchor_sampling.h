@@ -38,6 +38,9 @@ struct AnchorSet {
 /// Positions [P,3] of anchors in metres. In: root, the cube that they were drawn from.
 void anchorPositions(const AnchorSet& anchors, const RootCube& root, float* out);
 
+/// Bytes of that many anchors without ranks, at most.
+uint64_t anchorSetBytes(uint64_t count);
+
 /// Bytes that sampleAnchors holds at most, the result included, without those of the model.
 uint64_t sampleMemoryBound(uint64_t count, bool with_ranks);
 

@@ -32,8 +32,8 @@ struct FitStatus {
 /// on one thread; all else may be called by others at any time.
 class FitSession final : public FitObserver {
  public:
-  /// Holds the options to their memory. Errors: those of requireFitOptions() and holdToMemory(), and
-  /// kInvalidArgument where a checkpoint would replace a file of another kind.
+  /// Holds the options to their memory. Errors: those of requireFitOptions() and holdToMemory(),
+  /// and kInvalidArgument where a checkpoint would replace a file of another kind.
   FitSession(std::shared_ptr<const BackendFactory> backends,
              std::shared_ptr<const ViewSource> views, const FitOptions& options);
 
@@ -60,7 +60,7 @@ class FitSession final : public FitObserver {
   std::shared_ptr<const SplatModel> model() const;
   /// What the result was fitted with, as JSON.
   const std::string& settingsJson() const { return settings_json_; }
-  /// JSON at the path and curves beside it, with the ending .svg. Errors: kIo.
+  /// JSON at the path and curves beside it, with the extension .svg. Errors: kIo.
   void saveReport(const std::string& path) const;
   const FitHistory& history() const { return ended().history(); }
 

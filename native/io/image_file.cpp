@@ -185,11 +185,11 @@ Image readImageFile(const std::string& path, ImageHeader* header) {
 
 void writeImageFile(const Image& image, const std::string& path, bool keep_values) {
   validateImage(image);
-  const std::string ending = lowerEnding(path);
-  if (ending == ".png") return writePng(image, path, keep_values);
-  if (ending == ".exr") return writeExr(image, path, keep_values);
+  const std::string extension = lowerExtension(path);
+  if (extension == ".png") return writePng(image, path, keep_values);
+  if (extension == ".exr") return writeExr(image, path, keep_values);
   fail(ErrorCode::kUnsupported, path + " cannot be written as an image: its extension is '" +
-                                    ending + "'; .png and .exr are supported");
+                                    extension + "'; .png and .exr are supported");
 }
 
 }  // namespace stipple

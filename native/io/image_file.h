@@ -25,7 +25,7 @@ ImageHeader readImageHeader(const std::string& path);
 /// missing).
 Image readImageFile(const std::string& path, ImageHeader* header = nullptr);
 
-/// Writes by ending: .exr float32 scene linear premultiplied; .png 8-bit display sRGB straight
+/// Writes by extension: .exr float32 scene linear premultiplied; .png 8-bit display sRGB straight
 /// alpha. The transfer of the image is converted to that of the format unless keep_values is set.
 void writeImageFile(const Image& image, const std::string& path, bool keep_values = false);
 

@@ -76,10 +76,10 @@ TriMesh readMeshFile(const std::string& path) {
   // Names a missing or unreadable file in the words of every reader.
   {
     const InputFile file(path);
-    const std::string ending = lowerEnding(path);
-    if (ending != ".gltf" && ending != ".glb") {
+    const std::string extension = lowerExtension(path);
+    if (extension != ".gltf" && extension != ".glb") {
       fail(ErrorCode::kUnsupported, path + " cannot be read as a mesh: its extension is '" +
-                                        ending + "'; .gltf and .glb are supported");
+                                        extension + "'; .gltf and .glb are supported");
     }
     if (file.size() == 0) fail(ErrorCode::kFormat, path + " is empty");
   }

@@ -48,14 +48,14 @@ void writeGlb(const TriMesh& mesh, const std::string& path) {
 
 void writeMeshFile(const TriMesh& mesh, const std::string& path) {
   validate(mesh);
-  const std::string ending = lowerEnding(path);
-  if (ending == ".ply") {
+  const std::string extension = lowerExtension(path);
+  if (extension == ".ply") {
     writePly(mesh, path);
-  } else if (ending == ".glb") {
+  } else if (extension == ".glb") {
     writeGlb(mesh, path);
   } else {
     fail(ErrorCode::kUnsupported, path + " cannot be written as a mesh: its extension is '" +
-                                      ending + "'; .ply and .glb are supported");
+                                      extension + "'; .ply and .glb are supported");
   }
 }
 

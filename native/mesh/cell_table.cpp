@@ -10,6 +10,13 @@ namespace stipple {
 
 CellTable::CellTable(std::span<const uint64_t> sorted_codes, int shift, int level)
     : side_(uint32_t{1} << level) {
+  // Counted first: a table that grows as it is filled would take up to three times its memory.
+  size_t count = sorted_codes.empty() ? 0 : 1;
+  for (size_t i = 1; i < sorted_codes.size(); ++i) {
+    count += sorted_codes[i] >> shift != sorted_codes[i - 1] >> shift ? 1 : 0;
+  }
+  codes_.reserve(count);
+  begins_.reserve(count + 1);
   for (size_t i = 0; i < sorted_codes.size(); ++i) {
     const uint64_t code = sorted_codes[i] >> shift;
     if (codes_.empty() || code != codes_.back()) {

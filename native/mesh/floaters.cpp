@@ -61,17 +61,6 @@ double automaticMaxSize(const SplatCloud& cloud, const std::vector<uint32_t>& re
   return robustLimit(sizes, kSizeSigmas, kSizeFactor);
 }
 
-/// In: positions of what is left [n,3].
-double automaticRadius(const std::vector<float>& points) {
-  const size_t count = points.size() / 3;
-  const size_t query_count = std::min(count, kQueries);
-  std::vector<uint32_t> queries(query_count);
-  for (size_t i = 0; i < query_count; ++i) {
-    queries[i] = static_cast<uint32_t>(i * count / query_count);
-  }
-  return robustLimit(neighbourDistances(points, queries, kNeighbour), kRadiusSigmas, kRadiusFactor);
-}
-
 /// Takes the splats that fail a test out of `rest` and of the mask; returns how many.
 template <typename Fails>
 uint64_t drop(std::vector<uint32_t>& rest, std::vector<uint8_t>& mask, Fails&& fails) {
@@ -92,7 +81,7 @@ void dropIsolated(const SplatCloud& cloud, const FloaterOptions& options,
     std::copy_n(&cloud.positions[size_t{rest[i]} * 3], 3, &points[i * 3]);
   }
   advance(progress, 0.1, "Measuring distances");
-  report.radius = options.radius ? *options.radius : automaticRadius(points);
+  report.radius = options.radius ? *options.radius : connectingRadius(points);
   report.min_group_count =
       options.min_group_count.value_or(std::clamp<uint64_t>(rest.size() / 1000, 10, 1000));
   // All at one place: there is nothing that could be isolated.
@@ -144,6 +133,16 @@ std::vector<uint8_t> withoutFloaters(const SplatCloud& cloud, const FloaterOptio
   }
   report.kept = rest.size();
   return mask;
+}
+
+double connectingRadius(const std::vector<float>& points) {
+  const size_t count = points.size() / 3;
+  const size_t query_count = std::min(count, kQueries);
+  std::vector<uint32_t> queries(query_count);
+  for (size_t i = 0; i < query_count; ++i) {
+    queries[i] = static_cast<uint32_t>(i * count / query_count);
+  }
+  return robustLimit(neighbourDistances(points, queries, kNeighbour), kRadiusSigmas, kRadiusFactor);
 }
 
 }  // namespace stipple

@@ -44,4 +44,7 @@ struct FloaterReport {
 std::vector<uint8_t> withoutFloaters(const SplatCloud& cloud, const FloaterOptions& options,
                                      FloaterReport& report, Progress* progress);
 
+/// The radius that withoutFloaters() takes by itself for points [N,3]. 0: all are at one place.
+double connectingRadius(const std::vector<float>& points);
+
 }  // namespace stipple

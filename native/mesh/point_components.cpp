@@ -4,34 +4,16 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <nanoflann.hpp>
 #include <numeric>
 #include <optional>
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "mesh/point_tree.h"
 
 namespace stipple {
 
 namespace {
-
-/// A point as a k-d tree's row, through a list of indices.
-struct Rows {
-  std::span<const float> points;
-  std::span<const uint32_t> chosen;
-
-  size_t kdtree_get_point_count() const { return chosen.size(); }
-  double kdtree_get_pt(size_t row, size_t axis) const {
-    return static_cast<double>(points[size_t{chosen[row]} * 3 + axis]);
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Rows, double>,
-                                                 Rows, 3, uint32_t>;
 
 /// Groups under union; the root of a group is its smallest index.
 class Groups {
@@ -142,8 +124,8 @@ bool anyWithin(std::span<const float> points, std::span<const uint32_t> a,
                std::span<const uint32_t> b, double squared_radius) {
   constexpr size_t kBruteForce = 4096;
   if (a.size() > b.size()) std::swap(a, b);
-  std::optional<Tree> tree;
-  const Rows rows{points, b};
+  std::optional<PointTree> tree;
+  const PointRows rows{points, b};
   if (a.size() * b.size() > kBruteForce) {
     tree.emplace(3, rows, nanoflann::KDTreeSingleIndexAdaptorParams(16));
   }
@@ -210,8 +192,8 @@ std::vector<double> neighbourDistances(std::span<const float> points,
   if (count < 2) return result;
   std::vector<uint32_t> all(count);
   std::iota(all.begin(), all.end(), 0u);
-  const Rows rows{points, all};
-  Tree tree(3, rows, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  const PointRows rows{points, all};
+  PointTree tree(3, rows, nanoflann::KDTreeSingleIndexAdaptorParams(16));
   const size_t wanted = std::min(k + 1, count);  // the point itself is among them
   parallelFor(queries.size(), 256, [&](size_t begin, size_t end) {
     std::vector<uint32_t> indices(wanted);

@@ -1,5 +1,6 @@
 #include "model/splat_model.h"
 
+#include <algorithm>
 #include <string>
 
 #include "base/error.h"
@@ -53,7 +54,10 @@ SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress) c
 uint64_t SplatModel::memoryBound(const ModelRequest& request) const {
   const uint32_t gaussians = gaussiansOf(request, settings());
   const uint64_t splats = decoder().memoryBound(request.budget, gaussians);
-  return density() ? sampleMemoryBound(request.budget, false) + splats : splats;
+  if (!density()) return splats;
+  // What sampling needs beside the anchors is free again when they are decoded.
+  return std::max(sampleMemoryBound(request.budget, false),
+                  anchorSetBytes(request.budget) + splats);
 }
 
 void SplatModel::requireMemory(const ModelRequest& request, const MemoryLimit& limit) const {

@@ -109,7 +109,7 @@ AccuracySettings accuracyOf(AccuracyLevel level) {
       a.order = RayOrder::kResponse;
       a.projection = RayProjection::kRay;
       a.precision = Precision::kDouble;
-      a.least_alpha = rayYardstick().limits.least_alpha;
+      a.least_alpha = unlimitedRays().limits.least_alpha;
       break;
     case AccuracyLevel::kFinal:
       break;
@@ -128,7 +128,7 @@ RenderAccuracy renderAccuracy(const AccuracySettings& a) {
   accuracy.projection = a.projection;
   accuracy.precision = a.precision;
   accuracy.samples_per_side = a.samples_per_side;
-  if (a.level == AccuracyLevel::kReference) accuracy.limits = rayYardstick().limits;
+  if (a.level == AccuracyLevel::kReference) accuracy.limits = unlimitedRays().limits;
   accuracy.limits.least_alpha = a.least_alpha;
   return accuracy;
 }

@@ -40,6 +40,11 @@ float factor(float value) {
   return std::max(value, 0.0f);
 }
 
+/// What a shadow leaves of the light behind it, as Cycles' alpha of a picture has it.
+float passedOf(const float* light) {
+  return unit((light[0] + light[1] + light[2]) / 3.0f);
+}
+
 /// Alpha of meshes alone: that of the picture is 1 - (1 - a) s where a shadow lets s pass. Where s
 /// is 0, all is black.
 float alphaWithoutShadow(float alpha, float passed) {
@@ -81,8 +86,7 @@ MeshLayers::MeshLayers(uint32_t width, uint32_t height, std::span<const float> c
     if (light_.empty()) return;
     float* light = &light_[i * 3];
     for (size_t c = 0; c < 3; ++c) light[c] = factor(shadow[i * 3 + c]);
-    // What is left of the light behind, as the alpha of the passes has it.
-    passed_[i] = unit((light[0] + light[1] + light[2]) / 3.0f);
+    passed_[i] = passedOf(light);
     pixel[3] = alphaWithoutShadow(pixel[3], passed_[i]);
   });
 }
@@ -119,6 +123,22 @@ void MeshLayers::takeWorld(std::span<const float> seen,
     const float gap = 1.0f - hiddenAt(i);
     const float* behind = plain ? plain->data() : &spread[i * 3];
     for (size_t c = 0; c < 3; ++c) world_[i * 3 + c] = gap * behind[c];
+  });
+}
+
+void MeshLayers::takeShadow(std::span<const float> shadow) {
+  const size_t count = pixelCount();
+  requireSize(shadow.size(), count * 3, "the shadow");
+  if (!light_.empty()) {
+    fail(ErrorCode::kInvalidArgument,
+         "the layers have a shadow that is in their passes; another is allowed without it");
+  }
+  light_.resize(count * 3);
+  passed_.resize(count);
+  forPixels(count, [&](size_t i) {
+    float* light = &light_[i * 3];
+    for (size_t c = 0; c < 3; ++c) light[c] = factor(shadow[i * 3 + c]);
+    passed_[i] = passedOf(light);
   });
 }
 

@@ -11,7 +11,8 @@ namespace stipple {
 /// the picture of both. Colours are premultiplied and scene linear. All arrays share one order of
 /// rows, whichever that is.
 ///
-/// Order of calls: holdOut, takeWorld, lightBefore as far as each is needed; then what is read.
+/// Order of calls: holdOut, takeWorld, takeShadow, lightBefore as far as each is needed; then what
+/// is read.
 class MeshLayers {
  public:
   /// Its passes, of a film that was transparent. In: combined [H,W,4]; depth [H,W], of one sample
@@ -30,6 +31,11 @@ class MeshLayers {
   /// its colour where it has a single one. Behind a shadow catcher, where the pass has nothing,
   /// stands that colour, or what pixels around show.
   void takeWorld(std::span<const float> seen, const std::optional<std::vector<float>>& plain);
+
+  /// Takes the light of shadow catchers from another picture than the passes, which have nothing of
+  /// them. In: shadow [H,W,3], factors of the light of what is behind a catcher, 1 elsewhere.
+  /// Errors: kInvalidArgument where the passes came with a shadow.
+  void takeShadow(std::span<const float> shadow);
 
   /// Leaves shadows to the splats at and behind shadow catchers. In: composited colours [H,W,4] of
   /// the splats before the catchers, and of all; the light of each pixel is shared as these are.

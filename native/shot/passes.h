@@ -17,14 +17,15 @@ struct ShotPasses {
   uint32_t* objects = nullptr;     ///< [H,W]
 };
 
-/// Asks the renderer for those passes that have a place to go to.
-void askForPasses(const ShotPasses& passes, RenderOptions& options);
+/// Asks the renderer for those passes that have a place to go to, and for what finishes them.
+void askForPasses(const ShotPasses& passes, ShotSettings& settings);
 
 /// Premultiplied display values become premultiplied scene linear ones, in place. In: [N,4].
 void lineariseColour(float* colour, size_t pixel_count);
 
-/// Copies a drawn picture to where its passes go and finishes its colour: converted as the settings
-/// say, the splats' times splat_light, then the surface over what they leave. In: is_light, whether
+/// Copies a drawn picture to where its passes go and finishes its colour: over the background's
+/// image, converted as the settings say, the splats' times splat_light, then the surface over what
+/// they leave. In: is_light, whether
 /// colours have been linearised already where that was wanted.
 void fillPasses(const RenderResult& picture, const ShotSettings& settings, const ShotPasses& passes,
                 bool is_light = false);

@@ -22,8 +22,8 @@ RenderAccuracy accuracyOf(const ShotSettings& settings) {
 void drawMoment(ImageRenderer& images, const ShotSettings& settings,
                 std::span<const SplatInstance> instances, const Camera& camera,
                 const RenderOptions& options, RenderResult& result, Progress* progress) {
-  if (settings.method == ShotMethod::kYardstick) {
-    result = renderRays(instances, camera, options, rayYardstick(), progress);
+  if (settings.method == ShotMethod::kRaysUnlimited) {
+    result = renderRays(instances, camera, options, unlimitedRays(), progress);
   } else if (settings.method == ShotMethod::kReference) {
     narrow(renderReference(instances, camera, options, progress), result);
   } else {
@@ -46,8 +46,8 @@ void Renderer::render(Instances instances, const Camera& camera, const ShotSetti
   } else if (settings.method == ShotMethod::kReference) {
     fillPasses(renderReference(instances.list, camera, settings.options, &progress), settings,
                passes);
-  } else if (settings.method == ShotMethod::kYardstick) {
-    fillPasses(renderRays(instances.list, camera, settings.options, rayYardstick(), &progress),
+  } else if (settings.method == ShotMethod::kRaysUnlimited) {
+    fillPasses(renderRays(instances.list, camera, settings.options, unlimitedRays(), &progress),
                settings, passes);
   } else {
     renderSharp(instances, camera, settings, passes, progress);
@@ -94,7 +94,7 @@ void Renderer::renderBlurred(const Instances& instances, const Camera& camera,
 RenderMemory Renderer::memory(const Instances& instances, const Camera& camera,
                               const ShotSettings& settings) const {
   RenderMemory memory =
-      settings.method == ShotMethod::kYardstick
+      settings.method == ShotMethod::kRaysUnlimited
           ? rayMemory(instances.list, camera, settings.options)
           : factory_->imageMemory(instances.list, camera, settings.options, accuracyOf(settings));
   memory.other_bytes += CloudCuts::memoryBound(instances, settings.budget_share);

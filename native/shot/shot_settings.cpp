@@ -61,7 +61,7 @@ void takeOutput(OutputColour output, const Instances& instances, ShotSettings& s
 }
 
 bool followsRays(ShotMethod method) {
-  return method == ShotMethod::kRays || method == ShotMethod::kYardstick;
+  return method == ShotMethod::kRays || method == ShotMethod::kRaysUnlimited;
 }
 
 void validate(const ShotSettings& settings, const Camera& camera) {
@@ -72,6 +72,11 @@ void validate(const ShotSettings& settings, const Camera& camera) {
   }
   validateSurface(settings.options.surface, camera);
   if (settings.splat_light) validateLight(settings.splat_light, camera);
+  if (settings.background_image && settings.options.with_background) {
+    refuse(
+        "options->with_background is 1 beside options->background_image, which stands in its "
+        "place; 0 is allowed with it");
+  }
 }
 
 void requireDerivative(const ShotSettings& settings, const Instances& instances) {
@@ -97,6 +102,11 @@ void requireDerivative(const ShotSettings& settings, const Instances& instances)
     if (!instances.list[i].holdout) continue;
     refuse("instances[" + std::to_string(i) + "].holdout is 1; instances with derivatives have 0");
   }
+  if (settings.background_image || settings.solid_depth) {
+    refuse(
+        "options has a background_image or solid_depth; derivatives are those of splats alone and "
+        "of all that shows");
+  }
   if (settings.linearise) {
     refuse(
         "options->output_colour is 0 (scene linear), which converts the composited image; "
@@ -115,8 +125,10 @@ void requireMeasurable(const ShotSettings& settings) {
     refuse("render->method is " + std::to_string(static_cast<uint32_t>(settings.method)) +
            ", which measuring chooses itself; 0 is allowed");
   }
-  if (settings.splat_light || settings.options.surface.depth) {
-    refuse("render has a surface or light, which measuring does not draw; they must be NULL");
+  if (settings.splat_light || settings.options.surface.depth || settings.background_image) {
+    refuse(
+        "render has a surface, light or background_image, which measuring does not draw; they must "
+        "be NULL");
   }
 }
 

@@ -13,7 +13,7 @@ enum class ShotMethod : uint32_t {
   kTiled = 0,      ///< the cheapest that keeps the accuracy asked for
   kReference = 1,  ///< the same settings in double, every splat at every pixel
   kRays = 2,       ///< exact order and shape of the splats
-  kYardstick = 3,  ///< the same without limits
+  kRaysUnlimited = 3,  ///< the same without limits
 };
 
 enum class OutputColour : uint32_t {
@@ -30,6 +30,11 @@ struct ShotSettings {
   bool has_accuracy = false;
   Sampling sampling;
   const float* splat_light = nullptr;  ///< [H,W,3] factors of the splats' light; null: 1
+  /// [H,W,3] in the space that colours come out in: what is behind everything; null: nothing.
+  const float* background_image = nullptr;
+  /// True: expected depth only where half of a pixel is covered or more, and of splats alone where
+  /// they show no less than the surface.
+  bool solid_depth = false;
   bool linearise = false;  ///< the composited values are display values and light is asked for
   /// Composited values are display values and stay so, but light is what pictures are averaged in.
   bool averages_light = false;

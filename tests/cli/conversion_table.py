@@ -74,25 +74,25 @@ def in_first_order(rows):
 
 
 def written_formats():
-    """(title, ending, degree, options) of every way to write splats."""
+    """(title, extension, degree, options) of every way to write splats."""
     ways = []
     for form in json.loads(tool('formats', '--json')):
         if not form['can_write']:
             continue
-        ending = form['extensions'].split()[0]
+        extension = form['extensions'].split()[0]
         degree = min(DEGREE, form['max_sh_degree'])
         versions = (3, 4) if form['name'] == 'spz' else (0,)
         for version in versions:
             title = form['title'] + (f' {version}' if version else '')
-            ways.append((title, ending, degree, ['--format-version', version] if version else []))
+            ways.append((title, extension, degree, ['--format-version', version] if version else []))
     return ways
 
 
-def loss(folder, title, ending, degree, options):
+def loss(folder, title, extension, degree, options):
     """The figures of one format as a dict."""
     source, back = folder / 'source.ply', folder / 'back.ply'
     # A folder of its own: some formats are several files.
-    packed = Path(tempfile.mkdtemp(dir=folder)) / (f'cloud{ending}' if ending.startswith('.') else ending)
+    packed = Path(tempfile.mkdtemp(dir=folder)) / (f'cloud{extension}' if extension.startswith('.') else extension)
     write_ply(source, make_cloud(), DEGREE)
     tool('convert', source, packed, *options)
     tool('convert', packed, back)

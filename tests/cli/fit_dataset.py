@@ -17,6 +17,11 @@ def run(*arguments, status=0):
     return result
 
 
+def help_of(command):
+    """What --help prints, with the names of an option joined without a space, which newer releases of CLI11 add."""
+    return run(command, '--help').stdout.replace(', --', ',--')
+
+
 def error(*arguments):
     lines = run(*arguments, status=1).stderr.strip().splitlines()
     assert lines[-1].startswith('stipple: '), lines

@@ -45,7 +45,7 @@ def test_a_report_is_printed_and_written(view, tmp_path):
               tmp_path / 'r.json', '-o', tmp_path / 'r.csv', '-o', tmp_path / 'r.svg', '--within', 1e9, '--above',
               20).stdout
     lines = out.splitlines()
-    assert lines[0].startswith('48 x 36 pixels, 1728 of them compared, 400 splats')
+    assert lines[0].startswith('48 x 36 pixels, 1728 of them compared with the reference itself, 400 splats')
     assert any(line.startswith('preview ') for line in lines)
     assert 'best within 1e+09 ms: reference' in lines and lines[-1].startswith('cheapest above 20 dB: ')
     settings = json.loads((tmp_path / 'r.json').read_text())['settings']

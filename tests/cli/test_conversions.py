@@ -12,24 +12,24 @@ SIDE = 5
 
 @pytest.fixture(scope='module')
 def files(tmp_path_factory):
-    """The same cloud in every format that is written: {ending: file}."""
+    """The same cloud in every format that is written: {extension: file}."""
     folder = tmp_path_factory.mktemp('files')
     source = folder / 'source.ply'
     conversions.write_ply(source, conversions.make_cloud(SIDE), conversions.DEGREE)
     made = {}
-    for _, ending, _, options in conversions.written_formats():
-        made[ending] = folder / f'cloud{ending}'
-        conversions.tool('convert', source, made[ending], *options)
+    for _, extension, _, options in conversions.written_formats():
+        made[extension] = folder / f'cloud{extension}'
+        conversions.tool('convert', source, made[extension], *options)
     return made
 
 
 def test_every_format_converts_to_every_other(files, tmp_path):
     for source in files.values():
-        for ending in files:
-            made = tmp_path / f'made{ending}'
+        for extension in files:
+            made = tmp_path / f'made{extension}'
             conversions.tool('convert', source, made)
             info = json.loads(conversions.tool('info', made, '--json'))
-            assert info['count'] == SIDE ** 3, (source, ending)
+            assert info['count'] == SIDE ** 3, (source, extension)
             conversions.tool('convert', made, tmp_path / 'back.ply')
             positions = conversions.read_ply(tmp_path / 'back.ply', info['harmonic_degree'])
             conversions.in_first_order(positions)  # every splat is where it was, to within half a step of the grid

@@ -10,7 +10,7 @@ import time
 import zlib
 
 import pytest
-from fit_dataset import TOOL, dataset, error, figures, run  # noqa: F401
+from fit_dataset import TOOL, dataset, error, figures, help_of, run  # noqa: F401
 
 FEW = ('--iterations', 60, '--gaussians', 300, '--sh-degree', 0)
 
@@ -61,7 +61,7 @@ def test_lists_strategies_and_parts():
 
 
 def test_every_option_of_the_library_is_a_flag_with_a_help():
-    lines = run('fit', '--help').stdout
+    lines = help_of('fit')
     for name in ('model', 'strategy', 'start-splats,--start', 'max-splats,--gaussians',
                  'min-anchors,--least-anchors', 'max-anchors,--most-anchors,--anchors',
                  'gaussians-per-anchor', 'sh-degree', 'antialias', 'density-gradient,--no-density-gradient',
@@ -70,7 +70,8 @@ def test_every_option_of_the_library_is_a_flag_with_a_help():
                  'checkpoint-interval,--checkpoint-every', 'checkpoint-seconds', 'resume'):
         assert f'  --{name}' in lines, name
     assert 'checkpoint-path' not in lines  # the tool says where it lies
-    assert 'Default: 500 (fast), 2000 (balanced), 4000 (fine). Range: 1 to 10000000.' in lines
+    words = ' '.join(lines.split())  # newer releases of CLI11 break lines
+    assert 'Default: 500 (fast), 2000 (balanced), 4000 (fine). Range: 1 to 10000000.' in words
 
 
 @pytest.mark.parametrize('former, present', [

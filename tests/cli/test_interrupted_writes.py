@@ -43,8 +43,8 @@ def sources(tmp_path_factory):
 
 def writers():
     """(name of what is written, arguments of the tool before and after it)."""
-    ways = [(f'cloud{ending}' if ending.startswith('.') else ending, ('convert',), options)
-            for _, ending, _, options in conversions.written_formats()]
+    ways = [(f'cloud{extension}' if extension.startswith('.') else extension, ('convert',), options)
+            for _, extension, _, options in conversions.written_formats()]
     ways += [('meta.json', ('convert',), ()), ('cloud.gltf', ('convert',), ()),
              ('text.ply', ('convert',), ('--ascii',)), ('tree.stipple.safetensors', ('decode',), ()),
              ('volume.vdb', ('voxelize',), ('--resolution', 32)), ('a.png', ('render',), ()),

@@ -215,7 +215,8 @@ def test_render_understands_what_its_flags_were_called(scene):
             index, scene / f'{name}_index.exr', low_pass, 'none')
     for end in ('.exr', '_index.exr'):
         assert figures('compare', scene / f'former{end}', scene / f'present{end}')['max_error'] == 0
-    assert all(names in run('render', '--help').stdout for names in ('--object-index,--index', '--low-pass,--lowpass'))
+    shown = run('render', '--help').stdout.replace(', --', ',--')  # newer releases of CLI11 put a space between
+    assert all(names in shown for names in ('--object-index,--index', '--low-pass,--lowpass'))
 
 
 def test_formats_are_listed_for_programs_with_the_former_key_too(scene):

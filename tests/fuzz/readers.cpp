@@ -64,8 +64,8 @@ void readSplats(const fs::path& path) {
 
 std::vector<std::string> splatSeeds(const SplatFormat& format, const fs::path& folder) {
   std::vector<std::string> made;
-  const std::string endings = format.endings;
-  const std::string ending = endings.substr(0, endings.find(' '));
+  const std::string extensions = format.extensions;
+  const std::string extension = extensions.substr(0, extensions.find(' '));
   if (format.write == nullptr) {
     for (unsigned level = 0; level < 3; ++level) {
       RawKsplat raw;
@@ -78,15 +78,15 @@ std::vector<std::string> splatSeeds(const SplatFormat& format, const fs::path& f
   for (const int degree : {0, 1, 3}) {
     SplatCloud cloud = randomCloud(5, degree, 1);
     const auto add = [&](const SplatWriteOptions& options) {
-      writeSplatFile(cloud, (folder / ("seed" + ending)).string(), options);
-      made.push_back(load(folder / ("seed" + ending)));
+      writeSplatFile(cloud, (folder / ("seed" + extension)).string(), options);
+      made.push_back(load(folder / ("seed" + extension)));
     };
     add({});
     cloud.antialias = Antialias::kMip;
-    add({.ascii = ending == ".ply", .version = ending == ".spz" ? 3 : 0});
+    add({.ascii = extension == ".ply", .version = extension == ".spz" ? 3 : 0});
     add({.frame = Frame::kRFU});
   }
-  if (ending == ".glb") {
+  if (extension == ".glb") {
     writeSplatFile(randomCloud(5, 1, 1), (folder / "seed.spz").string(), {.version = 3});
     GlbBuilder file;
     file.addView(load(folder / "seed.spz"));
@@ -101,22 +101,22 @@ std::vector<std::string> splatSeeds(const SplatFormat& format, const fs::path& f
 
 void addSplatReaders(std::vector<Reader>& all) {
   for (const SplatFormat& format : splatFormats()) {
-    const std::string endings = format.endings;
-    const std::string ending = endings.substr(0, endings.find(' '));
+    const std::string extensions = format.extensions;
+    const std::string extension = extensions.substr(0, extensions.find(' '));
     // Streamed scenes are many files: below.
-    if (ending[0] != '.') continue;
+    if (extension[0] != '.') continue;
     all.push_back({format.name, nullptr,
-                   [ending](const fs::path& folder, const std::string& bytes) {
-                     storeFile(folder / ("input" + ending), bytes);
+                   [extension](const fs::path& folder, const std::string& bytes) {
+                     storeFile(folder / ("input" + extension), bytes);
                    },
                    // By the format's own reader, whatever the first bytes say.
-                   [ending, &format](const fs::path& folder) {
+                   [extension, &format](const fs::path& folder) {
                      const SplatCloud cloud =
-                         format.read((folder / ("input" + ending)).string(), nullptr);
+                         format.read((folder / ("input" + extension)).string(), nullptr);
                      keepsPromises([&] { validate(cloud, "cloud"); });
                    },
                    [&format](const fs::path& folder) { return splatSeeds(format, folder); },
-                   ending == ".glb" ? JsonPlace::kGlbChunk : JsonPlace::kNowhere});
+                   extension == ".glb" ? JsonPlace::kGlbChunk : JsonPlace::kNowhere});
   }
 }
 
@@ -493,8 +493,8 @@ std::vector<Reader> makeReaders() {
                  [asset](const fs::path& folder) { readSurface(folder / asset); }, surfaceSeeds,
                  JsonPlace::kSafetensorsHeader});
   all.push_back({"hierarchy", nullptr, storeAs(asset),
-                 [asset](const fs::path& folder) { readHierarchy(folder / asset); },
-                 hierarchySeeds, JsonPlace::kSafetensorsHeader});
+                 [asset](const fs::path& folder) { readHierarchy(folder / asset); }, hierarchySeeds,
+                 JsonPlace::kSafetensorsHeader});
   all.push_back({"transforms", nullptr, storeAs("transforms.json"),
                  [](const fs::path& folder) { readCameras(folder / "transforms.json"); },
                  transformsSeeds, JsonPlace::kWholeFile});

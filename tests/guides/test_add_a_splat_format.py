@@ -30,5 +30,5 @@ def test_the_guide_adds_a_format(tmp_path):
     assert json.loads(guide.run('info', 'renamed.ply', '--json'))['count'] == 6 ** 3
     (guide.folder / 'short.rows').write_text('splat rows\n1 2 3\n')
     assert 'short.rows, line 2: 14 numbers are expected' in guide.run('info', 'short.rows', status=1)
-    endings = (guide.folder / 'addon/stipple/scene/source/formats.py').read_text()
-    assert "'.rows'" in endings.split('DROPPED_ENDINGS', 1)[1].split(')', 1)[0]
+    extensions = (guide.folder / 'addon/stipple/scene/source/formats.py').read_text()
+    assert "'.rows'" in extensions.split('DROPPED_EXTENSIONS', 1)[1].split(')', 1)[0]

@@ -35,14 +35,14 @@ std::vector<Kind> kinds() {
   rays.order = RayOrder::kResponse;
   rays.projection = RayProjection::kRay;
   crossing.order = RayOrder::kResponse;
-  RenderAccuracy yardstick = rays;
-  yardstick.limits = rayYardstick().limits;
+  RenderAccuracy unlimited = rays;
+  unlimited.limits = unlimitedRays().limits;
   list.push_back({"draft", tiled, 1, 0.25});
   list.push_back({"preview", tiled, 2, 0.5});
   list.push_back({"final", tiled, kMaxShDegree});
   list.push_back({"order pixel", crossing, kMaxShDegree});
   list.push_back({"rays", rays, kMaxShDegree});
-  list.push_back({"reference", yardstick, kMaxShDegree});
+  list.push_back({"reference", unlimited, kMaxShDegree});
   return list;
 }
 

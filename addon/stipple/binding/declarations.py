@@ -83,6 +83,7 @@ FUNCTIONS = {
     'stipple_layers_free': (None, [_handle]),
     'stipple_layers_hold_out': (_status, [_handle, _floats, _floats]),
     'stipple_layers_take_world': (_status, [_handle, _floats, _floats]),
+    'stipple_layers_take_shadow': (_status, [_handle, _floats]),
     'stipple_layers_light_before': (_status, [_handle, _floats, _floats]),
     'stipple_layers_info': (_status, [_handle, _to(s.StippleLayersInfo)]),
     'stipple_layers_surface': (_status, [_handle, _to(s.StippleLayersBuffers)]),
@@ -190,6 +191,15 @@ FUNCTIONS = {
                                              _to(s.StippleGroundPlane)]),
     'stipple_level_points': (_status, [_doubles, _doubles, _doubles]),
     'stipple_scale_points': (_status, [_doubles, c_double, _doubles]),
+    # selecting splats by regions, and filling holes
+    'stipple_region_init': (None, [_to(s.StippleRegion)]),
+    'stipple_cloud_select_regions': (_status, [_handle, _to(s.StippleRegion), c_uint64, _mask, c_uint64,
+                                               POINTER(c_uint64)]),
+    'stipple_cloud_selected_positions': (_status, [_handle, _mask, c_uint64, c_uint64, _floats, POINTER(c_uint64)]),
+    'stipple_region_colours': (_status, [_handle, POINTER(c_uint64), c_uint64, _doubles]),
+    'stipple_fill_options_init': (None, [_to(s.StippleFillOptions)]),
+    'stipple_cloud_fill_start': (_status, [_handle, _to(s.StippleFillOptions), _mask, c_uint64,
+                                           _to(s.StippleFillReport), _out_handle]),
     # differentiable rendering
     'stipple_renderer_backward_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                   _to(s.StippleRenderOptions), _to(s.StippleBackwardInput),

@@ -183,6 +183,24 @@ class Side(IntEnum):
     OUTSIDE = 1
 
 
+class RegionKind(IntEnum):
+    ALL = 0
+    BRUSH = 1
+    LASSO = 2
+    SPHERE = 3
+    COLOUR = 4
+    GROW = 5
+    BOX = 6
+
+
+class RegionOperation(IntEnum):
+    SET = 0
+    ADD = 1
+    SUBTRACT = 2
+    INTERSECT = 3
+    TOGGLE = 4
+
+
 class Transfer(IntEnum):
     LINEAR = 0
     SRGB = 1
@@ -215,6 +233,8 @@ ENUMS = {
     'StippleEffect': (Effect, 'STIPPLE_EFFECT_'),
     'StippleEffectChoice': (EffectChoice, 'STIPPLE_EFFECT_'),
     'StippleSide': (Side, 'STIPPLE_SIDE_'),
+    'StippleRegionKind': (RegionKind, 'STIPPLE_REGION_'),
+    'StippleRegionOperation': (RegionOperation, 'STIPPLE_REGION_'),
     'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
     'StippleFitModel': (FitModel, 'STIPPLE_FIT_'),
     'StippleFitQuality': (FitQuality, 'STIPPLE_FIT_'),

@@ -34,6 +34,11 @@ class Layers(Handle):
         kept = self._array(seen, 3), None if plain is None else contiguous(plain)
         self._check(self.library.stipple_layers_take_world(self.pointer, *map(pointer_to, kept)))
 
+    def take_shadow(self, shadow):
+        """shadow [H,W,3] of an image with shadow catchers."""
+        kept = self._array(shadow, 3)
+        self._check(self.library.stipple_layers_take_shadow(self.pointer, pointer_to(kept)))
+
     def light_before(self, before, whole):
         """before, whole [H,W,4]: composited colours of the splats before the shadow catchers, and of all."""
         kept = self._array(before, 4), self._array(whole, 4)

@@ -77,14 +77,14 @@ class Renderer(Handle):
 
     def options(self, blend_space=BlendSpace.AS_TRAINED, output_colour=OutputColour.SCENE_LINEAR,
                 low_pass=LowPass.FROM_CLOUD, method=RenderMethod.TILED, background=None, accuracy=None,
-                object_order=ObjectOrder.TOGETHER):
+                object_order=ObjectOrder.TOGETHER, solid_depth=False):
         """background: three values in output_colour's space, or None for a transparent image. accuracy: a
-        StippleAccuracy, or None for final."""
+        StippleAccuracy, or None for final. solid_depth: depth only where half of a pixel is covered or more."""
         options = StippleRenderOptions()
         self.library.stipple_render_options_init(byref(options))
         options.blend_space, options.output_colour = int(blend_space), int(output_colour)
         options.low_pass, options.method = int(low_pass), int(method)
-        options.object_order = int(object_order)
+        options.object_order, options.solid_depth = int(object_order), int(solid_depth)
         if background is not None:
             options.with_background = 1
             options.background = (c_double * 3)(*background)
@@ -93,13 +93,21 @@ class Renderer(Handle):
         return options
 
     def start(self, instances, camera, options, with_depth=True, median_depth=False, surface=None,
-              with_transmittance=False, blur=None, with_normal=False, with_objects=False):
+              with_transmittance=False, blur=None, with_normal=False, with_objects=False, background_image=None):
         """Starts the image of instances, as of instance_array; clouds must outlive the start only.
 
         median_depth: where light is half gone, instead of the mean depth of what is seen. surface: a Surface that
-        stands between the splats. blur: a Blur, aperture and shutter.
+        stands between the splats. blur: a Blur, aperture and shutter. background_image [H,W,3]: what stands behind
+        everything, row 0 = top, in place of the options' background.
         """
         shape = (camera.height, camera.width)
+        if background_image is not None:
+            if background_image.shape != shape + (3,):
+                raise invalid(f'The image behind the splats has shape {background_image.shape}; allowed is '
+                              f'{shape + (3,)}.')
+            background_image = contiguous(background_image)
+            options = type(options).from_buffer_copy(options)
+            options.background_image = pointer_to(background_image)
         for layer in (surface, blur):
             options = layer.put_into(options) if layer is not None else options
         colour = np.empty(shape + (4,), np.float32)
@@ -113,7 +121,7 @@ class Renderer(Handle):
         array = instance_array(instances)
         job = Job(self.library, new_handle(self.library, 'stipple_renderer_render_start', self.pointer, array,
                                            len(instances), byref(camera), byref(options), byref(buffers)),
-                  keep=(colour, depth, transmittance, normal, objects, buffers, array, surface,
+                  keep=(colour, depth, transmittance, normal, objects, buffers, array, surface, background_image,
                         [placed[0] for placed in instances]))
         return RenderTask(job, colour, depth, transmittance, normal, objects)
 

@@ -6,10 +6,11 @@ from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_i
 
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, BudgetUnit, CameraModel, ColourSpace, ENUMS,
                     Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, Frame, JobState,
-                    LowPass, MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RenderMethod, Sampling,
-                    Side, SplatOrder, SplatQuantity, Status, Transfer, ViewRig, ViewSplit)
+                    LowPass, MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RegionKind,
+                    RegionOperation, RenderMethod, Sampling, Side, SplatOrder, SplatQuantity, Status, Transfer,
+                    ViewRig, ViewSplit)
 
-ABI_VERSION = 2
+ABI_VERSION = 3
 MAX_ANCHORS = 1 << 28
 NO_INDEX = 0xFFFFFFFF
 DRAW_GEOMETRY_FLOATS = 12
@@ -243,7 +244,8 @@ class StippleRenderOptions(_Sized):
                 ('surface_height', c_uint32), ('surface_depth', _floats), ('surface_colour', _floats),
                 ('matte_opacity', _floats), ('splat_light', _floats), ('accuracy', POINTER(StippleAccuracy)),
                 ('aperture', POINTER(StippleAperture)), ('shutter', POINTER(StippleShutter)), ('samples', c_uint32),
-                ('reserved_sampling', c_uint32)]
+                ('reserved_sampling', c_uint32), ('background_image', _floats), ('solid_depth', c_uint32),
+                ('reserved_depth', c_uint32)]
 
 
 class StippleAccuracyMeasureOptions(_Sized):
@@ -337,7 +339,27 @@ class StippleGroundPlaneOptions(_Sized):
 class StippleGroundPlane(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('normal', c_double * 3), ('offset', c_double),
                 ('matrix', _matrix), ('considered_count', c_uint64), ('inlier_count', c_uint64),
-                ('tolerance', c_double)]
+                ('tolerance', c_double), ('extent_min', c_double * 3), ('extent_max', c_double * 3)]
+
+
+class StippleRegion(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('kind', c_uint32), ('operation', c_uint32), ('shrink', c_uint32),
+                ('cloud_to_pixels', _matrix), ('cloud_to_depth', c_double * 4), ('points', _floats),
+                ('point_count', c_uint64), ('radius', c_double), ('depths', _floats), ('depth_width', c_uint32),
+                ('depth_height', c_uint32), ('depth_rect', c_double * 4), ('depth_margin', c_double),
+                ('centre', c_double * 3), ('colour', c_double * 3), ('tolerance', c_double),
+                ('cloud_to_box', _matrix), ('distance', c_double)]
+
+
+class StippleFillOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('radius', c_double), ('ring_width', c_double),
+                ('patch_size', c_double), ('seed', c_uint64)]
+
+
+class StippleFillReport(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('hole_count', c_uint64),
+                ('filled_count', c_uint64), ('no_ring_count', c_uint64), ('no_plane_count', c_uint64),
+                ('covered_count', c_uint64), ('splat_count', c_uint64), ('radius', c_double)]
 
 
 class StippleBackwardInput(_Sized):

@@ -27,6 +27,21 @@ void gather(const std::vector<float>& from, size_t stride, const std::vector<siz
   });
 }
 
+/// Indices of the splats whose mask is not 0.
+std::vector<size_t> chosenBy(const SplatCloud& cloud, std::span<const uint8_t> mask) {
+  validateSizes(cloud, "cloud");
+  if (mask.size() != cloud.size()) {
+    fail(ErrorCode::kInvalidArgument, "mask holds " + std::to_string(mask.size()) +
+                                          " values; the cloud has " + std::to_string(cloud.size()) +
+                                          " splats, one each is needed");
+  }
+  std::vector<size_t> chosen;
+  for (size_t i = 0; i < mask.size(); ++i) {
+    if (mask[i]) chosen.push_back(i);
+  }
+  return chosen;
+}
+
 }  // namespace
 
 void invertMask(std::vector<uint8_t>& mask) {
@@ -55,6 +70,18 @@ std::vector<uint8_t> insideBox(const SplatCloud& cloud, const Mat4d& cloud_to_bo
     }
   });
   return mask;
+}
+
+std::vector<float> selectedPositions(const SplatCloud& cloud, std::span<const uint8_t> mask,
+                                     size_t most) {
+  std::vector<size_t> chosen = chosenBy(cloud, mask);
+  const size_t count = std::min(chosen.size(), most);
+  // A row's source is never before it, so that the list can be thinned where it is.
+  for (size_t k = 0; k < count; ++k) chosen[k] = chosen[k * chosen.size() / count];
+  chosen.resize(count);
+  std::vector<float> positions;
+  gather(cloud.positions, 3, chosen, positions);
+  return positions;
 }
 
 std::vector<uint8_t> thinningMask(size_t total, size_t count, uint64_t seed) {
@@ -90,16 +117,7 @@ SplatCloud thinned(const SplatCloud& cloud, size_t count, uint64_t seed) {
 }
 
 SplatCloud kept(const SplatCloud& cloud, std::span<const uint8_t> mask) {
-  validateSizes(cloud, "cloud");
-  if (mask.size() != cloud.size()) {
-    fail(ErrorCode::kInvalidArgument, "mask holds " + std::to_string(mask.size()) +
-                                          " values; the cloud has " + std::to_string(cloud.size()) +
-                                          " splats, one each is needed");
-  }
-  std::vector<size_t> chosen;
-  for (size_t i = 0; i < mask.size(); ++i) {
-    if (mask[i]) chosen.push_back(i);
-  }
+  const std::vector<size_t> chosen = chosenBy(cloud, mask);
   SplatCloud result;
   result.sh_degree = cloud.sh_degree;
   result.colour_space = cloud.colour_space;

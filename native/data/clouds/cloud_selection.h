@@ -20,6 +20,11 @@ void invertMask(std::vector<uint8_t>& mask);
 /// How many splats a mask of 0 and 1 selects.
 uint64_t selectedCount(std::span<const uint8_t> mask);
 
+/// Positions [n,3] of splats whose mask [N] is not 0: all, or `most` that are evenly spread over
+/// their indices. Errors: kInvalidArgument where the mask has another length than the cloud.
+std::vector<float> selectedPositions(const SplatCloud& cloud, std::span<const uint8_t> mask,
+                                     size_t most);
+
 /// Which of `total` splats a plain thinning to `count` keeps: 1 for those with the smallest numbers
 /// keyed by (seed, index). [total] A smaller count is a part of a larger one, and the choice looks
 /// at nothing but the index: frames of a series whose splats keep their places thin alike. Errors:

@@ -143,8 +143,10 @@ uint64_t FieldDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per
   const uint64_t splat = (11 + 3 * shCoefficientCount(field_->layout.sh_degree)) * sizeof(float);
   // Centre, place, footprint, stretch, details.
   const uint64_t gaussian = splat + (8 + field_->details.channels()) * sizeof(float);
-  uint64_t floats = fieldInputWidth(*field_) + 2;
+  // Spacing, unit, inputs; sums of every layer, and what all but the last make of them.
+  uint64_t floats = 2 + fieldInputWidth(*field_);
   for (const LinearLayer& layer : field_->network.layers()) floats += 2 * layer.outputs;
+  floats -= field_->network.layers().back().outputs;
   // The search for neighbours: places as double and float, a tree, six numbers.
   const uint64_t spacing = 3 * 12 + 64 + 7 * sizeof(uint32_t);
   const uint64_t anchor = floats * sizeof(float) + spacing;

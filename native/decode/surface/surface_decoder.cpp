@@ -34,6 +34,10 @@ constexpr size_t kCentringSamples = 3;
 constexpr size_t kFewSamples = 10;
 constexpr size_t kManySamples = 4;
 
+size_t samplesPerSite(size_t site_count) {
+  return site_count <= kFewSites ? kFewSamples : kManySamples;
+}
+
 /// Unit quaternion w, x, y, z of the rotation whose columns are a, b, c.
 /// Based on: Shepperd, Quaternion from Rotation Matrix, 1978.
 void quaternionOf(const float* a, const float* b, const float* c, float* out) {
@@ -140,25 +144,43 @@ SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
     centreSites(index, assignSamples(index, sites, kCentringSamples, request.progress), sites);
     sortByCell(index, sites);
   }
-  const SurfacePatches patches =
-      assignSamples(index, sites, few ? kFewSamples : kManySamples, request.progress);
-  advance(request.progress, 0.4, "Decoding the surface");
-  SplatShapes shapes = fitShapes(index, sites, patches);
-  findNearBorders(index_->borders, sites, shapes);
-  balanceCoverage(index, sites, patches, shapes, request.progress);
+  SplatShapes shapes;
+  {
+    const SurfacePatches patches =
+        assignSamples(index, sites, samplesPerSite(sites.size()), request.progress);
+    advance(request.progress, 0.4, "Decoding the surface");
+    shapes = fitShapes(index, sites, patches);
+    findNearBorders(index_->borders, sites, shapes);
+    balanceCoverage(index, sites, patches, shapes, request.progress);
+  }
+  sites.cells = std::vector<CellTable>();
+  sites.around = std::vector<std::array<uint32_t, 28>>();
   SplatCloud cloud = cloudOf(index, sites, shapes);
   advance(request.progress, 1.0, "Decoding the surface");
   return cloud;
 }
 
 uint64_t SurfaceDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const {
-  // Per splat: the cloud (56 bytes), sites (36, twice while they are sorted), shapes (112), patch
-  // bounds and cell tables (at most 96), neighbour lists (112 per cell, at most a cell per splat,
-  // twice while they are sorted), scratch of the balance (at most 64). Per sample: owner and member
-  // (8) and the coverage (16).
-  constexpr uint64_t kBytesPerSplat = 56 + 2 * 36 + 112 + 96 + 2 * 112 + 64;
-  constexpr uint64_t kBytesPerSample = 24;
-  return anchor_count * gaussians_per_anchor * kBytesPerSplat + surface_->size() * kBytesPerSample;
+  // The most is held while the coverage is balanced: sorting holds the sites twice but no shapes,
+  // and the cloud is made when cells and patches are gone.
+  constexpr uint64_t kSite = 9 * sizeof(float);
+  constexpr uint64_t kShape = 28 * sizeof(float);
+  constexpr uint64_t kPatch = 2 * sizeof(uint32_t);  // where its members begin, and a copy
+  // Codes, runs and slots of a table, which is at least a quarter full.
+  constexpr uint64_t kCell = sizeof(uint64_t) + sizeof(uint32_t) + 4 * sizeof(uint32_t);
+  constexpr uint64_t kNeighbours = 28 * sizeof(uint32_t);
+  // Each site may have a cell of its own, in each of three tables. On closed surfaces there are 0.4
+  // to 0.9 cells a site in the finest table, and a quarter of that in the next: what is held is
+  // two thirds of this bound, and more of it for dust.
+  constexpr uint64_t kSplat = kSite + kShape + kPatch + 3 * kCell + kNeighbours;
+  // Owner, member, start of a run, coverage.
+  constexpr uint64_t kSample = 4 * sizeof(uint32_t);
+  // Bits of three grids of 256 and fewer cells a side, and what threads gather.
+  constexpr uint64_t kFixed = uint64_t{4} << 20;
+  const uint64_t splats = anchor_count * gaussians_per_anchor;
+  const uint64_t samples =
+      surface_->size() / sampleStride(surface_->size(), splats, samplesPerSite(splats));
+  return splats * kSplat + samples * kSample + kFixed;
 }
 
 }  // namespace stipple

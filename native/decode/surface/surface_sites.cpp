@@ -216,6 +216,9 @@ SurfaceSites projectAnchors(const SurfaceIndex& index, const DecodeRequest& requ
 
 void sortByCell(const SurfaceIndex& index, SurfaceSites& sites) {
   const size_t count = sites.size();
+  // Those of the old places, so that two generations of them are never held.
+  sites.cells = std::vector<CellTable>();
+  sites.around = std::vector<std::array<uint32_t, 28>>();
   sites.level = cellLevel(std::sqrt(index.area / static_cast<double>(count)));
   std::vector<uint64_t> codes(count);
   parallelFor(count, kAnchorGrain, [&](size_t begin, size_t end) {
@@ -270,12 +273,16 @@ size_t SurfaceSites::neighbours(uint64_t code, std::array<uint32_t, 27>& out) co
 void forSampleRuns(const SurfaceIndex& index, const SurfacePatches& patches, int level,
                    const std::function<void(size_t, size_t, uint64_t)>& body) {
   const int shift = 3 * (SurfaceIndex::kCodeLevel - level);
+  const auto starts_run = [&](size_t i) {
+    return i == 0 || index.codes[patches.sampleOf(i)] >> shift !=
+                         index.codes[patches.sampleOf(i - 1)] >> shift;
+  };
+  size_t run_count = 0;
+  for (size_t i = 0; i < patches.sample_count; ++i) run_count += starts_run(i) ? 1 : 0;
   std::vector<uint32_t> begins;
-  uint64_t last = ~uint64_t{0};
+  begins.reserve(run_count + 1);
   for (size_t i = 0; i < patches.sample_count; ++i) {
-    const uint64_t code = index.codes[patches.sampleOf(i)] >> shift;
-    if (code != last) begins.push_back(static_cast<uint32_t>(i));
-    last = code;
+    if (starts_run(i)) begins.push_back(static_cast<uint32_t>(i));
   }
   begins.push_back(static_cast<uint32_t>(patches.sample_count));
   parallelFor(begins.size() - 1, kRunGrain, [&](size_t begin, size_t end) {
@@ -285,11 +292,15 @@ void forSampleRuns(const SurfaceIndex& index, const SurfacePatches& patches, int
   });
 }
 
+size_t sampleStride(size_t sample_count, size_t site_count, size_t samples_per_site) {
+  const size_t wanted = std::max(kMinSamples, site_count * samples_per_site);
+  return std::max<size_t>(1, (sample_count + wanted / 2) / wanted);
+}
+
 SurfacePatches assignSamples(const SurfaceIndex& index, const SurfaceSites& sites,
                              size_t samples_per_site, Progress* progress) {
   SurfacePatches patches;
-  const size_t wanted = std::max(kMinSamples, sites.size() * samples_per_site);
-  patches.stride = std::max<size_t>(1, (index.size() + wanted / 2) / wanted);
+  patches.stride = sampleStride(index.size(), sites.size(), samples_per_site);
   patches.sample_count = index.size() / patches.stride;
   patches.owners.resize(patches.sample_count);
   const float cell_side = 1.0f / static_cast<float>(uint32_t{1} << sites.level);

@@ -50,6 +50,9 @@ SurfaceSites projectAnchors(const SurfaceIndex& index, const DecodeRequest& requ
 /// Sorts the sites by cell after their positions have changed.
 void sortByCell(const SurfaceIndex& index, SurfaceSites& sites);
 
+/// Every how many-th of the samples of a surface takes part.
+size_t sampleStride(size_t sample_count, size_t site_count, size_t samples_per_site);
+
 /// Gives every taking-part sample to its nearest site; sites on another sheet of the surface (other
 /// normal, or off the tangent plane) count as farther.
 /// `samples_per_site` is how many take part on average, where there are as many.

@@ -86,7 +86,9 @@ SplatCloud HierarchyDecoder::decode(const DecodeRequest& request) const {
 }
 
 uint64_t HierarchyDecoder::memoryBound(uint64_t anchor_count, uint32_t) const {
-  return anchor_count * (4 * (11 + leaves_->shStride()) + sizeof(uint32_t));
+  // Splats and the ids of their nodes, and what allocators round up.
+  constexpr uint64_t kRounding = uint64_t{64} << 10;
+  return anchor_count * (4 * (11 + leaves_->shStride()) + sizeof(uint32_t)) + kRounding;
 }
 
 }  // namespace stipple

@@ -6,7 +6,8 @@
  *   stipple_last_error_message() says, for this thread, what is wrong: the argument, the value seen and
  *   the value allowed. No C++ exception leaves the library and it never ends the process.
  *   Option structs start with struct_size; fill them with stipple_..._options_init first, then change
- *   fields. A field counts as given if struct_size reaches its end, so old programs keep working.
+ *   fields. A field counts as given if struct_size reaches its end. ..._init writes the struct as this
+ *   header has it, so the ABI version rises when an option struct grows.
  *   Buffers belong to the caller, on both sides. Handles are counted: a job keeps what it uses alive,
  *   so every stipple_..._free may be called at any time; NULL is allowed.
  *   Handles may be used from any thread; one handle must not be used by two threads at once unless a
@@ -29,8 +30,9 @@ extern "C" {
 
 /* ---- version ----------------------------------------------------------------------------------- */
 
-/* Raised when a function or struct changes in a way that old callers cannot use. */
-#define STIPPLE_ABI_VERSION 2u
+/* Raised when a function or struct changes in a way that old callers cannot use, and when an option struct grows:
+ * its ..._init would write past the end of an older caller's. */
+#define STIPPLE_ABI_VERSION 3u
 
 /* The ABI version of the loaded library; compare with STIPPLE_ABI_VERSION before any other call. */
 uint32_t stipple_abi_version(void);
@@ -1024,6 +1026,16 @@ typedef struct StippleRenderOptions {
   uint32_t samples;                /* 1..65536; 1: the middle of all. 0: 1 without aperture and shutter, else a
                                       power of two from 16 to 256, by how far they spread the splats */
   uint32_t reserved_sampling;
+  /* [H,W,3] in output_colour's space: what stands behind everything in place of background, and is composited as
+   * that is; alpha becomes 1. Values that are not finite count as black. NULL: none. Must stay valid until the job
+   * has ended. An average over aperture or shutter is composited over it as a whole. Not for backward passes. */
+  const float* background_image;
+  /* 1: the expected depth (StippleRenderBuffers.depth) is that of splats where they and the surface cover half of a
+   * pixel or more, and the splats no less of it than the surface: the mean of the splats alone. Elsewhere it is the
+   * surface's, or 1e10 where less than half is covered. Where no splat shows it is the surface's as given. 0: the
+   * mean of all that shows, however little. */
+  uint32_t solid_depth;
+  uint32_t reserved_depth;
 } StippleRenderOptions;
 void stipple_render_options_init(StippleRenderOptions* options);
 
@@ -1198,13 +1210,14 @@ StippleStatus stipple_mesh_matte_start(StippleContext* context, const StippleMes
 
 /* What another renderer drew of everything but the splats, as a surface between them, and the image of both.
  * Colours are premultiplied and scene linear. All arrays of one handle share one order of rows, whichever that is.
- * Order of calls: hold_out, take_world and light_before as far as each is needed; then what is read. A handle is
+ * Order of calls: hold_out, take_world, take_shadow and light_before as far as each is needed; then what is read. A handle is
  * used by one thread at a time. Same bits for any number of threads. Cost of each: O(pixels). */
 typedef struct StippleLayers StippleLayers;
 
 /* Makes the layers of passes whose film was transparent.
  * In: combined [H,W,4]; depth [H,W] metres of one sample of each pixel, 1e10 or NaN where nothing is; shadow
- * [H,W,3], factors of the light of what is behind a shadow catcher, or NULL without one. Colours that are not
+ * [H,W,3], factors of the light of what is behind a shadow catcher that hides meshes and world, or NULL without one
+ * (better: an image without catchers, and stipple_layers_take_shadow). Colours that are not
  * finite count as black.
  * Errors: INVALID_ARGUMENT for a side of 0; MEMORY_LIMIT. */
 StippleStatus stipple_layers_create(StippleContext* context, uint32_t width, uint32_t height, const float* combined,
@@ -1216,6 +1229,10 @@ StippleStatus stipple_layers_hold_out(StippleLayers* layers, const float* depth,
 /* Takes the light that the camera sees of the world. In: seen [H,W,3]; plain [3], its colour, or NULL where it has
  * many: what is hidden by a shadow catcher is then filled in from the pixels around. */
 StippleStatus stipple_layers_take_world(StippleLayers* layers, const float* seen, const float* plain);
+/* Takes the light of shadow catchers from another image than the passes, in which they hide nothing; after
+ * take_world. In: shadow [H,W,3], factors of the light of what is behind a catcher, and 1 elsewhere.
+ * Errors: INVALID_ARGUMENT where stipple_layers_create was given a shadow. */
+StippleStatus stipple_layers_take_shadow(StippleLayers* layers, const float* shadow);
 /* Leaves shadows to the splats at and behind shadow catchers. In: composited colours [H,W,4] of the splats before
  * the catchers (stipple_layers_matte), and of all; the light of each pixel is shared as these are. */
 StippleStatus stipple_layers_light_before(StippleLayers* layers, const float* before, const float* whole);
@@ -1485,6 +1502,10 @@ typedef struct StippleGroundPlane {
   uint64_t considered_count;   /* splats that were inspected, at most 50,000 */
   uint64_t inlier_count;       /* of those, in the plane */
   double tolerance;            /* as used */
+  /* The box of the inspected splats' middle 98 % along each axis of the levelled frame, metres: floaters count
+   * for nothing. */
+  double extent_min[3];
+  double extent_max[3];
 } StippleGroundPlane;
 
 /* Finds the plane in which most of the surface lies, with little below it, by random samples (the same for a
@@ -1495,6 +1516,109 @@ StippleStatus stipple_cloud_ground_plane(const StippleCloud* cloud, const double
 StippleStatus stipple_level_points(const double points[9], const double up[3], double matrix[16]);
 /* Gives the uniform scale about the origin that makes the distance of two points [2,3] the given length, metres. */
 StippleStatus stipple_scale_points(const double points[6], double length, double matrix[16]);
+
+/* ---- selecting splats by regions, and filling holes --------------------------------------------- */
+
+/* A selection says for each splat of a cloud 1 (selected) or 0. Regions, applied to it in order, make another one:
+ * a function of the cloud, the regions and the selection before, and of nothing else. Splats are judged by their
+ * centres, in double. */
+
+typedef enum StippleRegionKind {
+  STIPPLE_REGION_ALL = 0,    /* every splat */
+  STIPPLE_REGION_BRUSH = 1,  /* at most `radius` pixels from the path `points` */
+  STIPPLE_REGION_LASSO = 2,  /* inside the outline `points`, which closes itself; even-odd where it crosses itself */
+  STIPPLE_REGION_SPHERE = 3, /* at most `radius` from `centre`, in the frame that `cloud_to_box` leads to */
+  STIPPLE_REGION_COLOUR = 4, /* colours within `tolerance` of `colour`, everywhere or in a sphere */
+  STIPPLE_REGION_GROW = 5,   /* the selection before, grown or shrunken by `distance` */
+  STIPPLE_REGION_BOX = 6     /* the cube -1..1 of the frame that `cloud_to_box` leads to */
+} StippleRegionKind;
+
+typedef enum StippleRegionOperation {
+  STIPPLE_REGION_SET = 0,      /* the region alone is selected */
+  STIPPLE_REGION_ADD = 1,
+  STIPPLE_REGION_SUBTRACT = 2,
+  STIPPLE_REGION_INTERSECT = 3,
+  STIPPLE_REGION_TOGGLE = 4    /* what was selected in the region is not, and the other way round */
+} StippleRegionOperation;
+
+/* What a kind does not name is not read. All kinds but GROW may be limited to what is in front. */
+typedef struct StippleRegion {
+  uint32_t struct_size;
+  uint32_t kind;                /* StippleRegionKind */
+  uint32_t operation;           /* StippleRegionOperation */
+  uint32_t shrink;              /* grow: 1: the selection shrinks by `distance` */
+  double cloud_to_pixels[16];   /* brush, lasso, front only: a centre (x, y, z, 1) becomes (X, Y, -, W), its pixel
+                                   (X/W, Y/W), y downwards; W <= 0 is behind the camera and in no such region */
+  double cloud_to_depth[4];     /* front only: depth along the view axis, dot((x, y, z, 1)), cloud units */
+  const float* points;          /* [point_count,2] pixels */
+  uint64_t point_count;         /* brush: 1 to 65536, lasso: 3 to 16384 */
+  double radius;                /* brush: pixels; sphere, colour: units of that frame, colour: 0 is everywhere;
+                                   >= 0 */
+  const float* depths;          /* front only: depths [depth_height,depth_width] of what is seen, top row first,
+                                   cloud units, infinity where nothing is; NULL: through */
+  uint32_t depth_width;
+  uint32_t depth_height;
+  double depth_rect[4];         /* x0, y0, x1, y1: pixels that `depths` cover; what projects elsewhere is not seen */
+  double depth_margin;          /* a splat passes where its depth is at most the image's and this; cloud units */
+  double centre[3];             /* sphere, colour: in the frame that `cloud_to_box` leads to */
+  double colour[3];             /* linear Rec.709, as stipple_region_colours gives it */
+  double tolerance;             /* colour: distance in OKLab, 0 and above; 0.1 is a family of one hue */
+  double cloud_to_box[16];      /* sphere, colour, box: affine and invertible; stipple_region_init: the identity,
+                                   so that spheres lie in the space of the cloud */
+  double distance;              /* grow: cloud units; 0: the median distance of selected splats to their 8th
+                                   neighbour; negative: the selection shrinks by so much, too */
+} StippleRegion;
+void stipple_region_init(StippleRegion* region);
+
+/* Applies regions [region_count] in order. In and out: mask, the selection before and after, [mask_count] bytes
+ * where mask_count must be the cloud's count; anything but 0 counts as selected before. Out: selected_count, or
+ * NULL. Errors: INVALID_ARGUMENT for a path without points, an outline of fewer than three, a number that is not
+ * finite, a negative radius or tolerance, a mask of another length, an image of depths without size.
+ * Cost: O(N) for each region; a million splats take 5 to 40 ms on two idle cores, GROW longer. */
+StippleStatus stipple_cloud_select_regions(const StippleCloud* cloud, const StippleRegion* regions,
+                                           uint64_t region_count, uint8_t* mask, uint64_t mask_count,
+                                           uint64_t* selected_count);
+/* Gives the centres of selected splats for drawing: all of them, or max_count that are evenly spread over their
+ * indices. Out: positions [max_count,3]; written_count, of which as many rows are written. */
+StippleStatus stipple_cloud_selected_positions(const StippleCloud* cloud, const uint8_t* mask, uint64_t mask_count,
+                                               uint64_t max_count, float* positions, uint64_t* written_count);
+/* Gives the colours that STIPPLE_REGION_COLOUR compares, linear Rec.709 of degree 0, of the splats indices [count].
+ * Out: colours [count,3]. */
+StippleStatus stipple_region_colours(const StippleCloud* cloud, const uint64_t* indices, uint64_t count,
+                                     double* colours);
+
+typedef struct StippleFillOptions {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double radius;      /* removed splats this near to each other are one hole, cloud units; 0 (default): from the
+                         distances of the removed splats, as floaters are grouped */
+  double ring_width;  /* how far from a hole splats are copied, cloud units; 0 (default): from the size of the hole */
+  double patch_size;  /* side of what is copied at once, cloud units; 0 (default): from the size of the hole */
+  uint64_t seed;      /* of the choice among patches that fit equally */
+} StippleFillOptions;
+void stipple_fill_options_init(StippleFillOptions* options);
+
+typedef struct StippleFillReport {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t hole_count;      /* groups of removed splats */
+  uint64_t filled_count;    /* of those, filled */
+  uint64_t no_ring_count;   /* not filled: fewer than 16 splats are left around them */
+  uint64_t no_plane_count;  /* not filled: what is left around them spans no plane */
+  uint64_t covered_count;   /* not filled: nothing is missing of the ground under them; the four add up to holes */
+  uint64_t splat_count;     /* new splats */
+  double radius;            /* as used */
+} StippleFillReport;
+
+/* Fills holes: for each group of removed splats (mask 1, [mask_count] = the cloud's count) a plane is laid through
+ * what is left around it, and its footprint on that plane is covered by patches copied from there, with their
+ * heights over the plane. The job's cloud (stipple_job_cloud) has the new splats alone; it may be empty. mask is
+ * read before this returns; report (struct_size set, or NULL) must stay valid until the job has ended, it is
+ * written at its end. Errors: INVALID_ARGUMENT for a mask of another length and one that removes nothing or all.
+ * Determinism: by the seed. Cost: O(N log N). */
+StippleStatus stipple_cloud_fill_start(const StippleCloud* cloud, const StippleFillOptions* options,
+                                       const uint8_t* mask, uint64_t mask_count, StippleFillReport* report,
+                                       StippleJob** job);
 
 /* ---- differentiable rendering ------------------------------------------------------------------- */
 

@@ -29,7 +29,7 @@ class InputFile {
 /// The whole file as a string. In: limit, bytes; larger files are refused with kFormat.
 std::string readTextFile(const std::string& path, uint64_t limit);
 
-/// Ending of a path in lower case with its dot (".ply"), or empty.
-std::string lowerEnding(const std::string& path);
+/// Extension of a path in lower case with its dot (".ply"), or empty.
+std::string lowerExtension(const std::string& path);
 
 }  // namespace stipple

@@ -32,8 +32,8 @@ constexpr int kMaxLinks = 40;
 std::string temporaryName(const fs::path& target) {
   static std::atomic<unsigned> counter{0};
   const std::string name = temporaryFileName(::getpid(), counter.fetch_add(1));
-  // Same folder, because only there a rename is atomic; same ending, because some libraries choose
-  // the format by it. Short, so that no file name becomes longer than the system allows.
+  // Same folder, because only there a rename is atomic; same extension, because some libraries
+  // choose the format by it. Short, so that no file name becomes longer than the system allows.
   return (target.parent_path() / (name + target.extension().string())).string();
 }
 

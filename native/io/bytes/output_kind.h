@@ -7,7 +7,7 @@
 namespace stipple {
 
 /// Refuses a place where a file cannot be written, or would replace one of another kind: whatever
-/// its ending says, a report must not take the place of a model. An empty file may be replaced.
+/// its extension says, a report must not take the place of a model. An empty file may be replaced.
 /// In: what, such as "a checkpoint"; is_of_kind, asked of a file with content; what it throws means
 /// no. Errors: kIo with the reason; kInvalidArgument for a file of another kind.
 void requireOutputKind(const std::string& path, const std::string& what,

@@ -5,7 +5,7 @@
 
 namespace stipple {
 
-/// What a temporary file of a process is called, without an ending.
+/// What a temporary file of a process is called, without an extension.
 std::string temporaryFileName(long process, unsigned number);
 
 /// Locks a temporary file as long as what is returned stays open, which is at the longest as long

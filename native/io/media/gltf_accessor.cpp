@@ -92,6 +92,7 @@ float asFloat(T value, bool normalized) {
 template <typename T>
 void convert(const unsigned char* bytes, size_t stride, size_t count, size_t width, bool normalized,
              float* out, size_t out_stride) {
+  if (count == 0) return;  // `out` may be null
   if constexpr (std::is_same_v<T, float>) {
     const size_t row = width * sizeof(float);
     if (out_stride == width && stride == row) {

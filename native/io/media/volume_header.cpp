@@ -74,7 +74,7 @@ class Cursor {
   uint64_t offset_ = 0;
 };
 
-/// Takes an ending off a text. False where it has another.
+/// Takes an extension off a text. False where it has another.
 bool takeSuffix(std::string& text, const std::string& suffix) {
   if (text.size() < suffix.size() ||
       text.compare(text.size() - suffix.size(), suffix.size(), suffix) != 0) {

@@ -99,8 +99,8 @@ std::string csvOf(const AccuracyReport& report) {
   return out;
 }
 
-bool endsWith(const std::string& path, const char* ending) {
-  const std::string end = ending;
+bool endsWith(const std::string& path, const char* extension) {
+  const std::string end = extension;
   return path.size() >= end.size() && path.compare(path.size() - end.size(), end.size(), end) == 0;
 }
 

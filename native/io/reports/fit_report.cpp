@@ -123,7 +123,7 @@ std::string fitPlotsPath(const std::string& report_path) {
 }
 
 void requireFitReportPlace(const std::string& path) {
-  if (lowerEnding(path) == ".svg") {
+  if (lowerExtension(path) == ".svg") {
     fail(ErrorCode::kInvalidArgument,
          path + " ends in .svg, where the curves of a report go; .json is expected");
   }

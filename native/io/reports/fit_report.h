@@ -28,7 +28,7 @@ void writeFitReport(const FitReportHead& head, const FitHistory& history, const 
 /// measured nothing.
 AccuracyReport readFitAccuracy(const std::string& path);
 
-/// Where the plots of a report lie: under its name, with the ending .svg.
+/// Where the plots of a report lie: under its name, with the extension .svg.
 std::string fitPlotsPath(const std::string& report_path);
 /// Refuses places where a report or its plots cannot be written, or would replace a file of another
 /// kind. Errors: kIo, kInvalidArgument.

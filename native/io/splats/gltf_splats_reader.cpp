@@ -110,7 +110,7 @@ SplatCloud placed(SplatCloud cloud, const StippleMediaSplatPart& info, const std
 
 bool startsAsGltfSplats(const SplatFileStart& start) {
   const bool binary = start.bytes.rfind(kGlbMagic, 0) == 0;
-  if (start.is_folder || (!binary && lowerEnding(start.path) != ".gltf")) return false;
+  if (start.is_folder || (!binary && lowerExtension(start.path) != ".gltf")) return false;
   const InputFile file(start.path);
   uint64_t json = file.size();
   if (binary && start.bytes.size() >= kGlbHead) {

@@ -95,7 +95,7 @@ class Writer {
   }
 
   void write() {
-    if (lowerEnding(path_) == ".glb") {
+    if (lowerExtension(path_) == ".glb") {
       writeBinary();
     } else {
       writeText();

@@ -350,7 +350,7 @@ std::vector<SogPart> encodeSog(const SplatCloud& cloud, const SogOptions& option
 void writeSog(const SplatCloud& cloud, const std::string& path, const SogOptions& options,
               Progress* progress) {
   const std::vector<SogPart> parts = encodeSog(cloud, options, progress);
-  if (lowerEnding(path) == ".json") {
+  if (lowerExtension(path) == ".json") {
     writeFolder(parts, path);
   } else {
     writeZip(parts, path);

@@ -25,7 +25,7 @@ std::string listOfFormats(bool written) {
   std::vector<std::string> parts;
   for (const SplatFormat& format : splatFormats()) {
     if (written ? format.write == nullptr : format.read == nullptr) continue;
-    parts.push_back(std::string(format.title) + " (" + format.endings + ")");
+    parts.push_back(std::string(format.title) + " (" + format.extensions + ")");
   }
   std::string text;
   for (size_t i = 0; i < parts.size(); ++i) {
@@ -107,20 +107,20 @@ SplatCloud readSplatFile(const std::string& path, Progress* progress) {
   // A folder that no format knows gets the words of every reader.
   if (std::filesystem::is_directory(path, ignored)) const InputFile file(path);
   // A file that is named after a format and is not of it gets that reader's words.
-  const SplatFormat* named = splatFormatOfEnding(path);
+  const SplatFormat* named = splatFormatOfExtension(path);
   if (named != nullptr && named->read != nullptr) return named->read(path, progress);
   fail(ErrorCode::kFormat, path + " is not a splat file that can be read: its extension is '" +
-                               lowerEnding(path) +
+                               lowerExtension(path) +
                                "' and its first bytes are those of no format; " +
                                listOfFormats(false) + " can be read");
 }
 
 void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress) {
-  const SplatFormat* format = splatFormatOfEnding(path);
+  const SplatFormat* format = splatFormatOfExtension(path);
   if (format == nullptr || format->write == nullptr) {
     fail(ErrorCode::kUnsupported, path + " cannot be written as splats: its extension is '" +
-                                      lowerEnding(path) + "'; " + listOfFormats(true) +
+                                      lowerExtension(path) + "'; " + listOfFormats(true) +
                                       " can be written");
   }
   checkDegreeLimit(options);
@@ -134,7 +134,7 @@ void writeSplatFile(const SplatCloud& cloud, const std::string& path,
 void writeSplatLevels(const std::vector<const SplatCloud*>& levels, const SplatCloud* environment,
                       const std::string& path, const SplatWriteOptions& options,
                       Progress* progress) {
-  const SplatFormat* format = splatFormatOfEnding(path);
+  const SplatFormat* format = splatFormatOfExtension(path);
   if (format == nullptr || format->name != std::string_view("sog_levels")) {
     fail(ErrorCode::kUnsupported,
          path + " cannot be written as levels: it is not named lod-meta.json");

@@ -9,11 +9,11 @@
 
 namespace stipple {
 
-/// Reads a splat file; the format is told by its first bytes, then by its ending.
+/// Reads a splat file; the format is told by its first bytes, then by its extension.
 /// Errors: kIo (cannot be opened), kFormat (what is wrong and where), kUnsupported.
 SplatCloud readSplatFile(const std::string& path, Progress* progress = nullptr);
 
-/// Writes by the ending of the path; under a temporary name, then renamed. Harmonics that the
+/// Writes by the extension of the path; under a temporary name, then renamed. Harmonics that the
 /// format or the options leave no room for are cut off, positions turned to the frame of the format
 /// or the options.
 void writeSplatFile(const SplatCloud& cloud, const std::string& path,

@@ -28,20 +28,20 @@ std::string lowerName(const std::string& path) {
   return name;
 }
 
-std::vector<std::string> endingsOf(const SplatFormat& format) {
-  std::istringstream words(format.endings);
-  std::vector<std::string> endings;
-  for (std::string word; words >> word;) endings.push_back(word);
-  return endings;
+std::vector<std::string> extensionsOf(const SplatFormat& format) {
+  std::istringstream words(format.extensions);
+  std::vector<std::string> extensions;
+  for (std::string word; words >> word;) extensions.push_back(word);
+  return extensions;
 }
 
-/// Length of the format's ending that the file name has; 0 for none.
-size_t endingLength(const SplatFormat& format, const std::string& name) {
+/// Length of the format's extension that the file name has; 0 for none.
+size_t extensionLength(const SplatFormat& format, const std::string& name) {
   size_t longest = 0;
-  for (const std::string& ending : endingsOf(format)) {
-    if (name.size() >= ending.size() &&
-        name.compare(name.size() - ending.size(), ending.size(), ending) == 0) {
-      longest = std::max(longest, ending.size());
+  for (const std::string& extension : extensionsOf(format)) {
+    if (name.size() >= extension.size() &&
+        name.compare(name.size() - extension.size(), extension.size(), extension) == 0) {
+      longest = std::max(longest, extension.size());
     }
   }
   return longest;
@@ -66,7 +66,7 @@ const std::vector<SplatFormat>& splatFormats() {
   static const std::vector<SplatFormat> kFormats = {
       {.name = "ply",
        .title = "3DGS PLY",
-       .endings = ".ply",
+       .extensions = ".ply",
        .max_sh_degree = 4,
        .frame = Frame::kRDF,
        .keeps = kAll,
@@ -77,7 +77,7 @@ const std::vector<SplatFormat>& splatFormats() {
        .checks_values = true},
       {.name = "compressed-ply",
        .title = "compressed PLY",
-       .endings = ".compressed.ply",
+       .extensions = ".compressed.ply",
        .max_sh_degree = 3,
        .frame = Frame::kRDF,
        .keeps = kAll,
@@ -88,7 +88,7 @@ const std::vector<SplatFormat>& splatFormats() {
        .checks_values = true},
       {.name = "spz",
        .title = "SPZ",
-       .endings = ".spz",
+       .extensions = ".spz",
        .max_sh_degree = 4,
        .frame = Frame::kRUB,
        .keeps = {.frame = true, .antialias = true},
@@ -98,7 +98,7 @@ const std::vector<SplatFormat>& splatFormats() {
        .estimate = estimateSpzSplats},
       {.name = "splat",
        .title = "splat records",
-       .endings = ".splat",
+       .extensions = ".splat",
        .max_sh_degree = 0,
        .frame = Frame::kRDF,
        .read = readSplat32,
@@ -108,13 +108,13 @@ const std::vector<SplatFormat>& splatFormats() {
        .takes_any_degree = true},
       {.name = "ksplat",
        .title = "ksplat",
-       .endings = ".ksplat",
+       .extensions = ".ksplat",
        .max_sh_degree = 3,
        .frame = Frame::kRDF,
        .read = readKsplat},
       {.name = "gltf",
        .title = "glTF with KHR_gaussian_splatting",
-       .endings = ".glb .gltf",
+       .extensions = ".glb .gltf",
        .max_sh_degree = 3,
        .frame = kGltfFrame,
        .keeps = kAll,
@@ -125,7 +125,7 @@ const std::vector<SplatFormat>& splatFormats() {
        .checks_values = true},
       {.name = "sog_levels",
        .title = "streamed SOG",
-       .endings = "lod-meta.json",
+       .extensions = "lod-meta.json",
        .max_sh_degree = 3,
        .frame = Frame::kRDF,
        .keeps = kAll,
@@ -136,7 +136,7 @@ const std::vector<SplatFormat>& splatFormats() {
        .estimate = estimateSog},
       {.name = "sog",
        .title = "SOG",
-       .endings = ".sog meta.json",
+       .extensions = ".sog meta.json",
        .max_sh_degree = 3,
        .frame = Frame::kRDF,
        .keeps = kAll,
@@ -157,12 +157,12 @@ uint64_t estimatedFileBytes(const SplatFormat& format, uint64_t count, int degre
   return static_cast<uint64_t>(std::llround(format.estimate(count, written, options)));
 }
 
-const SplatFormat* splatFormatOfEnding(const std::string& path) {
+const SplatFormat* splatFormatOfExtension(const std::string& path) {
   const std::string name = lowerName(path);
   const SplatFormat* best = nullptr;
   size_t longest = 0;
   for (const SplatFormat& format : splatFormats()) {
-    const size_t length = endingLength(format, name);
+    const size_t length = extensionLength(format, name);
     if (length > longest) best = &format;
     longest = std::max(longest, length);
   }
@@ -175,7 +175,7 @@ const SplatFormat* splatFormatOfContent(const std::string& path) {
     if (format.read != nullptr && format.probe != nullptr && format.probe(start)) return &format;
   }
   // Some formats have no first bytes of their own.
-  const SplatFormat* named = start.is_folder ? nullptr : splatFormatOfEnding(path);
+  const SplatFormat* named = start.is_folder ? nullptr : splatFormatOfExtension(path);
   return named != nullptr && named->read != nullptr && named->probe == nullptr ? named : nullptr;
 }
 

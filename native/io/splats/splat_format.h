@@ -45,14 +45,14 @@ struct SplatFormat {
   const char* name;   ///< one word, for options and messages: "ply"
   const char* title;  ///< for people: "3DGS PLY"
   /// What file names end with, lower case, separated by blanks, the usual one first.
-  const char* endings;
+  const char* extensions;
   int max_sh_degree;  ///< higher harmonics are left out when written
   /// The frame that positions are written in: a cloud of another known frame is converted first.
   /// One of an unknown frame counts as kConventionalFrame.
   Frame frame;
   SplatFormatKeeps keeps = {};
   /// True where the first bytes (or a folder's name) say that a file is of this format; null where
-  /// nothing but the ending tells.
+  /// nothing but the extension tells.
   bool (*probe)(const SplatFileStart& start) = nullptr;
   SplatCloud (*read)(const std::string& path, Progress* progress) = nullptr;  ///< null: not read
   /// In: a cloud in its frame and colour space, of its degree (of any, where takes_any_degree) and
@@ -75,11 +75,11 @@ const std::vector<SplatFormat>& splatFormats();
 uint64_t estimatedFileBytes(const SplatFormat& format, uint64_t count, int degree,
                             const SplatWriteOptions& options);
 
-/// The format that a file's content has, or its ending where the format has no first bytes of its
-/// own; null for files of no format that can be read. Errors: kIo.
+/// The format that a file's content has, or its extension where the format has no first bytes of
+/// its own; null for files of no format that can be read. Errors: kIo.
 const SplatFormat* splatFormatOfContent(const std::string& path);
 
-/// The format whose ending the path has (the longest that fits), or null.
-const SplatFormat* splatFormatOfEnding(const std::string& path);
+/// The format whose extension the path has (the longest that fits), or null.
+const SplatFormat* splatFormatOfExtension(const std::string& path);
 
 }  // namespace stipple

@@ -247,9 +247,9 @@ std::optional<std::string> findColmapModel(const std::string& path) {
 std::vector<CameraView> readColmapCameras(const std::string& folder, Distorted distorted) {
   std::error_code ignored;
   const bool binary = fs::exists(fs::path(folder) / "images.bin", ignored);
-  const std::string ending = binary ? ".bin" : ".txt";
-  const std::string cameras_path = (fs::path(folder) / ("cameras" + ending)).string();
-  const std::string images_path = (fs::path(folder) / ("images" + ending)).string();
+  const std::string extension = binary ? ".bin" : ".txt";
+  const std::string cameras_path = (fs::path(folder) / ("cameras" + extension)).string();
+  const std::string images_path = (fs::path(folder) / ("images" + extension)).string();
   const ViewMaker maker(cameras_path, images_path,
                         binary ? readBinaryCameras(cameras_path) : readTextCameras(cameras_path),
                         distorted);

@@ -19,13 +19,13 @@ bool isFile(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-/// The file of this name, which may lack its ending.
+/// The file of this name, which may lack its extension.
 std::optional<std::string> pictureFile(const fs::path& path) {
   if (isFile(path)) return path.string();
-  for (const char* ending :
+  for (const char* extension :
        {".png", ".jpg", ".jpeg", ".JPG", ".PNG", ".JPEG", ".exr", ".tif", ".tiff", ".webp"}) {
-    const std::string with_ending = path.string() + ending;
-    if (isFile(with_ending)) return with_ending;
+    const std::string with_extension = path.string() + extension;
+    if (isFile(with_extension)) return with_extension;
   }
   return std::nullopt;
 }
@@ -40,9 +40,9 @@ class MaskFolder {
 
   std::string of(const fs::path& name) const {
     if (!exists_) return {};
-    fs::path ending = name;
-    ending.replace_extension(".png");
-    for (const fs::path& candidate : {fs::path(name.string() + ".png"), name, ending}) {
+    fs::path as_png = name;
+    as_png.replace_extension(".png");
+    for (const fs::path& candidate : {fs::path(name.string() + ".png"), name, as_png}) {
       if (isFile(folder_ / candidate)) return (folder_ / candidate).string();
     }
     return {};

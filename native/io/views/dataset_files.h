@@ -25,9 +25,9 @@ struct DatasetFiles {
 constexpr size_t kFewestViewsLeft = 3;
 
 /// Finds the picture of every camera of a data set, and its mask: where the cameras' file names
-/// one, or in a folder `masks` beside the pictures' folder, as NAME, NAME.png or with the ending
-/// .png. Pictures of transforms.json may be named without their ending. Those of COLMAP are looked
-/// for in `images` beside the model's folder and around it, and in these folders themselves.
+/// one, or in a folder `masks` beside the pictures' folder, as NAME, NAME.png or with the extension
+/// .png. Pictures of transforms.json may be named without their extension. Those of COLMAP are
+/// looked for in `images` beside the model's folder and around it, and in these folders themselves.
 /// Views whose image is missing are left out, as who culls photographs deletes them and leaves the
 /// list of cameras as it was. Errors: those of readCameraFile(); kIo where a mask or a depth image
 /// that the file names is missing, or where missing images leave fewer than kFewestViewsLeft views,

@@ -94,6 +94,23 @@ double middleExtent(const std::vector<WeightedPoint>& points) {
   return extent.norm();
 }
 
+/// The box that holds all but `outside` of the points on either side of each axis of a frame.
+void middleBox(const std::vector<WeightedPoint>& points, const Mat4d& to_frame, double outside,
+               Vec3d& lowest, Vec3d& highest) {
+  std::vector<double> values(points.size());
+  const size_t left_out =
+      std::min(static_cast<size_t>(outside * static_cast<double>(points.size())),
+               (points.size() - 1) / 2);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < points.size(); ++i) {
+      values[i] = (linearPart(to_frame) * points[i].at + translationPart(to_frame))[axis];
+    }
+    std::sort(values.begin(), values.end());
+    lowest[axis] = values[left_out];
+    highest[axis] = values[points.size() - 1 - left_out];
+  }
+}
+
 /// Weight in the plane less weight below it.
 double score(const Plane& plane, double tolerance, const std::vector<WeightedPoint>& points,
              size_t step) {
@@ -219,6 +236,7 @@ GroundPlane groundPlane(const SplatCloud& cloud, const Mat4d& cloud_to_world,
     const double distance = result.plane.normal.dot(point.at) - result.plane.offset;
     if (std::abs(distance) <= result.tolerance) ++result.inlier_count;
   }
+  middleBox(points, levelling(result.plane), 0.01, result.extent_min, result.extent_max);
   return result;
 }
 

@@ -28,6 +28,10 @@ struct GroundPlane {
   uint64_t considered_count = 0;  ///< splats looked at: at most 50,000, solid ones where possible
   uint64_t inlier_count = 0;      ///< of those, in the plane
   double tolerance = 0;           ///< metres
+  /// The box of the middle 98 % of the splats looked at, along each axis of the frame that
+  /// levelling() leads to, metres.
+  Vec3d extent_min = Vec3d::Zero();
+  Vec3d extent_max = Vec3d::Zero();
 };
 
 /// The plane that most of the surface lies in while little lies below it: the floor rather than a

@@ -327,7 +327,7 @@ void requireOrder(const PlacedScene& scene, const RayOptions& rays) {
        "global ordering only the order of their centres is allowed");
 }
 
-RayOptions rayYardstick() {
+RayOptions unlimitedRays() {
   RayOptions rays;
   rays.limits.least_alpha = 1e-9;
   rays.limits.most_alpha = 1;

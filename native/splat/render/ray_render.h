@@ -39,9 +39,9 @@ struct RayOptions {
 
 constexpr uint32_t kRayBlockSide = 64;
 
-/// The yardstick: nothing is left out that could show, no alpha is limited and no pixel ends early.
+/// Without limits: nothing is left out that could show, no alpha is limited, no pixel ends early.
 /// What is fainter than 1e-9 is skipped.
-RayOptions rayYardstick();
+RayOptions unlimitedRays();
 
 struct PlacedScene;
 /// Errors: kUnsupported for objects that are drawn apart, where splats come by response: those of

@@ -416,7 +416,7 @@ TEST_F(ProxyMesh, IsWrittenAndReadBack) {
   buffers.positions = one;
   buffers.vertex_capacity = 1;
   EXPECT_EQ(stipple_mesh_read(mesh, &buffers), STIPPLE_ERROR_BUFFER_TOO_SMALL);
-  for (const char* ending : {".glb", ".ply"}) std::filesystem::remove(stem + ending);
+  for (const char* extension : {".glb", ".ply"}) std::filesystem::remove(stem + extension);
   stipple_mesh_free(back);
   stipple_mesh_free(mesh);
   stipple_volume_free(volume);

@@ -21,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 
 struct Sample {
-  std::string name;  ///< with the format's ending
+  std::string name;  ///< with the format's extension
   std::string bytes;
   bool is_folder = false;  ///< the file names others, which are there
 };
@@ -35,10 +35,10 @@ class BadSplatFiles : public ScratchFolder {
       const SplatCloud cloud = randomCloud(6, degree, 31);
       for (const SplatFormat& format : splatFormats()) {
         if (format.write == nullptr) continue;
-        const std::string endings = format.endings;
-        const std::string ending = endings.substr(0, endings.find(' '));
-        if (ending[0] != '.') continue;
-        add(made, cloud, {}, "degree" + std::to_string(degree) + ending);
+        const std::string extensions = format.extensions;
+        const std::string extension = extensions.substr(0, extensions.find(' '));
+        if (extension[0] != '.') continue;
+        add(made, cloud, {}, "degree" + std::to_string(degree) + extension);
       }
       add(made, cloud, {.version = 3}, "old" + std::to_string(degree) + ".spz");
       add(made, cloud, {.ascii = true}, "text" + std::to_string(degree) + ".ply");
@@ -173,11 +173,11 @@ TEST_F(BadSplatFiles, SurvivesAnythingInThePlaceOfAnyValueOfAScene) {
 TEST_F(BadSplatFiles, LeavesTheOldFileWhereWritingFails) {
   for (const SplatFormat& format : splatFormats()) {
     if (format.write == nullptr) continue;
-    const std::string endings = format.endings;
-    const std::string ending = endings.substr(0, endings.find(' '));
-    if (ending[0] != '.') continue;
-    SCOPED_TRACE(ending);
-    const std::string file = store("old" + ending, "old");
+    const std::string extensions = format.extensions;
+    const std::string extension = extensions.substr(0, extensions.find(' '));
+    if (extension[0] != '.') continue;
+    SCOPED_TRACE(extension);
+    const std::string file = store("old" + extension, "old");
     const size_t before = fileCount();
     SplatCloud bad = randomCloud(5, 0, 33);
     bad.positions[3] = std::nanf("");

@@ -300,7 +300,7 @@ TEST_F(GltfSplats, FallBackColoursAreLinear) {
 TEST_F(GltfSplats, IsToldFromMeshesByContent) {
   GlbBuilder file;
   const std::string bytes = file.glb(scene(twoSplats(file).text()));
-  EXPECT_EQ(readSplatFile(store("no_ending", bytes)).size(), 2u);
+  EXPECT_EQ(readSplatFile(store("no_extension", bytes)).size(), 2u);
   expectError(ErrorCode::kFormat, {"a.glb", "no triangles"},
               [&] { readMeshFile(store("a.glb", bytes)); });
   GlbBuilder mesh;

@@ -81,9 +81,9 @@ TEST_F(SplatWriters, PassOverHarmonicsThatTheFormatDoesNotHold) {
 uint64_t bytesWritten(const SplatFormat& format, const SplatCloud& cloud,
                       const SplatWriteOptions& options, const std::string& folder) {
   std::filesystem::create_directory(folder);
-  const std::string endings = format.endings;
-  const std::string ending = endings.substr(0, endings.find(' '));
-  writeSplatFile(cloud, folder + (ending[0] == '.' ? "/a" : "/") + ending, options);
+  const std::string extensions = format.extensions;
+  const std::string extension = extensions.substr(0, extensions.find(' '));
+  writeSplatFile(cloud, folder + (extension[0] == '.' ? "/a" : "/") + extension, options);
   uint64_t bytes = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     if (entry.is_regular_file()) bytes += entry.file_size();
@@ -147,9 +147,9 @@ TEST_F(SplatWriters, KeepWhatTheirFormatsPromise) {
   const SplatWriteOptions turned = {.frame = Frame::kRFU};
   for (const SplatFormat& format : splatFormats()) {
     if (format.write == nullptr) continue;
-    const std::string endings = format.endings;
-    const std::string ending = endings.substr(0, endings.find(' '));
-    const std::string file = path(((ending[0] == '.' ? "a" : "") + ending).c_str());
+    const std::string extensions = format.extensions;
+    const std::string extension = extensions.substr(0, extensions.find(' '));
+    const std::string file = path(((extension[0] == '.' ? "a" : "") + extension).c_str());
     writeSplatFile(cloud, file, turned);
     const SplatCloud back = readSplatFile(file);
     EXPECT_EQ(back.frame == Frame::kRFU, format.keeps.frame) << format.name;

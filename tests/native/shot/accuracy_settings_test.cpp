@@ -21,7 +21,7 @@ TEST(AccuracySettings, EveryLevelIsValidAndNamedByItselfAlone) {
   EXPECT_LT(accuracyOf(AccuracyLevel::kDraft).budget_share,
             accuracyOf(AccuracyLevel::kPreview).budget_share);
   EXPECT_EQ(renderAccuracy(accuracyOf(AccuracyLevel::kReference)).limits.least_alpha,
-            rayYardstick().limits.least_alpha);
+            unlimitedRays().limits.least_alpha);
 }
 
 TEST(AccuracySettings, ANameTellsTheKnobsThatDifferFromTheLevel) {

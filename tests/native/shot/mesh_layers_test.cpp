@@ -215,6 +215,25 @@ TEST(MeshLayers, AWorldOfManyColoursIsFilledInBehindCatchers) {
   EXPECT_GT(filled, passes.count() / 8);
 }
 
+TEST(MeshLayers, ShadowsOfAnotherPictureLeaveMeshesAsTheyAre) {
+  const std::vector<float> combined = {0.25f, 0.25f, 0.25f, 0.5f, 0, 0, 0, 0, 0, 0, 0, 0};
+  const std::vector<float> shadow = {0.5f, 0.25f, 0.0f, 0.5f, 0.5f, 0.5f, 2.0f, 2.0f, 2.0f};
+  const std::vector<float> world = {0.25f, 0.25f, 0.25f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f};
+  MeshLayers layers(3, 1, combined, std::vector<float>{2.0f, kEmptyDepth, kEmptyDepth}, {});
+  layers.takeWorld(world, std::nullopt);
+  layers.takeShadow(shadow);
+  EXPECT_EQ(layers.light(), shadow);
+  EXPECT_EQ(layers.colour(), combined) << "the picture had no catchers";
+  std::vector<float> colour = combined, depth(3, kEmptyDepth);
+  layers.compose(colour, depth, std::vector<float>{0.5f, 1.0f, 1.0f});
+  // The world is as it shows, times the mean of the factors, which lets no more pass than there is.
+  EXPECT_EQ(colour, (std::vector<float>{0.3125f, 0.3125f, 0.3125f, 1.0f, 0.25f, 0.25f, 0.25f, 1.0f,
+                                        0.5f, 0.5f, 0.5f, 1.0f}));
+  EXPECT_THROW(layers.takeShadow(shadow), Error) << "they are taken once";
+  MeshLayers other(3, 1, combined, std::vector<float>(3, kEmptyDepth), {});
+  EXPECT_THROW(other.takeShadow(combined), Error);
+}
+
 TEST(MeshLayers, LightIsSharedAsTheSplatsBeforeCatchersShowInAll) {
   const std::vector<float> shadow = {0.5f, 0.5f, 0.5f};
   MeshLayers layers(1, 1, std::vector<float>{0, 0, 0, 0}, std::vector<float>{kEmptyDepth}, shadow);

@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <future>
 
 #include "base/error.h"
 #include "math/colour.h"
+#include "math/empty_depth.h"
 #include "splat/random_scene.h"
 
 namespace stipple {
@@ -48,7 +51,7 @@ std::vector<float> colourOf(Renderer& renderer, const Instances& instances,
   ShotPasses passes;
   passes.colour = colour.data();
   ShotSettings asked = settings;
-  askForPasses(passes, asked.options);
+  askForPasses(passes, asked);
   Progress progress;
   renderer.render(instances, view(), asked, passes, progress);
   return colour;
@@ -132,7 +135,8 @@ TEST(Renderer, TheFactoryDrawsWhatIsNotADefinition) {
     settings.sampling.aperture.radius = is_blurred ? 0.1 : 0;
     settings.sampling.samples = is_blurred ? 2 : 0;
     for (const ShotMethod method :
-         {ShotMethod::kTiled, ShotMethod::kRays, ShotMethod::kReference, ShotMethod::kYardstick}) {
+         {ShotMethod::kTiled, ShotMethod::kRays, ShotMethod::kReference,
+          ShotMethod::kRaysUnlimited}) {
       settings.method = method;
       const std::vector<float> colour = colourOf(renderer, instances, settings);
       const bool is_plain = std::all_of(colour.begin(), colour.end(), [](float value) {
@@ -147,7 +151,7 @@ TEST(Renderer, TheFactoryDrawsWhatIsNotADefinition) {
   // By rays means the exact order and shape of splats, in double.
   Renderer own(cpuImages());
   ShotSettings asked = settings;
-  askForPasses({}, asked.options);
+  askForPasses({}, asked);
   EXPECT_EQ(colourOf(own, instances, settings),
             renderRays(instances.list, view(), asked.options, {}).colour);
   EXPECT_EQ(renderer.memory(instances, view(), settings).sum(), 7u);
@@ -199,6 +203,132 @@ TEST(Renderer, CountsTheSamplesOfABlurredPictureAlone) {
   EXPECT_EQ(Renderer::sampleCount(instances, view(), settings), 9u);
 }
 
+std::vector<float> everywhere(std::initializer_list<float> pixel) {
+  std::vector<float> values;
+  for (size_t i = 0; i < size_t{kWidth} * kHeight; ++i) {
+    values.insert(values.end(), pixel.begin(), pixel.end());
+  }
+  return values;
+}
+
+TEST(Renderer, AnImageOfOneColourBehindSplatsIsThatBackground) {
+  const Instances instances = placed();
+  Renderer renderer(cpuImages());
+  const std::vector<float> behind = everywhere({0.2f, 0.4f, 3.0f});
+  // A matte leaves a hole in both.
+  const std::vector<float> wall = everywhere({4.0f}), some = everywhere({0.75f});
+  for (const OutputColour output : {OutputColour::kSceneLinear, OutputColour::kComposited}) {
+    for (const bool has_matte : {false, true}) {
+      ShotSettings settings;
+      if (has_matte) settings.options.surface = {kWidth, kHeight, wall.data(), nullptr, some.data()};
+      ShotSettings plain = settings;
+      plain.options.with_background = true;
+      for (size_t c = 0; c < 3; ++c) plain.options.background[c] = static_cast<double>(behind[c]);
+      takeOutput(output, instances, plain);
+      takeOutput(output, instances, settings);
+      const std::vector<float> transparent = colourOf(renderer, instances, settings);
+      settings.background_image = behind.data();
+      const std::vector<float> over = colourOf(renderer, instances, settings);
+      EXPECT_GT(largestDifference(over, transparent), 0.1);
+      // Roundings of single precision around values of 3.
+      EXPECT_LT(largestDifference(over, colourOf(renderer, instances, plain)), 2e-5);
+      settings.options.with_background = true;
+      EXPECT_THROW(validate(settings, view()), Error);
+    }
+  }
+}
+
+TEST(Renderer, AnImageBehindSplatsIsPixelByPixelAndNothingWhereItIsNoNumber) {
+  const Instances instances = placed();
+  Renderer renderer(cpuImages());
+  ShotSettings settings = settingsFor(placed(1, ColourSpace::kLinear), OutputColour::kSceneLinear);
+  const std::vector<float> alone = colourOf(renderer, instances, settings);
+  std::vector<float> behind = everywhere({0, 0, 0});
+  for (size_t i = 0; i < behind.size(); ++i) behind[i] = static_cast<float>(i % 7);
+  behind[3] = std::nanf(""), behind[4] = INFINITY;
+  settings.background_image = behind.data();
+  const std::vector<float> over = colourOf(renderer, instances, settings);
+  for (size_t i = 0; i < alone.size() / 4; ++i) {
+    EXPECT_EQ(over[i * 4 + 3], 1.0f);
+    for (size_t c = 0; c < 3; ++c) {
+      const float light = std::isfinite(behind[i * 3 + c]) ? behind[i * 3 + c] : 0.0f;
+      EXPECT_NEAR(over[i * 4 + c], alone[i * 4 + c] + (1 - alone[i * 4 + 3]) * light, 1e-5f);
+    }
+  }
+}
+
+/// Depths of splats, and what is needed to say what they should be.
+struct Depths {
+  std::vector<float> solid, mean, colour;
+};
+
+Depths depthsOf(const Instances& instances, ShotSettings settings) {
+  Depths made;
+  Renderer renderer(cpuImages());
+  for (const bool is_solid : {false, true}) {
+    std::vector<float> depth(size_t{kWidth} * kHeight), colour(depth.size() * 4);
+    ShotPasses passes;
+    passes.depth = depth.data();
+    passes.colour = colour.data();
+    settings.solid_depth = is_solid;
+    ShotSettings asked = settings;
+    askForPasses(passes, asked);
+    Progress progress;
+    renderer.render(instances, view(), asked, passes, progress);
+    (is_solid ? made.solid : made.mean) = depth;
+    made.colour = colour;
+  }
+  return made;
+}
+
+TEST(Renderer, ASolidDepthIsThereWhereHalfOfAPixelIsCovered) {
+  const Instances instances = placed(30);
+  ShotSettings settings = settingsFor(instances, OutputColour::kSceneLinear);
+  const Depths alone = depthsOf(instances, settings);
+  size_t faint = 0, covered = 0;
+  for (size_t i = 0; i < alone.solid.size(); ++i) {
+    const bool is_solid = alone.colour[i * 4 + 3] >= 0.5f;
+    covered += is_solid;
+    faint += !is_solid && alone.mean[i] < kEmptyDepth;
+    EXPECT_EQ(alone.solid[i], is_solid ? alone.mean[i] : kEmptyDepth);
+  }
+  EXPECT_GT(faint, 50u);
+  EXPECT_GT(covered, 50u);
+  // A background covers everything, and changes no depth.
+  settings.options.with_background = true;
+  EXPECT_EQ(depthsOf(instances, settings).solid, alone.solid);
+}
+
+TEST(Renderer, ASolidDepthIsOfSplatsOrOfTheSurfaceAndOfNothingBetween) {
+  const Instances instances = placed(30);
+  const std::vector<float> far = everywhere({1000.0f});
+  for (const float opacity : {1.0f, 0.7f, 0.3f}) {
+    const std::vector<float> colour = everywhere({0, 0, 0, opacity});
+    ShotSettings settings = settingsFor(instances, OutputColour::kSceneLinear);
+    const Depths alone = depthsOf(instances, settings);
+    settings.options.surface = {kWidth, kHeight, far.data(), colour.data(), nullptr};
+    settings.options.splats_apart = true;
+    const Depths both = depthsOf(instances, settings);
+    size_t splats_show = 0, surface_shows = 0;
+    for (size_t i = 0; i < both.solid.size(); ++i) {
+      const float alpha = alone.colour[i * 4 + 3], own = (1 - alpha) * opacity;
+      if (std::abs(alpha - own) < 1e-4f || std::abs(alpha + own - 0.5f) < 1e-4f) continue;
+      if (alpha == 0.0f || (own > alpha && alpha + own >= 0.5f)) {
+        ++surface_shows;
+        EXPECT_EQ(both.solid[i], 1000.0f);
+      } else if (alpha + own < 0.5f) {
+        EXPECT_EQ(both.solid[i], kEmptyDepth);
+      } else {
+        ++splats_show;
+        // The surface's part of the mean is taken off again: roundings of a thousand metres.
+        EXPECT_NEAR(both.solid[i], alone.mean[i], 2e-3f);
+      }
+    }
+    EXPECT_GT(splats_show, 50u);
+    EXPECT_GT(surface_shows, 50u);
+  }
+}
+
 TEST(ShotSettings, DerivativesAreThoseOfOneSharpTiledPictureOfSplatsAlone) {
   const Instances instances = placed(5);
   const auto refuses = [&](auto change) {
@@ -212,6 +342,9 @@ TEST(ShotSettings, DerivativesAreThoseOfOneSharpTiledPictureOfSplatsAlone) {
   refuses([](ShotSettings& s) { s.linearise = true; });
   refuses([](ShotSettings& s) { s.sampling.samples = 4; });
   refuses([](ShotSettings& s) { s.options.object_order = ObjectOrder::kApart; });
+  refuses([](ShotSettings& s) { s.solid_depth = true; });
+  const float image = 0;
+  refuses([&](ShotSettings& s) { s.background_image = &image; });
   Instances held_out = instances;
   held_out.list[0].holdout = true;
   EXPECT_THROW(requireDerivative(settingsFor(instances, OutputColour::kComposited), held_out),

@@ -39,7 +39,7 @@ void drawTiled(std::span<const SplatInstance> instances, const Camera& camera,
 
 void drawRays(std::span<const SplatInstance> instances, const Camera& camera,
               const RenderOptions& options, RenderResult& result, Progress* progress) {
-  RayOptions rays = rayYardstick();
+  RayOptions rays = unlimitedRays();
   result = renderRays(instances, camera, options, rays, progress);
 }
 
@@ -179,7 +179,7 @@ TEST(SampledRender, APanoramaIsOutOfFocusAlikeInEveryDirection) {
     camera.cx = 20.5 - 300 * longitude;
     camera.cy = 20.5;
     const Moments m = momentsOf(sampled(instance, camera, sampling, drawRays), 20.5, 20.5);
-    // The yardstick keeps the tails: 0.3 px^2, the splat's 0.09, two halves of a pixel.
+    // Unlimited rays keep the tails: 0.3 px^2, the splat's 0.09, two halves of a pixel.
     EXPECT_NEAR(m.xx, radius * radius / 4 + 0.5, 0.3) << longitude;
     EXPECT_NEAR(m.yy, radius * radius / 4 + 0.5, 0.3) << longitude;
     EXPECT_NEAR(m.x, 0, 0.05) << longitude;

@@ -27,9 +27,10 @@ std::atomic<uint64_t> calls{0};
 /// Room before each block for its size, keeping malloc's alignment.
 constexpr size_t kHeader = 16;
 
-[[maybe_unused]] void* allocate(size_t size) {
+/// Null where there is no memory.
+[[maybe_unused]] void* allocateIfPossible(size_t size) {
   auto* block = static_cast<std::byte*>(std::malloc(size + kHeader));
-  if (!block) throw std::bad_alloc();
+  if (!block) return nullptr;
   *reinterpret_cast<uint64_t*>(block) = size;
   calls.fetch_add(1);
   const uint64_t now = held.fetch_add(size) + size;
@@ -37,6 +38,12 @@ constexpr size_t kHeader = 16;
   while (now > seen && !peak.compare_exchange_weak(seen, now)) {
   }
   return block + kHeader;
+}
+
+[[maybe_unused]] void* allocate(size_t size) {
+  void* memory = allocateIfPossible(size);
+  if (!memory) throw std::bad_alloc();
+  return memory;
 }
 
 [[maybe_unused]] void release(void* pointer) {
@@ -54,6 +61,14 @@ void* operator new(size_t size) {
 }
 void* operator new[](size_t size) {
   return allocate(size);
+}
+// std::stable_sort calls these. The usual ones call those above, but the thread sanitizer's do not,
+// and what they give must not be released here.
+void* operator new(size_t size, const std::nothrow_t&) noexcept {
+  return allocateIfPossible(size);
+}
+void* operator new[](size_t size, const std::nothrow_t&) noexcept {
+  return allocateIfPossible(size);
 }
 void operator delete(void* pointer) noexcept {
   release(pointer);

@@ -70,7 +70,7 @@ TEST(RayRender, ARoundSplatFallsWithTheDistanceOfTheRay) {
   cloud.positions = {3, 2, 0.5f};  // camera: x 3, y -0.5, z 2
   const SplatInstance instance = instanceOf(cloud);
   const Vec3d centre(3, -0.5, 2);
-  const RenderResult picture = renderRays({&instance, 1}, camera, everyBuffer(), rayYardstick());
+  const RenderResult picture = renderRays({&instance, 1}, camera, everyBuffer(), unlimitedRays());
   double affine_error = 0;
   const ReferenceResult affine = renderReference({&instance, 1}, camera, everyBuffer());
   for (uint32_t y = 0; y < 65; ++y) {
@@ -98,7 +98,7 @@ TEST(RayRender, TilesLeaveNothingOut) {
   for (const CameraModel model : {CameraModel::kPerspective, CameraModel::kOrthographic}) {
     Camera camera = frontCamera(97, 83, 60, 1.2);
     camera.model = model;
-    for (const RayOptions& rays : {RayOptions{}, rayYardstick()}) {
+    for (const RayOptions& rays : {RayOptions{}, unlimitedRays()}) {
       const RenderResult picture =
           renderRays({&instance, 1}, camera, everyBuffer(LowPass::kClassic), rays);
       const std::vector<double> all =
@@ -184,13 +184,13 @@ TEST(RayRender, WhitensWhatAnyMatrixMakesOfASplat) {
   }
 }
 
-TEST(RayRender, TheYardstickHasNoLimits) {
+TEST(RayRender, UnlimitedRaysHaveNoLimits) {
   SplatCloud cloud = oneSplat(0.5f, 1.0f);
   const SplatInstance instance = instanceOf(cloud);
   const Camera camera = frontCamera(9, 9, 20, 3);
   const size_t centre = 4 * 9 + 4;
-  EXPECT_EQ(renderRays({&instance, 1}, camera, everyBuffer(), rayYardstick()).transmittance[centre],
-            0);
+  const RenderResult one = renderRays({&instance, 1}, camera, everyBuffer(), unlimitedRays());
+  EXPECT_EQ(one.transmittance[centre], 0);
   EXPECT_NEAR(value(renderRays({&instance, 1}, camera, everyBuffer(), {}).transmittance, centre),
               0.01, 1e-8);
   // A thousand layers of alpha 0.5 hide all but 2^-1000; ended early, 1e-4 at most is left.
@@ -202,8 +202,8 @@ TEST(RayRender, TheYardstickHasNoLimits) {
     cloud.opacities[i] = 0.5f;
     std::fill_n(&cloud.sh[i * 3], 3, 1.0f);
   }
-  const RenderResult yardstick = renderRays({&instance, 1}, camera, everyBuffer(), rayYardstick());
-  EXPECT_EQ(yardstick.counts[centre], 1000u);
+  const RenderResult unlimited = renderRays({&instance, 1}, camera, everyBuffer(), unlimitedRays());
+  EXPECT_EQ(unlimited.counts[centre], 1000u);
   EXPECT_LT(renderRays({&instance, 1}, camera, everyBuffer(), {}).counts[centre], 20u);
 }
 

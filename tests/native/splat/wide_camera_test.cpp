@@ -83,7 +83,7 @@ TEST(WideCamera, ARoundSplatFallsWithTheAngleWhereverItIs) {
       const Vec3d centre = place.cast<float>().cast<double>();
       const SplatInstance instance = instanceOf(cloud);
       const RenderResult picture =
-          renderRays({&instance, 1}, camera, everyBuffer(), rayYardstick());
+          renderRays({&instance, 1}, camera, everyBuffer(), unlimitedRays());
       double most = 0;
       for (uint32_t y = 0; y < camera.height; ++y) {
         for (uint32_t x = 0; x < camera.width; ++x) {
@@ -99,7 +99,7 @@ TEST(WideCamera, ARoundSplatFallsWithTheAngleWhereverItIs) {
           // float32 of the result; the scale is a float too.
           ASSERT_NEAR(value(picture.colour, i * 4 + 3), alpha < 1e-9 ? 0 : alpha, 3e-7)
               << "model " << static_cast<int>(model) << " at " << x << ", " << y;
-          // The yardstick leaves out what is fainter than 1e-9; alpha above has rounded here.
+          // Unlimited rays leave out what is fainter than 1e-9; alpha above has rounded here.
           if (alpha > 1e-8) {
             ASSERT_NEAR(value(picture.depth, i), along, 1e-6);
           }
@@ -192,7 +192,7 @@ TEST(WideCamera, EveryFaceOfACubeAgreesWithAPerspectivePicture) {
   for (float& value : cloud.positions) value *= 3;
   const SplatInstance instance = instanceOf(cloud);
   RayOptions rays;  // by response: the order of centres is by z there and by distance here
-  rays.limits = rayYardstick().limits;
+  rays.limits = unlimitedRays().limits;
   constexpr uint32_t kSide = 6;
   for (int face = 0; face < 6; ++face) {
     Mat3d turn;

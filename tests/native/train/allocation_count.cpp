@@ -13,18 +13,25 @@ std::atomic<size_t> count{0};
 std::atomic<size_t> held_bytes{0};
 std::atomic<size_t> most_bytes{0};
 
-void* counted(size_t bytes, size_t alignment) {
+/// Null where there is no memory.
+void* countedIfPossible(size_t bytes, size_t alignment) {
   ++count;
   // aligned_alloc wants a multiple of the alignment, malloc's own is enough for small ones.
   void* memory =
       alignment <= alignof(std::max_align_t)
           ? std::malloc(bytes ? bytes : 1)
           : std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
-  if (!memory) throw std::bad_alloc();
+  if (!memory) return nullptr;
   const size_t held = held_bytes += malloc_usable_size(memory);
   size_t most = most_bytes;
   while (held > most && !most_bytes.compare_exchange_weak(most, held)) {
   }
+  return memory;
+}
+
+void* counted(size_t bytes, size_t alignment) {
+  void* memory = countedIfPossible(bytes, alignment);
+  if (!memory) throw std::bad_alloc();
   return memory;
 }
 
@@ -55,6 +62,10 @@ void* operator new(size_t bytes) {
 }
 void* operator new(size_t bytes, std::align_val_t alignment) {
   return counted(bytes, static_cast<size_t>(alignment));
+}
+// std::stable_sort calls it. The usual one calls the first above, but those of sanitizers do not.
+void* operator new(size_t bytes, const std::nothrow_t&) noexcept {
+  return countedIfPossible(bytes, 1);
 }
 void operator delete(void* memory) noexcept {
   release(memory);
