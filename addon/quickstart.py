@@ -46,7 +46,7 @@ def open_scene():
         bpy.ops.wm.open_mainfile(filepath=str(OUT / 'suzanne.blend'))
     scene = bpy.context.scene
     scene.render.resolution_percentage = 200
-    base_colours.prepare_picture(scene)
+    base_colours.prepare_image(scene)
     return scene
 
 
@@ -100,7 +100,7 @@ def main():
         decode = timed(setattr, splats.data.stipple, 'anchors', budget)
         picture = OUT / f'splats_{budget}.png'
         say(f'{picture.name}: F12 with engine Stipple')
-        render = timed(base_colours.render_picture, scene, picture)
+        render = timed(base_colours.render_image, scene, picture)
         gaussians = budget * splats.data.stipple.gaussians_per_anchor
         rows.append((budget, gaussians, decode, render, psnr(picture)))
 
@@ -111,7 +111,7 @@ def main():
     splats.hide_render = True
     base_colours.prepare_cycles(scene, VOLUME_SAMPLES)
     say(f'volume.png: that volume ({seconds:.2f} s), by Cycles')
-    render = timed(base_colours.render_picture, scene, OUT / 'volume.png')
+    render = timed(base_colours.render_image, scene, OUT / 'volume.png')
     with quietly():
         bpy.ops.wm.save_as_mainfile(filepath=str(OUT / 'suzanne_splats.blend'))
 

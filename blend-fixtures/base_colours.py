@@ -1,6 +1,6 @@
-"""Inside Blender: pictures of a scene's base colours, rendered by Cycles.
+"""Inside Blender: images of a scene's base colours, rendered by Cycles.
 
-Splats of a mesh carry its base colours without any light, so this is the picture that they are compared with: every
+Splats of a mesh carry its base colours without any light, so this is the image that they are compared with: every
 Principled material emits its base colour, and nothing else lights the scene.
 """
 import bpy
@@ -27,8 +27,8 @@ def emit_base_colours():
         links.new(emission.outputs['Emission'], output.inputs['Surface'])
 
 
-def prepare_picture(scene):
-    """The settings that every compared picture shares: colours as they are, transparent film, 8-bit PNG."""
+def prepare_image(scene):
+    """The settings that every compared image shares: colours as they are, transparent film, 8-bit PNG."""
     scene.view_settings.view_transform = 'Standard'
     scene.view_settings.look = 'None'
     scene.view_settings.exposure = 0.0
@@ -52,7 +52,7 @@ def prepare_cycles(scene, samples=SAMPLES):
     scene.cycles.seed = 0
 
 
-def render_picture(scene, path):
+def render_image(scene, path):
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True, scene=scene.name)
 
@@ -60,10 +60,10 @@ def render_picture(scene, path):
 def render_base_colours(scene, path):
     """The scene's base colours by Cycles, as a PNG. The materials of the open file emit afterwards."""
     emit_base_colours()
-    prepare_picture(scene)
+    prepare_image(scene)
     prepare_cycles(scene)
     scene.cycles.max_bounces = 0
-    render_picture(scene, path)
+    render_image(scene, path)
 
 
 def use_nodes(material):

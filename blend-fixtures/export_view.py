@@ -26,7 +26,7 @@ def make_splats(anchors):
 
 
 def write_camera(scene, path, width, height):
-    from stipple.scene import cameras
+    from stipple.scene.view import cameras
     camera = cameras.from_parts(scene.camera.data, scene.camera.matrix_world, width, height)
     path.write_text(json.dumps({
         'w': width, 'h': height, 'fl_x': camera.fx, 'fl_y': camera.fy, 'cx': camera.cx, 'cy': camera.cy,

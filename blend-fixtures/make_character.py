@@ -57,7 +57,7 @@ def make():
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
     scene.render.resolution_percentage = 100
-    base_colours.prepare_picture(scene)
+    base_colours.prepare_image(scene)
     base_colours.prepare_cycles(scene)
     scene.cycles.max_bounces = 2
 

@@ -1,4 +1,4 @@
-"""Makes the scenes of this folder, and Cycles' pictures of their base colours in reference/. Blender 3.4 or newer:
+"""Makes the scenes of this folder, and Cycles' images of their base colours in reference/. Blender 3.4 or newer:
 
     blender -b --factory-startup --python-exit-code 1 --python blend-fixtures/make_fixtures.py
 
@@ -24,7 +24,7 @@ def new_scene():
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
     scene.render.resolution_percentage = 100
-    base_colours.prepare_picture(scene)
+    base_colours.prepare_image(scene)
     base_colours.prepare_cycles(scene)
     return scene
 
@@ -179,7 +179,7 @@ def make_instances():
         if collection != source:
             collection.objects.unlink(tower)
 
-    # Six around one in the middle: turned, stretched, leaning, and one mirrored.
+    # Six around one in the middle: rotated, stretched, leaning, and one mirrored.
     for index in range(7):
         instance = bpy.data.objects.new(f'Instance {index}', None)
         instance.instance_type, instance.instance_collection = 'COLLECTION', source

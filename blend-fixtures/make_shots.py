@@ -25,7 +25,7 @@ def add_on():
 
 
 def disc_rotations(normals):
-    """w,x,y,z that turn z to each normal; normals of -z are never reached exactly."""
+    """w,x,y,z that rotate z to each normal; normals of -z are never reached exactly."""
     w = 1.0 + normals[:, 2]
     quaternions = np.stack([w, -normals[:, 1], normals[:, 0], np.zeros_like(w)], axis=1)
     return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
@@ -57,8 +57,8 @@ def ring(count, colour, opacity):
 def tree(count):
     """A trunk and a crown, standing on the origin, 1 metre high."""
     trunk = count // 5
-    turn, up = evenly(trunk, 0.6180339887498949), (np.arange(trunk) + 0.5) / trunk
-    bark = np.stack([np.cos(turn), np.sin(turn), np.zeros(trunk)], axis=1)
+    around, up = evenly(trunk, 0.6180339887498949), (np.arange(trunk) + 0.5) / trunk
+    bark = np.stack([np.cos(around), np.sin(around), np.zeros(trunk)], axis=1)
     rest = count - trunk
     z, angle = 1 - 2 * (np.arange(rest) + 0.5) / rest, evenly(rest, 0.6180339887498949)
     leaf = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], axis=1)
@@ -81,7 +81,7 @@ def new_scene(location, target, lens=50.0):
     bpy.ops.preferences.addon_enable(module=add_on().__name__)
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = WIDTH, HEIGHT, 100
-    base_colours.prepare_picture(scene)
+    base_colours.prepare_image(scene)
     scene.render.engine = 'STIPPLE'
     camera = bpy.data.objects.new('Camera', bpy.data.cameras.new('Camera'))
     camera.data.lens = lens

@@ -5,7 +5,7 @@
 
 Writes cycles.png (Cycles + Stipple) and matte.png (Stipple, where the character is a hole); without_shadow.png and
 before_column.png, in which the shadow or the order of depth is another: they have to fail where the first passes. To
-renew reference/character_*.png after a change that is meant to change pictures, look at them and copy the first two.
+renew reference/character_*.png after a change that is meant to change images, look at them and copy the first two.
 """
 import pathlib
 import sys
@@ -24,16 +24,16 @@ def main():
     scene = bpy.context.scene
     objects = bpy.data.objects
     scene.render.engine = 'STIPPLE_CYCLES'
-    base_colours.render_picture(scene, out / 'cycles.png')
+    base_colours.render_image(scene, out / 'cycles.png')
     objects['Catcher'].hide_render = True
-    base_colours.render_picture(scene, out / 'without_shadow.png')
+    base_colours.render_image(scene, out / 'without_shadow.png')
     objects['Catcher'].hide_render = False
     objects['Character'].location.y = -2.0
-    base_colours.render_picture(scene, out / 'before_column.png')
+    base_colours.render_image(scene, out / 'before_column.png')
     objects['Character'].location.y = 0.0
     scene.render.engine = 'STIPPLE'
     scene.render.film_transparent = True
-    base_colours.render_picture(scene, out / 'matte.png')
+    base_colours.render_image(scene, out / 'matte.png')
 
 
 main()

@@ -5,8 +5,8 @@
 
 The rings of crossing.blend under the engine Stipple, and in a scene of Cycles a bar through both of them. passes.png:
 the nearer of both at each pixel by the depth passes; the ring of object index 2 is as bright as its normals are upright.
-Pictures that must not pass: passes_over.png, the splats over the bar, and passes_plain.png, without normals and
-indices. To renew the stored picture after a change that is meant to change it, look at it and copy passes.png to
+Images that must not pass: passes_over.png, the splats over the bar, and passes_plain.png, without normals and
+indices. To renew the stored image after a change that is meant to change it, look at it and copy passes.png to
 reference/.
 """
 import pathlib
@@ -28,7 +28,7 @@ def meshes_scene(splats):
     scene.camera = splats.camera
     scene.collection.objects.link(splats.camera)
     scene.render.resolution_x, scene.render.resolution_y = splats.render.resolution_x, splats.render.resolution_y
-    base_colours.prepare_picture(scene)
+    base_colours.prepare_image(scene)
     base_colours.prepare_cycles(scene, samples=16)
     mesh = bpy.data.meshes.new('Bar')
     x, y = 1.9, 0.12
@@ -152,7 +152,7 @@ def lit(nodes, layer):
 def main(out):
     bpy.ops.wm.open_mainfile(filepath=str(HERE / 'crossing.blend'))
     splats = bpy.context.scene
-    base_colours.prepare_picture(splats)
+    base_colours.prepare_image(splats)
     splats.render.engine = 'STIPPLE'
     second = bpy.data.objects['Second']
     bpy.data.objects['First'].pass_index, second.pass_index = 1, 2
@@ -168,7 +168,7 @@ def main(out):
         else:
             shown = nodes.nearer(image, near.outputs['Depth'], far.outputs['Image'], far.outputs['Depth'])
         nodes.show(shown)
-        base_colours.render_picture(splats, out / f'{name}.png')
+        base_colours.render_image(splats, out / f'{name}.png')
 
 
 if __name__ == '__main__':

@@ -5,7 +5,7 @@ reference/series_00NN.png hold.
 
 A ring of 3,000 splats that turns inside out over ten frames. It plays on the left as the files say; on the right
 another object of the same files plays to and fro at half speed with a third of the splats. To renew the stored
-pictures after a change that is meant to change pictures, look at OUT_FOLDER/series_00NN.png and copy them.
+images after a change that is meant to change images, look at OUT_FOLDER/series_00NN.png and copy them.
 """
 import pathlib
 import sys
@@ -39,7 +39,7 @@ def ring(frame):
     normal = np.stack([np.cos(around) * np.cos(inside), np.sin(around) * np.cos(inside), np.sin(inside)], 1)
     centre = np.stack([np.cos(around), np.sin(around), 0.2 * np.sin(2 * around - phase)], 1)
     positions = centre + tube[:, None] * normal
-    # The shortest turn from z to the normal; a normal of -z is never reached exactly.
+    # The shortest rotation from z to the normal; a normal of -z is never reached exactly.
     rotations = np.stack([1 + normal[:, 2], -normal[:, 1], normal[:, 0], np.zeros(COUNT)], 1)
     rotations /= np.linalg.norm(rotations, axis=1, keepdims=True)
     colour = 0.5 + 0.45 * np.cos(around[:, None] + np.array([0.0, 2.1, 4.2]))
@@ -81,7 +81,7 @@ def main():
     scene.camera = camera
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = WIDTH, HEIGHT, 100
     scene.frame_start, scene.frame_end = 1, FRAMES
-    base_colours.prepare_picture(scene)
+    base_colours.prepare_image(scene)
     scene.render.engine = 'STIPPLE'
     scene.render.filepath = str(out / 'series_####')
     bpy.ops.wm.save_as_mainfile(filepath=str(out / 'series.blend'))

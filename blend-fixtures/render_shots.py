@@ -5,9 +5,9 @@ holds.
         OUT_FOLDER
 
 Writes crossing.png and crowd.png by Stipple, NAME_cycles.png by Cycles + Stipple, budget_000N.png and
-budget_cycles_000N.png. Pictures that must not pass: crossing_first.png and crossing_second.png, one ring each, and
+budget_cycles_000N.png. Images that must not pass: crossing_first.png and crossing_second.png, one ring each, and
 crowd_less.png, with 199 instances. crossing_merged.png, both rings as one object, must be crossing.png. To renew the
-stored pictures after a change that is meant to change pictures, look at them and copy crossing.png, crowd.png and the
+stored images after a change that is meant to change images, look at them and copy crossing.png, crowd.png and the
 six of the budget to reference/.
 """
 import pathlib
@@ -27,7 +27,7 @@ def under_both_engines(scene, out, name):
     base_colours.prepare_cycles(scene, samples=4)  # nothing but splats: no noise
     for suffix, engine in ENGINES.items():
         scene.render.engine = engine
-        base_colours.render_picture(scene, out / f'{name}{suffix}.png')
+        base_colours.render_image(scene, out / f'{name}{suffix}.png')
     scene.render.engine = 'STIPPLE'
 
 
@@ -37,13 +37,13 @@ def render_crossing(out):
     under_both_engines(scene, out, 'crossing')
     for name, other in (('first', 'Second'), ('second', 'First')):
         objects[other].hide_render = True
-        base_colours.render_picture(scene, out / f'crossing_{name}.png')
+        base_colours.render_image(scene, out / f'crossing_{name}.png')
         objects[other].hide_render = False
     for obj in (objects['Second'], objects['First']):
         obj.select_set(True)
         bpy.context.view_layer.objects.active = obj
     assert bpy.ops.stipple.merge_splats() == {'FINISHED'}
-    base_colours.render_picture(scene, out / 'crossing_merged.png')
+    base_colours.render_image(scene, out / 'crossing_merged.png')
 
 
 def render_crowd(out):
@@ -54,7 +54,7 @@ def render_crowd(out):
     ground = bpy.data.objects['Ground'].data
     ground.attributes['size'].data[9].value = 0.0
     ground.update()
-    base_colours.render_picture(scene, out / 'crowd_less.png')
+    base_colours.render_image(scene, out / 'crowd_less.png')
 
 
 def render_budget(out):

@@ -5,7 +5,7 @@
 
 Writes plain.png; moved.png, from a camera that stands aside by MOVED_PX; and reseeded.png, from other anchors. The
 last two have to fail where the first passes. To renew reference/NAME_stipple.png after a change that is meant to
-change pictures, look at plain.png and copy it there.
+change images, look at plain.png and copy it there.
 """
 import pathlib
 import shutil
@@ -52,14 +52,14 @@ def main():
     bpy.ops.wm.open_mainfile(filepath=str(scene_file))
     scene = bpy.context.scene
     splats = make_splats()
-    base_colours.prepare_picture(scene)
+    base_colours.prepare_image(scene)
     scene.render.engine = 'STIPPLE'
-    base_colours.render_picture(scene, out / 'plain.png')
+    base_colours.render_image(scene, out / 'plain.png')
     splats.data.stipple.seed = 1
-    base_colours.render_picture(scene, out / 'reseeded.png')
+    base_colours.render_image(scene, out / 'reseeded.png')
     splats.data.stipple.seed = 0
     move_camera(scene, MOVED_PX)
-    base_colours.render_picture(scene, out / 'moved.png')
+    base_colours.render_image(scene, out / 'moved.png')
 
 
 main()

@@ -13,8 +13,8 @@ bl_info = {
 
 import bpy
 
-from . import cycles_engine, engine, operators, panels, preferences, properties
-from .viewport import drawing
+from . import cycles_engine, engine, operators, panels, preferences, properties, selection_tools
+from .viewport import drawing, selected_points
 from .scene.source import source_travel, sync
 from .scene.view import splat_engines, steady_effects
 
@@ -32,9 +32,13 @@ def register():
     steady_effects.register()
     splat_engines.register()
     drawing.register()
+    selected_points.register()
+    selection_tools.register()
 
 
 def unregister():
+    selection_tools.unregister()
+    selected_points.unregister()
     drawing.unregister()
     splat_engines.unregister()
     steady_effects.unregister()

@@ -19,20 +19,16 @@ from .engine import NativeWork
 from .scene.source import sources, splat_data
 from .scene.view import cameras, effects, facts, layers, mattes
 
-_VISIBILITY = ('visible_camera', 'visible_diffuse', 'visible_glossy', 'visible_transmission',
-               'visible_volume_scatter', 'visible_shadow')
-# From 5.0 on Cycles makes tiles of this size at most whatever the setting says.
-_LARGEST_TILE = 8192
 _SHADOW_PASS = 'Shadow Catcher'
 
 
 @contextlib.contextmanager
-def _without_splats(depsgraph, is_kept=True):
+def _without_splats(depsgraph, without_catchers=False, is_kept=True):
     """Cycles would draw splats as the points that they are stored as: while this lasts, no ray sees them.
 
     The film is transparent meanwhile, so that the world's light comes apart from the meshes', and the image is made
-    in one piece, so that it can be read when Cycles has ended. is_kept: False where the depsgraph may be gone at the
-    end.
+    in one piece, so that it can be read when Cycles has ended. without_catchers: the camera does not see shadow
+    catchers either. is_kept: False where the depsgraph may be gone at the end.
     """
     originals = set()
     for entry in depsgraph.object_instances:
@@ -40,24 +36,21 @@ def _without_splats(depsgraph, is_kept=True):
         obj = entry.instance_object if entry.is_instance else entry.object
         if splat_data.is_splat_object(obj) or _is_cloud_of_nodes(entry):
             originals.add(obj.original)
+    catchers = _shadow_catchers(depsgraph) if without_catchers else ()
 
     def owners():
         # References to evaluated things do not outlive what Cycles does.
         yield depsgraph.scene_eval.render, {'film_transparent': True}
-        yield depsgraph.scene_eval.cycles, {'use_auto_tile': False, 'tile_size': _LARGEST_TILE}
+        yield depsgraph.scene_eval.cycles, {'use_auto_tile': False, 'tile_size': cycles_functions.LARGEST_TILE}
         # Where the artist wants the pass, Cycles shows the catcher as a mesh; it fills the pass all the same.
         yield depsgraph.view_layer_eval.cycles, {'use_pass_shadow_catcher': False}
         for original in originals:
-            yield original.evaluated_get(depsgraph), dict.fromkeys(_VISIBILITY, False)
+            yield original.evaluated_get(depsgraph), dict.fromkeys(cycles_functions.VISIBILITY, False)
+        for original in catchers:
+            yield original.evaluated_get(depsgraph), {'visible_camera': False, 'is_shadow_catcher': False}
 
-    kept = [{name: getattr(owner, name) for name in wanted} for owner, wanted in owners()]
-    try:
-        for owner, wanted in owners():
-            _set(owner, wanted)
+    with cycles_functions.changed(owners, is_kept):
         yield
-    finally:
-        for (owner, _), values in zip(owners() if is_kept else (), kept):
-            _set(owner, values)
 
 
 def _is_cloud_of_nodes(entry):
@@ -70,13 +63,13 @@ def _is_cloud_of_nodes(entry):
     return not getattr(own, 'polygons', ())
 
 
-def _set(owner, values):
-    for name, value in values.items():
-        setattr(owner, name, value)
-
-
 def _has_shadow_catchers():
     return any(obj.is_shadow_catcher for obj in bpy.data.objects)
+
+
+def _shadow_catchers(depsgraph):
+    """The original objects that are marked so. An instance is one too where its instancer is, which is among them."""
+    return {obj.original for obj in depsgraph.objects if obj.is_shadow_catcher}
 
 
 def _make_engine():
@@ -115,6 +108,9 @@ def _make_engine():
                 self._failed = True
                 self._fail(error)
                 return
+            if self._catchers:
+                # Cycles' copy of the last frame, where data are persistent, is one without catchers.
+                cycles_functions.forget_scene(self)
             with _without_splats(depsgraph) if self._instances else contextlib.nullcontext():
                 super().update(data, depsgraph)
 
@@ -124,8 +120,8 @@ def _make_engine():
             if not self._instances:
                 super().render(depsgraph)
                 return
-            # In the background Cycles frees the depsgraph as soon as it has its own copy, unless data are persistent:
-            # nothing of it is touched afterwards.
+            # Cycles frees the depsgraph as soon as it has its own copy, unless data are persistent: nothing of it is
+            # touched after the last image.
             scene = depsgraph.scene.original
             layer_name = depsgraph.view_layer.name
             picture = facts.picture_facts(scene, depsgraph.view_layer)
@@ -142,13 +138,24 @@ def _make_engine():
             except StippleError as error:
                 self._fail(error)
                 return
-            world = facts.plain_world_colour(depsgraph.scene_eval.world)
-            with _without_splats(depsgraph, is_kept=scene.render.use_persistent_data):
-                passes = cycles_functions.render(self, functools.partial(super().render, depsgraph), layer_name)
+            draw = functools.partial(super().render, depsgraph)
+            shadow = None
+            if self._catchers:
+                with _without_splats(depsgraph), cycles_functions.kept_depsgraph(self):
+                    passes = cycles_functions.render(self, draw, layer_name)
+                if passes is None or self._cancelled():
+                    return
+                shadow = version.read_pass(passes[_SHADOW_PASS], picture.border.width, picture.border.height)
+                # Another scene to Cycles, which does not see that evaluated objects have changed.
+                cycles_functions.forget_scene(self)
+                with _without_splats(depsgraph, without_catchers=True):
+                    super().update(bpy.data, depsgraph)
+            with _without_splats(depsgraph, bool(self._catchers), scene.render.use_persistent_data):
+                passes = cycles_functions.render(self, draw, layer_name)
             if passes is None or self._cancelled():
                 return
             try:
-                self._insert_splats(passes, picture, camera, world, scene.stipple.shadow_margin)
+                self._insert_splats(passes, picture, camera, shadow, scene.stipple.shadow_margin)
             except CancelledError:
                 return
             except StippleError as error:
@@ -158,15 +165,18 @@ def _make_engine():
             scene = depsgraph.scene
             return cameras.camera_of(self._camera_object(depsgraph).evaluated_get(depsgraph), scene.render, border)
 
-        def _insert_splats(self, passes, picture, camera, world, shadow_margin):
+        def _insert_splats(self, passes, picture, camera, shadow, shadow_margin):
             matte = mattes.surface(self._holdouts, camera, self._wait) if self._holdouts else None
-            cycles = self._layers_of(passes, picture, world, matte)
+            cycles = self._layers_of(passes, picture, matte)
             renderer = Renderer(sources.context())
             self._say_memory(renderer, self._instances, camera)
-            if self._catchers and cycles.has_shadows():
-                self._light_what_is_before_catchers(cycles, renderer, picture, camera, shadow_margin)
+            if shadow is not None:
+                version.fill_pass(passes[_SHADOW_PASS], shadow)
+                cycles.take_shadow(shadow)
+                if cycles.has_shadows():
+                    self._light_what_is_before_catchers(cycles, renderer, picture, camera, shadow_margin)
             options = renderer.options(blend_space=picture.blend_space, accuracy=self._exactness,
-                                       object_order=self._order)
+                                       object_order=self._order, solid_depth=True)
             task = renderer.start(self._instances, camera, options, surface=cycles.surface(),
                                   with_transmittance=True, blur=self._spread, **self._shown_passes)
             self._wait(task.job)
@@ -205,18 +215,16 @@ def _make_engine():
             if before[..., 3].any():
                 cycles.light_before_catchers(before, drawn(cycles.matte()))
 
-        def _layers_of(self, passes, picture, world, matte):
+        def _layers_of(self, passes, picture, matte):
             """What Cycles has drawn. matte: of its holdouts, or None."""
             def read(name):
-                found = passes.get(name)
-                return None if found is None else version.read_pass(found, picture.border.width, picture.border.height)
+                return version.read_pass(passes[name], picture.border.width, picture.border.height)
 
-            cycles = layers.CyclesLayers(sources.context(), read('Combined'), read('Depth')[..., 0],
-                                         read(_SHADOW_PASS))
+            cycles = layers.CyclesLayers(sources.context(), read('Combined'), read('Depth')[..., 0])
             if matte is not None:
                 cycles.hold_out(matte)
             if picture.background is not None:
-                cycles.take_world(read(version.ENVIRONMENT_PASS), world)
+                cycles.take_world(read(version.ENVIRONMENT_PASS))
             return cycles
 
     return STIPPLE_RE_cycles

@@ -9,7 +9,7 @@ import time
 import bpy
 import numpy as np
 
-from . import version
+from . import cycles_world, version
 from .binding.errors import CancelledError, StippleError
 from .binding.renderer import Renderer
 from .binding.structs import JobState
@@ -133,12 +133,19 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
             camera = cameras.camera_of(camera_object.evaluated_get(depsgraph), scene.render, picture.border)
             shutter = self._shutter(depsgraph, camera_object)
             accuracy = self._accuracy(depsgraph, camera_object, camera, self._instances, shutter, len(self._mattes))
+            blur = self._blur(depsgraph, camera_object, shutter)
+            world = None
+            if cycles_world.is_needed(depsgraph):
+                world = cycles_world.image(self, depsgraph, picture.border, blur is not None)
+                if world is None:
+                    return
             renderer = Renderer(sources.context())
             self._say_memory(renderer, self._instances, camera)
-            options = renderer.options(blend_space=picture.blend_space, background=picture.background,
-                                       accuracy=accuracy, object_order=effects.object_order(scene, self._instances))
+            options = renderer.options(blend_space=picture.blend_space,
+                                       background=picture.background if world is None else None, accuracy=accuracy,
+                                       object_order=effects.object_order(scene, self._instances), solid_depth=True)
             task = renderer.start(self._instances, camera, options, picture.with_depth, surface=self._matte(camera),
-                                  blur=self._blur(depsgraph, camera_object, shutter),
+                                  blur=blur, background_image=None if world is None else world[::-1],
                                   **self._passes(depsgraph.view_layer))
             self._wait(task.job)
         except CancelledError:

@@ -82,12 +82,15 @@ class JobOperator:
 
     _timer = None
     _job = None
+    _is_shown = False
     escape_text = 'Esc cancels'  # what the status bar says
 
     def __init_subclass__(cls, **options):
         """Without the library none of these operators can do anything: their menu entries are grey and say why."""
         super().__init_subclass__(**options)
         asked = cls.__dict__.get('poll')
+        if asked is None and any('poll' in base.__dict__ for base in cls.__mro__[1:] if issubclass(base, JobOperator)):
+            return  # that of a mix-in, which is asked already
 
         def poll(cls, context):
             problem = sources.library_problem()
@@ -119,6 +122,9 @@ class JobOperator:
         self._timer = manager.event_timer_add(POLL_SECONDS, window=context.window)
         manager.modal_handler_add(self)
         manager.progress_begin(0, 100)
+        # A first step may take seconds: Blender draws this before it.
+        self._is_shown = False
+        self._say(context, 0.0, 'Preparing')
         return {'RUNNING_MODAL'}
 
     def modal(self, context, event):
@@ -127,10 +133,12 @@ class JobOperator:
             return {'RUNNING_MODAL'}
         if event.type != 'TIMER':
             return {'PASS_THROUGH'}
+        if not self._is_shown:
+            self._is_shown = True
+            return {'PASS_THROUGH'}
         state, fraction, stage = self._job.poll()
         if state == JobState.RUNNING:
-            context.window_manager.progress_update(int(100 * fraction))
-            context.workspace.status_text_set(f'{self.bl_label}: {stage} {fraction:.0%} ({self.escape_text})')
+            self._say(context, fraction, stage)
             return {'PASS_THROUGH'}
         self._leave_window(context)
         return self._finish_in_window(context)
@@ -150,6 +158,10 @@ class JobOperator:
         except StippleError as error:
             return self._failed(error)
         return {'FINISHED'}
+
+    def _say(self, context, fraction, stage):
+        context.window_manager.progress_update(int(100 * fraction))
+        context.workspace.status_text_set(f'{self.bl_label}: {stage} {fraction:.0%} ({self.escape_text})')
 
     def _leave_window(self, context):
         context.window_manager.event_timer_remove(self._timer)

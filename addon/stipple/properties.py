@@ -7,10 +7,10 @@ from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProp
 
 from . import version
 from .binding.errors import StippleError
-from .scene import overlays
+from .scene import overlays, selection_settings
 from .scene.fit import fit_proposal, fitting, strategies
 from .scene.sequence import sequences
-from .scene.source import source_paths, source_settings, sources, sync
+from .scene.source import setting_paths, source_paths, source_settings, sources, sync
 from .scene.view import effects, photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
@@ -31,6 +31,15 @@ SIDES = (('INSIDE', "Inside", "Keep what is inside"), ('OUTSIDE', "Outside", "Ke
 
 class STIPPLE_PG_source_object(bpy.types.PropertyGroup):
     object: PointerProperty(name="Object", type=bpy.types.Object)
+
+
+class STIPPLE_PG_source_file(bpy.types.PropertyGroup):
+    file: PointerProperty(name="File", type=bpy.types.Image)
+
+
+def _on_sequence_change(stipple, context):
+    source_paths.note(stipple)
+    sync.on_property_change(stipple, context)
 
 
 class STIPPLE_PG_splats(bpy.types.PropertyGroup):
@@ -87,7 +96,8 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                                              "made from", options={'HIDDEN'})
     # A series of files, one for each frame; source is its first. Names and meaning as in Blender's volumes.
     is_sequence: BoolProperty(name="Sequence", description="The source is the first of a numbered series of files, one "
-                              "for each frame", options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
+                              "for each frame", options=set(), override=_OVERRIDABLE, update=_on_sequence_change)
+    series_files: CollectionProperty(type=STIPPLE_PG_source_file)  # of a packed series: scene/source/source_packing.py
     frame_duration: IntProperty(name="Frames", description="Number of files of the series that are used", default=1,
                                 min=1, options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
     frame_start: IntProperty(name="Start", description="Frame of the scene at which the series starts", default=1,
@@ -156,7 +166,12 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                                                                    "also learns the world behind them", default=True,
                               options=set())
     dataset: StringProperty(name="Folder", description="Folder with photographs and their cameras",
-                            subtype='DIR_PATH', options=version.RELATIVE_PATH)
+                            subtype='DIR_PATH', options=version.RELATIVE_PATH,
+                            update=setting_paths.noting('dataset'))
+    # Images hold the paths in a form that Blender itself keeps right: scene/source/setting_paths.py.
+    dataset_file: PointerProperty(type=bpy.types.Image, options={'HIDDEN'})
+    report_file: PointerProperty(type=bpy.types.Image, options={'HIDDEN'})
+    checkpoint_file: PointerProperty(type=bpy.types.Image, options={'HIDDEN'})
     up_axis: EnumProperty(name="Up Axis",
                           description="Which way is up in the data set; choose the same for its cameras",
                           items=photo_cameras.UP_AXES, options=set())
@@ -203,12 +218,14 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
     progress: FloatProperty(name="Progress", subtype='PERCENTAGE', min=0.0, max=100.0, precision=0,
                             options={'HIDDEN', 'SKIP_SAVE'}, get=lambda _: 100 * fitting.state.fraction)
     report: StringProperty(name="Report", description="File for the fit's figures (.json, and curves as .svg beside "
-                           "it); empty for none", subtype='FILE_PATH', options=version.RELATIVE_PATH)
+                           "it); empty for none", subtype='FILE_PATH', options=version.RELATIVE_PATH,
+                           update=setting_paths.noting('report'))
     checkpoint: StringProperty(name="Checkpoint",
                                description="File (.safetensors) that keeps the state of a fit once a "
                                            "minute while it runs, so that it can go on after a stop or a crash; empty "
                                            "for none",
-                               subtype='FILE_PATH', options=version.RELATIVE_PATH)
+                               subtype='FILE_PATH', options=version.RELATIVE_PATH,
+                               update=setting_paths.noting('checkpoint'))
     resume: BoolProperty(name="Go On", description="The fit goes on from the checkpoint if there is one; otherwise it"
                                                    " starts from the beginning and replaces it", default=True,
                          options=set())
@@ -263,6 +280,23 @@ class STIPPLE_PG_quality(bpy.types.PropertyGroup):
                                 default=1.0, min=0.001, max=1.0, subtype='FACTOR', options=set(), override=_OVERRIDABLE)
 
 
+class STIPPLE_PG_selection(bpy.types.PropertyGroup):
+    """How the tools in the toolbar select splats."""
+
+    operation: EnumProperty(name="Operation", description="What becomes of the selection before; with Shift the tools "
+                            "extend it, with Ctrl they subtract, with both they intersect",
+                            items=selection_settings.OPERATIONS, options=set())
+    radius: FloatProperty(name="Radius", description="Radius of the brush, pixels", default=40.0, min=1.0, max=5000.0,
+                          soft_max=500.0, subtype='PIXEL', options=set())
+    front_only: BoolProperty(name="Front Only", description="Select what is seen, and nothing that lies behind other "
+                             "splats", default=False, options=set())
+    tolerance: FloatProperty(name="Tolerance", description="How different from the color that is clicked a color may "
+                             "be; 0.1 is a family of one hue", default=0.08, min=0.0, soft_max=0.5, subtype='FACTOR',
+                             precision=3, options=set())
+    within: FloatProperty(name="Within", description="Distance from the click up to which colors are looked for, 0 for "
+                          "everywhere", default=0.0, min=0.0, subtype='DISTANCE', unit='LENGTH', options=set())
+
+
 class STIPPLE_PG_scene(bpy.types.PropertyGroup):
     quality_viewport: PointerProperty(type=STIPPLE_PG_quality)
     quality_render: PointerProperty(type=STIPPLE_PG_quality)
@@ -310,6 +344,7 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         override=_OVERRIDABLE)
     fit: PointerProperty(type=STIPPLE_PG_fit)
     overlay: PointerProperty(type=STIPPLE_PG_overlay)
+    selection: PointerProperty(type=STIPPLE_PG_selection)
     max_splats: IntProperty(
         name="Max Splats", description="Maximum number of splats that the viewport shows, over all objects and their "
                                        "instances; 0 is no limit. Objects share them in proportion to their own "
@@ -322,8 +357,8 @@ class STIPPLE_PG_scene(bpy.types.PropertyGroup):
         options=set(), override=_OVERRIDABLE)
 
 
-classes = (STIPPLE_PG_source_object, STIPPLE_PG_splats, STIPPLE_PG_fit, STIPPLE_PG_overlay, STIPPLE_PG_quality,
-           STIPPLE_PG_scene)
+classes = (STIPPLE_PG_source_object, STIPPLE_PG_source_file, STIPPLE_PG_splats, STIPPLE_PG_fit, STIPPLE_PG_overlay,
+           STIPPLE_PG_selection, STIPPLE_PG_quality, STIPPLE_PG_scene)
 
 
 def register():

@@ -206,9 +206,9 @@ def test_a_quality_that_nothing_has_is_refused(library, context, cloud):
     assert report.cheapest_above(1e6).name == 'reference'  # its own picture has no error
 
 
-def test_reports_are_written_by_ending(report, tmp_path):
-    for ending in ('json', 'csv', 'svg'):
-        report.save(tmp_path / f'report.{ending}')
+def test_reports_are_written_by_extension(report, tmp_path):
+    for extension in ('json', 'csv', 'svg'):
+        report.save(tmp_path / f'report.{extension}')
     read = json.loads((tmp_path / 'report.json').read_text())
     assert [row['name'] for row in read['settings']] == [row.name for row in report.rows]
     assert read['settings'][-1]['psnr'] is None and read['settings'][0]['knobs']['share'] == '0.25'

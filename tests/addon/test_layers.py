@@ -86,3 +86,18 @@ def test_a_matte_of_a_mesh_has_smooth_edges(context):
     assert task.depth[0].tolist() == [1.0, 1.0, 1.0, EMPTY]
     with pytest.raises(StippleError, match='1 to 16 is allowed'):
         mesh.start_matte(context, [(square, np.eye(4))], camera, 17)
+
+
+def test_shadows_of_another_picture_leave_meshes_and_world(context):
+    combined, depth, shadow = passes()
+    combined[1, 0] = 0.0
+    lit = layers.Layers(context, combined, depth)
+    lit.take_shadow(shadow)
+    assert lit.info().has_shadows and lit.info().has_light
+    surface = lit.surface()
+    assert np.array_equal(surface.colour, combined)
+    assert np.array_equal(surface.light, shadow)
+    with pytest.raises(StippleError, match='another is allowed without it'):
+        lit.take_shadow(shadow)
+    with pytest.raises(StippleError, match=r'has shape \(2, 2, 3\)'):
+        lit.take_shadow(shadow[:, :2])

@@ -8,6 +8,7 @@ import pytest
 
 from stipple.binding import library
 from stipple.binding.errors import LibraryError
+from stipple.binding.structs import ABI_VERSION
 
 
 def build(folder, name, source):
@@ -36,7 +37,7 @@ def test_a_path_that_is_not_absolute_is_refused(tmp_path, monkeypatch):
 
 def test_wrong_abi_version_is_refused_with_both_versions(tmp_path):
     file = build(tmp_path, 'old', 'unsigned stipple_abi_version(void) { return 99u; }\n')
-    with pytest.raises(LibraryError, match=r'ABI version 99; this add-on needs version 2'):
+    with pytest.raises(LibraryError, match=f'ABI version 99; this add-on needs version {ABI_VERSION}'):
         library.load(file)
 
 
@@ -47,7 +48,7 @@ def test_another_library_is_refused(tmp_path):
 
 
 def test_library_that_lacks_a_function_is_refused(tmp_path):
-    file = build(tmp_path, 'partial', 'unsigned stipple_abi_version(void) { return 2u; }\n')
+    file = build(tmp_path, 'partial', f'unsigned stipple_abi_version(void) {{ return {ABI_VERSION}u; }}\n')
     with pytest.raises(LibraryError, match='lacks a function'):
         library.load(file)
 

@@ -1,6 +1,6 @@
 """Splats of the fixture scenes, made and rendered in background Blender, against stored pictures.
 
-Two yardsticks for each scene: Cycles' picture of the mesh's base colours (is it right?) and Stipple's own stored
+Two references for each scene: Cycles' picture of the mesh's base colours (is it right?) and Stipple's own stored
 picture (has it changed?). Both are also shown a picture that must not pass.
 """
 import json

@@ -97,7 +97,8 @@ def test_shell(stipple, tmp_path, scene):
 
 def save(stipple, name, objects, rig, fits):
     """A view, and the fits of it, side by side."""
-    rigs, capturing = (importlib.import_module(f'.scene.{m}', stipple.__name__) for m in ('view_rigs', 'view_capture'))
+    rigs, capturing = (importlib.import_module(m, stipple.__name__)
+                       for m in ('.scene.fit.view_rigs', '.scene.fit.view_capture'))
     binding, structs = (importlib.import_module(f'.binding.{m}', stipple.__name__) for m in ('renderer', 'structs'))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     place = rigs.around if rig == 'AROUND' else rigs.inside

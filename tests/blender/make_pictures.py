@@ -20,13 +20,15 @@ import densify_tour_steps
 import fit_tour_steps
 import picture_steps
 import screen
+import selection_tour_steps
 import tour_steps
 
 IMAGES = Path(__file__).resolve().parent.parent.parent / 'docs' / 'images'
 
 
 @pytest.mark.parametrize('steps,size', ((picture_steps, (screen.WIDTH, screen.HEIGHT)), (tour_steps, (1600, 1300)),
-                                        (fit_tour_steps, (1600, 1000)), (densify_tour_steps, (1400, 1100))),
+                                        (fit_tour_steps, (1600, 1000)), (densify_tour_steps, (1400, 1100)),
+                                        (selection_tour_steps, (1280, selection_tour_steps.HEIGHT))),
                          ids=lambda value: getattr(value, '__name__', ''))
 def test_pictures_of_windows(tmp_path, steps, size):
     shots, _ = screen.run_steps(Path(steps.__file__), tmp_path, bpy.app.binary_path, timeout=1500, size=size,

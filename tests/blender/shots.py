@@ -76,3 +76,27 @@ def mesh_between(stipple, opacity=0.98):
     quad = scenes.quad(size=1.0)
     emission(quad)
     return quad
+
+
+def set_panorama(rotation=(0.3, 0.2, 0.7), strength=0.8, pixels=None):
+    """A world of an environment texture that is rotated: a different colour in every direction, without edges."""
+    node = set_world((1.0, 1.0, 1.0))
+    node.inputs['Strength'].default_value = strength
+    tree = node.id_data
+    image = bpy.data.images.new('panorama', 256, 128, float_buffer=True)
+    if pixels is None:
+        v, u = np.meshgrid(np.linspace(0.0, np.pi, 128), np.linspace(0.0, 2 * np.pi, 256), indexing='ij')
+        # Even at the poles, and the same on both sides of the seam.
+        pixels = np.ones((128, 256, 4), np.float32)
+        pixels[..., 0] = 0.5 + 0.4 * np.cos(v)
+        pixels[..., 1] = 0.5 + 0.4 * np.sin(v) ** 2 * np.cos(3 * u)
+        pixels[..., 2] = 0.5 + 0.4 * np.sin(v) * np.sin(u)
+    image.pixels.foreach_set(pixels.reshape(-1))
+    image.pack()
+    texture, place = tree.nodes.new('ShaderNodeTexEnvironment'), tree.nodes.new('ShaderNodeMapping')
+    texture.image = image
+    place.inputs['Rotation'].default_value = rotation
+    tree.links.new(tree.nodes.new('ShaderNodeTexCoord').outputs['Generated'], place.inputs['Vector'])
+    tree.links.new(place.outputs[0], texture.inputs[0])
+    tree.links.new(texture.outputs[0], node.inputs['Color'])
+    return node

@@ -190,7 +190,7 @@ def test_unwritable_export_and_volume_paths(stipple, unchanged, tmp_path):
     assert not nowhere.exists()
 
 
-def test_wrong_endings(unchanged, tmp_path):
+def test_wrong_extensions(unchanged, tmp_path):
     scenes.make_splats(scenes.quad(), anchors=500)
     unchanged()
     scenes.refuses(lambda: bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'a.txt')), 'a.txt')

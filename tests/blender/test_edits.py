@@ -179,6 +179,17 @@ def test_merge_takes_the_budget_that_is_asked_for(stipple, tmp_path, budget, cou
     assert stipple.scene.source.splat_data.count(first.data) == count + 40
 
 
+def test_splats_of_an_older_file_are_merged_into(stipple, tmp_path):
+    """They are meshes there, and so is the datablock that their object gets, in versions with point clouds too."""
+    splat_data = stipple.scene.source.splat_data
+    mesh = bpy.data.meshes.new('older')
+    old = scenes.link(splat_data.new_object('older', splat_data.new_data('older', like=mesh)))
+    splat_data.write(old.data, make_arrays(stipple, count=30, degree=0))
+    scenes.select(old, import_arrays(stipple, tmp_path, make_arrays(stipple, count=40, degree=0)))
+    assert bpy.ops.stipple.merge_splats() == {'FINISHED'}
+    assert isinstance(old.data, bpy.types.Mesh) and splat_data.count(old.data) == 70
+
+
 def test_apply_moves_the_splats_and_keeps_the_mask(stipple, imported):
     before = read(stipple, imported)
     select(imported, box(size=0.9))

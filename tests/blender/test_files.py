@@ -236,9 +236,9 @@ def test_dialogs_and_file_handlers_know_the_formats_of_the_library(stipple):
     assert {'.ply', '.ksplat', 'meta.json'} <= set(formats.read_extensions())
     assert set(formats.read_extensions()) - set(formats.write_extensions()) == {'.ksplat'}
     # What can be dropped is known before the library is.
-    assert sorted(formats.DROPPED_ENDINGS) == sorted(e for e in formats.read_extensions() if e.startswith('.'))
+    assert sorted(formats.DROPPED_EXTENSIONS) == sorted(e for e in formats.read_extensions() if e.startswith('.'))
     assert formats.of_path('/a/B.PLY').name == 'ply' and formats.of_path('a.txt') is None
     handler = getattr(bpy.types, 'STIPPLE_FH_splats', None)
     assert (handler is not None) == (bpy.app.version >= (4, 1, 0))
     if handler is not None:
-        assert set(handler.bl_file_extensions.split(';')) == {'.safetensors', *formats.DROPPED_ENDINGS}
+        assert set(handler.bl_file_extensions.split(';')) == {'.safetensors', *formats.DROPPED_EXTENSIONS}

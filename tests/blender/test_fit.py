@@ -4,6 +4,7 @@
 import importlib
 import json
 import os
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -332,3 +333,38 @@ def test_strategies_and_parts_are_those_of_the_library(stipple, ball, fitting):
     chosen.parts = {'growth_control'}
     assert strategies.problem(strategies.text_of(chosen)) is None
     assert fitted().data.stipple.source_count <= 2000
+
+
+def test_a_window_says_what_begins_before_the_first_step(stipple):
+    """A first step may take seconds, in which Blender draws nothing."""
+    said, polls = [], []
+
+    class Manager:
+        def event_timer_add(self, *_arguments, **_options):
+            return object()
+
+        def progress_update(self, value):
+            said.append(value)
+
+        modal_handler_add = progress_begin = lambda self, *_arguments: None
+
+    class Work(stipple.jobs.JobOperator):
+        bl_label = 'Work'
+
+        def start(self, _context):
+            return Job()
+
+    class Job:
+        def poll(self):
+            polls.append(len(said))
+            return stipple.binding.structs.JobState.RUNNING, 0.25, 'Working'
+
+    workspace = SimpleNamespace(status_text_set=said.append)
+    context = SimpleNamespace(window_manager=Manager(), window=None, workspace=workspace)
+    work, timer = Work(), SimpleNamespace(type='TIMER')
+    assert work.run_in_window(context) == {'RUNNING_MODAL'}
+    assert 'Work: Preparing 0%' in said[-1]
+    work.modal(context, timer)
+    assert not polls  # Blender draws now
+    work.modal(context, timer)
+    assert polls and 'Work: Working 25%' in said[-1]

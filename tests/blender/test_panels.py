@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What panels offer for splats, and what of Blender's own they leave out."""
 
+from types import SimpleNamespace
+
 import bpy
 import pytest
 
@@ -34,6 +36,51 @@ def test_panels_about_faces_are_not_shown_for_splats(stipple, imported):
     finally:
         shown.register()
     assert {name for name in own} == set(shown._polls)
+
+
+class Sentences:
+    """A layout that notes the labels in it."""
+
+    def __init__(self):
+        self.labels = []
+
+    def label(self, text='', icon='NONE'):
+        self.labels.append((text, icon))
+
+    def prop(self, *_arguments, **_options):
+        pass
+
+    def operator(self, *_arguments, **_options):
+        return self
+
+    operator_menu_enum = prop
+
+    def box(self, *_arguments, **_options):
+        return self
+
+    row = column = split = box
+
+
+@pytest.mark.parametrize('pixels', [180, 260, 500])
+def test_sentences_of_the_render_panel_are_whole(stipple, imported, monkeypatch, pixels):
+    """Blender cuts off what is wider than its panel: about seven pixels for a letter, three letters for an icon."""
+    render = stipple.panels.render
+    monkeypatch.setattr(render.cycles_functions, 'denoising_problem', lambda *_: True)
+    scene = bpy.context.scene
+    scene.stipple.splat_color, scene.view_settings.view_transform = 'AS_TRAINED', 'Raw'
+    found = []
+    for engine in ('STIPPLE_CYCLES', 'STIPPLE'):
+        layout = Sentences()
+        panel = type('Panel', (), {'layout': layout})
+        context = type('Context', (), {'engine': engine, 'scene': scene, 'view_layer': bpy.context.view_layer,
+                                       'preferences': SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+                                       'region': SimpleNamespace(width=pixels)})
+        render.STIPPLE_PT_render_splats.draw(panel, context)
+        widths = [7 * (len(text) + (3 if icon != 'NONE' else 0)) for text, icon in layout.labels]
+        assert max(widths) < pixels, layout.labels
+        found.append(' '.join(text for text, _ in layout.labels))
+    assert 'without a denoiser' in found[0] and 'do not appear in reflections' in found[0]
+    assert 'changes colors' in found[1]
 
 
 @pytest.mark.parametrize('engine, name', [('CYCLES', 'Cycles'), ('BLENDER_WORKBENCH', 'Workbench')])

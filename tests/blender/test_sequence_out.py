@@ -144,8 +144,8 @@ def test_cancel_leaves_whole_frames_only(stipple, swarm, tmp_path, monkeypatch, 
 
     monkeypatch.setattr(stipple.jobs.Task, 'advance', cancel_at_frame_3)
     assert getattr(bpy.ops.stipple, operator)(filepath=str(tmp_path / path), frames='SERIES') == {'CANCELLED'}
-    stem, ending = path.split('.')
-    assert [p.name for p in sorted(tmp_path.glob('v*'))] == [f'{stem}_0001.{ending}', f'{stem}_0002.{ending}']
+    stem, extension = path.split('.')
+    assert [p.name for p in sorted(tmp_path.glob('v*'))] == [f'{stem}_0001.{extension}', f'{stem}_0002.{extension}']
     assert len(bpy.data.objects) == 1
     assert series.centre(stipple, swarm) == 0
 

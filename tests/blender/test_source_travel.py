@@ -263,7 +263,7 @@ def test_files_of_versions_that_kept_a_text(stipple, tmp_path, library, monkeypa
     sync = stipple.scene.source.sync
     for name in names:
         data = bpy.data.objects[name].data
-        known = sync.sources.identity(data.stipple)
+        known = sync.source_paths.identity(data.stipple)
         data[sync.WRITTEN_KEY] = data[sync.WRITTEN_KEY].replace(known, data.stipple.source)
         data.stipple.source_file = None
     monkeypatch.setattr(stipple.scene.source.source_travel, 'follow_texts', lambda: None)

@@ -4,11 +4,11 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene.source import edits, masks, source_paths, source_settings, sources, splat_data
+from ..scene.source import edits, erased, masks, source_paths, source_settings, sources, splat_data
 
 
 class STIPPLE_OT_clear_mask(JobOperator, bpy.types.Operator):
-    """Bring back the splats that cropping and deleting floaters hid"""
+    """Bring back the splats that cropping, erasing and deleting floaters hid"""
 
     bl_idname = 'stipple.clear_mask'
     bl_label = "Clear Mask"
@@ -17,7 +17,7 @@ class STIPPLE_OT_clear_mask(JobOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         return (splat_data.is_splat_object(context.object) and context.mode == 'OBJECT'
-                and masks.counts(context.object.data) is not None)
+                and (masks.counts(context.object.data) is not None or erased.any_of(context.object.data)))
 
     def start(self, context):
         data = context.object.data
@@ -30,9 +30,12 @@ class STIPPLE_OT_clear_mask(JobOperator, bpy.types.Operator):
 
     def finish(self, context, _job):
         data = context.object.data
-        total, kept = masks.counts(data)
+        before = splat_data.count(data)
+        total, kept = masks.counts(data) or (None, before)
         masks.clear(data)
+        erased.clear(data)
         edits.show(data, self._cloud)
+        total = splat_data.count(data) if total is None else total
         self.report({'INFO'}, f'{total - kept:,} splats are back, {total:,} in all')
 
 

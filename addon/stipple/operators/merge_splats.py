@@ -53,7 +53,7 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
         active = self._objects[0]
         path = sources.save_cloud(job.result, active.name)
         # A datablock of its own: the old one may have other users.
-        data = splat_data.new_data(active.data.name)
+        data = splat_data.new_data(active.data.name, like=active.data)
         with sync.paused():
             sources.attach_cloud(data, path)
         splats = job.result.columns()

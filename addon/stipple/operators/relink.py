@@ -10,7 +10,8 @@ from ..binding.errors import StippleError, invalid
 from ..binding.model import Model
 from ..jobs import JobOperator
 from ..scene.sequence import numbered
-from ..scene.source import formats, masks, source_paths, source_settings, sources, splat_data, sync
+from ..scene.source import (formats, masks, selections, source_paths, source_settings, sources, splat_data,
+                            sync)
 
 
 class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
@@ -21,7 +22,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
     bl_label = "Relink Source"
     bl_options = {'REGISTER', 'UNDO'}
 
-    filename_ext = formats.USUAL_ENDING
+    filename_ext = formats.USUAL_EXTENSION
     filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
     other_count: BoolProperty(name="Accept Another Count",
                               description="Take a file of another number of splats, too; a "
@@ -97,6 +98,8 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
                 for name, value in kept.items():
                     setattr(stipple, name, value)
             raise
+        if stipple.source_stamp != kept['source_stamp'] and selections.takes_mask(data):
+            selections.clear(data)  # bits of other splats
         sync.problems.pop(data.name, None)
         self.report({'INFO'}, f"'{data.name}' comes from '{self._path}' now: {count:,} splats")
 

@@ -21,7 +21,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     bl_label = "Export Splats"
     bl_options = {'REGISTER', 'PRESET'}
 
-    filename_ext = formats.USUAL_ENDING
+    filename_ext = formats.USUAL_EXTENSION
     check_extension = None  # several extensions are right
     filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
     collection: StringProperty(name="Collection", description="Export the splats of this collection", default="",

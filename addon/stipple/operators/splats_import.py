@@ -24,7 +24,7 @@ class STIPPLE_OT_splats_import(JobOperator, bpy.types.Operator, ImportHelper):
     bl_label = "Import Splats"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
-    filename_ext = formats.USUAL_ENDING
+    filename_ext = formats.USUAL_EXTENSION
     filter_glob: StringProperty(options={'HIDDEN', 'SKIP_SAVE'})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={'HIDDEN', 'SKIP_SAVE'})
     directory: StringProperty(subtype='DIR_PATH', options={'HIDDEN', 'SKIP_SAVE'})
@@ -146,7 +146,7 @@ if version.HAS_FILE_HANDLERS:
         bl_label = "Gaussian Splats"
         bl_import_operator = 'stipple.splats_import'
         bl_export_operator = 'stipple.splats_export'
-        bl_file_extensions = ';'.join((*formats.DROPPED_ENDINGS, '.safetensors'))
+        bl_file_extensions = ';'.join((*formats.DROPPED_EXTENSIONS, '.safetensors'))
 
         @classmethod
         def poll_drop(cls, context):

@@ -7,7 +7,7 @@ from ..binding.errors import invalid
 from ..binding.model import Model
 from ..jobs import JobOperator
 from ..scene import meshes
-from ..scene.source import source_paths, sources, splat_data, sync
+from ..scene.source import erased, source_paths, sources, splat_data, sync
 
 
 class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
@@ -42,7 +42,7 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
 
     def finish(self, _context, job):
         model, data = Model.of_job(job), self._object.data
-        splats = model.decode(self._settings).columns()
+        splats = erased.read(data).applied(model.decode(self._settings)).columns()
         # Never over the old file: undo goes back to it.
         path = sources.save_model(model, source_paths.place_for(self._object.name))
         sources.remember_model(path, model)

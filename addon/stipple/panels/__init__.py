@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing only."""
 
-from . import data, effects, fit, menus, mesh_panels, overlay, quality, render, sequence, start
+from . import data, effects, fit, menus, mesh_panels, overlay, quality, render, selection, sequence, start
 
-classes = (data.classes + sequence.classes + render.classes + quality.classes + effects.classes + start.classes
+classes = (data.classes + selection.classes + sequence.classes + render.classes + quality.classes + effects.classes + start.classes
            + fit.classes + overlay.classes + menus.classes)
 
 

@@ -9,7 +9,7 @@ import bpy
 
 from . import source_state
 from ..scene import geometry
-from ..scene.source import exporting, masks, source_settings, sources, splat_data, sync
+from ..scene.source import erased, exporting, masks, source_settings, sources, splat_data, sync
 from ..scene.view import viewed
 from .text import draw_anchors
 
@@ -162,9 +162,14 @@ def _shown_label(data):
 def _draw_hidden(layout, data):
     counts = masks.counts(data)
     if counts is not None:
-        row = layout.row()
-        row.label(text=f"{counts[0] - counts[1]:,} hidden", icon='HIDE_ON')
-        row.operator('stipple.clear_mask', text="", icon='X')
+        text = f"{counts[0] - counts[1]:,} hidden"
+    elif erased.any_of(data):
+        text = "Partly erased"
+    else:
+        return
+    row = layout.row()
+    row.label(text=text, icon='HIDE_ON')
+    row.operator('stipple.clear_mask', text="", icon='X')
 
 
 def _draw_tree_budget(layout, stipple):

@@ -153,6 +153,8 @@ def _draw_running(layout, settings, state):
     rows = []
     if state.seconds_left >= 1:
         rows.append(("Time Left", duration(state.seconds_left)))
+    elif state.views_left >= 1:
+        rows.append(("Views", f'ready in {duration(state.views_left)}'))
     if figures is not None and figures.iteration:
         rows.append(("Step", f'{figures.iteration:,} of {figures.iterations:,}'))
         rows.append(("Splats", f'{figures.splat_count:,}'))

@@ -3,6 +3,7 @@
 
 import bpy
 
+from .. import selection_tools
 from ..scene import geometry
 from ..scene.source import splat_data
 
@@ -31,9 +32,32 @@ class STIPPLE_MT_object(bpy.types.Menu):
         layout.operator('stipple.crop_by_mesh', icon='MESH_ICOSPHERE')
         layout.operator('stipple.clear_mask', icon='X')
         layout.separator()
+        layout.operator_menu_enum('stipple.add_shadow_catcher', 'kind', icon='SHADING_RENDERED')
+        layout.menu('STIPPLE_MT_select', icon='RESTRICT_SELECT_OFF')
+        layout.separator()
         layout.operator('stipple.add_budget', icon='MOD_DECIM')
         layout.operator('stipple.merge_splats', icon='AUTOMERGE_OFF')
         layout.operator('stipple.apply_transform', icon='OBJECT_ORIGIN')
+
+
+class STIPPLE_MT_select(bpy.types.Menu):
+    bl_label = "Select Splats"
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.operator_context = 'INVOKE_DEFAULT'
+        for name, text in selection_tools.NAMES:
+            layout.operator(name, text=text)
+        layout.separator()
+        for action, text in (('SELECT', "All"), ('DESELECT', "None"), ('INVERT', "Invert")):
+            layout.operator('stipple.select_all', text=text).action = action
+        layout.operator('stipple.select_grow', text="Grow")
+        layout.operator('stipple.select_shrink', text="Shrink")
+        layout.separator()
+        layout.operator('stipple.erase_selected', text="Erase", icon='HIDE_ON')
+        layout.operator('stipple.keep_selected', text="Keep Only")
+        layout.operator('stipple.separate_selected', text="Separate")
+        layout.operator('stipple.fill_erased', text="Fill")
 
 
 def _draw_object(self, context):
@@ -67,6 +91,7 @@ def _draw_external_data(self, _context):
     self.layout.separator()
     self.layout.operator_context = 'INVOKE_DEFAULT'
     self.layout.operator('stipple.collect_sources', icon='OUTLINER_DATA_POINTCLOUD')
+    self.layout.operator('stipple.pack_series', icon='PACKAGE')
 
 
 def _draw_export(self, _context):
@@ -89,4 +114,4 @@ def unregister():
         getattr(bpy.types, name).remove(draw)
 
 
-classes = (STIPPLE_MT_add, STIPPLE_MT_object)
+classes = (STIPPLE_MT_add, STIPPLE_MT_object, STIPPLE_MT_select)

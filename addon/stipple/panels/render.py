@@ -40,17 +40,21 @@ class STIPPLE_PT_render_splats(SplatRenderPanel, bpy.types.Panel):
         if context.engine == CYCLES_ENGINE:
             if cycles_functions.denoising_problem(scene, context.view_layer):
                 box = layout.box()
-                box.label(text="This Blender cannot denoise", icon='ERROR')
+                draw_text(box, context, "This Blender was built without a denoiser", 'ERROR')
                 box.operator('stipple.turn_denoising_off')
             layout.prop(scene.cycles, 'device')
             layout.prop(scene.stipple, 'shadow_margin')
-            layout.label(text="Splats do not appear in reflections", icon='INFO')
+            layout.operator_menu_enum('stipple.add_shadow_catcher', 'kind')
+            draw_text(layout, context, "Splats do not appear in reflections", 'INFO')
         else:
-            layout.prop(scene.stipple, 'meshes_as_mattes')
+            # Over the whole width: half of the editor cuts its words off.
+            row = layout.row()
+            row.use_property_split = False
+            row.prop(scene.stipple, 'meshes_as_mattes')
         layout.prop(scene.stipple, 'splat_color')
         if scene.stipple.splat_color == 'AS_TRAINED' and not facts.uses_standard_view(scene):
             box = layout.box()
-            box.label(text=f"{scene.view_settings.view_transform} view changes colors", icon='INFO')
+            draw_text(box, context, f"The view transform {scene.view_settings.view_transform} changes colors", 'INFO')
             box.operator('stipple.use_standard_view')
 
 
@@ -85,9 +89,9 @@ class STIPPLE_PT_render_film(bpy.types.Panel):
         return context.engine in cls.COMPAT_ENGINES
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop(context.scene.render, 'film_transparent', text="Transparent")
+        row = self.layout.row()
+        row.use_property_decorate = False
+        row.prop(context.scene.render, 'film_transparent', text="Transparent")
 
 
 class STIPPLE_PT_view_layer_passes(bpy.types.Panel):
@@ -128,15 +132,23 @@ def _draw_limit(layout, context, name):
     layout.prop(context.scene.stipple, name)
 
 
+def _draw_cryptomatte(self, context):
+    """Cycles' panel offers what splats have no part in."""
+    if context.engine == CYCLES_ENGINE:
+        draw_text(self.layout, context, 'Of meshes alone, as if no splats were before them. Splats are in Object Index',
+                  'INFO', is_quiet=True)
+
+
 # Cycles has panels of its own.
-_SIMPLIFY = (('RENDER_PT_simplify_viewport', _draw_max_splats),
-             ('CYCLES_RENDER_PT_simplify_viewport', _draw_max_splats),
-             ('RENDER_PT_simplify_render', _draw_max_splats_render),
-             ('CYCLES_RENDER_PT_simplify_render', _draw_max_splats_render))
+_ADDED = (('CYCLES_RENDER_PT_passes_crypto', _draw_cryptomatte),
+          ('RENDER_PT_simplify_viewport', _draw_max_splats),
+          ('CYCLES_RENDER_PT_simplify_viewport', _draw_max_splats),
+          ('RENDER_PT_simplify_render', _draw_max_splats_render),
+          ('CYCLES_RENDER_PT_simplify_render', _draw_max_splats_render))
 
 
-def _simplify_panels():
-    for name, draw in _SIMPLIFY:
+def _added_panels():
+    for name, draw in _ADDED:
         panel = getattr(bpy.types, name, None)
         if panel is not None:
             yield panel, draw
@@ -156,12 +168,12 @@ def register():
             panel.COMPAT_ENGINES.add(ENGINE)
         if 'CYCLES' in panel.COMPAT_ENGINES:
             panel.COMPAT_ENGINES.add(CYCLES_ENGINE)
-    for panel, draw in _simplify_panels():
+    for panel, draw in _added_panels():
         panel.append(draw)
 
 
 def unregister():
-    for panel, draw in _simplify_panels():
+    for panel, draw in _added_panels():
         panel.remove(draw)
     for panel in _panels():
         panel.COMPAT_ENGINES.difference_update({ENGINE, CYCLES_ENGINE})

@@ -16,12 +16,9 @@ from ...binding.structs import FitModel, FitQuality, FitShell, JobState
 from .. import meshes
 from . import fit_proposal, fit_reports, strategies
 from ..sequence import frames
-from ..source import source_paths, sources
+from ..source import setting_paths, source_paths, sources
 from ..view import photo_cameras
-from .view_task import VIEWS_END, ViewTask
-
-# Share of the whole in the progress bar until the fit ends.
-_FIT_END = 0.95
+from .view_task import ViewTask
 
 # What a native stage is called.
 _STAGES = {'Splats': 'Fitting splats', 'Density': 'Learning where surfaces are', 'Attributes': 'Learning attributes',
@@ -39,7 +36,8 @@ class State:
     problem: str = ''
     notes: tuple = ()
     fraction: float = 0.0
-    seconds_left: float = 0.0  # of what goes on now, 0 where it is not known
+    seconds_left: float = 0.0  # of everything, 0 where it is not known
+    views_left: float = 0.0    # until the views are rendered, 0 where it is not known
     source_names: tuple = ()  # of the visible objects that it is fitted to
     matrix: object = None     # of the object to be, to the world
     wants_stop: bool = False
@@ -64,7 +62,8 @@ _CHECKPOINT_SUFFIX = '.safetensors'
 
 def _checkpoint_path(settings):
     """Of the file that keeps a fit that runs, None where none is wanted."""
-    return Path(bpy.path.abspath(settings.checkpoint)) if settings.checkpoint else None
+    path = setting_paths.absolute(settings, 'checkpoint')
+    return Path(path) if path else None
 
 
 def has_checkpoint(settings):
@@ -86,7 +85,7 @@ def _require_checkpoint(settings):
 
 def _check_places(native, settings):
     """The library's judgement of the same, and of the report. A fit that goes on reads its checkpoint."""
-    report = bpy.path.abspath(settings.report) if settings.report else None
+    report = setting_paths.absolute(settings, 'report') or None
     resumes = settings.resume and has_checkpoint(settings)
     check_places(native.library, report, None if resumes else _checkpoint_path(settings))
 
@@ -111,11 +110,10 @@ class FitTask(ViewTask):
             self.cancel()
         return super().poll()
 
-    def _advanced(self, fraction, stage):
-        state.fraction, state.stage = fraction, stage
-
-    def _views_left(self, seconds):
-        state.seconds_left = seconds
+    def _advanced(self, stage):
+        state.fraction, state.stage = self.pace.fraction, stage
+        state.seconds_left = self.pace.seconds_left or 0.0
+        state.views_left = (self.pace.part_left or 0.0) if self.holds_scene else 0.0
 
     def _ended(self, error):
         state.is_running = False
@@ -130,7 +128,7 @@ class FitTask(ViewTask):
 
     def _name(self):
         if self._settings.views_from == 'DATASET':
-            return bpy.path.display_name_from_filepath(bpy.path.abspath(self._settings.dataset).rstrip('/\\')) + ' Fit'
+            return bpy.path.display_name_from_filepath(setting_paths.absolute(self._settings, 'dataset')) + ' Fit'
         return (self._objects[0].name if self._objects else 'Scene') + ' Fit'
 
     def _frame_of_views(self):
@@ -138,7 +136,7 @@ class FitTask(ViewTask):
         settings = self._settings
         if settings.views_from != 'DATASET':
             return frames.WORLD
-        return photo_cameras.chosen_frame(bpy.path.abspath(settings.dataset), settings.up_axis)
+        return photo_cameras.chosen_frame(setting_paths.absolute(settings, 'dataset'), settings.up_axis)
 
     def _use(self, views):
         settings = self._settings
@@ -157,15 +155,19 @@ class FitTask(ViewTask):
             most = max(1, settings.max_splats // options.gaussians_per_anchor)
             options.max_anchors = min(options.max_anchors, most)
             options.min_anchors = min(options.min_anchors, options.max_anchors)
+        yield 'use', 0.0, 'Starting the fit'
         self.job = Fit.start(self._native, views, options)
+        begun = None
         try:
             while True:
                 job_state, fraction, stage = self.job.poll()
                 state.figures = self.job.figures()
                 if job_state != JobState.RUNNING:
                     break
-                state.seconds_left = state.figures.seconds_left if state.figures.iteration else 0.0
-                yield VIEWS_END + (_FIT_END - VIEWS_END) * fraction, _STAGES.get(stage, stage)
+                if begun is None and state.figures.iteration:
+                    begun = state.figures.iteration - 1  # of a fit that goes on
+                left = None if begun is None else _seconds_left(state.figures, begun)
+                yield 'use', fraction, _STAGES.get(stage, stage or 'Starting the fit'), left
             state.notes = tuple(self.job.notes())
             if not state.figures.iteration:
                 self.job.wait()  # says why
@@ -173,12 +175,11 @@ class FitTask(ViewTask):
             made = self.job.model() if is_field else self.job.result()
             report = self.job.draw_report(fit_reports.SCALE)
             if settings.report:
-                self.job.save_report(bpy.path.abspath(settings.report))
+                self.job.save_report(setting_paths.absolute(settings, 'report'))
         finally:
             self.job = None
-        state.seconds_left = 0.0
         is_whole = state.figures.iteration == state.figures.iterations
-        yield _FIT_END, 'Keeping the result'
+        yield 'keep', 0.0, 'Keeping the result'
         if is_field:
             self._keep(made, sources.first_settings(made.settings()), report)  # seed 0: the fit's own draws
             self._forget(checkpoint if is_whole else None)
@@ -186,7 +187,7 @@ class FitTask(ViewTask):
         seen = made.seen()
         made = cloud_edit.merge([(made, np.eye(4))], self._frame)  # the same splats, with the label of their frame
         job = Model.from_cloud_start(self._native, made, seed=settings.seed)
-        yield from self._until_done(job, _FIT_END, 1.0)
+        yield from self._until_done(job, 'keep')
         self._keep(Model.of_job(job), DecodeSettings(made.info().count), report, seen)
         self._forget(checkpoint if is_whole else None)
 
@@ -204,6 +205,12 @@ class FitTask(ViewTask):
                              report)
         self.result.splats.seen = seen or {}
         state.kept_count = self.result.splats.count
+
+
+def _seconds_left(figures, begun):
+    """Of the steps: at the pace of the last ones, or of all with their measurements where that is slower."""
+    rest = figures.iterations - figures.iteration
+    return max(figures.seconds_left, figures.seconds * rest / (figures.iteration - begun))
 
 
 def seen_objects(context):

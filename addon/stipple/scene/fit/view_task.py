@@ -3,32 +3,31 @@
 
 import time
 
-import bpy
 import numpy as np
 
 from ...binding.errors import CancelledError, StippleError, invalid
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import ColourSpace, JobState
 from ...binding.views import Views
+from ...pace import Pace
 from .. import meshes
 from . import view_capture, view_rigs
-from ..source import sources
+from ..source import setting_paths, sources
 from ..view import facts
 
 # Surface samples that a fit of meshes starts from and learns its density on.
 POINT_COUNT = 20_000
 _POLL_SECONDS = 0.02
-# Shares of the whole in the progress bar: until points are known, until views are.
-_POINTS_END, VIEWS_END = 0.05, 0.35
 
 
 class ViewTask:
     """Polled like a native job, from Blender's main thread: rendering views needs Blender itself.
 
-    A task gives _use(views), a generator of (fraction, stage), and may listen to _advanced, _views_left and _ended.
-    cancel() while views are rendered ends with nothing.
+    A task gives _use(views), a generator of (part, share of it, stage[, seconds left of it]), and may listen to
+    _advanced and _ended. cancel() while views are rendered ends with nothing.
     """
 
+    parts = {'points': 0.05, 'views': 0.30, 'use': 0.62, 'keep': 0.03}  # of the work, and their usual shares
     colour_space = ColourSpace.DISPLAY  # of the splats that the views are for
 
     def __init__(self, context, objects, settings):
@@ -38,16 +37,18 @@ class ViewTask:
         self._context, self._objects, self._settings = context, objects, settings
         self._native = sources.context()
         self._cancelled, self._error = False, None
-        self._progress = (0.0, 'Preparing')
+        self.pace = Pace(self.parts)
+        self._stage = 'Preparing'
         self._steps = self._work()
 
     def poll(self):
         """(state, fraction 0..1, stage). Takes one step: a view, or a look at a native job."""
         if self._steps is not None:
             try:
-                self._progress = next(self._steps)
-                self._advanced(*self._progress)
-                return (JobState.RUNNING, *self._progress)
+                part, share, self._stage, *seconds_left = next(self._steps)
+                self.pace.update(part, share, *seconds_left)
+                self._advanced(self._stage)
+                return JobState.RUNNING, self.pace.fraction, self._stage
             except StopIteration:
                 pass
             except StippleError as error:
@@ -55,9 +56,9 @@ class ViewTask:
             self._steps = None
             self._ended(self._error)
         if self._error is None:
-            return JobState.DONE, 1.0, self._progress[1]
+            return JobState.DONE, 1.0, self._stage
         ended = JobState.CANCELLED if isinstance(self._error, CancelledError) else JobState.FAILED
-        return (ended, *self._progress)
+        return ended, self.pace.fraction, self._stage
 
     def cancel(self):
         self._cancelled = True
@@ -87,11 +88,8 @@ class ViewTask:
     def is_running(self):
         return self._steps is not None
 
-    def _advanced(self, fraction, stage):
+    def _advanced(self, stage):
         pass
-
-    def _views_left(self, seconds):
-        """Seconds until all views are rendered, 0 where it is not known."""
 
     def _ended(self, error):
         pass
@@ -103,10 +101,10 @@ class ViewTask:
     def _work(self):
         settings = self._settings
         if settings.views_from == 'DATASET':
-            yield 0.0, 'Reading the data set'
+            yield 'points', 0.0, 'Reading the data set'
             if not settings.dataset:
                 raise invalid('No data set is chosen; a folder with COLMAP cameras or a transforms.json is needed.')
-            views = Views.open(self._native, bpy.path.abspath(settings.dataset), settings.downscale)
+            views = Views.open(self._native, setting_paths.absolute(settings, 'dataset'), settings.downscale)
         else:
             views = Views.create(self._native, self.colour_space)
             yield from self._add_points(views)
@@ -120,10 +118,11 @@ class ViewTask:
         seen = meshes.source_objects(self._objects)
         if not seen:
             raise invalid('There is no mesh to fit splats to; select one, or show one.')
+        yield 'points', 0.0, 'Reading the meshes'
         depsgraph = self._context.evaluated_depsgraph_get()
         mesh = meshes.native_mesh(self._native, seen, depsgraph, 'MATERIAL')
         job = Model.from_mesh_start(self._native, mesh, 0.0, self._settings.seed)
-        yield from self._until_done(job, 0.0, _POINTS_END)
+        yield from self._until_done(job, 'points')
         cloud = Model.of_job(job).decode(DecodeSettings(POINT_COUNT, 1, seed=self._settings.seed)).read()
         views.set_points(cloud.positions, _linear_colours(cloud))
 
@@ -132,12 +131,9 @@ class ViewTask:
         capturing = view_capture.CaptureSettings(settings.engine, settings.view_size, settings.samples,
                                                  settings.transparent)
         shots = self._shots()
-        start = time.monotonic()
         with view_capture.Capture(self._context, self._objects, capturing) as capture:
             for i, (name, shot) in enumerate(shots):
-                share = i / len(shots)
-                self._views_left((time.monotonic() - start) * (len(shots) / i - 1) if i else 0.0)
-                yield _POINTS_END + (VIEWS_END - _POINTS_END) * share, f'Rendering view {i + 1} of {len(shots)}'
+                yield 'views', i / len(shots), f'Rendering view {i + 1} of {len(shots)}'
                 self._check_cancelled()
                 is_pose = isinstance(shot, view_rigs.Pose)
                 seen = capture.pose(name, shot) if is_pose else capture.camera(shot)
@@ -156,7 +152,7 @@ class ViewTask:
         poses = view_rigs.poses(settings.rig, scene, depsgraph, bounds, settings.view_count, settings.seed)
         return [(f'view_{i:04d}', pose) for i, pose in enumerate(poses)]
 
-    def _until_done(self, job, start, end):
+    def _until_done(self, job, part):
         while True:
             job_state, fraction, stage = job.poll()
             if job_state != JobState.RUNNING:
@@ -164,7 +160,7 @@ class ViewTask:
                 return
             if self._cancelled and self.holds_scene:
                 job.cancel()
-            yield start + (end - start) * fraction, stage
+            yield part, fraction, stage
 
     def _check_cancelled(self):
         if self._cancelled:

@@ -10,7 +10,8 @@ from ...binding.errors import StippleError, invalid
 from ...binding.grade import GradeSettings, graded
 from .. import grades
 from . import sequences
-from ..source import placement, source_settings, sources, splat_data, sync
+from ..source import erased, placement, source_settings, sources, splat_data, sync
+from ..source.erased import Erased
 
 FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
           ('SERIES', "Whole Series",
@@ -20,13 +21,14 @@ FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
 
 @dataclass
 class Decoded:
-    """A model at the budget of one frame."""
+    """A model at the budget of one frame, without what was erased."""
 
     model: object
     settings: object
+    erased: Erased
 
     def read_anew(self, _native):
-        return self.model.decode(self.settings)
+        return self.erased.applied(self.model.decode(self.settings))
 
 
 @dataclass
@@ -106,7 +108,7 @@ def _at_frame(data, stipple, number, budget):
         return sequences.frame_of(data, stipple, number, budget)
     settings = sources.decode_settings(stipple, budget)
     settings.check()
-    return Decoded(sources.model_of(data), settings)
+    return Decoded(sources.model_of(data), settings, erased.read(data))
 
 
 def _fixed_clouds(objects, with_models):

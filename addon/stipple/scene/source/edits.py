@@ -7,7 +7,7 @@ import numpy as np
 
 from ...binding.cloud import Cloud
 from ...binding.errors import invalid
-from . import masks, source_settings, sources, splat_data, sync
+from . import erased, masks, selections, source_settings, sources, splat_data, sync
 
 
 @dataclass
@@ -28,6 +28,10 @@ class Outcome:
     removed: int = 0
     kept: int = 0
 
+    def add(self, other):
+        self.removed += other.removed
+        self.kept += other.kept
+
     def __str__(self):
         return f'{self.removed:,} splats hidden, {self.kept:,} stay'
 
@@ -44,19 +48,29 @@ def selected_splats(context):
 def targets(objects):
     """Each object with its source. Errors: StippleError for none, and for one that cannot take a mask."""
     if not objects:
-        raise invalid('No splat object is selected; select at least one.')
+        raise nothing_is_selected()
     for obj in objects:
         _check(obj)
     found = []
     for obj in objects:
-        cloud = _source_of(obj)
-        mask = masks.read(obj.data)
-        count = cloud.info().count
-        found.append(Target(obj, cloud, np.ones(count, np.uint8) if mask is None else mask))
-        if len(found[-1].mask) != count:
-            raise invalid(f"'{obj.name}' has a mask of {len(found[-1].mask):,} splats; its source has {count:,}. Clear "
-                          'the mask first.')
+        cloud = source_of(obj)
+        found.append(Target(obj, cloud, mask_of(obj, cloud)))
     return found
+
+
+def nothing_is_selected():
+    return invalid('No splat object is selected; select at least one.')
+
+
+def mask_of(obj, cloud):
+    """[N] what stays of an object's whole source. Errors: StippleError for a mask of another count."""
+    mask, count = masks.read(obj.data), cloud.info().count
+    if mask is None:
+        return np.ones(count, np.uint8)
+    if len(mask) != count:
+        raise invalid(f"'{obj.name}' has a mask of {len(mask):,} splats; its source has {count:,}. Clear the mask "
+                      'first.')
+    return mask
 
 
 def spread(mask, chosen):
@@ -72,7 +86,7 @@ def write(edited):
     for target, mask in edited:
         both = target.mask & mask
         if not both.any():
-            raise invalid(f"No splat of '{target.obj.name}' would stay; at least one has to.")
+            raise nothing_stays(target.obj)
     for target, mask in edited:
         data = target.obj.data
         both = target.mask & mask
@@ -80,8 +94,31 @@ def write(edited):
         outcome.removed += before - after
         outcome.kept += after
         masks.store(data, both)
+        selections.trim(data, both)
         show(data, target.cloud)
     return outcome
+
+
+def attach(data, path, count, is_tree, mask=None):
+    """Notes a file of splats, or a tree of so many, as the source of a datablock. mask: [count] what stays of it, None
+    for all."""
+    with sync.paused():
+        masks.clear(data)
+        if is_tree:
+            sources.attach_tree(data, path, count)
+        else:
+            sources.attach_cloud(data, path)
+        if mask is not None:
+            masks.store(data, mask)
+
+
+def is_any_hidden(objects):
+    """Whether splats of any object were hidden or erased. Cheap enough for a menu."""
+    return any(masks.counts(obj.data) is not None or erased.any_of(obj.data) for obj in objects)
+
+
+def nothing_stays(obj):
+    return invalid(f"No splat of '{obj.name}' would stay; at least one has to.")
 
 
 def show(data, cloud=None):
@@ -102,22 +139,28 @@ def refuse_sequence(obj):
                       'Source first, which keeps the present frame alone.')
 
 
-def _check(obj):
+def check_editable(obj, is_edited=sync.is_edited):
+    """Refuses splats that nothing can be taken from. is_edited: tells whether a datablock was edited by hand."""
     data = obj.data
     if data.library is not None:
         raise invalid(f"'{obj.name}' is linked from another file; make it local first.")
     refuse_sequence(obj)
+    if data.stipple.edited or is_edited(data):
+        raise invalid(f"'{obj.name}' was edited by hand; choose Use as New Source or Revert to Source first.")
+
+
+def _check(obj):
+    data = obj.data
     known = source_settings.of(data.stipple)
-    if not known.takes_mask:
+    if not known.takes_mask and data.library is None and not data.stipple.is_sequence:
         made = 'decoded from a learned field' if known.is_learned else 'made from meshes'
         raise invalid(f"'{obj.name}' is {made}, so there are no splats of a file to hide; choose Use as New Source "
                       f"first, "
                       'which keeps the present ones.')
-    if data.stipple.edited or sync.is_edited(data):
-        raise invalid(f"'{obj.name}' was edited by hand; choose Use as New Source or Revert to Source first.")
+    check_editable(obj)
 
 
-def _source_of(obj):
+def source_of(obj):
     """The whole cloud of the source; splats that have none get a file of their own first."""
     data = obj.data
     if not source_settings.of(data.stipple).has_source or not data.stipple.source:

@@ -113,7 +113,7 @@ def size_label(context, operator):
         objects = chosen(context, operator.collection, operator.use_selection)
     except StippleError as error:
         return str(error)
-    form = formats.of_path(operator.filepath) or formats.of_path('a' + formats.USUAL_ENDING)
+    form = formats.of_path(operator.filepath) or formats.of_path('a' + formats.USUAL_EXTENSION)
     total = size = 0
     for obj in objects:
         count = _count(obj.data, operator.budget)

@@ -7,11 +7,11 @@ from . import sources
 
 # Blender asks which files may be dropped into its windows while it registers, before any library is loaded; a test
 # compares these with the library's.
-DROPPED_ENDINGS = (
+DROPPED_EXTENSIONS = (
     '.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog',
 )
 # Of dialogs, until a name is typed.
-USUAL_ENDING = '.ply'
+USUAL_EXTENSION = '.ply'
 _known = {}
 
 
@@ -36,7 +36,7 @@ def write_extensions():
 
 
 def of_path(path):
-    """The format whose ending a path has (the longest that fits), or None."""
+    """The format whose extension a path has (the longest that fits), or None."""
     fits = [(len(extension), form) for form in all_formats() for extension in form.extensions
             if path.lower().endswith(extension)]
     return max(fits, key=lambda fit: fit[0])[1] if fits else None

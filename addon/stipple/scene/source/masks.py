@@ -16,12 +16,8 @@ COUNTS_KEY = 'stipple_mask_counts'  # splats of the source, and those that stay
 
 def read(data):
     """The mask [N], 1 for a splat that stays, or None where all stay."""
-    packed = data.get(MASK_KEY)
-    if packed is None:
-        return None
-    total = data[COUNTS_KEY][0]
-    bits = np.frombuffer(zlib.decompress(base64.b64decode(packed)), np.uint8)
-    return np.unpackbits(bits, count=total)
+    text = data.get(MASK_KEY)
+    return None if text is None else unpacked(text, data[COUNTS_KEY][0])
 
 
 def store(data, mask):
@@ -30,8 +26,23 @@ def store(data, mask):
     if kept == len(mask):
         clear(data)
         return
-    data[MASK_KEY] = base64.b64encode(zlib.compress(np.packbits(mask != 0).tobytes(), 1)).decode()
+    data[MASK_KEY] = packed(mask)
     data[COUNTS_KEY] = [len(mask), kept]
+
+
+def packed(mask):
+    """A mask as text."""
+    return base64.b64encode(zlib.compress(np.packbits(mask != 0).tobytes(), 1)).decode()
+
+
+def unpacked(text, count):
+    """The mask [count] of a text. Errors: ValueError and zlib.error for a text that is of no such mask."""
+    size = -(-count // 8)
+    reader = zlib.decompressobj()
+    bits = reader.decompress(base64.b64decode(text, validate=True), size + 1)  # whatever the text claims to hold
+    if len(bits) != size:
+        raise ValueError(f'{len(bits):,} bytes of a mask; {count:,} splats have {size:,}')
+    return np.unpackbits(np.frombuffer(bits, np.uint8), count=count)
 
 
 def clear(data):
@@ -54,5 +65,5 @@ def counts(data):
 
 def key(data):
     """A text that is equal for equal masks; empty for none."""
-    packed = data.get(MASK_KEY)
-    return '' if packed is None else f'mask {zlib.crc32(packed.encode()):08x}'
+    text = data.get(MASK_KEY)
+    return '' if text is None else f'mask {zlib.crc32(text.encode()):08x}'

@@ -37,3 +37,29 @@ def new_object(name, positions, triangles, matrix, collection, purpose):
     obj.visible_camera = purpose != 'CASTER'
     obj.hide_render = purpose == 'HIDDEN'
     return obj
+
+
+def plane_over(levelling, lowest, highest, extend):
+    """(positions [4,3], triangles [2,3]) of the rectangle at height 0 of the frame that the rigid 4x4 matrix leads to,
+    back in the frame that it comes from. lowest, highest [3]: of what it is to lie under, metres; extend: how much
+    larger than that it is, as a share."""
+    (x0, y0), (x1, y1) = lowest[:2], highest[:2]
+    grown_x, grown_y = 0.5 * extend * (x1 - x0), 0.5 * extend * (y1 - y0)
+    corners = np.array([(x, y, 0.0, 1.0) for x, y in ((x0 - grown_x, y0 - grown_y), (x1 + grown_x, y0 - grown_y),
+                                                      (x1 + grown_x, y1 + grown_y), (x0 - grown_x, y1 + grown_y))])
+    return (corners @ np.linalg.inv(levelling).T)[:, :3], np.array([(0, 1, 2), (0, 2, 3)])
+
+
+def smooth_and_shrink(obj, depth):
+    """Shades a mesh of voxels as what it stands for, and moves its surface inwards by so many metres of the world."""
+    obj.data.polygons.foreach_set('use_smooth', [True] * len(obj.data.polygons))
+    if depth > 0:
+        shrink = obj.modifiers.new("Inset", 'DISPLACE')
+        shrink.mid_level = 0.0
+        shrink.strength = -depth / float(np.mean(np.abs(obj.matrix_world.to_scale())))
+
+
+def keep_with(obj, parent):
+    """Makes an object move along with another, from where it is."""
+    obj.parent = parent
+    obj.matrix_parent_inverse = parent.matrix_world.inverted()

@@ -30,9 +30,9 @@ class SourceFiles:
             for number in range(_MOST_COPIES):
                 yield os.path.join(folder, self.folder + (f'.{number:03d}' if number else '')), self.names
             return
-        stem, ending = numbered.split_extension(self.names[0])
+        stem, extension = numbered.split_extension(self.names[0])
         for number in range(_MOST_COPIES):
-            yield folder, (f'{stem}.{number:03d}{ending}' if number else self.names[0],)
+            yield folder, (f'{stem}.{number:03d}{extension}' if number else self.names[0],)
 
 
 def of(path, is_sequence):

@@ -11,6 +11,7 @@ same path as text, for scripts and for files without such an Image.
 import logging
 import os
 import re
+import shutil
 
 import bpy
 
@@ -21,6 +22,8 @@ MODEL_SUFFIX = '.stipple.safetensors'
 FOLDER = 'stipple'  # beside the .blend
 _MARK = 'stipple_source'  # a property of Images that hold a path
 _LONGEST_NAME = 60
+# What Blender takes an Image for. It remaps the paths of both; a movie it does not pack.
+FILE, WHOLE = 'FILE', 'MOVIE'
 
 log = logging.getLogger('stipple')
 _unpacked = {}  # what tells a packed file from others → where it lies as a file
@@ -37,6 +40,11 @@ def of(data):
     return data.stipple.source if file is None else file.filepath
 
 
+def identity(stipple):
+    """A text that is equal for equal sources, wherever they lie."""
+    return stipple.source_stamp or stipple.source
+
+
 def file_of(data):
     """Where the source of a datablock lies now; a packed one that is not there is unpacked for this session."""
     data = data.original
@@ -45,9 +53,22 @@ def file_of(data):
         return absolute(data.stipple.source, data)
     owner = file.override_library.reference if file.override_library is not None else file
     path = os.path.normpath(bpy.path.abspath(file.filepath, library=owner.library))
-    if file.packed_file is None or data.stipple.is_sequence or not is_alone(path) or os.path.exists(path):
+    if file.packed_file is None or not is_alone(path) or os.path.exists(path):
         return path
-    return _unpack(file, path)
+    return _unpack(packed_files(data), path)
+
+
+def packed_files(data):
+    """The packed Images of a datablock's source, the first file's first: all those of a packed series."""
+    first = data.stipple.source_file
+    others = [entry.file for entry in data.stipple.series_files] if data.stipple.is_sequence else []
+    return [file for file in dict.fromkeys([first, *others]) if file is not None and file.packed_file is not None]
+
+
+def packed_images():
+    """{absolute path: packed Image of this file that holds one of our files}."""
+    return {os.path.normpath(bpy.path.abspath(file.filepath)): file for file in bpy.data.images
+            if is_own(file) and file.get(_MARK) and file.packed_file is not None}
 
 
 def is_alone(path):
@@ -68,12 +89,14 @@ def stored(path):
 def note(stipple, _context=None):
     """Update function of `source`: the Image follows the text."""
     file = stipple.source_file
+    kind = WHOLE if stipple.is_sequence else FILE
     if not stipple.source:
         stipple.source_file = None
-    elif file is None or file.filepath != stipple.source or is_own(stipple.id_data) and not is_own(file):
+    elif (file is None or file.filepath != stipple.source or is_own(stipple.id_data) and not is_own(file)
+          or is_own(file) and file.source != kind and file.packed_file is None):
         if file is None or not is_own(file) or file.users > 1 or file.packed_file is not None:
-            file = _image_of(stipple.source)
-        file.filepath = stipple.source
+            file = image_of(stipple.source, kind)
+        file.source, file.filepath = kind, stipple.source
         stipple.source_file = file
 
 
@@ -117,6 +140,26 @@ def splat_datablocks():
                 yield data
 
 
+def image_of(path, kind):
+    """An Image of this file for a path: the one that others with the same path have, else a new one. kind: FILE or
+    WHOLE."""
+    for file in bpy.data.images:
+        if (is_own(file) and file.get(_MARK) and file.filepath == path and file.source == kind
+                and file.packed_file is None):
+            return file
+    return new_image(path, kind)
+
+
+def new_image(path, kind):
+    """An Image that holds a path and is never read as an image."""
+    name = bpy.path.basename(path.rstrip('/\\')) or 'folder'
+    file = bpy.data.images.new('.' + name[:_LONGEST_NAME], 1, 1)
+    file.source = kind
+    file.filepath = path
+    file[_MARK] = True
+    return file
+
+
 def forget():
     """Files that were unpacked belong to the .blend before."""
     _unpacked.clear()
@@ -132,33 +175,22 @@ def _library_of(owner, path):
     return owner.library
 
 
-def _image_of(path):
-    """An Image of this file for a path: the one that others with the same source have, else a new one."""
-    for file in bpy.data.images:
-        if is_own(file) and file.get(_MARK) and file.filepath == path and file.packed_file is None:
-            return file
-    file = bpy.data.images.new('.' + bpy.path.basename(path)[:_LONGEST_NAME], 1, 1)
-    file.source = 'FILE'
-    file[_MARK] = True
-    return file
-
-
-def _unpack(file, path):
-    """A packed file as one in the folder of this session; where that cannot be written, the path that it is missing
-    from."""
-    key = (file.name_full, file.filepath, file.packed_file.size)
+def _unpack(files, path):
+    """Packed files in a folder of this session: the path of the first there; where that cannot be written, the path
+    that it is missing from."""
+    key = tuple((file.name_full, file.filepath, file.packed_file.size) for file in files)
     known = _unpacked.get(key)
     if known is None or not os.path.exists(known):
         folder = os.path.join(bpy.app.tempdir, FOLDER, str(len(_unpacked)))
         known = os.path.join(folder, os.path.basename(path))
         try:
             os.makedirs(folder, exist_ok=True)
-            with open(known, 'wb') as unpacked:
-                unpacked.write(file.packed_file.data)
+            for file in files:
+                with open(os.path.join(folder, bpy.path.basename(file.filepath)), 'wb') as unpacked:
+                    unpacked.write(file.packed_file.data)
         except OSError as error:
-            log.error("The packed source '%s' cannot be unpacked into '%s': %s", file.name, folder, error.strerror)
-            if os.path.exists(known):
-                os.remove(known)
+            log.error("The packed source '%s' cannot be unpacked into '%s': %s", files[0].name, folder, error.strerror)
+            shutil.rmtree(folder, ignore_errors=True)
             known = path
         _unpacked[key] = known
     return known

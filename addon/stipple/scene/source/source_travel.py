@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ...binding.errors import StippleError
 from .. import handlers
-from . import source_files, source_paths, sources, splat_data, sync
+from . import setting_paths, source_files, source_packing, source_paths, sources, splat_data, sync
 from .source_paths import log
 
 # told: whether this Blender tells the path before it saves. before: the path until then.
@@ -44,6 +44,7 @@ def point_at(file, path):
 
 def follow_texts():
     """The texts say what the Images hold; splats of earlier versions get an Image."""
+    setting_paths.follow()
     for data in source_paths.splat_datablocks():
         stipple = data.stipple
         if not source_paths.is_own(data):
@@ -55,6 +56,8 @@ def follow_texts():
             stipple.source = source_paths.stored(source_paths.file_of(data))
         elif stipple.source != file.filepath:
             stipple.source = file.filepath
+        else:
+            source_paths.note(stipple)  # a series of a version that had it packed in part
 
 
 def say_missing():
@@ -78,9 +81,9 @@ def _adopt(data):
     _find(data, _state['homes'] + libraries)
     written = data.get(sync.WRITTEN_KEY, '')
     if written.startswith(before + '|'):
-        data[sync.WRITTEN_KEY] = sources.identity(stipple) + written[len(before):]
+        data[sync.WRITTEN_KEY] = source_paths.identity(stipple) + written[len(before):]
     if data.get(splat_data.SEEN_SOURCE_KEY) == before:
-        data[splat_data.SEEN_SOURCE_KEY] = sources.identity(stipple)
+        data[splat_data.SEEN_SOURCE_KEY] = source_paths.identity(stipple)
 
 
 def _find(data, folders):
@@ -134,6 +137,7 @@ def _save_pre(*arguments):
         _state['homes'] = [home] + [other for other in _state['homes'] if other != home]
     _state['changed'] = _bring_home(source_paths.folder_beside(path)) if path else []
     follow_texts()
+    source_packing.complete()
 
 
 @persistent
@@ -147,7 +151,10 @@ def _save_post(*arguments):
             for name, before in changed:
                 bpy.data.images[name, None].filepath = before
     elif bpy.data.filepath != _state['before']:
-        # Blender 3.4 tells no path beforehand, so that what is beside the file is known only now.
+        # Blender 3.4 tells save_pre nothing, so that what is beside the file is known only now. To write a path beside
+        # an unknown place before would spare the second writing, and lose data: Save Copy and Save Startup File
+        # look the same to save_pre, and of a save that fails nobody hears at all (there is no save_post_fail). Their
+        # files, or the one that is open, would name sources that are not there.
         if _bring_home(source_paths.folder_beside(bpy.data.filepath)):
             _save_again()
     follow_texts()
@@ -183,6 +190,7 @@ def _save_post_fail(*_):
 @persistent
 def _loaded(*_):
     source_paths.forget()
+    source_packing.forget()
     _said.clear()
     _state['homes'] = []
     _imported()
@@ -194,6 +202,7 @@ def _undone(*_):
     for data in source_paths.splat_datablocks():
         if data.stipple.source_file is not None:
             _find(data, _state['homes'])
+    setting_paths.find(_state['homes'])
     follow_texts()
 
 

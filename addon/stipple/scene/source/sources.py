@@ -22,7 +22,7 @@ from ...binding.errors import StippleError
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import AnchorOrder, JobState, Status
 from .. import meshes
-from . import masks, source_paths, source_settings, splat_data
+from . import erased, masks, selections, source_paths, source_settings, splat_data
 from .source_paths import MODEL_SUFFIX
 
 _MAX_MODELS = 4
@@ -40,6 +40,7 @@ _stamps = {}
 _models = OrderedDict()
 _reading = {}  # jobs of models that were asked for, by the same keys
 _clouds = OrderedDict()
+_whole = {}  # the cloud of whole_cloud() that was asked for last: one edit of a source comes after another
 
 
 def library_problem():
@@ -70,6 +71,7 @@ def forget():
     for job in _reading.values():
         job.close()
     _reading.clear()
+    _whole.clear()
     _clouds.clear()
     _models.clear()
     _contexts.clear()
@@ -99,11 +101,6 @@ def check_unchanged(data):
         what = 'is missing' if found == 'MISSING' else 'has changed since it was read'
         raise StippleError(f"The source '{source_paths.file_of(data)}' of '{data.name}' {what}; choose "
                            'Relink, or Use as New Source to keep the splats that are stored.', Status.ERROR_IO)
-
-
-def identity(stipple):
-    """A text that is equal for equal sources, wherever they lie."""
-    return stipple.source_stamp or stipple.source
 
 
 def stamp(path):
@@ -212,10 +209,10 @@ def decode(data, settings):
     """The cloud of a datablock's model at these settings; kept for the next image. Errors: StippleError, also for a
     source that has changed."""
     check_unchanged(data)
-    key = (_file_key(source_paths.file_of(data)) + (masks.key(data),), settings)
+    key = (_file_key(source_paths.file_of(data)) + (masks.key(data), erased.key(data)), settings)
     cloud = _clouds.get(key)
     if cloud is None:
-        cloud = model_of(data).decode(settings)
+        cloud = _decoded(data, settings)
         _clouds[key] = cloud
         total = sum(k[1].anchors * k[1].gaussians_per_anchor for k in _clouds)
         while total > _MAX_CACHED_SPLATS and len(_clouds) > 1:
@@ -226,18 +223,28 @@ def decode(data, settings):
 
 
 def decode_data(data, settings):
-    """The cloud that a datablock's source gives at these settings, without what its mask leaves out."""
+    """The cloud that a datablock's source gives at these settings, without what was hidden or erased."""
     if source_settings.of(data.stipple).as_they_are:
         return masked(whole_cloud(data), data)
-    return model_of(data).decode(settings)
+    return _decoded(data, settings)
+
+
+def _decoded(data, settings):
+    return erased.read(data).applied(model_of(data).decode(settings))
 
 
 def whole_cloud(data):
-    """All splats of a datablock's source, masked ones too."""
+    """All splats of a datablock's source, masked ones too; the last one is kept."""
     path = source_paths.file_of(data)
-    if source_settings.of(data.stipple).counts_splats:
-        return model(path).decode(DecodeSettings(data.stipple.source_count))
-    return Cloud.load(context(), path)
+    key = _file_key(path)
+    if key not in _whole:
+        if source_settings.of(data.stipple).counts_splats:
+            cloud = model(path).decode(DecodeSettings(data.stipple.source_count))
+        else:
+            cloud = Cloud.load(context(), path)
+        _whole.clear()
+        _whole[key] = cloud
+    return _whole[key]
 
 
 def full_cloud(data):
@@ -340,6 +347,7 @@ def save_cloud(cloud, name):
 
 def attach_tree(data, path, count):
     """Notes a splat tree of this many splats as the source of a datablock; its mask stays."""
+    _end_edits(data)
     stipple = data.stipple
     stipple.source = source_paths.stored(path)
     stipple.source_stamp = stamp(path)
@@ -352,6 +360,7 @@ def attach_tree(data, path, count):
 
 def attach_cloud(data, path):
     """Notes a splat file as the source of a datablock, all of it shown."""
+    _end_edits(data)
     stipple = data.stipple
     stipple.source = source_paths.stored(path)
     stipple.source_stamp = stamp(path)
@@ -360,6 +369,12 @@ def attach_cloud(data, path):
     stipple.source_objects.clear()
     stipple.source_changed = stipple.edited = False
     masks.clear(data)
+
+
+def _end_edits(data):
+    """A new source of splats holds what was left of the one before, and nothing of it is selected."""
+    erased.clear(data)
+    selections.clear(data)
 
 
 def _save(write, path, suffix, overwrite):

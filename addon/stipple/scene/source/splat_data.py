@@ -35,9 +35,11 @@ SEEN_SOURCE_KEY = 'stipple_seen_source'
 MIN_SCALE = 1e-9
 
 
-def new_data(name):
-    """An empty splat datablock of the kind that this Blender holds splats in."""
-    data = bpy.data.pointclouds.new(name) if version.HAS_SIZED_POINT_CLOUDS else bpy.data.meshes.new(name)
+def new_data(name, like=None):
+    """An empty splat datablock of the kind that this Blender holds splats in. like: of the kind of this datablock,
+    which an object of it can take; one of an older Blender's file is a mesh."""
+    is_mesh = isinstance(like, bpy.types.Mesh) if like is not None else not version.HAS_SIZED_POINT_CLOUDS
+    data = bpy.data.meshes.new(name) if is_mesh else bpy.data.pointclouds.new(name)
     data[LAYOUT_KEY] = LAYOUT
     return data
 

@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 from ...binding.errors import StippleError
 from .. import grades, handlers, limits, meshes
 from ..sequence import sequences
-from . import masks, source_settings, sources, splat_data
+from . import erased, masks, selections, source_paths, source_settings, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -91,8 +91,8 @@ def _decoded(data, settings):
     settings.check()
     sources.check_unchanged(data)
     made = sources.decode_data(data, settings).columns()
-    if not masks.key(data):
-        made.seen = splat_data.kept_seen(data, sources.identity(data.stipple), made.count)
+    if not masks.key(data) and not erased.any_of(data):
+        made.seen = splat_data.kept_seen(data, source_paths.identity(data.stipple), made.count)
     return made
 
 
@@ -117,7 +117,7 @@ def write(data, splats, key, grade=None):
 
 def write_decoded(data, splats):
     """Stores splats that were decoded with the present settings."""
-    splat_data.keep_seen(data, sources.identity(data.stipple), splats.seen)
+    splat_data.keep_seen(data, source_paths.identity(data.stipple), splats.seen)
     write(data, splats, written_key(data, sources.decode_settings(data.stipple)))
 
 
@@ -132,13 +132,15 @@ def written_key(data, settings):
     known = source_settings.of(data.stipple)
     if known.as_they_are:
         return masks.key(data)
-    parts = [sources.identity(data.stipple), settings.anchors]
+    parts = [source_paths.identity(data.stipple), settings.anchors]
     if known.counts_anchors:
         parts += [settings.gaussians_per_anchor, int(settings.order), settings.seed]
     if known.takes_mask:
         parts.append(masks.key(data))
     if known.has_time:
         parts.append(f'{settings.time!r} s')
+    if erased.any_of(data):
+        parts.append(erased.key(data))
     return '|'.join(map(str, parts))
 
 
@@ -149,7 +151,8 @@ def copy_settings(old, new):
             setattr(new.stipple, name, getattr(old.stipple, name))
     for entry in old.stipple.source_objects:
         new.stipple.source_objects.add().object = entry.object
-    masks.copy(old, new)
+    for part in (masks, erased, selections):
+        part.copy(old, new)
     if old.animation_data is not None and old.animation_data.action is not None:
         new.animation_data_create().action = old.animation_data.action
 

@@ -82,6 +82,8 @@ def plain_world_colour(world):
     if world is None or not version.has_nodes(world):
         return world_colour(world)
     output = next((n for n in world.node_tree.nodes if n.type == 'OUTPUT_WORLD' and n.is_active_output), None)
+    if output is not None and output.inputs['Volume'].is_linked:
+        return None
     if output is None or not output.inputs['Surface'].is_linked:
         return world_colour(world)
     node = output.inputs['Surface'].links[0].from_node

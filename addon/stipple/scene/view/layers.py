@@ -12,14 +12,17 @@ from ...binding.renderer import Surface
 class CyclesLayers:
     """Passes of an image whose film was transparent."""
 
-    def __init__(self, context, combined, depth, shadow=None):
-        """combined [H,W,4]; depth [H,W] of one sample of each pixel; shadow [H,W,3] factors of what is behind a shadow
-        catcher, or None without one."""
-        self._layers = Layers(context, combined, depth, shadow)
+    def __init__(self, context, combined, depth):
+        """combined [H,W,4]; depth [H,W] of one sample of each pixel; neither has anything of shadow catchers."""
+        self._layers = Layers(context, combined, depth)
 
-    def take_world(self, seen, plain):
-        """seen [H,W,3]: the pass of the world; plain: its colour, or None where it has many."""
-        self._layers.take_world(seen, plain)
+    def take_world(self, seen):
+        """seen [H,W,3]: the pass of the world."""
+        self._layers.take_world(seen)
+
+    def take_shadow(self, shadow):
+        """After take_world. shadow [H,W,3]: factors of the light of what is behind shadow catchers."""
+        self._layers.take_shadow(shadow)
 
     def hold_out(self, matte):
         """Before take_world. matte: a Surface of the holdouts, of which Cycles' passes show nothing but what they leave

@@ -10,6 +10,9 @@ from ..source import sources
 from . import cameras
 
 
+_SOLID = 0.5  # opacity from which on something is there
+
+
 class PointOperator:
     """Mix-in for operators with `points` (flat coordinates), `point_count` and `use_points`: a click for each point.
 
@@ -92,13 +95,37 @@ def point_at(depsgraph, region, region_data, x, y):
 
 def point_of_pixel(placed, camera, x, y):
     """The same for instances of instances.gather and a place in a camera's image, pixels from its top left."""
-    camera.cx, camera.cy, camera.width, camera.height = camera.cx - x + 0.5, camera.cy - y + 0.5, 1, 1
+    _see_pixel(camera, x, y)
     renderer = Renderer(sources.context())
     task = renderer.start(placed, camera, renderer.options(), median_depth=True)
     task.job.wait()
     depth = float(task.depth[0, 0])
     if depth >= EMPTY_DEPTH:
-        raise invalid('There are no solid splats under the mouse; click where the surface is.')
+        raise _nothing_there()
     scale = depth if camera.model == 0 else 1.0
     seen = np.array([(0.5 - camera.cx) / camera.fx * scale, (0.5 - camera.cy) / camera.fy * scale, depth, 1.0])
     return (np.linalg.inv(np.array(camera.world_to_camera).reshape(4, 4)) @ seen)[:3].tolist()
+
+
+def colour_of_pixel(placed, camera, x, y):
+    """The linear colour [3] of instances at such a place, of their harmonics of degree 0 alone. Errors: StippleError
+    where nothing solid is."""
+    _see_pixel(camera, x, y)
+    renderer = Renderer(sources.context())
+    options = renderer.options()
+    options.sh_degree_limit = 0
+    task = renderer.start(placed, camera, options, with_depth=False)
+    task.job.wait()
+    pixel = task.colour[0, 0].astype(np.float64)
+    if pixel[3] < _SOLID:
+        raise _nothing_there()
+    return (pixel[:3] / pixel[3]).tolist()
+
+
+def _see_pixel(camera, x, y):
+    """The camera sees the pixel around a place of its image alone."""
+    camera.cx, camera.cy, camera.width, camera.height = camera.cx - x + 0.5, camera.cy - y + 0.5, 1, 1
+
+
+def _nothing_there():
+    return invalid('There are no solid splats under the mouse; click where the surface is.')

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all operators that select splats have: which splats, which operation, and for those that are drawn, where.
+
+A drawn operator follows the mouse until the button is released and executes once then: one undo step. Scripts give the
+same properties and execute at once, in background too.
+"""
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatVectorProperty, IntVectorProperty
+
+from ...binding.errors import StippleError, invalid
+from ...binding.regions import RegionOperation
+from ...jobs import JobOperator
+from ...scene import selection_settings
+from ...scene.source import edits, selecting
+from ...scene.view import drawn_regions, picking
+from ...viewport.stroke_marks import StrokeMarks
+
+_KEYS_OF_RADIUS = {'WHEELUPMOUSE': 1.1, 'WHEELDOWNMOUSE': 1 / 1.1, 'RIGHT_BRACKET': 1.1, 'LEFT_BRACKET': 1 / 1.1}
+
+
+class SelectOperator(JobOperator):
+    """Mix-in: changes the selections of the selected splat objects by regions_of(obj)."""
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT' and bool(edits.selected_splats(context))
+
+    def start(self, context):
+        targets = selecting.targets(context, edits.selected_splats(context))
+        self._outcome = selecting.select(targets, self.regions_of)
+        return None
+
+    def finish(self, context, _job):
+        redraw(context)
+        self.report({'INFO'}, str(self._outcome))
+
+
+class OperationOperator(SelectOperator):
+    """The same with a choice of operations; the keys that are held when the mouse starts decide over the setting."""
+
+    operation: EnumProperty(name="Operation", description="What becomes of the selection before",
+                            items=selection_settings.OPERATIONS)
+
+    def chosen_operation(self):
+        return RegionOperation[self.operation]
+
+    def take_operation(self, context, event):
+        if self.properties.is_property_set('operation'):
+            return
+        if event.shift and event.ctrl:
+            self.operation = 'INTERSECT'
+        elif event.shift:
+            self.operation = 'ADD'
+        elif event.ctrl:
+            self.operation = 'SUBTRACT'
+        else:
+            self.operation = selection_settings.of(context.scene).operation
+
+
+class DrawnOperator(OperationOperator):
+    """The same, drawn in a 3D view."""
+
+    view_matrix: FloatVectorProperty(size=16, options={'HIDDEN', 'SKIP_SAVE'})
+    projection_matrix: FloatVectorProperty(size=16, options={'HIDDEN', 'SKIP_SAVE'})
+    region_size: IntVectorProperty(size=2, options={'HIDDEN', 'SKIP_SAVE'})
+
+    shape = ''       # of StrokeMarks
+    _marks = None
+    _is_drawing = False
+
+    def invoke(self, context, event):
+        view = picking.view_under(context, event)
+        if view is None and event.type == 'LEFTMOUSE':
+            return {'PASS_THROUGH'}
+        self._region, self._region_data = (None, None) if view is None else view[:2]
+        self.take_settings(context)
+        self._marks = StrokeMarks(self.shape, self.mark_radius(context))
+        if event.type == 'LEFTMOUSE' and event.value in {'PRESS', 'CLICK_DRAG'}:
+            if not self._press(context, event):
+                self._leave(context)
+                return {'CANCELLED'}
+        elif view is not None:
+            self._marks.move(self._region, *view[2:])
+        context.window_manager.modal_handler_add(self)
+        context.workspace.status_text_set(self.help_text())
+        return {'RUNNING_MODAL'}
+
+    def modal(self, context, event):
+        if event.type in {'ESC', 'RIGHTMOUSE'}:
+            self._leave(context)
+            return {'CANCELLED'}
+        factor = _KEYS_OF_RADIUS.get(event.type) if event.value == 'PRESS' else None
+        if factor is not None and self.scale_radius(context, factor):
+            self._marks.radius = self.mark_radius(context)
+            self._marks.redraw()
+            return {'RUNNING_MODAL'}
+        if event.type in {'MOUSEMOVE', 'INBETWEEN_MOUSEMOVE'}:
+            self._move(context, event)
+            return {'RUNNING_MODAL'}
+        if event.type == 'LEFTMOUSE' and event.value == 'PRESS' and not self._is_drawing:
+            if picking.view_under(context, event) is None:
+                return {'PASS_THROUGH'}
+            if not self._press(context, event):
+                self._leave(context)
+                return {'CANCELLED'}
+            return {'RUNNING_MODAL'}
+        if event.type == 'LEFTMOUSE' and event.value == 'RELEASE' and self._is_drawing:
+            self._move(context, event)
+            is_done = self.release(context)
+            self._leave(context)
+            return self.execute(context) if is_done else {'CANCELLED'}
+        # While nothing is drawn, the view can be rotated.
+        return {'RUNNING_MODAL'} if self._is_drawing else {'PASS_THROUGH'}
+
+    def cancel(self, context):
+        """Blender itself ends the operator, for instance when the window closes."""
+        if self._marks is not None:
+            self._leave(context)
+        super().cancel(context)
+
+    # What the kinds of drawing fill in.
+
+    def take_settings(self, context):
+        """Settings of the scene, where the caller gives none."""
+
+    def mark_radius(self, _context):
+        return 0.0
+
+    def scale_radius(self, _context, _factor):
+        """Whether the radius was changed."""
+        return False
+
+    def press(self, context, place):
+        """The button goes down at a place of the view, pixels. Errors: StippleError."""
+
+    def drag(self, context, place):
+        """The mouse is at another place."""
+
+    def release(self, _context):
+        """Whether there is something to execute."""
+        return True
+
+    def help_text(self):
+        return f'{self.bl_label}: draw on the splats. Shift adds, Ctrl subtracts, both intersect, Esc cancels'
+
+    def camera(self):
+        """The camera of the view that was drawn in. Errors: StippleError."""
+        return drawn_regions.camera_of(self.view_matrix, self.projection_matrix, self.region_size)
+
+    def _press(self, context, event):
+        view = picking.view_under(context, event)
+        self._region, self._region_data = view[:2]
+        if not any(self.properties.is_property_set(name) for name in ('view_matrix', 'projection_matrix')):
+            self.view_matrix = [value for row in self._region_data.view_matrix for value in row]
+            self.projection_matrix = [value for row in self._region_data.window_matrix for value in row]
+            self.region_size = self._region.width, self._region.height
+        self.take_operation(context, event)
+        try:
+            self.press(context, self._place(event))
+        except StippleError as error:
+            self.report({'WARNING'}, str(error))
+            return False
+        self._is_drawing = True
+        self._marks.begin(self._region, self._place(event))
+        return True
+
+    def _move(self, context, event):
+        if self._is_drawing:
+            place = self._place(event)
+            self.drag(context, place)
+            self._marks.radius = self.mark_radius(context)
+            self._marks.add(place)
+            return
+        view = picking.view_under(context, event)
+        if view is None:
+            self._marks.move(None, 0, 0)
+        else:
+            self._marks.move(view[0], *view[2:])
+
+    def _place(self, event):
+        """Of the mouse in the view, pixels from its bottom left corner."""
+        return event.mouse_x - self._region.x + 0.5, event.mouse_y - self._region.y + 0.5
+
+    def _leave(self, context):
+        self._marks.close()
+        self._marks = None
+        context.workspace.status_text_set(None)
+
+
+class PathOperator(DrawnOperator):
+    """The same, along a path."""
+
+    path: CollectionProperty(type=bpy.types.OperatorMousePath, options={'HIDDEN', 'SKIP_SAVE'})
+    front_only: BoolProperty(name="Front Only", description="Select what is seen, and nothing that lies behind other "
+                             "splats", default=False)
+
+    def take_settings(self, context):
+        if not self.properties.is_property_set('front_only'):
+            self.front_only = selection_settings.of(context.scene).front_only
+
+    def press(self, context, place):
+        if self.front_only:
+            # It is drawn while the stroke is.
+            self._start_front(context)
+        self.path.clear()
+        self._add(place)
+
+    def drag(self, _context, place):
+        self._add(place)
+
+    def points(self):
+        """[(x, y)] of the path. Errors: StippleError for none."""
+        if not len(self.path):
+            raise invalid('The stroke has no path; give it at least one place in pixels.')
+        return [tuple(entry.loc) for entry in self.path]
+
+    def start(self, context):
+        self._camera = self.camera()
+        self._front = self._start_front(context).front() if self.front_only else None
+        return super().start(context)
+
+    def _start_front(self, context):
+        space = context.space_data if context.area is not None and context.area.type == 'VIEW_3D' else None
+        return drawn_regions.start_front(context.evaluated_depsgraph_get(), self.camera(), space)
+
+    def _add(self, place):
+        if len(self.path) == 0 or tuple(self.path[-1].loc) != place:
+            entry = self.path.add()
+            entry.loc = place
+
+
+def redraw(context):
+    """What is selected is drawn in 3D views, and counted in panels."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {'VIEW_3D', 'PROPERTIES'}:
+                area.tag_redraw()

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tools that select splats with the mouse, in a window on a virtual screen."""
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+import screen
+import selection_steps
+
+
+@pytest.fixture(scope='module')
+def shots(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('window')
+    pictures, text = screen.run_steps(Path(selection_steps.__file__), folder, bpy.app.binary_path, timeout=500,
+                                      options=('--enable-event-simulate',))
+    assert 'Traceback' not in text, text
+    return pictures, json.loads((folder / 'facts.json').read_text())
+
+
+def test_strokes_select_extend_subtract_and_undo(shots):
+    counts = shots[1]['steps']
+    assert counts['brush'] > 500
+    assert 100 < counts['subtracted'] < counts['brush'] - 100
+    assert counts['added'] > counts['subtracted'] + 50
+    assert counts['undone'] == counts['subtracted'] and counts['undone_twice'] == counts['brush']
+    assert counts['cancelled'] == counts['brush']
+
+
+def test_front_only_takes_the_first_wall(shots):
+    counts = shots[1]['steps']
+    assert 0.4 * counts['brush'] < counts['front'] < 0.6 * counts['brush']
+
+
+def test_the_other_tools_select(shots):
+    counts = shots[1]['steps']
+    assert counts['lasso'] > 500 and counts['sphere'] > 50
+    # Half of both walls is red.
+    assert 3500 < counts['color'] < 4500
+    red, green, blue = shots[1]['color']
+    assert red > 0.6 and green < 0.05 and blue < 0.05
+    assert shots[1]['tools'] == ['stipple.select_brush', 'stipple.select_sphere', 'stipple.select_color',
+                                 'stipple.select_brush']
+    assert shots[1]['tool_of_button'] == 'stipple.select_lasso'
+
+
+def test_keys_change_the_radius_and_the_wheel_leaves_the_view(shots):
+    radii, distances = shots[1]['radii'], shots[1]['distances']
+    assert radii['larger'] == pytest.approx(44, rel=0.01) and radii['smaller'] == pytest.approx(40 / 1.1, rel=0.01)
+    assert radii['wheel'] == pytest.approx(40 * 1.1, rel=0.01)
+    assert distances['before'] == distances['after']
+    # The wheel is the view's again, and F drags the radius as it does for other brushes.
+    assert distances['zoomed'] != distances['before']
+    assert radii['dragged'] == pytest.approx(70, abs=15)
+
+
+def test_tools_come_and_go_with_the_add_on(shots):
+    assert shots[1]['disabled'] == []
+    assert shots[1]['enabled'] == ['stipple.select_brush', 'stipple.select_lasso', 'stipple.select_sphere',
+                                   'stipple.select_color']
+
+
+def test_selected_splats_and_strokes_are_drawn(shots):
+    pictures, facts = shots
+    changed = {name: (pictures[name] != pictures['hover']).any(-1).sum() for name in ('stroke', 'brush', 'lasso')}
+    assert changed['brush'] > 2000 and changed['stroke'] > 100, changed
+    # The theme's colour over what the stroke has passed, and nowhere before.
+    def of_theme(name):
+        return (np.abs(pictures[name] - 255 * np.array(facts['theme'])).max(axis=-1) < 8).sum()
+    assert of_theme('brush') > 1000 and of_theme('hover') < 50
+
+
+def test_erased_splats_are_gone(shots):
+    assert shots[1]['steps']['erased'] == 0
+    assert (shots[0]['erased'] != shots[0]['hover']).any(-1).sum() > 5000
