@@ -43,7 +43,7 @@ SYSTEM_HEADERS = re.compile(r'(stdint|stddef|strings|dlfcn|unistd|fcntl|pthread|
                             r'execinfo)\.h'
                             r'|sys/(file|stat|mman|types|resource|wait|statvfs|ioctl)\.h|[a-z_0-9]+')
 
-SOURCE_ENDINGS = ('.cpp', '.h', '.c', '.py', '.sh', '.cmake', 'CMakeLists.txt')
+SOURCE_EXTENSIONS = ('.cpp', '.h', '.c', '.py', '.sh', '.cmake', 'CMakeLists.txt')
 LINE_LIMIT = 600
 PROSE_WIDTH = 120  # characters of a line of documentation, and of Python
 FILE_LIMIT = 40  # of one folder
@@ -184,7 +184,7 @@ def blender_import_violations(folder):
 def length_violations(root):
     found = []
     for name in project_files(root):
-        if name.endswith(SOURCE_ENDINGS) and name not in LONGER_ALLOWED:
+        if name.endswith(SOURCE_EXTENSIONS) and name not in LONGER_ALLOWED:
             lines = (pathlib.Path(root) / name).read_bytes().count(b'\n')
             if lines > LINE_LIMIT:
                 found.append(f'{name}: {lines} lines, at most {LINE_LIMIT} are allowed')

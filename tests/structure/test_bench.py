@@ -28,6 +28,15 @@ def bench(tmp_path):
     return run
 
 
+def test_the_program_is_where_the_command_looks_for_it():
+    looked_for = re.search(r'tests/bench\.py (build/release/\S+)', (ROOT / 'tests' / 'run.sh').read_text())[1]
+    program = ROOT / looked_for
+    if not (ROOT / 'build' / 'release' / 'build.ninja').exists():
+        pytest.skip('build/release is not built here')
+    names = subprocess.run([program, '--benchmark_list_tests'], capture_output=True, text=True, check=True).stdout
+    assert len(names.split()) > 100
+
+
 FAST = {'name': 'io.read.1M/iterations:8/manual_time', 'ratio_fread': 0.7, 'best_ms': 3.0}
 LIMIT = '# why\n\nio.read.*  fread  >= 0.6   as fast as one fread\n'
 
