@@ -12,6 +12,8 @@ packages=(
   # start and the tests use OpenImageIO's tools too.
   nlohmann-json3-dev libopenvdb-dev libboost-dev libtinygltf-dev libopenimageio-dev openimageio-tools
   zlib1g-dev libzstd-dev libwebp-dev
+  # Matrix products of networks.
+  libdnnl-dev
   # The command-line tool.
   libcli11-dev
   # Images of plots: one header that reads and fills the outlines of letters.

@@ -14,7 +14,7 @@ TOP_LEVEL = {'CMakeLists.txt', 'CMakePresets.json', 'LICENSE', 'README.md', '.gi
 
 # How a third-party header is recognised: package name of the table -> start of the included path.
 THIRD_PARTY = {
-    'oneTBB': r'(tbb|oneapi)/',
+    'oneTBB': r'(tbb|oneapi/tbb)/',
     'Eigen': r'Eigen/',
     'Highway': r'hwy/',
     'nanoflann': r'nanoflann\.hpp',
@@ -28,12 +28,14 @@ THIRD_PARTY = {
     'zstd': r'(zstd|zdict)(_errors)?\.h',
     'CLI11': r'CLI/',
     'stb': r'stb/',
+    'oneDNN': r'(oneapi/)?dnnl/|dnnl\w*\.h',
     'Google Benchmark': r'benchmark/',
 }
 # A format's library is known to the files of that format only (benchmarks may measure against some).
 FORMAT_FILES = {'OpenVDB': r'native/(io/media/volume_|bench/)', 'tinygltf': r'native/io/media/gltf_',
                 'OpenImageIO': r'native/(io/media/image_|bench/)', 'zlib': r'native/io/media/zlib_',
-                'zstd': r'native/io/media/zstd_', 'libwebp': r'native/io/media/webp_'}
+                'zstd': r'native/io/media/zstd_', 'libwebp': r'native/io/media/webp_',
+                'oneDNN': r'native/nn/onednn/'}
 
 # Headers of ours whose purpose is to hand a package's types to every folder.
 CARRIERS = {'math/vec.h': {'Eigen'}}

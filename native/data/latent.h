@@ -1,0 +1,21 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace stipple {
+
+/// A code that the decoders of density-sampled Gaussians turn into splats at any budget, with the
+/// camera that the flow network saw the object by.
+struct Latent {
+  uint64_t token_count = 0;
+  uint32_t width = 16;
+  std::vector<float> tokens;  ///< [token_count, width]
+  /// Direction from the origin to the camera (3), 1 / distance (0: orthographic), distance *
+  /// tan(field of view / 2), or half of an orthographic scale. All 0 where there is none.
+  std::array<float, 5> camera = {0, 0, 0, 0, 0};
+};
+
+}  // namespace stipple

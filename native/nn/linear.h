@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "data/weight_table.h"
+#include "nn/network_run.h"
+
+namespace stipple {
+
+enum class LinearBias { kNeeded, kNone };
+
+/// A linear layer of a file: out = in weightᵀ + bias, weight [outputs, inputs] as PyTorch stores it.
+/// The weight stays in the file and is widened and packed a panel at a time while it is used.
+class Linear {
+ public:
+  Linear() = default;
+  /// Reads `name`.weight and `name`.bias. In: inputs, outputs: as the network needs them, kAnySize
+  /// where the file decides. Errors: kFormat (WeightTable::require).
+  Linear(const WeightTable& weights, const std::string& name, uint64_t inputs, uint64_t outputs,
+         LinearBias bias = LinearBias::kNeeded);
+
+  size_t inputs() const { return inputs_; }
+  size_t outputs() const { return outputs_; }
+  /// In: in [rows, inputs], `in_stride` floats from row to row. Out: out [rows, outputs], likewise;
+  /// apart from `in`.
+  /// Threads and determinism: parallel; same bits for any number of threads.
+  void apply(const NetworkRun& run, size_t rows, const float* in, size_t in_stride, float* out,
+             size_t out_stride) const;
+  /// Rows without gaps.
+  void apply(const NetworkRun& run, size_t rows, const float* in, float* out) const {
+    apply(run, rows, in, inputs_, out, outputs_);
+  }
+
+ private:
+  WeightTable weights_;  // keeps the file
+  const WeightTensor* weight_ = nullptr;
+  std::vector<float> bias_;
+  size_t inputs_ = 0;
+  size_t outputs_ = 0;
+};
+
+}  // namespace stipple

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "data/weight_table.h"
+#include "nn/network_run.h"
+
+namespace stipple {
+
+/// out [rows, outputs] = in [rows, inputs] weightᵀ + bias, for one panel of outputs.
+struct LinearPanel {
+  size_t rows = 0;
+  size_t inputs = 0;
+  size_t outputs = 0;
+  const float* in = nullptr;
+  size_t in_stride = 0;
+  const float* bias = nullptr;  ///< [outputs], or null for none
+  float* out = nullptr;
+  size_t out_stride = 0;
+};
+
+/// What multiplies matrices for networks. Every member works on the calling thread alone; layers
+/// cut their work into panels and run those in parallel, so that no second pool of threads lives
+/// inside Blender.
+class MatrixBackend {
+ public:
+  virtual ~MatrixBackend() = default;
+  virtual const char* name() const = 0;             ///< "highway", "onednn"
+  virtual std::string instructionSets() const = 0;  ///< what is in use: "AVX3_ZEN4"
+  virtual bool has(Precision precision) const = 0;
+  /// Floats that packed weights of [outputs, inputs] take.
+  virtual size_t packedSize(size_t inputs, size_t outputs, Precision precision) const = 0;
+  /// Brings rows [first_output, first_output + outputs) of a weight into the form that multiply()
+  /// wants. Out: packed [packedSize()].
+  virtual void pack(const WeightTensor& weight, size_t inputs, size_t first_output, size_t outputs,
+                    Precision precision, float* packed) const = 0;
+  virtual void multiply(const LinearPanel& panel, const float* packed,
+                        Precision precision) const = 0;
+};
+
+/// oneDNN's where libstipple_nn.so can be loaded, else ours; or the one that the environment
+/// variable STIPPLE_MATRIX_BACKEND names.
+const MatrixBackend& defaultMatrixBackend();
+/// All that work here, ours first: for tests and benchmarks.
+std::span<const MatrixBackend* const> matrixBackends();
+
+}  // namespace stipple
