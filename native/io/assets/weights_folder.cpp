@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "io/bytes/input_file.h"
 #include "io/bytes/safetensors.h"
+#include "io/bytes/sha256.h"
 
 namespace stipple {
 
@@ -124,6 +125,13 @@ const char* publishedWeightsSource() {
          "licences; their names and folders do not matter.";
 }
 
+WeightsState stateOf(const WeightsFile& file, const PublishedWeights& published) {
+  if (file.path.empty()) return WeightsState::kMissing;
+  if (file.bytes != published.bytes) return WeightsState::kOtherSize;
+  if (file.sha256.empty()) return WeightsState::kUnchecked;
+  return file.sha256 == published.sha256 ? WeightsState::kPublished : WeightsState::kOtherContent;
+}
+
 std::optional<WeightsRole> weightsRole(std::span<const std::string> tensor_names) {
   for (const Sign& sign : kSigns) {
     if (std::all_of(sign.names.begin(), sign.names.end(),
@@ -177,6 +185,23 @@ const WeightsFile& requireWeights(const WeightsFolder& folder, WeightsRole role)
                                           "). " + publishedWeightsSource());
   }
   return file;
+}
+
+void hashWeights(WeightsFolder& folder, Progress* progress) {
+  uint64_t total = 0;
+  for (const WeightsFile& file : folder.files) total += file.bytes;
+  uint64_t done = 0;
+  for (size_t i = 0; i < kWeightsRoleCount; ++i) {
+    WeightsFile& file = folder.files[i];
+    if (file.path.empty()) continue;
+    const auto share = [&](uint64_t bytes) {
+      return static_cast<double>(bytes) / static_cast<double>(std::max<uint64_t>(total, 1));
+    };
+    if (progress) progress->enterPart(share(done), share(done + file.bytes));
+    const std::string stage = std::string("Checking the ") + publishedWeights()[i].label;
+    file.sha256 = sha256OfFile(file.path, progress, stage.c_str());
+    done += file.bytes;
+  }
 }
 
 }  // namespace stipple

@@ -19,11 +19,11 @@ constexpr size_t kWeightsRoleCount = 4;
 /// What is known of the published file of a role. We have none of these files.
 struct PublishedWeights {
   WeightsRole role;
-  const char* label;   ///< for people
-  const char* path;    ///< in the published model
-  uint64_t bytes;      ///< of the published file
-  const char* sha256;  ///< 64 hexadecimal digits
-  const char* licence; ///< one or two sentences
+  const char* label;    ///< for people
+  const char* path;     ///< in the published model
+  uint64_t bytes;       ///< of the published file
+  const char* sha256;   ///< 64 hexadecimal digits
+  const char* licence;  ///< one or two sentences
 };
 
 /// One for each role, in order.
@@ -33,12 +33,16 @@ const char* publishedWeightsSource();
 
 /// A file that was found for a role.
 struct WeightsFile {
-  std::string path;      ///< empty: there is none
+  std::string path;  ///< empty: there is none
   uint64_t bytes = 0;
   int64_t modified = 0;  ///< nanoseconds since 1970
   /// Of the content, 64 hexadecimal digits, where hashWeights() has read it.
   std::string sha256;
 };
+
+/// What a file is, compared with the published one of its role.
+enum class WeightsState : uint32_t { kMissing, kOtherSize, kUnchecked, kPublished, kOtherContent };
+WeightsState stateOf(const WeightsFile& file, const PublishedWeights& published);
 
 /// The files of a folder that turn images into splats.
 struct WeightsFolder {
@@ -54,9 +58,9 @@ struct WeightsFolder {
 std::optional<WeightsRole> weightsRole(std::span<const std::string> tensor_names);
 
 /// Looks through a folder and its subfolders for safetensors files, and reads their headers. Where
-/// several files have the same role, the one of the published size is taken, else the first by path.
-/// Errors: kIo for a folder that cannot be read; kInvalidArgument for one with too many entries to
-/// be a folder of weights.
+/// several files have the same role, the one of the published size is taken, else the first by
+/// path. Errors: kIo for a folder that cannot be read; kInvalidArgument for one with too many
+/// entries to be a folder of weights.
 WeightsFolder findWeights(const std::string& folder);
 
 /// The file of a role. Errors: kInvalidArgument where it is missing, with what to do.
