@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
   addMesh(app, context);
   addFit(app, context);
   addDensify(app, context);
+  addGenerate(app, context);
   addCompare(app, context);
   addAccuracy(app, context);
   try {
