@@ -83,11 +83,12 @@ void ContentRotary::angles(const NetworkRun& run, size_t rows, const float* h,
   float* gate = scratch.wide.data();
   float* content = gate + rows * width;
   float* places = content + rows * width;  // [rows, heads, 3]
-  layerNorm({.width = sizes_.channels,
-             .epsilon = kRotaryEpsilon,
-             .weight = norm_weight_,
-             .bias = norm_bias_},
-            rows, h, normed);
+  LayerNorm norm;
+  norm.width = sizes_.channels;
+  norm.epsilon = kRotaryEpsilon;
+  norm.weight = norm_weight_;
+  norm.bias = norm_bias_;
+  layerNorm(norm, rows, h, normed);
   gate_.apply(run, rows, normed, gate);
   content_.apply(run, rows, normed, content);
   siluGate(rows * width, gate, content, content);
@@ -181,10 +182,14 @@ void FlowBlock::apply(const NetworkRun& run, size_t rows, float* h, std::span<co
                       const char* stage) const {
   const size_t channels = sizes_.channels;
   Modulated modulated;
-  modulated.attention_norm = {
-      .width = channels, .epsilon = kBlockEpsilon, .weight = norm1_weight_, .bias = norm1_bias_};
-  modulated.mlp_norm = {
-      .width = channels, .epsilon = kBlockEpsilon, .weight = norm2_weight_, .bias = norm2_bias_};
+  for (LayerNorm* norm : {&modulated.attention_norm, &modulated.mlp_norm}) {
+    norm->width = channels;
+    norm->epsilon = kBlockEpsilon;
+  }
+  modulated.attention_norm.weight = norm1_weight_;
+  modulated.attention_norm.bias = norm1_bias_;
+  modulated.mlp_norm.weight = norm2_weight_;
+  modulated.mlp_norm.bias = norm2_bias_;
   if (!shift_table_.empty()) {
     modulated.numbers = shift_table_;
     for (size_t i = 0; i < modulated.numbers.size(); ++i) modulated.numbers[i] += time[i];

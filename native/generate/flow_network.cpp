@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "generate/sobol_points.h"
 #include "nn/activations.h"
 #include "nn/norms.h"
@@ -211,9 +212,9 @@ void FlowNetwork::requireState(const Latent& state, double time, const FlowConte
   }
   requireFinite(state.tokens.data(), state.tokens.size(), sizes_.token_width, "tokens of a latent");
   requireFinite(state.camera.data(), kCameraWidth, kCameraWidth, "camera of a latent");
-  if (!(time >= 0 && time <= 1)) {
+  if (!std::isfinite(time) || time < 0 || time > 1) {
     fail(ErrorCode::kInvalidArgument,
-         "the time of a flow is " + std::to_string(time) + "; 0 to 1 is allowed");
+         "the time of a flow is " + numberText(time) + "; 0 to 1 is allowed");
   }
   if (context.rows == 0 || context.copies == 0 ||
       context.values.size() != context.rows * channels) {
@@ -236,7 +237,11 @@ void FlowNetwork::readOut(const NetworkRun& run, const Time& time, size_t rows, 
     shift[i] += time.embedding[i];
     scale[i] += time.embedding[i];
   }
-  const LayerNorm norm{.width = channels, .epsilon = kHeadEpsilon, .scale = scale, .shift = shift};
+  LayerNorm norm;
+  norm.width = channels;
+  norm.epsilon = kHeadEpsilon;
+  norm.scale = scale;
+  norm.shift = shift;
   float* camera = h + (rows - 1) * channels;
   layerNorm(norm, velocity.token_count, h, h);
   token_head_.apply(run, velocity.token_count, h, velocity.tokens.data());
