@@ -1,9 +1,17 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "nn/network_run.h"
+
 namespace stipple {
+
+class DinoEncoder;
+class VaeEncoder;
+struct PreparedImage;
 
 /// What a flow network is told of an image: two vectors of features for each token. Row k of one
 /// belongs to row k of the other.
@@ -14,5 +22,15 @@ struct ImageCondition {
   std::vector<float> structure;  ///< [rows, structure_width]
   std::vector<float> colour;     ///< [rows, colour_width]
 };
+
+/// Encodes an image by both networks. The colours of the tokens that belong to the whole image are
+/// zeros.
+/// In: noise: of VaeEncoder::noiseCount() for the image, normally distributed, or empty: the
+/// image's mean latent (VaeEncoder::encode()). Errors: kFormat for networks whose patches differ;
+/// those of the encoders. Threads and determinism: as of the encoders. Cost: the sum of both;
+/// memory: the larger one's.
+ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
+                           const VaeEncoder& colour, const PreparedImage& image,
+                           std::span<const float> noise);
 
 }  // namespace stipple
