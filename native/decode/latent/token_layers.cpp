@@ -51,7 +51,7 @@ void requireLatent(const Latent& latent, size_t width) {
              std::to_string(latent.token_count) + " tokens of " + std::to_string(width) +
              "; one token or more, and as many numbers as they have, are needed");
   }
-  requireFinite(latent.tokens.data(), latent.token_count, width, "the latent's token");
+  requireFinite(latent.tokens.data(), latent.tokens.size(), width, "the latent's token");
 }
 
 PointEmbedding::PointEmbedding(const WeightTable& network, size_t width)
