@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <string>
 
-#include "generate/flow_sampler.h"
 #include "generate/image_preparation.h"
 #include "generate/seeded_noise.h"
 
@@ -14,7 +13,12 @@ namespace stipple {
 struct GenerateOptions {
   /// Where the four files of weights are (io/assets/weights_folder.h).
   std::string weights_folder;
-  FlowSettings flow;
+  /// From noise to the object, 1 to 1000; 10 to 20 are usual. Time grows with them.
+  uint32_t steps = 20;
+  /// How much more than plainly the image is followed, 0 to 100; up to 1 takes half the time.
+  double guidance = 3.0;
+  /// 0.01 to 100. Above 1 more of the steps are taken where there is much noise.
+  double shift = 3.0;
   /// Tokens of the latent, 1 to kMostFlowTokens. Published networks were trained with 1,024 to
   /// 8,192; time grows with them, and their square.
   uint64_t token_count = 8192;
@@ -29,8 +33,8 @@ struct GenerateOptions {
   uint32_t preview_steps = 0;
   /// Anchors of a preview, at least 1.
   uint64_t preview_anchors = 1024;
-  /// A file that keeps the state after every step, and that an equal generation goes on from; empty:
-  /// none.
+  /// A file that keeps the state after every step, and that an equal generation goes on from;
+  /// empty: none.
   std::string checkpoint_path;
   /// Of the structure encoder's attention heads, which its file does not tell.
   size_t structure_head_width = 64;

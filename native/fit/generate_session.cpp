@@ -32,6 +32,10 @@ constexpr uint64_t kFirstColourChannels = 128;
 // Of the whole work, what comes before the encoders and behind the last step.
 constexpr double kPreparationShare = 0.01, kEndShare = 0.99;
 
+FlowSettings flowSettings(const GenerateOptions& options) {
+  return {options.steps, options.guidance, options.shift};
+}
+
 /// The networks up to the latent. What is large stays in their files.
 struct Networks {
   WeightsFolder folder;
@@ -63,7 +67,8 @@ struct Networks {
     return structure.flops(size, size) + colour.flops(size, size);
   }
   StageCost samplingCost(const GenerateOptions& options) const {
-    return flowSamplingCost(flow.sizes(), options.token_count, rows(options), options.flow);
+    return flowSamplingCost(flow.sizes(), options.token_count, rows(options),
+                            flowSettings(options));
   }
   uint64_t rows(const GenerateOptions& options) const {
     const uint32_t size = options.preparation.canvas_size;
@@ -72,8 +77,8 @@ struct Networks {
 };
 
 void requireOptions(const GenerateOptions& options) {
-  validate(options.flow);
-  requirePreparation(options.preparation);
+  validate(flowSettings(options));
+  validate(options.preparation);
   if (options.token_count == 0 || options.token_count > kMostFlowTokens) {
     fail(ErrorCode::kInvalidArgument, "the number of tokens is " +
                                           std::to_string(options.token_count) + "; 1 to " +
@@ -106,9 +111,9 @@ std::string keyOf(const Networks& networks, const GenerateOptions& options,
                     "\",\"noise\":" + text(static_cast<uint64_t>(options.noise.source)) +
                     ",\"mean_colour\":" + text(options.uses_mean_colour ? 1 : 0) +
                     ",\"tokens\":" + text(options.token_count) +
-                    ",\"steps\":" + text(options.flow.steps) +
-                    ",\"guidance\":" + numberText(options.flow.guidance) +
-                    ",\"shift\":" + numberText(options.flow.shift) + ",\"weights\":[";
+                    ",\"steps\":" + text(options.steps) +
+                    ",\"guidance\":" + numberText(options.guidance) +
+                    ",\"shift\":" + numberText(options.shift) + ",\"weights\":[";
   for (const WeightsFile& file : networks.folder.files) {
     key += (key.back() == '[' ? "" : ",") + text(file.bytes);
   }
@@ -138,10 +143,23 @@ StageValues valuesOf(std::string name, std::span<const float> numbers) {
 }  // namespace
 
 struct GenerateSession::Work {
-  Work(ByteImage shown, std::optional<ByteImage> covered, const GenerateOptions& options)
-      : image(std::move(shown)), mask(std::move(covered)), networks(options) {
-    status.steps = options.flow.steps;
+  Work(ByteImage shown, std::optional<ByteImage> covered, const GenerateOptions& given)
+      : options(given), image(std::move(shown)), mask(std::move(covered)), networks(given) {
+    status.steps = options.steps;
   }
+
+  void run(Progress& progress);
+  /// The state that a checkpoint keeps, or that of the noise.
+  SamplerState firstState(const std::string& key, const GenerationNoise& noise);
+  /// In: end: of the encoders' part of the whole work.
+  FlowContext contextOf(const NetworkRun& run, const PreparedImage& prepared,
+                        std::span<const float> noise, double end);
+  void sample(const NetworkRun& run, const FlowContext& context, const std::string& key,
+              SamplerState& state, const ProgressShare& share);
+  void keep(const std::string& key, const SamplerState& state) const;
+  void showPreview(const FlowPreview& preview);
+  std::shared_ptr<const SplatModel> modelOf(const Latent& latent,
+                                            const std::string& settings) const;
 
   void note(const std::string& name, std::span<const float> numbers) {
     StageValues values = valuesOf(name, numbers);
@@ -158,6 +176,7 @@ struct GenerateSession::Work {
     status.seconds_left = each * (status.steps - step);
   }
 
+  GenerateOptions options;
   ByteImage image;
   std::optional<ByteImage> mask;
   Networks networks;
@@ -166,23 +185,22 @@ struct GenerateSession::Work {
 
   mutable std::mutex mutex;  ///< of what follows
   GenerateStatus status;
-  std::deque<StageValues> stages;  ///< they stay where they are
-  std::shared_ptr<const SplatCloud> preview;
+  std::deque<StageValues> stages;            ///< they stay where they are
+  std::shared_ptr<const SplatCloud> newest;  ///< preview, until it is taken
 };
 
 GenerateSession::GenerateSession(ByteImage image, std::optional<ByteImage> mask,
-                                 const GenerateOptions& options)
-    : options_(options) {
-  requireOptions(options_);
-  requireByteImage(image, "the image");
-  if (!options_.checkpoint_path.empty()) requireCheckpointPlace(options_.checkpoint_path);
-  work_ = std::make_unique<Work>(std::move(image), std::move(mask), options_);
+                                 const GenerateOptions& options) {
+  requireOptions(options);
+  requireByteImage(image, "The image");
+  if (!options.checkpoint_path.empty()) requireCheckpointPlace(options.checkpoint_path);
+  work_ = std::make_unique<Work>(std::move(image), std::move(mask), options);
 }
 
 GenerateSession::~GenerateSession() = default;
 
 uint64_t GenerateSession::memoryBound() const {
-  return workBytes(work_->networks, options_);
+  return workBytes(work_->networks, work_->options);
 }
 
 GenerateEstimate GenerateSession::estimate(const GenerateOptions& options) {
@@ -200,83 +218,83 @@ GenerateEstimate GenerateSession::estimate(const GenerateOptions& options) {
   return estimate;
 }
 
-std::shared_ptr<const SplatModel> GenerateSession::modelOf(const Latent& latent,
-                                                           const std::string& settings) const {
-  return makeLatentSplats(latent, work_->networks.folder.of(WeightsRole::kDecoder).path, settings);
+std::shared_ptr<const SplatModel> GenerateSession::Work::modelOf(
+    const Latent& latent, const std::string& settings) const {
+  return makeLatentSplats(latent, networks.folder.of(WeightsRole::kDecoder).path, settings);
 }
 
-SamplerState GenerateSession::firstState(const std::string& key, const GenerationNoise& noise) {
-  Work& work = *work_;
-  if (!options_.checkpoint_path.empty() && std::filesystem::exists(options_.checkpoint_path)) {
-    const Checkpoint checkpoint = readCheckpoint(options_.checkpoint_path);
+SamplerState GenerateSession::Work::firstState(const std::string& key,
+                                               const GenerationNoise& noise) {
+  if (!options.checkpoint_path.empty() && std::filesystem::exists(options.checkpoint_path)) {
+    const Checkpoint checkpoint = readCheckpoint(options.checkpoint_path);
     if (checkpoint.settings_json != key) {
       fail(ErrorCode::kInvalidArgument,
-           "'" + options_.checkpoint_path +
+           "'" + options.checkpoint_path +
                "' keeps a generation of another image, or with other settings or weights; remove "
                "it, or choose another file");
     }
     SamplerState state = samplerOfTensors(checkpoint.tensors);
-    const std::lock_guard<std::mutex> lock(work.mutex);
-    work.status.step = work.status.resumed_step = state.step;
+    const std::lock_guard<std::mutex> lock(mutex);
+    status.step = status.resumed_step = state.step;
     return state;
   }
-  return startSampling(work.networks.flow, options_.token_count, noise, options_.flow);
+  return startSampling(networks.flow, options.token_count, noise, flowSettings(options));
 }
 
-void GenerateSession::keep(const std::string& key, const SamplerState& state) const {
-  if (options_.checkpoint_path.empty()) return;
-  writeCheckpoint(key, tensorsOfSampler(state), options_.checkpoint_path);
+void GenerateSession::Work::keep(const std::string& key, const SamplerState& state) const {
+  if (options.checkpoint_path.empty()) return;
+  writeCheckpoint(key, tensorsOfSampler(state), options.checkpoint_path);
 }
 
-void GenerateSession::showPreview(const FlowPreview& preview) {
-  Work& work = *work_;
+void GenerateSession::Work::showPreview(const FlowPreview& preview) {
   ModelRequest request;
-  request.budget = options_.preview_anchors;
+  request.budget = options.preview_anchors;
   const std::shared_ptr<const SplatModel> model = modelOf(preview.latent, "{}");
   auto cloud = std::make_shared<const SplatCloud>(model->decode(request));
-  const std::lock_guard<std::mutex> lock(work.mutex);
-  work.preview = std::move(cloud);
-  work.status.preview_step = preview.step;
+  const std::lock_guard<std::mutex> lock(mutex);
+  newest = std::move(cloud);
+  status.preview_step = preview.step;
 }
 
 void GenerateSession::run(Progress& progress) {
-  Work& work = *work_;
+  work_->run(progress);
+}
+
+void GenerateSession::Work::run(Progress& progress) {
   const NetworkRun run = {.progress = &progress};
   progress.advance(0, "Preparing the image");
-  const PreparedImage prepared =
-      prepareImage(work.image, work.mask ? &*work.mask : nullptr, options_.preparation);
-  const std::string key = keyOf(work.networks, options_, prepared);
+  const PreparedImage prepared = prepareImage(image, mask ? &*mask : nullptr, options.preparation);
+  const std::string key = keyOf(networks, options, prepared);
   const std::vector<float> bytes(prepared.rgb.begin(), prepared.rgb.end());
-  work.note("prepared", bytes);
+  note("prepared", bytes);
 
   NoiseSizes sizes;
-  const uint32_t size = options_.preparation.canvas_size;
-  sizes.colour = work.networks.colour.noiseCount(size, size);
-  sizes.tokens = options_.token_count * work.networks.flow.sizes().token_width;
-  GenerationNoise noise = drawNoise(sizes, options_.noise);
-  work.note("noise.colour", noise.colour);
-  work.note("noise.tokens", noise.tokens);
-  if (options_.uses_mean_colour) noise.colour.clear();
+  const uint32_t size = options.preparation.canvas_size;
+  sizes.colour = networks.colour.noiseCount(size, size);
+  sizes.tokens = options.token_count * networks.flow.sizes().token_width;
+  GenerationNoise noise = drawNoise(sizes, options.noise);
+  note("noise.colour", noise.colour);
+  note("noise.tokens", noise.tokens);
+  if (options.uses_mean_colour) noise.colour.clear();
   SamplerState state = firstState(key, noise);
 
-  const double encoding = work.networks.encoderWork(size);
-  const double sampling = work.networks.samplingCost(options_).flops;
+  const double encoding = networks.encoderWork(size);
+  const double sampling = networks.samplingCost(options).flops;
   const double middle =
       kPreparationShare + (kEndShare - kPreparationShare) * encoding / (encoding + sampling);
   const FlowContext context = contextOf(run, prepared, noise.colour, middle);
   sample(run, context, key, state, {middle, kEndShare});
   progress.advance(kEndShare, "Reading the decoder");
-  work.note("latent", state.latent.tokens);
-  work.note("camera", state.latent.camera);
-  work.model = modelOf(state.latent, key);
+  note("latent", state.latent.tokens);
+  note("camera", state.latent.camera);
+  model = modelOf(state.latent, key);
 }
 
-FlowContext GenerateSession::contextOf(const NetworkRun& run, const PreparedImage& prepared,
-                                       std::span<const float> noise, double end) {
-  Work& work = *work_;
+FlowContext GenerateSession::Work::contextOf(const NetworkRun& run, const PreparedImage& prepared,
+                                             std::span<const float> noise, double end) {
   StageListener listener;
   std::vector<float> rows;
-  if (options_.watches_layers) {
+  if (options.watches_layers) {
     listener = [&](const std::string& stage, const StageNumbers& numbers) {
       rows.resize(numbers.rows * numbers.width);
       for (size_t i = 0; i < numbers.rows; ++i) {
@@ -284,41 +302,40 @@ FlowContext GenerateSession::contextOf(const NetworkRun& run, const PreparedImag
         std::copy(row, row + numbers.width,
                   rows.begin() + static_cast<ptrdiff_t>(i * numbers.width));
       }
-      work.note(stage, rows);
+      note(stage, rows);
     };
   }
-  const ImageCondition condition = encodeImage(run, work.networks.structure, work.networks.colour,
-                                               prepared, noise, {kPreparationShare, end}, listener);
-  work.note("structure", condition.structure);
-  work.note("colour", condition.colour);
-  return work.networks.flow.context(run, condition, {end, end});
+  const ImageCondition condition = encodeImage(run, networks.structure, networks.colour, prepared,
+                                               noise, {kPreparationShare, end}, listener);
+  note("structure.features", condition.structure);
+  note("colour.features", condition.colour);
+  return networks.flow.context(run, condition, {end, end});
 }
 
-void GenerateSession::sample(const NetworkRun& run, const FlowContext& context,
-                             const std::string& key, SamplerState& state,
-                             const ProgressShare& share) {
-  Work& work = *work_;
+void GenerateSession::Work::sample(const NetworkRun& run, const FlowContext& context,
+                                   const std::string& key, SamplerState& state,
+                                   const ProgressShare& share) {
   const uint32_t first = state.step;
-  work.step_watch = {};
+  step_watch = {};
   FlowListener listener;
   listener.preview_every = 1;
   listener.preview = [&](const FlowPreview& preview) {
     const std::string name = "step" + std::to_string(preview.step);
-    work.note(name + ".tokens", state.latent.tokens);
-    work.note(name + ".camera", state.latent.camera);
-    work.finishStep(preview.step, first);
+    note(name + ".tokens", state.latent.tokens);
+    note(name + ".camera", state.latent.camera);
+    finishStep(preview.step, first);
     keep(key, state);
-    const uint32_t every = options_.preview_steps;
+    const uint32_t every = options.preview_steps;
     if (every > 0 && preview.step % every == 0) showPreview(preview);
   };
   try {
-    sampleLatent(run, work.networks.flow, context, state, listener, share);
+    sampleLatent(run, networks.flow, context, state, listener, share);
   } catch (const Error& error) {
     // Half a step is kept too: a call of the network takes minutes.
     if (error.code() == ErrorCode::kCancelled) keep(key, state);
     throw;
   }
-  work.finishStep(state.step, first);
+  finishStep(state.step, first);
   keep(key, state);
 }
 
@@ -340,7 +357,7 @@ const StageValues& GenerateSession::stageAt(size_t index) const {
 
 std::shared_ptr<const SplatCloud> GenerateSession::takePreview() {
   const std::lock_guard<std::mutex> lock(work_->mutex);
-  return std::exchange(work_->preview, nullptr);
+  return std::exchange(work_->newest, nullptr);
 }
 
 std::shared_ptr<const SplatModel> GenerateSession::model() const {

@@ -6,15 +6,12 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <span>
 #include <string>
 
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
 #include "data/images/byte_image.h"
-#include "data/latent.h"
 #include "fit/generate_options.h"
-#include "generate/flow_sampler.h"
 #include "io/assets/weights_folder.h"
 #include "model/splat_model.h"
 
@@ -82,17 +79,6 @@ class GenerateSession {
  private:
   struct Work;
 
-  SamplerState firstState(const std::string& key, const GenerationNoise& noise);
-  FlowContext contextOf(const NetworkRun& run, const PreparedImage& prepared,
-                        std::span<const float> noise, double end);
-  void sample(const NetworkRun& run, const FlowContext& context, const std::string& key,
-              SamplerState& state, const ProgressShare& share);
-  void keep(const std::string& key, const SamplerState& state) const;
-  void showPreview(const FlowPreview& preview);
-  std::shared_ptr<const SplatModel> modelOf(const Latent& latent,
-                                            const std::string& settings) const;
-
-  GenerateOptions options_;
   std::unique_ptr<Work> work_;
 };
 

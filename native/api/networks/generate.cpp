@@ -27,7 +27,9 @@ GenerateOptions generateOptionsFrom(const StippleGenerateOptions* given) {
   GenerateOptions options;
   options.weights_folder = &require(from.weights_folder_utf8, "options->weights_folder_utf8");
   if (from.checkpoint_path_utf8) options.checkpoint_path = from.checkpoint_path_utf8;
-  options.flow = {from.steps, from.guidance, from.shift};
+  options.steps = from.steps;
+  options.guidance = from.guidance;
+  options.shift = from.shift;
   options.token_count = from.token_count;
   options.preparation.canvas_size = from.canvas_size;
   options.preparation.erode_radius = from.erode_radius;
@@ -60,15 +62,15 @@ void stipple_generate_options_init(StippleGenerateOptions* options) {
   const GenerateOptions defaults;
   *options = {};
   options->struct_size = sizeof(StippleGenerateOptions);
-  options->steps = defaults.flow.steps;
+  options->steps = defaults.steps;
   options->token_count = static_cast<uint32_t>(defaults.token_count);
   options->canvas_size = defaults.preparation.canvas_size;
   options->erode_radius = defaults.preparation.erode_radius;
   options->noise_source = static_cast<uint32_t>(defaults.noise.source);
   options->preview_anchors = defaults.preview_anchors;
   options->seed = defaults.noise.seed;
-  options->guidance = defaults.flow.guidance;
-  options->shift = defaults.flow.shift;
+  options->guidance = defaults.guidance;
+  options->shift = defaults.shift;
 }
 
 StippleStatus stipple_generate_start(StippleContext* context, const StippleImage* image,
