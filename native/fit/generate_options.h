@@ -29,9 +29,12 @@ struct GenerateOptions {
   /// Notes what passes by in every layer of the encoders too, for comparing with somebody else's
   /// run.
   bool watches_layers = false;
+  /// Metres: the largest side of the object, which stands on the origin with the middle of its base;
+  /// 0: as the networks have it, in a cube of side 1 around the origin.
+  double size = 1.0;
   /// A preview is decoded after every so many steps; 0: never.
   uint32_t preview_steps = 0;
-  /// Anchors of a preview, at least 1.
+  /// Anchors of a preview, and of the splats that tell how large the object is; at least 1.
   uint64_t preview_anchors = 1024;
   /// A file that keeps the state after every step, and that an equal generation goes on from;
   /// empty: none.

@@ -30,6 +30,7 @@ GenerateOptions generateOptionsFrom(const StippleGenerateOptions* given) {
   options.steps = from.steps;
   options.guidance = from.guidance;
   options.shift = from.shift;
+  options.size = from.size;
   options.token_count = from.token_count;
   options.preparation.canvas_size = from.canvas_size;
   options.preparation.erode_radius = from.erode_radius;
@@ -71,6 +72,7 @@ void stipple_generate_options_init(StippleGenerateOptions* options) {
   options->seed = defaults.noise.seed;
   options->guidance = defaults.guidance;
   options->shift = defaults.shift;
+  options->size = defaults.size;
 }
 
 StippleStatus stipple_generate_start(StippleContext* context, const StippleImage* image,

@@ -18,7 +18,7 @@ struct Arguments {
   std::string image, out, weights, mask, checkpoint, seed_mode = "keyed";
   uint64_t seed = 42;
   int64_t steps = 20, tokens = 8192, canvas = 1024, erode = 1;
-  double guidance = 3.0, shift = 3.0;
+  double guidance = 3.0, shift = 3.0, size = 1.0;
   std::optional<int64_t> anchors;
   bool mean_colour = false, check = false, estimate = false, json = false;
 };
@@ -39,6 +39,7 @@ StippleGenerateOptions optionsOf(const Arguments& arguments) {
   options.seed = arguments.seed;
   options.guidance = arguments.guidance;
   options.shift = arguments.shift;
+  options.size = arguments.size;
   return options;
 }
 
@@ -161,6 +162,10 @@ void addGenerate(CLI::App& app, const Context& context) {
   command->add_option("--canvas", to.canvas, "Pixels of the image that networks see")
       ->capture_default_str();
   command->add_option("--erode", to.erode, "Pixels that the mask shrinks by")
+      ->capture_default_str();
+  command
+      ->add_option("--size", to.size,
+                   "Metres of the largest side; 0: as the networks have it, around the origin")
       ->capture_default_str();
   command->add_flag("--mean-colour", to.mean_colour, "No noise on the colours of the image");
   command->add_option("--anchors", to.anchors, "Splats: anchors, each of which becomes several");

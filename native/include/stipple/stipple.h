@@ -2205,10 +2205,12 @@ typedef struct StippleGenerateOptions {
   uint32_t watches_layers;   /* 1: stages have every layer of the encoders too; default 0 */
   uint32_t reserved;
   uint32_t preview_steps;    /* a preview after every so many steps; 0, the default: none */
-  uint64_t preview_anchors;  /* of a preview, default 1024; each is several splats */
+  uint64_t preview_anchors;  /* of a preview, and of the splats that the size is measured at, default 1024 */
   uint64_t seed;             /* of all noise, default 42 */
   double guidance;           /* 0..100, default 3; 1 and less: half as many runs of the network */
   double shift;              /* 0.01..100, default 3; above 1 more steps are taken where there is much noise */
+  double size;               /* metres, default 1: the largest side of the object, which stands on the origin with the
+                                middle of its base; 0: as the networks have it */
   const char* weights_folder_utf8;  /* must be given */
   const char* checkpoint_path_utf8; /* NULL, the default: none. A file that keeps the state after every step; the same
                                        image, settings and weights go on from it, and others are refused. It stays */
@@ -2251,7 +2253,7 @@ typedef struct StippleGenerateStage {
 /* Turns the object in an image into a latent, which decodes to splats at any budget (stipple_job_model), as a job.
  * In: image: RGB or RGBA; mask: NULL, or an image of any size that is opaque or white on the object and is used in
  * place of the image's alpha.
- * The object comes out upright (z up) in a cube of side 1 around the origin, its pictured side towards +x.
+ * The object comes out upright (z up), its pictured side towards +x.
  * Errors: INVALID_ARGUMENT for files of weights that are missing, for an image that is opaque everywhere without a
  * mask, and for one whose mask leaves nothing; FORMAT for networks that do not fit together; MEMORY_LIMIT.
  * Threads and determinism: the same result for any number of threads.
