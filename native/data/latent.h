@@ -18,4 +18,10 @@ struct Latent {
   std::array<float, 5> camera = {0, 0, 0, 0, 0};
 };
 
+/// Where decoded splats stand: a position p of the networks becomes scale p + offset.
+struct LatentPlacement {
+  double scale = 1.0;                        ///< above 0
+  std::array<double, 3> offset = {0, 0, 0};  ///< metres
+};
+
 }  // namespace stipple
