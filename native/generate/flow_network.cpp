@@ -25,9 +25,9 @@ constexpr float kHeadEpsilon = 1e-5f;
 /// A buffer of the training program that files of one's own training hold: the places of tokens,
 /// which are known.
 constexpr const char* kPlacesBuffer = "pos_pe";
-/// What layers of nn/ hold packed at a time: half of it attention, half linear layers, plus room of
-/// threads.
-constexpr uint64_t kLayerBytes = uint64_t{160} << 20;
+/// What layers of nn/ hold packed at a time: 32 MiB of keys and values or 16 MiB of weights, and
+/// idle memory of at most 64 MiB.
+constexpr uint64_t kLayerBytes = uint64_t{128} << 20;
 
 std::string numbered(const char* name, size_t i) {
   return std::string(name) + "." + std::to_string(i);
