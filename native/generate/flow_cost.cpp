@@ -150,7 +150,9 @@ StageCost colourEncoderCost(uint32_t canvas_size) {
 StageCost octreeLevelCost(uint64_t cells, uint64_t token_count) {
   constexpr uint64_t kBlocks = 4, kChildren = 8, c = kDecoderChannels;
   const StageCost block = crossAttentionCost(cells, token_count) + linearCost(8 * c * c, cells);
-  return linearCost(c * c + 3 * c + kChildren * c, cells) + kBlocks * block;
+  constexpr uint64_t kLevelWaves = 256;
+  const StageCost level = linearCost(kLevelWaves * c + c * c + 6 * c * c, 1);
+  return level + linearCost(c * c + 3 * c + kChildren * c, cells) + kBlocks * block;
 }
 
 StageCost octreeCost(uint64_t anchor_count, uint64_t token_count) {

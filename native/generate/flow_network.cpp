@@ -18,16 +18,32 @@ namespace stipple {
 
 namespace {
 
-constexpr double kLongestPeriod = 10000.0;
+constexpr float kLongestPeriod = 10000.0f;
 /// The network was trained with times of 0 to 1000.
 constexpr double kTimeUnits = 1000.0;
 constexpr float kHeadEpsilon = 1e-5f;
 /// A buffer of the training program that files of one's own training hold: the places of tokens,
 /// which are known.
 constexpr const char* kPlacesBuffer = "pos_pe";
-/// What layers of nn/ hold packed at a time: half of it attention, half linear layers, plus room of
-/// threads.
-constexpr uint64_t kLayerBytes = uint64_t{160} << 20;
+/// What layers of nn/ hold packed at a time: 32 MiB of keys and values or 16 MiB of weights, and
+/// idle memory of at most 64 MiB.
+constexpr uint64_t kLayerBytes = uint64_t{128} << 20;
+
+/// [cos(t w_i), sin(t w_i)], w_i = exp(-ln(longest) i / (width / 2)), step by step in float32:
+/// angles of up to 1000 round by 3e-5, and networks were trained with the rounded ones.
+std::vector<float> timeWaves(float t, size_t width) {
+  const size_t count = width / 2;
+  const float rate = -std::log(kLongestPeriod);
+  std::vector<float> waves(2 * count);
+  for (size_t i = 0; i < count; ++i) {
+    const float exponent = rate * static_cast<float>(i) / static_cast<float>(count);
+    const auto frequency = static_cast<float>(std::exp(static_cast<double>(exponent)));
+    const auto angle = static_cast<double>(t * frequency);
+    waves[i] = static_cast<float>(std::cos(angle));
+    waves[count + i] = static_cast<float>(std::sin(angle));
+  }
+  return waves;
+}
 
 std::string numbered(const char* name, size_t i) {
   return std::string(name) + "." + std::to_string(i);
@@ -175,9 +191,8 @@ FlowContext FlowNetwork::emptyContext(const NetworkRun& run, uint64_t rows) cons
 
 FlowNetwork::Time FlowNetwork::embedTime(const NetworkRun& run, double time) const {
   const size_t channels = sizes_.block.channels;
-  // The network was given its time in float32.
-  const auto units = static_cast<double>(static_cast<float>(kTimeUnits * time));
-  const std::vector<float> waves = timeEncoding(units, kLongestPeriod, sizes_.time_width);
+  const std::vector<float> waves =
+      timeWaves(static_cast<float>(kTimeUnits * time), sizes_.time_width);
   Time result;
   std::vector<float> hidden(channels);
   result.embedding.resize(channels);

@@ -1,9 +1,6 @@
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -72,42 +69,15 @@ class FlowGolden {
 };
 
 /// One call of a network of 96 channels, 64 tokens, 20 rows of context, and four steps with it.
-inline const FlowGolden& flowGolden() {
-  static const FlowGolden& golden =
-      *new FlowGolden(STIPPLE_TEST_DATA "/networks/deg_flow_a.safetensors", "weights.");
-  return golden;
-}
-inline ImageCondition flowCondition() {
-  return flowGolden().condition("input.feature1", "input.feature2");
-}
+const FlowGolden& flowGolden();
+ImageCondition flowCondition();
 constexpr double kFlowGoldenTime = 0.7;
 
 /// Four steps of a network of 64 channels, 64 tokens, 21 rows of context, call by call.
-inline const FlowGolden& pipelineGolden() {
-  static const FlowGolden& golden =
-      *new FlowGolden(STIPPLE_TEST_DATA "/networks/deg_pipeline_a.safetensors", "weights.flow.");
-  return golden;
-}
-inline ImageCondition pipelineCondition() {
-  return pipelineGolden().condition("expect.feature1", "expect.feature2");
-}
+const FlowGolden& pipelineGolden();
+ImageCondition pipelineCondition();
 
-inline void expectLatentsNear(const Latent& seen, const Latent& expected, float tolerance) {
-  ASSERT_EQ(seen.token_count, expected.token_count);
-  ASSERT_EQ(seen.tokens.size(), expected.tokens.size());
-  float worst = 0;
-  for (size_t i = 0; i < seen.tokens.size(); ++i) {
-    worst = std::max(worst, std::abs(seen.tokens[i] - expected.tokens[i]));
-  }
-  EXPECT_LE(worst, tolerance) << "tokens";
-  for (size_t i = 0; i < kCameraWidth; ++i) {
-    EXPECT_NEAR(seen.camera[i], expected.camera[i], tolerance) << "camera " << i;
-  }
-}
-
-inline void expectSameLatents(const Latent& seen, const Latent& expected) {
-  EXPECT_EQ(seen.tokens, expected.tokens);
-  EXPECT_EQ(seen.camera, expected.camera);
-}
+void expectLatentsNear(const Latent& seen, const Latent& expected, float tolerance);
+void expectSameLatents(const Latent& seen, const Latent& expected);
 
 }  // namespace stipple::testing
