@@ -119,7 +119,8 @@ class GenerateOperator(JobOperator):
                 (bpy.data.pointclouds if isinstance(data, bpy.types.PointCloud) else bpy.data.meshes).remove(data)
         self._names = ()
 
-    def _draw_settings(self, layout, context):
+    def _draw_settings(self, layout, context, width_px=None):
+        """width_px: of a dialog, None in a file browser."""
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
@@ -133,8 +134,8 @@ class GenerateOperator(JobOperator):
         try:
             cost = image_task.estimate_of(self._settings(1.0))
         except StippleError as error:
-            draw_text(box, context, str(error), 'ERROR')
+            draw_text(box, context, str(error), 'ERROR', width_px=width_px)
             return
         draw_text(box, context, f'About {duration(cost.seconds * self.seed_count)} and {size(cost.bytes)} of memory here',
-                  'TIME')
-        draw_text(box, context, weights_table.NOT_TRIED, 'INFO')
+                  'TIME', width_px=width_px)
+        draw_text(box, context, weights_table.NOT_TRIED, 'INFO', width_px=width_px)

@@ -18,6 +18,8 @@ _ENGINES = (('CYCLES', "Cycles", "Rendered by Cycles"), ('EEVEE', "EEVEE", "Rend
 _VIEWS = (('CAMERA', "Scene Camera", "As the scene's camera sees the selected objects"),
           ('FRONT', "Front", "From the front and a little above"))
 
+_WIDTH_PX = 400
+
 
 class STIPPLE_OT_splats_from_render(GenerateOperator, bpy.types.Operator):
     """Render the selected objects with a transparent film and make splats of the image, in their place. No mask is
@@ -45,7 +47,7 @@ class STIPPLE_OT_splats_from_render(GenerateOperator, bpy.types.Operator):
 
     def invoke(self, context, _event):
         self._asked = True
-        return context.window_manager.invoke_props_dialog(self, width=400)
+        return context.window_manager.invoke_props_dialog(self, width=_WIDTH_PX)
 
     _asked = False
 
@@ -77,7 +79,7 @@ class STIPPLE_OT_splats_from_render(GenerateOperator, bpy.types.Operator):
         self.layout.use_property_split = True
         for name in ('view', 'engine', 'samples', 'hide_source'):
             self.layout.prop(self, name)
-        self._draw_settings(self.layout, context)
+        self._draw_settings(self.layout, context, _WIDTH_PX)
 
     def _name(self):
         return self._objects[0].name + ' Splats'
