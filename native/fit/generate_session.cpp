@@ -11,8 +11,10 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "base/progress.h"
 #include "base/stopwatch.h"
 #include "fit/machine_speed.h"
+#include "fit/object_placement.h"
 #include "generate/dino_encoder.h"
 #include "generate/flow_cost.h"
 #include "generate/flow_network.h"
@@ -20,6 +22,7 @@
 #include "generate/vae_encoder.h"
 #include "io/assets/checkpoint.h"
 #include "io/assets/weight_file.h"
+#include "io/assets/weights_reference.h"
 #include "io/bytes/sha256.h"
 #include "model/latent_splats.h"
 
@@ -29,8 +32,9 @@ namespace {
 
 // Channels of the colour encoder's first level, whose maps are the largest that there are.
 constexpr uint64_t kFirstColourChannels = 128;
+constexpr double kLargestSize = 1e6;  // metres
 // Of the whole work, what comes before the encoders and behind the last step.
-constexpr double kPreparationShare = 0.01, kEndShare = 0.99;
+constexpr double kPreparationShare = 0.01, kSampledShare = 0.96;
 
 FlowSettings flowSettings(const GenerateOptions& options) {
   return {options.steps, options.guidance, options.shift};
@@ -42,14 +46,14 @@ struct Networks {
   DinoEncoder structure;
   VaeEncoder colour;
   FlowNetwork flow;
-  WeightTable decoder;
+  LatentNetworks decoder;
 
   explicit Networks(const GenerateOptions& options)
       : folder(findWeights(options.weights_folder)),
         structure(open(WeightsRole::kStructureEncoder), {options.structure_head_width}),
         colour(open(WeightsRole::kColourEncoder)),
         flow(open(WeightsRole::kFlow)),
-        decoder(open(WeightsRole::kDecoder)) {
+        decoder(readLatentNetworks(open(WeightsRole::kDecoder))) {
     const FlowSizes& sizes = flow.sizes();
     if (sizes.structure_width != structure.width() || sizes.colour_width != colour.tokenWidth()) {
       fail(ErrorCode::kFormat,
@@ -84,8 +88,12 @@ void requireOptions(const GenerateOptions& options) {
                                           std::to_string(options.token_count) + "; 1 to " +
                                           std::to_string(kMostFlowTokens) + " is allowed");
   }
-  if (options.preview_steps > 0 && options.preview_anchors == 0) {
+  if (options.preview_anchors == 0) {
     fail(ErrorCode::kInvalidArgument, "the anchors of a preview are 0; 1 or more is allowed");
+  }
+  if (!(options.size >= 0) || options.size > kLargestSize) {
+    fail(ErrorCode::kInvalidArgument, "the size of the object is " + numberText(options.size) +
+                                          " m; 0 to " + numberText(kLargestSize) + " is allowed");
   }
 }
 
@@ -101,6 +109,17 @@ uint64_t workBytes(const Networks& networks, const GenerateOptions& options) {
   return condition + std::max({structure, colour, flow});
 }
 
+/// Moves decoded splats to where they shall stand.
+void place(const LatentPlacement& placement, SplatCloud& cloud) {
+  for (size_t i = 0; i < cloud.positions.size(); ++i) {
+    cloud.positions[i] = static_cast<float>(
+        placement.scale * static_cast<double>(cloud.positions[i]) + placement.offset[i % 3]);
+  }
+  for (float& scale : cloud.scales) {
+    scale = static_cast<float>(placement.scale * static_cast<double>(scale));
+  }
+}
+
 /// What a checkpoint must agree in, as JSON.
 std::string keyOf(const Networks& networks, const GenerateOptions& options,
                   const PreparedImage& prepared) {
@@ -112,8 +131,8 @@ std::string keyOf(const Networks& networks, const GenerateOptions& options,
                     ",\"mean_colour\":" + text(options.uses_mean_colour ? 1 : 0) +
                     ",\"tokens\":" + text(options.token_count) +
                     ",\"steps\":" + text(options.steps) +
-                    ",\"guidance\":" + numberText(options.guidance) +
-                    ",\"shift\":" + numberText(options.shift) + ",\"weights\":[";
+                    ",\"guidance\":" + numberText(options.guidance, 17) +
+                    ",\"shift\":" + numberText(options.shift, 17) + ",\"weights\":[";
   for (const WeightsFile& file : networks.folder.files) {
     key += (key.back() == '[' ? "" : ",") + text(file.bytes);
   }
@@ -158,8 +177,12 @@ struct GenerateSession::Work {
               SamplerState& state, const ProgressShare& share);
   void keep(const std::string& key, const SamplerState& state) const;
   void showPreview(const FlowPreview& preview);
-  std::shared_ptr<const SplatModel> modelOf(const Latent& latent,
+  /// In: weights: the decoder's, which the model's file names; settings, as JSON.
+  std::shared_ptr<const SplatModel> modelOf(const Latent& latent, const WeightsReference& weights,
                                             const std::string& settings) const;
+  /// The splats of a preview.
+  SplatCloud decoded(const SplatModel& model, Progress* progress) const;
+  void finish(Latent latent, const std::string& settings, Progress& progress);
 
   void note(const std::string& name, std::span<const float> numbers) {
     StageValues values = valuesOf(name, numbers);
@@ -219,8 +242,17 @@ GenerateEstimate GenerateSession::estimate(const GenerateOptions& options) {
 }
 
 std::shared_ptr<const SplatModel> GenerateSession::Work::modelOf(
-    const Latent& latent, const std::string& settings) const {
-  return makeLatentSplats(latent, networks.folder.of(WeightsRole::kDecoder).path, settings);
+    const Latent& latent, const WeightsReference& weights, const std::string& settings) const {
+  return makeLatentSplats(networks.decoder, std::make_shared<const Latent>(latent), weights,
+                          {settings, {}});
+}
+
+SplatCloud GenerateSession::Work::decoded(const SplatModel& model, Progress* progress) const {
+  const ModelSettings allowed = model.settings();
+  ModelRequest request;
+  request.budget =
+      std::clamp(options.preview_anchors, allowed.minimum_budget, allowed.maximum_budget);
+  return model.decode(request, progress);
 }
 
 SamplerState GenerateSession::Work::firstState(const std::string& key,
@@ -247,13 +279,26 @@ void GenerateSession::Work::keep(const std::string& key, const SamplerState& sta
 }
 
 void GenerateSession::Work::showPreview(const FlowPreview& preview) {
-  ModelRequest request;
-  request.budget = options.preview_anchors;
-  const std::shared_ptr<const SplatModel> model = modelOf(preview.latent, "{}");
-  auto cloud = std::make_shared<const SplatCloud>(model->decode(request));
+  auto cloud = std::make_shared<SplatCloud>(decoded(*modelOf(preview.latent, {}, "{}"), nullptr));
+  if (options.size > 0) place(standingOnBase(*cloud, options.size), *cloud);
   const std::lock_guard<std::mutex> lock(mutex);
   newest = std::move(cloud);
   status.preview_step = preview.step;
+}
+
+void GenerateSession::Work::finish(Latent latent, const std::string& settings, Progress& progress) {
+  const ProgressPart part(&progress, kSampledShare, 1);
+  const std::string& path = networks.folder.of(WeightsRole::kDecoder).path;
+  const WeightsReference weights = referenceOf(path, &progress);
+  if (options.size > 0) {
+    const SplatCloud cloud = decoded(*modelOf(latent, weights, settings), &progress);
+    note("splats.positions", cloud.positions);
+    note("splats.scales", cloud.scales);
+    note("splats.opacities", cloud.opacities);
+    note("splats.colours", cloud.sh);
+    latent.placement = standingOnBase(cloud, options.size);
+  }
+  model = modelOf(latent, weights, settings);
 }
 
 void GenerateSession::run(Progress& progress) {
@@ -281,13 +326,12 @@ void GenerateSession::Work::run(Progress& progress) {
   const double encoding = networks.encoderWork(size);
   const double sampling = networks.samplingCost(options).flops;
   const double middle =
-      kPreparationShare + (kEndShare - kPreparationShare) * encoding / (encoding + sampling);
+      kPreparationShare + (kSampledShare - kPreparationShare) * encoding / (encoding + sampling);
   const FlowContext context = contextOf(run, prepared, noise.colour, middle);
-  sample(run, context, key, state, {middle, kEndShare});
-  progress.advance(kEndShare, "Reading the decoder");
+  sample(run, context, key, state, {middle, kSampledShare});
   note("latent", state.latent.tokens);
   note("camera", state.latent.camera);
-  model = modelOf(state.latent, key);
+  finish(std::move(state.latent), key, progress);
 }
 
 FlowContext GenerateSession::Work::contextOf(const NetworkRun& run, const PreparedImage& prepared,
