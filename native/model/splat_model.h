@@ -23,6 +23,14 @@ struct ModelNotes {
   AssetExtras extras;
 };
 
+/// What reading an asset may need beside its file.
+struct ReadingAid {
+  /// Folder of the user's files of networks' weights, which assets name and do not hold; empty:
+  /// nobody has said where it is.
+  std::string weights_folder;
+  Progress* progress = nullptr;  ///< of reading; files of weights are hashed once
+};
+
 /// What a model is, beside its settings. 0 where it does not apply.
 struct ModelInfo {
   int leaf_level = 0;         ///< of its density
