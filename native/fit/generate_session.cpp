@@ -13,6 +13,8 @@
 #include "base/number_text.h"
 #include "base/progress.h"
 #include "base/stopwatch.h"
+#include "decode/latent/latent_decoder.h"
+#include "decode/latent/latent_networks.h"
 #include "fit/machine_speed.h"
 #include "fit/object_placement.h"
 #include "generate/dino_encoder.h"
@@ -107,17 +109,6 @@ uint64_t workBytes(const Networks& networks, const GenerateOptions& options) {
   const uint64_t condition = rows * (width + networks.colour.tokenWidth()) * sizeof(float);
   const uint64_t flow = networks.flow.memoryBound(options.token_count, rows);
   return condition + std::max({structure, colour, flow});
-}
-
-/// Moves decoded splats to where they shall stand.
-void place(const LatentPlacement& placement, SplatCloud& cloud) {
-  for (size_t i = 0; i < cloud.positions.size(); ++i) {
-    cloud.positions[i] = static_cast<float>(
-        placement.scale * static_cast<double>(cloud.positions[i]) + placement.offset[i % 3]);
-  }
-  for (float& scale : cloud.scales) {
-    scale = static_cast<float>(placement.scale * static_cast<double>(scale));
-  }
 }
 
 /// What a checkpoint must agree in, as JSON.
