@@ -59,21 +59,21 @@ def generate(files, image, out, *arguments, **keywords):
 
 def test_an_image_becomes_a_model_that_decodes_to_any_budget(files):
     generate(files, 'image.png', 'model.stipple.safetensors')
-    for anchors in (1, 40):
+    for anchors in (32, 40):
         subprocess.run([TOOL, 'decode', files / 'model.stipple.safetensors', files / 'out.ply', '--anchors', str(anchors),
                         '--weights', files / 'weights'], check=True, timeout=60)
         assert f'element vertex {32 * anchors}\n'.encode() in (files / 'out.ply').read_bytes()[:400]
 
 
 def test_an_image_becomes_splats(files):
-    figures = json.loads(generate(files, 'image.png', 'a.ply', '--anchors', 24, '--json').stdout)
-    assert figures['gaussians'] == 24 * 32
+    figures = json.loads(generate(files, 'image.png', 'a.ply', '--anchors', 44, '--json').stdout)
+    assert figures['gaussians'] == 44 * 32
     assert figures['estimated_seconds'] > 0 and figures['operations'] > 1e6
 
 
 def test_the_same_seed_gives_the_same_file_and_another_does_not(files):
     for name, seed in (('one.ply', 5), ('same.ply', 5), ('other.ply', 6)):
-        generate(files, 'image.png', name, '--anchors', 8, '--seed', seed)
+        generate(files, 'image.png', name, '--anchors', 40, '--seed', seed)
     one, same, other = ((files / name).read_bytes() for name in ('one.ply', 'same.ply', 'other.ply'))
     assert one == same and one != other
 
@@ -81,25 +81,25 @@ def test_the_same_seed_gives_the_same_file_and_another_does_not(files):
 def test_threads_do_not_change_the_result(files):
     for threads in (1, 2):
         subprocess.run([TOOL, '--threads', str(threads), 'generate', files / 'image.png', files / f't{threads}.ply',
-                        '--weights', files / 'weights', *map(str, SMALL), '--anchors', '8'], check=True, timeout=120)
+                        '--weights', files / 'weights', *map(str, SMALL), '--anchors', '40'], check=True, timeout=120)
     assert (files / 't1.ply').read_bytes() == (files / 't2.ply').read_bytes()
 
 
 def test_a_mask_stands_in_for_alpha_and_without_either_the_message_says_what_to_do(files):
-    generate(files, 'opaque.png', 'masked.ply', '--anchors', 8, '--mask', files / 'mask.png')
+    generate(files, 'opaque.png', 'masked.ply', '--anchors', 40, '--mask', files / 'mask.png')
     line = error(files / 'opaque.png', files / 'none.ply', '--weights', files / 'weights', *SMALL)
     assert 'mask' in line and 'transparent' in line
     assert not (files / 'none.ply').exists()
 
 
 def test_check_says_whether_files_are_published_and_what_passes_by(files):
-    figures = json.loads(generate(files, 'image.png', 'c.ply', '--anchors', 8, '--check', '--json').stdout)
+    figures = json.loads(generate(files, 'image.png', 'c.ply', '--anchors', 40, '--check', '--json').stdout)
     assert figures['TripoSplat decoder.state'] == 'another size than the published file'
     assert len(figures['TripoSplat decoder.sha256']) == 64
     assert figures['structure.layer1.out.count'] > 0
     assert figures['step3.tokens.deviation'] > 0
     assert abs(figures['latent.mean']) < 10
-    table = generate(files, 'image.png', 'c.ply', '--anchors', 8, '--check').stdout
+    table = generate(files, 'image.png', 'c.ply', '--anchors', 40, '--check').stdout
     assert 'structure.features' in table and 'SHA-256' in table
 
 
@@ -119,7 +119,7 @@ def test_errors_are_one_line_and_say_what_to_do(files, tmp_path):
 def test_a_run_that_was_interrupted_goes_on_to_the_same_splats(files):
     """Many steps, so that the signal comes while it samples."""
     state = files / 'state.stipple.safetensors'
-    many = ('--steps', 300, '--anchors', 8)
+    many = ('--steps', 300, '--anchors', 40)
     generate(files, 'image.png', 'whole.ply', *many)
     arguments = [TOOL, 'generate', files / 'image.png', files / 'resumed.ply', '--weights', files / 'weights', *SMALL,
                  *many, '--checkpoint', state]

@@ -5,6 +5,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
+#include "api/networks/weights_folder_of.h"
 #include "base/parallel.h"
 #include "data/images/byte_image.h"
 #include "fit/generate_session.h"
@@ -20,12 +21,14 @@ GenerateSession& sessionOf(const StippleJob* job) {
   return *given.generation;
 }
 
-GenerateOptions generateOptionsFrom(const StippleGenerateOptions* given) {
+GenerateOptions generateOptionsFrom(const StippleContext& context,
+                                    const StippleGenerateOptions* given) {
   StippleGenerateOptions defaults;
   stipple_generate_options_init(&defaults);
   const StippleGenerateOptions from = completed(given, defaults, "options");
   GenerateOptions options;
-  options.weights_folder = &require(from.weights_folder_utf8, "options->weights_folder_utf8");
+  options.weights_folder =
+      weightsFolderOf(context, from.weights_folder_utf8, "options->weights_folder_utf8");
   if (from.checkpoint_path_utf8) options.checkpoint_path = from.checkpoint_path_utf8;
   options.steps = from.steps;
   options.guidance = from.guidance;
@@ -85,7 +88,7 @@ StippleStatus stipple_generate_start(StippleContext* context, const StippleImage
     std::optional<ByteImage> shown;
     if (mask) shown = toMask(toByteImage(*mask->image));
     auto session = std::make_shared<GenerateSession>(toByteImage(*image->image), std::move(shown),
-                                                     generateOptionsFrom(options));
+                                                     generateOptionsFrom(*context, options));
     context->state->requireMemory(session->memoryBound(), "this generation");
     *job = startJob(
         context->state,
@@ -102,7 +105,7 @@ StippleStatus stipple_generate_estimate(StippleContext* context,
                                         StippleGenerateEstimate* estimate) {
   return guarded([&] {
     require(context, "context");
-    const GenerateOptions settings = generateOptionsFrom(options);
+    const GenerateOptions settings = generateOptionsFrom(*context, options);
     GenerateEstimate found;
     withThreads(context->state->thread_count, [&] { found = GenerateSession::estimate(settings); });
     deliver(estimate, estimateTo(found), "estimate");

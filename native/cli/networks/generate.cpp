@@ -26,7 +26,7 @@ struct Arguments {
 StippleGenerateOptions optionsOf(const Arguments& arguments) {
   StippleGenerateOptions options;
   stipple_generate_options_init(&options);
-  options.weights_folder_utf8 = arguments.weights.c_str();
+  if (!arguments.weights.empty()) options.weights_folder_utf8 = arguments.weights.c_str();
   if (!arguments.checkpoint.empty()) options.checkpoint_path_utf8 = arguments.checkpoint.c_str();
   options.steps = counted32(arguments.steps, "--steps");
   options.token_count = counted32(arguments.tokens, "--tokens");
@@ -99,9 +99,9 @@ void generate(const Context& context, const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   const StippleGenerateOptions options = optionsOf(arguments);
   Report report;
-  if (arguments.check) addWeights(context, arguments.weights, arguments.json, report);
   auto estimate = sized<StippleGenerateEstimate>();
   check(stipple_generate_estimate(context.get(), &options, &estimate));
+  if (arguments.check) addWeights(context, arguments.weights, arguments.json, report);
   addEstimate(estimate, report);
   if (arguments.estimate) return report.print(arguments.json);
   if (arguments.out.empty()) throw Failure("out is missing; splats or a model is expected");
@@ -145,7 +145,8 @@ void addGenerate(CLI::App& app, const Context& context) {
   command->add_option("image", to.image, "Image with alpha, or any with --mask")->required();
   command->add_option("out", to.out,
                       "The latent as a model (.stipple.safetensors), or splats (.ply and others)");
-  command->add_option("--weights", to.weights, "Folder with the files of weights")->required();
+  command->add_option("--weights", to.weights,
+                      "Folder with the files of weights; default: that of the tool's --weights");
   command->add_option("--mask", to.mask, "Image that is white, or opaque, on the object");
   command->add_option("--seed", to.seed)->capture_default_str();
   command

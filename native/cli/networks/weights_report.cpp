@@ -24,7 +24,8 @@ const char* stateText(uint32_t state) {
 }  // namespace
 
 void addWeights(const Context& context, const std::string& folder, bool json, Report& report) {
-  const auto found = make<Weights>(stipple_weights_find, context.get(), folder.c_str());
+  const auto found =
+      make<Weights>(stipple_weights_find, context.get(), folder.empty() ? nullptr : folder.c_str());
   const auto job =
       make<Job>(stipple_weights_check_start, const_cast<const StippleWeights*>(found.get()));
   finish(job);

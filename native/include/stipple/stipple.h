@@ -2181,7 +2181,7 @@ typedef struct StippleWeightsInfo {
 } StippleWeightsInfo;
 
 /* Looks through a folder and its subfolders and tells files apart by the names of their tensors: what they are called
- * and where they lie does not matter. Reads their headers alone.
+ * and where they lie does not matter. Reads their headers alone. folder_utf8: NULL for the context's weights folder.
  * Errors: IO for a folder that cannot be read; INVALID_ARGUMENT for one with more than 20,000 files and folders. */
 StippleStatus stipple_weights_find(StippleContext* context, const char* folder_utf8, StippleWeights** weights);
 void stipple_weights_free(StippleWeights* weights);
@@ -2218,7 +2218,7 @@ typedef struct StippleGenerateOptions {
   double shift;              /* 0.01..100, default 3; above 1 more steps are taken where there is much noise */
   double size;               /* metres, default 1: the largest side of the object, which stands on the origin with the
                                 middle of its base; 0: as the networks have it */
-  const char* weights_folder_utf8;  /* must be given */
+  const char* weights_folder_utf8;  /* NULL, the default: the context's (stipple_context_set_weights_folder) */
   const char* checkpoint_path_utf8; /* NULL, the default: none. A file that keeps the state after every step; the same
                                        image, settings and weights go on from it, and others are refused. It stays */
 } StippleGenerateOptions;

@@ -56,13 +56,14 @@ def _library_path():
 def context():
     """The native context of the current preferences. Errors: LibraryError."""
     chosen = preferences.get()
-    path, threads, limit = _library_path(), 0, 0
+    path, threads, limit, weights = _library_path(), 0, 0, ''
     if chosen is not None:
-        threads, limit = chosen.threads, chosen.memory_limit << 20
+        threads, limit, weights = chosen.threads, chosen.memory_limit << 20, chosen.weights_folder
     key = (str(library.find(path)), threads, limit)
     if key not in _contexts:
         _contexts.clear()
         _contexts[key] = Context(library.load(path), threads, limit)
+    _contexts[key].use_weights_of(weights)
     return _contexts[key]
 
 
