@@ -125,7 +125,8 @@ std::string keyOf(const Networks& networks, const GenerateOptions& options,
                     ",\"guidance\":" + numberText(options.guidance, 17) +
                     ",\"shift\":" + numberText(options.shift, 17) + ",\"weights\":[";
   for (const WeightsFile& file : networks.folder.files) {
-    key += (key.back() == '[' ? "" : ",") + text(file.bytes);
+    if (key.back() != '[') key += ',';
+    key += text(file.bytes);
   }
   return key + "]}";
 }
@@ -195,7 +196,7 @@ struct GenerateSession::Work {
   std::optional<ByteImage> mask;
   Networks networks;
   Stopwatch watch, step_watch;
-  std::shared_ptr<const SplatModel> model;
+  std::shared_ptr<const SplatModel> result;
 
   mutable std::mutex mutex;  ///< of what follows
   GenerateStatus status;
@@ -289,7 +290,7 @@ void GenerateSession::Work::finish(Latent latent, const std::string& settings, P
     note("splats.colours", cloud.sh);
     latent.placement = standingOnBase(cloud, options.size);
   }
-  model = modelOf(latent, weights, settings);
+  result = modelOf(latent, weights, settings);
 }
 
 void GenerateSession::run(Progress& progress) {
@@ -396,10 +397,10 @@ std::shared_ptr<const SplatCloud> GenerateSession::takePreview() {
 }
 
 std::shared_ptr<const SplatModel> GenerateSession::model() const {
-  if (!work_->model) {
+  if (!work_->result) {
     fail(ErrorCode::kInvalidArgument, "this generation has not ended, or has not ended well");
   }
-  return work_->model;
+  return work_->result;
 }
 
 }  // namespace stipple
