@@ -28,8 +28,8 @@ struct Case {
 
 FeatureMap randomMap(size_t height, size_t width, size_t channels, uint64_t seed) {
   FeatureMap map = FeatureMap::ofSize(height, width, channels);
-  const std::vector<float> numbers = evenNumbers(map.values.size(), seed);
-  std::copy(numbers.begin(), numbers.end(), map.values.begin());
+  const std::vector<float> made = numbers(map.values.size(), seed);
+  std::copy(made.begin(), made.end(), map.values.begin());
   return map;
 }
 
@@ -200,13 +200,13 @@ TEST(Convolution, RefusesWeightsOfAnotherShape) {
   std::string message;
   EXPECT_EQ(errorOf([&] { Convolution(weights.table(), "layer", 3, 4, kPixelGrid); }, &message),
             ErrorCode::kFormat);
-  EXPECT_THAT(message, HasSubstr("made"));
+  EXPECT_THAT(message, HasSubstr("net.safetensors"));
   EXPECT_THAT(message, HasSubstr("layer.weight"));
 }
 
 TEST(Convolution, RefusesNumbersThatAreNotFinite) {
   MadeWeights weights;
-  std::vector<float> values = evenNumbers(36, 3);
+  std::vector<float> values = numbers(36, 3);
   values[20] = std::numeric_limits<float>::quiet_NaN();
   weights.add("layer.weight", {2, 2, 3, 3}, values);
   weights.add("layer.bias", {2}, {0.0f, 0.0f});

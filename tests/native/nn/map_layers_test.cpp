@@ -55,7 +55,7 @@ TEST(GroupNorm, GivesTheSameBitsForAnyNumberOfThreads) {
   MadeWeights weights;
   weights.addNorm("norm", 6);
   const GroupNorm layer(weights.table(), "norm", 6, 3, 1e-6f);
-  const FeatureMap map = mapOf(90, 70, 6, evenNumbers(90 * 70 * 6, 4));
+  const FeatureMap map = mapOf(90, 70, 6, numbers(90 * 70 * 6, 4));
   ChannelNorm one;
   withThreads(1, [&] { one = layer.of({}, map); });
   withThreads(3, [&] {
@@ -91,7 +91,7 @@ TEST(MaxPool, TakesTheLargestOfEachWindow) {
 }
 
 TEST(MaxPool, WalksOverlappingWindowsWithTheSameBitsForAnyNumberOfThreads) {
-  const FeatureMap map = mapOf(31, 21, 3, evenNumbers(31 * 21 * 3, 6));
+  const FeatureMap map = mapOf(31, 21, 3, numbers(31 * 21 * 3, 6));
   FeatureMap one;
   withThreads(1, [&] { one = maxPool({}, map, 3, 2); });
   withThreads(3, [&] { EXPECT_EQ(maxPool({}, map, 3, 2).values, one.values); });
