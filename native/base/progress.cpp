@@ -22,17 +22,6 @@ std::string Progress::stage() const {
   return stage_;
 }
 
-ProgressPart::ProgressPart(Progress* progress, double begin, double end) : progress_(progress) {
-  if (progress_ == nullptr) return;
-  begin_ = progress_->part_begin_.load(std::memory_order_relaxed);
-  size_ = progress_->part_size_.load(std::memory_order_relaxed);
-  progress_->enterPart(begin_ + size_ * begin, begin_ + size_ * end);
-}
-
-ProgressPart::~ProgressPart() {
-  if (progress_ != nullptr) progress_->enterPart(begin_, begin_ + size_);
-}
-
 void advance(Progress* progress, double fraction, const char* stage) {
   if (progress) progress->advance(fraction, stage);
 }

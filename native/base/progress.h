@@ -27,28 +27,11 @@ class Progress {
   std::string stage() const;
 
  private:
-  friend class ProgressPart;
-
   std::atomic<bool> cancelled_{false};
   std::atomic<double> fraction_{0.0};
   std::atomic<double> part_begin_{0.0}, part_size_{1.0};
   mutable std::mutex mutex_;
   std::string stage_;
-};
-
-/// While it lives, 0..1 of what advance() is told means begin..end of what it meant before: for
-/// work that is made of several pieces and may itself be a piece. Progress may be null. Not while
-/// another thread advances.
-class ProgressPart {
- public:
-  ProgressPart(Progress* progress, double begin, double end);
-  ~ProgressPart();
-  ProgressPart(const ProgressPart&) = delete;
-  ProgressPart& operator=(const ProgressPart&) = delete;
-
- private:
-  Progress* progress_;
-  double begin_ = 0, size_ = 1;  // of before
 };
 
 /// `progress->advance(...)` where progress may be null.

@@ -60,14 +60,13 @@ SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress) c
   sampling.count = request.budget;
   sampling.order = request.order;
   sampling.seed = request.seed;
-  AnchorSet anchors;
-  {
-    const ProgressPart part(progress, 0, kSamplingShare);
-    anchors = drawLearned(*sampled, sampling, draws(), progress);
-  }
+  if (progress) progress->enterPart(0, kSamplingShare);
+  const AnchorSet anchors = drawLearned(*sampled, sampling, draws(), progress);
   wanted.anchors = &anchors;
-  const ProgressPart part(progress, kSamplingShare, 1);
-  return decoder().decode(wanted);
+  if (progress) progress->enterPart(kSamplingShare, 1);
+  SplatCloud cloud = decoder().decode(wanted);
+  if (progress) progress->enterPart(0, 1);
+  return cloud;
 }
 
 uint64_t SplatModel::memoryBound(const ModelRequest& request) const {

@@ -78,7 +78,7 @@ class SplatModel {
   /// Which settings it has: those of its kind, with its own ranges.
   ModelSettings settings() const;
   /// The splats of a request. Errors: kInvalidArgument for a budget or a K outside settings(), a
-  /// time that is not finite; kCancelled.
+  /// time that is not finite; kCancelled. Progress runs from 0 to 1 of the whole work.
   /// Threads and determinism: parallel; same result for any number of threads.
   SplatCloud decode(const ModelRequest& request, Progress* progress = nullptr) const;
   /// Bytes that decode() holds at most, without the model itself.

@@ -104,10 +104,10 @@ def test_figures_of_another_job_are_refused(context, weights):
 
 
 def test_a_folder_that_the_context_knows_need_not_be_given(context, weights, image):
-    context.use_weights_of(str(weights))
+    context.set_weights_folder(str(weights))
     options = generate_options(context.library, weights, **SMALL)
     options.weights_folder_utf8 = None
     Generation.start(context, image, None, options).wait()
-    context.use_weights_of('')
+    context.set_weights_folder('')
     with pytest.raises(StippleError, match='huggingface'):
         Generation.start(context, image, None, options)

@@ -20,11 +20,10 @@ class Context(Handle):
         options.thread_count = threads
         options.memory_limit_bytes = memory_limit_bytes
         super().__init__(library, new_handle(library, 'stipple_context_create', byref(options)))
-
         self._weights_folder = ''
 
-    def use_weights_of(self, folder):
-        """Where assets find the files of weights that they name; '': where STIPPLE_WEIGHTS says."""
+    def set_weights_folder(self, folder):
+        """Says where models that name a file of weights find it; '' for where the environment says."""
         if folder != self._weights_folder:
             self._check(self.library.stipple_context_set_weights_folder(self.pointer,
                                                                         path_bytes(folder) if folder else None))

@@ -142,7 +142,7 @@ TEST(Convolution, PadsOnTheRightAndBelowAloneWhenItHalves) {
 TEST(Convolution, NormalisesWhatItReadsAndLeavesThePaddingZero) {
   const Case c = {"normed", {3, 1, 1, 1}, 10, 30, 6, 4};
   MadeWeights made = weightsOf(c);
-  made.addNorm("norm", c.inputs);
+  made.addLayer("norm", {c.inputs});
   const WeightTable weights = made.table();
   const FeatureMap in = randomMap(c.height, c.width, c.inputs, 5);
   const ChannelNorm norm = GroupNorm(weights, "norm", c.inputs, 3, 1e-6f).of({}, in);

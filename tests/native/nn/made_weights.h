@@ -27,20 +27,25 @@ class MadeWeights {
     add(name, shape, values);
   }
 
-  /// name.weight and name.bias of a layer whose outputs are about as large as its inputs.
-  void addLayer(const std::string& name, const std::vector<uint64_t>& shape) {
+  /// Random numbers of a size that suits what the name says: weights of layers make outputs about
+  /// as large as inputs, those of norms are near 1, everything else is small.
+  void addAsNamed(const std::string& name, const std::vector<uint64_t>& shape) {
+    const bool is_weight = name.ends_with(".weight");
+    if (is_weight && shape.size() == 1) {
+      std::vector<float> values = numbers(static_cast<size_t>(shape[0]), ++seed_);
+      for (float& value : values) value = 1.0f + 0.2f * value;
+      add(name, shape, values);
+      return;
+    }
     float inputs = 1.0f;
     for (size_t i = 1; i < shape.size(); ++i) inputs *= static_cast<float>(shape[i]);
-    addRandom(name + ".weight", shape, std::sqrt(3.0f / inputs));
-    addRandom(name + ".bias", {shape[0]}, 0.1f);
+    addRandom(name, shape, is_weight ? std::sqrt(3.0f / inputs) : 0.2f);
   }
 
-  /// name.weight near 1 and name.bias.
-  void addNorm(const std::string& name, uint64_t channels) {
-    std::vector<float> values = numbers(static_cast<size_t>(channels), ++seed_);
-    for (float& value : values) value = 1.0f + 0.2f * value;
-    add(name + ".weight", {channels}, values);
-    addRandom(name + ".bias", {channels}, 0.1f);
+  /// name.weight and name.bias. In: shape: of the weight.
+  void addLayer(const std::string& name, const std::vector<uint64_t>& shape) {
+    addAsNamed(name + ".weight", shape);
+    addAsNamed(name + ".bias", {shape[0]});
   }
 
   /// From now on, this tensor is not added.

@@ -53,7 +53,7 @@ TEST(GroupNorm, KeepsSmallDifferencesOfLargeNumbers) {
 
 TEST(GroupNorm, GivesTheSameBitsForAnyNumberOfThreads) {
   MadeWeights weights;
-  weights.addNorm("norm", 6);
+  weights.addLayer("norm", {6});
   const GroupNorm layer(weights.table(), "norm", 6, 3, 1e-6f);
   const FeatureMap map = mapOf(90, 70, 6, numbers(90 * 70 * 6, 4));
   ChannelNorm one;
@@ -67,7 +67,7 @@ TEST(GroupNorm, GivesTheSameBitsForAnyNumberOfThreads) {
 
 TEST(GroupNorm, RefusesChannelsThatMakeNoGroups) {
   MadeWeights weights;
-  weights.addNorm("norm", 6);
+  weights.addLayer("norm", {6});
   try {
     GroupNorm(weights.table(), "norm", 6, 4, 1e-6f);
     FAIL();
