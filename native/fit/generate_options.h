@@ -35,7 +35,7 @@ struct GenerateOptions {
   /// A preview is decoded after every so many steps; 0: never.
   uint32_t preview_steps = 0;
   /// Anchors of a preview, and of the splats that tell how large the object is; at least 1.
-  uint64_t preview_anchors = 1024;
+  uint64_t preview_anchors = 256;
   /// A file that keeps the state after every step, and that an equal generation goes on from;
   /// empty: none.
   std::string checkpoint_path;

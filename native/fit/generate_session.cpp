@@ -173,7 +173,7 @@ struct GenerateSession::Work {
   std::shared_ptr<const SplatModel> modelOf(const Latent& latent, const WeightsReference& weights,
                                             const std::string& settings) const;
   /// The splats of a preview.
-  SplatCloud decoded(const SplatModel& model, Progress* progress) const;
+  SplatCloud decoded(const SplatModel& model) const;
   void finish(Latent latent, const std::string& settings, Progress& progress);
 
   void note(const std::string& name, std::span<const float> numbers) {
@@ -239,12 +239,13 @@ std::shared_ptr<const SplatModel> GenerateSession::Work::modelOf(
                           {settings, {}});
 }
 
-SplatCloud GenerateSession::Work::decoded(const SplatModel& model, Progress* progress) const {
+SplatCloud GenerateSession::Work::decoded(const SplatModel& model) const {
   const ModelSettings allowed = model.settings();
   ModelRequest request;
   request.budget =
       std::clamp(options.preview_anchors, allowed.minimum_budget, allowed.maximum_budget);
-  return model.decode(request, progress);
+  // So few that nobody waits for a cancel, and decoding would begin the bar anew.
+  return model.decode(request);
 }
 
 SamplerState GenerateSession::Work::firstState(const std::string& key,
@@ -271,7 +272,7 @@ void GenerateSession::Work::keep(const std::string& key, const SamplerState& sta
 }
 
 void GenerateSession::Work::showPreview(const FlowPreview& preview) {
-  auto cloud = std::make_shared<SplatCloud>(decoded(*modelOf(preview.latent, {}, "{}"), nullptr));
+  auto cloud = std::make_shared<SplatCloud>(decoded(*modelOf(preview.latent, {}, "{}")));
   if (options.size > 0) place(standingOnBase(*cloud, options.size), *cloud);
   const std::lock_guard<std::mutex> lock(mutex);
   newest = std::move(cloud);
@@ -279,11 +280,11 @@ void GenerateSession::Work::showPreview(const FlowPreview& preview) {
 }
 
 void GenerateSession::Work::finish(Latent latent, const std::string& settings, Progress& progress) {
-  const ProgressPart part(&progress, kSampledShare, 1);
+  progress.enterPart(kSampledShare, 1);
   const std::string& path = networks.folder.of(WeightsRole::kDecoder).path;
   const WeightsReference weights = referenceOf(path, &progress);
   if (options.size > 0) {
-    const SplatCloud cloud = decoded(*modelOf(latent, weights, settings), &progress);
+    const SplatCloud cloud = decoded(*modelOf(latent, weights, settings));
     note("splats.positions", cloud.positions);
     note("splats.scales", cloud.scales);
     note("splats.opacities", cloud.opacities);
@@ -291,6 +292,7 @@ void GenerateSession::Work::finish(Latent latent, const std::string& settings, P
     latent.placement = standingOnBase(cloud, options.size);
   }
   result = modelOf(latent, weights, settings);
+  progress.enterPart(0, 1);
 }
 
 void GenerateSession::run(Progress& progress) {

@@ -66,7 +66,7 @@ def test_an_image_becomes_splats_that_stand_on_the_cursor(stipple, weights, pict
     # The network's +x, which the image shows, looks along -y.
     assert (obj.matrix_world.to_3x3() @ Vector((1, 0, 0)))[:] == pytest.approx((0, -1, 0), abs=1e-6)
     low, high = extent(stipple, obj)
-    # The size was measured with 1,024 anchors, not these 40: a fifth of it is left for that.
+    # The size was measured with 256 anchors, not these 40: a fifth of it is left for that.
     assert max(high - low) == pytest.approx(2.0, rel=0.2)
     assert low[2] == pytest.approx(3.0, abs=0.4)
 
