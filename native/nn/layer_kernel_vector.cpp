@@ -179,10 +179,33 @@ void softmaxVector(SoftmaxRow& row) {
   for (; i < row.width; ++i) row.out[i] *= factor;
 }
 
+void narrowVector(size_t count, const float* from, uint16_t* to) {
+  const Tag d;
+  const hn::RebindToUnsigned<Tag> whole;
+  const hn::Rebind<uint16_t, Tag> half;
+  const size_t lanes = hn::Lanes(d);
+  const auto narrowed = [&](Vec values) {
+    const auto bits = hn::BitCast(whole, values);
+    const auto is_odd = hn::And(hn::ShiftRight<16>(bits), hn::Set(whole, 1u));
+    const auto rounded = hn::Add(hn::Add(bits, hn::Set(whole, 0x7fffu)), is_odd);
+    return hn::TruncateTo(half, hn::ShiftRight<16>(rounded));
+  };
+  size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    hn::StoreU(narrowed(hn::LoadU(d, from + i)), half, to + i);
+  }
+  if (i == count) return;
+  HWY_ALIGN float rest[hn::MaxLanes(d)] = {};
+  HWY_ALIGN uint16_t halves[hn::MaxLanes(d)];
+  std::copy(from + i, from + count, rest);
+  hn::Store(narrowed(hn::Load(d, rest)), half, halves);
+  std::copy_n(halves, count - i, to + i);
+}
+
 /// Highway's own one-lane target is not the plain kernel, which has the name "scalar".
 LayerKernel namedLayerKernel() {
   return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET), activateVector,
-          siluGateVector, softmaxVector};
+          siluGateVector, softmaxVector, narrowVector};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "nn/highway_backend.h"
+#include "nn/onednn_backend.h"
 
 namespace stipple {
 
@@ -32,7 +33,9 @@ const MatrixBackend& defaultMatrixBackend() {
 
 std::span<const MatrixBackend* const> matrixBackends() {
   static const std::vector<const MatrixBackend*> backends = [] {
-    return std::vector<const MatrixBackend*>{&highwayBackend()};
+    std::vector<const MatrixBackend*> all = {&highwayBackend()};
+    if (const MatrixBackend* onednn = onednnBackend()) all.push_back(onednn);
+    return all;
   }();
   return backends;
 }

@@ -24,6 +24,7 @@ struct Store {
 }  // namespace
 
 Scratch::Scratch(size_t count) {
+  if (count == 0) return;
   Store& store = Store::instance();
   {
     const std::lock_guard<std::mutex> lock(store.mutex);
@@ -42,6 +43,7 @@ Scratch::Scratch(size_t count) {
 
 Scratch::~Scratch() {
   Store& store = Store::instance();
+  if (values_.empty()) return;
   const std::lock_guard<std::mutex> lock(store.mutex);
   if (store.floats + values_.size() > kMostIdle) return;
   store.floats += values_.size();
