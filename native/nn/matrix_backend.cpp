@@ -31,6 +31,14 @@ const MatrixBackend& defaultMatrixBackend() {
   return backend;
 }
 
+const MatrixBackend& backendOf(const NetworkRun& run) {
+  return run.backend != nullptr ? *run.backend : defaultMatrixBackend();
+}
+
+Precision precisionOf(const NetworkRun& run) {
+  return backendOf(run).has(run.precision) ? run.precision : Precision::kFloat32;
+}
+
 std::span<const MatrixBackend* const> matrixBackends() {
   static const std::vector<const MatrixBackend*> backends = [] {
     std::vector<const MatrixBackend*> all = {&highwayBackend()};
