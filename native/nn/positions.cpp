@@ -15,21 +15,38 @@ constexpr size_t kGrain = 1 << 12;
 constexpr size_t kAxes = 3;
 constexpr size_t kWholePowers = 16;
 
-std::vector<float> frequenciesOf(PositionEncoding encoding, size_t count) {
-  std::vector<float> frequencies(count);
+/// `count` numbers from 0 to `last` in even steps, with the rounding of torch.linspace on x86
+/// processors: pairs of runs of eight, each from where it begins, and the rest one by one; the
+/// second half is counted from the end.
+std::vector<float> evenSteps(size_t count, float last) {
+  constexpr size_t kRun = 8;
+  std::vector<float> steps(count, 0.0f);
+  if (count < 2) return steps;
+  const float step = last / static_cast<float>(count - 1);
+  const auto at = [&](size_t i) {
+    return i < count / 2 ? step * static_cast<float>(i)
+                         : last - step * static_cast<float>(count - 1 - i);
+  };
+  const size_t in_runs = count / (2 * kRun) * (2 * kRun);
   for (size_t i = 0; i < count; ++i) {
-    double exponent = 0.0;
-    if (encoding == PositionEncoding::kGeometric) {
-      if (count > 1) exponent = 10.0 * static_cast<double>(i) / static_cast<double>(count - 1);
-    } else if (i < kWholePowers) {
-      exponent = static_cast<double>(i);
-    } else {
-      exponent =
-          16.0 * static_cast<double>(i - kWholePowers) / static_cast<double>(count - kWholePowers);
+    const bool is_in_run = i < in_runs;
+    steps[i] = is_in_run ? at(i / kRun * kRun) + static_cast<float>(i % kRun) * step : at(i);
+  }
+  return steps;
+}
+
+std::vector<float> frequenciesOf(PositionEncoding encoding, size_t count) {
+  constexpr float kLastExponent = 10;
+  std::vector<float> frequencies(count);
+  const std::vector<float> even = evenSteps(count, kLastExponent);
+  for (size_t i = 0; i < count; ++i) {
+    double exponent = static_cast<double>(even[i]);
+    if (encoding == PositionEncoding::kPowers) {
+      exponent = i < kWholePowers ? static_cast<double>(i)
+                                  : 16.0 * static_cast<double>(i - kWholePowers) /
+                                        static_cast<double>(count - kWholePowers);
     }
-    // The exponent too is a float32 number where the networks were trained.
-    const auto rounded = static_cast<double>(static_cast<float>(exponent));
-    frequencies[i] = static_cast<float>(std::exp2(rounded));
+    frequencies[i] = static_cast<float>(std::exp2(exponent));
   }
   return frequencies;
 }
@@ -38,7 +55,7 @@ std::vector<float> frequenciesOf(PositionEncoding encoding, size_t count) {
 /// frequencies turn many times, so that the rounding of an angle is part of the encoding.
 float angleOf(PositionEncoding encoding, float x, float frequency) {
   constexpr float kPi = std::numbers::pi_v<float>;
-  if (encoding == PositionEncoding::kGeometric) return kPi * x * frequency;
+  if (encoding == PositionEncoding::kGeometric) return x * frequency * kPi;
   return x * frequency * 2.0f * kPi;
 }
 
@@ -68,9 +85,13 @@ void addPositions(PositionEncoding encoding, size_t rows, size_t width, const fl
 std::vector<float> timeEncoding(double t, double longest, size_t width) {
   const size_t count = width / 2;
   std::vector<float> encoding(2 * count);
+  // In float32 as the released networks were trained: at t = 1000 the angle's rounding is 6e-5.
+  const auto time = static_cast<float>(t);
+  const auto decay = static_cast<float>(-std::log(longest));
   for (size_t i = 0; i < count; ++i) {
-    const double part = static_cast<double>(i) / static_cast<double>(count);
-    const double angle = t * std::exp(-std::log(longest) * part);
+    const float exponent = decay * static_cast<float>(i) / static_cast<float>(count);
+    const auto frequency = static_cast<float>(std::exp(static_cast<double>(exponent)));
+    const auto angle = static_cast<double>(time * frequency);
     encoding[i] = static_cast<float>(std::cos(angle));
     encoding[count + i] = static_cast<float>(std::sin(angle));
   }
