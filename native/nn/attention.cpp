@@ -11,7 +11,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "nn/attention_products.h"
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 #include "nn/scratch.h"
 
 namespace stipple {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "nn/kernels/panel_kernel.h"
 #include "nn/matrix_backend.h"
-#include "nn/panel_kernel.h"
 #include "nn/scratch.h"
 
 namespace stipple {

@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "base/own_library.h"
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 #include "nn/onednn/nn_table.h"
 #include "nn/scratch.h"
 

@@ -7,7 +7,7 @@
 
 #include "base/parallel.h"
 #include "nn/activations.h"
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 #include "nn/norms.h"
 #include "nn/positions.h"
 #include "test_numbers.h"

@@ -7,9 +7,9 @@
 
 #include "base/parallel.h"
 #include "io/scratch_folder.h"
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 #include "nn/matrix_backend.h"
-#include "nn/panel_kernel.h"
+#include "nn/kernels/panel_kernel.h"
 #include "test_numbers.h"
 
 namespace stipple {

@@ -1,11 +1,11 @@
-#include "bench/multiply_peak.h"
+#include "bench/nn/multiply_peak.h"
 
 #include <cstddef>
 
 #include "base/stopwatch.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "bench/multiply_peak.cpp"
+#define HWY_TARGET_INCLUDE "bench/nn/multiply_peak.cpp"
 #include <hwy/foreach_target.h>
 // After it, as each target includes the rest anew.
 #include <hwy/highway.h>

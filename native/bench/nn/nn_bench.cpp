@@ -11,7 +11,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "bench/comparison.h"
-#include "bench/multiply_peak.h"
+#include "bench/nn/multiply_peak.h"
 #include "nn/attention.h"
 #include "nn/linear.h"
 #include "nn/matrix_backend.h"

@@ -2,7 +2,7 @@
 #include <bit>
 #include <cmath>
 
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 
 namespace stipple {
 

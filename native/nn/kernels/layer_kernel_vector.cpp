@@ -1,12 +1,12 @@
 #include <algorithm>
 
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 
 // Lanes are numbers beside each other. What layer_kernel_scalar.cpp does in double is done in
 // float32 by forms that lose nothing where two numbers nearly cancel.
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "nn/layer_kernel_vector.cpp"
+#define HWY_TARGET_INCLUDE "nn/kernels/layer_kernel_vector.cpp"
 #include <hwy/foreach_target.h>
 // After it, as each target includes the rest anew.
 #include <hwy/contrib/math/math-inl.h>
