@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/number_text.h"
+#include "base/parallel.h"
 #include "generate/sobol_points.h"
 #include "nn/activations.h"
 #include "nn/norms.h"
@@ -25,9 +26,16 @@ constexpr float kHeadEpsilon = 1e-5f;
 /// A buffer of the training program that files of one's own training hold: the places of tokens,
 /// which are known.
 constexpr const char* kPlacesBuffer = "pos_pe";
-/// What layers of nn/ hold packed at a time: 32 MiB of keys and values or 16 MiB of weights, and
-/// idle memory of at most 64 MiB.
-constexpr uint64_t kLayerBytes = uint64_t{128} << 20;
+/// What layers of nn/ hold packed at a time: keys and values, weights, and what every thread works
+/// in. The store of idle memory keeps no more than was in use.
+uint64_t layerBytes(const FlowBlockSizes& sizes, uint64_t rows) {
+  constexpr uint64_t kMostKeys = uint64_t{32} << 20, kMostWeights = uint64_t{16} << 20;
+  constexpr uint64_t kThread = uint64_t{1} << 20;
+  const uint64_t keys = sizeof(float) * 2 * rows * sizes.channels;
+  const uint64_t weights =
+      sizeof(float) * sizes.channels * std::max(3 * sizes.channels, sizes.mlp_width);
+  return std::min(keys, kMostKeys) + std::min(weights, kMostWeights) + threadLimit() * kThread;
+}
 
 /// [cos(t w_i), sin(t w_i)], w_i = exp(-ln(longest) i / (width / 2)), step by step in float32:
 /// angles of up to 1000 round by 3e-5, and networks were trained with the rounded ones.
@@ -334,7 +342,7 @@ uint64_t FlowNetwork::memoryBound(uint64_t token_count, uint64_t context_rows) c
   const uint64_t channels = sizes_.block.channels;
   const uint64_t rows = token_count + context_rows + 1;
   const uint64_t tokens = sizeof(float) * rows * (channels + 1);
-  return tokens + flowBlockMemoryBytes(sizes_.block, rows) + kLayerBytes;
+  return tokens + flowBlockMemoryBytes(sizes_.block, rows) + layerBytes(sizes_.block, rows);
 }
 
 }  // namespace stipple

@@ -72,7 +72,8 @@ class FlowNetwork {
                 Latent& velocity, ProgressShare share = {}) const;
 
   /// The most bytes that velocity() and context() take beside their arguments, what layers pack
-  /// included. Weights are not: they are pages of a file.
+  /// included. Weights are not: they are pages of a file. Each of six large arrays may take up to
+  /// 2 MiB more, by pages.
   uint64_t memoryBound(uint64_t token_count, uint64_t context_rows) const;
 
  private:

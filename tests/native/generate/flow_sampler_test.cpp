@@ -24,8 +24,7 @@ using testing::flowGolden;
 using testing::pipelineCondition;
 using testing::pipelineGolden;
 
-/// What four steps with guidance make of 5e-5 in a call: the same network in float64 differs from
-/// the recorded run by 6.9e-5.
+/// What four steps with guidance make of 5e-5 in a call.
 constexpr float kSampleTolerance = 2e-4f;
 
 const FlowNetwork& network() {

@@ -5,12 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <bit>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
 #include "io/bytes/safetensors.h"
+#include "io/bytes/sha256.h"
 
 namespace stipple {
 namespace {
@@ -31,6 +33,17 @@ TEST(SobolPoints, SumUpToTheRecordedNumber) {
   uint64_t sum = 0;
   for (const Point& point : sobolIntegers(8192)) sum += uint64_t{point[0]} + point[1] + point[2];
   EXPECT_EQ(sum, 13194139521024u);
+}
+
+TEST(SobolPoints, HaveTheRecordedHashes) {
+  static_assert(std::endian::native == std::endian::little);
+  Sha256 integers, floats;
+  const std::vector<Point> points = sobolIntegers(8192);
+  integers.add(points.data(), points.size() * sizeof(Point));
+  EXPECT_EQ(integers.finish(), "383caa6ce58408ce82c4a8eacc4f1e6b00de03939468133579afff0bc031f54e");
+  const std::vector<float> numbers = sobolPoints(8192);
+  floats.add(numbers.data(), numbers.size() * sizeof(float));
+  EXPECT_EQ(floats.finish(), "884df4db664a680c100d032c9855397ced6afa28f8984efbee6b77f6ba3efe6b");
 }
 
 TEST(SobolPoints, AreTheFloatsThatARecordedRunUsed) {
