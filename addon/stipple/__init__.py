@@ -14,7 +14,7 @@ bl_info = {
 import bpy
 
 from . import cycles_engine, engine, operators, panels, preferences, properties, selection_tools
-from .viewport import drawing, selected_points, view_world
+from .viewport import drawing, selected_points, stroke_preparation, view_world
 from .scene.source import source_travel, sync
 from .scene.view import splat_engines, steady_effects
 
@@ -34,11 +34,13 @@ def register():
     drawing.register()
     view_world.register()
     selected_points.register()
+    stroke_preparation.register()
     selection_tools.register()
 
 
 def unregister():
     selection_tools.unregister()
+    stroke_preparation.unregister()
     selected_points.unregister()
     view_world.unregister()
     drawing.unregister()

@@ -57,4 +57,5 @@ def test_the_process_ends_with_blender(shots):
 def test_how_long_it_takes(shots):
     """Printed with -s: seconds until the coarse and the fine picture of each world."""
     print({name: round(seconds, 1) for name, seconds in shots[1]['seconds'].items()}, shots[1]['sizes'])
-    assert shots[1]['sizes'] == [2048, 4096, 3]
+    width = view_world_steps.STEPS[-1][0]
+    assert shots[1]['sizes'] == [width // 2, width, 3]

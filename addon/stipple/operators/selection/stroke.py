@@ -14,7 +14,9 @@ from ...jobs import JobOperator
 from ...scene import selection_settings
 from ...scene.source import edits, selecting
 from ...scene.view import drawn_regions, picking
+from ...viewport import selected_points
 from ...viewport.stroke_marks import StrokeMarks
+from .stroke_preview import StrokePreview
 
 _KEYS_OF_RADIUS = {'WHEELUPMOUSE': 1.1, 'WHEELDOWNMOUSE': 1 / 1.1, 'RIGHT_BRACKET': 1.1, 'LEFT_BRACKET': 1 / 1.1}
 
@@ -67,6 +69,7 @@ class DrawnOperator(OperationOperator):
 
     shape = ''       # of StrokeMarks
     _marks = None
+    _preview = None
     _is_drawing = False
 
     def invoke(self, context, event):
@@ -141,6 +144,14 @@ class DrawnOperator(OperationOperator):
         """Whether there is something to execute."""
         return True
 
+    def can_preview(self):
+        """Whether it can be told while the mouse moves what would be selected."""
+        return False
+
+    def preview_regions(self, obj):
+        """What regions_of(obj) would be if the mouse stopped here."""
+        return self.regions_of(obj)
+
     def help_text(self):
         return f'{self.bl_label}: draw on the splats. Shift adds, Ctrl subtracts, both intersect, Esc cancels'
 
@@ -163,6 +174,7 @@ class DrawnOperator(OperationOperator):
             return False
         self._is_drawing = True
         self._marks.begin(self._region, self._place(event))
+        self._preview = StrokePreview(context, selected_points.show_instead)
         return True
 
     def _move(self, context, event):
@@ -171,6 +183,8 @@ class DrawnOperator(OperationOperator):
             self.drag(context, place)
             self._marks.radius = self.mark_radius(context)
             self._marks.add(place)
+            if event.type == 'MOUSEMOVE' and self.can_preview():
+                self._preview.update(self.preview_regions)
             return
         view = picking.view_under(context, event)
         if view is None:
@@ -185,12 +199,16 @@ class DrawnOperator(OperationOperator):
     def _leave(self, context):
         self._marks.close()
         self._marks = None
+        if self._preview is not None:
+            self._preview.close()
+            self._preview = None
         context.workspace.status_text_set(None)
 
 
 class PathOperator(DrawnOperator):
     """The same, along a path."""
 
+    least_points = 1
     path: CollectionProperty(type=bpy.types.OperatorMousePath, options={'HIDDEN', 'SKIP_SAVE'})
     front_only: BoolProperty(name="Front Only", description="Select what is seen, and nothing that lies behind other "
                              "splats", default=False)
@@ -200,14 +218,23 @@ class PathOperator(DrawnOperator):
             self.front_only = selection_settings.of(context.scene).front_only
 
     def press(self, context, place):
-        if self.front_only:
-            # It is drawn while the stroke is.
-            self._start_front(context)
+        self._camera, self._front = self.camera(), None
+        # It is drawn while the stroke is.
+        self._front_task = self._start_front(context) if self.front_only else None
         self.path.clear()
         self._add(place)
 
     def drag(self, _context, place):
         self._add(place)
+
+    def can_preview(self):
+        if len(self.path) < self.least_points:
+            return False
+        if self.front_only and self._front is None:
+            if self._front_task.is_running():
+                return False
+            self._front = self._front_task.front()
+        return True
 
     def points(self):
         """[(x, y)] of the path. Errors: StippleError for none."""

@@ -13,7 +13,7 @@ import numpy as np
 from ...binding.errors import invalid
 from ...binding.regions import Region, RegionKind
 from ...binding.renderer import EMPTY_DEPTH, Renderer
-from ...binding.structs import CameraModel
+from ...binding.structs import CameraModel, JobState
 from .. import instances
 from ..source import placement, sources
 from . import cameras, viewed
@@ -56,6 +56,9 @@ class FrontTask:
 
     def __init__(self, task, camera, placed):
         self._task, self._camera, self._placed = task, camera, placed
+
+    def is_running(self):
+        return self._task.job.poll()[0] == JobState.RUNNING
 
     def front(self):
         """Waits. Errors: StippleError."""
