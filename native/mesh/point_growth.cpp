@@ -290,29 +290,36 @@ bool decideByBlocks(std::span<const float> points, const Box& box, const Lattice
   }
   const KeyedIndices to = sorted(targets);
   const double squared = distance * distance;
+  const auto has = [&](uint32_t block, const float* at) {
+    const double x = static_cast<double>(at[0]), y = static_cast<double>(at[1]),
+                 z = static_cast<double>(at[2]);
+    const float* last = &packed[0] + size_t{blocks.end(block)} * 3;
+    for (const float* p = &packed[size_t{blocks.begin(block)} * 3]; p != last; p += 3) {
+      const double dx = static_cast<double>(p[0]) - x, dy = static_cast<double>(p[1]) - y,
+                   dz = static_cast<double>(p[2]) - z;
+      if (dx * dx + dy * dy + dz * dz <= squared) return true;
+    }
+    return false;
+  };
   parallelFor(to.size(), kGrain, [&](size_t begin, size_t end) {
     std::array<uint32_t, 27> around;
+    uint32_t own = CellTable::kNone;
     size_t around_count = 0;
+    bool is_looked_up = false;
     for (size_t t = begin; t < end; ++t) {
       if (t == begin || to[t].key != to[t - 1].key) {
-        around_count = blocks.neighbours(to[t].key, around);
-        // The own block first: what is there is near for the most part.
-        const auto own =
-            std::find(around.begin(), around.begin() + around_count, blocks.find(to[t].key));
-        if (own != around.begin() + around_count) std::swap(*own, around[0]);
+        own = blocks.find(to[t].key);
+        is_looked_up = false;
       }
       const float* at = &points[size_t{to[t].index} * 3];
-      const double x = static_cast<double>(at[0]), y = static_cast<double>(at[1]),
-                   z = static_cast<double>(at[2]);
-      bool found = false;
+      // Most are near one of their own block: then nobody asks for the others.
+      bool found = own != CellTable::kNone && has(own, at);
+      if (!found && !is_looked_up) {
+        around_count = blocks.neighbours(to[t].key, around);
+        is_looked_up = true;
+      }
       for (size_t k = 0; k < around_count && !found; ++k) {
-        const float* p = &packed[size_t{blocks.begin(around[k])} * 3];
-        const float* last = &packed[size_t{blocks.end(around[k])} * 3];
-        for (; p != last && !found; p += 3) {
-          const double dx = static_cast<double>(p[0]) - x, dy = static_cast<double>(p[1]) - y,
-                       dz = static_cast<double>(p[2]) - z;
-          found = dx * dx + dy * dy + dz * dz <= squared;
-        }
+        found = around[k] != own && has(around[k], at);
       }
       if (found) near[to[t].index] = 1;
     }

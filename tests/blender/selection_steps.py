@@ -230,6 +230,49 @@ def press_panel_button(name):
     return step
 
 
+def quad_view(window):
+    with window.context():
+        bpy.ops.screen.region_quadview()
+
+
+def quad_drag(window):
+    """A click in the middle of the first of the four regions, which has a view of its own."""
+    regions = [region for region in window.area.regions if region.type == 'WINDOW']
+    facts['regions'] = len(regions)
+    region = regions[0]
+    facts['quad expected'] = in_circle(region)
+    x, y = region.x + region.width // 2, region.y + region.height // 2
+    for kind, value in (('MOUSEMOVE', 'NOTHING'), ('LEFTMOUSE', 'PRESS'), ('LEFTMOUSE', 'RELEASE')):
+        window.window.event_simulate(type=kind, value=value, x=x, y=y)
+
+
+def in_circle(region):
+    """Splats that a click in the middle of a region should select."""
+    positions = np.array([vertex.co for vertex in data().vertices])
+    matrix = np.array(region.data.perspective_matrix) @ np.array(bpy.context.object.matrix_world)
+    clip = np.c_[positions, np.ones(len(positions))] @ matrix.T
+    pixels = (0.5 + 0.5 * clip[:, :2] / clip[:, 3:]) * (region.width, region.height)
+    middle = region.width // 2 + 0.5, region.height // 2 + 0.5
+    return int((np.linalg.norm(pixels - middle, axis=1) <= settings().radius).sum())
+
+
+def panoramic_camera(window):
+    camera = scenes.camera((0, -6, 0), (np.pi / 2, 0, 0), type='PANO')
+    addon('version').panorama_settings(camera.data).panorama_type = 'EQUIRECTANGULAR'
+    scene = window.window.scene
+    scene.render.engine = 'STIPPLE'
+    window.region_data.view_perspective = 'CAMERA'
+    window.space.shading.type = 'RENDERED'
+
+
+def plain_view(window):
+    window.space.shading.type = 'SOLID'
+    window.region_data.view_perspective = 'ORTHO'
+    with window.context():
+        bpy.ops.view3d.view_axis(type='FRONT')
+    window.region_data.view_distance = 6
+
+
 def erase(window):
     with window.context():
         assert bpy.ops.stipple.erase_selected('INVOKE_DEFAULT') == {'FINISHED'}
@@ -273,4 +316,5 @@ steps = [build, note_theme, watch_preview, forget_source, note_prepared, tool('s
          set_to(front_only=False), press_panel_button('stipple.select_lasso'), *drag(OUTLINE, shot='lasso'),
          taken('lasso'), lambda _window: 'lasso_done', tool('stipple.select_sphere'), *drag(((40, 0), (80, 30), (100, 40)), shot='sphere'),
          taken('sphere'), tool('stipple.select_color'), *drag(((-80, 0),)), note_color, taken('color', True),
-         tool('stipple.select_brush'), *drag(LINE), erase, taken('erased'), lambda _window: 'erased', disable_and_enable, write]
+         tool('stipple.select_brush'), quad_view, quad_drag, taken('quad', True), quad_view, panoramic_camera, *drag(LINE),
+         taken('panorama', True), plain_view, lambda _window: None, *drag(LINE), erase, taken('erased'), lambda _window: 'erased', disable_and_enable, write]

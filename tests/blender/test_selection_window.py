@@ -35,6 +35,17 @@ def test_front_only_takes_the_first_wall(shots):
     assert 0.4 * counts['brush'] < counts['front'] < 0.6 * counts['brush']
 
 
+def test_a_region_of_quad_view_selects_what_it_shows_itself(shots):
+    facts = shots[1]
+    assert facts['regions'] == 4
+    assert facts['steps']['quad'] == facts['quad expected'] > 20
+
+
+def test_nothing_is_drawn_in_a_panorama(shots):
+    """One warning, and the selection stays."""
+    assert shots[1]['steps']['panorama'] == shots[1]['steps']['quad']
+
+
 def test_the_other_tools_select(shots):
     counts = shots[1]['steps']
     assert counts['lasso'] > 500 and counts['sphere'] > 50

@@ -14,7 +14,7 @@ from .. import selection_tools
 from ..binding.errors import StippleError
 from ..scene import selection_settings
 from ..scene.source import edits, selecting, sync
-from ..scene.view import drawn_regions
+from ..scene.view import drawn_regions, picking
 
 REST_SECONDS = 0.1
 POLL_SECONDS = 0.05
@@ -24,16 +24,24 @@ _FRONT_TOOLS = {'stipple.select_brush', 'stipple.select_lasso'}
 _state = {'handler': None, 'view': None, 'seen': None, 'since': 0.0, 'done': None}
 
 
-def prepare(context, region, region_data, space, front_only):
-    """Begins what strokes over the selected splat objects need in a view. Returns whether all is at hand or under way.
-    Errors: StippleError."""
+def prepare(context, region, region_data, space, front):
+    """Begins what strokes over the selected splat objects need in a view. front: _front_of(). Returns whether all is at
+    hand. Errors: StippleError."""
     objects = edits.selected_splats(context)
     is_ready = selecting.prepare(objects)
+    front_only, through_meshes = front
     if front_only and objects:
         camera = drawn_regions.camera_of(region_data.view_matrix, region_data.window_matrix,
                                          (region.width, region.height))
-        drawn_regions.start_front(context.evaluated_depsgraph_get(), camera, space)
+        task = drawn_regions.start_front(context.evaluated_depsgraph_get(), camera, space, through_meshes)
+        is_ready = not task.is_running() and is_ready
     return is_ready
+
+
+def _front_of(context, tool):
+    """(whether strokes are limited to the front, whether meshes hide nothing of it)"""
+    settings = selection_settings.of(context.scene)
+    return settings.front_only and tool in _FRONT_TOOLS, settings.through_meshes
 
 
 def _draw():
@@ -44,9 +52,8 @@ def _draw():
     tool = context.workspace.tools.from_space_view3d_mode('OBJECT', create=False)
     if tool is None or tool.idname not in dict(selection_tools.NAMES):
         return
-    front_only = tool.idname in _FRONT_TOOLS and selection_settings.of(context.scene).front_only
     names = tuple((obj.data.name_full, obj.data.get(sync.WRITTEN_KEY)) for obj in edits.selected_splats(context))
-    seen = (context.region.as_pointer(), context.region.width, context.region.height, front_only, names,
+    seen = (context.region.as_pointer(), context.region.width, context.region.height, _front_of(context, tool.idname), names,
             tuple(value for row in context.region_data.perspective_matrix for value in row))
     if seen == _state['seen'] or not names:
         return
@@ -66,7 +73,7 @@ def _tend():
         window, area, region = _state['view']
         with bpy.context.temp_override(window=window, area=area, region=region):
             space = area.spaces.active
-            if not prepare(bpy.context, region, space.region_3d, space, _state['seen'][3]):
+            if not prepare(bpy.context, region, picking.data_of(region, space), space, _state['seen'][3]):
                 return POLL_SECONDS  # a file is being read
     except (StippleError, ReferenceError, TypeError, AttributeError):
         pass  # the stroke itself says what is wrong; the area may be gone

@@ -18,7 +18,7 @@ from ..binding.renderer import Renderer
 from ..binding.structs import AccuracyLevel, JobState, Projection
 from ..scene import instances
 from ..scene.source import sources
-from ..scene.view import cameras, effects, facts, mattes, picture_options, quality, viewed
+from ..scene.view import cameras, effects, facts, mattes, picture_options, quality, view_mattes, viewed
 from . import view_world
 
 # Coarse images have one pixel for this many of the region's along each side: the least, the first and the most.
@@ -67,34 +67,12 @@ def view_camera(context, depsgraph):
                       aperture)
 
 
-class ViewMattes:
-    """Meshes that hide splats in a view; each is read again only when it has changed."""
-
-    def __init__(self):
-        self.placed = []  # as of mattes.gather_owned
-        self._read = {}
-
-    def update(self, depsgraph):
-        used, wanted = {}, 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS'
-
-        def mesh_of(evaluated):
-            # Geometry that nodes instance without its object has the name of its own data.
-            key = evaluated.original.name_full, evaluated.data.name_full
-            made = viewed.geometry_version(evaluated.original)
-            known = self._read.get(key)
-            used[key] = known if known is not None and known[0] == made else (made, mattes.read(evaluated))
-            return used[key][1]
-
-        self.placed = mattes.gather_owned(depsgraph, wanted, mesh_of)
-        self._read = used
-
-
 class ViewImage:
     """The image of one 3D view: coarse at once, fine when the view rests."""
 
     def __init__(self):
         self._instances = []
-        self._mattes = ViewMattes()
+        self._mattes = view_mattes.ViewMattes()
         self._version = 0
         self._coarse = COARSE[1]
         self._renderer = None
@@ -111,7 +89,7 @@ class ViewImage:
         """Takes what the view shows now. Errors: StippleError."""
         viewed.note_changes(depsgraph)
         self._instances = instances.gather_owned(depsgraph, 'VIEWPORT', warn)
-        self._mattes.update(depsgraph)
+        self._mattes.update(depsgraph, 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS')
         self._version += 1
 
     def draw(self, engine, context, depsgraph):

@@ -13,7 +13,7 @@ from ...binding.regions import RegionOperation
 from ...jobs import JobOperator
 from ...scene import selection_settings
 from ...scene.source import edits, selecting
-from ...scene.view import drawn_regions, picking
+from ...scene.view import cameras, drawn_regions, picking
 from ...viewport import selected_points
 from ...viewport.stroke_marks import StrokeMarks
 from .stroke_preview import StrokePreview
@@ -162,6 +162,11 @@ class DrawnOperator(OperationOperator):
     def _press(self, context, event):
         view = picking.view_under(context, event)
         self._region, self._region_data = view[:2]
+        space = next(area.spaces.active for area in context.screen.areas if self._region in tuple(area.regions))
+        if cameras.shows_panorama(space, self._region_data, context.engine):
+            self.report({'WARNING'}, 'This view shows a panorama, in which nothing can be drawn; leave the camera '
+                        '(View > Cameras > Active Camera), or choose another shading.')
+            return False
         if not any(self.properties.is_property_set(name) for name in ('view_matrix', 'projection_matrix')):
             self.view_matrix = [value for row in self._region_data.view_matrix for value in row]
             self.projection_matrix = [value for row in self._region_data.window_matrix for value in row]
@@ -211,11 +216,14 @@ class PathOperator(DrawnOperator):
     least_points = 1
     path: CollectionProperty(type=bpy.types.OperatorMousePath, options={'HIDDEN', 'SKIP_SAVE'})
     front_only: BoolProperty(name="Front Only", description="Select what is seen, and nothing that lies behind other "
-                             "splats", default=False)
+                             "splats and meshes", default=False)
+    through_meshes: BoolProperty(name="Through Meshes", description="With Front Only, select what meshes hide, too",
+                                 default=False)
 
     def take_settings(self, context):
-        if not self.properties.is_property_set('front_only'):
-            self.front_only = selection_settings.of(context.scene).front_only
+        for name in ('front_only', 'through_meshes'):
+            if not self.properties.is_property_set(name):
+                setattr(self, name, getattr(selection_settings.of(context.scene), name))
 
     def press(self, context, place):
         self._camera, self._front = self.camera(), None
@@ -249,7 +257,7 @@ class PathOperator(DrawnOperator):
 
     def _start_front(self, context):
         space = context.space_data if context.area is not None and context.area.type == 'VIEW_3D' else None
-        return drawn_regions.start_front(context.evaluated_depsgraph_get(), self.camera(), space)
+        return drawn_regions.start_front(context.evaluated_depsgraph_get(), self.camera(), space, self.through_meshes)
 
     def _add(self, place):
         if len(self.path) == 0 or tuple(self.path[-1].loc) != place:

@@ -16,7 +16,7 @@ from ...binding.renderer import EMPTY_DEPTH, Renderer
 from ...binding.structs import CameraModel, JobState
 from .. import instances
 from ..source import placement, sources
-from . import cameras, viewed
+from . import cameras, mattes, view_mattes, viewed
 from .facts import Border
 
 # Pixels of the longer side of the image that tells what is in front: a stroke is far wider than one of them.
@@ -25,6 +25,7 @@ DEPTH_SIDE = 400
 # of what splats cover. Not of the depth: orthographic views stand anywhere.
 FRONT_SHARE = 0.02
 
+_meshes = view_mattes.ViewMattes()
 _last = {}  # the image of depths that was asked for last, by what it shows: strokes of a view share it
 
 
@@ -52,18 +53,32 @@ class Front:
 
 
 class FrontTask:
-    """Depths in the making."""
+    """Depths in the making: of meshes, then of splats between them."""
 
-    def __init__(self, task, camera, placed):
-        self._task, self._camera, self._placed = task, camera, placed
+    def __init__(self, begin, meshes, camera, kept):
+        """begin: starts the job of the splats before and behind a Surface, or None. meshes: samples of
+        mattes.start_samples, or None. kept: lives as long as this."""
+        self._begin, self._meshes, self._camera, self._kept = begin, meshes, camera, kept
+        self._task = begin(None) if meshes is None else None
 
     def is_running(self):
+        """Never waits; goes on with the splats when the meshes are done. Errors: StippleError."""
+        if self._task is None:
+            if self._meshes.job.poll()[0] == JobState.RUNNING:
+                return True
+            self._go_on()
         return self._task.job.poll()[0] == JobState.RUNNING
 
     def front(self):
         """Waits. Errors: StippleError."""
+        if self._task is None:
+            self._go_on()
         self._task.job.wait()
         return Front(self._task.depth, self._camera)
+
+    def _go_on(self):
+        self._meshes.job.wait()
+        self._task = self._begin(mattes.surface_of(self._meshes))
 
 
 def camera_of(view_matrix, projection_matrix, size):
@@ -76,21 +91,34 @@ def camera_of(view_matrix, projection_matrix, size):
     return cameras.from_view(SimpleNamespace(view_matrix=view, window_matrix=window), *size)
 
 
-def start_front(depsgraph, camera, space=None):
+def start_front(depsgraph, camera, space=None, behind_meshes=False):
     """A FrontTask of the splats that a view shows. space: the 3D view, whose hidden objects hide nothing; None for all
-    of the view layer. Errors: StippleError."""
-    entries = [placed for owner, obj, placed in instances.gather_owned(depsgraph, 'VIEWPORT')
-               if space is None or viewed.shows(space, depsgraph, owner, obj)]
+    of the view layer. behind_meshes: whether meshes hide nothing. Errors: StippleError."""
+    def is_seen(owner, obj, _placed):
+        return space is None or viewed.shows(space, depsgraph, owner, obj)
+
+    entries = [entry[2] for entry in instances.gather_owned(depsgraph, 'VIEWPORT') if is_seen(*entry)]
+    hiding = []
+    if not behind_meshes:
+        _meshes.update(depsgraph, 'ALL')
+        hiding = [entry[2] for entry in _meshes.placed
+                  if is_seen(*entry) and entry[0].display_type not in {'WIRE', 'BOUNDS'}]
     coarse = -(-max(camera.width, camera.height) // DEPTH_SIDE)
     part = cameras.part_of(camera, Border(0, 0, camera.width, camera.height), coarse)
-    key = (bytes(camera), tuple((id(cloud), matrix.tobytes()) for cloud, matrix, _ in entries))
+    key = (bytes(camera), tuple((id(cloud), matrix.tobytes()) for cloud, matrix, _ in entries),
+           tuple((id(mesh), matrix.tobytes()) for mesh, matrix in hiding))
     if key not in _last:
         renderer = Renderer(sources.context())
         options = renderer.options()
         options.sh_degree_limit = 0  # nobody sees its colours
-        task = renderer.start(entries, part, options, median_depth=True)
+
+        def begin(surface):
+            return renderer.start(entries, part, options, median_depth=True, surface=surface)
+
+        meshes = mattes.start_samples(hiding, part, 1) if hiding else None
         _last.clear()
-        _last[key] = FrontTask(task, camera, entries)  # which holds the clouds, so that their ids stay theirs
+        # Which holds the clouds and meshes, so that their ids stay theirs.
+        _last[key] = FrontTask(begin, meshes, camera, (entries, hiding))
     return _last[key]
 
 
@@ -117,6 +145,8 @@ def colour(obj, value, tolerance, operation, centre=(0.0, 0.0, 0.0), radius=0.0)
 
 
 def forget():
+    global _meshes
+    _meshes = view_mattes.ViewMattes()
     _last.clear()
 
 
