@@ -396,11 +396,11 @@ def test_meshes_hide_what_is_behind_them(stipple, own, tmp_path):
     scenes.select(obj)
     brush(view, front_only=True, through_meshes=True)
     front = selected(own, obj)
-    left = of_world(obj, arrays.positions)[:, 0] < -0.1
+    left = drawn_views.of_world(obj, arrays.positions)[:, 0] < -0.1
     assert front[left].sum() > 20 and front[~left].sum() > 20
     brush(view, front_only=True)
     assert not selected(own, obj)[left].any()
-    right = of_world(obj, arrays.positions)[:, 0] > 0.1
+    right = drawn_views.of_world(obj, arrays.positions)[:, 0] > 0.1
     assert_same(selected(own, obj)[right], front[right], most=3)
     plane.display_type = 'WIRE'
     brush(view, front_only=True)

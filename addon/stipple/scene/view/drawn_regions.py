@@ -25,6 +25,8 @@ DEPTH_SIDE = 400
 # of what splats cover. Not of the depth: orthographic views stand anywhere.
 FRONT_SHARE = 0.02
 
+_SOLID = 0.5  # opacity of a mesh in a pixel from which on it hides splats
+
 _meshes = view_mattes.ViewMattes()
 _last = {}  # the image of depths that was asked for last, by what it shows: strokes of a view share it
 
@@ -53,32 +55,24 @@ class Front:
 
 
 class FrontTask:
-    """Depths in the making: of meshes, then of splats between them."""
+    """Depths in the making: of splats, and of meshes."""
 
-    def __init__(self, begin, meshes, camera, kept):
-        """begin: starts the job of the splats before and behind a Surface, or None. meshes: samples of
-        mattes.start_samples, or None. kept: lives as long as this."""
-        self._begin, self._meshes, self._camera, self._kept = begin, meshes, camera, kept
-        self._task = begin(None) if meshes is None else None
+    def __init__(self, splats, meshes, camera, kept):
+        """splats: a RenderTask. meshes: samples of mattes.start_samples, or None. kept: lives as long as this."""
+        self._splats, self._meshes, self._camera, self._kept = splats, meshes, camera, kept
 
     def is_running(self):
-        """Never waits; goes on with the splats when the meshes are done. Errors: StippleError."""
-        if self._task is None:
-            if self._meshes.job.poll()[0] == JobState.RUNNING:
-                return True
-            self._go_on()
-        return self._task.job.poll()[0] == JobState.RUNNING
+        """Never waits."""
+        return any(task is not None and task.job.poll()[0] == JobState.RUNNING for task in (self._splats, self._meshes))
 
     def front(self):
         """Waits. Errors: StippleError."""
-        if self._task is None:
-            self._go_on()
-        self._task.job.wait()
-        return Front(self._task.depth, self._camera)
-
-    def _go_on(self):
-        self._meshes.job.wait()
-        self._task = self._begin(mattes.surface_of(self._meshes))
+        self._splats.job.wait()
+        depths = self._splats.depth
+        if self._meshes is not None:
+            self._meshes.job.wait()
+            depths = np.where(self._meshes.opacity >= _SOLID, np.minimum(depths, self._meshes.depth), depths)
+        return Front(depths, self._camera)
 
 
 def camera_of(view_matrix, projection_matrix, size):
@@ -111,14 +105,11 @@ def start_front(depsgraph, camera, space=None, behind_meshes=False):
         renderer = Renderer(sources.context())
         options = renderer.options()
         options.sh_degree_limit = 0  # nobody sees its colours
-
-        def begin(surface):
-            return renderer.start(entries, part, options, median_depth=True, surface=surface)
-
+        task = renderer.start(entries, part, options, median_depth=True)
         meshes = mattes.start_samples(hiding, part, 1) if hiding else None
         _last.clear()
         # Which holds the clouds and meshes, so that their ids stay theirs.
-        _last[key] = FrontTask(begin, meshes, camera, (entries, hiding))
+        _last[key] = FrontTask(task, meshes, camera, (entries, hiding))
     return _last[key]
 
 
