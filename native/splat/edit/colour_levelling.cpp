@@ -20,8 +20,10 @@ constexpr double kMeanReach = 1.5;
 constexpr double kMeanSigmas = 2.5;
 /// Colours that differ by so much are of two materials rather than of one in two lights.
 constexpr double kMaterialStep = 0.1;
-/// Sums of coverage below which a mean says nothing.
-constexpr double kLeastCover = 1e-6;
+/// Mean coverage below which a mean says nothing.
+constexpr double kLeastCover = 0.05;
+/// Light does not change by more across a hole.
+constexpr double kMostAdded = 0.25;
 /// Passes over the hole per cell of its width, after which nothing changes by a thousandth any
 /// more.
 constexpr size_t kPassesPerCell = 3;
@@ -41,7 +43,7 @@ void blurLine(const CellLook* from, CellLook* to, size_t count, size_t step,
   }
 }
 
-/// The mean look around each cell, of solid ground alone.
+/// The mean look around each cell, of solid ground; everything else counts as not covered.
 std::vector<CellLook> meansOf(const HoleRaster& raster, const std::vector<CellLook>& looks,
                               size_t reach) {
   const double sigma = kMeanReach * static_cast<double>(reach);
@@ -64,6 +66,9 @@ std::vector<CellLook> meansOf(const HoleRaster& raster, const std::vector<CellLo
       blurLine(&across[x], &ground[x], raster.height, raster.width, bell);
     }
   });
+  double whole = bell[0];
+  for (size_t k = 1; k < bell.size(); ++k) whole += 2 * bell[k];
+  for (CellLook& look : ground) look /= whole * whole;
   return ground;
 }
 
@@ -84,37 +89,33 @@ class Ground {
       // The ground goes on where the patch would.
       if (raster_.cells[to] != Cell::kSolid) return false;
       const size_t beside = beyond(source, move);
-      step = colour(to) - colour(beside == kNone ? source : beside);
-      return true;
+      return difference(to, beside == kNone ? source : beside, step);
     }
     const uint32_t other = sources_[to];
-    if (static_cast<std::ptrdiff_t>(other) == static_cast<std::ptrdiff_t>(source) + move) {
-      step = Vec3d::Zero();
+    step = Vec3d::Zero();
+    if (static_cast<std::ptrdiff_t>(other) == static_cast<std::ptrdiff_t>(source) + move)
       return true;
-    }
     // The mean of what the two patches say of the way from one cell to the other.
     const size_t there = beyond(source, move), back = beyond(other, -move);
-    step = Vec3d::Zero();
-    int count = 0;
-    if (there != kNone) {
-      step += colour(other) - colour(there);
-      ++count;
-    }
-    if (back != kNone) {
-      step += colour(back) - colour(source);
-      ++count;
-    }
-    step = count > 0 ? Vec3d(step / count) : Vec3d(colour(other) - colour(source));
-    return true;
+    Vec3d one, two;
+    const bool has_one = there != kNone && difference(other, there, one);
+    const bool has_two = back != kNone && difference(back, source, two);
+    if (has_one) step += one;
+    if (has_two) step += two;
+    if (has_one && has_two) step /= 2;
+    return has_one || has_two || difference(other, source, step);
   }
 
  private:
   std::ptrdiff_t offset(size_t from, size_t to) const {
     return static_cast<std::ptrdiff_t>(to) - static_cast<std::ptrdiff_t>(from);
   }
-  Vec3d colour(size_t cell) const {
-    const CellLook& mean = means_[cell];
-    return mean.head<3>() / std::max(mean[3], kLeastCover);
+  /// Colour of `a` less that of `b`. False where too little of one is covered.
+  bool difference(size_t a, size_t b, Vec3d& difference) const {
+    const CellLook &first = means_[a], &second = means_[b];
+    if (first[3] < kLeastCover || second[3] < kLeastCover) return false;
+    difference = first.head<3>() / first[3] - second.head<3>() / second[3];
+    return true;
   }
   /// The solid cell beside another one, or kNone.
   size_t beyond(size_t cell, std::ptrdiff_t move) const {
@@ -194,6 +195,7 @@ std::vector<Vec3d> levelledColours(const HoleRaster& raster, const std::vector<C
       }
     });
   }
+  for (Vec3d& colour : added) colour = colour.cwiseMax(-kMostAdded).cwiseMin(kMostAdded);
   return added;
 }
 

@@ -442,15 +442,17 @@ class Hole {
     });
   }
 
-  /// Light is added to what a splat reflects to all sides; nothing becomes darker than black by it.
+  /// Light is added to what a splat reflects to all sides. Nothing becomes darker than black or
+  /// brighter than white by it.
   static void addColour(const Vec3d& added, SplatCloud& result, size_t splat) {
-    constexpr double kBlack = -0.5;
+    constexpr double kBlack = -0.5, kWhite = 0.5;
     constexpr double kC0 = static_cast<double>(kShC0);
     float* sh = &result.sh[splat * result.shStride()];
     for (size_t c = 0; c < 3; ++c) {
       const double before = kC0 * static_cast<double>(sh[c]);
-      const double after = before + added[static_cast<Eigen::Index>(c)];
-      sh[c] = static_cast<float>(std::max(after, std::min(before, kBlack)) / kC0);
+      const double after = std::clamp(before + added[static_cast<Eigen::Index>(c)],
+                                      std::min(before, kBlack), std::max(before, kWhite));
+      sh[c] = static_cast<float>(after / kC0);
     }
   }
 
