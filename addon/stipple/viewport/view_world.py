@@ -46,7 +46,8 @@ class _Painter:
         self._folder = tempfile.mkdtemp(prefix='stipple-worlds-', dir=bpy.app.tempdir)
         command = [bpy.app.binary_path, '--background', '--factory-startup', '--python', str(SCRIPT)]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
-                                         stderr=subprocess.DEVNULL, cwd=self._folder)
+                                         stderr=subprocess.DEVNULL, cwd=self._folder,
+                                         creationflags=getattr(subprocess, 'CREATE_NO_WINDOW', 0))
         self._count = 0
         self._paths = []  # of pictures that are still to come
 
