@@ -18,6 +18,10 @@ constexpr size_t kTaskRows = 192;
 /// Packed weights at a time: 16 MiB, whatever the layer, or one panel of it.
 constexpr size_t kMostPacked = size_t{1} << 22;
 
+size_t roundedUp(size_t count, size_t unit) {
+  return (count + unit - 1) / unit * unit;
+}
+
 }  // namespace
 
 Linear::Linear(const WeightTable& weights, const std::string& name, uint64_t inputs,
@@ -33,10 +37,11 @@ Linear::Linear(const WeightTable& weights, const std::string& name, uint64_t inp
 
 void Linear::apply(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,
                    float* out, size_t out_stride) const {
-  const MatrixBackend& backend = run.backend != nullptr ? *run.backend : defaultMatrixBackend();
-  const Precision precision = backend.has(run.precision) ? run.precision : Precision::kFloat32;
+  const MatrixBackend& backend = backendOf(run);
+  const Precision precision = precisionOf(run);
+  // Each panel begins at a cache line.
   const size_t panel_size =
-      backend.packedSize(inputs_, std::min(kPanelOutputs, outputs_), precision);
+      roundedUp(backend.packedSize(inputs_, std::min(kPanelOutputs, outputs_), precision), 16);
   const size_t panels = rangeCount(outputs_, kPanelOutputs);
   const size_t most_panels = std::clamp<size_t>(kMostPacked / std::max<size_t>(panel_size, 1), 1,
                                                 std::max<size_t>(panels, 1));

@@ -43,6 +43,10 @@ class MatrixBackend {
 /// oneDNN's where libstipple_nn.so can be loaded, else ours; or the one that the environment
 /// variable STIPPLE_MATRIX_BACKEND names.
 const MatrixBackend& defaultMatrixBackend();
+/// The backend of a run, and the precision that it has of the one that the run asks for: float32
+/// where it has no other.
+const MatrixBackend& backendOf(const NetworkRun& run);
+Precision precisionOf(const NetworkRun& run);
 /// All that work here, ours first: for tests and benchmarks.
 std::span<const MatrixBackend* const> matrixBackends();
 

@@ -7,8 +7,9 @@
 
 #include "base/parallel.h"
 #include "io/scratch_folder.h"
+#include "nn/kernels/layer_kernel.h"
 #include "nn/matrix_backend.h"
-#include "nn/panel_kernel.h"
+#include "nn/kernels/panel_kernel.h"
 #include "test_numbers.h"
 
 namespace stipple {
@@ -128,6 +129,36 @@ TEST(Linear, TakesWeightsOfSixteenBitsAndNoBias) {
     run.backend = backend;
     Linear(table, "fc", 70, 40, LinearBias::kNone).apply(run, c.rows, in.data(), out.data());
     expectProduct(c, in, c.inputs, cut, {}, out, c.outputs, 6e-8, backend->name());
+  }
+}
+
+TEST(Linear, RoundsFactorsToBfloat16WhereItIsAskedTo) {
+  const Case c = {200, 300, 290};
+  const std::vector<float> weight = numbers(c.outputs * c.inputs, 2);
+  const std::vector<float> bias = numbers(c.outputs, 3);
+  const std::vector<float> in = numbers(c.rows * c.inputs, 1);
+  const WeightTable table = TableBuilder()
+                                .add("fc.weight", {c.outputs, c.inputs}, weight)
+                                .add("fc.bias", {c.outputs}, bias)
+                                .table();
+  const auto rounded = [](std::vector<float> values) {
+    std::vector<uint16_t> halves(values.size());
+    scalarLayerKernel().narrow(values.size(), values.data(), halves.data());
+    for (size_t i = 0; i < values.size(); ++i) {
+      values[i] = std::bit_cast<float>(static_cast<uint32_t>(halves[i]) << 16);
+    }
+    return values;
+  };
+  for (const MatrixBackend* backend : matrixBackends()) {
+    NetworkRun run;
+    run.backend = backend;
+    run.precision = Precision::kBfloat16;
+    std::vector<float> out(c.rows * c.outputs);
+    Linear(table, "fc", c.inputs, c.outputs).apply(run, c.rows, in.data(), out.data());
+    // A backend that has it not multiplies in float32.
+    const bool has = backend->has(Precision::kBfloat16);
+    expectProduct(c, has ? rounded(in) : in, c.inputs, has ? rounded(weight) : weight, bias, out,
+                  c.outputs, 6e-8, backend->name());
   }
 }
 
