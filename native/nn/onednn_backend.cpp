@@ -67,9 +67,12 @@ class OnednnBackend : public MatrixBackend {
     const bool is_narrow = precision == Precision::kBfloat16;
     const bool has_gaps = panel.in_stride != panel.inputs;
     // bfloat16 takes half of it.
-    Scratch rows(is_narrow || has_gaps ? panel.rows * panel.inputs : 0);
+    const bool has_narrow = is_narrow && panel.narrow_in != nullptr;
+    Scratch rows(!has_narrow && (is_narrow || has_gaps) ? panel.rows * panel.inputs : 0);
     const void* in = panel.in;
-    if (is_narrow) {
+    if (has_narrow) {
+      in = panel.narrow_in;
+    } else if (is_narrow) {
       in = narrowed(panel, reinterpret_cast<uint16_t*>(rows.data()));
     } else if (has_gaps) {
       for (size_t row = 0; row < panel.rows; ++row) {
