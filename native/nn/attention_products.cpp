@@ -73,7 +73,7 @@ class BackendProducts : public AttentionProducts {
   BackendProducts(const MatrixBackend& backend, size_t head_width)
       : backend_(backend), width_(head_width) {}
   size_t mostQueries() const override { return 192; }
-  size_t mostKeys() const override { return 512; }
+  size_t mostKeys() const override { return 1024; }
   bool takesNarrow() const override { return true; }
 
   size_t packedFloats(size_t keys) const override {
