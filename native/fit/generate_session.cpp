@@ -34,6 +34,8 @@ namespace {
 
 // Channels of the colour encoder's first level, whose maps are the largest that there are.
 constexpr uint64_t kFirstColourChannels = 128;
+// What layers pack and threads work in, about (docs/methods/image_encoders.md has measurements).
+constexpr uint64_t kLayerBytes = uint64_t{96} << 20;
 constexpr double kLargestSize = 1e6;  // metres
 // Of the whole work, what comes before the encoders and behind the last step.
 constexpr double kPreparationShare = 0.01, kSampledShare = 0.96;
@@ -108,7 +110,7 @@ uint64_t workBytes(const Networks& networks, const GenerateOptions& options) {
   const uint64_t colour = 2 * side * side * kFirstColourChannels * sizeof(float);
   const uint64_t condition = rows * (width + networks.colour.tokenWidth()) * sizeof(float);
   const uint64_t flow = networks.flow.memoryBound(options.token_count, rows);
-  return condition + std::max({structure, colour, flow});
+  return condition + kLayerBytes + std::max({structure, colour, flow});
 }
 
 /// What a checkpoint must agree in, as JSON.
