@@ -89,6 +89,10 @@ void stipple_context_options_init(StippleContextOptions* options);
 /* options may be NULL (defaults). The environment variable STIPPLE_BACKEND names what draws and fits;
    not set: "cpu". Errors: STIPPLE_ERROR_INVALID_ARGUMENT for a name that the library does not have. */
 StippleStatus stipple_context_create(const StippleContextOptions* options, StippleContext** context);
+/* Says where files of networks' weights lie, for assets that name theirs and do not hold it (STIPPLE_MODEL_LATENT).
+ * It holds for what is loaded from then on. NULL: the folder that the environment variable STIPPLE_WEIGHTS names, as
+ * it is in a context where this was never called. */
+StippleStatus stipple_context_set_weights_folder(StippleContext* context, const char* folder_utf8);
 void stipple_context_free(StippleContext* context);
 
 /* ---- jobs -------------------------------------------------------------------------------------- */
@@ -524,7 +528,8 @@ void stipple_model_from_cloud_options_init(StippleModelFromCloudOptions* options
 typedef enum StippleModelKind {
   STIPPLE_MODEL_SURFACE = 0,  /* of a mesh: density and surface */
   STIPPLE_MODEL_HIERARCHY = 1, /* of a cloud: its merge tree; any budget up to its count */
-  STIPPLE_MODEL_FIELD = 2     /* learned from views: density and a field of attributes */
+  STIPPLE_MODEL_FIELD = 2,    /* learned from views: density and a field of attributes */
+  STIPPLE_MODEL_LATENT = 3    /* generated: a latent that two networks turn into a density and splats */
 } StippleModelKind;
 
 typedef struct StippleModelInfo {
@@ -599,7 +604,9 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
                                              StippleJob** job);
 /* Reads an asset file (docs/formats.md). Tensors and metadata of a newer minor version are kept with the model as
  * it was loaded and saved with it; models made from it do not have them.
- * Errors: UNSUPPORTED for a newer major version; FORMAT with what is wrong. */
+ * Errors: UNSUPPORTED for a newer major version; FORMAT with what is wrong; UNAVAILABLE where it names a file of
+ * weights that is not in the context's weights folder.
+ * Cost: files of weights are read once in a process, to compare their SHA-256. */
 StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8, StippleModel** model);
 /* This does the same as a job (stipple_job_model). */
 StippleStatus stipple_model_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);

@@ -13,8 +13,6 @@ namespace {
 
 constexpr char kTokens[] = "latent.tokens";
 constexpr char kCamera[] = "latent.camera";
-constexpr size_t kHashDigits = 64;
-constexpr size_t kLongestName = 255;
 
 void requireNumbers(std::span<const float> values, const std::string& name, const char* tensor,
                     ErrorCode code) {
@@ -22,24 +20,6 @@ void requireNumbers(std::span<const float> values, const std::string& name, cons
     if (std::isfinite(value)) continue;
     fail(code, name + ": tensor " + tensor + " holds " + std::to_string(value) +
                    "; every value must be a finite number");
-  }
-}
-
-void validateWeights(const WeightsReference& weights, const std::string& name, ErrorCode code) {
-  // It is looked for in a folder of the user's, and nowhere else.
-  const bool is_name = !weights.name.empty() && weights.name.size() <= kLongestName &&
-                       weights.name.find_first_of(std::string("/\\\0", 3)) == std::string::npos &&
-                       weights.name != "." && weights.name != "..";
-  if (!is_name) {
-    fail(code, name + " names its file of weights '" + weights.name.substr(0, 60) +
-                   "'; a file name without folders is needed");
-  }
-  if (weights.bytes == 0) fail(code, name + " says that its file of weights has 0 bytes");
-  const bool is_hash = weights.sha256.size() == kHashDigits &&
-                       weights.sha256.find_first_not_of("0123456789abcdef") == std::string::npos;
-  if (!is_hash) {
-    fail(code, name + " has the weights_sha256 '" + weights.sha256.substr(0, 70) +
-                   "'; 64 hexadecimal digits in lower case are needed");
   }
 }
 
@@ -55,7 +35,7 @@ void validateAsset(const LatentAsset& asset, const std::string& name, ErrorCode 
   }
   requireNumbers(latent.tokens, name, kTokens, code);
   requireNumbers(latent.camera, name, kCamera, code);
-  validateWeights(asset.weights, name, code);
+  validate(asset.weights, name, code);
 }
 
 Latent readLatent(const SafeTensorsReader& file) {
