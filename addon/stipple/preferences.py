@@ -14,6 +14,11 @@ UP_AXES = (('AUTO', "From File", "The frame is what the file says, or what files
            ('Y', "Y Up", "As in glTF and most game engines"))
 
 
+def _on_weights_folder_change(chosen, context):
+    from .scene.generate import weights_table  # it reads these preferences
+    weights_table.on_folder_change(chosen, context)
+
+
 class STIPPLE_PG_format(bpy.types.PropertyGroup):
     """What was chosen last for files of a format; its name is the format's."""
 
@@ -42,9 +47,13 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
                                                                "ellipses. Beyond it, the largest objects are drawn as"
                                                                " colored points", default=POINTS_ABOVE, min=0,
                               max=16_000_000)
+    weights_folder: StringProperty(name="Weights Folder", description="Where the files of networks are that turn images "
+                                   "into splats. You download them yourself; what they are called does not matter",
+                                   subtype='DIR_PATH', update=_on_weights_folder_change)
+    weights_table: StringProperty(options={'HIDDEN'})  # what is known of its files: scene/generate/weights_table.py
     formats: CollectionProperty(type=STIPPLE_PG_format)
 
-    def draw(self, _context):
+    def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -58,6 +67,8 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
         column.prop(self, 'library_path')
         for entry in self.formats:
             column.prop(entry, 'up_axis', text=f"Up Axis of .{entry.name}")
+        from .panels import weights  # it reads these preferences
+        weights.draw(layout, context, self)
 
 
 def get():

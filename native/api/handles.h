@@ -21,6 +21,7 @@
 #include "data/sparse_volume.h"
 #include "data/views/memory_view_source.h"
 #include "density/density_model.h"
+#include "io/assets/weights_folder.h"
 #include "io/views/camera_file.h"
 #include "measure/picture_accuracy.h"
 #include "model/splat_model.h"
@@ -114,6 +115,11 @@ struct StippleImageChannels {
 struct StippleLayers {
   stipple::api::Context context;
   stipple::MeshLayers layers;
+};
+
+struct StippleWeights {
+  stipple::api::Context context;
+  std::shared_ptr<const stipple::WeightsFolder> folder;
 };
 
 struct StippleAccuracyReport {

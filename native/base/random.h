@@ -44,6 +44,9 @@ enum class RandomUse : uint32_t {
   kAnchorBudget = 32,
   kAnchorSeed = 33,
   kPriorSample = 34,
+  kColourNoise = 40,
+  kTokenNoise = 41,
+  kCameraNoise = 42,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and

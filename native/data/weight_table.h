@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <span>
@@ -54,6 +55,10 @@ class WeightTable {
   std::vector<float> floats(std::string_view name, std::initializer_list<uint64_t> shape) const {
     return floats(name, std::span<const uint64_t>(shape.begin(), shape.size()));
   }
+  /// Refuses the numbers [first, first + count) of a tensor that require() gave where one of them
+  /// is NaN or infinity. Errors: kFormat, as require().
+  void requireFinite(std::string_view name, const WeightTensor& tensor, uint64_t first,
+                     uint64_t count) const;
   /// Names under this table's prefix, in order.
   std::vector<std::string> names() const;
   /// How many n there are so that names begin with `prefix` + "0.", … "n-1." without a gap.

@@ -59,8 +59,11 @@ std::vector<float> latticeOf(uint32_t gaussians) {
 }  // namespace
 
 void activateSplats(const SplatLayout& layout, const LayoutAnchors& anchors, const float* raw,
-                    size_t stride, SplatCloud& cloud) {
-  const std::vector<float> lattice = latticeOf(layout.gaussians);
+                    size_t stride, SplatCloud& cloud, const SplatBiases* biases) {
+  const std::vector<float> own_lattice =
+      biases != nullptr ? std::vector<float>() : latticeOf(layout.gaussians);
+  const std::span<const float> lattice = biases != nullptr ? biases->lattice : own_lattice;
+  const float spread_bias = biases != nullptr ? biases->spread : kSpreadBias;
   const size_t higher = layout.higherCoefficients();
   cloud.sh_degree = layout.sh_degree;
   cloud.resize(anchors.units.size() * layout.gaussians);
@@ -71,7 +74,7 @@ void activateSplats(const SplatLayout& layout, const LayoutAnchors& anchors, con
       const float unit = anchors.units[i];
       for (size_t k = 0; k < layout.gaussians; ++k) {
         const size_t n = i * layout.gaussians + k;
-        const float spread = softplus(from[layout.spread(k)] + kSpreadBias);
+        const float spread = softplus(from[layout.spread(k)] + spread_bias);
         for (size_t axis = 0; axis < 3; ++axis) {
           const float turn = std::tanh(from[layout.centre(k) + axis] + lattice[k * 3 + axis]);
           cloud.positions[n * 3 + axis] = anchors.positions[i * 3 + axis] +

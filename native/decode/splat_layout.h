@@ -39,13 +39,21 @@ struct LayoutAnchors {
   std::span<const float> units;      ///< [P] > 0, lengths as multiples of DeG's
 };
 
+/// What a network was trained to have added to its outputs, where its file says so; it may be
+/// rounded.
+struct SplatBiases {
+  std::span<const float> lattice;  ///< [K,3] to raw centres
+  float spread = 0;                ///< to raw spreads
+};
+
 /// Places and sizes in the unit cube, which decoders turn into the world.
 /// In: raw: P rows of `stride` floats, the outputs first. Out: cloud: P * K splats, anchor-major;
-/// frame and flags stay. Threads and determinism: anchors in parallel, independent.
+/// frame and flags stay. In: biases: null for those of zeros that fill the lattice.
+/// Threads and determinism: anchors in parallel, independent.
 /// Source: DeG (arXiv 2605.16355), attribute decoder. Differs: lengths have a unit per anchor, any
 /// K, harmonics; quaternions are unit.
 void activateSplats(const SplatLayout& layout, const LayoutAnchors& anchors, const float* raw,
-                    size_t stride, SplatCloud& cloud);
+                    size_t stride, SplatCloud& cloud, const SplatBiases* biases = nullptr);
 
 /// Derivatives by the outputs. In: what activateSplats got and gave; gradient: by the values of
 /// the cloud, in the unit cube too. Out: raw_gradient, P rows of `stride`; other columns stay.

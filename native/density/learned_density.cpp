@@ -223,7 +223,7 @@ void LearnedDensity::refreshAll() {
 }
 
 void LearnedDensity::childLogProbabilities(int level, std::span<const uint64_t> cells,
-                                           std::span<float> out) const {
+                                           std::span<float> out, Progress*) const {
   const size_t l = static_cast<size_t>(level);
   const std::vector<uint64_t>& active = levels_[l].cells;
   parallelFor(cells.size(), kGrain, [&](size_t begin, size_t end) {

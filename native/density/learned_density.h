@@ -58,8 +58,8 @@ class LearnedDensity final : public DensityModel {
   LearnedDensity(const RootCube& root, std::vector<LearnedLevel> levels);
 
   int leafLevel() const override { return static_cast<int>(levels_.size()); }
-  void childLogProbabilities(int level, std::span<const uint64_t> cells,
-                             std::span<float> out) const override;
+  void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* progress = nullptr) const override;
 
   const RootCube& root() const override { return root_; }
   const std::vector<LearnedLevel>& levels() const { return levels_; }
@@ -126,8 +126,8 @@ class SettledDensity final : public DensityModel {
   explicit SettledDensity(const LearnedDensity& density) : density_(density) {}
   int leafLevel() const override { return density_.settledLevel(); }
   const RootCube& root() const override { return density_.root(); }
-  void childLogProbabilities(int level, std::span<const uint64_t> cells,
-                             std::span<float> out) const override {
+  void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* = nullptr) const override {
     density_.settledLogProbabilities(level, cells, out);
   }
 

@@ -16,7 +16,6 @@
 namespace stipple {
 namespace {
 
-constexpr size_t kQueryCells = 32768;  // cells in one question to the model
 constexpr size_t kGrain = 1024;
 
 /// The cells of one level that hold anchors, in Morton order.
@@ -122,12 +121,13 @@ class LevelSampler {
     for (int level = 0; level < anchors.leaf_level; ++level) {
       next.restart(std::min<size_t>(options_.count, 8 * frontier.cells.size()));
       size_t place = 0;
-      for (size_t begin = 0; begin < frontier.cells.size(); begin += kQueryCells) {
+      const size_t question = std::max<size_t>(model_.questionCells(), 1);
+      for (size_t begin = 0; begin < frontier.cells.size(); begin += question) {
         advance(progress_,
                 (level + static_cast<double>(begin) / static_cast<double>(frontier.cells.size())) /
                     (anchors.leaf_level + 1),
                 "Sampling anchors");
-        const size_t end = std::min(frontier.cells.size(), begin + kQueryCells);
+        const size_t end = std::min(frontier.cells.size(), begin + question);
         place = descend(level, frontier, begin, end, place, next);
       }
       std::swap(frontier, next);
@@ -149,7 +149,7 @@ class LevelSampler {
       place += frontier.counts[begin + i];
     }
     model_.childLogProbabilities(level, std::span(frontier.cells).subspan(begin, cell_count),
-                                 log_probabilities_);
+                                 log_probabilities_, progress_);
     // Numbers of a source come in the order of the cells.
     parallelFor(cell_count, source_ != nullptr ? cell_count : kGrain, [&](size_t from, size_t to) {
       for (size_t i = from; i < to; ++i) {

@@ -174,7 +174,7 @@ std::optional<OctreeTables> OctreeDensity::tables() const {
 }
 
 void OctreeDensity::childLogProbabilities(int level, std::span<const uint64_t> cells,
-                                          std::span<float> out) const {
+                                          std::span<float> out, Progress*) const {
   if (level < 0 || level >= leaf_level_) {
     fail(ErrorCode::kInvalidArgument, "the octree was asked for children of level " +
                                           std::to_string(level) + "; allowed is 0 to " +

@@ -38,8 +38,8 @@ class OctreeDensity final : public DensityModel {
 
   int leafLevel() const override { return leaf_level_; }
   /// Cells without mass, stored or not, give eight times -inf.
-  void childLogProbabilities(int level, std::span<const uint64_t> cells,
-                             std::span<float> out) const override;
+  void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* progress = nullptr) const override;
 
   const RootCube& root() const override { return root_; }
   size_t leafCount() const override { return leaf_count_; }

@@ -1,9 +1,17 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "nn/network_run.h"
+
 namespace stipple {
+
+class DinoEncoder;
+class VaeEncoder;
+struct PreparedImage;
 
 /// What a flow network is told of an image: two vectors of features for each token. Row k of one
 /// belongs to row k of the other.
@@ -14,5 +22,21 @@ struct ImageCondition {
   std::vector<float> structure;  ///< [rows, structure_width]
   std::vector<float> colour;     ///< [rows, colour_width]
 };
+
+/// Which part of a longer piece of work something is, for its progress: 0..1 of the whole.
+struct WorkPart {
+  double begin = 0.0;
+  double end = 1.0;
+};
+
+/// Encodes an image by both networks. The colours of the tokens that belong to the whole image are
+/// zeros.
+/// In: noise: of VaeEncoder::noiseCount() for the image, normally distributed, or empty: the
+/// image's mean latent (VaeEncoder::encode()); part: of whose progress (Progress::enterPart()).
+/// Errors: kFormat for networks whose patches differ; those of the encoders.
+/// Threads and determinism: as of the encoders. Cost: the sum of both; memory: the larger one's.
+ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
+                           const VaeEncoder& colour, const PreparedImage& image,
+                           std::span<const float> noise, const WorkPart& part = {});
 
 }  // namespace stipple

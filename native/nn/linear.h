@@ -1,7 +1,9 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,8 +14,8 @@ namespace stipple {
 
 enum class LinearBias { kNeeded, kNone };
 
-/// A linear layer of a file: out = in weightᵀ + bias, weight [outputs, inputs] as PyTorch stores it.
-/// The weight stays in the file and is widened and packed a panel at a time while it is used.
+/// A linear layer of a file: out = in weightᵀ + bias, weight [outputs, inputs] as PyTorch stores
+/// it. The weight stays in the file and is widened and packed a panel at a time while it is used.
 class Linear {
  public:
   Linear() = default;
@@ -25,7 +27,8 @@ class Linear {
   size_t inputs() const { return inputs_; }
   size_t outputs() const { return outputs_; }
   /// In: in [rows, inputs], `in_stride` floats from row to row. Out: out [rows, outputs], likewise;
-  /// apart from `in`.
+  /// apart from `in`. The first use looks at all weights. Errors: kFormat for NaN or infinity among
+  /// them; kCancelled.
   /// Threads and determinism: parallel; same bits for any number of threads.
   void apply(const NetworkRun& run, size_t rows, const float* in, size_t in_stride, float* out,
              size_t out_stride) const;
@@ -36,7 +39,9 @@ class Linear {
 
  private:
   WeightTable weights_;  // keeps the file
+  std::string name_;
   const WeightTensor* weight_ = nullptr;
+  std::shared_ptr<std::atomic<bool>> is_checked_;  // whether weights are known to be finite
   std::vector<float> bias_;
   size_t inputs_ = 0;
   size_t outputs_ = 0;

@@ -8,18 +8,21 @@
 namespace stipple {
 
 /// Sines and cosines of positions, added to tokens by networks of density-sampled Gaussians
-/// (arXiv 2605.16355 and its released code). F = width / 6 frequencies for each of three axes: all
-/// sines, then all cosines, axis after axis, and zeros up to the width.
+/// (arXiv 2605.16355 and its released code). F = width / 6 frequencies; for each of three axes
+/// after the other F sines, then F cosines; and zeros up to the width.
 enum class PositionEncoding {
-  kGeometric,  ///< sin(pi x f), f = 2^(10 i / (F - 1)): octree and Gaussian decoders, encoder
-  kPowers,     ///< sin(((x f) 2) pi) in float32, f = 2^e, e = 0..15 and F - 16 more, 16 k / (F - 16)
-               ///< for k = 0...: the flow network
+  /// sin((x f) pi) in float32, f = 2^(10 i / (F - 1)) with exponents in the float32 of
+  /// torch.linspace, which the highest frequencies show: octree and Gaussian decoders, encoder.
+  kGeometric,
+  kPowers,  ///< sin(((x f) 2) pi) in float32, f = 2^e, e = 0..15 and F - 16 more, 16 k / (F - 16)
+            ///< for k = 0...: the flow network
 };
 /// out[r, i] += encoding of points[r]. In: points [rows, 3].
 void addPositions(PositionEncoding encoding, size_t rows, size_t width, const float* points,
                   float* out);
 
-/// [cos(t w_i), sin(t w_i)], w_i = exp(-ln(longest) i / (width / 2)), in double then float32.
+/// [cos(t w_i), sin(t w_i)], w_i = exp(-ln(longest) i / (width / 2)), with angles in float32
+/// as the released networks compute them.
 /// In: t, times 2 pi already where the network asks for it; width, even.
 std::vector<float> timeEncoding(double t, double longest, size_t width);
 

@@ -291,7 +291,7 @@ def boundary_violations(root):
     found = []
     for name in project_files(root):
         folder, _, file = name.rpartition('/')
-        if folder != 'native/api' or not file.endswith(('.cpp', '.h')):
+        if not (folder + '/').startswith('native/api/') or not file.endswith(('.cpp', '.h')):
             continue
         path = pathlib.Path(root) / name
         found += [f'{name}:{line}: {included}: a conversion has no use for it' for line, included in includes(path)

@@ -38,6 +38,7 @@ FUNCTIONS = {
     'stipple_job_cloud': (_status, [_handle, _out_handle]),
     'stipple_job_volume': (_status, [_handle, _out_handle]),
     'stipple_job_mesh': (_status, [_handle, _out_handle]),
+    'stipple_job_weights': (_status, [_handle, _out_handle]),
     # splat clouds
     'stipple_cloud_create': (_status, [_handle, _to(s.StippleCloudArrays), _out_handle]),
     'stipple_cloud_free': (None, [_handle]),
@@ -272,6 +273,13 @@ FUNCTIONS = {
     'stipple_image_channels_count': (c_uint64, [_handle]),
     'stipple_image_channels_info': (_status, [_handle, c_uint64, _to(s.StippleImageChannelInfo)]),
     'stipple_image_channels_read': (_status, [_handle, c_uint64, _floats, c_uint64]),
+    # weights of networks
+    'stipple_weights_find': (_status, [_handle, _path, _out_handle]),
+    'stipple_weights_free': (None, [_handle]),
+    'stipple_weights_info': (_status, [_handle, _to(s.StippleWeightsInfo)]),
+    'stipple_weights_file': (_status, [_handle, c_uint32, _to(s.StippleWeightsFile)]),
+    'stipple_weights_note': (_status, [_handle, c_uint64, POINTER(c_char_p)]),
+    'stipple_weights_check_start': (_status, [_handle, _out_handle]),
 }
 
 

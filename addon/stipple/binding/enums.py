@@ -206,6 +206,21 @@ class Transfer(IntEnum):
     SRGB = 1
 
 
+class WeightsRole(IntEnum):
+    STRUCTURE_ENCODER = 0
+    COLOUR_ENCODER = 1
+    FLOW = 2
+    DECODER = 3
+
+
+class WeightsState(IntEnum):
+    MISSING = 0
+    OTHER_SIZE = 1
+    UNCHECKED = 2
+    PUBLISHED = 3
+    OTHER_CONTENT = 4
+
+
 # Each enumeration: the C type and what its values' names start with.
 ENUMS = {
     'StippleStatus': (Status, 'STIPPLE_'),
@@ -241,5 +256,7 @@ ENUMS = {
     'StippleSplatQuantity': (SplatQuantity, 'STIPPLE_QUANTITY_'),
     'StippleFitBackground': (FitBackground, 'STIPPLE_FIT_BACKGROUND_'),
     'StippleFitShell': (FitShell, 'STIPPLE_FIT_SHELL_'),
+    'StippleWeightsRole': (WeightsRole, 'STIPPLE_WEIGHTS_'),
+    'StippleWeightsState': (WeightsState, 'STIPPLE_WEIGHTS_'),
     'StippleFitOptionKind': (FitOptionKind, 'STIPPLE_FIT_OPTION_'),
 }

@@ -8,7 +8,7 @@ from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, BudgetUni
                     Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, Frame, JobState,
                     LowPass, MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RegionKind,
                     RegionOperation, RenderMethod, Sampling, Side, SplatOrder, SplatQuantity, Status, Transfer,
-                    ViewRig, ViewSplit)
+                    ViewRig, ViewSplit, WeightsRole, WeightsState)
 
 ABI_VERSION = 3
 MAX_ANCHORS = 1 << 28
@@ -474,6 +474,18 @@ class StippleImageComparison(_Sized):
 class StippleImageChannelInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('width', c_uint32), ('height', c_uint32), ('reserved', c_uint32),
                 ('name_utf8', c_char_p)]
+
+
+class StippleWeightsFile(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('role', c_uint32), ('state', c_uint32), ('reserved', c_uint32),
+                ('bytes', c_uint64), ('published_bytes', c_uint64), ('modified_ns', c_int64), ('label_utf8', c_char_p),
+                ('path_utf8', c_char_p), ('published_path_utf8', c_char_p), ('published_sha256_utf8', c_char_p),
+                ('sha256_utf8', c_char_p), ('licence_utf8', c_char_p)]
+
+
+class StippleWeightsInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('file_count', c_uint32), ('note_count', c_uint64),
+                ('folder_utf8', c_char_p), ('source_utf8', c_char_p)]
 
 
 STRUCTS = {cls.__name__: cls for cls in _Sized.__subclasses__()}

@@ -74,6 +74,7 @@ typedef struct StippleVolume StippleVolume;     /* sparse voxels */
 typedef struct StippleImage StippleImage;
 typedef struct StippleImageChannels StippleImageChannels; /* named channels of an EXR file */
 typedef struct StippleJob StippleJob;           /* long work in the background */
+typedef struct StippleWeights StippleWeights;   /* which files of networks' weights a folder has */
 
 /* ---- context ----------------------------------------------------------------------------------- */
 
@@ -120,6 +121,7 @@ StippleStatus stipple_job_model(const StippleJob* job, StippleModel** model);
 StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud);
 StippleStatus stipple_job_volume(const StippleJob* job, StippleVolume** volume);
 StippleStatus stipple_job_mesh(const StippleJob* job, StippleMesh** mesh);
+StippleStatus stipple_job_weights(const StippleJob* job, StippleWeights** weights);
 
 /* ---- splat clouds ------------------------------------------------------------------------------ */
 
@@ -2125,6 +2127,65 @@ StippleStatus stipple_image_channels_info(const StippleImageChannels* channels, 
 /* values [height,width], row 0 = top. capacity: floats that values has room for. */
 StippleStatus stipple_image_channels_read(const StippleImageChannels* channels, uint64_t index, float* values,
                                           uint64_t capacity);
+
+/* ---- weights of networks ----------------------------------------------------------------------- */
+
+/* What turns an image into splats are the networks of four published files, which their users download. Nothing
+ * here downloads or contains them. Their structure was verified on small networks with random weights; the published
+ * files themselves have never been run by the makers of this library. */
+typedef enum StippleWeightsRole {
+  STIPPLE_WEIGHTS_STRUCTURE_ENCODER = 0, /* an image's structure: DINOv3 ViT-H/16+ */
+  STIPPLE_WEIGHTS_COLOUR_ENCODER = 1,    /* an image's colours: the encoder of FLUX.2's autoencoder */
+  STIPPLE_WEIGHTS_FLOW = 2,              /* from noise and features to a latent */
+  STIPPLE_WEIGHTS_DECODER = 3            /* from a latent to splats */
+} StippleWeightsRole;
+
+typedef enum StippleWeightsState {
+  STIPPLE_WEIGHTS_MISSING = 0,
+  STIPPLE_WEIGHTS_OTHER_SIZE = 1,    /* the names of its tensors are right, its size is not the published one's */
+  STIPPLE_WEIGHTS_UNCHECKED = 2,     /* of the published size; nobody has compared its content yet */
+  STIPPLE_WEIGHTS_PUBLISHED = 3,     /* its SHA-256 is that of the published file */
+  STIPPLE_WEIGHTS_OTHER_CONTENT = 4  /* its SHA-256 is another one */
+} StippleWeightsState;
+
+/* Texts live as long as the handle that they were asked of. */
+typedef struct StippleWeightsFile {
+  uint32_t struct_size;
+  uint32_t role;                      /* StippleWeightsRole */
+  uint32_t state;                     /* StippleWeightsState */
+  uint32_t reserved;
+  uint64_t bytes;                     /* 0 where it is missing */
+  uint64_t published_bytes;
+  int64_t modified_ns;                /* nanoseconds since 1970 */
+  const char* label_utf8;             /* what people call it */
+  const char* path_utf8;              /* "" where it is missing */
+  const char* published_path_utf8;    /* in the published model */
+  const char* published_sha256_utf8;  /* 64 hexadecimal digits */
+  const char* sha256_utf8;            /* of the file, where it was read (stipple_weights_check_start); else "" */
+  const char* licence_utf8;           /* one or two sentences */
+} StippleWeightsFile;
+
+typedef struct StippleWeightsInfo {
+  uint32_t struct_size;
+  uint32_t file_count;     /* roles: one for each value of StippleWeightsRole, missing ones too */
+  uint64_t note_count;     /* of stipple_weights_note */
+  const char* folder_utf8;
+  const char* source_utf8; /* where users get the files */
+} StippleWeightsInfo;
+
+/* Looks through a folder and its subfolders and tells files apart by the names of their tensors: what they are called
+ * and where they lie does not matter. Reads their headers alone.
+ * Errors: IO for a folder that cannot be read; INVALID_ARGUMENT for one with more than 20,000 files and folders. */
+StippleStatus stipple_weights_find(StippleContext* context, const char* folder_utf8, StippleWeights** weights);
+void stipple_weights_free(StippleWeights* weights);
+StippleStatus stipple_weights_info(const StippleWeights* weights, StippleWeightsInfo* info);
+/* role: StippleWeightsRole. */
+StippleStatus stipple_weights_file(const StippleWeights* weights, uint32_t role, StippleWeightsFile* file);
+/* A sentence about files that cannot be read, or of which there are several. */
+StippleStatus stipple_weights_note(const StippleWeights* weights, uint64_t index, const char** text_utf8);
+/* Compares the files' SHA-256 with the published ones, as a job (stipple_job_weights). A file that this process has
+ * read before, with the same path, size and time, is not read again. Cost: about 4 GB are read. */
+StippleStatus stipple_weights_check_start(const StippleWeights* weights, StippleJob** job);
 
 #ifdef __cplusplus
 }

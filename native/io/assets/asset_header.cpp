@@ -1,5 +1,6 @@
 #include "io/assets/asset_header.h"
 
+#include <charconv>
 #include <cstdlib>
 
 #include "base/error.h"
@@ -41,6 +42,19 @@ const std::string& requireText(const SafeTensorsReader& file, const char* key) {
          file.path() + " is not a Stipple asset: its metadata has no '" + key + "'");
   }
   return found->second;
+}
+
+uint64_t requireWhole(const SafeTensorsReader& file, const char* key, uint64_t least,
+                      uint64_t most) {
+  const std::string& text = requireText(file, key);
+  uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
+    fail(ErrorCode::kFormat, file.path() + " has " + key + " = " + text.substr(0, 40) + "; " +
+                                 std::to_string(least) + " to " + std::to_string(most) +
+                                 " is needed");
+  }
+  return value;
 }
 
 bool isFirstText(const SafeTensorsReader& file, const char* key, const std::string& first,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 
@@ -11,10 +12,15 @@ namespace stipple {
 constexpr char kAssetSurface[] = "surface";
 constexpr char kAssetHierarchy[] = "hierarchy";
 constexpr char kAssetField[] = "field";
+constexpr char kAssetLatent[] = "latent";
 constexpr char kAssetCheckpoint[] = "checkpoint";
 
 /// Text of the metadata. Errors: kFormat where it is missing.
 const std::string& requireText(const SafeTensorsReader& file, const char* key);
+
+/// A whole number of the metadata. Errors: kFormat where it is none from `least` to `most`.
+uint64_t requireWhole(const SafeTensorsReader& file, const char* key, uint64_t least,
+                      uint64_t most);
 
 /// Whether a text of the metadata is the first of the two that it may be. Errors: kFormat.
 bool isFirstText(const SafeTensorsReader& file, const char* key, const std::string& first,

@@ -1,6 +1,5 @@
 #include "io/assets/field_asset.h"
 
-#include <charconv>
 #include <cmath>
 
 #include "base/error.h"
@@ -12,19 +11,6 @@ namespace {
 
 constexpr char kStem[] = "field.";
 constexpr uint64_t kMostAnchors = uint64_t{1} << 28;
-
-/// A whole number of the metadata. Errors: kFormat.
-uint64_t wholeOf(const SafeTensorsReader& file, const char* key, uint64_t least, uint64_t most) {
-  const std::string& text = requireText(file, key);
-  uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
-    fail(ErrorCode::kFormat, file.path() + " has " + key + " = " + text.substr(0, 40) + "; " +
-                                 std::to_string(least) + " to " + std::to_string(most) +
-                                 " is needed");
-  }
-  return value;
-}
 
 bool isFieldTensor(const std::string& name) {
   return name.rfind(kStem, 0) == 0;
@@ -92,14 +78,14 @@ FieldAsset readFieldAsset(const std::string& path) {
   asset.jitter = isFirstText(file, "jitter", "leaf", "none");
   // Files of fields that learned with independent draws do not have it.
   asset.nested = file.metadata().contains("draws") && isFirstText(file, "draws", "nested", "any");
-  if (asset.nested) asset.seed = wholeOf(file, "seed", 0, UINT64_MAX);
+  if (asset.nested) asset.seed = requireWhole(file, "seed", 0, UINT64_MAX);
   asset.contracted =
       file.metadata().contains("space") && isFirstText(file, "space", "contracted", "plain");
-  asset.field_level = static_cast<int>(wholeOf(file, "field_level", 1, 10));
-  asset.gaussians = static_cast<uint32_t>(wholeOf(file, "K", 4, 32));
-  asset.sh_degree = static_cast<int>(wholeOf(file, "sh_degree", 0, kMaxShDegree));
-  asset.least_anchors = wholeOf(file, "least_anchors", 1, kMostAnchors);
-  asset.most_anchors = wholeOf(file, "most_anchors", asset.least_anchors, kMostAnchors);
+  asset.field_level = static_cast<int>(requireWhole(file, "field_level", 1, 10));
+  asset.gaussians = static_cast<uint32_t>(requireWhole(file, "K", 4, 32));
+  asset.sh_degree = static_cast<int>(requireWhole(file, "sh_degree", 0, kMaxShDegree));
+  asset.least_anchors = requireWhole(file, "least_anchors", 1, kMostAnchors);
+  asset.most_anchors = requireWhole(file, "most_anchors", asset.least_anchors, kMostAnchors);
   for (const auto& [name, tensor] : file.tensors()) {
     if (isFieldTensor(name)) asset.tensors[name] = file.readTensor(name);
   }

@@ -1,6 +1,7 @@
 #include "io/bytes/input_file.h"
 
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -60,6 +61,17 @@ void InputFile::readAt(uint64_t offset, void* bytes, size_t count) const {
     offset += static_cast<uint64_t>(got);
     count -= static_cast<size_t>(got);
   }
+}
+
+std::shared_ptr<const uint8_t> InputFile::map() const {
+  const auto length = static_cast<size_t>(size_);
+  if (length == 0) fail(ErrorCode::kIo, path_ + " cannot be mapped: it is empty");
+  void* memory = ::mmap(nullptr, length, PROT_READ, MAP_PRIVATE, descriptor_, 0);
+  if (memory == MAP_FAILED) {
+    fail(ErrorCode::kIo, path_ + " cannot be mapped: " + reason(errno));
+  }
+  return {static_cast<const uint8_t*>(memory),
+          [memory, length](const uint8_t*) { ::munmap(memory, length); }};
 }
 
 std::string readTextFile(const std::string& path, uint64_t limit) {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -37,6 +38,8 @@ class SafeTensorsReader {
   const std::map<std::string, std::string>& metadata() const { return metadata_; }
   const std::map<std::string, SafeTensor>& tensors() const { return tensors_; }
   const std::string& path() const { return file_.path(); }
+  /// The whole file in memory; tensors lie at their offsets (InputFile::map).
+  std::shared_ptr<const uint8_t> map() const { return file_.map(); }
   /// Values of a tensor. In: width, the last sizes of its shape multiplied; the first is free.
   /// Errors: kFormat where the tensor is missing or of another type or shape.
   std::vector<float> readFloats(const std::string& name, uint64_t width) const;

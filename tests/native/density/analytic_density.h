@@ -18,8 +18,8 @@ class AnalyticDensity final : public DensityModel {
 
   int leafLevel() const override { return leaf_level_; }
   const RootCube& root() const override { return root_; }
-  void childLogProbabilities(int, std::span<const uint64_t> cells,
-                             std::span<float> out) const override {
+  void childLogProbabilities(int, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* = nullptr) const override {
     ++questions;
     cells_asked += cells.size();
     for (size_t n = 0; n < cells.size(); ++n) {

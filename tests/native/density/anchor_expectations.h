@@ -69,8 +69,8 @@ class ConstantModel final : public DensityModel {
   ConstantModel(int leaf_level, std::array<float, 8> logs) : leaf_level_(leaf_level), logs_(logs) {}
   int leafLevel() const override { return leaf_level_; }
   const RootCube& root() const override { return root_; }
-  void childLogProbabilities(int, std::span<const uint64_t> cells,
-                             std::span<float> out) const override {
+  void childLogProbabilities(int, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* = nullptr) const override {
     for (size_t i = 0; i < 8 * cells.size(); ++i) out[i] = logs_[i % 8];
   }
 

@@ -20,8 +20,8 @@ class AnyModel final : public DensityModel {
   explicit AnyModel(const OctreeDensity& octree) : octree_(octree) {}
   int leafLevel() const override { return octree_.leafLevel(); }
   const RootCube& root() const override { return octree_.root(); }
-  void childLogProbabilities(int level, std::span<const uint64_t> cells,
-                             std::span<float> out) const override {
+  void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* = nullptr) const override {
     octree_.childLogProbabilities(level, cells, out);
   }
 

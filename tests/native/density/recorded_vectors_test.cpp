@@ -22,8 +22,8 @@ class FrontierModel final : public DensityModel {
   explicit FrontierModel(Logit logit) : logit_(logit) {}
   int leafLevel() const override { return 8; }
   const RootCube& root() const override { return root_; }
-  void childLogProbabilities(int level, std::span<const uint64_t> cells,
-                             std::span<float> out) const override {
+  void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* = nullptr) const override {
     asked.emplace_back(cells.begin(), cells.end());
     for (size_t parent = 0; parent < cells.size(); ++parent) {
       double sum = 0.0;

@@ -1,0 +1,124 @@
+// Based on: DeG, density-sampled Gaussians (arXiv 2605.16355), and its released networks: tokens
+// with normalised queries and keys. Layouts of to_qkv (3, heads, width) and to_kv (2, heads, width)
+// are those of the published files.
+#include "decode/latent/token_layers.h"
+
+#include <cmath>
+
+#include "base/error.h"
+#include "nn/activations.h"
+#include "nn/attention.h"
+#include "nn/norms.h"
+#include "nn/positions.h"
+
+namespace stipple {
+
+namespace {
+
+/// The encoding of positions needs two frequencies for the sine and the cosine of three axes.
+constexpr size_t kLeastWidth = 12;
+
+std::vector<float> readGamma(const WeightTable& weights, const char* name,
+                             const TokenHeads& heads) {
+  return weights.floats(name, {heads.count, heads.width});
+}
+
+}  // namespace
+
+TokenHeads readTokenHeads(const WeightTable& network) {
+  constexpr char kGamma[] = "blocks.0.cross_attn.q_rms_norm.gamma";
+  const std::vector<uint64_t>& shape = network.require(kGamma, {kAnySize, kAnySize}).shape;
+  const TokenHeads heads = {shape[0], shape[1]};
+  if (heads.tokenWidth() < kLeastWidth) {
+    fail(ErrorCode::kFormat, network.source() + ": " + kGamma + " says that there are " +
+                                 std::to_string(heads.count) + " heads of " +
+                                 std::to_string(heads.width) + " numbers; at least " +
+                                 std::to_string(kLeastWidth) + " numbers in all are needed");
+  }
+  return heads;
+}
+
+void requireLatent(const Latent& latent, size_t width) {
+  if (latent.width != width) {
+    fail(ErrorCode::kInvalidArgument, "the latent has " + std::to_string(latent.width) +
+                                          " numbers for each token; these weights read " +
+                                          std::to_string(width));
+  }
+  if (latent.token_count == 0 || latent.tokens.size() / width != latent.token_count ||
+      latent.tokens.size() % width != 0) {
+    fail(ErrorCode::kInvalidArgument,
+         "the latent has " + std::to_string(latent.tokens.size()) + " numbers for " +
+             std::to_string(latent.token_count) + " tokens of " + std::to_string(width) +
+             "; one token or more, and as many numbers as they have, are needed");
+  }
+  requireFinite(latent.tokens.data(), latent.tokens.size(), width, "the latent's token");
+}
+
+PointEmbedding::PointEmbedding(const WeightTable& network, size_t width)
+    : in_(network, "in_proj", 3, width), out_(network, "input_layer", width, width) {}
+
+void PointEmbedding::apply(const NetworkRun& run, size_t rows, const float* points, float* scratch,
+                           float* tokens) const {
+  in_.apply(run, rows, points, scratch);
+  addPositions(PositionEncoding::kGeometric, rows, in_.outputs(), points, scratch);
+  out_.apply(run, rows, scratch, tokens);
+}
+
+CrossAttention::CrossAttention(const WeightTable& weights, const TokenHeads& heads)
+    : heads_(heads),
+      to_queries_(weights, "to_q", heads.tokenWidth(), heads.tokenWidth()),
+      to_keys_(weights, "to_kv", kAnySize, 2 * heads.tokenWidth()),
+      to_out_(weights, "to_out", heads.tokenWidth(), heads.tokenWidth()),
+      query_gamma_(readGamma(weights, "q_rms_norm.gamma", heads)),
+      key_gamma_(readGamma(weights, "k_rms_norm.gamma", heads)) {}
+
+std::vector<float> CrossAttention::keysOf(const NetworkRun& run, const Latent& latent) const {
+  const size_t stride = to_keys_.outputs();
+  std::vector<float> keys(latent.token_count * stride);
+  to_keys_.apply(run, latent.token_count, latent.tokens.data(), keys.data());
+  rmsNormHeads(latent.token_count, heads_.count, heads_.width, key_gamma_, keys.data(), stride);
+  return keys;
+}
+
+void CrossAttention::apply(const NetworkRun& run, size_t rows, const float* in,
+                           std::span<const float> keys, float* scratch, float* out) const {
+  const size_t width = heads_.tokenWidth();
+  to_queries_.apply(run, rows, in, scratch);
+  rmsNormHeads(rows, heads_.count, heads_.width, query_gamma_, scratch, width);
+  const AttentionShape shape = {heads_.count, heads_.width, rows, keys.size() / (2 * width)};
+  attention(run, shape, {scratch, width}, {keys.data(), 2 * width},
+            {keys.data() + width, 2 * width}, scratch, width);
+  to_out_.apply(run, rows, scratch, out);
+}
+
+SelfAttention::SelfAttention(const WeightTable& weights, const TokenHeads& heads)
+    : heads_(heads),
+      to_all_(weights, "to_qkv", heads.tokenWidth(), 3 * heads.tokenWidth()),
+      to_out_(weights, "to_out", heads.tokenWidth(), heads.tokenWidth()),
+      query_gamma_(readGamma(weights, "q_rms_norm.gamma", heads)),
+      key_gamma_(readGamma(weights, "k_rms_norm.gamma", heads)) {}
+
+void SelfAttention::apply(const NetworkRun& run, size_t rows, const float* in, float* scratch,
+                          float* out) const {
+  const size_t width = heads_.tokenWidth();
+  const size_t stride = 3 * width;
+  to_all_.apply(run, rows, in, scratch);
+  rmsNormHeads(rows, heads_.count, heads_.width, query_gamma_, scratch, stride);
+  rmsNormHeads(rows, heads_.count, heads_.width, key_gamma_, scratch + width, stride);
+  const AttentionShape shape = {heads_.count, heads_.width, rows, rows};
+  attention(run, shape, {scratch, stride}, {scratch + width, stride}, {scratch + 2 * width, stride},
+            scratch, stride);
+  to_out_.apply(run, rows, scratch, stride, out, width);
+}
+
+TokenMlp::TokenMlp(const WeightTable& weights, size_t width)
+    : up_(weights, "0", width, kAnySize), down_(weights, "2", up_.outputs(), width) {}
+
+void TokenMlp::apply(const NetworkRun& run, size_t rows, const float* in, float* scratch,
+                     float* out) const {
+  up_.apply(run, rows, in, scratch);
+  activate(Activation::kGeluTanh, {scratch, rows * up_.outputs()});
+  down_.apply(run, rows, scratch, out);
+}
+
+}  // namespace stipple

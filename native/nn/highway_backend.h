@@ -1,0 +1,10 @@
+#pragma once
+
+#include "nn/matrix_backend.h"
+
+namespace stipple {
+
+/// Our own kernels (nn/panel_kernel.h): always there, float32 only.
+const MatrixBackend& highwayBackend();
+
+}  // namespace stipple

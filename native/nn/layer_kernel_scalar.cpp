@@ -1,0 +1,65 @@
+#include <algorithm>
+#include <cmath>
+
+#include "nn/layer_kernel.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr double kRootTwoOverPi = 0.79788456080286536;
+constexpr double kRootHalf = 0.70710678118654752;
+
+/// In double, so that each is right to the last bit of float32 or two.
+double activated(Activation activation, double x) {
+  switch (activation) {
+    case Activation::kSilu:
+      return x / (1.0 + std::exp(-x));
+    case Activation::kRelu:
+      return x > 0.0 ? x : 0.0;
+    case Activation::kGeluTanh:
+      return 0.5 * x * (1.0 + std::tanh(kRootTwoOverPi * (x + 0.044715 * x * x * x)));
+    case Activation::kGeluErf:
+      return 0.5 * x * std::erfc(-kRootHalf * x);
+  }
+  return x;
+}
+
+void activateScalar(Activation activation, size_t count, float* values) {
+  for (size_t i = 0; i < count; ++i) {
+    values[i] = static_cast<float>(activated(activation, static_cast<double>(values[i])));
+  }
+}
+
+void siluGateScalar(size_t count, const float* gate, const float* up, float* out) {
+  for (size_t i = 0; i < count; ++i) {
+    const double silu = activated(Activation::kSilu, static_cast<double>(gate[i]));
+    out[i] = static_cast<float>(silu * static_cast<double>(up[i]));
+  }
+}
+
+void softmaxScalar(SoftmaxRow& row) {
+  float peak = row.peak;
+  for (size_t i = 0; i < row.keys; ++i) {
+    const float bias = row.key_bias == nullptr ? 0.0f : row.key_bias[i];
+    row.scores[i] = row.scale * row.scores[i] + bias;
+    peak = std::max(peak, row.scores[i]);
+  }
+  float sum = 0.0f;
+  for (size_t i = 0; i < row.keys; ++i) {
+    row.scores[i] = std::exp(row.scores[i] - peak);
+    sum += row.scores[i];
+  }
+  const float shrink = std::exp(row.peak - peak);
+  row.peak = peak;
+  row.sum = row.sum * shrink + sum;
+  for (size_t i = 0; i < row.width; ++i) row.out[i] *= shrink;
+}
+
+}  // namespace
+
+LayerKernel scalarLayerKernel() {
+  return {"scalar", activateScalar, siluGateScalar, softmaxScalar};
+}
+
+}  // namespace stipple

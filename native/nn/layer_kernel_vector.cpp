@@ -1,0 +1,213 @@
+#include <algorithm>
+
+#include "nn/layer_kernel.h"
+
+// Lanes are numbers beside each other. What layer_kernel_scalar.cpp does in double is done in
+// float32 by forms that lose nothing where two numbers nearly cancel.
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nn/layer_kernel_vector.cpp"
+#include <hwy/foreach_target.h>
+// After it, as each target includes the rest anew.
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace stipple {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Tag = hn::ScalableTag<float>;
+using Vec = hn::Vec<Tag>;
+
+/// 1 / (1 + exp(-z)). exp(-z) stays finite: beyond 87 the logistic is 0 or 1 to float32 but for
+/// numbers below the smallest normal one.
+HWY_INLINE Vec logisticOf(Tag d, Vec z) {
+  const Vec held = hn::Min(hn::Max(z, hn::Set(d, -87.0f)), hn::Set(d, 87.0f));
+  const Vec one = hn::Set(d, 1.0f);
+  return hn::Div(one, hn::Add(one, hn::Exp(d, hn::Neg(held))));
+}
+
+struct Silu {
+  static HWY_INLINE Vec of(Tag d, Vec x) { return hn::Mul(x, logisticOf(d, x)); }
+};
+
+struct Relu {
+  static HWY_INLINE Vec of(Tag d, Vec x) { return hn::Max(x, hn::Zero(d)); }
+};
+
+/// (1 + tanh(u)) / 2 is the logistic of 2 u, which has no difference of nearly equal numbers.
+struct GeluTanh {
+  static HWY_INLINE Vec of(Tag d, Vec x) {
+    // 2 sqrt(2 / pi), and that times 0.044715.
+    const Vec slope =
+        hn::MulAdd(hn::Mul(x, x), hn::Set(d, 0.0713548162726f), hn::Set(d, 1.5957691216057308f));
+    return hn::Mul(x, logisticOf(d, hn::Mul(x, slope)));
+  }
+};
+
+/// erfc(y) exp(y^2) for y in 0..9.5, by t = 1 / (1 + y / 2): a polynomial with the smallest
+/// greatest relative error (4.3e-8; 3e-7 with the rounding of its float32 steps), fitted by
+/// weighted least squares whose weights follow the error.
+HWY_INLINE Vec scaledErfc(Tag d, Vec y) {
+  const Vec one = hn::Set(d, 1.0f);
+  const Vec t = hn::Div(one, hn::MulAdd(y, hn::Set(d, 0.5f), one));
+  Vec sum = hn::Set(d, -5.889064696e-02f);
+  sum = hn::MulAdd(sum, t, hn::Set(d, 2.837013275e-01f));
+  sum = hn::MulAdd(sum, t, hn::Set(d, -4.853823570e-01f));
+  sum = hn::MulAdd(sum, t, hn::Set(d, 2.759765778e-01f));
+  sum = hn::MulAdd(sum, t, hn::Set(d, -2.517657379e-02f));
+  sum = hn::MulAdd(sum, t, hn::Set(d, 2.020693558e-01f));
+  sum = hn::MulAdd(sum, t, hn::Set(d, 2.432611299e-01f));
+  sum = hn::MulAdd(sum, t, hn::Set(d, 2.823534672e-01f));
+  sum = hn::MulAdd(sum, t, hn::Set(d, 2.820876774e-01f));
+  return hn::Mul(sum, t);
+}
+
+/// x erfc(-x / sqrt(2)) / 2: for x > 0 what erfc(x / sqrt(2)) leaves of x.
+struct GeluErf {
+  static HWY_INLINE Vec of(Tag d, Vec x) {
+    // Beyond 13 (9.2 sqrt(2)) erfc is 0 to float32.
+    const Vec magnitude = hn::Min(hn::Abs(x), hn::Set(d, 13.0f));
+    const Vec y = hn::Mul(magnitude, hn::Set(d, 0.70710678f));
+    const Vec fall = hn::Exp(d, hn::Mul(hn::Mul(magnitude, magnitude), hn::Set(d, -0.5f)));
+    const Vec tail = hn::Mul(hn::Mul(hn::Set(d, 0.5f), magnitude), hn::Mul(fall, scaledErfc(d, y)));
+    return hn::Sub(hn::Max(x, hn::Zero(d)), tail);
+  }
+};
+
+/// values[i] = Function(values[i]); what is left of a vector goes through one of its own, so that a
+/// number becomes the same wherever it lies.
+template <class Function>
+void activateAll(size_t count, float* values) {
+  const Tag d;
+  const size_t lanes = hn::Lanes(d);
+  size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    hn::StoreU(Function::of(d, hn::LoadU(d, values + i)), d, values + i);
+  }
+  if (i == count) return;
+  HWY_ALIGN float rest[hn::MaxLanes(d)] = {};
+  std::copy(values + i, values + count, rest);
+  hn::Store(Function::of(d, hn::Load(d, rest)), d, rest);
+  std::copy_n(rest, count - i, values + i);
+}
+
+void activateVector(Activation activation, size_t count, float* values) {
+  switch (activation) {
+    case Activation::kSilu:
+      return activateAll<Silu>(count, values);
+    case Activation::kRelu:
+      return activateAll<Relu>(count, values);
+    case Activation::kGeluTanh:
+      return activateAll<GeluTanh>(count, values);
+    case Activation::kGeluErf:
+      return activateAll<GeluErf>(count, values);
+  }
+}
+
+void siluGateVector(size_t count, const float* gate, const float* up, float* out) {
+  const Tag d;
+  const size_t lanes = hn::Lanes(d);
+  size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    const Vec silu = Silu::of(d, hn::LoadU(d, gate + i));
+    hn::StoreU(hn::Mul(silu, hn::LoadU(d, up + i)), d, out + i);
+  }
+  if (i == count) return;
+  HWY_ALIGN float rest[hn::MaxLanes(d)] = {};
+  HWY_ALIGN float factor[hn::MaxLanes(d)] = {};
+  std::copy(gate + i, gate + count, rest);
+  std::copy(up + i, up + count, factor);
+  hn::Store(hn::Mul(Silu::of(d, hn::Load(d, rest)), hn::Load(d, factor)), d, rest);
+  std::copy_n(rest, count - i, out + i);
+}
+
+void softmaxVector(SoftmaxRow& row) {
+  const Tag d;
+  const size_t lanes = hn::Lanes(d);
+  const Vec scale = hn::Set(d, row.scale);
+  HWY_ALIGN float edge[hn::MaxLanes(d)];
+  const size_t whole = row.keys / lanes * lanes;
+  const size_t rest = row.keys - whole;
+  const auto scored = [&](Vec score, const float* bias) {
+    return hn::MulAdd(scale, score, bias == nullptr ? hn::Zero(d) : hn::LoadU(d, bias));
+  };
+  Vec peaks = hn::Set(d, row.peak);
+  for (size_t i = 0; i < whole; i += lanes) {
+    const float* bias = row.key_bias == nullptr ? nullptr : row.key_bias + i;
+    peaks = hn::Max(peaks, scored(hn::LoadU(d, row.scores + i), bias));
+  }
+  Vec last = hn::Zero(d);
+  if (rest > 0) {
+    std::fill_n(edge, lanes, 0.0f);
+    if (row.key_bias != nullptr) std::copy_n(row.key_bias + whole, rest, edge);
+    const Vec bias = hn::Load(d, edge);
+    // Lanes without a key have the score of one that has.
+    std::fill_n(edge, lanes, row.scores[whole]);
+    std::copy_n(row.scores + whole, rest, edge);
+    last = hn::MulAdd(scale, hn::Load(d, edge), bias);
+    hn::Store(last, d, edge);
+    for (size_t i = rest; i < lanes; ++i) edge[i] = edge[0];
+    last = hn::Load(d, edge);
+    peaks = hn::Max(peaks, last);
+  }
+  const Vec peak = hn::MaxOfLanes(d, peaks);
+  Vec sums = hn::Zero(d);
+  for (size_t i = 0; i < whole; i += lanes) {
+    const float* bias = row.key_bias == nullptr ? nullptr : row.key_bias + i;
+    const Vec power = hn::Exp(d, hn::Sub(scored(hn::LoadU(d, row.scores + i), bias), peak));
+    sums = hn::Add(sums, power);
+    hn::StoreU(power, d, row.scores + i);
+  }
+  if (rest > 0) {
+    hn::Store(hn::Exp(d, hn::Sub(last, peak)), d, edge);
+    std::copy_n(edge, rest, row.scores + whole);
+    std::fill(edge + rest, edge + lanes, 0.0f);
+    sums = hn::Add(sums, hn::Load(d, edge));
+  }
+  const Vec shrink = hn::Exp(d, hn::Sub(hn::Set(d, row.peak), peak));
+  const float factor = hn::GetLane(shrink);
+  row.peak = hn::GetLane(peak);
+  row.sum = row.sum * factor + hn::GetLane(hn::SumOfLanes(d, sums));
+  if (factor == 1.0f) return;
+  size_t i = 0;
+  for (; i + lanes <= row.width; i += lanes) {
+    hn::StoreU(hn::Mul(hn::LoadU(d, row.out + i), shrink), d, row.out + i);
+  }
+  for (; i < row.width; ++i) row.out[i] *= factor;
+}
+
+/// Highway's own one-lane target is not the plain kernel, which has the name "scalar".
+LayerKernel namedLayerKernel() {
+  return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET), activateVector,
+          siluGateVector, softmaxVector};
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace stipple
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+#include "base/kernel_choice.h"
+
+namespace stipple {
+
+HWY_EXPORT(namedLayerKernel);
+
+std::vector<LayerKernel> layerKernels() {
+  return onEveryTarget(scalarLayerKernel(),
+                       [] { return HWY_DYNAMIC_DISPATCH(namedLayerKernel)(); });
+}
+
+const LayerKernel& chosenLayerKernel() {
+  static const LayerKernel kernel =
+      chooseKernel(HWY_DYNAMIC_DISPATCH(namedLayerKernel)(), layerKernels);
+  return kernel;
+}
+
+}  // namespace stipple
+
+#endif  // HWY_ONCE

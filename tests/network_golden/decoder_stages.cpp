@@ -1,0 +1,138 @@
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "decode/latent/latent_decoder.h"
+#include "decode/latent/latent_density.h"
+#include "decode/latent/latent_networks.h"
+#include "density/anchor_sampling.h"
+#include "math/morton.h"
+#include "network_golden/stages.h"
+
+namespace stipple {
+namespace {
+
+// The goldens are float32 sums in another order, on networks whose numbers are of order one.
+constexpr StageTolerance kNetworkCall = {5e-5, 0};
+// Anchors are multiples of 2^-24 here, and the encoding of positions multiplies them by up to
+// 3,217.
+constexpr StageTolerance kFromLatent = {1e-4, 1e-4};
+// One float32 formula, and multiples of 2^-24.
+constexpr StageTolerance kFormula = {1e-6, 1e-6};
+
+/// Asks a network as the sampler does, and keeps the logits of each level for comparison.
+class WatchedDensity final : public DensityModel {
+ public:
+  WatchedDensity(std::shared_ptr<const OctreeNetwork> network, std::shared_ptr<const Latent> latent,
+                 int leaf_level)
+      : density_(network, latent, {}, leaf_level),
+        network_(std::move(network)),
+        keys_(network_->keysOf({}, *latent)) {}
+  int leafLevel() const override { return density_.leafLevel(); }
+  const RootCube& root() const override { return density_.root(); }
+  void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* progress) const override {
+    std::vector<float> logits(8 * cells.size());
+    network_->logits({}, keys_, level, cells, logits);
+    seen.push_back(std::move(logits));
+    density_.childLogProbabilities(level, cells, out, progress);
+  }
+
+  mutable std::vector<std::vector<float>> seen;  // per level
+
+ private:
+  LatentDensity density_;
+  std::shared_ptr<const OctreeNetwork> network_;
+  OctreeNetwork::Keys keys_;
+};
+
+std::string levelName(const char* stem, int level) {
+  return stem + std::to_string(level);
+}
+
+std::vector<double> recordedNumbers(const GoldenFile& file, int leaf_level) {
+  std::vector<double> numbers;
+  for (int level = 1; level <= leaf_level; ++level) {
+    for (const float u : file.floats(levelName("input.uniform.level", level))) {
+      numbers.push_back(static_cast<double>(u));
+    }
+  }
+  for (const float u : file.floats("input.jitter")) numbers.push_back(static_cast<double>(u));
+  return numbers;
+}
+
+std::vector<int64_t> leavesOf(std::span<const float> points, int level) {
+  std::vector<int64_t> leaves;
+  for (size_t i = 0; i < points.size(); i += 3) {
+    const auto at = [&](size_t axis) {
+      return static_cast<uint32_t>(std::floor(std::ldexp(points[i + axis], level)));
+    };
+    leaves.push_back(static_cast<int64_t>(mortonEncode(at(0), at(1), at(2))));
+  }
+  return leaves;
+}
+
+AnchorSet sampleStages(const GoldenFile& file, const LatentNetworks& networks,
+                       std::shared_ptr<const Latent> latent, StageReport& report) {
+  const int leaf_level = file.config().at("level").get<int>();
+  const WatchedDensity density(networks.octree, std::move(latent), leaf_level);
+  RecordedUniformSource source(recordedNumbers(file, leaf_level));
+  const uint64_t count = file.config().at("num_points").get<uint64_t>();
+  AnchorSet anchors = sampleAnchors(density, {.count = count}, source);
+  for (int level = 1; level <= leaf_level; ++level) {
+    const std::string name = levelName("logits.level", level);
+    report.compare(name, density.seen[static_cast<size_t>(level - 1)],
+                   file.floats("expect." + name), kNetworkCall);
+  }
+  const std::vector<int64_t> drawn = {static_cast<int64_t>(source.drawnCount())};
+  const std::vector<int64_t> recorded = {
+      static_cast<int64_t>(recordedNumbers(file, leaf_level).size())};
+  report.compareExactly("octree.draws", drawn, recorded);
+  const std::vector<float> points = file.floats("expect.points");
+  const std::vector<int64_t> leaves(anchors.leaves.begin(), anchors.leaves.end());
+  report.compareExactly("octree.leaves", leaves, leavesOf(points, leaf_level));
+  report.compare("points", anchors.positions, points, kFormula);
+  report.compare("log_probs", anchors.log_q, file.floats("expect.log_probs"), kFromLatent);
+  return anchors;
+}
+
+void compareSplats(const std::string& stem, const GoldenFile& file, const SplatCloud& cloud,
+                   StageTolerance tolerance, StageReport& report) {
+  const auto compare = [&](const char* name, std::span<const float> seen) {
+    const std::string whole = std::string("gaussians.") + name;
+    report.compare(stem + whole, seen, file.floats("expect." + whole), tolerance);
+  };
+  compare("position", cloud.positions);
+  compare("scale", cloud.scales);
+  compare("opacity", cloud.opacities);
+  compare("rotation_wxyz", cloud.rotations);
+  compare("sh_dc", cloud.sh);
+}
+
+}  // namespace
+
+void decoderStages(const GoldenFile& file, StageReport& report) {
+  if (!file.has("expect.gaussians.position")) return;
+  const bool is_pipeline = file.hasUnder("weights.decoder.");
+  const LatentNetworks networks = readLatentNetworks(file.weights(is_pipeline ? "decoder." : ""));
+  const std::string latent_name = is_pipeline ? "expect.sample.latent" : "input.latent";
+  auto latent = std::make_shared<Latent>();
+  latent->token_count = file.shape(latent_name).at(1);
+  latent->width = static_cast<uint32_t>(file.shape(latent_name).at(2));
+  latent->tokens = file.floats(latent_name);
+  const AnchorSet anchors = sampleStages(file, networks, latent, report);
+
+  const LatentDecoder decoder(networks.gaussians, latent);
+  const std::vector<float> points = file.floats("expect.points");
+  const std::vector<float> features = file.floats("expect.features");
+  report.compare("features",
+                 networks.gaussians->features({}, *latent, points.size() / 3, points.data()),
+                 features, kNetworkCall);
+  compareSplats("activated ", file, decoder.splatsOf(points, features), kFormula, report);
+  DecodeRequest request;
+  request.anchors = &anchors;
+  request.gaussians_per_anchor = networks.gaussians->gaussians();
+  compareSplats("decoded ", file, decoder.decode(request), kFromLatent, report);
+}
+
+}  // namespace stipple

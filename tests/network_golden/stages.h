@@ -1,0 +1,17 @@
+#pragma once
+
+#include "network_golden/golden_file.h"
+#include "network_golden/stage_report.h"
+
+namespace stipple {
+
+// Each runs all stages of its kind that the file has numbers for, and leaves the others out.
+
+/// From an image to the condition of a flow network.
+void encoderStages(const GoldenFile& file, StageReport& report);
+/// The flow network and its sampler.
+void flowStages(const GoldenFile& file, StageReport& report);
+/// From a latent to splats.
+void decoderStages(const GoldenFile& file, StageReport& report);
+
+}  // namespace stipple
