@@ -32,7 +32,7 @@ StippleStatus stipple_context_create(const StippleContextOptions* options,
 
 StippleStatus stipple_context_set_weights_folder(StippleContext* context, const char* folder_utf8) {
   return guarded([&] {
-    WeightsPlace& weights = *require(context, "context").state->weights;
+    stipple::WeightsPlace& weights = *require(context, "context").state->weights;
     if (folder_utf8 != nullptr) {
       weights.set(folder_utf8);
     } else {

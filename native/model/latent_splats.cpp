@@ -36,8 +36,11 @@ class LatentSplats final : public SplatModel {
   ModelInfo info() const override {
     ModelInfo info;
     info.leaf_level = density_->leafLevel();
-    info.bounds_min = {-0.5f, -0.5f, -0.5f};
-    info.bounds_max = {0.5f, 0.5f, 0.5f};
+    const RootCube& root = density_->root();
+    for (size_t axis = 0; axis < 3; ++axis) {
+      info.bounds_min[axis] = static_cast<float>(root.origin[axis]);
+      info.bounds_max[axis] = static_cast<float>(root.origin[axis] + root.side);
+    }
     return info;
   }
 
