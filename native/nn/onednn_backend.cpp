@@ -1,6 +1,7 @@
 #include "nn/onednn_backend.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <memory>
 
 #include "base/error.h"
@@ -43,10 +44,19 @@ class OnednnBackend : public MatrixBackend {
             Precision precision, float* packed) const override {
     if (inputs == 0 || outputs == 0) return;
     const StippleNnWeight weight = {inputs, outputs, numberOf(precision)};
-    Scratch values(inputs * outputs);
-    widen(tensor, first_output * inputs, {values.data(), inputs * outputs});
+    const size_t first = first_output * inputs, count = inputs * outputs;
+    const bool as_it_lies = liesAs(tensor, precision);
+    Scratch values(as_it_lies ? 0 : count);
+    const void* from = values.data();
+    if (as_it_lies) {
+      from = tensor.bytes + first * (precision == Precision::kBfloat16 ? 2 : 4);
+    } else if (precision == Precision::kBfloat16) {
+      narrow(tensor, first, count, reinterpret_cast<uint16_t*>(values.data()));
+    } else {
+      widen(tensor, first, {values.data(), count});
+    }
     StippleNnStatus status;
-    table_.pack(&weight, values.data(), packed, &status);
+    table_.pack(&weight, from, packed, &status);
     throwIfFailed(status);
   }
 
@@ -57,9 +67,12 @@ class OnednnBackend : public MatrixBackend {
     const bool is_narrow = precision == Precision::kBfloat16;
     const bool has_gaps = panel.in_stride != panel.inputs;
     // bfloat16 takes half of it.
-    Scratch rows(is_narrow || has_gaps ? panel.rows * panel.inputs : 0);
+    const bool has_narrow = is_narrow && panel.narrow_in != nullptr;
+    Scratch rows(!has_narrow && (is_narrow || has_gaps) ? panel.rows * panel.inputs : 0);
     const void* in = panel.in;
-    if (is_narrow) {
+    if (has_narrow) {
+      in = panel.narrow_in;
+    } else if (is_narrow) {
       in = narrowed(panel, reinterpret_cast<uint16_t*>(rows.data()));
     } else if (has_gaps) {
       for (size_t row = 0; row < panel.rows; ++row) {
@@ -77,6 +90,25 @@ class OnednnBackend : public MatrixBackend {
  private:
   static uint32_t numberOf(Precision precision) {
     return precision == Precision::kBfloat16 ? kNnBfloat16 : kNnFloat32;
+  }
+
+  /// Whether oneDNN can read the tensor where it is.
+  static bool liesAs(const WeightTensor& tensor, Precision precision) {
+    const bool is_narrow = precision == Precision::kBfloat16;
+    const WeightType type = is_narrow ? WeightType::kBfloat16 : WeightType::kFloat32;
+    return tensor.type == type &&
+           reinterpret_cast<uintptr_t>(tensor.bytes) % (is_narrow ? 2 : 4) == 0;
+  }
+
+  static void narrow(const WeightTensor& tensor, size_t first, size_t count, uint16_t* to) {
+    constexpr size_t kPiece = 1024;
+    float piece[kPiece];
+    const LayerKernel& kernel = chosenLayerKernel();
+    for (size_t begin = 0; begin < count; begin += kPiece) {
+      const size_t size = std::min(kPiece, count - begin);
+      widen(tensor, first + begin, {piece, size});
+      kernel.narrow(size, piece, to + begin);
+    }
   }
 
   static const void* narrowed(const LinearPanel& panel, uint16_t* to) {

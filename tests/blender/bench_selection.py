@@ -103,6 +103,6 @@ def test_a_stroke(stipple, tmp_path, name, make):
     report('  part: pack and store', best_of(RUNS, lambda: target.keep_selected(mask, [region])), TARGET)
     shown = {}
     preview = previews.StrokePreview(bpy.context, lambda found: (shown.clear(), shown.update(found)))
-    preview.update(lambda _obj: [region])
+    report('  first move of the mouse while drawing', best_of(1, lambda: preview.update(lambda _obj: [region])), 0.016)
     report('  a move of the mouse while drawing', best_of(RUNS, lambda: preview.update(lambda _obj: [region])), 0.016)
     report('  points to draw', best_of(RUNS, lambda: selecting.positions(obj, 200_000)), TARGET)

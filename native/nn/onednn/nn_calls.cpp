@@ -92,15 +92,16 @@ dnnl::memory::desc matrix(uint64_t rows, uint64_t columns, Type type) {
           type, dnnl::memory::format_tag::ab};
 }
 
+Type typeOf(uint32_t precision) {
+  return precision == kNnBfloat16 ? Type::bf16 : Type::f32;
+}
+
 /// weight^T [inputs, outputs] as it lies, row by row of the weight.
 dnnl::memory::desc transposed(const StippleNnWeight& weight) {
   const auto inputs = static_cast<dnnl::memory::dim>(weight.inputs);
   const auto outputs = static_cast<dnnl::memory::dim>(weight.outputs);
-  return {dnnl::memory::dims{inputs, outputs}, Type::f32, dnnl::memory::dims{1, inputs}};
-}
-
-Type typeOf(uint32_t precision) {
-  return precision == kNnBfloat16 ? Type::bf16 : Type::f32;
+  return {dnnl::memory::dims{inputs, outputs}, typeOf(weight.precision),
+          dnnl::memory::dims{1, inputs}};
 }
 
 dnnl::matmul::primitive_desc describe(const dnnl::memory::desc& in,
@@ -271,7 +272,7 @@ uint64_t stipple_nn_packed_bytes(const StippleNnWeight* weight, StippleNnStatus*
   return bytes;
 }
 
-void stipple_nn_pack(const StippleNnWeight* weight, const float* values, void* packed,
+void stipple_nn_pack(const StippleNnWeight* weight, const void* values, void* packed,
                      StippleNnStatus* status) {
   guard(status, [&] {
     dnnl::memory from(transposed(*weight), engine(), writable(values));

@@ -8,7 +8,7 @@
 
 namespace stipple {
 
-constexpr uint32_t kNnTableVersion = 1;
+constexpr uint32_t kNnTableVersion = 2;
 
 extern "C" {
 
@@ -48,8 +48,8 @@ struct StippleNnTable {
   uint32_t (*has_precision)(uint32_t precision);
   /// Bytes of a packed weight.
   uint64_t (*packed_bytes)(const StippleNnWeight* weight, StippleNnStatus* status);
-  /// In: values [outputs, inputs]. Out: packed [packed_bytes], at a multiple of 64.
-  void (*pack)(const StippleNnWeight* weight, const float* values, void* packed,
+  /// In: values [outputs, inputs] in the precision of the weight. Out: packed [packed_bytes].
+  void (*pack)(const StippleNnWeight* weight, const void* values, void* packed,
                StippleNnStatus* status);
   /// On the calling thread alone.
   void (*multiply)(const StippleNnWeight* weight, const StippleNnProduct* product,

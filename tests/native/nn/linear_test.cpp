@@ -8,8 +8,8 @@
 #include "base/parallel.h"
 #include "io/scratch_folder.h"
 #include "nn/kernels/layer_kernel.h"
-#include "nn/matrix_backend.h"
 #include "nn/kernels/panel_kernel.h"
+#include "nn/matrix_backend.h"
 #include "test_numbers.h"
 
 namespace stipple {
@@ -155,6 +155,26 @@ TEST(Linear, RoundsFactorsToBfloat16WhereItIsAskedTo) {
     run.precision = Precision::kBfloat16;
     std::vector<float> out(c.rows * c.outputs);
     Linear(table, "fc", c.inputs, c.outputs).apply(run, c.rows, in.data(), out.data());
+    // The same from bfloat16 as it lies in memory, which oneDNN reads in place.
+    std::vector<uint16_t> halves(weight.size());
+    scalarLayerKernel().narrow(weight.size(), weight.data(), halves.data());
+    const std::map<std::string, WeightTensor> tensors = {
+        {"fc.weight",
+         {WeightType::kBfloat16,
+          "BF16",
+          {c.outputs, c.inputs},
+          reinterpret_cast<const uint8_t*>(halves.data())}},
+        {"fc.bias",
+         {WeightType::kFloat32,
+          "F32",
+          {c.outputs},
+          reinterpret_cast<const uint8_t*>(bias.data())}}};
+    std::vector<float> in_place(out.size());
+    Linear(WeightTable("memory", tensors, nullptr), "fc", c.inputs, c.outputs)
+        .apply(run, c.rows, in.data(), in_place.data());
+    if (backend->has(Precision::kBfloat16)) {
+      EXPECT_EQ(in_place, out);
+    }
     // A backend that has it not multiplies in float32.
     const bool has = backend->has(Precision::kBfloat16);
     expectProduct(c, has ? rounded(in) : in, c.inputs, has ? rounded(weight) : weight, bias, out,

@@ -6,9 +6,10 @@ import time
 
 import numpy as np
 
-from ...binding import cloud_edit, regions
+from ...binding import regions
+from ...binding.cloud import Cloud, SplatArrays
 from ...binding.errors import StippleError
-from ...scene.source import edits, selecting, selections
+from ...scene.source import edits, selecting, selections, sources
 
 # Splats of all objects that are looked at for each move of the mouse.
 MOST = 100_000
@@ -57,6 +58,16 @@ def _is_read(obj):
     return not selections.takes_mask(obj.data) or bool(obj.data.stipple.source)
 
 
+def _places(positions):
+    """A Cloud of splats at these places; what is drawn asks for nothing else of them."""
+    count = len(positions)
+    rotations = np.zeros((count, 4), np.float32)
+    rotations[:, 0] = 1.0
+    return Cloud.create(sources.context(), SplatArrays(
+        positions, rotations, np.ones((count, 3), np.float32), np.ones(count, np.float32),
+        np.zeros((count, 1, 3), np.float32)))
+
+
 class _Sample:
     """Every n-th splat of a target that can be selected."""
 
@@ -66,7 +77,7 @@ class _Sample:
         chosen = chosen[::max(1, -(-len(chosen) // max(most, 1)))]
         mask = np.zeros(len(target.stays), np.uint8)
         mask[chosen] = 1
-        self._cloud = cloud_edit.keep(target.cloud, mask)
+        self._cloud = _places(regions.selected_positions(target.cloud, mask, len(chosen)))
         self._before = target.selected[chosen]
 
     def after(self, chosen):
