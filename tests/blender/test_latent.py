@@ -68,7 +68,7 @@ def test_without_weights_the_engine_draws_what_is_stored_while_it_is_what_is_wan
     gathered = stipple.scene.instances.gather(bpy.context.evaluated_depsgraph_get(), 'RENDER')
     take_weights_away(stipple, tmp_path)
     again = stipple.scene.instances.gather(bpy.context.evaluated_depsgraph_get(), 'RENDER')
-    assert [placed[0].count for placed in again] == [placed[0].count for placed in gathered] == [40 * EACH]
+    assert [placed[0].columns().count for placed in again] == [placed[0].columns().count for placed in gathered] == [40 * EACH]
     splats.data.stipple.anchors_render = 60
     with pytest.raises(stipple.binding.errors.StippleError, match='decoder.safetensors'):
         stipple.scene.instances.gather(bpy.context.evaluated_depsgraph_get(), 'RENDER')
@@ -102,7 +102,7 @@ def test_what_takes_long_is_decoded_beside_blender(stipple, splats):
     beside = sources.decode_data(data, wanted(2000)).columns()
     assert not sources.is_decoding() and sources.decoding_share(data) is None
     direct = sources.decode_data(data, wanted(2000)).columns()
-    np.testing.assert_array_equal(beside.positions, direct.positions)
+    np.testing.assert_array_equal(beside.column('positions'), direct.column('positions'))
 
 
 def test_what_nobody_takes_is_forgotten(stipple, splats):
