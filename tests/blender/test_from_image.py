@@ -83,9 +83,11 @@ def test_the_budget_decodes_again_and_travels_with_a_file(stipple, weights, pict
     assert stipple.scene.source.splat_data.count(obj.data) == 50 * EACH
 
 
-def test_a_second_budget_can_be_added(stipple, weights, picture):
+def test_renders_have_a_budget_of_their_own(stipple, weights, picture):
     bpy.ops.stipple.splats_from_image(filepath=str(picture), **SMALL)
-    assert bpy.ops.stipple.add_budget() == {'FINISHED'}
+    data = bpy.context.object.data
+    data.stipple.anchors_render = 70
+    assert stipple.scene.source.sources.full_cloud(data).info().count == 70 * EACH
 
 
 def test_seeds_stand_side_by_side_and_differ(stipple, weights, picture):

@@ -17,7 +17,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import pipeline_weights  # noqa: E402
 
 TOOL = Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
-SMALL = ('--canvas', pipeline_weights.CANVAS, '--tokens', pipeline_weights.TOKENS, '--steps', pipeline_weights.STEPS)
+SIZES = ('--canvas', pipeline_weights.CANVAS, '--tokens', pipeline_weights.TOKENS)
+SMALL = (*SIZES, '--steps', pipeline_weights.STEPS)
 
 
 def run(*arguments, status=0):
@@ -60,8 +61,8 @@ def generate(files, image, out, *arguments, **keywords):
 def test_an_image_becomes_a_model_that_decodes_to_any_budget(files):
     generate(files, 'image.png', 'model.stipple.safetensors')
     for anchors in (32, 40):
-        subprocess.run([TOOL, 'decode', files / 'model.stipple.safetensors', files / 'out.ply', '--anchors', str(anchors),
-                        '--weights', files / 'weights'], check=True, timeout=60)
+        subprocess.run([TOOL, '--weights', files / 'weights', 'decode', files / 'model.stipple.safetensors',
+                        files / 'out.ply', '--anchors', str(anchors)], check=True, timeout=60)
         assert f'element vertex {32 * anchors}\n'.encode() in (files / 'out.ply').read_bytes()[:400]
 
 
@@ -112,7 +113,7 @@ def test_errors_are_one_line_and_say_what_to_do(files, tmp_path):
     assert 'huggingface.co' in error(files / 'image.png', tmp_path / 'a.ply', '--weights', tmp_path, *SMALL)
     assert 'no_such' in error(files / 'image.png', tmp_path / 'a.ply', '--weights', files / 'no_such', *SMALL)
     assert '.ply' in error(files / 'image.png', tmp_path / 'a.txt', '--weights', files / 'weights', *SMALL)
-    assert 'steps' in error(files / 'image.png', tmp_path / 'a.ply', '--weights', files / 'weights', '--steps', 2000)
+    assert 'steps' in error(files / 'image.png', tmp_path / 'a.ply', '--weights', files / 'weights', *SIZES, '--steps', 2000)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -120,8 +121,8 @@ def test_a_run_that_was_interrupted_goes_on_to_the_same_splats(files):
     """Many steps, so that the signal comes while it samples."""
     state = files / 'state.stipple.safetensors'
     many = ('--steps', 300, '--anchors', 40)
-    generate(files, 'image.png', 'whole.ply', *many)
-    arguments = [TOOL, 'generate', files / 'image.png', files / 'resumed.ply', '--weights', files / 'weights', *SMALL,
+    run(files / 'image.png', files / 'whole.ply', '--weights', files / 'weights', *SIZES, *many)
+    arguments = [TOOL, 'generate', files / 'image.png', files / 'resumed.ply', '--weights', files / 'weights', *SIZES,
                  *many, '--checkpoint', state]
     process = subprocess.Popen(list(map(str, arguments)), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     until = time.monotonic() + 60

@@ -2219,7 +2219,7 @@ typedef struct StippleGenerateOptions {
   uint32_t watches_layers;   /* 1: stages have every layer of the encoders too; default 0 */
   uint32_t reserved;
   uint32_t preview_steps;    /* a preview after every so many steps; 0, the default: none */
-  uint64_t preview_anchors;  /* of a preview, and of the splats that the size is measured at, default 1024 */
+  uint64_t preview_anchors;  /* of a preview, and of the splats that the size is measured at, default 256 */
   uint64_t seed;             /* of all noise, default 42 */
   double guidance;           /* 0..100, default 3; 1 and less: half as many runs of the network */
   double shift;              /* 0.01..100, default 3; above 1 more steps are taken where there is much noise */

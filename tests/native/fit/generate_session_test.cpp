@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "fit/object_placement.h"
 #include "io/assets/latent_asset.h"
 #include "io/assets/weight_file.h"
 #include "io/scratch_folder.h"
@@ -19,8 +20,6 @@
 
 namespace stipple {
 namespace {
-
-using testing::HasSubstr;
 
 /// The small networks of a golden pipeline in files as users have them, and its image.
 class GenerateSessionOfGolden : public ScratchFolder {
@@ -203,20 +202,10 @@ TEST_F(GenerateSessionOfGolden, StandsOnItsBaseAsLargeAsAskedFor) {
   ModelRequest request;
   request.budget = options_.preview_anchors;
   const SplatCloud cloud = session.model()->decode(request);
-  double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  for (size_t i = 0; i < cloud.size(); ++i) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const auto value = static_cast<double>(cloud.positions[3 * i + axis]);
-      low[axis] = std::min(low[axis], value);
-      high[axis] = std::max(high[axis], value);
-    }
-  }
-  double largest = 0;
-  for (size_t axis = 0; axis < 3; ++axis) largest = std::max(largest, high[axis] - low[axis]);
-  // A hundredth of the splats, and faint ones, do not count for the size.
-  EXPECT_NEAR(largest, 2.5, 0.5);
-  EXPECT_NEAR(low[2], 0.0, 0.25);
-  EXPECT_NEAR((low[0] + high[0]) / 2, 0.0, 0.25);
+  // The splats that it was measured at stand there already, up to float32.
+  const LatentPlacement again = standingOnBase(cloud, 2.5);
+  EXPECT_NEAR(again.scale, 1.0, 1e-5);
+  for (const double offset : again.offset) EXPECT_NEAR(offset, 0.0, 1e-5);
 }
 
 TEST_F(GenerateSessionOfGolden, TheKeyedNoiseAndSeedsDecideTheLatent) {
@@ -233,7 +222,7 @@ TEST_F(GenerateSessionOfGolden, EstimatesGrowWithTheWork) {
   EXPECT_GT(few.bytes, 0u);
   options_.steps = 40;
   const GenerateEstimate many = GenerateSession::estimate(options_);
-  EXPECT_GT(many.operations, 5 * few.operations);
+  EXPECT_GT(many.operations, 3 * few.operations);  // encoders are as they were
   EXPECT_GT(many.seconds, few.seconds);
   EXPECT_EQ(many.weight_bytes, few.weight_bytes);
 }
