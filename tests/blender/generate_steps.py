@@ -66,39 +66,8 @@ def made(_window):
     return 'made'
 
 
-def cancelled_start(window):
-    """Another one, which is stopped by Esc."""
-    for obj in list(bpy.data.objects):
-        if obj.name != 'Cube':
-            continue
-        obj.hide_set(False)
-        obj.select_set(True)
-        window.window.view_layer.objects.active = obj
-    with window.context():
-        bpy.ops.stipple.splats_from_render('INVOKE_DEFAULT', canvas='512', tokens=64, steps=900, samples=1,
-                                           engine='CYCLES', anchors=64, seed=9)
-
-
-def stop(window):
-    window.window.event_simulate(type='ESC', value='PRESS', x=10, y=10)
-    window.window.event_simulate(type='ESC', value='RELEASE', x=10, y=10)
-
-
-def stopped(_window):
-    """Until the checkpoint of what was stopped is there and nothing runs."""
-    left = list((Path(weights).parent / 'cache').glob('generation_*'))
-    if not left:
-        return False
-    facts['left'] = len(left)
-    facts['after_stop'] = sorted(obj.name for obj in bpy.data.objects)
-    folder = Path(sys.argv[sys.argv.index('--') + 2])
-    (folder / 'facts.json').write_text(json.dumps(facts))
-    return None
-
-
 def wait(_window):
     return None
 
 
-steps = [build, wait, preferences, ask, dialog, confirm, running, wait, made, cancelled_start, wait, confirm, wait, wait,
-         stop, stopped, wait]
+steps = [build, wait, preferences, ask, dialog, confirm, running, wait, made]

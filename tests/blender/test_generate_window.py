@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Images to splats in a window on a virtual screen: preferences, the dialog, the result, Esc."""
+"""Images to splats in a window on a virtual screen: preferences, the dialog, the result."""
 
 import json
 import sys
@@ -46,9 +46,3 @@ def test_the_result_stands_in_place_of_what_was_rendered(shots):
     _, facts, _ = shots
     assert facts['count'] == 64 * 32 and facts['cube_hidden']
     assert facts['location'] == pytest.approx((0.0, 0.0, -1.0))
-
-
-def test_esc_leaves_a_state_to_go_on_from_and_no_object(shots):
-    _, facts, _ = shots
-    assert facts['left'] == 1
-    assert [name for name in facts['after_stop'] if name.startswith('Cube')] == ['Cube', 'Cube Splats']

@@ -158,6 +158,7 @@ TEST_F(GenerateSessionOfGolden, ShowsPreviewsAndGivesEachOnce) {
 }
 
 TEST_F(GenerateSessionOfGolden, GoesOnFromACheckpointToTheSameBits) {
+  options_.steps = 200;  // so that the cancel comes while it samples
   const Latent whole = generated(options_);
   options_.checkpoint_path = path("state.stipple.safetensors");
   {
