@@ -12,6 +12,8 @@ from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parent.parent
 LIBRARIES = ('libstipple.so', 'libstipple_media.so')
+# Where oneDNN was there when the library was built; without it networks run on Stipple's own kernels.
+OPTIONAL_LIBRARIES = ('libstipple_nn.so',)
 # A fixed time, so that equal content gives an equal zip.
 TIME = (2026, 1, 1, 0, 0, 0)
 
@@ -22,7 +24,8 @@ def make(libraries, output):
     files = {f'stipple/{p.relative_to(package).as_posix()}': p for p in package.rglob('*')
              if p.is_file() and '__pycache__' not in p.parts and 'lib' not in p.relative_to(package).parts[:1]}
     files['stipple/LICENSE'] = PROJECT / 'LICENSE'
-    for name in LIBRARIES:
+    optional = tuple(name for name in OPTIONAL_LIBRARIES if (libraries / name).is_file())
+    for name in LIBRARIES + optional:
         if not (libraries / name).is_file():
             raise FileNotFoundError(f"The library '{libraries / name}' is missing; build the target stipple first.")
         # Follows version links: the zip holds one plain file per library.

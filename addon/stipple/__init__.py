@@ -14,7 +14,7 @@ bl_info = {
 import bpy
 
 from . import cycles_engine, engine, operators, panels, preferences, properties, selection_tools
-from .viewport import drawing, selected_points
+from .viewport import drawing, selected_points, stroke_preparation, view_world
 from .scene.source import source_travel, sync
 from .scene.view import splat_engines, steady_effects
 
@@ -32,13 +32,17 @@ def register():
     steady_effects.register()
     splat_engines.register()
     drawing.register()
+    view_world.register()
     selected_points.register()
+    stroke_preparation.register()
     selection_tools.register()
 
 
 def unregister():
     selection_tools.unregister()
+    stroke_preparation.unregister()
     selected_points.unregister()
+    view_world.unregister()
     drawing.unregister()
     splat_engines.unregister()
     steady_effects.unregister()

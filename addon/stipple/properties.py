@@ -289,7 +289,9 @@ class STIPPLE_PG_selection(bpy.types.PropertyGroup):
     radius: FloatProperty(name="Radius", description="Radius of the brush, pixels", default=40.0, min=1.0, max=5000.0,
                           soft_max=500.0, subtype='PIXEL', options=set())
     front_only: BoolProperty(name="Front Only", description="Select what is seen, and nothing that lies behind other "
-                             "splats", default=False, options=set())
+                             "splats and meshes", default=False, options=set())
+    through_meshes: BoolProperty(name="Through Meshes", description="With Front Only, select what meshes hide, too",
+                                 default=False, options=set())
     tolerance: FloatProperty(name="Tolerance", description="How different from the color that is clicked a color may "
                              "be; 0.1 is a family of one hue", default=0.08, min=0.0, soft_max=0.5, subtype='FACTOR',
                              precision=3, options=set())

@@ -163,6 +163,7 @@ ShotSettings shotFrom(const StippleRenderOptions* options, const Instances& inst
   const auto output = enumValue<OutputColour>(given.output_colour, 1, "options->output_colour");
   settings.splat_light = given.splat_light;
   settings.background_image = given.background_image;
+  settings.surroundings = {given.surroundings, given.surroundings_width, given.surroundings_height};
   settings.solid_depth = enumValue<uint32_t>(given.solid_depth, 1, "options->solid_depth") == 1;
   if (given.accuracy) takeAccuracy(accuracyFrom(given.accuracy, "options->accuracy"), settings);
   settings.sampling = samplingFrom(given, instances);

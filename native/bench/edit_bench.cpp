@@ -168,16 +168,21 @@ Region regionOf(RegionKind kind, const std::vector<float>& points) {
   return region;
 }
 
-void stroke(benchmark::State& state, RegionKind kind, bool front) {
+/// In: special: with depths of what is in front; growing: of scattered splats.
+void stroke(benchmark::State& state, RegionKind kind, bool special) {
   const SplatCloud& cloud = cloudOf(kStrokeCloud);
   const std::vector<float> points = path(kind != RegionKind::kBrush);
   const std::vector<float> depths(size_t{1920} * 1080, 3.0f);
   std::vector<uint8_t> before(cloud.size(), 0), other(cloud.size());
   std::array<Region, 1> regions = {regionOf(kind, points)};
   regions[0].cloud_to_depth = cameraOf(kStrokeCloud).world_to_camera.row(2);
-  if (front) regions[0].seen = {depths, 1920, 1080, Vec4d(0, 0, 1920, 1080), 0.1, true};
+  if (special && kind != RegionKind::kGrow)
+    regions[0].seen = {depths, 1920, 1080, Vec4d(0, 0, 1920, 1080), 0.1, true};
   withThreads(2, [&] {
-    if (kind == RegionKind::kGrow) {
+    if (kind == RegionKind::kGrow && special) {
+      // Scattered over the whole cloud, as a colour selects.
+      for (size_t i = 0; i < before.size(); ++i) before[i] = i * 2654435761u % 1000 < 377 ? 1 : 0;
+    } else if (kind == RegionKind::kGrow) {
       const std::array<Region, 1> ball = {regionOf(RegionKind::kSphere, points)};
       before = selectedByRegions(cloud, ball, before);
     }
@@ -217,7 +222,7 @@ void fill(benchmark::State& state) {
 struct Stroke {
   const char* name;
   RegionKind kind;
-  bool front;
+  bool special;
 };
 constexpr Stroke kStrokes[] = {
     {"regions.brush.1M", RegionKind::kBrush, false},
@@ -226,12 +231,13 @@ constexpr Stroke kStrokes[] = {
     {"regions.sphere.1M", RegionKind::kSphere, false},
     {"regions.colour.1M", RegionKind::kColour, false},
     {"regions.grow.1M", RegionKind::kGrow, false},
+    {"regions.grow_scattered.1M", RegionKind::kGrow, true},
 };
 
 const bool kRegistered = [] {
   for (const Stroke& each : kStrokes) {
     benchmark::RegisterBenchmark(
-        each.name, [&each](benchmark::State& state) { stroke(state, each.kind, each.front); })
+        each.name, [&each](benchmark::State& state) { stroke(state, each.kind, each.special); })
         ->UseManualTime()
         ->Iterations(kStrokeRepeats)
         ->Unit(benchmark::kMillisecond);

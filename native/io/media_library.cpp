@@ -1,46 +1,18 @@
 #include "io/media_library.h"
 
-#include <dlfcn.h>
-
-#include <filesystem>
 #include <mutex>
 #include <string>
 #include <utility>
 
 #include "base/error.h"
+#include "base/own_library.h"
 
 namespace stipple {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr char kFileName[] = "libstipple_media.so";
 constexpr char kTableFunction[] = "stipple_media_table";
-
-/// The folder of the file that holds this code: libstipple.so, or a program that it is linked into.
-fs::path ownFolder() {
-  Dl_info info{};
-  if (::dladdr(reinterpret_cast<const void*>(&mediaTable), &info) == 0 || !info.dli_fname) {
-    return fs::path();
-  }
-  std::error_code error;
-  // A program knows itself by the name that it was called by, which may be relative or in PATH.
-  const fs::path file = std::string(info.dli_fname).find('/') == std::string::npos
-                            ? fs::read_symlink("/proc/self/exe", error)
-                            : fs::absolute(info.dli_fname, error);
-  return fs::weakly_canonical(file, error).parent_path();
-}
-
-fs::path findLibrary() {
-  const fs::path folder = ownFolder();
-  std::error_code ignored;
-  for (const char* place : {".", "../lib", "../../lib"}) {
-    const fs::path candidate = folder / place / kFileName;
-    if (fs::exists(candidate, ignored)) return candidate.lexically_normal();
-  }
-  return folder / kFileName;
-}
 
 [[noreturn]] void failUnavailable(const std::string& why) {
   fail(ErrorCode::kUnavailable, std::string(kFileName) +
@@ -50,18 +22,15 @@ fs::path findLibrary() {
 }
 
 const StippleMediaTable* openLibrary() {
-  const fs::path file = findLibrary();
-  void* library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (library == nullptr) {
-    const char* why = ::dlerror();
-    failUnavailable(why != nullptr ? why : "the loader gives no reason");
-  }
+  std::string path, why;
+  void* library = openOwnLibrary(kFileName, path, why);
+  if (library == nullptr) failUnavailable(why);
   const auto function =
-      reinterpret_cast<StippleMediaTableFunction>(::dlsym(library, kTableFunction));
+      reinterpret_cast<StippleMediaTableFunction>(findInLibrary(library, kTableFunction));
   const StippleMediaTable* table = function != nullptr ? function(kMediaTableVersion) : nullptr;
   if (table == nullptr) {
-    ::dlclose(library);
-    failUnavailable(file.string() + " belongs to another version; version " +
+    closeOwnLibrary(library);
+    failUnavailable(path + " belongs to another version; version " +
                     std::to_string(kMediaTableVersion) + " of its table is needed");
   }
   return table;

@@ -10,6 +10,7 @@
 #include "base/random.h"
 #include "math/morton.h"
 #include "math/radix_order.h"
+#include "mesh/cell_table.h"
 #include "mesh/point_tree.h"
 
 namespace stipple {
@@ -21,6 +22,9 @@ constexpr size_t kNeighbour = 8;
 constexpr size_t kSpacingQueries = 32;
 /// Beyond so many cells along an axis, rounding could put a point into the cell beside its own.
 constexpr double kMostCells = 1e12;
+constexpr int kMaxLevel = 21;  ///< of Morton codes
+/// Sources of a block above which a tree finds the nearest one sooner.
+constexpr size_t kMostPerBlock = 48;
 
 /// Ends a search at the first point within a distance.
 class AnyWithin {
@@ -174,6 +178,16 @@ class Lattice {
     return true;
   }
 
+  /// Of the smallest grid of 2^level blocks along each axis that holds the box.
+  int blockLevel(const Box& box) const {
+    int level = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      const double blocks = (box.highest[k] - box.lowest[k]) / side_ / 2 + 1;
+      while (std::ldexp(1.0, level) < blocks) ++level;
+    }
+    return level;
+  }
+
  private:
   std::array<double, 3> corner_;
   double side_;
@@ -244,6 +258,75 @@ void decideByTree(std::span<const float> points, const Box& box,
   });
 }
 
+/// The same block by block of the lattice, each target against the sources of the blocks around its
+/// own. Returns false, with nothing done, where blocks are too many to be told apart, or hold so
+/// many sources that a tree is quicker.
+bool decideByBlocks(std::span<const float> points, const Box& box, const Lattice& lattice,
+                    const std::vector<uint32_t>& sources, const std::vector<uint32_t>& targets,
+                    double distance, std::vector<uint8_t>& near) {
+  const int level = lattice.blockLevel(box);
+  if (level > kMaxLevel) return false;
+  const auto sorted = [&](const std::vector<uint32_t>& list) {
+    KeyedIndices keys(list.size());
+    parallelFor(list.size(), kGrain, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        const Cell block = Lattice::blockOf(lattice.cellOf(&points[size_t{list[i]} * 3]));
+        keys[i] = {mortonEncode(static_cast<uint32_t>(block[0]), static_cast<uint32_t>(block[1]),
+                                static_cast<uint32_t>(block[2])),
+                   list[i]};
+      }
+    });
+    sortByKey(keys);
+    return keys;
+  };
+  const KeyedIndices from = sorted(sources);
+  std::vector<uint64_t> codes(from.size());
+  for (size_t i = 0; i < from.size(); ++i) codes[i] = from[i].key;
+  const CellTable blocks(codes, 0, level);
+  if (from.size() > kMostPerBlock * blocks.size()) return false;
+  std::vector<float> packed(from.size() * 3);
+  for (size_t i = 0; i < from.size(); ++i) {
+    std::copy_n(&points[size_t{from[i].index} * 3], 3, &packed[i * 3]);
+  }
+  const KeyedIndices to = sorted(targets);
+  const double squared = distance * distance;
+  const auto has = [&](uint32_t block, const float* at) {
+    const double x = static_cast<double>(at[0]), y = static_cast<double>(at[1]),
+                 z = static_cast<double>(at[2]);
+    const float* last = &packed[0] + size_t{blocks.end(block)} * 3;
+    for (const float* p = &packed[size_t{blocks.begin(block)} * 3]; p != last; p += 3) {
+      const double dx = static_cast<double>(p[0]) - x, dy = static_cast<double>(p[1]) - y,
+                   dz = static_cast<double>(p[2]) - z;
+      if (dx * dx + dy * dy + dz * dz <= squared) return true;
+    }
+    return false;
+  };
+  parallelFor(to.size(), kGrain, [&](size_t begin, size_t end) {
+    std::array<uint32_t, 27> around;
+    uint32_t own = CellTable::kNone;
+    size_t around_count = 0;
+    bool is_looked_up = false;
+    for (size_t t = begin; t < end; ++t) {
+      if (t == begin || to[t].key != to[t - 1].key) {
+        own = blocks.find(to[t].key);
+        is_looked_up = false;
+      }
+      const float* at = &points[size_t{to[t].index} * 3];
+      // Most are near one of their own block: then nobody asks for the others.
+      bool found = own != CellTable::kNone && has(own, at);
+      if (!found && !is_looked_up) {
+        around_count = blocks.neighbours(to[t].key, around);
+        is_looked_up = true;
+      }
+      for (size_t k = 0; k < around_count && !found; ++k) {
+        found = around[k] != own && has(around[k], at);
+      }
+      if (found) near[to[t].index] = 1;
+    }
+  });
+  return true;
+}
+
 /// Which points whose mask is not `source` are at most `distance` from one whose mask is. [N]
 std::vector<uint8_t> nearOthers(std::span<const float> points, std::span<const uint8_t> mask,
                                 uint8_t source, double distance) {
@@ -268,6 +351,7 @@ std::vector<uint8_t> nearOthers(std::span<const float> points, std::span<const u
     decideByTree(points, box, sources, targets, distance, near);
     return near;
   }
+  if (decideByBlocks(points, box, lattice, sources, targets, distance, near)) return near;
   CellSet cells, blocks;
   for (const uint32_t i : sources) {
     const Cell cell = lattice.cellOf(&points[size_t{i} * 3]);

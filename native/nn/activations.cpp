@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/parallel.h"
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 
 namespace stipple {
 

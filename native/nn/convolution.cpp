@@ -5,8 +5,8 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "base/parallel.h"
+#include "nn/kernels/matrix_kernel.h"
 #include "nn/matrix_backend.h"
-#include "nn/matrix_kernel.h"
 #include "nn/scratch.h"
 
 namespace stipple {
@@ -22,14 +22,6 @@ constexpr size_t kMostPacked = size_t{1} << 22;
 constexpr size_t kTileRows = 8;
 constexpr size_t kTileColumns = 24;
 constexpr size_t kProductRows = 4;
-
-const MatrixBackend& backendOf(const NetworkRun& run) {
-  return run.backend != nullptr ? *run.backend : defaultMatrixBackend();
-}
-
-Precision precisionOf(const NetworkRun& run) {
-  return backendOf(run).has(run.precision) ? run.precision : Precision::kFloat32;
-}
 
 void throwIfCancelled(const NetworkRun& run) {
   if (run.progress != nullptr) run.progress->throwIfCancelled();

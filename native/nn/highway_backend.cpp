@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "nn/panel_kernel.h"
+#include "nn/kernels/panel_kernel.h"
 
 namespace stipple {
 

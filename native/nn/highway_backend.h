@@ -4,7 +4,7 @@
 
 namespace stipple {
 
-/// Our own kernels (nn/panel_kernel.h): always there, float32 only.
+/// Our own kernels (nn/kernels/panel_kernel.h): always there, float32 only.
 const MatrixBackend& highwayBackend();
 
 }  // namespace stipple

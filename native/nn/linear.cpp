@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "nn/kernels/layer_kernel.h"
 #include "nn/matrix_backend.h"
 #include "nn/scratch.h"
 
@@ -17,6 +18,14 @@ constexpr size_t kPanelOutputs = 256;
 constexpr size_t kTaskRows = 192;
 /// Packed weights at a time: 16 MiB, whatever the layer, or one panel of it.
 constexpr size_t kMostPacked = size_t{1} << 22;
+
+/// Numbers of the input that are rounded to bfloat16 at a time: 32 MiB of them.
+constexpr size_t kMostNarrow = size_t{1} << 24;
+constexpr size_t kNarrowRows = 16;
+
+size_t roundedUp(size_t count, size_t unit) {
+  return (count + unit - 1) / unit * unit;
+}
 
 }  // namespace
 
@@ -33,10 +42,33 @@ Linear::Linear(const WeightTable& weights, const std::string& name, uint64_t inp
 
 void Linear::apply(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,
                    float* out, size_t out_stride) const {
-  const MatrixBackend& backend = run.backend != nullptr ? *run.backend : defaultMatrixBackend();
-  const Precision precision = backend.has(run.precision) ? run.precision : Precision::kFloat32;
+  if (precisionOf(run) == Precision::kFloat32) {
+    return applyRows(run, rows, in, in_stride, nullptr, out, out_stride);
+  }
+  // Each number of `in` is rounded once, not for each panel again.
+  const size_t most_rows = std::max(kTaskRows, kMostNarrow / std::max<size_t>(inputs_, 1));
+  const LayerKernel& kernel = chosenLayerKernel();
+  for (size_t first = 0; first < rows; first += most_rows) {
+    const size_t count = std::min(most_rows, rows - first);
+    const float* from = in + first * in_stride;
+    Scratch room((count * inputs_ + 1) / 2);
+    auto* narrow = reinterpret_cast<uint16_t*>(room.data());
+    parallelFor(count, kNarrowRows, [&](size_t begin, size_t end) {
+      for (size_t row = begin; row < end; ++row) {
+        kernel.narrow(inputs_, from + row * in_stride, narrow + row * inputs_);
+      }
+    });
+    applyRows(run, count, from, in_stride, narrow, out + first * out_stride, out_stride);
+  }
+}
+
+void Linear::applyRows(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,
+                       const uint16_t* narrow_in, float* out, size_t out_stride) const {
+  const MatrixBackend& backend = backendOf(run);
+  const Precision precision = precisionOf(run);
+  // Each panel begins at a cache line.
   const size_t panel_size =
-      backend.packedSize(inputs_, std::min(kPanelOutputs, outputs_), precision);
+      roundedUp(backend.packedSize(inputs_, std::min(kPanelOutputs, outputs_), precision), 16);
   const size_t panels = rangeCount(outputs_, kPanelOutputs);
   const size_t most_panels = std::clamp<size_t>(kMostPacked / std::max<size_t>(panel_size, 1), 1,
                                                 std::max<size_t>(panels, 1));
@@ -72,6 +104,7 @@ void Linear::apply(const NetworkRun& run, size_t rows, const float* in, size_t i
       product.outputs = outputsOf(first + panel);
       product.in = in + row * in_stride;
       product.in_stride = in_stride;
+      if (narrow_in != nullptr) product.narrow_in = narrow_in + row * inputs_;
       product.bias = bias_.empty() ? nullptr : bias_.data() + first_output;
       product.out = out + row * out_stride + first_output;
       product.out_stride = out_stride;

@@ -38,6 +38,9 @@ class Linear {
   }
 
  private:
+  void applyRows(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,
+                 const uint16_t* narrow_in, float* out, size_t out_stride) const;
+
   WeightTable weights_;  // keeps the file
   std::string name_;
   const WeightTensor* weight_ = nullptr;

@@ -1,7 +1,7 @@
 #include "nn/matmul.h"
 
 #include "base/parallel.h"
-#include "nn/matrix_kernel.h"
+#include "nn/kernels/matrix_kernel.h"
 
 namespace stipple {
 

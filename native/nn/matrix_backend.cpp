@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "nn/highway_backend.h"
+#include "nn/onednn_backend.h"
 
 namespace stipple {
 
@@ -30,9 +31,19 @@ const MatrixBackend& defaultMatrixBackend() {
   return backend;
 }
 
+const MatrixBackend& backendOf(const NetworkRun& run) {
+  return run.backend != nullptr ? *run.backend : defaultMatrixBackend();
+}
+
+Precision precisionOf(const NetworkRun& run) {
+  return backendOf(run).has(run.precision) ? run.precision : Precision::kFloat32;
+}
+
 std::span<const MatrixBackend* const> matrixBackends() {
   static const std::vector<const MatrixBackend*> backends = [] {
-    return std::vector<const MatrixBackend*>{&highwayBackend()};
+    std::vector<const MatrixBackend*> all = {&highwayBackend()};
+    if (const MatrixBackend* onednn = onednnBackend()) all.push_back(onednn);
+    return all;
   }();
   return backends;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -16,6 +17,9 @@ struct LinearPanel {
   size_t outputs = 0;
   const float* in = nullptr;
   size_t in_stride = 0;
+  /// The same rounded to bfloat16, rows without gaps, where the caller has it: products in bfloat16
+  /// then read it in place of `in`.
+  const uint16_t* narrow_in = nullptr;
   const float* bias = nullptr;  ///< [outputs], or null for none
   float* out = nullptr;
   size_t out_stride = 0;
@@ -43,6 +47,10 @@ class MatrixBackend {
 /// oneDNN's where libstipple_nn.so can be loaded, else ours; or the one that the environment
 /// variable STIPPLE_MATRIX_BACKEND names.
 const MatrixBackend& defaultMatrixBackend();
+/// The backend of a run, and the precision that it has of the one that the run asks for: float32
+/// where it has no other.
+const MatrixBackend& backendOf(const NetworkRun& run);
+Precision precisionOf(const NetworkRun& run);
 /// All that work here, ours first: for tests and benchmarks.
 std::span<const MatrixBackend* const> matrixBackends();
 

@@ -8,8 +8,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "nn/kernels/matrix_kernel.h"
 #include "nn/matmul.h"
-#include "nn/matrix_kernel.h"
 
 namespace stipple {
 

@@ -1,5 +1,6 @@
 #include "nn/scratch.h"
 
+#include <cstdint>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -7,6 +8,8 @@
 namespace stipple {
 
 namespace {
+
+constexpr size_t kLine = 64;
 
 /// Memory that nobody uses. It lives as long as the process: a thread may give some back when
 /// static objects are destroyed.
@@ -24,6 +27,8 @@ struct Store {
 }  // namespace
 
 Scratch::Scratch(size_t count) {
+  if (count == 0) return;
+  count += kLine / sizeof(float);
   Store& store = Store::instance();
   {
     const std::lock_guard<std::mutex> lock(store.mutex);
@@ -34,14 +39,22 @@ Scratch::Scratch(size_t count) {
       values_ = std::move(store.idle.back());
       store.idle.pop_back();
       store.floats -= values_.size();
+      findLine();
       return;
     }
   }
   values_.resize(count);
+  findLine();
+}
+
+void Scratch::findLine() {
+  const auto address = reinterpret_cast<uintptr_t>(values_.data());
+  line_ = values_.data() + (kLine - address % kLine) % kLine / sizeof(float);
 }
 
 Scratch::~Scratch() {
   Store& store = Store::instance();
+  if (values_.empty()) return;
   const std::lock_guard<std::mutex> lock(store.mutex);
   if (store.floats + values_.size() > kMostIdle) return;
   store.floats += values_.size();

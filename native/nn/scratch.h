@@ -17,10 +17,14 @@ class Scratch {
   ~Scratch();
   Scratch(const Scratch&) = delete;
   Scratch& operator=(const Scratch&) = delete;
-  float* data() { return values_.data(); }
+  /// At a cache line.
+  float* data() { return line_; }
 
  private:
+  void findLine();
+
   DefaultInitVector<float> values_;
+  float* line_ = nullptr;
 };
 
 }  // namespace stipple

@@ -149,6 +149,7 @@ void askForPasses(const ShotPasses& passes, ShotSettings& settings) {
   options.with_median_depth = passes.median_depth != nullptr;
   options.with_counts = passes.counts != nullptr;
   options.with_transmittance = passes.transmittance != nullptr || settings.background_image ||
+                               settings.surroundings.pixels ||
                                (settings.solid_depth && options.with_background);
   options.with_normal = passes.normal != nullptr;
   options.with_objects = passes.objects != nullptr;

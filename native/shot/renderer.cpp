@@ -38,8 +38,14 @@ Renderer::Renderer(std::shared_ptr<const ImageRendererFactory> images)
       images_(factory_->makeImageRenderer()),
       orders_(factory_->makeImageRenderer()) {}
 
-void Renderer::render(Instances instances, const Camera& camera, const ShotSettings& settings,
+void Renderer::render(Instances instances, const Camera& camera, const ShotSettings& asked,
                       const ShotPasses& passes, Progress& progress) {
+  ShotSettings settings = asked;
+  std::vector<float> behind;
+  if (asked.surroundings.pixels) {
+    behind = surroundingsSeen(asked.surroundings, camera);
+    settings.background_image = behind.data();
+  }
   cuts_.cut(instances, settings.budget_share, &progress);
   if (isSampled(settings.sampling)) {
     renderBlurred(instances, camera, settings, passes, progress);
@@ -98,6 +104,9 @@ RenderMemory Renderer::memory(const Instances& instances, const Camera& camera,
           ? rayMemory(instances.list, camera, settings.options)
           : factory_->imageMemory(instances.list, camera, settings.options, accuracyOf(settings));
   memory.other_bytes += CloudCuts::memoryBound(instances, settings.budget_share);
+  if (settings.surroundings.pixels) {
+    memory.other_bytes += surroundingsSeenBytes(camera);
+  }
   if (isSampled(settings.sampling)) {
     memory.other_bytes +=
         renderSampledBytes(instances.list.size(), camera, settings.options, settings.sampling);

@@ -77,6 +77,13 @@ void validate(const ShotSettings& settings, const Camera& camera) {
         "options->with_background is 1 beside options->background_image, which stands in its "
         "place; 0 is allowed with it");
   }
+  validate(settings.surroundings);
+  if (settings.surroundings.pixels &&
+      (settings.background_image || settings.options.with_background)) {
+    refuse(
+        "options->surroundings stands beside a background, in whose place it is; with_background "
+        "0 and background_image NULL are allowed with it");
+  }
 }
 
 void requireDerivative(const ShotSettings& settings, const Instances& instances) {
@@ -102,10 +109,10 @@ void requireDerivative(const ShotSettings& settings, const Instances& instances)
     if (!instances.list[i].holdout) continue;
     refuse("instances[" + std::to_string(i) + "].holdout is 1; instances with derivatives have 0");
   }
-  if (settings.background_image || settings.solid_depth) {
+  if (settings.background_image || settings.surroundings.pixels || settings.solid_depth) {
     refuse(
-        "options has a background_image or solid_depth; derivatives are those of splats alone and "
-        "of all that shows");
+        "options has a background_image, surroundings or solid_depth; derivatives are those of "
+        "splats alone and of all that shows");
   }
   if (settings.linearise) {
     refuse(
@@ -125,10 +132,11 @@ void requireMeasurable(const ShotSettings& settings) {
     refuse("render->method is " + std::to_string(static_cast<uint32_t>(settings.method)) +
            ", which measuring chooses itself; 0 is allowed");
   }
-  if (settings.splat_light || settings.options.surface.depth || settings.background_image) {
+  if (settings.splat_light || settings.options.surface.depth || settings.background_image ||
+      settings.surroundings.pixels) {
     refuse(
-        "render has a surface, light or background_image, which measuring does not draw; they must "
-        "be NULL");
+        "render has a surface, light, background_image or surroundings, which measuring does not "
+        "draw; they must be NULL");
   }
 }
 

@@ -5,6 +5,7 @@
 #include "shot/accuracy_settings.h"
 #include "shot/instances.h"
 #include "shot/sampled_render.h"
+#include "shot/surroundings.h"
 
 namespace stipple {
 
@@ -32,6 +33,7 @@ struct ShotSettings {
   const float* splat_light = nullptr;  ///< [H,W,3] factors of the splats' light; null: 1
   /// [H,W,3] in the space that colours come out in: what is behind everything; null: nothing.
   const float* background_image = nullptr;
+  Surroundings surroundings;  ///< what is behind everything, in all directions
   /// True: expected depth only where half of a pixel is covered or more, and of splats alone where
   /// they show no less than the surface.
   bool solid_depth = false;

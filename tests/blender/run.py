@@ -45,7 +45,7 @@ def main():
         return 1
     # Blender runs in a folder of its own: paths of tests become absolute.
     arguments = [str(Path(a).resolve()) if Path(a.partition('::')[0]).exists() else a for a in arguments]
-    if not any(str(HERE) in a for a in arguments):
+    if not any(Path(a.partition('::')[0]).exists() for a in arguments):
         arguments.append(str(HERE))
     with tempfile.TemporaryDirectory(prefix='stipple-blender-') as folder:
         addons = Path(folder, 'user', 'scripts', 'addons')

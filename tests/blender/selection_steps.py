@@ -127,6 +127,42 @@ def drag(places, *held, shot=None):
     return [events(*press(places, *held)), lambda _window: shot, events(released(places[-1], *held))]
 
 
+def watch_preview(_window):
+    """Notes what each update of a stroke shows, and how long it took."""
+    preview = addon('operators.selection.stroke_preview').StrokePreview
+    plain = preview.update
+    facts['preview seconds'] = []
+
+    def update(self, regions_of):
+        taken = plain(self, regions_of)
+        if taken > 0:
+            facts['preview seconds'].append(taken)
+            instead = addon('viewport.selected_points')._instead
+            facts.setdefault('updates', []).append(sum(len(places) for _, places in instead.values()))
+        return taken
+
+    preview.update = update
+
+
+def note_previewed(_window):
+    facts['previewed'] = facts['updates'][-1]
+
+
+def note_prepared(_window):
+    sources = addon('scene.source.sources')
+    facts.setdefault('prepared', []).append(bool(sources._whole))
+
+
+def forget_source(_window):
+    sources = addon('scene.source.sources')
+    sources._whole.clear()
+    sources._whole_ahead.clear()
+
+
+def wait_for_source(_window):
+    return None if addon('scene.source.sources')._whole else False
+
+
 def key(kind, place=(0, 0)):
     return (kind, 'PRESS', place, ()), (kind, 'RELEASE', place, ())
 
@@ -194,6 +230,49 @@ def press_panel_button(name):
     return step
 
 
+def quad_view(window):
+    with window.context():
+        bpy.ops.screen.region_quadview()
+
+
+def quad_drag(window):
+    """A click in the middle of the first of the four regions, which has a view of its own."""
+    regions = [region for region in window.area.regions if region.type == 'WINDOW']
+    facts['regions'] = len(regions)
+    region = regions[0]
+    facts['quad expected'] = in_circle(region)
+    x, y = region.x + region.width // 2, region.y + region.height // 2
+    for kind, value in (('MOUSEMOVE', 'NOTHING'), ('LEFTMOUSE', 'PRESS'), ('LEFTMOUSE', 'RELEASE')):
+        window.window.event_simulate(type=kind, value=value, x=x, y=y)
+
+
+def in_circle(region):
+    """Splats that a click in the middle of a region should select."""
+    positions = np.array([vertex.co for vertex in data().vertices])
+    matrix = np.array(region.data.perspective_matrix) @ np.array(bpy.context.object.matrix_world)
+    clip = np.c_[positions, np.ones(len(positions))] @ matrix.T
+    pixels = (0.5 + 0.5 * clip[:, :2] / clip[:, 3:]) * (region.width, region.height)
+    middle = region.width // 2 + 0.5, region.height // 2 + 0.5
+    return int((np.linalg.norm(pixels - middle, axis=1) <= settings().radius).sum())
+
+
+def panoramic_camera(window):
+    camera = scenes.camera((0, -6, 0), (np.pi / 2, 0, 0), type='PANO')
+    addon('version').panorama_settings(camera.data).panorama_type = 'EQUIRECTANGULAR'
+    scene = window.window.scene
+    scene.render.engine = 'STIPPLE'
+    window.region_data.view_perspective = 'CAMERA'
+    window.space.shading.type = 'RENDERED'
+
+
+def plain_view(window):
+    window.space.shading.type = 'SOLID'
+    window.region_data.view_perspective = 'ORTHO'
+    with window.context():
+        bpy.ops.view3d.view_axis(type='FRONT')
+    window.region_data.view_distance = 6
+
+
 def erase(window):
     with window.context():
         assert bpy.ops.stipple.erase_selected('INVOKE_DEFAULT') == {'FINISHED'}
@@ -221,11 +300,13 @@ def write(_window):
 LINE = ((-120, 60), (-60, 70), (0, 60), (60, 70), (120, 60))
 OUTLINE = ((-100, -100), (100, -100), (100, 20), (20, 20), (-100, 20))
 WHEEL = ('WHEELUPMOUSE', 'PRESS', (10, 0), ())
-steps = [build, note_theme, tool('stipple.select_brush'), events(('MOUSEMOVE', 'NOTHING', (0, -60), ())),
-         lambda _window: 'hover', *drag(LINE, shot='stroke'), taken('brush', True),
+steps = [build, note_theme, watch_preview, forget_source, note_prepared, tool('stipple.select_brush'), wait_for_source,
+         note_prepared, events(('MOUSEMOVE', 'NOTHING', (0, -60), ())),
+         lambda _window: 'hover', *drag(LINE, shot='stroke'), note_previewed, taken('brush', True),
          *drag(((-120, 60), (-60, 70)), 'ctrl'), taken('subtracted'), *drag(((0, -60), (20, -60)), 'shift'),
          taken('added'), undo('undone'), undo('undone_twice'),
-         events(*press(((0, -60), (20, -60))), *key('ESC'), released((20, -60))), taken('cancelled'),
+         events(('MOUSEMOVE', 'NOTHING', (20, -60), ())), lambda _window: 'before_cancel',
+         events(*press(((0, -60), (20, -60))), *key('ESC'), released((20, -60))), taken('cancelled', True),
          set_to(radius=40), events(*key('RIGHT_BRACKET')), note_radius('larger'),
          events(*key('LEFT_BRACKET'), *key('LEFT_BRACKET')), note_radius('smaller'), note_distance('before'),
          events(*press(((0, 0), (10, 0))), WHEEL, WHEEL, released((10, 0))), note_radius('wheel'),
@@ -233,6 +314,7 @@ steps = [build, note_theme, tool('stipple.select_brush'), events(('MOUSEMOVE', '
          events(*key('F')), events(('MOUSEMOVE', 'NOTHING', (30, 0), ())), events(*press(((30, 0),)), released((30, 0))),
          note_radius('dragged'), set_to(radius=40, front_only=True), *drag(LINE), taken('front'),
          set_to(front_only=False), press_panel_button('stipple.select_lasso'), *drag(OUTLINE, shot='lasso'),
-         taken('lasso'), tool('stipple.select_sphere'), *drag(((40, 0), (80, 30), (100, 40)), shot='sphere'),
+         taken('lasso'), lambda _window: 'lasso_done', tool('stipple.select_sphere'), *drag(((40, 0), (80, 30), (100, 40)), shot='sphere'),
          taken('sphere'), tool('stipple.select_color'), *drag(((-80, 0),)), note_color, taken('color', True),
-         tool('stipple.select_brush'), *drag(LINE), erase, taken('erased'), lambda _window: 'erased', disable_and_enable, write]
+         tool('stipple.select_brush'), quad_view, quad_drag, taken('quad', True), quad_view, panoramic_camera, *drag(LINE),
+         taken('panorama', True), plain_view, lambda _window: None, *drag(LINE), erase, taken('erased'), lambda _window: 'erased', disable_and_enable, write]

@@ -3,6 +3,7 @@
 
 import importlib
 import shutil
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -385,6 +386,51 @@ def test_front_only_leaves_what_lies_behind(stipple, own, tmp_path, camera):
     assert_same(found, front, most=0.02 * front.sum())
     bpy.ops.stipple.select_lasso(path=path(*OUTLINE), front_only=True, **view.given)
     assert selected(own, obj)[:2000].sum() > 20 and not selected(own, obj)[2000:].any()
+
+
+def test_meshes_hide_what_is_behind_them(stipple, own, tmp_path):
+    """A plane before the left half of the first wall; Through Meshes and wires leave it out."""
+    obj, arrays = two_walls(stipple, tmp_path)
+    view = View((0.0, 0.0, 5.0))
+    plane = scenes.quad('Plane', size=4.0, offset=(-2.0, 0.0, 1.0))
+    scenes.select(obj)
+    brush(view, front_only=True, through_meshes=True)
+    front = selected(own, obj)
+    left = drawn_views.of_world(obj, arrays.positions)[:, 0] < -0.1
+    assert front[left].sum() > 20 and front[~left].sum() > 20
+    brush(view, front_only=True)
+    assert not selected(own, obj)[left].any()
+    right = drawn_views.of_world(obj, arrays.positions)[:, 0] > 0.1
+    assert_same(selected(own, obj)[right], front[right], most=3)
+    plane.display_type = 'WIRE'
+    brush(view, front_only=True)
+    assert_same(selected(own, obj), front)
+
+
+def test_preparing_a_stroke_changes_nothing_of_it(stipple, own, splats, tmp_path):
+    """The source is read in a thread while nobody waits, once, and the next stroke takes it."""
+    sources = stipple.scene.source.sources
+    view = View()
+    brush(view)
+    expected = selected(own, splats)
+    bpy.ops.stipple.select_all(action='DESELECT')
+    sources._whole.clear()
+    while not own('selecting').prepare([splats]):
+        pass
+    whole = next(iter(sources._whole.values()))
+    brush(view)
+    assert_same(selected(own, splats), expected)
+    assert next(iter(sources._whole.values())) is whole
+    # What is wrong with a file is said by the stroke itself.
+    sources._whole.clear()
+    path = stipple.scene.source.source_paths.file_of(splats.data)
+    Path(path).rename(f'{path}.gone')
+    with pytest.raises(stipple.binding.errors.StippleError, match='cannot be read'):
+        own('selecting').prepare([splats])
+    scenes.refuses(lambda: brush(view), 'cannot be read')
+    Path(f'{path}.gone').rename(path)
+    brush(view)
+    assert_same(selected(own, splats), expected)
 
 
 def test_front_only_is_stored_with_regions(stipple, own, ball):

@@ -35,6 +35,17 @@ def test_front_only_takes_the_first_wall(shots):
     assert 0.4 * counts['brush'] < counts['front'] < 0.6 * counts['brush']
 
 
+def test_a_region_of_quad_view_selects_what_it_shows_itself(shots):
+    facts = shots[1]
+    assert facts['regions'] == 4
+    assert facts['steps']['quad'] == facts['quad expected'] > 20
+
+
+def test_nothing_is_drawn_in_a_panorama(shots):
+    """One warning, and the selection stays."""
+    assert shots[1]['steps']['panorama'] == shots[1]['steps']['quad']
+
+
 def test_the_other_tools_select(shots):
     counts = shots[1]['steps']
     assert counts['lasso'] > 500 and counts['sphere'] > 50
@@ -71,6 +82,22 @@ def test_selected_splats_and_strokes_are_drawn(shots):
     def of_theme(name):
         return (np.abs(pictures[name] - 255 * np.array(facts['theme'])).max(axis=-1) < 8).sum()
     assert of_theme('brush') > 1000 and of_theme('hover') < 50
+    # While the button is down already, and no longer once a stroke is cancelled.
+    for name, selected in (('stroke', 'brush'), ('lasso', 'lasso_done')):
+        assert 0.5 < of_theme(name) / of_theme(selected) < 2, name
+    assert np.array_equal(pictures['cancelled'], pictures['before_cancel'])
+
+
+def test_what_is_drawn_while_the_mouse_moves_is_what_is_selected(shots):
+    """At most every splat is looked at here, so that it is all of them."""
+    facts = shots[1]
+    assert facts['previewed'] == facts['steps']['brush']
+    assert max(facts['preview seconds']) < 1.0
+    print('seconds of an update:', [round(seconds, 4) for seconds in facts['preview seconds']])
+
+
+def test_tools_read_the_source_before_the_first_stroke(shots):
+    assert shots[1]['prepared'] == [False, True]
 
 
 def test_erased_splats_are_gone(shots):

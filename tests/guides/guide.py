@@ -96,7 +96,9 @@ class Guide:
         command = _commands_of('lib/libstipple.so')[-1].replace('-o lib/libstipple.so', ' '.join(
             ['-o', shlex.quote(str(library)), *map(shlex.quote, map(str, objects))]), 1)
         _run(command, BUILD, shell=True)
-        (library.parent / 'libstipple_media.so').symlink_to(BUILD / 'lib' / 'libstipple_media.so')
+        for name in ('libstipple_media.so', 'libstipple_nn.so'):
+            if (BUILD / 'lib' / name).exists():
+                (library.parent / name).symlink_to(BUILD / 'lib' / name)
         return library
 
     def run(self, *arguments, status=0, environment=None):

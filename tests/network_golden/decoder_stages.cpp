@@ -1,4 +1,3 @@
-#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -6,7 +5,7 @@
 #include "decode/latent/latent_density.h"
 #include "decode/latent/latent_networks.h"
 #include "density/anchor_sampling.h"
-#include "math/morton.h"
+#include "network_golden/recorded_splats.h"
 #include "network_golden/stages.h"
 
 namespace stipple {
@@ -50,33 +49,11 @@ std::string levelName(const char* stem, int level) {
   return stem + std::to_string(level);
 }
 
-std::vector<double> recordedNumbers(const GoldenFile& file, int leaf_level) {
-  std::vector<double> numbers;
-  for (int level = 1; level <= leaf_level; ++level) {
-    for (const float u : file.floats(levelName("input.uniform.level", level))) {
-      numbers.push_back(static_cast<double>(u));
-    }
-  }
-  for (const float u : file.floats("input.jitter")) numbers.push_back(static_cast<double>(u));
-  return numbers;
-}
-
-std::vector<int64_t> leavesOf(std::span<const float> points, int level) {
-  std::vector<int64_t> leaves;
-  for (size_t i = 0; i < points.size(); i += 3) {
-    const auto at = [&](size_t axis) {
-      return static_cast<uint32_t>(std::floor(std::ldexp(points[i + axis], level)));
-    };
-    leaves.push_back(static_cast<int64_t>(mortonEncode(at(0), at(1), at(2))));
-  }
-  return leaves;
-}
-
 AnchorSet sampleStages(const GoldenFile& file, const LatentNetworks& networks,
                        std::shared_ptr<const Latent> latent, StageReport& report) {
   const int leaf_level = file.config().at("level").get<int>();
   const WatchedDensity density(networks.octree, std::move(latent), leaf_level);
-  RecordedUniformSource source(recordedNumbers(file, leaf_level));
+  RecordedUniformSource source(recordedUniforms(file));
   const uint64_t count = file.config().at("num_points").get<uint64_t>();
   AnchorSet anchors = sampleAnchors(density, {.count = count}, source);
   for (int level = 1; level <= leaf_level; ++level) {
@@ -85,28 +62,14 @@ AnchorSet sampleStages(const GoldenFile& file, const LatentNetworks& networks,
                    file.floats("expect." + name), kNetworkCall);
   }
   const std::vector<int64_t> drawn = {static_cast<int64_t>(source.drawnCount())};
-  const std::vector<int64_t> recorded = {
-      static_cast<int64_t>(recordedNumbers(file, leaf_level).size())};
+  const std::vector<int64_t> recorded = {static_cast<int64_t>(recordedUniforms(file).size())};
   report.compareExactly("octree.draws", drawn, recorded);
   const std::vector<float> points = file.floats("expect.points");
   const std::vector<int64_t> leaves(anchors.leaves.begin(), anchors.leaves.end());
-  report.compareExactly("octree.leaves", leaves, leavesOf(points, leaf_level));
+  report.compareExactly("octree.leaves", leaves, recordedLeaves(file));
   report.compare("points", anchors.positions, points, kFormula);
   report.compare("log_probs", anchors.log_q, file.floats("expect.log_probs"), kFromLatent);
   return anchors;
-}
-
-void compareSplats(const std::string& stem, const GoldenFile& file, const SplatCloud& cloud,
-                   StageTolerance tolerance, StageReport& report) {
-  const auto compare = [&](const char* name, std::span<const float> seen) {
-    const std::string whole = std::string("gaussians.") + name;
-    report.compare(stem + whole, seen, file.floats("expect." + whole), tolerance);
-  };
-  compare("position", cloud.positions);
-  compare("scale", cloud.scales);
-  compare("opacity", cloud.opacities);
-  compare("rotation_wxyz", cloud.rotations);
-  compare("sh_dc", cloud.sh);
 }
 
 }  // namespace

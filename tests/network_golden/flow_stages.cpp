@@ -1,19 +1,16 @@
 // From a condition to a latent: places of tokens, noise, single calls of the flow network,
-// sampling; and the whole way from the bytes of an image and a seed.
+// sampling.
 
 #include <string>
 #include <vector>
 
 #include "base/error.h"
 #include "base/progress.h"
-#include "generate/dino_encoder.h"
 #include "generate/flow_network.h"
 #include "generate/flow_sampler.h"
 #include "generate/image_condition.h"
-#include "generate/image_preparation.h"
 #include "generate/seeded_noise.h"
 #include "generate/sobol_points.h"
-#include "generate/vae_encoder.h"
 #include "network_golden/stages.h"
 
 namespace stipple {
@@ -25,9 +22,6 @@ constexpr StageTolerance kCallTolerance = {5e-5, 0.0};
 constexpr StageTolerance kSampleTolerance = {2e-4, 0.0};
 // PyTorch's vectorised logarithm and cosine are a few ulp off, of numbers up to 5.8.
 constexpr StageTolerance kNoiseTolerance = {2e-6, 0.0};
-// From the bytes of an image: a relative difference of 1e-5 in the features moves a latent
-// by 1.2e-4.
-constexpr StageTolerance kWholeTolerance = {1e-3, 0.0};
 // 1000 t in float32, computed by the one and the other way.
 constexpr StageTolerance kTimeTolerance = {0.0, 1.2e-7};
 
@@ -147,41 +141,11 @@ void stepStages(const GoldenFile& file, StageReport& report) {
                  report);
 }
 
-/// From an image and a seed to a latent.
-void wholeStages(const GoldenFile& file, StageReport& report) {
-  if (!file.has("input.image_rgba") || !file.hasUnder("weights.flow.")) return;
-  const nlohmann::json& dino = file.config().at("dino");
-  const DinoEncoder structure(file.weights("dino."), {dino.at("hidden_size").get<size_t>() /
-                                                      dino.at("num_heads").get<size_t>()});
-  const VaeEncoder colour(file.weights("vae."));
-  const FlowNetwork network(file.weights("flow."));
-  const FlowSettings settings = settingsOf(file);
-  const std::vector<uint64_t> shape = file.shape("input.image_rgba");
-  const ByteImage picture = {static_cast<uint32_t>(shape.at(1)), static_cast<uint32_t>(shape.at(0)),
-                             static_cast<uint32_t>(shape.at(2)), file.bytes("input.image_rgba")};
-  const PreparedImage image =
-      prepareImage(picture, nullptr,
-                   {.canvas_size = file.config().at("canvas_size").get<uint32_t>(),
-                    .erode_radius = file.config().at("erode_radius").get<uint32_t>()});
-  const uint64_t token_count = file.config().at("flow").at("q_token_length").get<uint64_t>();
-  const GenerationNoise noise =
-      drawNoise({.colour = colour.noiseCount(image.size, image.size),
-                 .tokens = token_count * network.sizes().token_width},
-                {NoiseSource::kTorchCpu, file.config().at("torch_cpu_seed").get<uint64_t>()});
-  const ImageCondition condition = encodeImage({}, structure, colour, image, noise.colour);
-  SamplerState state = startSampling(network, token_count, noise, settings);
-  sampleLatent({}, network, network.context({}, condition), state);
-  const Latent expected = latentOf(file, "expect.sample");
-  report.compare("whole.latent", state.latent.tokens, expected.tokens, kWholeTolerance);
-  report.compare("whole.camera", state.latent.camera, expected.camera, kWholeTolerance);
-}
-
 }  // namespace
 
 void flowStages(const GoldenFile& file, StageReport& report) {
   callStages(file, report);
   stepStages(file, report);
-  wholeStages(file, report);
 }
 
 }  // namespace stipple

@@ -21,8 +21,10 @@ bool runFile(const char* path) {
     const char* name;
     void (*run)(const GoldenFile&, StageReport&);
   };
-  const Group groups[] = {
-      {"encoders", encoderStages}, {"flow", flowStages}, {"decoder", decoderStages}};
+  const Group groups[] = {{"encoders", encoderStages},
+                          {"flow", flowStages},
+                          {"decoder", decoderStages},
+                          {"whole", wholeStages}};
   for (const Group& group : groups) {
     try {
       group.run(file, report);

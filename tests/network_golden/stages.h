@@ -13,5 +13,7 @@ void encoderStages(const GoldenFile& file, StageReport& report);
 void flowStages(const GoldenFile& file, StageReport& report);
 /// From a latent to splats.
 void decoderStages(const GoldenFile& file, StageReport& report);
+/// From an image and a seed to splats; of recorded numbers only those that anchors are drawn by.
+void wholeStages(const GoldenFile& file, StageReport& report);
 
 }  // namespace stipple

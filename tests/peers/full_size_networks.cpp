@@ -1,11 +1,12 @@
 // Runs the image encoders in the sizes of their published files, with weights that are made up.
 //
-//   full_size_networks FOLDER SIZE [dino] [vae]
+//   full_size_networks FOLDER SIZE [dino] [vae] [bfloat16]
 //
 // Writes dino.safetensors (1.7 GB, BF16) and vae.safetensors (138 MB, F32) into FOLDER unless they
 // are there, as files with holes: one page of random numbers in 16. Encodes an image of SIZE x SIZE
 // pixels by each and prints seconds, processor seconds, operations, and the most memory that no
-// file lies behind, beside the pages of the mapped file.
+// file lies behind, beside the pages of the mapped file. With bfloat16 each runs once more with the
+// factors of products cut to 16 bits, and what comes out is compared.
 
 #include <sys/resource.h>
 
@@ -32,6 +33,7 @@
 #include "generate/encoder_shapes.h"
 #include "generate/vae_encoder.h"
 #include "io/assets/weight_file.h"
+#include "nn/matrix_backend.h"
 
 namespace stipple {
 namespace {
@@ -145,7 +147,9 @@ double processorSeconds() {
          1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-void measure(const char* name, double flops, const std::function<std::vector<float>()>& encode) {
+/// Returns what `encode` gives.
+std::vector<float> measure(const char* name, double flops,
+                           const std::function<std::vector<float>()>& encode) {
   Memory most;
   const Memory before = Memory::now();
   std::atomic<bool> is_done{false};
@@ -174,6 +178,30 @@ void measure(const char* name, double flops, const std::function<std::vector<flo
       name, flops * 1e-12, seconds, flops / seconds * 1e-9, processor_seconds,
       flops / processor_seconds * 1e-9, most.own >> 20, before.own >> 20, most.mapped >> 20,
       std::sqrt(squares / static_cast<double>(numbers.size())), numbers.size());
+  return numbers;
+}
+
+using Encode = std::function<std::vector<float>(const NetworkRun&)>;
+
+void measureBoth(const char* name, double flops, bool with_bfloat16, const Encode& encode) {
+  const std::vector<float> exact = measure(name, flops, [&] { return encode({}); });
+  if (!with_bfloat16) return;
+  NetworkRun run;
+  run.precision = Precision::kBfloat16;
+  if (!backendOf(run).has(run.precision)) {
+    std::printf("%s has no bfloat16 here\n", backendOf(run).name());
+    return;
+  }
+  const std::vector<float> cut = measure(name, flops, [&] { return encode(run); });
+  double squares = 0.0, errors = 0.0;
+  for (size_t i = 0; i < exact.size(); ++i) {
+    const auto value = static_cast<double>(exact[i]);
+    const double error = static_cast<double>(cut[i]) - value;
+    squares += value * value;
+    errors += error * error;
+  }
+  std::printf("      in bfloat16, with an error of %.4f of the root of the mean square\n",
+              std::sqrt(errors / squares));
 }
 
 std::string weightsIn(const std::string& folder, const char* name, const WeightShapes& shapes,
@@ -183,20 +211,24 @@ std::string weightsIn(const std::string& folder, const char* name, const WeightS
   return path;
 }
 
-void run(const std::string& folder, size_t size, bool with_dino, bool with_vae) {
+void run(const std::string& folder, size_t size, bool with_dino, bool with_vae,
+         bool with_bfloat16) {
   std::vector<float> rgb(size * size * 3);
   for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = 0.5f + 0.5f * randomNumber(i);
-  std::printf("%zu x %zu pixels, at most %zu threads\n", size, size, threadLimit());
+  std::printf("%zu x %zu pixels, at most %zu threads, products by %s with %s\n", size, size,
+              threadLimit(), defaultMatrixBackend().name(),
+              defaultMatrixBackend().instructionSets().c_str());
   if (with_dino) {
     const DinoEncoder encoder(
         openWeightFile(weightsIn(folder, "dino.safetensors", dinoShapes(1280, 5120, 32), 2)));
-    measure("dino", encoder.flops(size, size), [&] { return encoder.encode({}, rgb, size, size); });
+    measureBoth("dino", encoder.flops(size, size), with_bfloat16,
+                [&](const NetworkRun& run) { return encoder.encode(run, rgb, size, size); });
   }
   if (with_vae) {
     const VaeEncoder encoder(openWeightFile(
         weightsIn(folder, "vae.safetensors", vaeShapes({128, 256, 512, 512}, 32), 4)));
-    measure("vae", encoder.flops(size, size),
-            [&] { return encoder.encode({}, rgb, size, size, {}); });
+    measureBoth("vae", encoder.flops(size, size), with_bfloat16,
+                [&](const NetworkRun& run) { return encoder.encode(run, rgb, size, size, {}); });
   }
 }
 
@@ -206,16 +238,18 @@ void run(const std::string& folder, size_t size, bool with_dino, bool with_vae) 
 int main(int count, char** arguments) {
   const size_t size = count < 3 ? 0 : std::strtoul(arguments[2], nullptr, 10);
   if (size == 0) {
-    std::fprintf(stderr, "full_size_networks FOLDER SIZE [dino] [vae]\n");
+    std::fprintf(stderr, "full_size_networks FOLDER SIZE [dino] [vae] [bfloat16]\n");
     return 2;
   }
-  bool with_dino = count == 3, with_vae = count == 3;
+  bool with_dino = false, with_vae = false, with_bfloat16 = false;
   for (int i = 3; i < count; ++i) {
     with_dino |= std::strcmp(arguments[i], "dino") == 0;
     with_vae |= std::strcmp(arguments[i], "vae") == 0;
+    with_bfloat16 |= std::strcmp(arguments[i], "bfloat16") == 0;
   }
+  if (!with_dino && !with_vae) with_dino = with_vae = true;
   try {
-    stipple::run(arguments[1], size, with_dino, with_vae);
+    stipple::run(arguments[1], size, with_dino, with_vae, with_bfloat16);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

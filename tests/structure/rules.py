@@ -28,7 +28,7 @@ THIRD_PARTY = {
     'zstd': r'(zstd|zdict)(_errors)?\.h',
     'CLI11': r'CLI/',
     'stb': r'stb/',
-    'oneDNN': r'(oneapi/)?dnnl/|dnnl\w*\.h',
+    'oneDNN': r'(oneapi/)?dnnl/|dnnl\w*\.h|omp\.h',  # OpenMP runs its loops, and is held there
     'Google Benchmark': r'benchmark/',
 }
 # A format's library is known to the files of that format only (benchmarks may measure against some).

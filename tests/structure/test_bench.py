@@ -75,7 +75,7 @@ def test_a_line_that_is_no_limit_is_refused(bench):
 
 
 def test_the_limits_name_ratios_of_the_benchmarks():
-    sources = ''.join(path.read_text() for path in (ROOT / 'native' / 'bench').glob('*_bench.cpp'))
+    sources = ''.join(path.read_text() for path in (ROOT / 'native' / 'bench').rglob('*_bench.cpp'))
     rows = [line.split() for line in LIMITS.read_text().splitlines() if line and not line.startswith('#')]
     assert len(rows) > 40
     assert len({tuple(row[:2]) for row in rows}) == len(rows)

@@ -93,12 +93,14 @@ class Renderer(Handle):
         return options
 
     def start(self, instances, camera, options, with_depth=True, median_depth=False, surface=None,
-              with_transmittance=False, blur=None, with_normal=False, with_objects=False, background_image=None):
+              with_transmittance=False, blur=None, with_normal=False, with_objects=False, background_image=None,
+              surroundings=None):
         """Starts the image of instances, as of instance_array; clouds must outlive the start only.
 
         median_depth: where light is half gone, instead of the mean depth of what is seen. surface: a Surface that
         stands between the splats. blur: a Blur, aperture and shutter. background_image [H,W,3]: what stands behind
-        everything, row 0 = top, in place of the options' background.
+        everything, row 0 = top, in place of the options' background. surroundings [h,w,3]: the same of all
+        directions, row 0 straight up, the middle column along +y, columns further right towards +x.
         """
         shape = (camera.height, camera.width)
         if background_image is not None:
@@ -108,6 +110,13 @@ class Renderer(Handle):
             background_image = contiguous(background_image)
             options = type(options).from_buffer_copy(options)
             options.background_image = pointer_to(background_image)
+        if surroundings is not None:
+            if surroundings.ndim != 3 or surroundings.shape[2] != 3:
+                raise invalid(f'The surroundings have shape {surroundings.shape}; allowed is (height, width, 3).')
+            surroundings = contiguous(surroundings)
+            options = type(options).from_buffer_copy(options)
+            options.surroundings = pointer_to(surroundings)
+            options.surroundings_height, options.surroundings_width = surroundings.shape[:2]
         for layer in (surface, blur):
             options = layer.put_into(options) if layer is not None else options
         colour = np.empty(shape + (4,), np.float32)
@@ -122,7 +131,7 @@ class Renderer(Handle):
         job = Job(self.library, new_handle(self.library, 'stipple_renderer_render_start', self.pointer, array,
                                            len(instances), byref(camera), byref(options), byref(buffers)),
                   keep=(colour, depth, transmittance, normal, objects, buffers, array, surface, background_image,
-                        [placed[0] for placed in instances]))
+                        surroundings, [placed[0] for placed in instances]))
         return RenderTask(job, colour, depth, transmittance, normal, objects)
 
     def sample_count(self, instances, camera, options, blur):

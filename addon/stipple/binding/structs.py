@@ -10,7 +10,7 @@ from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, BudgetUni
                     RegionOperation, RenderMethod, Sampling, Side, SplatOrder, SplatQuantity, Status, Transfer,
                     ViewRig, ViewSplit, WeightsRole, WeightsState)
 
-ABI_VERSION = 3
+ABI_VERSION = 4
 MAX_ANCHORS = 1 << 28
 NO_INDEX = 0xFFFFFFFF
 DRAW_GEOMETRY_FLOATS = 12
@@ -245,7 +245,8 @@ class StippleRenderOptions(_Sized):
                 ('matte_opacity', _floats), ('splat_light', _floats), ('accuracy', POINTER(StippleAccuracy)),
                 ('aperture', POINTER(StippleAperture)), ('shutter', POINTER(StippleShutter)), ('samples', c_uint32),
                 ('reserved_sampling', c_uint32), ('background_image', _floats), ('solid_depth', c_uint32),
-                ('reserved_depth', c_uint32)]
+                ('reserved_depth', c_uint32), ('surroundings', _floats), ('surroundings_width', c_uint32),
+                ('surroundings_height', c_uint32)]
 
 
 class StippleAccuracyMeasureOptions(_Sized):

@@ -56,7 +56,12 @@ def draw_settings(layout, context):
     column = layout.column()
     column.use_property_split = True
     column.use_property_decorate = False
-    for name in ('radius', 'front_only', 'tolerance', 'within'):
+    for name in ('radius', 'front_only'):
+        column.prop(settings, name)
+    row = column.row()
+    row.enabled = settings.front_only
+    row.prop(settings, 'through_meshes')
+    for name in ('tolerance', 'within'):
         column.prop(settings, name)
 
 

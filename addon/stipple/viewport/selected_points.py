@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points over the centres of selected splats, all of the source and not just those that the budget shows."""
+"""Points over the centres of selected splats, all of the source and not just those that the budget shows; while a stroke
+is being drawn, over what it would select."""
 
 import logging
 
@@ -20,6 +21,7 @@ POINT_SIZE_PX = 3.0
 
 log = logging.getLogger('stipple')
 _state = {'handler': None, 'drawing': None, 'off': False}
+_instead = {}  # {name of the data: (number, centres)} that are drawn in place of a selection
 
 
 class _Drawing:
@@ -32,7 +34,7 @@ class _Drawing:
     def draw(self, context, space):
         depsgraph = context.evaluated_depsgraph_get()
         entries = [entry for entry in viewed.shown(self._scene.update(depsgraph), space, depsgraph)
-                   if not selections.is_empty(entry.obj.data)]
+                   if not selections.is_empty(entry.obj.data) or entry.obj.data.name_full in _instead]
         used = {entry.obj.data.name_full for entry in entries}
         self._batches = {name: known for name, known in self._batches.items() if name in used}
         shader = gpu.shader.from_builtin(version.UNIFORM_COLOR_SHADER)
@@ -49,12 +51,20 @@ class _Drawing:
         gpu.state.point_size_set(1.0)
 
     def _batch_of(self, obj, shader):
-        known, now = self._batches.get(obj.data.name_full), selecting.state(obj.data)
+        known, instead = self._batches.get(obj.data.name_full), _instead.get(obj.data.name_full)
+        now = selecting.state(obj.data) if instead is None else instead[0]
         if known is None or known[0] != now:
-            places = _positions(obj)
+            places = _positions(obj) if instead is None else instead[1]
             batch = batch_for_shader(shader, 'POINTS', {'pos': places}) if len(places) else None
             known = self._batches[obj.data.name_full] = (now, batch)
         return known[1]
+
+
+def show_instead(found):
+    """Draws {name of the data: centres [n,3] in the object's space} in place of what is selected; {} for that again."""
+    _state['number'] = number = _state.get('number', 0) + 1
+    _instead.clear()
+    _instead.update({name: (('instead', number), places) for name, places in found.items()})
 
 
 def _positions(obj):
@@ -68,7 +78,8 @@ def _draw():
     """Called by Blender for every redraw of every 3D view: raises nothing."""
     context = bpy.context
     space = context.space_data
-    if _state['off'] or space is None or not space.overlay.show_overlays or not _is_any_selected():
+    if _state['off'] or space is None or not space.overlay.show_overlays or not (
+            _instead or _is_any_selected()):
         return
     try:
         if _state['drawing'] is None:
@@ -88,6 +99,7 @@ def _is_any_selected():
 def _forget(*_):
     """Another file: what is known of this one goes."""
     _state.update(drawing=None, off=False)
+    _instead.clear()
     selecting.forget()
     drawn_regions.forget()
 

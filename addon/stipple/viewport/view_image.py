@@ -18,7 +18,8 @@ from ..binding.renderer import Renderer
 from ..binding.structs import AccuracyLevel, JobState, Projection
 from ..scene import instances
 from ..scene.source import sources
-from ..scene.view import cameras, effects, facts, mattes, picture_options, quality, viewed
+from ..scene.view import cameras, effects, facts, mattes, picture_options, quality, view_mattes, viewed
+from . import view_world
 
 # Coarse images have one pixel for this many of the region's along each side: the least, the first and the most.
 # Beyond the most, ordering the splats takes the time and not their pixels.
@@ -66,38 +67,17 @@ def view_camera(context, depsgraph):
                       aperture)
 
 
-class ViewMattes:
-    """Meshes that hide splats in a view; each is read again only when it has changed."""
-
-    def __init__(self):
-        self.placed = []  # as of mattes.gather_owned
-        self._read = {}
-
-    def update(self, depsgraph):
-        used, wanted = {}, 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS'
-
-        def mesh_of(evaluated):
-            # Geometry that nodes instance without its object has the name of its own data.
-            key = evaluated.original.name_full, evaluated.data.name_full
-            made = viewed.geometry_version(evaluated.original)
-            known = self._read.get(key)
-            used[key] = known if known is not None and known[0] == made else (made, mattes.read(evaluated))
-            return used[key][1]
-
-        self.placed = mattes.gather_owned(depsgraph, wanted, mesh_of)
-        self._read = used
-
-
 class ViewImage:
     """The image of one 3D view: coarse at once, fine when the view rests."""
 
     def __init__(self):
         self._instances = []
-        self._mattes = ViewMattes()
+        self._mattes = view_mattes.ViewMattes()
         self._version = 0
         self._coarse = COARSE[1]
         self._renderer = None
         self._clipped = {}
+        self._world = None     # view_world.Picture, or None for a single colour
         self._key = None       # of what the view shows now
         self._changed = 0.0    # when that was last another
         self._task = None      # _Making, or None
@@ -109,7 +89,7 @@ class ViewImage:
         """Takes what the view shows now. Errors: StippleError."""
         viewed.note_changes(depsgraph)
         self._instances = instances.gather_owned(depsgraph, 'VIEWPORT', warn)
-        self._mattes.update(depsgraph)
+        self._mattes.update(depsgraph, 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS')
         self._version += 1
 
     def draw(self, engine, context, depsgraph):
@@ -123,12 +103,14 @@ class ViewImage:
         # Nothing projects meshes into panoramas: there they hide nothing, as in renders.
         hiding = [] if not entries or seen.is_panoramic else [
             entry for entry in self._mattes.placed if viewed.shows(space, depsgraph, *entry[:2])]
+        world = view_world.picture(depsgraph)
         key = (self._version, tuple(id(entry) for entry in entries + hiding), bytes(seen.camera), seen.border,
-               seen.aperture, planes.tobytes(), facts.blend_space(scene), scene.render.film_transparent,
+               seen.aperture, planes.tobytes(), facts.blend_space(scene), scene.render.film_transparent, id(world),
                quality.key_of(scene.stipple.quality_viewport), effects.choices_of(scene), scene.stipple.blur_samples)
         now = time.perf_counter()
         if key != self._key:
             self._key, self._changed, self._sample_count, self._surface = key, now, None, None
+        self._world = world
         self._take()
         if self._task is not None and self._task.is_fine and self._task.key != key:
             self._task.close()
@@ -161,7 +143,9 @@ class ViewImage:
         images at most."""
         if self._renderer is None:
             self._renderer = Renderer(sources.context())
-        background = None if scene.render.film_transparent else facts.world_colour(scene.world)
+        is_plain = self._world is None and not scene.render.film_transparent
+        background = facts.world_colour(scene.world) if is_plain else None
+        around = None if self._world is None else self._world.pixels
         placed, part = self._placed(entries, planes), cameras.part_of(seen.camera, seen.border, coarse)
         options = self._renderer.options(blend_space=facts.blend_space(scene), background=background,
                                          accuracy=self._accuracy(scene, depsgraph, seen, coarse),
@@ -174,7 +158,8 @@ class ViewImage:
             blur.samples = samples = min(samples, self._sample_count)
 
         def begin(surface):
-            return self._renderer.start(placed, part, options, with_depth=False, surface=surface, blur=blur)
+            return self._renderer.start(placed, part, options, with_depth=False, surface=surface, blur=blur,
+                                        surroundings=around)
 
         side = MATTE_SIDE if coarse == 1 else 1
         meshes = None

@@ -32,7 +32,7 @@ extern "C" {
 
 /* Raised when a function or struct changes in a way that old callers cannot use, and when an option struct grows:
  * its ..._init would write past the end of an older caller's. */
-#define STIPPLE_ABI_VERSION 3u
+#define STIPPLE_ABI_VERSION 4u
 
 /* The ABI version of the loaded library; compare with STIPPLE_ABI_VERSION before any other call. */
 uint32_t stipple_abi_version(void);
@@ -1038,6 +1038,13 @@ typedef struct StippleRenderOptions {
    * mean of all that shows, however little. */
   uint32_t solid_depth;
   uint32_t reserved_depth;
+  /* [H,W,3] of all directions, in output_colour's space: each pixel shows what its ray meets in place of background. Row 0
+   * is straight up (+z), the middle column looks along +y, columns further right turn towards +x. Read between four
+   * pixels; composited like a background_image, which must be NULL beside it. NULL: none. Must stay valid until the
+   * job has ended. Not for backward passes. */
+  const float* surroundings;
+  uint32_t surroundings_width;
+  uint32_t surroundings_height;
 } StippleRenderOptions;
 void stipple_render_options_init(StippleRenderOptions* options);
 

@@ -19,6 +19,7 @@
 #include "mesh/floaters.h"
 #include "mesh/point_components.h"
 #include "mesh/point_growth.h"
+#include "splat/edit/colour_levelling.h"
 #include "splat/edit/ground_plane.h"
 #include "splat/edit/hole_raster.h"
 #include "splat/edit/local_surface.h"
@@ -118,6 +119,7 @@ struct Plan {
   std::vector<uint32_t> splats;   ///< of the ground, cell by cell, in their order
   std::vector<CellLook> looks;    ///< of each cell, by the ground that is left
   std::vector<uint32_t> sources;  ///< of each cell; UINT32_MAX: nothing is missing
+  std::vector<Vec3d> added;       ///< to the colours that are copied into each cell, as stored
 };
 
 std::vector<float> coverOf(const std::vector<CellLook>& looks) {
@@ -376,7 +378,8 @@ class Hole {
     cells = std::max(cells, static_cast<double>(kLeastReach));
     if (options_.patch_size) cells = *options_.patch_size / raster.side / 2;
     options.reach = static_cast<size_t>(std::min(cells, static_cast<double>(kMostReach)));
-    plan.sources = quiltSources(raster, std::move(plan.looks), options);
+    plan.sources = quiltSources(raster, plan.looks, options);
+    plan.added = levelledColours(raster, plan.looks, plan.sources, options.reach);
   }
 
   /// False for a needle one of whose ends lies where something else is copied, or nothing: it would
@@ -434,8 +437,23 @@ class Hole {
         const Vec2d move =
             raster.side * (along(copy.to, raster.width) - along(copy.from, raster.width));
         copySplat(surface, copy.splat, move, result, before + k);
+        addColour(plan.added[copy.to], result, before + k);
       }
     });
+  }
+
+  /// Light is added to what a splat reflects to all sides. Nothing becomes darker than black or
+  /// brighter than white by it.
+  static void addColour(const Vec3d& added, SplatCloud& result, size_t splat) {
+    constexpr double kBlack = -0.5, kWhite = 0.5;
+    constexpr double kC0 = static_cast<double>(kShC0);
+    float* sh = &result.sh[splat * result.shStride()];
+    for (size_t c = 0; c < 3; ++c) {
+      const double before = kC0 * static_cast<double>(sh[c]);
+      const double after = std::clamp(before + added[static_cast<Eigen::Index>(c)],
+                                      std::min(before, kBlack), std::max(before, kWhite));
+      sh[c] = static_cast<float>(after / kC0);
+    }
   }
 
   void copySplat(const LocalSurface& surface, size_t from, const Vec2d& move, SplatCloud& result,

@@ -14,6 +14,7 @@
 #include "base/parallel.h"
 #include "nn/group_norm.h"
 #include "nn/made_weights.h"
+#include "nn/matrix_backend.h"
 
 namespace stipple {
 namespace {
@@ -108,10 +109,14 @@ TEST(Convolution, SumsWhatEachOutputSees) {
     const WeightTable weights = weightsOf(c).table();
     const Convolution layer(weights, "layer", c.inputs, c.outputs, c.grid);
     const FeatureMap in = randomMap(c.height, c.width, c.inputs, 99);
-    const FeatureMap out = layer.apply({}, in);
-    ASSERT_EQ(out.height, c.grid.outputs(c.height)) << c.name;
-    ASSERT_EQ(out.width, c.grid.outputs(c.width)) << c.name;
-    expectDirectSums(c, weights, in, out);
+    for (const MatrixBackend* backend : matrixBackends()) {
+      NetworkRun run;
+      run.backend = backend;
+      const FeatureMap out = layer.apply(run, in);
+      ASSERT_EQ(out.height, c.grid.outputs(c.height)) << c.name << " by " << backend->name();
+      ASSERT_EQ(out.width, c.grid.outputs(c.width)) << c.name << " by " << backend->name();
+      expectDirectSums(c, weights, in, out);
+    }
   }
 }
 

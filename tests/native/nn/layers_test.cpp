@@ -7,7 +7,7 @@
 
 #include "base/parallel.h"
 #include "nn/activations.h"
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 #include "nn/norms.h"
 #include "nn/positions.h"
 #include "test_numbers.h"
@@ -79,6 +79,31 @@ TEST(Activations, GateAndAdd) {
   const std::vector<float> factor = {2, -1};
   addScaled(2, 2, factor, y.data(), x.data());
   EXPECT_EQ(x, (std::vector<float>{31, 2, 93, 4}));
+}
+
+TEST(Narrow, EveryKernelTakesTheNearestAndOfTwoTheEven) {
+  const float inf = std::numeric_limits<float>::infinity();
+  // 1 + 2^-8 lies in the middle of 1 and 1 + 2^-7, 1 + 3 2^-8 in the middle of that and 1 + 2^-6.
+  const std::vector<float> from = {1.0f, 1.00390625f, 1.01171875f,   1.0039064f, -2.5f, 0.0f, -0.0f,
+                                   inf,  -inf,        3.4028235e38f, 1.17e-38f,  1e-41f};
+  const std::vector<uint16_t> expected = {0x3f80, 0x3f80, 0x3f82, 0x3f81, 0xc020, 0x0000,
+                                          0x8000, 0x7f80, 0xff80, 0x7f80, 0x007f, 0x0000};
+  for (const LayerKernel& kernel : layerKernels()) {
+    // As the beginning of a vector, and at its end.
+    for (const size_t first : {size_t{0}, size_t{29}}) {
+      std::vector<float> padded(first, 7.0f);
+      padded.insert(padded.end(), from.begin(), from.end());
+      std::vector<uint16_t> out(padded.size());
+      kernel.narrow(padded.size(), padded.data(), out.data());
+      for (size_t i = 0; i < from.size(); ++i) {
+        EXPECT_EQ(out[first + i], expected[i]) << kernel.target << " " << from[i];
+      }
+    }
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    uint16_t narrow = 0;
+    kernel.narrow(1, &nan, &narrow);
+    EXPECT_EQ(narrow & 0x7fff, 0x7fc0) << kernel.target;
+  }
 }
 
 TEST(Softmax, EveryKernelAgreesWithDoubleOverSeveralTiles) {

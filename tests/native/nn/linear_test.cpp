@@ -7,8 +7,9 @@
 
 #include "base/parallel.h"
 #include "io/scratch_folder.h"
+#include "nn/kernels/layer_kernel.h"
+#include "nn/kernels/panel_kernel.h"
 #include "nn/matrix_backend.h"
-#include "nn/panel_kernel.h"
 #include "test_numbers.h"
 
 namespace stipple {
@@ -128,6 +129,56 @@ TEST(Linear, TakesWeightsOfSixteenBitsAndNoBias) {
     run.backend = backend;
     Linear(table, "fc", 70, 40, LinearBias::kNone).apply(run, c.rows, in.data(), out.data());
     expectProduct(c, in, c.inputs, cut, {}, out, c.outputs, 6e-8, backend->name());
+  }
+}
+
+TEST(Linear, RoundsFactorsToBfloat16WhereItIsAskedTo) {
+  const Case c = {200, 300, 290};
+  const std::vector<float> weight = numbers(c.outputs * c.inputs, 2);
+  const std::vector<float> bias = numbers(c.outputs, 3);
+  const std::vector<float> in = numbers(c.rows * c.inputs, 1);
+  const WeightTable table = TableBuilder()
+                                .add("fc.weight", {c.outputs, c.inputs}, weight)
+                                .add("fc.bias", {c.outputs}, bias)
+                                .table();
+  const auto rounded = [](std::vector<float> values) {
+    std::vector<uint16_t> halves(values.size());
+    scalarLayerKernel().narrow(values.size(), values.data(), halves.data());
+    for (size_t i = 0; i < values.size(); ++i) {
+      values[i] = std::bit_cast<float>(static_cast<uint32_t>(halves[i]) << 16);
+    }
+    return values;
+  };
+  for (const MatrixBackend* backend : matrixBackends()) {
+    NetworkRun run;
+    run.backend = backend;
+    run.precision = Precision::kBfloat16;
+    std::vector<float> out(c.rows * c.outputs);
+    Linear(table, "fc", c.inputs, c.outputs).apply(run, c.rows, in.data(), out.data());
+    // The same from bfloat16 as it lies in memory, which oneDNN reads in place.
+    std::vector<uint16_t> halves(weight.size());
+    scalarLayerKernel().narrow(weight.size(), weight.data(), halves.data());
+    const std::map<std::string, WeightTensor> tensors = {
+        {"fc.weight",
+         {WeightType::kBfloat16,
+          "BF16",
+          {c.outputs, c.inputs},
+          reinterpret_cast<const uint8_t*>(halves.data())}},
+        {"fc.bias",
+         {WeightType::kFloat32,
+          "F32",
+          {c.outputs},
+          reinterpret_cast<const uint8_t*>(bias.data())}}};
+    std::vector<float> in_place(out.size());
+    Linear(WeightTable("memory", tensors, nullptr), "fc", c.inputs, c.outputs)
+        .apply(run, c.rows, in.data(), in_place.data());
+    if (backend->has(Precision::kBfloat16)) {
+      EXPECT_EQ(in_place, out);
+    }
+    // A backend that has it not multiplies in float32.
+    const bool has = backend->has(Precision::kBfloat16);
+    expectProduct(c, has ? rounded(in) : in, c.inputs, has ? rounded(weight) : weight, bias, out,
+                  c.outputs, 6e-8, backend->name());
   }
 }
 

@@ -7,7 +7,7 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "nn/matrix_kernel.h"
+#include "nn/kernels/matrix_kernel.h"
 
 namespace stipple {
 namespace {

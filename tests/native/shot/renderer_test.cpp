@@ -345,6 +345,7 @@ TEST(ShotSettings, DerivativesAreThoseOfOneSharpTiledPictureOfSplatsAlone) {
   refuses([](ShotSettings& s) { s.solid_depth = true; });
   const float image = 0;
   refuses([&](ShotSettings& s) { s.background_image = &image; });
+  refuses([&](ShotSettings& s) { s.surroundings = {&image, 1, 1}; });
   Instances held_out = instances;
   held_out.list[0].holdout = true;
   EXPECT_THROW(requireDerivative(settingsFor(instances, OutputColour::kComposited), held_out),

@@ -19,6 +19,7 @@ class STIPPLE_OT_select_lasso(PathOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO'}
 
     shape = 'LASSO'
+    least_points = _LEAST_CORNERS
 
     def release(self, _context):
         return len(self.path) >= _LEAST_CORNERS

@@ -34,6 +34,9 @@ class STIPPLE_OT_select_sphere(DrawnOperator, bpy.types.Operator):
         at = region_2d_to_location_3d(self._region, self._region_data, place, Vector(self.center))
         self.radius = float(np.linalg.norm(np.array(at) - np.array(self.center)))
 
+    def can_preview(self):
+        return self.radius > 0
+
     def release(self, _context):
         return self.radius > 0
 

@@ -13,8 +13,10 @@ from ...binding.regions import RegionOperation
 from ...jobs import JobOperator
 from ...scene import selection_settings
 from ...scene.source import edits, selecting
-from ...scene.view import drawn_regions, picking
+from ...scene.view import cameras, drawn_regions, picking
+from ...viewport import selected_points
 from ...viewport.stroke_marks import StrokeMarks
+from .stroke_preview import StrokePreview
 
 _KEYS_OF_RADIUS = {'WHEELUPMOUSE': 1.1, 'WHEELDOWNMOUSE': 1 / 1.1, 'RIGHT_BRACKET': 1.1, 'LEFT_BRACKET': 1 / 1.1}
 
@@ -67,6 +69,7 @@ class DrawnOperator(OperationOperator):
 
     shape = ''       # of StrokeMarks
     _marks = None
+    _preview = None
     _is_drawing = False
 
     def invoke(self, context, event):
@@ -141,6 +144,14 @@ class DrawnOperator(OperationOperator):
         """Whether there is something to execute."""
         return True
 
+    def can_preview(self):
+        """Whether it can be told while the mouse moves what would be selected."""
+        return False
+
+    def preview_regions(self, obj):
+        """What regions_of(obj) would be if the mouse stopped here."""
+        return self.regions_of(obj)
+
     def help_text(self):
         return f'{self.bl_label}: draw on the splats. Shift adds, Ctrl subtracts, both intersect, Esc cancels'
 
@@ -151,6 +162,11 @@ class DrawnOperator(OperationOperator):
     def _press(self, context, event):
         view = picking.view_under(context, event)
         self._region, self._region_data = view[:2]
+        space = next(area.spaces.active for area in context.screen.areas if self._region in tuple(area.regions))
+        if cameras.shows_panorama(space, self._region_data, context.engine):
+            self.report({'WARNING'}, 'This view shows a panorama, in which nothing can be drawn; leave the camera '
+                        '(View > Cameras > Active Camera), or choose another shading.')
+            return False
         if not any(self.properties.is_property_set(name) for name in ('view_matrix', 'projection_matrix')):
             self.view_matrix = [value for row in self._region_data.view_matrix for value in row]
             self.projection_matrix = [value for row in self._region_data.window_matrix for value in row]
@@ -163,6 +179,7 @@ class DrawnOperator(OperationOperator):
             return False
         self._is_drawing = True
         self._marks.begin(self._region, self._place(event))
+        self._preview = StrokePreview(context, selected_points.show_instead)
         return True
 
     def _move(self, context, event):
@@ -171,6 +188,8 @@ class DrawnOperator(OperationOperator):
             self.drag(context, place)
             self._marks.radius = self.mark_radius(context)
             self._marks.add(place)
+            if event.type == 'MOUSEMOVE' and self.can_preview():
+                self._preview.update(self.preview_regions)
             return
         view = picking.view_under(context, event)
         if view is None:
@@ -185,29 +204,45 @@ class DrawnOperator(OperationOperator):
     def _leave(self, context):
         self._marks.close()
         self._marks = None
+        if self._preview is not None:
+            self._preview.close()
+            self._preview = None
         context.workspace.status_text_set(None)
 
 
 class PathOperator(DrawnOperator):
     """The same, along a path."""
 
+    least_points = 1
     path: CollectionProperty(type=bpy.types.OperatorMousePath, options={'HIDDEN', 'SKIP_SAVE'})
     front_only: BoolProperty(name="Front Only", description="Select what is seen, and nothing that lies behind other "
-                             "splats", default=False)
+                             "splats and meshes", default=False)
+    through_meshes: BoolProperty(name="Through Meshes", description="With Front Only, select what meshes hide, too",
+                                 default=False)
 
     def take_settings(self, context):
-        if not self.properties.is_property_set('front_only'):
-            self.front_only = selection_settings.of(context.scene).front_only
+        for name in ('front_only', 'through_meshes'):
+            if not self.properties.is_property_set(name):
+                setattr(self, name, getattr(selection_settings.of(context.scene), name))
 
     def press(self, context, place):
-        if self.front_only:
-            # It is drawn while the stroke is.
-            self._start_front(context)
+        self._camera, self._front = self.camera(), None
+        # It is drawn while the stroke is.
+        self._front_task = self._start_front(context) if self.front_only else None
         self.path.clear()
         self._add(place)
 
     def drag(self, _context, place):
         self._add(place)
+
+    def can_preview(self):
+        if len(self.path) < self.least_points:
+            return False
+        if self.front_only and self._front is None:
+            if self._front_task.is_running():
+                return False
+            self._front = self._front_task.front()
+        return True
 
     def points(self):
         """[(x, y)] of the path. Errors: StippleError for none."""
@@ -222,7 +257,7 @@ class PathOperator(DrawnOperator):
 
     def _start_front(self, context):
         space = context.space_data if context.area is not None and context.area.type == 'VIEW_3D' else None
-        return drawn_regions.start_front(context.evaluated_depsgraph_get(), self.camera(), space)
+        return drawn_regions.start_front(context.evaluated_depsgraph_get(), self.camera(), space, self.through_meshes)
 
     def _add(self, place):
         if len(self.path) == 0 or tuple(self.path[-1].loc) != place:

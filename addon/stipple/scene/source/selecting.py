@@ -168,6 +168,21 @@ def targets(context, objects):
     return [MaskTarget(obj) if selections.takes_mask(obj.data) else RegionTarget(obj) for obj in objects]
 
 
+def prepare(objects):
+    """Takes what the next stroke over objects needs: begins to read what is in files, in a thread, and returns whether
+    all is at hand. Changes nothing that a stroke gives. Errors: StippleError."""
+    is_ready = True
+    for obj in objects:
+        if selections.takes_mask(obj.data):
+            known = source_settings.of(obj.data.stipple)
+            # Splats without a file get one by the first stroke, and not because somebody looks at them.
+            if known.has_source and obj.data.stipple.source:
+                is_ready = sources.read_whole_ahead(obj.data) and is_ready
+        else:
+            mask_of_regions(obj)
+    return is_ready
+
+
 def select(found, regions_of):
     """Changes the selections of targets. regions_of: a function of an object, its regions in its own space. Returns an
     Outcome. Errors: StippleError, with all selections as they were."""

@@ -22,6 +22,7 @@ from ...binding.errors import StippleError
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import AnchorOrder, JobState, Status
 from .. import meshes
+from .ahead import Ahead
 from . import erased, masks, selections, source_paths, source_settings, splat_data
 from .source_paths import MODEL_SUFFIX
 
@@ -41,6 +42,7 @@ _models = OrderedDict()
 _reading = {}  # jobs of models that were asked for, by the same keys
 _clouds = OrderedDict()
 _whole = {}  # the cloud of whole_cloud() that was asked for last: one edit of a source comes after another
+_whole_ahead = {}  # what is being read for it, by the same key
 
 
 def library_problem():
@@ -72,6 +74,7 @@ def forget():
         job.close()
     _reading.clear()
     _whole.clear()
+    _whole_ahead.clear()
     _clouds.clear()
     _models.clear()
     _contexts.clear()
@@ -238,13 +241,36 @@ def whole_cloud(data):
     path = source_paths.file_of(data)
     key = _file_key(path)
     if key not in _whole:
-        if source_settings.of(data.stipple).counts_splats:
-            cloud = model(path).decode(DecodeSettings(data.stipple.source_count))
-        else:
-            cloud = Cloud.load(context(), path)
+        ahead = _whole_ahead.pop(key, None)
+        cloud = _whole_reader(data, path)() if ahead is None else ahead.result()
         _whole.clear()
         _whole[key] = cloud
     return _whole[key]
+
+
+def read_whole_ahead(data):
+    """Begins to read what whole_cloud() gives, in a thread of its own. Returns whether that is at hand. Errors:
+    StippleError."""
+    path = source_paths.file_of(data)
+    key = _file_key(path)
+    if key in _whole:
+        return True
+    if key not in _whole_ahead:
+        _whole_ahead.clear()  # one at a time is kept
+        _whole_ahead[key] = Ahead(_whole_reader(data, path))
+    if _whole_ahead[key].is_running():
+        return False
+    whole_cloud(data)
+    return True
+
+
+def _whole_reader(data, path):
+    """A function that reads all splats of a source and never touches Blender."""
+    if source_settings.of(data.stipple).counts_splats:
+        tree, settings = model(path), DecodeSettings(data.stipple.source_count)
+        return lambda: tree.decode(settings)
+    native = context()
+    return lambda: Cloud.load(native, path)
 
 
 def full_cloud(data):

@@ -172,6 +172,14 @@ def looked_through(context):
     return camera_object if is_camera and camera_object.type == 'CAMERA' else None
 
 
+def shows_panorama(space, region_data, engine):
+    """Whether a 3D view shows what a panoramic camera sees: Blender's own shadings show a perspective instead."""
+    camera = space.camera
+    return (region_data.view_perspective == 'CAMERA' and camera is not None and camera.type == 'CAMERA'
+            and camera.data.type == 'PANO' and space.shading.type == 'RENDERED'
+            and engine not in {version.EEVEE_ENGINE, 'BLENDER_WORKBENCH'})
+
+
 def panorama_of_view(context, region, camera_object, depsgraph):
     """(StippleCamera, Border) of a panoramic camera that a view looks through: over the region, as the image in the
     camera's frame goes on, and what of the region the image fills, or None where it lies outside.

@@ -13,10 +13,10 @@ import numpy as np
 from ...binding.errors import invalid
 from ...binding.regions import Region, RegionKind
 from ...binding.renderer import EMPTY_DEPTH, Renderer
-from ...binding.structs import CameraModel
+from ...binding.structs import CameraModel, JobState
 from .. import instances
 from ..source import placement, sources
-from . import cameras, viewed
+from . import cameras, mattes, view_mattes, viewed
 from .facts import Border
 
 # Pixels of the longer side of the image that tells what is in front: a stroke is far wider than one of them.
@@ -25,6 +25,9 @@ DEPTH_SIDE = 400
 # of what splats cover. Not of the depth: orthographic views stand anywhere.
 FRONT_SHARE = 0.02
 
+_SOLID = 0.5  # opacity of a mesh in a pixel from which on it hides splats
+
+_meshes = view_mattes.ViewMattes()
 _last = {}  # the image of depths that was asked for last, by what it shows: strokes of a view share it
 
 
@@ -52,15 +55,24 @@ class Front:
 
 
 class FrontTask:
-    """Depths in the making."""
+    """Depths in the making: of splats, and of meshes."""
 
-    def __init__(self, task, camera, placed):
-        self._task, self._camera, self._placed = task, camera, placed
+    def __init__(self, splats, meshes, camera, kept):
+        """splats: a RenderTask. meshes: samples of mattes.start_samples, or None. kept: lives as long as this."""
+        self._splats, self._meshes, self._camera, self._kept = splats, meshes, camera, kept
+
+    def is_running(self):
+        """Never waits."""
+        return any(task is not None and task.job.poll()[0] == JobState.RUNNING for task in (self._splats, self._meshes))
 
     def front(self):
         """Waits. Errors: StippleError."""
-        self._task.job.wait()
-        return Front(self._task.depth, self._camera)
+        self._splats.job.wait()
+        depths = self._splats.depth
+        if self._meshes is not None:
+            self._meshes.job.wait()
+            depths = np.where(self._meshes.opacity >= _SOLID, np.minimum(depths, self._meshes.depth), depths)
+        return Front(depths, self._camera)
 
 
 def camera_of(view_matrix, projection_matrix, size):
@@ -73,21 +85,31 @@ def camera_of(view_matrix, projection_matrix, size):
     return cameras.from_view(SimpleNamespace(view_matrix=view, window_matrix=window), *size)
 
 
-def start_front(depsgraph, camera, space=None):
+def start_front(depsgraph, camera, space=None, behind_meshes=False):
     """A FrontTask of the splats that a view shows. space: the 3D view, whose hidden objects hide nothing; None for all
-    of the view layer. Errors: StippleError."""
-    entries = [placed for owner, obj, placed in instances.gather_owned(depsgraph, 'VIEWPORT')
-               if space is None or viewed.shows(space, depsgraph, owner, obj)]
+    of the view layer. behind_meshes: whether meshes hide nothing. Errors: StippleError."""
+    def is_seen(owner, obj, _placed):
+        return space is None or viewed.shows(space, depsgraph, owner, obj)
+
+    entries = [entry[2] for entry in instances.gather_owned(depsgraph, 'VIEWPORT') if is_seen(*entry)]
+    hiding = []
+    if not behind_meshes:
+        _meshes.update(depsgraph, 'ALL')
+        hiding = [entry[2] for entry in _meshes.placed
+                  if is_seen(*entry) and entry[0].display_type not in {'WIRE', 'BOUNDS'}]
     coarse = -(-max(camera.width, camera.height) // DEPTH_SIDE)
     part = cameras.part_of(camera, Border(0, 0, camera.width, camera.height), coarse)
-    key = (bytes(camera), tuple((id(cloud), matrix.tobytes()) for cloud, matrix, _ in entries))
+    key = (bytes(camera), tuple((id(cloud), matrix.tobytes()) for cloud, matrix, _ in entries),
+           tuple((id(mesh), matrix.tobytes()) for mesh, matrix in hiding))
     if key not in _last:
         renderer = Renderer(sources.context())
         options = renderer.options()
         options.sh_degree_limit = 0  # nobody sees its colours
         task = renderer.start(entries, part, options, median_depth=True)
+        meshes = mattes.start_samples(hiding, part, 1) if hiding else None
         _last.clear()
-        _last[key] = FrontTask(task, camera, entries)  # which holds the clouds, so that their ids stay theirs
+        # Which holds the clouds and meshes, so that their ids stay theirs.
+        _last[key] = FrontTask(task, meshes, camera, (entries, hiding))
     return _last[key]
 
 
@@ -114,6 +136,8 @@ def colour(obj, value, tolerance, operation, centre=(0.0, 0.0, 0.0), radius=0.0)
 
 
 def forget():
+    global _meshes
+    _meshes = view_mattes.ViewMattes()
     _last.clear()
 
 

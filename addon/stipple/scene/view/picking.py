@@ -80,8 +80,13 @@ def view_under(context, event):
         for region in area.regions:
             x, y = event.mouse_x - region.x, event.mouse_y - region.y
             if region.type == 'WINDOW' and 0 <= x < region.width and 0 <= y < region.height:
-                return region, area.spaces.active.region_3d, x, y
+                return region, data_of(region, area.spaces.active), x, y
     return None
+
+
+def data_of(region, space):
+    """What a region of a 3D view sees by: in Quad View each has its own."""
+    return region.data if len(space.region_quadviews) else space.region_3d
 
 
 def point_at(depsgraph, region, region_data, x, y):

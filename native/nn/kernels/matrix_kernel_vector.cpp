@@ -1,13 +1,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/matrix_kernel.h"
+#include "nn/kernels/matrix_kernel.h"
 
 // Lanes are columns. The steps of matrix_kernel_scalar.cpp; products and sums are fused where the
 // processor can, so targets differ by rounding.
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "nn/matrix_kernel_vector.cpp"
+#define HWY_TARGET_INCLUDE "nn/kernels/matrix_kernel_vector.cpp"
 #include <hwy/foreach_target.h>
 // After it, as each target includes the rest anew.
 #include <hwy/contrib/math/math-inl.h>

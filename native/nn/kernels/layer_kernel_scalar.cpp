@@ -1,7 +1,8 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
-#include "nn/layer_kernel.h"
+#include "nn/kernels/layer_kernel.h"
 
 namespace stipple {
 
@@ -56,10 +57,17 @@ void softmaxScalar(SoftmaxRow& row) {
   for (size_t i = 0; i < row.width; ++i) row.out[i] *= shrink;
 }
 
+void narrowScalar(size_t count, const float* from, uint16_t* to) {
+  for (size_t i = 0; i < count; ++i) {
+    const auto bits = std::bit_cast<uint32_t>(from[i]);
+    to[i] = static_cast<uint16_t>((bits + 0x7fffu + ((bits >> 16) & 1u)) >> 16);
+  }
+}
+
 }  // namespace
 
 LayerKernel scalarLayerKernel() {
-  return {"scalar", activateScalar, siluGateScalar, softmaxScalar};
+  return {"scalar", activateScalar, siluGateScalar, softmaxScalar, narrowScalar};
 }
 
 }  // namespace stipple

@@ -1,12 +1,12 @@
 #include <algorithm>
 
-#include "nn/panel_kernel.h"
+#include "nn/kernels/panel_kernel.h"
 
 // Lanes are columns; a strip is two vectors wide. The steps of panel_kernel_scalar.cpp; products
 // and sums are fused where the processor can, so targets differ by rounding.
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "nn/panel_kernel_vector.cpp"
+#define HWY_TARGET_INCLUDE "nn/kernels/panel_kernel_vector.cpp"
 #include <hwy/foreach_target.h>
 // After it, as each target includes the rest anew.
 #include <hwy/highway.h>

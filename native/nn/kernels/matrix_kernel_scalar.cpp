@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "nn/matrix_kernel.h"
+#include "nn/kernels/matrix_kernel.h"
 
 namespace stipple {
 

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "nn/panel_kernel.h"
+#include "nn/kernels/panel_kernel.h"
 
 namespace stipple {
 

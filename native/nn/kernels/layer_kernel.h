@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "nn/activations.h"
@@ -26,6 +27,8 @@ struct LayerKernel {
   /// out[i] = silu(gate[i]) up[i].
   void (*siluGate)(size_t count, const float* gate, const float* up, float* out);
   void (*softmax)(SoftmaxRow& row);
+  /// To the nearest bfloat16, of two as near the even one. Infinities and usual NaN stay.
+  void (*narrow)(size_t count, const float* from, uint16_t* to);
 };
 
 /// The kernel to use: the best for this processor, or what STIPPLE_FORCE_TARGET names.

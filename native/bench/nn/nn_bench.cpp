@@ -1,0 +1,215 @@
+// Layers of networks at the sizes of the flow network: products of matrices against what the
+// processor multiplies at most, layers and attention against those products, two threads against
+// one. All reference rates are of the same run.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/random.h"
+#include "bench/comparison.h"
+#include "bench/nn/multiply_peak.h"
+#include "nn/attention.h"
+#include "nn/linear.h"
+#include "nn/matrix_backend.h"
+
+namespace stipple::bench {
+namespace {
+
+constexpr int kRepeats = 7;
+
+std::vector<float> numbers(size_t count, uint64_t seed) {
+  std::vector<float> out(count);
+  parallelFor(count, size_t{1} << 16, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      out[i] = 2.0f * unitFloat(keyedBits(seed, RandomUse::kNetworkStart, i)) - 1.0f;
+    }
+  });
+  return out;
+}
+
+/// A weight [outputs, inputs] of bfloat16 numbers, as the released networks have.
+WeightTable weightOf(size_t inputs, size_t outputs) {
+  auto halves = std::make_shared<std::vector<uint16_t>>(inputs * outputs);
+  for (size_t i = 0; i < halves->size(); ++i) {
+    // Signs and the upper bits of mantissas of numbers of 1/8 to 1/4.
+    (*halves)[i] = static_cast<uint16_t>(0x3e00 | (i * 40503u & 0x807fu));
+  }
+  std::map<std::string, WeightTensor> tensors;
+  tensors["fc.weight"] = {WeightType::kBfloat16,
+                          "BF16",
+                          {outputs, inputs},
+                          reinterpret_cast<const uint8_t*>(halves->data())};
+  return WeightTable("benchmark", std::move(tensors), halves);
+}
+
+const char* nameOf(Precision precision) {
+  return precision == Precision::kBfloat16 ? "bf16" : "f32";
+}
+
+/// One product of a backend, packed outside the clock, whose operands stay in the caches: what its
+/// layers are compared with.
+class BareProduct {
+ public:
+  static constexpr size_t kRows = 192, kInputs = 1024, kOutputs = 256;
+  static constexpr double kOperations = 2.0 * kRows * kInputs * kOutputs;
+
+  BareProduct(const MatrixBackend& backend, Precision precision)
+      : backend_(backend),
+        precision_(precision),
+        in_(numbers(kRows * kInputs, 1)),
+        out_(kRows * kOutputs),
+        packed_(backend.packedSize(kInputs, kOutputs, precision) + kLine) {
+    const WeightTable table = weightOf(kInputs, kOutputs);
+    backend.pack(table.require("fc.weight", {kOutputs, kInputs}), kInputs, 0, kOutputs, precision,
+                 packed());
+  }
+  void multiply() {
+    LinearPanel panel;
+    panel.rows = kRows;
+    panel.inputs = kInputs;
+    panel.outputs = kOutputs;
+    panel.in = in_.data();
+    panel.in_stride = kInputs;
+    panel.out = out_.data();
+    panel.out_stride = kOutputs;
+    backend_.multiply(panel, packed(), precision_);
+  }
+  /// The best of some in a row.
+  double operationsPerSecond() {
+    double best = 1e300;
+    for (int i = 0; i < kRepeats; ++i) best = std::min(best, secondsOf([&] { multiply(); }));
+    return kOperations / best;
+  }
+
+ private:
+  static constexpr size_t kLine = 16;
+  float* packed() {
+    void* memory = packed_.data();
+    size_t room = packed_.size() * sizeof(float);
+    return static_cast<float*>(
+        std::align(64, (packed_.size() - kLine) * sizeof(float), memory, room));
+  }
+  const MatrixBackend& backend_;
+  Precision precision_;
+  std::vector<float> in_, out_, packed_;
+};
+
+void multiplyOnce(benchmark::State& state, const MatrixBackend& backend, Precision precision) {
+  BareProduct product(backend, precision);
+  product.multiply();
+  double best = 0, peak = 0;
+  for (auto step : state) {
+    (void)step;
+    peak = std::max(peak, peakOperationsPerSecond());
+    const double rate = product.operationsPerSecond();
+    best = std::max(best, rate);
+    state.SetIterationTime(BareProduct::kOperations / rate);
+  }
+  state.counters["gflops"] = 1e-9 * best;
+  state.counters["peak_gflops"] = 1e-9 * peak;
+  state.counters["ratio_peak"] = best / peak;
+  state.SetLabel(backend.instructionSets() + ", peak " + peakTarget());
+}
+
+/// Runs `work`, of so many operations, on one thread and on two by turns, with the bare product and
+/// the peak between.
+template <class Work>
+void compareWithProduct(benchmark::State& state, const MatrixBackend& backend, Precision precision,
+                        double operations, const Work& work) {
+  BareProduct product(backend, precision);
+  double one = 1e300, two = 1e300, rate = 0, peak = 0;
+  work();
+  for (auto step : state) {
+    (void)step;
+    peak = std::max(peak, peakOperationsPerSecond());
+    rate = std::max(rate, product.operationsPerSecond());
+    double seconds = 0;
+    withThreads(1, [&] { seconds = secondsOf(work); });
+    one = std::min(one, seconds);
+    state.SetIterationTime(seconds);
+    withThreads(2, [&] { seconds = secondsOf(work); });
+    two = std::min(two, seconds);
+  }
+  state.counters["best_ms"] = 1e3 * one;
+  state.counters["gflops"] = 1e-9 * operations / one;
+  state.counters["ratio_product"] = operations / one / rate;
+  state.counters["ratio_peak"] = operations / one / peak;
+  state.counters["ratio_one_thread"] = one / two;
+  state.SetLabel(backend.instructionSets());
+}
+
+struct LinearCase {
+  size_t rows, inputs, outputs;
+};
+
+void linear(benchmark::State& state, const MatrixBackend& backend, Precision precision,
+            const LinearCase& c) {
+  const WeightTable table = weightOf(c.inputs, c.outputs);
+  const Linear layer(table, "fc", c.inputs, c.outputs, LinearBias::kNone);
+  const std::vector<float> in = numbers(c.rows * c.inputs, 1);
+  std::vector<float> out(c.rows * c.outputs);
+  NetworkRun run;
+  run.backend = &backend;
+  run.precision = precision;
+  const double operations = 2.0 * static_cast<double>(c.rows * c.inputs * c.outputs);
+  compareWithProduct(state, backend, precision, operations,
+                     [&] { layer.apply(run, c.rows, in.data(), out.data()); });
+}
+
+void attend(benchmark::State& state, const MatrixBackend& backend, Precision precision,
+            const AttentionShape& shape) {
+  const size_t width = shape.heads * shape.head_width;
+  // Queries, keys and values side by side, as one layer makes them.
+  const std::vector<float> qkv = numbers(shape.keys * 3 * width, 1);
+  std::vector<float> out(shape.queries * width);
+  const double operations =
+      4.0 * static_cast<double>(shape.heads * shape.head_width * shape.queries * shape.keys);
+  NetworkRun run;
+  run.backend = &backend;
+  run.precision = precision;
+  compareWithProduct(state, backend, precision, operations, [&] {
+    attention(run, shape, {qkv.data(), 3 * width}, {qkv.data() + width, 3 * width},
+              {qkv.data() + 2 * width, 3 * width}, out.data(), width);
+  });
+}
+
+template <class Function>
+void add(const std::string& name, const Function& function) {
+  benchmark::RegisterBenchmark(name.c_str(), function)
+      ->UseManualTime()
+      ->Iterations(kRepeats)
+      ->Unit(benchmark::kMillisecond);
+}
+
+const bool registered = [] {
+  for (const MatrixBackend* backend : matrixBackends()) {
+    for (const Precision precision : {Precision::kFloat32, Precision::kBfloat16}) {
+      if (!backend->has(precision)) continue;
+      const std::string kind = std::string(backend->name()) + "_" + nameOf(precision);
+      add("nn.product_" + kind + ".192x1024x256",
+          [=](benchmark::State& state) { multiplyOnce(state, *backend, precision); });
+      const LinearCase cases[] = {{4096, 1024, 3072}, {4096, 1024, 4096}, {4096, 4096, 1024}};
+      for (const LinearCase& c : cases) {
+        add("nn.linear_" + kind + "." + std::to_string(c.rows) + "x" + std::to_string(c.inputs) +
+                "x" + std::to_string(c.outputs),
+            [=](benchmark::State& state) { linear(state, *backend, precision, c); });
+      }
+      // Attention in float32 goes through our own kernels, whatever the backend.
+      if (precision == Precision::kFloat32 && backend != matrixBackends().front()) continue;
+      const AttentionShape shapes[] = {{16, 64, 4096, 4096}, {1, 512, 4096, 4096}};
+      for (const AttentionShape& shape : shapes) {
+        add("nn.attention_" + kind + ".4096x4096_" + std::to_string(shape.heads) + "x" +
+                std::to_string(shape.head_width),
+            [=](benchmark::State& state) { attend(state, *backend, precision, shape); });
+      }
+    }
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace stipple::bench
