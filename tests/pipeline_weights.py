@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The small random networks of a golden pipeline, in four files as users have them, and its image."""
 
+import hashlib
 import json
 import struct
 from pathlib import Path
@@ -23,8 +24,8 @@ def read():
     return found
 
 
-def write(path, tensors):
-    header, at = {}, 0
+def write(path, tensors, metadata=None):
+    header, at = {'__metadata__': metadata} if metadata else {}, 0
     for name, (dtype, shape, data) in tensors.items():
         header[name] = {'dtype': dtype, 'shape': shape, 'data_offsets': [at, at + len(data)]}
         at += len(data)
@@ -40,6 +41,17 @@ def split(folder):
         prefix = f'weights.{network}.'
         write(Path(folder) / f'{network}.safetensors',
               {name[len(prefix):]: value for name, value in tensors.items() if name.startswith(prefix)})
+
+
+def write_latent(path, decoder, tokens=TOKENS):
+    """Writes the golden's latent as an asset that names a file of its decoder's weights."""
+    content = Path(decoder).read_bytes()
+    _, _, latent = read()['expect.sample.latent']
+    metadata = {'stipple_version': '1.0', 'kind': 'latent', 'frame': 'right-handed, z up, unit cube',
+                'weights_file': Path(decoder).name, 'weights_bytes': str(len(content)),
+                'weights_sha256': hashlib.sha256(content).hexdigest(), 'settings': '{"seed": 42}'}
+    write(path, {'latent.tokens': ('F32', [tokens, 16], latent[:tokens * 64]),
+                 'latent.camera': ('F32', [5], struct.pack('<5f', 1, 0, 0, 0.5, 0.7))}, metadata)
 
 
 def image():

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What belongs to the machine rather than to a file."""
 
+import os
+
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, IntProperty, StringProperty
 
@@ -75,6 +77,12 @@ def get():
     """The add-on's preferences, or None while it is not enabled in the user's preferences."""
     addon = bpy.context.preferences.addons.get(__package__)
     return addon.preferences if addon else None
+
+
+def weights_folder():
+    """The folder of the files of networks' weights, '' for none."""
+    chosen = get()
+    return os.path.normpath(chosen.weights_folder) if chosen is not None and chosen.weights_folder else ''
 
 
 def up_axis(format_name):

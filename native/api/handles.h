@@ -22,6 +22,7 @@
 #include "data/views/memory_view_source.h"
 #include "density/density_model.h"
 #include "io/assets/weights_folder.h"
+#include "io/assets/weights_place.h"
 #include "io/views/camera_file.h"
 #include "measure/picture_accuracy.h"
 #include "model/splat_model.h"
@@ -36,6 +37,8 @@ struct ContextState : MemoryLimit {
   uint32_t thread_count = 0;
   /// What draws and differentiates, for fits and images alike.
   std::shared_ptr<const BackendFactory> backends = chosenBackends();
+  /// Where assets find the weights that they name; "": nobody has said.
+  std::shared_ptr<WeightsPlace> weights = std::make_shared<WeightsPlace>();
 };
 using Context = std::shared_ptr<const ContextState>;
 

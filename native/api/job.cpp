@@ -32,10 +32,12 @@ void run(StippleJob& job, JobWork work) {
 
 }  // namespace
 
-StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit) {
+StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit,
+                     std::shared_ptr<GenerateSession> generation) {
   auto job = std::make_unique<StippleJob>();
   job->context = std::move(context);
   job->fit = std::move(fit);
+  job->generation = std::move(generation);
   StippleJob* address = job.get();
   job->thread =
       std::thread([address, work = std::move(work)]() mutable { run(*address, std::move(work)); });

@@ -17,6 +17,7 @@
 namespace stipple {
 
 class FitSession;
+class GenerateSession;
 
 }  // namespace stipple
 
@@ -33,8 +34,10 @@ using JobResult = std::variant<std::monostate, std::shared_ptr<const SplatModel>
 /// all that it uses, apart from the caller's buffers.
 using JobWork = std::function<JobResult(Progress&)>;
 
-/// In: fit, for a job of fitting: what can be asked while it runs and after any end of it.
-StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit = nullptr);
+/// In: fit, of a job of fitting, generation, of one that makes splats of an image: what can be asked
+/// while it runs and after any end of it.
+StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit = nullptr,
+                     std::shared_ptr<GenerateSession> generation = nullptr);
 
 }  // namespace stipple::api
 
@@ -43,7 +46,8 @@ struct StippleJob {
 
   stipple::api::Context context;
   stipple::Progress progress;
-  std::shared_ptr<stipple::FitSession> fit;  ///< null of other jobs
+  std::shared_ptr<stipple::FitSession> fit;              ///< null of other jobs
+  std::shared_ptr<stipple::GenerateSession> generation;  ///< likewise
   std::thread thread;
 
   mutable std::mutex mutex;  ///< of what follows

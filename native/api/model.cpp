@@ -96,7 +96,8 @@ StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8,
     require(model, "model");
     const std::string path = &require(path_utf8, "path_utf8");
     withThreads(context->state->thread_count, [&] {
-      *model = new StippleModel{context->state, loadModel(path)};
+      const ReadingAid aid = {context->state->weights->folder(), nullptr};
+      *model = new StippleModel{context->state, loadModel(path, aid)};
     });
   });
 }
@@ -106,8 +107,9 @@ StippleStatus stipple_model_load_start(StippleContext* context, const char* path
   return guarded([&] {
     const Context state = require(context, "context").state;
     const std::string path = &require(path_utf8, "path_utf8");
-    require(job, "job") =
-        startJob(state, [path](Progress&) -> JobResult { return loadModel(path); });
+    require(job, "job") = startJob(state, [path, state](Progress& progress) -> JobResult {
+      return loadModel(path, {state->weights->folder(), &progress});
+    });
   });
 }
 

@@ -37,6 +37,7 @@ using Views = Handle<StippleViews, stipple_views_free>;
 using Renderer = Handle<StippleRenderer, stipple_renderer_free>;
 using Volume = Handle<StippleVolume, stipple_volume_free>;
 using Image = Handle<StippleImage, stipple_image_free>;
+using Weights = Handle<StippleWeights, stipple_weights_free>;
 using Job = Handle<StippleJob, stipple_job_free>;
 
 /// Calls f(..., &pointer), checks, and takes the handle.

@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <exception>
+#include <string>
 
 #include "cli/commands.h"
 
@@ -20,13 +21,20 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", stipple_version_string());
   Context context;
   uint32_t threads = 0;
+  std::string weights;
   app.add_option("--threads", threads, "0: as many as the machine has")->capture_default_str();
+  app.add_option(
+      "--weights", weights,
+      "Folder with files of networks' weights; default: the one that STIPPLE_WEIGHTS names");
   const auto create = [&] {
     StippleContextOptions options;
     stipple_context_options_init(&options);
     options.thread_count = threads;
     context =
         make<Context>(stipple_context_create, const_cast<const StippleContextOptions*>(&options));
+    if (!weights.empty()) {
+      check(stipple_context_set_weights_folder(context.get(), weights.c_str()));
+    }
   };
   app.parse_complete_callback(create);
   addInfo(app, context);
@@ -38,6 +46,7 @@ int run(int argc, char** argv) {
   addMesh(app, context);
   addFit(app, context);
   addDensify(app, context);
+  addGenerate(app, context);
   addCompare(app, context);
   addAccuracy(app, context);
   try {

@@ -7,6 +7,12 @@
 
 namespace stipple {
 
+/// Where decoded splats stand: a position p of the networks becomes scale p + offset.
+struct LatentPlacement {
+  double scale = 1.0;                        ///< above 0
+  std::array<double, 3> offset = {0, 0, 0};  ///< metres
+};
+
 /// A code that the decoders of density-sampled Gaussians turn into splats at any budget, with the
 /// camera that the flow network saw the object by.
 struct Latent {
@@ -16,6 +22,7 @@ struct Latent {
   /// Direction from the origin to the camera (3), 1 / distance (0: orthographic), distance *
   /// tan(field of view / 2), or half of an orthographic scale. All 0 where there is none.
   std::array<float, 5> camera = {0, 0, 0, 0, 0};
+  LatentPlacement placement;
 };
 
 }  // namespace stipple

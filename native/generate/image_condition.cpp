@@ -10,9 +10,21 @@
 
 namespace stipple {
 
+namespace {
+
+StageListener under(const std::string& prefix, const StageListener& listener) {
+  if (!listener) return {};
+  return [prefix, &listener](const std::string& stage, const StageNumbers& numbers) {
+    listener(prefix + stage, numbers);
+  };
+}
+
+}  // namespace
+
 ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
                            const VaeEncoder& colour, const PreparedImage& image,
-                           std::span<const float> noise, const WorkPart& part) {
+                           std::span<const float> noise, const WorkPart& part,
+                           const StageListener& listener) {
   if (structure.patchSize() != colour.tokenSize()) {
     fail(ErrorCode::kFormat, "The image encoders do not fit together: one has patches of " +
                                  std::to_string(structure.patchSize()) + " pixels, the other of " +
@@ -28,9 +40,11 @@ ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
   condition.structure_width = static_cast<uint32_t>(structure.width());
   condition.colour_width = static_cast<uint32_t>(colour.tokenWidth());
   if (run.progress != nullptr) run.progress->enterPart(part.begin, middle);
-  condition.structure = structure.encode(run, rgb, image.size, image.size);
+  condition.structure =
+      structure.encode(run, rgb, image.size, image.size, under("structure.", listener));
   if (run.progress != nullptr) run.progress->enterPart(middle, part.end);
-  const std::vector<float> tokens = colour.encode(run, rgb, image.size, image.size, noise);
+  const std::vector<float> tokens =
+      colour.encode(run, rgb, image.size, image.size, noise, under("colour.", listener));
   if (run.progress != nullptr) run.progress->enterPart(0.0, 1.0);
   condition.colour.assign(structure.prefixRows() * colour.tokenWidth(), 0.0f);
   condition.colour.insert(condition.colour.end(), tokens.begin(), tokens.end());

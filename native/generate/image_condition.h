@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "generate/stage_listener.h"
 #include "nn/network_run.h"
 
 namespace stipple {
@@ -32,11 +33,13 @@ struct WorkPart {
 /// Encodes an image by both networks. The colours of the tokens that belong to the whole image are
 /// zeros.
 /// In: noise: of VaeEncoder::noiseCount() for the image, normally distributed, or empty: the
-/// image's mean latent (VaeEncoder::encode()); part: of whose progress (Progress::enterPart()).
+/// image's mean latent (VaeEncoder::encode()); part: of whose progress (Progress::enterPart());
+/// listener: hears of the stages of both, with "structure." and "colour." before their names.
 /// Errors: kFormat for networks whose patches differ; those of the encoders.
 /// Threads and determinism: as of the encoders. Cost: the sum of both; memory: the larger one's.
 ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
                            const VaeEncoder& colour, const PreparedImage& image,
-                           std::span<const float> noise, const WorkPart& part = {});
+                           std::span<const float> noise, const WorkPart& part = {},
+                           const StageListener& listener = {});
 
 }  // namespace stipple

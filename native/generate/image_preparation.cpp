@@ -26,17 +26,7 @@ void validate(const ByteImage& image, const ByteImage* mask, const PreparationOp
                                             " channels; it must have 1, white on the object.");
     }
   }
-  const uint32_t size = options.canvas_size;
-  if (size < 32 || size > 2048 || size % 16 != 0) {
-    fail(ErrorCode::kInvalidArgument, "The canvas is " + std::to_string(size) +
-                                          " pixels wide; multiples of 16 from 32 to 2048 are "
-                                          "allowed.");
-  }
-  if (options.erode_radius > kMostErosion) {
-    fail(ErrorCode::kInvalidArgument, "The mask shall shrink by " +
-                                          std::to_string(options.erode_radius) +
-                                          " pixels; 0 to 64 are allowed.");
-  }
+  validate(options);
   const uint64_t longer = std::max(image.width, image.height);
   const uint64_t shorter = std::min(image.width, image.height);
   if (longer > kLongest * shorter) {
@@ -176,6 +166,20 @@ std::vector<uint8_t> onBlack(const ByteImage& rgba) {
 }
 
 }  // namespace
+
+void validate(const PreparationOptions& options) {
+  const uint32_t size = options.canvas_size;
+  if (size < 32 || size > 2048 || size % 16 != 0) {
+    fail(ErrorCode::kInvalidArgument, "The canvas is " + std::to_string(size) +
+                                          " pixels wide; multiples of 16 from 32 to 2048 are "
+                                          "allowed.");
+  }
+  if (options.erode_radius > kMostErosion) {
+    fail(ErrorCode::kInvalidArgument, "The mask shall shrink by " +
+                                          std::to_string(options.erode_radius) +
+                                          " pixels; 0 to 64 are allowed.");
+  }
+}
 
 PreparedImage prepareImage(const ByteImage& image, const ByteImage* mask,
                            const PreparationOptions& options, PreparationSteps* steps) {

@@ -17,6 +17,9 @@ struct PreparationOptions {
   uint32_t erode_radius = 1;
 };
 
+/// Errors: kInvalidArgument for a value outside its range.
+void validate(const PreparationOptions& options);
+
 /// An object on black, square, in the middle.
 struct PreparedImage {
   uint32_t size = 0;         ///< side in pixels

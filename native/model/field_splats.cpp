@@ -90,7 +90,7 @@ std::shared_ptr<const SplatModel> makeFieldSplats(std::shared_ptr<const OctreeDe
                                              std::move(notes));
 }
 
-std::shared_ptr<const SplatModel> readFieldSplats(const std::string& path) {
+std::shared_ptr<const SplatModel> readFieldSplats(const std::string& path, const ReadingAid&) {
   FieldAsset asset = readFieldAsset(path);
   ModelNotes notes = {std::move(asset.settings_json), std::move(asset.extras)};
   FieldParameters like;

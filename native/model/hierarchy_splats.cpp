@@ -69,7 +69,7 @@ std::shared_ptr<const SplatModel> makeHierarchySplats(
   return std::make_shared<const HierarchySplats>(std::move(hierarchy), std::move(notes));
 }
 
-std::shared_ptr<const SplatModel> readHierarchySplats(const std::string& path) {
+std::shared_ptr<const SplatModel> readHierarchySplats(const std::string& path, const ReadingAid&) {
   HierarchyAsset asset = readHierarchyAsset(path);
   ModelNotes notes = {std::move(asset.settings_json), std::move(asset.extras)};
   auto leaves = std::make_shared<const SplatCloud>(std::move(asset.leaves));

@@ -5,9 +5,10 @@
 namespace stipple {
 
 // The readers, each in the file of its kind.
-std::shared_ptr<const SplatModel> readSurfaceSplats(const std::string& path);
-std::shared_ptr<const SplatModel> readHierarchySplats(const std::string& path);
-std::shared_ptr<const SplatModel> readFieldSplats(const std::string& path);
+std::shared_ptr<const SplatModel> readSurfaceSplats(const std::string& path, const ReadingAid&);
+std::shared_ptr<const SplatModel> readHierarchySplats(const std::string& path, const ReadingAid&);
+std::shared_ptr<const SplatModel> readFieldSplats(const std::string& path, const ReadingAid&);
+std::shared_ptr<const SplatModel> readLatentSplats(const std::string& path, const ReadingAid&);
 
 std::span<const ModelKind> modelKinds() {
   static const std::array kinds = {
@@ -26,6 +27,11 @@ std::span<const ModelKind> modelKinds() {
                 2,
                 {.budget_unit = BudgetUnit::kAnchors, .has_order = true, .has_seed = true},
                 readFieldSplats},
+      ModelKind{"latent",
+                "generated splats",
+                3,
+                {.budget_unit = BudgetUnit::kAnchors, .has_order = true, .has_seed = true},
+                readLatentSplats},
   };
   return kinds;
 }

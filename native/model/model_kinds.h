@@ -17,8 +17,9 @@ struct ModelKind {
   const char* label;  ///< for people
   uint32_t number;    ///< of StippleModelKind in the C header
   ModelTraits traits;
-  /// Reads an asset file of this kind. Errors: kIo, kFormat.
-  std::shared_ptr<const SplatModel> (*read)(const std::string& path);
+  /// Reads an asset file of this kind. Errors: kIo, kFormat; kUnavailable where it needs weights
+  /// that are not there; kCancelled.
+  std::shared_ptr<const SplatModel> (*read)(const std::string& path, const ReadingAid& aid);
 };
 
 /// The table: all kinds that there are.
@@ -27,8 +28,8 @@ std::span<const ModelKind> modelKinds();
 /// The row of a model's kind. In: name, which the table has.
 const ModelKind& modelKind(std::string_view name);
 
-/// The model of an asset file. Errors: kIo, kFormat; kUnsupported for a kind that the table does
-/// not have, or a newer major version.
-std::shared_ptr<const SplatModel> loadModel(const std::string& path);
+/// The model of an asset file. Errors: those of ModelKind::read; kUnsupported for a kind that the
+/// table does not have, or a newer major version.
+std::shared_ptr<const SplatModel> loadModel(const std::string& path, const ReadingAid& aid = {});
 
 }  // namespace stipple

@@ -25,9 +25,9 @@ const ModelKind& modelKind(std::string_view name) {
   return *kind;
 }
 
-std::shared_ptr<const SplatModel> loadModel(const std::string& path) {
+std::shared_ptr<const SplatModel> loadModel(const std::string& path, const ReadingAid& aid) {
   const std::string name = readAssetKind(path);
-  if (const ModelKind* kind = find(name)) return kind->read(path);
+  if (const ModelKind* kind = find(name)) return kind->read(path, aid);
   std::string known;
   for (const ModelKind& kind : modelKinds()) {
     known += (known.empty() ? "'" : "', '") + std::string(kind.name);

@@ -11,6 +11,13 @@ namespace stipple {
 
 namespace {
 
+/// Of the time that a decode takes, about: networks spend as much on densities as on splats.
+constexpr double kSamplingShare = 0.5;
+
+const char* unitOf(const ModelSettings& settings) {
+  return settings.budget_unit == BudgetUnit::kAnchors ? "anchors" : "splats";
+}
+
 uint32_t gaussiansOf(const ModelRequest& request, const ModelSettings& settings) {
   const bool is_own =
       request.gaussians_per_anchor == 1 && settings.minimum_gaussians_per_anchor > 1;
@@ -34,9 +41,16 @@ ModelSettings SplatModel::settings() const {
 
 SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress) const {
   requireFinite(request.time, "the time");
+  const ModelSettings allowed = settings();
+  if (request.budget < allowed.minimum_budget || request.budget > allowed.maximum_budget) {
+    fail(ErrorCode::kInvalidArgument,
+         "the budget is " + std::to_string(request.budget) + " " + unitOf(allowed) + "; " +
+             std::to_string(allowed.minimum_budget) + " to " +
+             std::to_string(allowed.maximum_budget) + " is allowed for this model");
+  }
   DecodeRequest wanted;
   wanted.budget = request.budget;
-  wanted.gaussians_per_anchor = gaussiansOf(request, settings());
+  wanted.gaussians_per_anchor = gaussiansOf(request, allowed);
   wanted.time = request.time;
   wanted.seed = request.seed;
   wanted.progress = progress;
@@ -46,23 +60,29 @@ SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress) c
   sampling.count = request.budget;
   sampling.order = request.order;
   sampling.seed = request.seed;
+  if (progress) progress->enterPart(0, kSamplingShare);
   const AnchorSet anchors = drawLearned(*sampled, sampling, draws(), progress);
   wanted.anchors = &anchors;
-  return decoder().decode(wanted);
+  if (progress) progress->enterPart(kSamplingShare, 1);
+  SplatCloud cloud = decoder().decode(wanted);
+  if (progress) progress->enterPart(0, 1);
+  return cloud;
 }
 
 uint64_t SplatModel::memoryBound(const ModelRequest& request) const {
   const uint32_t gaussians = gaussiansOf(request, settings());
   const uint64_t splats = decoder().memoryBound(request.budget, gaussians);
-  if (!density()) return splats;
-  // What sampling needs beside the anchors is free again when they are decoded.
+  const std::shared_ptr<const DensityModel> sampled = density();
+  if (!sampled) return splats;
+  // What sampling needs beside the anchors is free again when they are decoded, apart from what
+  // answers leave.
   return std::max(sampleMemoryBound(request.budget, false),
-                  anchorSetBytes(request.budget) + splats);
+                  anchorSetBytes(request.budget) + splats) +
+         sampled->answerMemoryBound();
 }
 
 void SplatModel::requireMemory(const ModelRequest& request, const MemoryLimit& limit) const {
-  const bool in_anchors = settings().budget_unit == BudgetUnit::kAnchors;
-  limit.requireBudget(request.budget, in_anchors ? "anchors" : "splats", [&](uint64_t budget) {
+  limit.requireBudget(request.budget, unitOf(settings()), [&](uint64_t budget) {
     ModelRequest smaller = request;
     smaller.budget = budget;
     return memoryBound(smaller);

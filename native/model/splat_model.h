@@ -23,6 +23,14 @@ struct ModelNotes {
   AssetExtras extras;
 };
 
+/// What reading an asset may need beside its file.
+struct ReadingAid {
+  /// Folder of the user's files of networks' weights, which assets name and do not hold; empty:
+  /// nobody has said where it is.
+  std::string weights_folder;
+  Progress* progress = nullptr;  ///< of reading; files of weights are hashed once
+};
+
 /// What a model is, beside its settings. 0 where it does not apply.
 struct ModelInfo {
   int leaf_level = 0;         ///< of its density
@@ -70,7 +78,7 @@ class SplatModel {
   /// Which settings it has: those of its kind, with its own ranges.
   ModelSettings settings() const;
   /// The splats of a request. Errors: kInvalidArgument for a budget or a K outside settings(), a
-  /// time that is not finite; kCancelled.
+  /// time that is not finite; kCancelled. Progress runs from 0 to 1 of the whole work.
   /// Threads and determinism: parallel; same result for any number of threads.
   SplatCloud decode(const ModelRequest& request, Progress* progress = nullptr) const;
   /// Bytes that decode() holds at most, without the model itself.

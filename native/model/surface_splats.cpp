@@ -58,7 +58,7 @@ std::shared_ptr<const SplatModel> makeSurfaceSplats(SurfaceModel surface, ModelN
   return std::make_shared<const SurfaceSplats>(std::move(surface), std::move(notes));
 }
 
-std::shared_ptr<const SplatModel> readSurfaceSplats(const std::string& path) {
+std::shared_ptr<const SplatModel> readSurfaceSplats(const std::string& path, const ReadingAid&) {
   SurfaceAsset asset = readSurfaceAsset(path);
   ModelNotes notes = {std::move(asset.settings_json), std::move(asset.extras)};
   try {

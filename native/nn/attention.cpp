@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -66,11 +67,14 @@ void attendTile(const PackedHeads& packed, const Attention& work, size_t slot, s
                 size_t first, size_t count) {
   const LayerKernel& layer = chosenLayerKernel();
   const size_t width = work.shape.head_width;
-  Scratch room(count * (packed.tile_keys + width + 2));
+  const bool is_narrow = work.products.takesNarrow();
+  const size_t narrow_floats = is_narrow ? (count * packed.tile_keys + 1) / 2 : 0;
+  Scratch room(count * (packed.tile_keys + width + 2) + narrow_floats);
   float* scores = room.data();
   float* sums = scores + count * packed.tile_keys;
   float* peaks = sums + count * width;
   float* weights = peaks + count;
+  auto* narrow = reinterpret_cast<uint16_t*>(weights + count);
   // Finite, so that its difference to a score of minus infinity is no NaN.
   std::fill_n(peaks, count, std::numeric_limits<float>::lowest());
   std::fill_n(weights, count, 0.0f);
@@ -89,11 +93,13 @@ void attendTile(const PackedHeads& packed, const Attention& work, size_t slot, s
       row.sum = weights[i];
       row.out = sums + i * width;
       row.width = tile == 0 ? 0 : width;
+      if (is_narrow) row.narrow = narrow + i * keys;
       layer.softmax(row);
       peaks[i] = row.peak;
       weights[i] = row.sum;
     }
-    work.products.weigh(count, keys, scores, packed.at(slot, tile), tile > 0, sums);
+    const void* powers = is_narrow ? static_cast<const void*>(narrow) : scores;
+    work.products.weigh(count, keys, powers, packed.at(slot, tile), tile > 0, sums);
   }
   for (size_t i = 0; i < count; ++i) {
     // No key counts where all biases are minus infinity.

@@ -14,6 +14,8 @@ class AttentionProducts {
   /// Of a tile, at most. Not of the number of threads.
   virtual size_t mostQueries() const = 0;
   virtual size_t mostKeys() const = 0;
+  /// Whether weigh() takes weights rounded to bfloat16.
+  virtual bool takesNarrow() const = 0;
   /// Floats that a tile of packed keys and values takes.
   virtual size_t packedFloats(size_t keys) const = 0;
   /// In: k and v [keys, head_width]. Out: packed [packedFloats()].
@@ -23,12 +25,12 @@ class AttentionProducts {
   virtual void score(size_t queries, size_t keys, const float* q, size_t q_stride,
                      const float* packed, float* scores) const = 0;
   /// sums [queries, head_width] = weights [queries, keys] v, or added to them where they have
-  /// begun.
-  virtual void weigh(size_t queries, size_t keys, const float* weights, const float* packed,
+  /// begun. In: weights, in bfloat16 where takesNarrow().
+  virtual void weigh(size_t queries, size_t keys, const void* weights, const float* packed,
                      bool has_begun, float* sums) const = 0;
 };
 
-/// In float32 by our own kernels, or by the run's backend in the precision that it has.
+/// In float32 by our own kernels, or in bfloat16 by the backend of a run that has it.
 std::unique_ptr<AttentionProducts> makeAttentionProducts(const NetworkRun& run, size_t head_width);
 
 }  // namespace stipple

@@ -13,6 +13,7 @@
 #include "decode/tree/hierarchy_decoder.h"
 #include "density/octree_density.h"
 #include "io/assets/hierarchy_asset.h"
+#include "io/assets/latent_asset.h"
 #include "io/assets/surface_asset.h"
 #include "io/glb_builder.h"
 #include "io/image_channels.h"
@@ -355,6 +356,21 @@ std::vector<std::string> hierarchySeeds(const fs::path& folder) {
   return made;
 }
 
+std::vector<std::string> latentSeeds(const fs::path& folder) {
+  LatentAsset asset;
+  asset.latent.token_count = 3;
+  asset.latent.width = 2;
+  asset.latent.tokens = {1, 2, 3, 4, 5, 6};
+  asset.weights = {"decoder.safetensors", 576148442, std::string(64, 'a')};
+  writeLatentAsset(asset, (folder / "seed").string());
+  return {load(folder / "seed")};
+}
+
+void readLatent(const fs::path& path) {
+  const LatentAsset asset = readLatentAsset(path.string());
+  keepsPromises([&] { writeLatentAsset(asset, (path.parent_path() / "again").string()); });
+}
+
 // ---- Cameras ------------------------------------------------------------------------------------
 
 /// The camera without distortion of a lens, as a data set gives it.
@@ -494,6 +510,9 @@ std::vector<Reader> makeReaders() {
                  JsonPlace::kSafetensorsHeader});
   all.push_back({"hierarchy", nullptr, storeAs(asset),
                  [asset](const fs::path& folder) { readHierarchy(folder / asset); }, hierarchySeeds,
+                 JsonPlace::kSafetensorsHeader});
+  all.push_back({"latent", nullptr, storeAs(asset),
+                 [asset](const fs::path& folder) { readLatent(folder / asset); }, latentSeeds,
                  JsonPlace::kSafetensorsHeader});
   all.push_back({"transforms", nullptr, storeAs("transforms.json"),
                  [](const fs::path& folder) { readCameras(folder / "transforms.json"); },

@@ -4,7 +4,7 @@
 from ctypes import byref
 
 from .errors import invalid
-from .handle import Handle, new_handle
+from .handle import Handle, new_handle, path_bytes
 from .structs import StippleContextOptions
 
 
@@ -20,6 +20,14 @@ class Context(Handle):
         options.thread_count = threads
         options.memory_limit_bytes = memory_limit_bytes
         super().__init__(library, new_handle(library, 'stipple_context_create', byref(options)))
+        self._weights_folder = ''
+
+    def set_weights_folder(self, folder):
+        """Says where models that name a file of weights find it; '' for where the environment says."""
+        if folder != self._weights_folder:
+            self._check(self.library.stipple_context_set_weights_folder(self.pointer,
+                                                                        path_bytes(folder) if folder else None))
+            self._weights_folder = folder
 
     def version(self):
         return self.library.stipple_version_string().decode()

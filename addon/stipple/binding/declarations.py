@@ -28,6 +28,7 @@ FUNCTIONS = {
     # context
     'stipple_context_options_init': (None, [_to(s.StippleContextOptions)]),
     'stipple_context_create': (_status, [_to(s.StippleContextOptions), _out_handle]),
+    'stipple_context_set_weights_folder': (_status, [_handle, _path]),
     'stipple_context_free': (None, [_handle]),
     # jobs
     'stipple_job_poll': (_status, [_handle, _to(s.StippleJobProgress)]),
@@ -280,6 +281,13 @@ FUNCTIONS = {
     'stipple_weights_file': (_status, [_handle, c_uint32, _to(s.StippleWeightsFile)]),
     'stipple_weights_note': (_status, [_handle, c_uint64, POINTER(c_char_p)]),
     'stipple_weights_check_start': (_status, [_handle, _out_handle]),
+    # splats from an image
+    'stipple_generate_options_init': (None, [_to(s.StippleGenerateOptions)]),
+    'stipple_generate_start': (_status, [_handle, _handle, _handle, _to(s.StippleGenerateOptions), _out_handle]),
+    'stipple_generate_estimate': (_status, [_handle, _to(s.StippleGenerateOptions), _to(s.StippleGenerateEstimate)]),
+    'stipple_generate_figures': (_status, [_handle, _to(s.StippleGenerateFigures)]),
+    'stipple_generate_stage': (_status, [_handle, c_uint32, _to(s.StippleGenerateStage)]),
+    'stipple_generate_preview': (_status, [_handle, _out_handle]),
 }
 
 

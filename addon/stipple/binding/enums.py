@@ -221,6 +221,11 @@ class WeightsState(IntEnum):
     OTHER_CONTENT = 4
 
 
+class NoiseSource(IntEnum):
+    KEYED = 0
+    TORCH_CPU = 1
+
+
 # Each enumeration: the C type and what its values' names start with.
 ENUMS = {
     'StippleStatus': (Status, 'STIPPLE_'),
@@ -256,6 +261,7 @@ ENUMS = {
     'StippleSplatQuantity': (SplatQuantity, 'STIPPLE_QUANTITY_'),
     'StippleFitBackground': (FitBackground, 'STIPPLE_FIT_BACKGROUND_'),
     'StippleFitShell': (FitShell, 'STIPPLE_FIT_SHELL_'),
+    'StippleNoiseSource': (NoiseSource, 'STIPPLE_NOISE_'),
     'StippleWeightsRole': (WeightsRole, 'STIPPLE_WEIGHTS_'),
     'StippleWeightsState': (WeightsState, 'STIPPLE_WEIGHTS_'),
     'StippleFitOptionKind': (FitOptionKind, 'STIPPLE_FIT_OPTION_'),

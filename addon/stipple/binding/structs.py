@@ -6,7 +6,7 @@ from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_i
 
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, BudgetUnit, CameraModel, ColourSpace, ENUMS,
                     Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, Frame, JobState,
-                    LowPass, MaterialColour, ObjectOrder, OutputColour, Precision, Projection, RegionKind,
+                    LowPass, MaterialColour, NoiseSource, ObjectOrder, OutputColour, Precision, Projection, RegionKind,
                     RegionOperation, RenderMethod, Sampling, Side, SplatOrder, SplatQuantity, Status, Transfer,
                     ViewRig, ViewSplit, WeightsRole, WeightsState)
 
@@ -487,6 +487,30 @@ class StippleWeightsFile(_Sized):
 class StippleWeightsInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('file_count', c_uint32), ('note_count', c_uint64),
                 ('folder_utf8', c_char_p), ('source_utf8', c_char_p)]
+
+
+class StippleGenerateOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('steps', c_uint32), ('token_count', c_uint32), ('canvas_size', c_uint32),
+                ('erode_radius', c_uint32), ('noise_source', c_uint32), ('uses_mean_colour', c_uint32),
+                ('watches_layers', c_uint32), ('reserved', c_uint32), ('preview_steps', c_uint32), ('preview_anchors', c_uint64), ('seed', c_uint64), ('guidance', c_double),
+                ('shift', c_double), ('size', c_double), ('weights_folder_utf8', c_char_p), ('checkpoint_path_utf8', c_char_p)]
+
+
+class StippleGenerateEstimate(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('bytes', c_uint64), ('weight_bytes', c_uint64),
+                ('seconds', c_double), ('operations', c_double)]
+
+
+class StippleGenerateFigures(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('step', c_uint32), ('steps', c_uint32), ('resumed_step', c_uint32),
+                ('preview_step', c_uint32), ('stage_count', c_uint32), ('seconds', c_double),
+                ('seconds_left', c_double)]
+
+
+class StippleGenerateStage(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('count', c_uint64), ('minimum', c_double),
+                ('maximum', c_double), ('mean', c_double), ('deviation', c_double), ('seconds', c_double),
+                ('name_utf8', c_char_p)]
 
 
 STRUCTS = {cls.__name__: cls for cls in _Sized.__subclasses__()}

@@ -133,6 +133,9 @@ def _draw_budget(self, context):
     draw_anchors(column, stipple, 'anchors_render', each, "Render")
     if known.has_seed:
         column.prop(stipple, 'seed')
+    share = sources.decoding_share(data)
+    if share is not None:
+        column.label(text=f"Decoding: {share:.0%}", icon='SORTTIME')
     if known.is_learned:
         used = (stipple.anchors, stipple.anchors_render or stipple.anchors)
         is_beyond = max(used) > known.most_learned or min(used) < known.least_learned

@@ -15,6 +15,8 @@ class STIPPLE_MT_add(bpy.types.Menu):
         self.layout.operator_context = 'INVOKE_DEFAULT'
         self.layout.operator('stipple.splats_from_mesh', text="From Selected Meshes", icon='MESH_DATA')
         self.layout.operator('stipple.splats_import', text="From File", icon='FILE')
+        self.layout.operator('stipple.splats_from_image', text="From Image", icon='IMAGE_DATA')
+        self.layout.operator('stipple.splats_from_render', text="From Render of Selected", icon='RENDER_STILL')
 
 
 class STIPPLE_MT_object(bpy.types.Menu):

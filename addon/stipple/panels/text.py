@@ -9,10 +9,11 @@ _MARGIN = 4
 _MIN_LETTERS = 8
 
 
-def draw_text(layout, context, text, icon='NONE', is_quiet=False, columns=1):
+def draw_text(layout, context, text, icon='NONE', is_quiet=False, columns=1, width_px=None):
     """A sentence, whole, in as many lines as it takes. is_quiet: grey and narrow, as notes are. columns: that the
-    layout is one of, side by side."""
-    width = int(context.region.width / context.preferences.system.ui_scale / _LETTER_PX) // columns - _MARGIN
+    layout is one of, side by side. width_px: of a dialog, None in a panel."""
+    shown_px = context.region.width / context.preferences.system.ui_scale if width_px is None else width_px
+    width = int(shown_px / _LETTER_PX) // columns - _MARGIN
     characters = max(_MIN_LETTERS, width if icon == 'NONE' else width - _MARGIN)
     column = layout.column(align=True)
     if is_quiet:

@@ -5,9 +5,10 @@ import bpy
 
 from .. import version
 from ..binding.errors import StippleError
+from ..binding.structs import Status
 from . import grades, limits, shown
 from .sequence import sequences
-from .source import placement, sources, splat_data, sync
+from .source import placement, source_settings, sources, splat_data, sync
 from .view import viewed
 
 
@@ -73,14 +74,18 @@ def _cloud_of(obj, mode, scene, most):
         # Stored splats of a file that is gone or has changed: nobody would see the panel that says so.
         sources.check_unchanged(original)
     if limits.has_budget(stipple) and not _has_modifiers(obj) and not _is_edited(original, mode):
+        least = source_settings.of(stipple).least_budget
+        settings = sources.at_most(sources.decode_settings(stipple, mode, scene), most, least)
         try:
             if stipple.is_sequence:
                 cloud = sequences.frame_of(original, stipple, scene.frame_current, mode, most).cloud()
             else:
-                cloud = sources.decode(original, sources.at_most(sources.decode_settings(stipple, mode, scene), most))
+                cloud = sources.decode(original, settings)
             return cloud and grades.apply(cloud, stipple)
         except StippleError as error:
-            raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
+            # Without what the source needs beside its file, what is stored is still what it gives.
+            if error.status != Status.ERROR_UNAVAILABLE or not sync.is_stored(original, settings):
+                raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
     if splat_data.count(data) == 0:
         return None
     if _has_modifiers(obj) or mode == 'VIEWPORT' and grades.is_shown(original, grades.settings_of(stipple)):

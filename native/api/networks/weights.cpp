@@ -3,6 +3,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
+#include "api/networks/weights_folder_of.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -27,6 +28,20 @@ StippleWeightsFile fileTo(const WeightsFile& file, const PublishedWeights& publi
 
 }  // namespace
 
+namespace stipple::api {
+
+std::string weightsFolderOf(const StippleContext& context, const char* given, const char* name) {
+  const std::string folder = given != nullptr ? given : context.state->weights->folder();
+  if (folder.empty()) {
+    fail(ErrorCode::kInvalidArgument, std::string(name) +
+                                          " names no weights folder, and the context has none; " +
+                                          publishedWeightsSource());
+  }
+  return folder;
+}
+
+}  // namespace stipple::api
+
 extern "C" {
 
 StippleStatus stipple_weights_find(StippleContext* context, const char* folder_utf8,
@@ -34,7 +49,7 @@ StippleStatus stipple_weights_find(StippleContext* context, const char* folder_u
   return guarded([&] {
     require(context, "context");
     require(weights, "weights");
-    const std::string folder = &require(folder_utf8, "folder_utf8");
+    const std::string folder = weightsFolderOf(*context, folder_utf8, "folder_utf8");
     *weights = new StippleWeights{context->state,
                                   std::make_shared<const WeightsFolder>(findWeights(folder))};
   });

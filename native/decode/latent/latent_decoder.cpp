@@ -1,5 +1,6 @@
 #include "decode/latent/latent_decoder.h"
 
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,6 +38,7 @@ SplatCloud LatentDecoder::decode(const DecodeRequest& request) const {
   const std::vector<float> features =
       network_->features(run, *latent_, anchors.size(), anchors.positions.data());
   SplatCloud cloud = splatsOf(anchors.positions, features);
+  place(latent_->placement, cloud);
   advance(request.progress, 1.0, "Decoding splats");
   return cloud;
 }
@@ -64,6 +66,17 @@ uint64_t LatentDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_pe
   // Packed weights and tiles of scores of each thread.
   constexpr uint64_t kLayers = uint64_t{64} << 20;
   return network_->memoryBound(anchor_count, latent_->token_count) + splats + kLayers;
+}
+
+void place(const LatentPlacement& placement, SplatCloud& cloud) {
+  if (placement.scale == 1 && placement.offset == std::array<double, 3>{}) return;
+  parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = 3 * begin; i < 3 * end; ++i) {
+      cloud.positions[i] = static_cast<float>(
+          placement.scale * static_cast<double>(cloud.positions[i]) + placement.offset[i % 3]);
+      cloud.scales[i] = static_cast<float>(placement.scale * static_cast<double>(cloud.scales[i]));
+    }
+  });
 }
 
 }  // namespace stipple

@@ -8,7 +8,8 @@
 namespace stipple {
 
 /// Anchors become K Gaussians each by a network that sees all anchors and a latent. Splats are in
-/// the cube of side 1 around the origin or up to 0.75 of their spread outside it, z up.
+/// the cube of side 1 around the origin or up to 0.75 of their spread outside it, z up, and then
+/// where the latent's placement has them.
 class LatentDecoder final : public Decoder {
  public:
   /// In: run: how the network is run; its progress is not looked at.
@@ -22,8 +23,8 @@ class LatentDecoder final : public Decoder {
   SplatCloud decode(const DecodeRequest& request) const override;
   uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
 
-  /// What decode() does behind the network. In: points [rows,3] in the unit cube; features, as the
-  /// network returns them.
+  /// What decode() does behind the network, without the placement. In: points [rows,3] in the unit
+  /// cube; features, as the network returns them.
   SplatCloud splatsOf(std::span<const float> points, std::span<const float> features) const;
 
  private:
@@ -31,5 +32,8 @@ class LatentDecoder final : public Decoder {
   std::shared_ptr<const Latent> latent_;
   NetworkRun run_;
 };
+
+/// Moves splats of the networks to where they shall stand.
+void place(const LatentPlacement& placement, SplatCloud& cloud);
 
 }  // namespace stipple

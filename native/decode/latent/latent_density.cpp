@@ -19,6 +19,11 @@ LatentDensity::LatentDensity(std::shared_ptr<const OctreeNetwork> network,
                                           std::to_string(kMaxLeafLevel));
   }
   requireLatent(*latent_, network_->latentWidth());
+  const LatentPlacement& placement = latent_->placement;
+  root_.side = placement.scale;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    root_.origin[axis] = placement.offset[axis] - placement.scale / 2;
+  }
   run_.progress = nullptr;
 }
 

@@ -8,9 +8,10 @@
 
 namespace stipple {
 
-/// The density of a latent's object over the cube of side 1 around the origin, as a network tells
-/// it. What cells see of the latent is computed at the first question and kept: 2 * width floats
-/// for each token and block (256 MiB for the published network and 8,192 tokens).
+/// The density of a latent's object over the cube of side 1 around the origin, or where the
+/// latent's placement has that cube, as a network tells it. What cells see of the latent is
+/// computed at the first question and kept: 2 * width floats for each token and block (256 MiB for
+/// the published network and 8,192 tokens).
 class LatentDensity final : public DensityModel {
  public:
   /// In: run: how the network is run; its progress is not looked at.
@@ -34,7 +35,7 @@ class LatentDensity final : public DensityModel {
   std::shared_ptr<const Latent> latent_;
   NetworkRun run_;
   int leaf_level_;
-  RootCube root_ = {{-0.5, -0.5, -0.5}, 1.0};
+  RootCube root_;
   mutable std::mutex mutex_;  // of keys_
   mutable std::shared_ptr<const OctreeNetwork::Keys> keys_;
 };

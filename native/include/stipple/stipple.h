@@ -89,6 +89,10 @@ void stipple_context_options_init(StippleContextOptions* options);
 /* options may be NULL (defaults). The environment variable STIPPLE_BACKEND names what draws and fits;
    not set: "cpu". Errors: STIPPLE_ERROR_INVALID_ARGUMENT for a name that the library does not have. */
 StippleStatus stipple_context_create(const StippleContextOptions* options, StippleContext** context);
+/* Says where files of networks' weights lie, for assets that name theirs and do not hold it (STIPPLE_MODEL_LATENT).
+ * It holds for what is loaded from then on. NULL: the folder that the environment variable STIPPLE_WEIGHTS names, as
+ * it is in a context where this was never called. */
+StippleStatus stipple_context_set_weights_folder(StippleContext* context, const char* folder_utf8);
 void stipple_context_free(StippleContext* context);
 
 /* ---- jobs -------------------------------------------------------------------------------------- */
@@ -524,7 +528,8 @@ void stipple_model_from_cloud_options_init(StippleModelFromCloudOptions* options
 typedef enum StippleModelKind {
   STIPPLE_MODEL_SURFACE = 0,  /* of a mesh: density and surface */
   STIPPLE_MODEL_HIERARCHY = 1, /* of a cloud: its merge tree; any budget up to its count */
-  STIPPLE_MODEL_FIELD = 2     /* learned from views: density and a field of attributes */
+  STIPPLE_MODEL_FIELD = 2,    /* learned from views: density and a field of attributes */
+  STIPPLE_MODEL_LATENT = 3    /* generated: a latent that two networks turn into a density and splats */
 } StippleModelKind;
 
 typedef struct StippleModelInfo {
@@ -599,7 +604,9 @@ StippleStatus stipple_model_from_cloud_start(StippleContext* context, const Stip
                                              StippleJob** job);
 /* Reads an asset file (docs/formats.md). Tensors and metadata of a newer minor version are kept with the model as
  * it was loaded and saved with it; models made from it do not have them.
- * Errors: UNSUPPORTED for a newer major version; FORMAT with what is wrong. */
+ * Errors: UNSUPPORTED for a newer major version; FORMAT with what is wrong; UNAVAILABLE where it names a file of
+ * weights that is not in the context's weights folder.
+ * Cost: files of weights are read once in a process, to compare their SHA-256. */
 StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8, StippleModel** model);
 /* This does the same as a job (stipple_job_model). */
 StippleStatus stipple_model_load_start(StippleContext* context, const char* path_utf8, StippleJob** job);
@@ -2181,7 +2188,7 @@ typedef struct StippleWeightsInfo {
 } StippleWeightsInfo;
 
 /* Looks through a folder and its subfolders and tells files apart by the names of their tensors: what they are called
- * and where they lie does not matter. Reads their headers alone.
+ * and where they lie does not matter. Reads their headers alone. folder_utf8: NULL for the context's weights folder.
  * Errors: IO for a folder that cannot be read; INVALID_ARGUMENT for one with more than 20,000 files and folders. */
 StippleStatus stipple_weights_find(StippleContext* context, const char* folder_utf8, StippleWeights** weights);
 void stipple_weights_free(StippleWeights* weights);
@@ -2193,6 +2200,89 @@ StippleStatus stipple_weights_note(const StippleWeights* weights, uint64_t index
 /* Compares the files' SHA-256 with the published ones, as a job (stipple_job_weights). A file that this process has
  * read before, with the same path, size and time, is not read again. Cost: about 4 GB are read. */
 StippleStatus stipple_weights_check_start(const StippleWeights* weights, StippleJob** job);
+
+/* ---- splats from an image ---------------------------------------------------------------------- */
+
+typedef enum StippleNoiseSource {
+  STIPPLE_NOISE_KEYED = 0,    /* the same on every machine */
+  STIPPLE_NOISE_TORCH_CPU = 1 /* what PyTorch draws on a CPU, to repeat somebody's run */
+} StippleNoiseSource;
+
+typedef struct StippleGenerateOptions {
+  uint32_t struct_size;
+  uint32_t steps;            /* from noise to the object, 1..1000, default 20; time grows with them */
+  uint32_t token_count;      /* of the latent, 1..65536, default 8192; published networks know 1024..8192 */
+  uint32_t canvas_size;      /* pixels of the image that networks see, a multiple of 16, 32..2048, default 1024 */
+  uint32_t erode_radius;     /* pixels that the mask shrinks by, 0..64, default 1 */
+  uint32_t noise_source;     /* StippleNoiseSource, default keyed */
+  uint32_t uses_mean_colour; /* 1: no noise on what the colour encoder says; default 0 */
+  uint32_t watches_layers;   /* 1: stages have every layer of the encoders too; default 0 */
+  uint32_t reserved;
+  uint32_t preview_steps;    /* a preview after every so many steps; 0, the default: none */
+  uint64_t preview_anchors;  /* of a preview, and of the splats that the size is measured at, default 256 */
+  uint64_t seed;             /* of all noise, default 42 */
+  double guidance;           /* 0..100, default 3; 1 and less: half as many runs of the network */
+  double shift;              /* 0.01..100, default 3; above 1 more steps are taken where there is much noise */
+  double size;               /* metres, default 1: the largest side of the object, which stands on the origin with the
+                                middle of its base; 0: as the networks have it */
+  const char* weights_folder_utf8;  /* NULL, the default: the context's (stipple_context_set_weights_folder) */
+  const char* checkpoint_path_utf8; /* NULL, the default: none. A file that keeps the state after every step; the same
+                                       image, settings and weights go on from it, and others are refused. It stays */
+} StippleGenerateOptions;
+void stipple_generate_options_init(StippleGenerateOptions* options);
+
+typedef struct StippleGenerateEstimate {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t bytes;        /* of memory, about; weights are read from their files while they are used */
+  uint64_t weight_bytes; /* of those files */
+  double seconds;        /* about, on this machine */
+  double operations;     /* multiplications and additions */
+} StippleGenerateEstimate;
+
+typedef struct StippleGenerateFigures {
+  uint32_t struct_size;
+  uint32_t step;         /* steps that are done */
+  uint32_t steps;
+  uint32_t resumed_step; /* where it went on from a checkpoint; 0: it began */
+  uint32_t preview_step; /* of the newest preview; 0: none yet */
+  uint32_t stage_count;  /* of stipple_generate_stage */
+  double seconds;
+  double seconds_left;   /* by the steps that are done; 0: not known yet */
+} StippleGenerateFigures;
+
+/* What passed by at one place of the networks. */
+typedef struct StippleGenerateStage {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t count;
+  double minimum;
+  double maximum;
+  double mean;
+  double deviation;
+  double seconds;        /* from the stage before to this one */
+  const char* name_utf8; /* "step3.latent"; lives as long as the job */
+} StippleGenerateStage;
+
+/* Turns the object in an image into a latent, which decodes to splats at any budget (stipple_job_model), as a job.
+ * In: image: RGB or RGBA; mask: NULL, or an image of any size that is opaque or white on the object and is used in
+ * place of the image's alpha.
+ * The object comes out upright (z up), its pictured side towards +x.
+ * Errors: INVALID_ARGUMENT for files of weights that are missing, for an image that is opaque everywhere without a
+ * mask, and for one whose mask leaves nothing; FORMAT for networks that do not fit together; MEMORY_LIMIT.
+ * Threads and determinism: the same result for any number of threads.
+ * Cost: stipple_generate_estimate. Source: arXiv 2605.16355 and its released code. */
+StippleStatus stipple_generate_start(StippleContext* context, const StippleImage* image, const StippleImage* mask,
+                                     const StippleGenerateOptions* options, StippleJob** job);
+/* What such a job takes on this machine, about. The machine's speed is measured when a process asks first (a fifth of a
+ * second). Errors: as stipple_generate_start, of options and weights. */
+StippleStatus stipple_generate_estimate(StippleContext* context, const StippleGenerateOptions* options,
+                                        StippleGenerateEstimate* estimate);
+/* How a job of stipple_generate_start is doing. Never waits. */
+StippleStatus stipple_generate_figures(const StippleJob* job, StippleGenerateFigures* figures);
+StippleStatus stipple_generate_stage(const StippleJob* job, uint32_t index, StippleGenerateStage* stage);
+/* *cloud: the newest preview, which is given once; NULL where there is no newer one. Never waits. */
+StippleStatus stipple_generate_preview(StippleJob* job, StippleCloud** cloud);
 
 #ifdef __cplusplus
 }

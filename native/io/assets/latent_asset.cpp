@@ -13,8 +13,8 @@ namespace {
 
 constexpr char kTokens[] = "latent.tokens";
 constexpr char kCamera[] = "latent.camera";
-constexpr size_t kHashDigits = 64;
-constexpr size_t kLongestName = 255;
+// Scale and offset; files whose object lies as the networks have it do not have it.
+constexpr char kPlacement[] = "latent.placement";
 
 void requireNumbers(std::span<const float> values, const std::string& name, const char* tensor,
                     ErrorCode code) {
@@ -22,24 +22,6 @@ void requireNumbers(std::span<const float> values, const std::string& name, cons
     if (std::isfinite(value)) continue;
     fail(code, name + ": tensor " + tensor + " holds " + std::to_string(value) +
                    "; every value must be a finite number");
-  }
-}
-
-void validateWeights(const WeightsReference& weights, const std::string& name, ErrorCode code) {
-  // It is looked for in a folder of the user's, and nowhere else.
-  const bool is_name = !weights.name.empty() && weights.name.size() <= kLongestName &&
-                       weights.name.find_first_of(std::string("/\\\0", 3)) == std::string::npos &&
-                       weights.name != "." && weights.name != "..";
-  if (!is_name) {
-    fail(code, name + " names its file of weights '" + weights.name.substr(0, 60) +
-                   "'; a file name without folders is needed");
-  }
-  if (weights.bytes == 0) fail(code, name + " says that its file of weights has 0 bytes");
-  const bool is_hash = weights.sha256.size() == kHashDigits &&
-                       weights.sha256.find_first_not_of("0123456789abcdef") == std::string::npos;
-  if (!is_hash) {
-    fail(code, name + " has the weights_sha256 '" + weights.sha256.substr(0, 70) +
-                   "'; 64 hexadecimal digits in lower case are needed");
   }
 }
 
@@ -55,7 +37,27 @@ void validateAsset(const LatentAsset& asset, const std::string& name, ErrorCode 
   }
   requireNumbers(latent.tokens, name, kTokens, code);
   requireNumbers(latent.camera, name, kCamera, code);
-  validateWeights(asset.weights, name, code);
+  const LatentPlacement& placement = latent.placement;
+  bool is_placed = std::isfinite(placement.scale) && placement.scale > 0;
+  for (const double offset : placement.offset) is_placed = is_placed && std::isfinite(offset);
+  if (!is_placed) {
+    fail(code, name + " has a tensor " + kPlacement +
+                   " that no object stands by; a scale above 0 and a finite offset are needed");
+  }
+  validate(asset.weights, name, code);
+}
+
+LatentPlacement readPlacement(const SafeTensorsReader& file) {
+  LatentPlacement placement;
+  if (!file.tensors().contains(kPlacement)) return placement;
+  const Tensor stored = file.readTensor(kPlacement);
+  const auto* values = std::get_if<std::vector<double>>(&stored.values);
+  if (values == nullptr || values->size() != 4) {
+    fail(ErrorCode::kFormat, file.path() + ": tensor " + kPlacement + " is not F64 of shape [4]");
+  }
+  placement.scale = (*values)[0];
+  std::copy(values->begin() + 1, values->end(), placement.offset.begin());
+  return placement;
 }
 
 Latent readLatent(const SafeTensorsReader& file) {
@@ -77,6 +79,7 @@ Latent readLatent(const SafeTensorsReader& file) {
                                  std::to_string(camera.size()) + " numbers; 5 are needed");
   }
   std::copy(camera.begin(), camera.end(), latent.camera.begin());
+  latent.placement = readPlacement(file);
   return latent;
 }
 
@@ -94,6 +97,10 @@ void writeLatentAsset(const LatentAsset& asset, const std::string& path) {
   const std::vector<float> camera(asset.latent.camera.begin(), asset.latent.camera.end());
   file.add(kTokens, asset.latent.tokens, asset.latent.width);
   file.add(kCamera, camera, 1);
+  const LatentPlacement& where = asset.latent.placement;
+  const Tensor placement = {
+      {4}, std::vector<double>{where.scale, where.offset[0], where.offset[1], where.offset[2]}};
+  if (where.scale != 1 || where.offset != std::array<double, 3>{}) file.add(kPlacement, placement);
   addAssetExtras(file, asset.extras);
   file.write(path);
 }

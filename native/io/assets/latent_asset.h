@@ -5,16 +5,9 @@
 
 #include "data/latent.h"
 #include "io/assets/asset_header.h"
+#include "io/assets/weights_reference.h"
 
 namespace stipple {
-
-/// Which file of weights a latent was made for. Assets name it and do not hold it, since it is a
-/// thousand times their size and the same for all latents.
-struct WeightsReference {
-  std::string name;    ///< of the file, without folders
-  uint64_t bytes = 0;  ///< its size
-  std::string sha256;  ///< of its content, 64 hexadecimal digits in lower case
-};
 
 /// The stored parts of a latent: io knows arrays, not networks.
 struct LatentAsset {

@@ -68,29 +68,6 @@ WeightsFile statusOf(const fs::path& path) {
   return file;
 }
 
-/// All safetensors files below a folder, by path.
-std::vector<fs::path> filesBelow(const std::string& folder) {
-  std::vector<fs::path> paths;
-  std::error_code error;
-  size_t entries = 0;
-  fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, error);
-  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
-    if (++entries > kMaxEntries) {
-      fail(ErrorCode::kInvalidArgument,
-           "'" + folder + "' holds more than " + std::to_string(kMaxEntries) +
-               " files and folders; choose the folder that the files of weights are in");
-    }
-    if (at.depth() >= kMaxDepth) at.disable_recursion_pending();
-    std::error_code ignored;
-    if (lowerExtension(at->path().string()) == ".safetensors" && at->is_regular_file(ignored)) {
-      paths.push_back(at->path());
-    }
-  }
-  if (error) fail(ErrorCode::kIo, "'" + folder + "' cannot be read: " + error.message());
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
 /// Whether a file is a better one for its role than what was found before it.
 bool isBetter(const WeightsFile& file, const WeightsFile& before, const PublishedWeights& role) {
   return before.path.empty() || (file.bytes == role.bytes && before.bytes != role.bytes);
@@ -146,14 +123,36 @@ std::optional<WeightsRole> weightsRole(std::span<const std::string> tensor_names
   return std::nullopt;
 }
 
+std::vector<std::string> weightFilesBelow(const std::string& folder) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  size_t entries = 0;
+  fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, error);
+  for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
+    if (++entries > kMaxEntries) {
+      fail(ErrorCode::kInvalidArgument,
+           "'" + folder + "' holds more than " + std::to_string(kMaxEntries) +
+               " files and folders; choose the folder that the files of weights are in");
+    }
+    if (at.depth() >= kMaxDepth) at.disable_recursion_pending();
+    std::error_code ignored;
+    if (lowerExtension(at->path().string()) == ".safetensors" && at->is_regular_file(ignored)) {
+      paths.push_back(at->path().string());
+    }
+  }
+  if (error) fail(ErrorCode::kIo, "'" + folder + "' cannot be read: " + error.message());
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
 WeightsFolder findWeights(const std::string& folder) {
   WeightsFolder found;
   found.path = folder;
   std::array<size_t, kWeightsRoleCount> counts = {};
-  for (const fs::path& path : filesBelow(folder)) {
+  for (const std::string& path : weightFilesBelow(folder)) {
     std::vector<std::string> names;
     try {
-      const SafeTensorsReader reader(path.string());
+      const SafeTensorsReader reader(path);
       for (const auto& [name, tensor] : reader.tensors()) names.push_back(name);
     } catch (const Error& error) {
       found.notes.push_back(std::string(error.what()) + ".");

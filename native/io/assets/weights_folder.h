@@ -63,6 +63,9 @@ std::optional<WeightsRole> weightsRole(std::span<const std::string> tensor_names
 /// entries to be a folder of weights.
 WeightsFolder findWeights(const std::string& folder);
 
+/// All safetensors files in a folder and its subfolders, by path. Errors: those of findWeights().
+std::vector<std::string> weightFilesBelow(const std::string& folder);
+
 /// The file of a role. Errors: kInvalidArgument where it is missing, with what to do.
 const WeightsFile& requireWeights(const WeightsFolder& folder, WeightsRole role);
 

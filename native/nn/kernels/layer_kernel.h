@@ -18,6 +18,8 @@ struct SoftmaxRow {
   float sum = 0.0f;                 ///< of exponentials so far, relative to the peak
   float* out = nullptr;             ///< [width] so far; brought to the new peak
   size_t width = 0;
+  /// [keys], or null. Exponentials go there rounded to bfloat16, and scores may keep anything.
+  uint16_t* narrow = nullptr;
 };
 
 /// What layers do to numbers one by one, on this thread.

@@ -39,6 +39,13 @@ void siluGateScalar(size_t count, const float* gate, const float* up, float* out
   }
 }
 
+void narrowScalar(size_t count, const float* from, uint16_t* to) {
+  for (size_t i = 0; i < count; ++i) {
+    const auto bits = std::bit_cast<uint32_t>(from[i]);
+    to[i] = static_cast<uint16_t>((bits + 0x7fffu + ((bits >> 16) & 1u)) >> 16);
+  }
+}
+
 void softmaxScalar(SoftmaxRow& row) {
   float peak = row.peak;
   for (size_t i = 0; i < row.keys; ++i) {
@@ -51,17 +58,11 @@ void softmaxScalar(SoftmaxRow& row) {
     row.scores[i] = std::exp(row.scores[i] - peak);
     sum += row.scores[i];
   }
+  if (row.narrow != nullptr) narrowScalar(row.keys, row.scores, row.narrow);
   const float shrink = std::exp(row.peak - peak);
   row.peak = peak;
   row.sum = row.sum * shrink + sum;
   for (size_t i = 0; i < row.width; ++i) row.out[i] *= shrink;
-}
-
-void narrowScalar(size_t count, const float* from, uint16_t* to) {
-  for (size_t i = 0; i < count; ++i) {
-    const auto bits = std::bit_cast<uint32_t>(from[i]);
-    to[i] = static_cast<uint16_t>((bits + 0x7fffu + ((bits >> 16) & 1u)) >> 16);
-  }
 }
 
 }  // namespace

@@ -145,6 +145,33 @@ HWY_INLINE Vec expOfNotPositive(Tag d, Vec t) {
   return hn::IfThenElseZero(hn::Ge(power, lowest), hn::BitCast(d, bits));
 }
 
+using Half = hn::Rebind<uint16_t, Tag>;
+
+/// To the nearest bfloat16, of two as near the even one.
+HWY_INLINE hn::Vec<Half> narrowOf(Tag, Vec values) {
+  const hn::RebindToUnsigned<Tag> whole;
+  const auto bits = hn::BitCast(whole, values);
+  const auto is_odd = hn::And(hn::ShiftRight<16>(bits), hn::Set(whole, 1u));
+  const auto rounded = hn::Add(hn::Add(bits, hn::Set(whole, 0x7fffu)), is_odd);
+  return hn::TruncateTo(Half(), hn::ShiftRight<16>(rounded));
+}
+
+void narrowVector(size_t count, const float* from, uint16_t* to) {
+  const Tag d;
+  const Half half;
+  const size_t lanes = hn::Lanes(d);
+  size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    hn::StoreU(narrowOf(d, hn::LoadU(d, from + i)), half, to + i);
+  }
+  if (i == count) return;
+  HWY_ALIGN float rest[hn::MaxLanes(d)] = {};
+  HWY_ALIGN uint16_t halves[hn::MaxLanes(d)];
+  std::copy(from + i, from + count, rest);
+  hn::Store(narrowOf(d, hn::Load(d, rest)), half, halves);
+  std::copy_n(halves, count - i, to + i);
+}
+
 void softmaxVector(SoftmaxRow& row) {
   const Tag d;
   const size_t lanes = hn::Lanes(d);
@@ -181,11 +208,16 @@ void softmaxVector(SoftmaxRow& row) {
     const Vec power =
         expOfNotPositive(d, hn::Sub(scored(hn::LoadU(d, row.scores + i), bias), peak));
     sums = hn::Add(sums, power);
-    hn::StoreU(power, d, row.scores + i);
+    if (row.narrow != nullptr) {
+      hn::StoreU(narrowOf(d, power), Half(), row.narrow + i);
+    } else {
+      hn::StoreU(power, d, row.scores + i);
+    }
   }
   if (rest > 0) {
     hn::Store(expOfNotPositive(d, hn::Sub(last, peak)), d, edge);
     std::copy_n(edge, rest, row.scores + whole);
+    if (row.narrow != nullptr) narrowVector(rest, edge, row.narrow + whole);
     std::fill(edge + rest, edge + lanes, 0.0f);
     sums = hn::Add(sums, hn::Load(d, edge));
   }
@@ -199,29 +231,6 @@ void softmaxVector(SoftmaxRow& row) {
     hn::StoreU(hn::Mul(hn::LoadU(d, row.out + i), shrink), d, row.out + i);
   }
   for (; i < row.width; ++i) row.out[i] *= factor;
-}
-
-void narrowVector(size_t count, const float* from, uint16_t* to) {
-  const Tag d;
-  const hn::RebindToUnsigned<Tag> whole;
-  const hn::Rebind<uint16_t, Tag> half;
-  const size_t lanes = hn::Lanes(d);
-  const auto narrowed = [&](Vec values) {
-    const auto bits = hn::BitCast(whole, values);
-    const auto is_odd = hn::And(hn::ShiftRight<16>(bits), hn::Set(whole, 1u));
-    const auto rounded = hn::Add(hn::Add(bits, hn::Set(whole, 0x7fffu)), is_odd);
-    return hn::TruncateTo(half, hn::ShiftRight<16>(rounded));
-  };
-  size_t i = 0;
-  for (; i + lanes <= count; i += lanes) {
-    hn::StoreU(narrowed(hn::LoadU(d, from + i)), half, to + i);
-  }
-  if (i == count) return;
-  HWY_ALIGN float rest[hn::MaxLanes(d)] = {};
-  HWY_ALIGN uint16_t halves[hn::MaxLanes(d)];
-  std::copy(from + i, from + count, rest);
-  hn::Store(narrowed(hn::Load(d, rest)), half, halves);
-  std::copy_n(halves, count - i, to + i);
 }
 
 /// Highway's own one-lane target is not the plain kernel, which has the name "scalar".

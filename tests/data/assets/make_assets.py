@@ -113,8 +113,18 @@ def whole_field():
            'provenance': 'written by hand'}, tensors)
 
 
+def latent():
+    tensors = {'latent.tokens': f32(numbers(6, 4, 1)), 'latent.camera': f32(numbers(5, 1, 2)[:, 0]),
+               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+    write('latent_1.0.stipple.safetensors',
+          {'stipple_version': '1.0', 'kind': 'latent', 'frame': 'right-handed, z up, unit cube',
+           'weights_file': 'decoder.safetensors', 'weights_bytes': '576148442', 'weights_sha256': '0123456789abcdef' * 4,
+           'settings': '{"seed": 42}', 'provenance': 'written by hand'}, tensors)
+
+
 if __name__ == '__main__':
     surface()
     hierarchy()
     field()
     whole_field()
+    latent()

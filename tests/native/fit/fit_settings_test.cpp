@@ -136,8 +136,7 @@ TEST(FitSettings, AFitGoesOnWithNothingElseChanged) {
       std::ostringstream wanted;
       wanted << "a.checkpoint is of a fit whose " << option.name << " was "
              << fitValueText(option, other) << "; now it is "
-             << fitValueText(option, option.member.get(options))
-             << ", and resuming needs the same";
+             << fitValueText(option, option.member.get(options)) << ", and resuming needs the same";
       EXPECT_EQ(messageOf(resume, ErrorCode::kInvalidArgument), wanted.str());
     }
   }

@@ -3,13 +3,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
@@ -22,6 +19,7 @@
 #include "generate/image_condition.h"
 #include "generate/image_preparation.h"
 #include "generate/made_encoders.h"
+#include "generate/peak_memory.h"
 #include "generate/vae_encoder.h"
 
 namespace stipple {
@@ -201,42 +199,22 @@ TEST(VaeEncoder, RefusesOtherNetworksAndSizes) {
   EXPECT_NE(encode(8, 8, std::vector<float>(32, std::numeric_limits<float>::quiet_NaN())), "");
 }
 
-/// Bytes of memory that no file lies behind.
-size_t ownMemory() {
-  std::ifstream file("/proc/self/statm");
-  size_t total = 0, resident = 0, shared = 0;
-  file >> total >> resident >> shared;
-  return (resident - shared) * static_cast<size_t>(sysconf(_SC_PAGESIZE));
-}
-
 TEST(VaeEncoder, TakesTwoMapsOfItsFirstLevel) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "the sanitizer's own memory would be measured";
 #endif
   const VaeEncoder encoder(madeVae({128, 128, 128, 128}, 8).table());
   const std::vector<float> rgb = picture(256, 256);
-  size_t most = 0, before = 0;
-  withThreads(2, [&] {
-    before = ownMemory();
-    std::atomic<bool> is_done{false};
-    std::thread watch([&] {
-      while (!is_done.load()) {
-        most = std::max(most, ownMemory());
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      }
-    });
-    encoder.encode({}, rgb, 256, 256, {});
-    is_done = true;
-    watch.join();
-  });
-  const size_t maps = 2 * 4 * size_t{256} * 256 * 128;
+  uint64_t peak = 0;
+  withThreads(2, [&] { peak = peakMemoryOf([&] { encoder.encode({}, rgb, 256, 256, {}); }); });
+  const uint64_t maps = 2 * 4 * uint64_t{256} * 256 * 128;
   // Weights of a layer packed, 0.6 MiB, and the same again for each thread that packs; 96 rows of
   // 1152 inputs, a tile of 10 x 26 x 128 and its sums, 0.7 MB, for each of two threads; what the
   // store of scratch memory keeps beside them, at most 64 MiB but no more than was in use; the
   // allocator's rounding.
-  const size_t others = size_t{16} << 20;
-  EXPECT_GT(most - before, maps);  // else this measures nothing
-  EXPECT_LT(most - before, maps + others);
+  const uint64_t others = uint64_t{16} << 20;
+  EXPECT_GT(peak, maps);  // else this measures nothing
+  EXPECT_LT(peak, maps + others);
 }
 
 TEST(Encoders, StopWithinASecondWhenCancelled) {

@@ -3,14 +3,10 @@
 #include "generate/flow_network.h"
 
 #include <gtest/gtest.h>
-#include <malloc.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
@@ -22,6 +18,7 @@
 #include "base/progress.h"
 #include "flow_golden.h"
 #include "generate/flow_sampler.h"
+#include "generate/peak_memory.h"
 #include "generate/seeded_noise.h"
 #include "generate/sobol_points.h"
 
@@ -191,14 +188,6 @@ TEST(FlowNetwork, GivesTheSameBitsForAnyNumberOfThreads) {
   expectSameLatents(velocities[2], velocities[0]);
 }
 
-/// Bytes of memory that no file lies behind.
-uint64_t ownMemory() {
-  std::ifstream file("/proc/self/statm");
-  uint64_t total = 0, resident = 0, shared = 0;
-  file >> total >> resident >> shared;
-  return (resident - shared) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
-}
-
 TEST(FlowNetwork, TakesNoMoreMemoryThanItsBound) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "the sanitizer's own memory would be measured";
@@ -208,26 +197,15 @@ TEST(FlowNetwork, TakesNoMoreMemoryThanItsBound) {
   const FlowContext context = network.context({}, flowCondition());
   const GenerationNoise noise = drawNoise({.tokens = kTokens * 16}, {});
   const Latent state = startSampling(network, kTokens, noise, {}).latent;
-  uint64_t before = 0, most = 0, bound = 0;
+  uint64_t bound = 0, peak = 0;
   withThreads(2, [&] {
     bound = network.memoryBound(kTokens, context.rows);
-    malloc_trim(0);  // what earlier tests have freed and the allocator has kept
-    before = ownMemory();
-    std::atomic<bool> is_done{false};
-    std::thread watch([&] {
-      while (!is_done) {
-        most = std::max(most, ownMemory());
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      }
-    });
-    velocityOf(network, state, 0.5, context);
-    is_done = true;
-    watch.join();
+    peak = peakMemoryOf([&] { velocityOf(network, state, 0.5, context); });
   });
   // Large arrays take whole pages of 2 MiB, of which there are five; the result comes on top.
   const uint64_t rounding = (5 * uint64_t{2} << 20) + kTokens * 16 * sizeof(float);
-  EXPECT_GT(most - before, bound / 2);  // else this measures nothing
-  EXPECT_LE(most - before, bound + rounding);
+  EXPECT_GT(peak, bound / 2);  // else this measures nothing
+  EXPECT_LE(peak, bound + rounding);
 }
 
 TEST(FlowNetwork, StopsWithinASecondAtAnyMoment) {

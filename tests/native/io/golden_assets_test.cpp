@@ -7,6 +7,7 @@
 
 #include "io/assets/field_asset.h"
 #include "io/assets/hierarchy_asset.h"
+#include "io/assets/latent_asset.h"
 #include "io/assets/surface_asset.h"
 #include "scratch_folder.h"
 
@@ -143,6 +144,27 @@ TEST_F(GoldenAssets, ReadsAFieldOfVersion1AndKeepsAllOfIt) {
   expectField(asset);
   writeFieldAsset(asset, path("again"));
   expectField(readFieldAsset(path("again")));
+}
+
+void expectLatent(const LatentAsset& asset) {
+  EXPECT_EQ(asset.latent.token_count, 6u);
+  EXPECT_EQ(asset.latent.width, 4u);
+  EXPECT_EQ(asset.latent.tokens, numbers(6, 4, 1));
+  EXPECT_EQ(std::vector<float>(asset.latent.camera.begin(), asset.latent.camera.end()),
+            numbers(5, 1, 2));
+  EXPECT_EQ(asset.weights.name, "decoder.safetensors");
+  EXPECT_EQ(asset.weights.bytes, 576148442u);
+  EXPECT_EQ(asset.weights.sha256,
+            "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef");
+  EXPECT_EQ(asset.settings_json, "{\"seed\": 42}");
+  expectExtras(asset.extras);
+}
+
+TEST_F(GoldenAssets, ReadsALatentOfVersion1AndKeepsAllOfIt) {
+  const LatentAsset asset = readLatentAsset(golden("latent_1.0"));
+  expectLatent(asset);
+  writeLatentAsset(asset, path("again"));
+  expectLatent(readLatentAsset(path("again")));
 }
 
 TEST_F(GoldenAssets, ReadsAFieldThatSaysHowItsAnchorsAreDrawn) {

@@ -8,10 +8,12 @@
 #include "decode/test_clouds.h"
 #include "decode/test_meshes.h"
 #include "decode/tree/merge_tree.h"
+#include "io/scratch_folder.h"
 #include "model/field_splats.h"
 #include "model/hierarchy_splats.h"
 #include "model/splat_model.h"
 #include "model/surface_splats.h"
+#include "small_latent.h"
 #include "train/allocation_count.h"
 
 namespace stipple {
@@ -151,6 +153,22 @@ TEST(DecodeMemory, OfFieldsIsBoundTightly) {
       expectTight(std::to_string(degree) + " with " + std::to_string(gaussians),
                   useOf(*model, 20000, gaussians));
     }
+  }
+}
+
+class DecodeMemoryOfLatents : public ScratchFolder {};
+
+TEST_F(DecodeMemoryOfLatents, IsWithinTheBound) {
+  // Keys and values of the latent are made by the first decode and stay.
+  const std::string golden = STIPPLE_TEST_DATA "/networks/deg_pipeline_a.safetensors";
+  for (const uint64_t budget : {32u, 2048u, 10000u}) {
+    const Model model = test::smallLatent(golden, folder_.string());
+    const Use use = useOf(*model, budget, 32);
+    EXPECT_GE(use.bound, use.peak) << budget;
+    // What each thread packs and 24 MiB of the sampler are constant, and much beside a network of
+    // 64 channels.
+    constexpr uint64_t kConstant = uint64_t{96} << 20;
+    EXPECT_LE(use.bound, 2 * use.peak + kConstant) << budget;
   }
 }
 

@@ -18,6 +18,7 @@ TEST_F(ModelKinds, HaveTheNumbersOfTheHeader) {
   EXPECT_EQ(modelKind("surface").number, static_cast<uint32_t>(STIPPLE_MODEL_SURFACE));
   EXPECT_EQ(modelKind("hierarchy").number, static_cast<uint32_t>(STIPPLE_MODEL_HIERARCHY));
   EXPECT_EQ(modelKind("field").number, static_cast<uint32_t>(STIPPLE_MODEL_FIELD));
+  EXPECT_EQ(modelKind("latent").number, static_cast<uint32_t>(STIPPLE_MODEL_LATENT));
 }
 
 TEST_F(ModelKinds, HaveNamesAndNumbersOfTheirOwn) {
@@ -36,15 +37,15 @@ TEST_F(ModelKinds, ReadersRefuseAssetsOfAnotherKind) {
   file.write(path("nothing"));
   for (const ModelKind& kind : modelKinds()) {
     expectError(ErrorCode::kUnsupported, {kind.name, "'nothing'"},
-                [&] { kind.read(path("nothing")); });
+                [&] { kind.read(path("nothing"), {}); });
   }
 }
 
 TEST_F(ModelKinds, ThatNobodyKnowsAreRefusedWithThoseThatCanBeRead) {
   SafeTensorsWriter file;
-  setAssetKind(file, "latent");
+  setAssetKind(file, "later");
   file.write(path("later"));
-  expectError(ErrorCode::kUnsupported, {"'latent'", "'surface', 'hierarchy', 'field"},
+  expectError(ErrorCode::kUnsupported, {"'later'", "'surface', 'hierarchy', 'field', 'latent'"},
               [&] { loadModel(path("later")); });
 }
 

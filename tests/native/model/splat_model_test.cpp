@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "decode/field/field_parameters.h"
@@ -14,6 +15,7 @@
 #include "model/hierarchy_splats.h"
 #include "model/model_kinds.h"
 #include "model/surface_splats.h"
+#include "small_latent.h"
 
 namespace stipple {
 namespace {
@@ -53,9 +55,16 @@ std::shared_ptr<const SplatModel> field(bool nested) {
                          {true, nested, 7});
 }
 
-std::vector<std::shared_ptr<const SplatModel>> allKinds() {
-  return {surface(), hierarchy(), field(true)};
-}
+/// Generated splats, and the folder that has their weights.
+class SplatModelOfEveryKind : public ScratchFolder {
+ protected:
+  std::vector<std::shared_ptr<const SplatModel>> allKinds() {
+    std::filesystem::create_directories(weights());
+    return {surface(), hierarchy(), field(true),
+            test::smallLatent(STIPPLE_TEST_DATA "/networks/deg_pipeline_a.safetensors", weights())};
+  }
+  std::string weights() const { return path("weights"); }
+};
 
 ModelRequest small() {
   ModelRequest request;
@@ -71,7 +80,7 @@ void expectSameSplats(const SplatCloud& one, const SplatCloud& other) {
   EXPECT_EQ(one.sh, other.sh);
 }
 
-TEST(SplatModel, OfEveryKindGivesTheSameBitsAtEveryTimeWhereNothingMoves) {
+TEST_F(SplatModelOfEveryKind, GivesTheSameBitsAtEveryTimeWhereNothingMoves) {
   for (const auto& model : allKinds()) {
     ASSERT_FALSE(model->settings().time) << model->kind();
     ModelRequest request = small();
@@ -84,7 +93,7 @@ TEST(SplatModel, OfEveryKindGivesTheSameBitsAtEveryTimeWhereNothingMoves) {
   }
 }
 
-TEST(SplatModel, RefusesATimeThatIsNotFinite) {
+TEST_F(SplatModelOfEveryKind, RefusesATimeThatIsNotFinite) {
   for (const auto& model : allKinds()) {
     ModelRequest request = small();
     request.time = std::numeric_limits<double>::quiet_NaN();
@@ -142,13 +151,11 @@ TEST(SplatModel, WithoutASettingGivesTheSameSplatsWhateverItsValue) {
   expectNoDifference(*hierarchy(), [](ModelRequest& request) { request.seed = 3; });
 }
 
-class StoredModel : public ScratchFolder {};
-
-TEST_F(StoredModel, OfEveryKindComesBackThroughTheTableWithTheSameSplats) {
+TEST_F(SplatModelOfEveryKind, ComesBackThroughTheTableWithTheSameSplats) {
   for (const auto& model : allKinds()) {
     const std::string file = path(model->kind());
     model->save(file);
-    const auto again = loadModel(file);
+    const auto again = loadModel(file, {weights(), nullptr});
     EXPECT_STREQ(again->kind(), model->kind());
     expectSameSplats(again->decode(small()), model->decode(small()));
     again->save(file + " again");

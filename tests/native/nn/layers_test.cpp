@@ -142,6 +142,29 @@ TEST(Softmax, EveryKernelAgreesWithDoubleOverSeveralTiles) {
   }
 }
 
+TEST(Softmax, EveryKernelRoundsToBfloat16WhereItIsAskedTo) {
+  for (const LayerKernel& kernel : layerKernels()) {
+    std::vector<float> scores = numbers(37, 3), same = scores;
+    std::vector<uint16_t> narrow(38, 0x1234), expected(37);
+    SoftmaxRow row;
+    row.peak = std::numeric_limits<float>::lowest();
+    row.keys = 37;
+    row.scores = same.data();
+    kernel.softmax(row);
+    kernel.narrow(37, same.data(), expected.data());
+    const float sum = row.sum;
+    row.peak = std::numeric_limits<float>::lowest();
+    row.sum = 0.0f;
+    row.scores = scores.data();
+    row.narrow = narrow.data();
+    kernel.softmax(row);
+    EXPECT_EQ(row.sum, sum) << kernel.target;
+    EXPECT_EQ(narrow.back(), 0x1234) << kernel.target;
+    narrow.pop_back();
+    EXPECT_EQ(narrow, expected) << kernel.target;
+  }
+}
+
 TEST(Softmax, EveryKernelTakesRowsWithoutAKey) {
   const float none = -std::numeric_limits<float>::infinity();
   for (const LayerKernel& kernel : layerKernels()) {

@@ -78,7 +78,7 @@ std::shared_ptr<const SplatModel> makeDriftingSplats(std::vector<float> velocity
   return std::make_shared<const DriftingSplats>(std::move(velocity), range);
 }
 
-std::shared_ptr<const SplatModel> readDriftingSplats(const std::string& path) {
+std::shared_ptr<const SplatModel> readDriftingSplats(const std::string& path, const ReadingAid&) {
   const SafeTensorsReader file(path);
   requireAssetKind(file, "drift");
   const auto time = timeOfSettings(requireText(file, "settings"), path).value_or(AssetTime());

@@ -2,7 +2,6 @@
 """What the weights folder has, as Preferences show it and keep it: no panel reads a file."""
 
 import json
-import os
 
 from ... import preferences
 from ...binding.errors import StippleError
@@ -23,8 +22,7 @@ NOT_TRIED = ("The structure of these networks was verified on small ones with ra
 
 def folder():
     """The weights folder of Preferences, '' for none."""
-    chosen = preferences.get()
-    return os.path.normpath(chosen.weights_folder) if chosen is not None and chosen.weights_folder else ''
+    return preferences.weights_folder()
 
 
 def rows():

@@ -10,7 +10,7 @@ import os
 import time
 import zlib
 from collections import OrderedDict
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -19,6 +19,7 @@ from ...binding import cloud_edit, library
 from ...binding.cloud import Cloud
 from ...binding.context import Context
 from ...binding.errors import StippleError
+from ...binding.job import Job
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import AnchorOrder, JobState, Status
 from .. import meshes
@@ -41,6 +42,7 @@ _stamps = {}
 _models = OrderedDict()
 _reading = {}  # jobs of models that were asked for, by the same keys
 _clouds = OrderedDict()
+_decoding = {}  # _Decoding of clouds that take long, by datablock
 _whole = {}  # the cloud of whole_cloud() that was asked for last: one edit of a source comes after another
 _whole_ahead = {}  # what is being read for it, by the same key
 
@@ -65,6 +67,7 @@ def context():
     if key not in _contexts:
         _contexts.clear()
         _contexts[key] = Context(library.load(path), threads, limit)
+    _contexts[key].set_weights_folder(preferences.weights_folder())
     return _contexts[key]
 
 
@@ -73,6 +76,9 @@ def forget():
     for job in _reading.values():
         job.close()
     _reading.clear()
+    for decoding in _decoding.values():
+        decoding.job.close()
+    _decoding.clear()
     _whole.clear()
     _whole_ahead.clear()
     _clouds.clear()
@@ -212,7 +218,7 @@ def decode(data, settings):
     """The cloud of a datablock's model at these settings; kept for the next image. Errors: StippleError, also for a
     source that has changed."""
     check_unchanged(data)
-    key = (_file_key(source_paths.file_of(data)) + (masks.key(data), erased.key(data)), settings)
+    key = _cloud_key(data, settings)
     cloud = _clouds.get(key)
     if cloud is None:
         cloud = _decoded(data, settings)
@@ -233,7 +239,64 @@ def decode_data(data, settings):
 
 
 def _decoded(data, settings):
-    return erased.read(data).applied(model_of(data).decode(settings))
+    decoding = _decoding.get(data.name_full)
+    if decoding is None or decoding.key != _cloud_key(data, settings):
+        return erased.read(data).applied(model_of(data).decode(settings))
+    del _decoding[data.name_full]
+    decoding.job.wait()
+    return erased.read(data).applied(Cloud.of_job(decoding.job))
+
+
+def _cloud_key(data, settings):
+    """What tells clouds apart."""
+    return _file_key(source_paths.file_of(data)) + (masks.key(data), erased.key(data)), settings
+
+
+@dataclass
+class _Decoding:
+    key: tuple
+    job: Job
+    ended: bool = False  # when is_decoding() asked last
+
+
+def is_decoded(data, settings, patience):
+    """Whether decode_data() will not take long. Where it would, decoding goes on in the library's own thread, for a
+    later call; what was being decoded for the datablock at other settings is cancelled. patience: seconds that are
+    waited for what begins now."""
+    if not source_settings.of(data.stipple).counts_anchors or data.stipple.is_sequence:
+        return True
+    decoding = _decoding.get(data.name_full)
+    try:
+        key = _cloud_key(data, settings)
+        if decoding is not None and decoding.key == key:
+            return not _is_running(decoding.job)
+        if decoding is not None:
+            _decoding.pop(data.name_full).job.close()
+        decoding = _decoding[data.name_full] = _Decoding(key, model_of(data).decode_start(settings))
+    except StippleError:
+        return True  # decoding says what is wrong
+    until = time.perf_counter() + patience
+    while _is_running(decoding.job):
+        if time.perf_counter() >= until:
+            return False
+        time.sleep(0.001)
+    return True
+
+
+def is_decoding():
+    """Whether clouds are being decoded that is_decoded() has been asked for. What nobody has taken since it was done is
+    forgotten."""
+    for name, decoding in list(_decoding.items()):
+        if decoding.ended:
+            del _decoding[name]
+        decoding.ended = not _is_running(decoding.job)
+    return bool(_decoding)
+
+
+def decoding_share(data):
+    """How much of a datablock's decoding is done, 0 to 1; None where none goes on."""
+    decoding = _decoding.get(data.name_full)
+    return None if decoding is None else decoding.job.poll()[1]
 
 
 def whole_cloud(data):
@@ -324,11 +387,11 @@ def seconds(stipple, scene=None):
     return frames * stipple.frame_speed * scene.render.fps_base / scene.render.fps
 
 
-def at_most(settings, most):
-    """The settings for that many splats at most, at least one anchor; most: None for as they are."""
+def at_most(settings, most, least=1):
+    """The settings for that many splats at most, but not for a budget below `least`; most: None for as they are."""
     if most is None:
         return settings
-    return replace(settings, anchors=min(settings.anchors, max(1, most // settings.gaussians_per_anchor)))
+    return replace(settings, anchors=min(settings.anchors, max(least, most // settings.gaussians_per_anchor)))
 
 
 def _tree_budget(stipple, mode):

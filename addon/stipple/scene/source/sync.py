@@ -24,6 +24,7 @@ ENGINE = 'STIPPLE'
 CYCLES_ENGINE = 'STIPPLE_CYCLES'
 MOVE_SECONDS = 0.05  # that one move of a slider may take
 REST_SECONDS = 0.25  # after which a slider rests
+PREVIEW_SECONDS = 0.2  # that a move may take where it was meant to take MOVE_SECONDS
 FEW = 1000           # fewer splats say nothing about the time that each takes
 
 log = logging.getLogger('stipple')
@@ -44,12 +45,14 @@ class paused:
         _state['paused'] -= 1
 
 
-def sync(obj, depsgraph, mode, most=None, share=None):
+def sync(obj, depsgraph, mode, most=None, share=None, patience=None):
     """Writes the attributes that an object's data should have now. Returns True where it wrote.
 
     depsgraph: evaluated settings (animation, drivers) are read through it; None: the settings as they are.
     mode: 'VIEWPORT' or 'RENDER'. most: splats that are written at most while a slider is dragged, None for all.
-    share: of Max Splats, None to look it up. Errors: StippleError, with the splats as they were.
+    share: of Max Splats, None to look it up. patience: seconds that decoding may take; where it takes longer it goes on
+    beside Blender, and a later call writes (sources.is_decoding). None for as long as it takes. Errors: StippleError,
+    with the splats as they were.
     """
     data = obj.data
     stipple = data.stipple
@@ -61,7 +64,7 @@ def sync(obj, depsgraph, mode, most=None, share=None):
         sources.check_unchanged(data)
     limit = (limits.share(depsgraph, mode) if share is None else share).most(data)
     most = min((number for number in (most, limit) if number is not None), default=None)
-    key, decode = _wanted(data, depsgraph, mode, most)
+    key, decode, is_ready = _wanted(data, depsgraph, mode, most)
     if data.get(WRITTEN_KEY) == key:
         return regrade(data, grade)
     if is_edited(data):
@@ -69,6 +72,8 @@ def sync(obj, depsgraph, mode, most=None, share=None):
         raise StippleError(f"The splats of '{data.name}' were edited by hand; use them as a new source, or revert to "
                            'the source, to change their settings.')
     begin = time.perf_counter()
+    if patience is not None and not is_ready(patience):
+        return False
     splats = decode()
     write(data, splats, key, grade)
     if splats.count >= FEW:
@@ -77,14 +82,17 @@ def sync(obj, depsgraph, mode, most=None, share=None):
 
 
 def _wanted(data, depsgraph, mode, most):
-    """(key of the splats that a datablock should have now, function that makes them)."""
+    """(key of the splats that a datablock should have now, function that makes them, function that says whether that is
+    done within some seconds)."""
     stipple = _evaluated(data, depsgraph)
     scene = bpy.context.scene if depsgraph is None else depsgraph.scene
     if stipple.is_sequence:
         frame = sequences.frame_of(data, stipple, scene.frame_current, mode, most)
-        return frame.key, frame.splats
-    settings = sources.at_most(sources.decode_settings(stipple, mode, scene), most)
-    return written_key(data, settings), lambda: _decoded(data, settings)
+        return frame.key, frame.splats, lambda patience: True
+    least = source_settings.of(stipple).least_budget
+    settings = sources.at_most(sources.decode_settings(stipple, mode, scene), most, least)
+    return (written_key(data, settings), lambda: _decoded(data, settings),
+            lambda patience: sources.is_decoded(data, settings, patience))
 
 
 def _decoded(data, settings):
@@ -157,6 +165,11 @@ def copy_settings(old, new):
         new.animation_data_create().action = old.animation_data.action
 
 
+def is_stored(data, settings):
+    """Whether the attributes are the splats of these settings."""
+    return data.get(WRITTEN_KEY) == written_key(data, settings) and not is_edited(data)
+
+
 def is_edited(data):
     """True where the attributes are not the ones that were written last."""
     known = data.get(FINGERPRINT_KEY)
@@ -193,7 +206,7 @@ def follow(obj):
     most = int(MOVE_SECONDS / _state['seconds_per_splat'])
     # The first move after a file is opened does not wait for a tree of gigabytes either.
     if sources.is_at_hand(obj.data, MOVE_SECONDS):
-        try_sync(obj, None, 'VIEWPORT', most)
+        try_sync(obj, None, 'VIEWPORT', most, patience=PREVIEW_SECONDS)
     _complete_later()
 
 
@@ -209,10 +222,22 @@ def complete():
     if sources.is_reading():
         return REST_SECONDS
     if not _state['rendering']:
-        sync_all()
+        sync_all(patience=REST_SECONDS)
+        if sources.is_decoding():
+            _show_progress()
+            return REST_SECONDS
+    return None
 
 
-def try_sync(obj, depsgraph, mode, most=None, share=None):
+def _show_progress():
+    """Has panels drawn again, which show it."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == 'PROPERTIES':
+                area.tag_redraw()
+
+
+def try_sync(obj, depsgraph, mode, most=None, share=None, patience=None):
     """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once.
 
     In background a render has no panel, and an engine of Blender's own draws what is stored: there the process ends
@@ -220,7 +245,7 @@ def try_sync(obj, depsgraph, mode, most=None, share=None):
     """
     name = obj.data.name
     try:
-        sync(obj, depsgraph, mode, most, share)
+        sync(obj, depsgraph, mode, most, share, patience)
         problems.pop(name, None)
     except StippleError as error:
         if mode == 'RENDER' and bpy.app.background:
@@ -239,13 +264,13 @@ def splat_objects():
     return found.values()
 
 
-def sync_all(depsgraph=None, mode='VIEWPORT'):
+def sync_all(depsgraph=None, mode='VIEWPORT', patience=None):
     if _state['paused']:
         return
     objects = list(splat_objects())
     share = limits.share(depsgraph, mode) if objects else None
     for obj in objects:
-        try_sync(obj, depsgraph, mode, share=share)
+        try_sync(obj, depsgraph, mode, share=share, patience=patience)
 
 
 def _evaluated(data, depsgraph):

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The object in an image becomes splats."""
+
+import os
+
+import bpy
+from bpy.props import FloatProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ...binding.image import Image
+from ...scene.generate import image_task, placing
+from ...scene.source import sources
+from .generating import GenerateOperator
+
+
+class STIPPLE_OT_splats_from_image(GenerateOperator, bpy.types.Operator, ImportHelper):
+    """Make splats of the object in an image, by networks whose weights you download yourself"""
+
+    bl_idname = 'stipple.splats_from_image'
+    bl_label = "Splats from Image"
+    bl_options = {'REGISTER', 'UNDO', 'PRESET'}
+
+    filename_ext = '.png'
+    filter_glob: StringProperty(default='*.png;*.jpg;*.jpeg;*.webp;*.tif;*.tiff;*.exr',
+                                options={'HIDDEN', 'SKIP_SAVE'})
+    mask: StringProperty(name="Mask", description="Path of an image that is white, or opaque, on the object, for images "
+                         "without transparency", options={'SKIP_SAVE'})
+    size: FloatProperty(name="Size", description="Length of the object's largest side", default=1.0, min=0.001,
+                        soft_max=100.0, unit='LENGTH')
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT'
+
+    def execute(self, context):
+        if bpy.app.background or not self._asked:
+            return super().execute(context)
+        return self.run_in_window(context)
+
+    _asked = False
+
+    def invoke(self, context, event):
+        self._asked = True
+        return ImportHelper.invoke(self, context, event)
+
+    def start(self, context):
+        settings = self._settings(self.size)
+        native = sources.context()
+        path = bpy.path.abspath(self.filepath)
+        mask_path = bpy.path.abspath(self.mask) if self.mask else ''
+        image = Image.load(native, path)
+        mask = Image.load(native, mask_path) if mask_path else None
+        identity = b''.join(_identity(one) for one in (path, mask_path) if one)
+        self._location = tuple(context.scene.cursor.location)
+        return image_task.ImageTask(image, mask, identity, settings, self.seed_count, self.anchors)
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, 'mask')
+        self.layout.prop(self, 'size')
+        self._draw_settings(self.layout, context)
+
+    def _name(self):
+        return os.path.splitext(os.path.basename(self.filepath))[0] + ' Splats'
+
+    def _matrix(self, index):
+        return placing.beside(self._location, self.size, index, self.seed_count)
+
+
+def _identity(path):
+    status = os.stat(path)
+    return f'{os.path.abspath(path)}:{status.st_size}:{status.st_mtime_ns};'.encode('utf-8', 'surrogateescape')
+
+
+classes = (STIPPLE_OT_splats_from_image,)

@@ -1,0 +1,184 @@
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "cli/commands.h"
+#include "cli/formats.h"
+#include "cli/networks/weights_report.h"
+#include "cli/numbers.h"
+#include "cli/report.h"
+
+namespace stipple::cli {
+
+namespace {
+
+struct Arguments {
+  std::string image, out, weights, mask, checkpoint, seed_mode = "keyed";
+  uint64_t seed = 42;
+  int64_t steps = 20, tokens = 8192, canvas = 1024, erode = 1;
+  double guidance = 3.0, shift = 3.0, size = 1.0;
+  std::optional<int64_t> anchors;
+  bool mean_colour = false, check = false, estimate = false, json = false;
+};
+
+StippleGenerateOptions optionsOf(const Arguments& arguments) {
+  StippleGenerateOptions options;
+  stipple_generate_options_init(&options);
+  if (!arguments.weights.empty()) options.weights_folder_utf8 = arguments.weights.c_str();
+  if (!arguments.checkpoint.empty()) options.checkpoint_path_utf8 = arguments.checkpoint.c_str();
+  options.steps = counted32(arguments.steps, "--steps");
+  options.token_count = counted32(arguments.tokens, "--tokens");
+  options.canvas_size = counted32(arguments.canvas, "--canvas");
+  options.erode_radius = counted32(arguments.erode, "--erode", 0);
+  options.noise_source =
+      arguments.seed_mode == "torch-cpu" ? STIPPLE_NOISE_TORCH_CPU : STIPPLE_NOISE_KEYED;
+  options.uses_mean_colour = arguments.mean_colour ? 1 : 0;
+  options.watches_layers = arguments.check ? 1 : 0;
+  options.seed = arguments.seed;
+  options.guidance = arguments.guidance;
+  options.shift = arguments.shift;
+  options.size = arguments.size;
+  return options;
+}
+
+void addEstimate(const StippleGenerateEstimate& estimate, Report& report) {
+  report.add("estimated_seconds", estimate.seconds);
+  report.add("estimated_bytes", estimate.bytes);
+  report.add("weight_bytes", estimate.weight_bytes);
+  report.add("operations", estimate.operations);
+}
+
+/// What passed by in the networks, as a table for people, or among the figures.
+void addStages(const Job& job, bool json, Report& report) {
+  auto figures = sized<StippleGenerateFigures>();
+  check(stipple_generate_figures(job.get(), &figures));
+  if (!json) {
+    std::printf("%-28s %12s %13s %13s %13s %13s %9s\n", "stage", "numbers", "minimum", "maximum",
+                "mean", "deviation", "seconds");
+  }
+  for (uint32_t i = 0; i < figures.stage_count; ++i) {
+    auto stage = sized<StippleGenerateStage>();
+    check(stipple_generate_stage(job.get(), i, &stage));
+    const std::string name = stage.name_utf8;
+    if (!json) {
+      std::printf("%-28s %12llu %13.6g %13.6g %13.6g %13.6g %9.3f\n", stage.name_utf8,
+                  static_cast<unsigned long long>(stage.count), stage.minimum, stage.maximum,
+                  stage.mean, stage.deviation, stage.seconds);
+      continue;
+    }
+    report.add(name + ".count", stage.count);
+    report.add(name + ".minimum", stage.minimum);
+    report.add(name + ".maximum", stage.maximum);
+    report.add(name + ".mean", stage.mean);
+    report.add(name + ".deviation", stage.deviation);
+    report.add(name + ".seconds", stage.seconds);
+  }
+}
+
+/// Splats at a budget: the one that was asked for, or the model's own.
+Cloud decoded(const Model& model, const std::optional<int64_t>& anchors) {
+  auto settings = sized<StippleModelSettings>();
+  check(stipple_model_settings(model.get(), &settings));
+  StippleDecodeOptions options;
+  stipple_decode_options_init(&options);
+  options.anchor_count = anchors ? counted(*anchors, "--anchors") : settings.default_budget;
+  const auto job = make<Job>(stipple_model_decode_start, model.get(), &options);
+  finish(job);
+  return make<Cloud>(stipple_job_cloud, job.get());
+}
+
+void requireOut(const std::string& out) {
+  if (hasModelExtension(out) || hasSplatExtension(out)) return;
+  throw Failure("'" + out + "' is neither splats nor a model; " + splatExtensions(true) +
+                " or .stipple.safetensors is expected");
+}
+
+void generate(const Context& context, const Arguments& arguments) {
+  const auto start = std::chrono::steady_clock::now();
+  const StippleGenerateOptions options = optionsOf(arguments);
+  Report report;
+  auto estimate = sized<StippleGenerateEstimate>();
+  check(stipple_generate_estimate(context.get(), &options, &estimate));
+  if (arguments.check) addWeights(context, arguments.weights, arguments.json, report);
+  addEstimate(estimate, report);
+  if (arguments.estimate) return report.print(arguments.json);
+  if (arguments.out.empty()) throw Failure("out is missing; splats or a model is expected");
+  requireOut(arguments.out);
+  const auto image = make<Image>(stipple_image_load, context.get(), arguments.image.c_str());
+  Image mask;
+  if (!arguments.mask.empty()) {
+    mask = make<Image>(stipple_image_load, context.get(), arguments.mask.c_str());
+  }
+  std::fprintf(stderr, "about %.0f s and %.0f MiB of memory on this machine\n", estimate.seconds,
+               static_cast<double>(estimate.bytes) / (1 << 20));
+  const auto job =
+      make<Job>(stipple_generate_start, context.get(), const_cast<const StippleImage*>(image.get()),
+                const_cast<const StippleImage*>(mask.get()), &options);
+  finish(job);
+  const auto model = make<Model>(stipple_job_model, const_cast<const StippleJob*>(job.get()));
+  if (hasModelExtension(arguments.out)) {
+    check(stipple_model_save(model.get(), arguments.out.c_str()));
+  } else {
+    const Cloud cloud = decoded(model, arguments.anchors);
+    check(stipple_cloud_save(cloud.get(), arguments.out.c_str(), nullptr));
+    auto info = sized<StippleCloudInfo>();
+    check(stipple_cloud_info(cloud.get(), &info));
+    report.add("gaussians", info.count);
+  }
+  std::error_code ignored;
+  if (!arguments.checkpoint.empty()) std::filesystem::remove(arguments.checkpoint, ignored);
+  if (arguments.check) addStages(job, arguments.json, report);
+  report.add("seconds", secondsSince(start));
+  report.print(arguments.json);
+}
+
+}  // namespace
+
+void addGenerate(CLI::App& app, const Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  Arguments& to = *arguments;
+  CLI::App* command = app.add_subcommand(
+      "generate",
+      "An image to splats, by networks whose weights you download (docs/images_to_splats.md)");
+  command->add_option("image", to.image, "Image with alpha, or any with --mask")->required();
+  command->add_option("out", to.out,
+                      "The latent as a model (.stipple.safetensors), or splats (.ply and others)");
+  command->add_option("--weights", to.weights,
+                      "Folder with the files of weights; default: that of the tool's --weights");
+  command->add_option("--mask", to.mask, "Image that is white, or opaque, on the object");
+  command->add_option("--seed", to.seed)->capture_default_str();
+  command
+      ->add_option("--seed-mode", to.seed_mode,
+                   "keyed, the same everywhere; or torch-cpu, PyTorch's noise on a CPU")
+      ->check(CLI::IsMember({"keyed", "torch-cpu"}))
+      ->capture_default_str();
+  command->add_option("--steps", to.steps, "From noise to the object")->capture_default_str();
+  command->add_option("--guidance", to.guidance, "How closely the image is followed")
+      ->capture_default_str();
+  command->add_option("--shift", to.shift, "Above 1: more steps where there is much noise")
+      ->capture_default_str();
+  command->add_option("--tokens", to.tokens, "Size of the latent")->capture_default_str();
+  command->add_option("--canvas", to.canvas, "Pixels of the image that networks see")
+      ->capture_default_str();
+  command->add_option("--erode", to.erode, "Pixels that the mask shrinks by")
+      ->capture_default_str();
+  command
+      ->add_option("--size", to.size,
+                   "Metres of the largest side; 0: as the networks have it, around the origin")
+      ->capture_default_str();
+  command->add_flag("--mean-colour", to.mean_colour, "No noise on the colours of the image");
+  command->add_option("--anchors", to.anchors, "Splats: anchors, each of which becomes several");
+  command->add_option(
+      "--checkpoint", to.checkpoint,
+      "File that keeps the state after every step; the same command goes on from it");
+  command->add_flag("--check", to.check,
+                    "Says for a report whether the files are those published, and what passes by "
+                    "in every layer");
+  command->add_flag("--estimate", to.estimate, "Only says what it would take");
+  command->add_flag("--json", to.json, "Figures as JSON");
+  command->callback([arguments, &context] { generate(context, *arguments); });
+}
+
+}  // namespace stipple::cli

@@ -1,0 +1,408 @@
+// Based on: the released pipeline of arXiv 2605.16355. Differs: all noise comes from one seed, work
+// can be interrupted and continued, and previews are decoded on the way.
+#include "fit/generate_session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/number_text.h"
+#include "base/progress.h"
+#include "base/stopwatch.h"
+#include "decode/latent/latent_decoder.h"
+#include "decode/latent/latent_networks.h"
+#include "fit/machine_speed.h"
+#include "fit/object_placement.h"
+#include "generate/dino_encoder.h"
+#include "generate/flow_cost.h"
+#include "generate/flow_network.h"
+#include "generate/image_condition.h"
+#include "generate/vae_encoder.h"
+#include "io/assets/checkpoint.h"
+#include "io/assets/weight_file.h"
+#include "io/assets/weights_reference.h"
+#include "io/bytes/sha256.h"
+#include "model/latent_splats.h"
+
+namespace stipple {
+
+namespace {
+
+// Channels of the colour encoder's first level, whose maps are the largest that there are.
+constexpr uint64_t kFirstColourChannels = 128;
+constexpr double kLargestSize = 1e6;  // metres
+// Of the whole work, what comes before the encoders and behind the last step.
+constexpr double kPreparationShare = 0.01, kSampledShare = 0.96;
+
+FlowSettings flowSettings(const GenerateOptions& options) {
+  return {options.steps, options.guidance, options.shift};
+}
+
+/// The networks up to the latent. What is large stays in their files.
+struct Networks {
+  WeightsFolder folder;
+  DinoEncoder structure;
+  VaeEncoder colour;
+  FlowNetwork flow;
+  LatentNetworks decoder;
+
+  explicit Networks(const GenerateOptions& options)
+      : folder(findWeights(options.weights_folder)),
+        structure(open(WeightsRole::kStructureEncoder), {options.structure_head_width}),
+        colour(open(WeightsRole::kColourEncoder)),
+        flow(open(WeightsRole::kFlow)),
+        decoder(readLatentNetworks(open(WeightsRole::kDecoder))) {
+    const FlowSizes& sizes = flow.sizes();
+    if (sizes.structure_width != structure.width() || sizes.colour_width != colour.tokenWidth()) {
+      fail(ErrorCode::kFormat,
+           "the files of weights do not fit together: the flow network takes features of " +
+               std::to_string(sizes.structure_width) + " and " +
+               std::to_string(sizes.colour_width) + " numbers, the encoders give " +
+               std::to_string(structure.width()) + " and " + std::to_string(colour.tokenWidth()));
+    }
+  }
+
+  WeightTable open(WeightsRole role) const {
+    return openWeightFile(requireWeights(folder, role).path);
+  }
+  double encoderWork(uint32_t size) const {
+    return structure.flops(size, size) + colour.flops(size, size);
+  }
+  StageCost samplingCost(const GenerateOptions& options) const {
+    return flowSamplingCost(flow.sizes(), options.token_count, rows(options),
+                            flowSettings(options));
+  }
+  uint64_t rows(const GenerateOptions& options) const {
+    const uint32_t size = options.preparation.canvas_size;
+    return structure.rowsFor(size, size);
+  }
+};
+
+void requireOptions(const GenerateOptions& options) {
+  validate(flowSettings(options));
+  validate(options.preparation);
+  if (options.token_count == 0 || options.token_count > kMostFlowTokens) {
+    fail(ErrorCode::kInvalidArgument, "the number of tokens is " +
+                                          std::to_string(options.token_count) + "; 1 to " +
+                                          std::to_string(kMostFlowTokens) + " is allowed");
+  }
+  if (options.preview_anchors == 0) {
+    fail(ErrorCode::kInvalidArgument, "the anchors of a preview are 0; 1 or more is allowed");
+  }
+  if (!(options.size >= 0) || options.size > kLargestSize) {
+    fail(ErrorCode::kInvalidArgument, "the size of the object is " + numberText(options.size) +
+                                          " m; 0 to " + numberText(kLargestSize) + " is allowed");
+  }
+}
+
+/// Encoders work one after the other, and their memory is free before the flow network begins.
+uint64_t workBytes(const Networks& networks, const GenerateOptions& options) {
+  const uint64_t side = options.preparation.canvas_size, rows = networks.rows(options);
+  const uint64_t width = networks.structure.width();
+  constexpr uint64_t kInner = 4;  // how much wider than tokens the MLPs of image encoders are
+  const uint64_t structure = rows * (2 + 2 * kInner) * width * sizeof(float);
+  const uint64_t colour = 2 * side * side * kFirstColourChannels * sizeof(float);
+  const uint64_t condition = rows * (width + networks.colour.tokenWidth()) * sizeof(float);
+  const uint64_t flow = networks.flow.memoryBound(options.token_count, rows);
+  return condition + std::max({structure, colour, flow});
+}
+
+/// What a checkpoint must agree in, as JSON.
+std::string keyOf(const Networks& networks, const GenerateOptions& options,
+                  const PreparedImage& prepared) {
+  Sha256 image;
+  image.add(prepared.rgb.data(), prepared.rgb.size());
+  const auto text = [](uint64_t value) { return std::to_string(value); };
+  std::string key = "{\"image\":\"" + image.finish() + "\",\"seed\":\"" + text(options.noise.seed) +
+                    "\",\"noise\":" + text(static_cast<uint64_t>(options.noise.source)) +
+                    ",\"mean_colour\":" + text(options.uses_mean_colour ? 1 : 0) +
+                    ",\"tokens\":" + text(options.token_count) +
+                    ",\"steps\":" + text(options.steps) +
+                    ",\"guidance\":" + numberText(options.guidance, 17) +
+                    ",\"shift\":" + numberText(options.shift, 17) + ",\"weights\":[";
+  for (const WeightsFile& file : networks.folder.files) {
+    if (key.back() != '[') key += ',';
+    key += text(file.bytes);
+  }
+  return key + "]}";
+}
+
+StageValues valuesOf(std::string name, std::span<const float> numbers) {
+  StageValues values;
+  values.name = std::move(name);
+  values.count = numbers.size();
+  if (numbers.empty()) return values;
+  double sum = 0, squares = 0;
+  values.minimum = values.maximum = static_cast<double>(numbers[0]);
+  for (const float number : numbers) {
+    const auto value = static_cast<double>(number);
+    values.minimum = std::min(values.minimum, value);
+    values.maximum = std::max(values.maximum, value);
+    sum += value;
+    squares += value * value;
+  }
+  const auto count = static_cast<double>(numbers.size());
+  values.mean = sum / count;
+  values.deviation = std::sqrt(std::max(0.0, squares / count - values.mean * values.mean));
+  return values;
+}
+
+}  // namespace
+
+struct GenerateSession::Work {
+  Work(ByteImage shown, std::optional<ByteImage> covered, const GenerateOptions& given)
+      : options(given), image(std::move(shown)), mask(std::move(covered)), networks(given) {
+    status.steps = options.steps;
+  }
+
+  void run(Progress& progress);
+  /// The state that a checkpoint keeps, or that of the noise.
+  SamplerState firstState(const std::string& key, const GenerationNoise& noise);
+  /// In: end: of the encoders' part of the whole work.
+  FlowContext contextOf(const NetworkRun& run, const PreparedImage& prepared,
+                        std::span<const float> noise, double end);
+  void sample(const NetworkRun& run, const FlowContext& context, const std::string& key,
+              SamplerState& state, const ProgressShare& share);
+  void keep(const std::string& key, const SamplerState& state) const;
+  void showPreview(const FlowPreview& preview);
+  /// In: weights: the decoder's, which the model's file names; settings, as JSON.
+  std::shared_ptr<const SplatModel> modelOf(const Latent& latent, const WeightsReference& weights,
+                                            const std::string& settings) const;
+  /// The splats of a preview.
+  SplatCloud decoded(const SplatModel& model) const;
+  void finish(Latent latent, const std::string& settings, Progress& progress);
+
+  void note(const std::string& name, std::span<const float> numbers) {
+    StageValues values = valuesOf(name, numbers);
+    const std::lock_guard<std::mutex> lock(mutex);
+    values.seconds = watch.lap();
+    stages.push_back(std::move(values));
+    status.stage_count = stages.size();
+  }
+  /// In: first: the step that this run began with.
+  void finishStep(uint32_t step, uint32_t first) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    status.step = step;
+    const double each = step_watch.seconds() / std::max(1u, step - first);
+    status.seconds_left = each * (status.steps - step);
+  }
+
+  GenerateOptions options;
+  ByteImage image;
+  std::optional<ByteImage> mask;
+  Networks networks;
+  Stopwatch watch, step_watch;
+  std::shared_ptr<const SplatModel> result;
+
+  mutable std::mutex mutex;  ///< of what follows
+  GenerateStatus status;
+  std::deque<StageValues> stages;            ///< they stay where they are
+  std::shared_ptr<const SplatCloud> newest;  ///< preview, until it is taken
+};
+
+GenerateSession::GenerateSession(ByteImage image, std::optional<ByteImage> mask,
+                                 const GenerateOptions& options) {
+  requireOptions(options);
+  requireByteImage(image, "The image");
+  if (!options.checkpoint_path.empty()) requireCheckpointPlace(options.checkpoint_path);
+  work_ = std::make_unique<Work>(std::move(image), std::move(mask), options);
+}
+
+GenerateSession::~GenerateSession() = default;
+
+uint64_t GenerateSession::memoryBound() const {
+  return workBytes(work_->networks, work_->options);
+}
+
+GenerateEstimate GenerateSession::estimate(const GenerateOptions& options) {
+  requireOptions(options);
+  const Networks networks(options);
+  const StageCost sampling = networks.samplingCost(options);
+  const double encoding = networks.encoderWork(options.preparation.canvas_size);
+  const MachineSpeed& speed = machineSpeed();
+  GenerateEstimate estimate;
+  estimate.operations = encoding + sampling.flops;
+  estimate.seconds = (encoding + sampling.flops - sampling.attention_flops) / speed.products +
+                     sampling.attention_flops / speed.attention;
+  estimate.bytes = workBytes(networks, options);
+  for (const WeightsFile& file : networks.folder.files) estimate.weight_bytes += file.bytes;
+  return estimate;
+}
+
+std::shared_ptr<const SplatModel> GenerateSession::Work::modelOf(
+    const Latent& latent, const WeightsReference& weights, const std::string& settings) const {
+  return makeLatentSplats(networks.decoder, std::make_shared<const Latent>(latent), weights,
+                          {settings, {}});
+}
+
+SplatCloud GenerateSession::Work::decoded(const SplatModel& model) const {
+  const ModelSettings allowed = model.settings();
+  ModelRequest request;
+  request.budget =
+      std::clamp(options.preview_anchors, allowed.minimum_budget, allowed.maximum_budget);
+  // So few that nobody waits for a cancel, and decoding would begin the bar anew.
+  return model.decode(request);
+}
+
+SamplerState GenerateSession::Work::firstState(const std::string& key,
+                                               const GenerationNoise& noise) {
+  if (!options.checkpoint_path.empty() && std::filesystem::exists(options.checkpoint_path)) {
+    const Checkpoint checkpoint = readCheckpoint(options.checkpoint_path);
+    if (checkpoint.settings_json != key) {
+      fail(ErrorCode::kInvalidArgument,
+           "'" + options.checkpoint_path +
+               "' keeps a generation of another image, or with other settings or weights; remove "
+               "it, or choose another file");
+    }
+    SamplerState state = samplerOfTensors(checkpoint.tensors);
+    const std::lock_guard<std::mutex> lock(mutex);
+    status.step = status.resumed_step = state.step;
+    return state;
+  }
+  return startSampling(networks.flow, options.token_count, noise, flowSettings(options));
+}
+
+void GenerateSession::Work::keep(const std::string& key, const SamplerState& state) const {
+  if (options.checkpoint_path.empty()) return;
+  writeCheckpoint(key, tensorsOfSampler(state), options.checkpoint_path);
+}
+
+void GenerateSession::Work::showPreview(const FlowPreview& preview) {
+  auto cloud = std::make_shared<SplatCloud>(decoded(*modelOf(preview.latent, {}, "{}")));
+  if (options.size > 0) place(standingOnBase(*cloud, options.size), *cloud);
+  const std::lock_guard<std::mutex> lock(mutex);
+  newest = std::move(cloud);
+  status.preview_step = preview.step;
+}
+
+void GenerateSession::Work::finish(Latent latent, const std::string& settings, Progress& progress) {
+  progress.enterPart(kSampledShare, 1);
+  const std::string& path = networks.folder.of(WeightsRole::kDecoder).path;
+  const WeightsReference weights = referenceOf(path, &progress);
+  if (options.size > 0) {
+    const SplatCloud cloud = decoded(*modelOf(latent, weights, settings));
+    note("splats.positions", cloud.positions);
+    note("splats.scales", cloud.scales);
+    note("splats.opacities", cloud.opacities);
+    note("splats.colours", cloud.sh);
+    latent.placement = standingOnBase(cloud, options.size);
+  }
+  result = modelOf(latent, weights, settings);
+  progress.enterPart(0, 1);
+}
+
+void GenerateSession::run(Progress& progress) {
+  work_->run(progress);
+}
+
+void GenerateSession::Work::run(Progress& progress) {
+  const NetworkRun run = {.progress = &progress};
+  progress.advance(0, "Preparing the image");
+  const PreparedImage prepared = prepareImage(image, mask ? &*mask : nullptr, options.preparation);
+  const std::string key = keyOf(networks, options, prepared);
+  const std::vector<float> bytes(prepared.rgb.begin(), prepared.rgb.end());
+  note("prepared", bytes);
+
+  NoiseSizes sizes;
+  const uint32_t size = options.preparation.canvas_size;
+  sizes.colour = networks.colour.noiseCount(size, size);
+  sizes.tokens = options.token_count * networks.flow.sizes().token_width;
+  GenerationNoise noise = drawNoise(sizes, options.noise);
+  note("noise.colour", noise.colour);
+  note("noise.tokens", noise.tokens);
+  if (options.uses_mean_colour) noise.colour.clear();
+  SamplerState state = firstState(key, noise);
+
+  const double encoding = networks.encoderWork(size);
+  const double sampling = networks.samplingCost(options).flops;
+  const double middle =
+      kPreparationShare + (kSampledShare - kPreparationShare) * encoding / (encoding + sampling);
+  const FlowContext context = contextOf(run, prepared, noise.colour, middle);
+  sample(run, context, key, state, {middle, kSampledShare});
+  note("latent", state.latent.tokens);
+  note("camera", state.latent.camera);
+  finish(std::move(state.latent), key, progress);
+}
+
+FlowContext GenerateSession::Work::contextOf(const NetworkRun& run, const PreparedImage& prepared,
+                                             std::span<const float> noise, double end) {
+  StageListener listener;
+  std::vector<float> rows;
+  if (options.watches_layers) {
+    listener = [&](const std::string& stage, const StageNumbers& numbers) {
+      rows.resize(numbers.rows * numbers.width);
+      for (size_t i = 0; i < numbers.rows; ++i) {
+        const float* row = numbers.values + i * numbers.stride;
+        std::copy(row, row + numbers.width,
+                  rows.begin() + static_cast<ptrdiff_t>(i * numbers.width));
+      }
+      note(stage, rows);
+    };
+  }
+  const ImageCondition condition = encodeImage(run, networks.structure, networks.colour, prepared,
+                                               noise, {kPreparationShare, end}, listener);
+  note("structure.features", condition.structure);
+  note("colour.features", condition.colour);
+  return networks.flow.context(run, condition, {end, end});
+}
+
+void GenerateSession::Work::sample(const NetworkRun& run, const FlowContext& context,
+                                   const std::string& key, SamplerState& state,
+                                   const ProgressShare& share) {
+  const uint32_t first = state.step;
+  step_watch = {};
+  FlowListener listener;
+  listener.preview_every = 1;
+  listener.preview = [&](const FlowPreview& preview) {
+    const std::string name = "step" + std::to_string(preview.step);
+    note(name + ".tokens", state.latent.tokens);
+    note(name + ".camera", state.latent.camera);
+    finishStep(preview.step, first);
+    keep(key, state);
+    const uint32_t every = options.preview_steps;
+    if (every > 0 && preview.step % every == 0) showPreview(preview);
+  };
+  try {
+    sampleLatent(run, networks.flow, context, state, listener, share);
+  } catch (const Error& error) {
+    // Half a step is kept too: a call of the network takes minutes.
+    if (error.code() == ErrorCode::kCancelled) keep(key, state);
+    throw;
+  }
+  finishStep(state.step, first);
+  keep(key, state);
+}
+
+GenerateStatus GenerateSession::status() const {
+  const std::lock_guard<std::mutex> lock(work_->mutex);
+  GenerateStatus status = work_->status;
+  status.seconds = work_->watch.seconds();
+  return status;
+}
+
+const StageValues& GenerateSession::stageAt(size_t index) const {
+  const std::lock_guard<std::mutex> lock(work_->mutex);
+  if (index >= work_->stages.size()) {
+    fail(ErrorCode::kInvalidArgument, "index is " + std::to_string(index) + "; there are " +
+                                          std::to_string(work_->stages.size()) + " stages so far");
+  }
+  return work_->stages[index];
+}
+
+std::shared_ptr<const SplatCloud> GenerateSession::takePreview() {
+  const std::lock_guard<std::mutex> lock(work_->mutex);
+  return std::exchange(work_->newest, nullptr);
+}
+
+std::shared_ptr<const SplatModel> GenerateSession::model() const {
+  if (!work_->result) {
+    fail(ErrorCode::kInvalidArgument, "this generation has not ended, or has not ended well");
+  }
+  return work_->result;
+}
+
+}  // namespace stipple

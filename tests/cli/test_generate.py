@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`stipple generate` from an image to splats, with the small networks of a golden."""
+
+import json
+import os
+import signal
+import struct
+import subprocess
+import sys
+import time
+import zlib
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import pipeline_weights  # noqa: E402
+
+TOOL = Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
+SIZES = ('--canvas', pipeline_weights.CANVAS, '--tokens', pipeline_weights.TOKENS)
+SMALL = (*SIZES, '--steps', pipeline_weights.STEPS)
+
+
+def run(*arguments, status=0):
+    result = subprocess.run([TOOL, 'generate', *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    assert result.returncode == status, (arguments, result.stdout, result.stderr)
+    return result
+
+
+def error(*arguments):
+    return run(*arguments, status=1).stderr.strip().splitlines()[-1]
+
+
+def write_png(path, width, height, channels, rows):
+    def chunk(kind, data):
+        return struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
+    stride = width * channels
+    raw = b''.join(b'\0' + rows[y * stride:(y + 1) * stride] for y in range(height))
+    kind = {1: 0, 3: 2, 4: 6}[channels]
+    Path(path).write_bytes(b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', struct.pack('>IIBBBBB', width, height, 8, kind, 0, 0, 0))
+                           + chunk(b'IDAT', zlib.compress(raw)) + chunk(b'IEND', b''))
+
+
+@pytest.fixture(scope='module')
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('generate')
+    weights = folder / 'weights'
+    weights.mkdir()
+    pipeline_weights.split(weights)
+    width, height, rgba = pipeline_weights.image()
+    write_png(folder / 'image.png', width, height, 4, rgba)
+    write_png(folder / 'opaque.png', width, height, 3, b''.join(rgba[i:i + 3] for i in range(0, len(rgba), 4)))
+    write_png(folder / 'mask.png', width, height, 1, rgba[3::4])
+    return folder
+
+
+def generate(files, image, out, *arguments, **keywords):
+    return run(files / image, files / out, '--weights', files / 'weights', *SMALL, *arguments, **keywords)
+
+
+def test_an_image_becomes_a_model_that_decodes_to_any_budget(files):
+    generate(files, 'image.png', 'model.stipple.safetensors')
+    for anchors in (32, 40):
+        subprocess.run([TOOL, '--weights', files / 'weights', 'decode', files / 'model.stipple.safetensors',
+                        files / 'out.ply', '--anchors', str(anchors)], check=True, timeout=60)
+        assert f'element vertex {32 * anchors}\n'.encode() in (files / 'out.ply').read_bytes()[:400]
+
+
+def test_an_image_becomes_splats(files):
+    figures = json.loads(generate(files, 'image.png', 'a.ply', '--anchors', 44, '--json').stdout)
+    assert figures['gaussians'] == 44 * 32
+    assert figures['estimated_seconds'] > 0 and figures['operations'] > 1e6
+
+
+def test_the_same_seed_gives_the_same_file_and_another_does_not(files):
+    for name, seed in (('one.ply', 5), ('same.ply', 5), ('other.ply', 6)):
+        generate(files, 'image.png', name, '--anchors', 40, '--seed', seed)
+    one, same, other = ((files / name).read_bytes() for name in ('one.ply', 'same.ply', 'other.ply'))
+    assert one == same and one != other
+
+
+def test_threads_do_not_change_the_result(files):
+    for threads in (1, 2):
+        subprocess.run([TOOL, '--threads', str(threads), 'generate', files / 'image.png', files / f't{threads}.ply',
+                        '--weights', files / 'weights', *map(str, SMALL), '--anchors', '40'], check=True, timeout=120)
+    assert (files / 't1.ply').read_bytes() == (files / 't2.ply').read_bytes()
+
+
+def test_a_mask_stands_in_for_alpha_and_without_either_the_message_says_what_to_do(files):
+    generate(files, 'opaque.png', 'masked.ply', '--anchors', 40, '--mask', files / 'mask.png')
+    line = error(files / 'opaque.png', files / 'none.ply', '--weights', files / 'weights', *SMALL)
+    assert 'mask' in line and 'transparent' in line
+    assert not (files / 'none.ply').exists()
+
+
+def test_check_says_whether_files_are_published_and_what_passes_by(files):
+    figures = json.loads(generate(files, 'image.png', 'c.ply', '--anchors', 40, '--check', '--json').stdout)
+    assert figures['TripoSplat decoder.state'] == 'another size than the published file'
+    assert len(figures['TripoSplat decoder.sha256']) == 64
+    assert figures['structure.layer1.out.count'] > 0
+    assert figures['step3.tokens.deviation'] > 0
+    assert abs(figures['latent.mean']) < 10
+    table = generate(files, 'image.png', 'c.ply', '--anchors', 40, '--check').stdout
+    assert 'structure.features' in table and 'SHA-256' in table
+
+
+def test_estimate_alone_writes_nothing(files):
+    figures = json.loads(run(files / 'image.png', '--weights', files / 'weights', *SMALL, '--estimate', '--json').stdout)
+    assert figures['weight_bytes'] == sum(f.stat().st_size for f in (files / 'weights').iterdir())
+
+
+def test_errors_are_one_line_and_say_what_to_do(files, tmp_path):
+    assert 'huggingface.co' in error(files / 'image.png', tmp_path / 'a.ply', '--weights', tmp_path, *SMALL)
+    assert 'no_such' in error(files / 'image.png', tmp_path / 'a.ply', '--weights', files / 'no_such', *SMALL)
+    assert '.ply' in error(files / 'image.png', tmp_path / 'a.txt', '--weights', files / 'weights', *SMALL)
+    assert 'steps' in error(files / 'image.png', tmp_path / 'a.ply', '--weights', files / 'weights', *SIZES, '--steps', 2000)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_was_interrupted_goes_on_to_the_same_splats(files):
+    """Many steps, so that the signal comes while it samples."""
+    state = files / 'state.stipple.safetensors'
+    many = ('--steps', 300, '--anchors', 40)
+    run(files / 'image.png', files / 'whole.ply', '--weights', files / 'weights', *SIZES, *many)
+    arguments = [TOOL, 'generate', files / 'image.png', files / 'resumed.ply', '--weights', files / 'weights', *SIZES,
+                 *many, '--checkpoint', state]
+    process = subprocess.Popen(list(map(str, arguments)), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    until = time.monotonic() + 60
+    while not state.exists() and time.monotonic() < until:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(60) == 128 + signal.SIGINT
+    assert state.exists() and not (files / 'resumed.ply').exists()
+    subprocess.run(list(map(str, arguments)), check=True, timeout=120, stdout=subprocess.DEVNULL)
+    assert (files / 'resumed.ply').read_bytes() == (files / 'whole.ply').read_bytes()
+    assert not state.exists()
