@@ -185,7 +185,12 @@ SeenCloud FitSession::decode(uint64_t budget) const {
 
 std::shared_ptr<const SplatModel> FitSession::model() const {
   FitModel& model = ended().model();
-  std::optional<FieldResult> learned = fieldResult(model);
+  std::optional<FieldResult> learned;
+  {
+    // The density is frozen by the first who asks for it, and a decode may be that one.
+    std::lock_guard<std::mutex> lock(decode_mutex_);
+    learned = fieldResult(model);
+  }
   if (!learned) {
     fail(ErrorCode::kUnsupported, std::string("the ") + model.name() +
                                       " model has no field; its splats can be made a hierarchy");

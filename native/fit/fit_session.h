@@ -82,7 +82,7 @@ class FitSession final : public FitObserver {
   std::string settings_json_;
   std::unique_ptr<Trainer> trainer_;
 
-  mutable std::mutex decode_mutex_;  ///< models decode one budget at a time
+  mutable std::mutex decode_mutex_;  ///< models decode and are handed over one at a time
   mutable std::mutex mutex_;         ///< of what follows
   bool has_ended_ = false;
   FitFigures figures_;

@@ -173,6 +173,8 @@ class GltfReader {
       for (size_t i = 0; i < count; ++i) indices[i] = static_cast<uint32_t>(i);
     }
     std::vector<uint32_t> corners = triangleCorners(indices, modeOf(primitive));
+    // Files have such parts although glTF wants one element at least; they add nothing.
+    if (corners.empty()) return;
     // A mirroring transform turns the triangles inside out; this turns them back.
     if (matrix.topLeftCorner<3, 3>().determinant() < 0) {
       for (size_t t = 0; t + 2 < corners.size(); t += 3) std::swap(corners[t + 1], corners[t + 2]);

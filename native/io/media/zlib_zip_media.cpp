@@ -38,16 +38,19 @@ void stipple_media_zip_inflate(const char* name, const uint8_t* bytes, uint64_t 
     z_stream& stream = inflater.stream;
     // zlib does not write through next_in; its type is older than const.
     stream.next_in = const_cast<Bytef*>(bytes);
-    stream.next_out = whole;
+    // It refuses a null pointer, which an empty file may bring, even where it has nothing to write.
+    uint8_t nothing = 0;
+    uint8_t* const out = whole_bytes == 0 ? &nothing : whole;
+    stream.next_out = out;
     int result = Z_OK;
     while (result == Z_OK) {
       const auto used = static_cast<uint64_t>(stream.next_in - bytes);
-      const auto made = static_cast<uint64_t>(stream.next_out - whole);
+      const auto made = static_cast<uint64_t>(stream.next_out - out);
       stream.avail_in = piece(byte_count - used);
       stream.avail_out = piece(whole_bytes - made);
       result = inflate(&stream, Z_NO_FLUSH);
     }
-    const auto made = static_cast<uint64_t>(stream.next_out - whole);
+    const auto made = static_cast<uint64_t>(stream.next_out - out);
     if (result == Z_STREAM_END && made == whole_bytes) return;
     if (result == Z_MEM_ERROR) throw std::bad_alloc();
     fail(ErrorCode::kFormat,

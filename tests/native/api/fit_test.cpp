@@ -316,6 +316,29 @@ TEST_F(FitTest, AFieldIsAModelOfAnyBudget) {
   }
 }
 
+TEST_F(FitTest, AFieldIsDecodedAndHandedOverByTwoThreadsAtOnce) {
+  STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
+  options_.iterations = 20;
+  options_.min_anchors = 16;
+  options_.max_anchors = 64;
+  StippleJob* job = start();
+  STIPPLE_ASSERT_OK(stipple_job_wait(job));
+  // Whoever comes first freezes the density, which the thread sanitizer watches.
+  StippleModel* model = nullptr;
+  std::thread other([&] { STIPPLE_EXPECT_OK(stipple_fit_model(job, &model)); });
+  const std::vector<float> wanted = result(job);
+  other.join();
+  EXPECT_EQ(result(job), wanted);
+  stipple_job_free(job);
+  StippleDecodeOptions decode;
+  stipple_decode_options_init(&decode);
+  decode.anchor_count = 64;
+  StippleCloud* cloud = nullptr;
+  STIPPLE_ASSERT_OK(stipple_model_decode(model, &decode, &cloud));
+  EXPECT_EQ(taken(cloud), wanted);
+  stipple_model_free(model);
+}
+
 TEST_F(FitTest, AFieldHasAShellWhereItIsAskedFor) {
   STIPPLE_ASSERT_OK(stipple_fit_options_preset(&options_, STIPPLE_FIT_FIELD, STIPPLE_FIT_FAST));
   options_.iterations = 20;

@@ -250,6 +250,47 @@ TEST_F(MeshFile, JoinsPrimitivesWithDifferentAttributes) {
   EXPECT_EQ(mesh.corner_colours[12], 0.0f);
 }
 
+TEST_F(MeshFile, LeavesOutPartsWithoutElements) {
+  GlbBuilder file;
+  const int positions = file.addFloats(kTriangle, 3);
+  const int no_positions = file.addFloats({}, 3);
+  const int no_colours = file.addFloats({}, 4);
+  const int no_indices = file.addIndices({});
+  file.addIndices({0, 1, 2});
+  const auto part = [](int position, const std::string& more = "") {
+    return "{\"attributes\":{\"POSITION\":" + std::to_string(position) + more + "}";
+  };
+  const auto parts = [](const std::string& list) {
+    return "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[" +
+           list + "]}]";
+  };
+  const std::string whole = part(positions) + ",\"indices\":4}";
+  const std::string colours =
+      ",\"NORMAL\":" + std::to_string(no_positions) + ",\"COLOR_0\":" + std::to_string(no_colours);
+  const std::string without_vertices = part(no_positions, colours) + "}";
+  const std::string without_indices =
+      part(positions) + ",\"indices\":" + std::to_string(no_indices) + "}";
+  const TriMesh expected = read(file.glb(parts(whole)));
+  for (const int mode : {4, 5, 6}) {
+    const std::string as = ",\"mode\":" + std::to_string(mode) + "}";
+    std::string empty = without_vertices;
+    empty.replace(empty.size() - 1, 1, as);
+    std::string unused = without_indices;
+    unused.replace(unused.size() - 1, 1, as);
+    const TriMesh mesh = read(file.glb(parts(empty + "," + whole + "," + unused)));
+    validate(mesh);
+    EXPECT_EQ(mesh.positions, expected.positions) << mode;
+    EXPECT_EQ(mesh.triangles, expected.triangles) << mode;
+    EXPECT_EQ(mesh.materials.size(), expected.materials.size()) << mode;
+    EXPECT_TRUE(mesh.corner_normals.empty()) << mode;
+    EXPECT_TRUE(mesh.corner_colours.empty()) << mode;
+  }
+  expectError(ErrorCode::kFormat, {"a.glb", "no triangles"},
+              [&] { read(file.glb(parts(without_vertices + "," + without_indices))); });
+  expectError(ErrorCode::kFormat, {"primitive 0", "vertex 0 of 0"},
+              [&] { read(file.glb(parts(part(no_positions) + ",\"indices\":4}"))); });
+}
+
 TEST_F(MeshFile, SaysWhatIsWrong) {
   GlbBuilder file;
   file.addFloats(kTriangle, 3);

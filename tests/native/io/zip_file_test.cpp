@@ -25,11 +25,16 @@ class Zip : public ScratchFolder {
 
 TEST_F(Zip, ReadsStoredAndDeflatedEntries) {
   const std::string large(200000, 'x');
-  const std::string archive =
-      ZipBytes().add("a", "stored").add("b/c", large, true).add("empty", "").text("a comment");
+  const std::string archive = ZipBytes()
+                                  .add("a", "stored")
+                                  .add("b/c", large, true)
+                                  .add("empty", "")
+                                  .add("empty, deflated", "", true)
+                                  .text("a comment");
   EXPECT_EQ(read(archive, "a"), "stored");
   EXPECT_EQ(read(archive, "b/c"), large);
   EXPECT_EQ(read(archive, "empty"), "");
+  EXPECT_EQ(read(archive, "empty, deflated"), "");
   expectError(ErrorCode::kFormat, {"a.zip", "no file 'd'"}, [&] { read(archive, "d"); });
 }
 
