@@ -23,7 +23,7 @@ StageListener under(const std::string& prefix, const StageListener& listener) {
 
 ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
                            const VaeEncoder& colour, const PreparedImage& image,
-                           std::span<const float> noise, const WorkPart& part,
+                           std::span<const float> noise, const ProgressShare& share,
                            const StageListener& listener) {
   if (structure.patchSize() != colour.tokenSize()) {
     fail(ErrorCode::kFormat, "The image encoders do not fit together: one has patches of " +
@@ -33,16 +33,16 @@ ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
   std::vector<float> rgb(image.rgb.size());
   for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<float>(image.rgb[i]) / 255.0f;
   const double structure_flops = structure.flops(image.size, image.size);
-  const double share = structure_flops / (structure_flops + colour.flops(image.size, image.size));
-  const double middle = part.begin + share * (part.end - part.begin);
+  const double middle =
+      share.at(structure_flops / (structure_flops + colour.flops(image.size, image.size)));
   ImageCondition condition;
   condition.rows = structure.rowsFor(image.size, image.size);
   condition.structure_width = static_cast<uint32_t>(structure.width());
   condition.colour_width = static_cast<uint32_t>(colour.tokenWidth());
-  if (run.progress != nullptr) run.progress->enterPart(part.begin, middle);
+  if (run.progress != nullptr) run.progress->enterPart(share.begin, middle);
   condition.structure =
       structure.encode(run, rgb, image.size, image.size, under("structure.", listener));
-  if (run.progress != nullptr) run.progress->enterPart(middle, part.end);
+  if (run.progress != nullptr) run.progress->enterPart(middle, share.end);
   const std::vector<float> tokens =
       colour.encode(run, rgb, image.size, image.size, noise, under("colour.", listener));
   if (run.progress != nullptr) run.progress->enterPart(0.0, 1.0);

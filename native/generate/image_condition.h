@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "generate/progress_share.h"
 #include "generate/stage_listener.h"
 #include "nn/network_run.h"
 
@@ -24,22 +25,16 @@ struct ImageCondition {
   std::vector<float> colour;     ///< [rows, colour_width]
 };
 
-/// Which part of a longer piece of work something is, for its progress: 0..1 of the whole.
-struct WorkPart {
-  double begin = 0.0;
-  double end = 1.0;
-};
-
 /// Encodes an image by both networks. The colours of the tokens that belong to the whole image are
 /// zeros.
 /// In: noise: of VaeEncoder::noiseCount() for the image, normally distributed, or empty: the
-/// image's mean latent (VaeEncoder::encode()); part: of whose progress (Progress::enterPart());
+/// image's mean latent (VaeEncoder::encode()); share: of whose progress (Progress::enterPart());
 /// listener: hears of the stages of both, with "structure." and "colour." before their names.
 /// Errors: kFormat for networks whose patches differ; those of the encoders.
 /// Threads and determinism: as of the encoders. Cost: the sum of both; memory: the larger one's.
 ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
                            const VaeEncoder& colour, const PreparedImage& image,
-                           std::span<const float> noise, const WorkPart& part = {},
+                           std::span<const float> noise, const ProgressShare& share = {},
                            const StageListener& listener = {});
 
 }  // namespace stipple

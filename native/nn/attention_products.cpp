@@ -125,7 +125,7 @@ class BackendProducts : public AttentionProducts {
   }
 
  private:
-  static constexpr Precision kNarrow = Precision::kBfloat16;
+  static constexpr FactorPrecision kNarrow = FactorPrecision::kBfloat16;
   /// Keys of a piece that is turned while it lies in the first cache.
   static constexpr size_t kTurned = 16;
 
@@ -141,7 +141,8 @@ class BackendProducts : public AttentionProducts {
 }  // namespace
 
 std::unique_ptr<AttentionProducts> makeAttentionProducts(const NetworkRun& run, size_t head_width) {
-  if (precisionOf(run) == Precision::kFloat32) return std::make_unique<PanelProducts>(head_width);
+  if (precisionOf(run) == FactorPrecision::kFloat32)
+    return std::make_unique<PanelProducts>(head_width);
   return std::make_unique<BackendProducts>(backendOf(run), head_width);
 }
 

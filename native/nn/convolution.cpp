@@ -169,7 +169,7 @@ void Convolution::apply(const NetworkRun& run, const FeatureMap& in, const Chann
   }
   const size_t inner = grid_.kernel * grid_.kernel * inputs_;
   const MatrixBackend& backend = backendOf(run);
-  const Precision precision = precisionOf(run);
+  const FactorPrecision precision = precisionOf(run);
   const size_t panel_size = backend.packedSize(inner, std::min(kPanelOutputs, outputs_), precision);
   const size_t panels = rangeCount(outputs_, kPanelOutputs);
   const size_t most_panels =

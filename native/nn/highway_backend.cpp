@@ -12,14 +12,16 @@ class HighwayBackend : public MatrixBackend {
  public:
   const char* name() const override { return "highway"; }
   std::string instructionSets() const override { return chosenPanelKernel().target; }
-  bool has(Precision precision) const override { return precision == Precision::kFloat32; }
+  bool has(FactorPrecision precision) const override {
+    return precision == FactorPrecision::kFloat32;
+  }
 
-  size_t packedSize(size_t inputs, size_t outputs, Precision) const override {
+  size_t packedSize(size_t inputs, size_t outputs, FactorPrecision) const override {
     return stripFloats(chosenPanelKernel().strip, inputs, outputs);
   }
 
   void pack(const WeightTensor& weight, size_t inputs, size_t first_output, size_t outputs,
-            Precision, float* packed) const override {
+            FactorPrecision, float* packed) const override {
     // Numbers of a row that are widened at a time.
     constexpr size_t kPiece = 64;
     float piece[kPiece];
@@ -38,7 +40,7 @@ class HighwayBackend : public MatrixBackend {
     }
   }
 
-  void multiply(const LinearPanel& panel, const float* packed, Precision) const override {
+  void multiply(const LinearPanel& panel, const float* packed, FactorPrecision) const override {
     PanelProduct product;
     product.shape = {panel.rows, panel.inputs, panel.outputs};
     product.a = panel.in;

@@ -42,7 +42,7 @@ Linear::Linear(const WeightTable& weights, const std::string& name, uint64_t inp
 
 void Linear::apply(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,
                    float* out, size_t out_stride) const {
-  if (precisionOf(run) == Precision::kFloat32) {
+  if (precisionOf(run) == FactorPrecision::kFloat32) {
     return applyRows(run, rows, in, in_stride, nullptr, out, out_stride);
   }
   // Each number of `in` is rounded once, not for each panel again.
@@ -65,7 +65,7 @@ void Linear::apply(const NetworkRun& run, size_t rows, const float* in, size_t i
 void Linear::applyRows(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,
                        const uint16_t* narrow_in, float* out, size_t out_stride) const {
   const MatrixBackend& backend = backendOf(run);
-  const Precision precision = precisionOf(run);
+  const FactorPrecision precision = precisionOf(run);
   // Each panel begins at a cache line.
   const size_t panel_size =
       roundedUp(backend.packedSize(inputs_, std::min(kPanelOutputs, outputs_), precision), 16);

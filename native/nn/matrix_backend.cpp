@@ -35,8 +35,8 @@ const MatrixBackend& backendOf(const NetworkRun& run) {
   return run.backend != nullptr ? *run.backend : defaultMatrixBackend();
 }
 
-Precision precisionOf(const NetworkRun& run) {
-  return backendOf(run).has(run.precision) ? run.precision : Precision::kFloat32;
+FactorPrecision precisionOf(const NetworkRun& run) {
+  return backendOf(run).has(run.precision) ? run.precision : FactorPrecision::kFloat32;
 }
 
 std::span<const MatrixBackend* const> matrixBackends() {

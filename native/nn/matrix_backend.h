@@ -33,15 +33,15 @@ class MatrixBackend {
   virtual ~MatrixBackend() = default;
   virtual const char* name() const = 0;             ///< "highway", "onednn"
   virtual std::string instructionSets() const = 0;  ///< what is in use: "AVX3_ZEN4"
-  virtual bool has(Precision precision) const = 0;
+  virtual bool has(FactorPrecision precision) const = 0;
   /// Floats that packed weights of [outputs, inputs] take.
-  virtual size_t packedSize(size_t inputs, size_t outputs, Precision precision) const = 0;
+  virtual size_t packedSize(size_t inputs, size_t outputs, FactorPrecision precision) const = 0;
   /// Brings rows [first_output, first_output + outputs) of a weight into the form that multiply()
   /// wants. Out: packed [packedSize()].
   virtual void pack(const WeightTensor& weight, size_t inputs, size_t first_output, size_t outputs,
-                    Precision precision, float* packed) const = 0;
+                    FactorPrecision precision, float* packed) const = 0;
   virtual void multiply(const LinearPanel& panel, const float* packed,
-                        Precision precision) const = 0;
+                        FactorPrecision precision) const = 0;
 };
 
 /// oneDNN's where libstipple_nn.so can be loaded, else ours; or the one that the environment
@@ -50,7 +50,7 @@ const MatrixBackend& defaultMatrixBackend();
 /// The backend of a run, and the precision that it has of the one that the run asks for: float32
 /// where it has no other.
 const MatrixBackend& backendOf(const NetworkRun& run);
-Precision precisionOf(const NetworkRun& run);
+FactorPrecision precisionOf(const NetworkRun& run);
 /// All that work here, ours first: for tests and benchmarks.
 std::span<const MatrixBackend* const> matrixBackends();
 

@@ -27,11 +27,11 @@ class OnednnBackend : public MatrixBackend {
 
   const char* name() const override { return "onednn"; }
   std::string instructionSets() const override { return table_.instruction_set(); }
-  bool has(Precision precision) const override {
+  bool has(FactorPrecision precision) const override {
     return table_.has_precision(numberOf(precision)) != 0;
   }
 
-  size_t packedSize(size_t inputs, size_t outputs, Precision precision) const override {
+  size_t packedSize(size_t inputs, size_t outputs, FactorPrecision precision) const override {
     if (inputs == 0 || outputs == 0) return 0;
     const StippleNnWeight weight = {inputs, outputs, numberOf(precision)};
     StippleNnStatus status;
@@ -41,7 +41,7 @@ class OnednnBackend : public MatrixBackend {
   }
 
   void pack(const WeightTensor& tensor, size_t inputs, size_t first_output, size_t outputs,
-            Precision precision, float* packed) const override {
+            FactorPrecision precision, float* packed) const override {
     if (inputs == 0 || outputs == 0) return;
     const StippleNnWeight weight = {inputs, outputs, numberOf(precision)};
     const size_t first = first_output * inputs, count = inputs * outputs;
@@ -49,8 +49,8 @@ class OnednnBackend : public MatrixBackend {
     Scratch values(as_it_lies ? 0 : count);
     const void* from = values.data();
     if (as_it_lies) {
-      from = tensor.bytes + first * (precision == Precision::kBfloat16 ? 2 : 4);
-    } else if (precision == Precision::kBfloat16) {
+      from = tensor.bytes + first * (precision == FactorPrecision::kBfloat16 ? 2 : 4);
+    } else if (precision == FactorPrecision::kBfloat16) {
       narrow(tensor, first, count, reinterpret_cast<uint16_t*>(values.data()));
     } else {
       widen(tensor, first, {values.data(), count});
@@ -60,11 +60,12 @@ class OnednnBackend : public MatrixBackend {
     throwIfFailed(status);
   }
 
-  void multiply(const LinearPanel& panel, const float* packed, Precision precision) const override {
+  void multiply(const LinearPanel& panel, const float* packed,
+                FactorPrecision precision) const override {
     if (panel.rows == 0 || panel.outputs == 0) return;
     if (panel.inputs == 0) return fillWithBias(panel);
     const StippleNnWeight weight = {panel.inputs, panel.outputs, numberOf(precision)};
-    const bool is_narrow = precision == Precision::kBfloat16;
+    const bool is_narrow = precision == FactorPrecision::kBfloat16;
     const bool has_gaps = panel.in_stride != panel.inputs;
     // bfloat16 takes half of it.
     const bool has_narrow = is_narrow && panel.narrow_in != nullptr;
@@ -88,13 +89,13 @@ class OnednnBackend : public MatrixBackend {
   }
 
  private:
-  static uint32_t numberOf(Precision precision) {
-    return precision == Precision::kBfloat16 ? kNnBfloat16 : kNnFloat32;
+  static uint32_t numberOf(FactorPrecision precision) {
+    return precision == FactorPrecision::kBfloat16 ? kNnBfloat16 : kNnFloat32;
   }
 
   /// Whether oneDNN can read the tensor where it is.
-  static bool liesAs(const WeightTensor& tensor, Precision precision) {
-    const bool is_narrow = precision == Precision::kBfloat16;
+  static bool liesAs(const WeightTensor& tensor, FactorPrecision precision) {
+    const bool is_narrow = precision == FactorPrecision::kBfloat16;
     const WeightType type = is_narrow ? WeightType::kBfloat16 : WeightType::kFloat32;
     return tensor.type == type &&
            reinterpret_cast<uintptr_t>(tensor.bytes) % (is_narrow ? 2 : 4) == 0;

@@ -187,7 +187,7 @@ void measureBoth(const char* name, double flops, bool with_bfloat16, const Encod
   const std::vector<float> exact = measure(name, flops, [&] { return encode({}); });
   if (!with_bfloat16) return;
   NetworkRun run;
-  run.precision = Precision::kBfloat16;
+  run.precision = FactorPrecision::kBfloat16;
   if (!backendOf(run).has(run.precision)) {
     std::printf("%s has no bfloat16 here\n", backendOf(run).name());
     return;

@@ -46,8 +46,8 @@ WeightTable weightOf(size_t inputs, size_t outputs) {
   return WeightTable("benchmark", std::move(tensors), halves);
 }
 
-const char* nameOf(Precision precision) {
-  return precision == Precision::kBfloat16 ? "bf16" : "f32";
+const char* nameOf(FactorPrecision precision) {
+  return precision == FactorPrecision::kBfloat16 ? "bf16" : "f32";
 }
 
 /// One product of a backend, packed outside the clock, whose operands stay in the caches: what its
@@ -57,7 +57,7 @@ class BareProduct {
   static constexpr size_t kRows = 192, kInputs = 1024, kOutputs = 256;
   static constexpr double kOperations = 2.0 * kRows * kInputs * kOutputs;
 
-  BareProduct(const MatrixBackend& backend, Precision precision)
+  BareProduct(const MatrixBackend& backend, FactorPrecision precision)
       : backend_(backend),
         precision_(precision),
         in_(numbers(kRows * kInputs, 1)),
@@ -94,11 +94,12 @@ class BareProduct {
         std::align(64, (packed_.size() - kLine) * sizeof(float), memory, room));
   }
   const MatrixBackend& backend_;
-  Precision precision_;
+  FactorPrecision precision_;
   std::vector<float> in_, out_, packed_;
 };
 
-void multiplyOnce(benchmark::State& state, const MatrixBackend& backend, Precision precision) {
+void multiplyOnce(benchmark::State& state, const MatrixBackend& backend,
+                  FactorPrecision precision) {
   BareProduct product(backend, precision);
   product.multiply();
   double best = 0, peak = 0;
@@ -118,8 +119,8 @@ void multiplyOnce(benchmark::State& state, const MatrixBackend& backend, Precisi
 /// Runs `work`, of so many operations, on one thread and on two by turns, with the bare product and
 /// the peak between.
 template <class Work>
-void compareWithProduct(benchmark::State& state, const MatrixBackend& backend, Precision precision,
-                        double operations, const Work& work) {
+void compareWithProduct(benchmark::State& state, const MatrixBackend& backend,
+                        FactorPrecision precision, double operations, const Work& work) {
   BareProduct product(backend, precision);
   double one = 1e300, two = 1e300, rate = 0, peak = 0;
   work();
@@ -146,7 +147,7 @@ struct LinearCase {
   size_t rows, inputs, outputs;
 };
 
-void linear(benchmark::State& state, const MatrixBackend& backend, Precision precision,
+void linear(benchmark::State& state, const MatrixBackend& backend, FactorPrecision precision,
             const LinearCase& c) {
   const WeightTable table = weightOf(c.inputs, c.outputs);
   const Linear layer(table, "fc", c.inputs, c.outputs, LinearBias::kNone);
@@ -160,7 +161,7 @@ void linear(benchmark::State& state, const MatrixBackend& backend, Precision pre
                      [&] { layer.apply(run, c.rows, in.data(), out.data()); });
 }
 
-void attend(benchmark::State& state, const MatrixBackend& backend, Precision precision,
+void attend(benchmark::State& state, const MatrixBackend& backend, FactorPrecision precision,
             const AttentionShape& shape) {
   const size_t width = shape.heads * shape.head_width;
   // Queries, keys and values side by side, as one layer makes them.
@@ -187,7 +188,8 @@ void add(const std::string& name, const Function& function) {
 
 const bool registered = [] {
   for (const MatrixBackend* backend : matrixBackends()) {
-    for (const Precision precision : {Precision::kFloat32, Precision::kBfloat16}) {
+    for (const FactorPrecision precision :
+         {FactorPrecision::kFloat32, FactorPrecision::kBfloat16}) {
       if (!backend->has(precision)) continue;
       const std::string kind = std::string(backend->name()) + "_" + nameOf(precision);
       add("nn.product_" + kind + ".192x1024x256",
@@ -199,7 +201,7 @@ const bool registered = [] {
             [=](benchmark::State& state) { linear(state, *backend, precision, c); });
       }
       // Attention in float32 goes through our own kernels, whatever the backend.
-      if (precision == Precision::kFloat32 && backend != matrixBackends().front()) continue;
+      if (precision == FactorPrecision::kFloat32 && backend != matrixBackends().front()) continue;
       const AttentionShape shapes[] = {{16, 64, 4096, 4096}, {1, 512, 4096, 4096}};
       for (const AttentionShape& shape : shapes) {
         add("nn.attention_" + kind + ".4096x4096_" + std::to_string(shape.heads) + "x" +

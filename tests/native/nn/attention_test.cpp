@@ -106,10 +106,10 @@ TEST(Attention, InBfloat16IsAsNearAsItsFactors) {
   std::vector<Case> cases(std::begin(kCases), std::end(kCases));
   cases.push_back({{2, 64, 200, 1100}, true});
   for (const MatrixBackend* backend : matrixBackends()) {
-    if (!backend->has(Precision::kBfloat16)) continue;
+    if (!backend->has(FactorPrecision::kBfloat16)) continue;
     NetworkRun run;
     run.backend = backend;
-    run.precision = Precision::kBfloat16;
+    run.precision = FactorPrecision::kBfloat16;
     for (const Case& c : cases) {
       const AttentionShape& s = c.shape;
       const Inputs in(s, 1.0f);
@@ -134,7 +134,7 @@ TEST(Attention, InBfloat16IsAsNearAsItsFactors) {
 TEST(Attention, WritesOverItsQueriesWithTheSameBitsForAnyNumberOfThreads) {
   const AttentionShape shape = {3, 64, 250, 600};
   const Inputs in(shape, 5.0f);
-  for (const Precision precision : {Precision::kBfloat16, Precision::kFloat32}) {
+  for (const FactorPrecision precision : {FactorPrecision::kBfloat16, FactorPrecision::kFloat32}) {
     NetworkRun run;
     run.precision = precision;
     std::vector<float> first;
@@ -150,7 +150,7 @@ TEST(Attention, WritesOverItsQueriesWithTheSameBitsForAnyNumberOfThreads) {
     const std::vector<double> expected = byHand(shape, in.q, in.k, in.v, in.stride, {}, 1.0 / 8.0);
     // bfloat16, where a backend has it, rounds values and weights by 2^-9.
     EXPECT_NEAR(static_cast<double>(first[0]), expected[0],
-                precision == Precision::kFloat32 ? 1e-5 : 2e-2);
+                precision == FactorPrecision::kFloat32 ? 1e-5 : 2e-2);
   }
 }
 

@@ -152,7 +152,7 @@ TEST(Linear, RoundsFactorsToBfloat16WhereItIsAskedTo) {
   for (const MatrixBackend* backend : matrixBackends()) {
     NetworkRun run;
     run.backend = backend;
-    run.precision = Precision::kBfloat16;
+    run.precision = FactorPrecision::kBfloat16;
     std::vector<float> out(c.rows * c.outputs);
     Linear(table, "fc", c.inputs, c.outputs).apply(run, c.rows, in.data(), out.data());
     // The same from bfloat16 as it lies in memory, which oneDNN reads in place.
@@ -172,11 +172,11 @@ TEST(Linear, RoundsFactorsToBfloat16WhereItIsAskedTo) {
     std::vector<float> in_place(out.size());
     Linear(WeightTable("memory", tensors, nullptr), "fc", c.inputs, c.outputs)
         .apply(run, c.rows, in.data(), in_place.data());
-    if (backend->has(Precision::kBfloat16)) {
+    if (backend->has(FactorPrecision::kBfloat16)) {
       EXPECT_EQ(in_place, out);
     }
     // A backend that has it not multiplies in float32.
-    const bool has = backend->has(Precision::kBfloat16);
+    const bool has = backend->has(FactorPrecision::kBfloat16);
     expectProduct(c, has ? rounded(in) : in, c.inputs, has ? rounded(weight) : weight, bias, out,
                   c.outputs, 6e-8, backend->name());
   }
@@ -190,7 +190,8 @@ TEST(Linear, HasTheSameBitsForAnyNumberOfThreads) {
   const Linear linear(table, "fc", 300, 700);
   const std::vector<float> in = numbers(401 * 300, 8);
   for (const MatrixBackend* backend : matrixBackends()) {
-    for (const Precision precision : {Precision::kFloat32, Precision::kBfloat16}) {
+    for (const FactorPrecision precision :
+         {FactorPrecision::kFloat32, FactorPrecision::kBfloat16}) {
       std::vector<float> first;
       for (const unsigned threads : {1u, 2u, 5u}) {
         std::vector<float> out(401 * 700);

@@ -84,7 +84,8 @@ TEST_F(MatrixBackends, WorkOnTheCallingThreadAlone) {
   const std::vector<float> in = numbers(rows * inputs, 2);
   std::vector<float> out(rows * outputs);
   for (const MatrixBackend* backend : matrixBackends()) {
-    for (const Precision precision : {Precision::kFloat32, Precision::kBfloat16}) {
+    for (const FactorPrecision precision :
+         {FactorPrecision::kFloat32, FactorPrecision::kBfloat16}) {
       if (!backend->has(precision)) continue;
       const size_t before = threadCount();
       std::vector<float> packed(backend->packedSize(inputs, outputs, precision) + 16);
