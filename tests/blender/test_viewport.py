@@ -238,15 +238,14 @@ def test_averages_of_rendered_views_are_those_of_renders(stipple, viewed, square
 
 
 def test_rendered_views_read_a_mesh_again_only_when_it_changes(stipple, viewed, square, monkeypatch):
-    view_image = importlib.import_module(f'{stipple.__name__}.viewport.view_image')
     quad = scenes.quad('before')
     read, reader = [], stipple.scene.view.mattes.read
     monkeypatch.setattr(stipple.scene.view.mattes, 'read', lambda obj: read.append(obj.name) or reader(obj))
-    kept = view_image.ViewMattes()
+    kept = importlib.import_module(f'{stipple.__name__}.scene.view.view_mattes').ViewMattes()
 
     def update():
         bpy.context.view_layer.update()
-        kept.update(bpy.context.evaluated_depsgraph_get())
+        kept.update(bpy.context.evaluated_depsgraph_get(), 'ALL')
         return len(read)
 
     assert update() == 1 and update() == 1
