@@ -60,12 +60,34 @@ struct Wave {
   Vec cosine, sine;
 };
 
+/// harmonicWave(). Half turns are taken off; what is left, at most a quarter turn, goes into the
+/// Taylor series of both, whose next terms are below 1e-8 there. Whole numbers stay in float, since
+/// a phase may be any.
 HWY_INLINE Wave waveOf(Tag d, float k, Vec offset, Vec phase) {
-  constexpr float kTurn = static_cast<float>(2 * std::numbers::pi);
-  Vec turns = hn::MulAdd(hn::Set(d, k), offset, hn::Mul(phase, hn::Set(d, 1 / kTurn)));
-  turns = hn::Sub(turns, hn::Round(turns));
-  const Vec angle = hn::Mul(turns, hn::Set(d, kTurn));
-  return {hn::Cos(d, angle), hn::Sin(d, angle)};
+  constexpr double kTurn = 2 * std::numbers::pi;
+  const auto number = [d](double value) { return hn::Set(d, static_cast<float>(value)); };
+  const Vec turns =
+      hn::MulAdd(number(static_cast<double>(k)), offset, hn::Mul(phase, number(1 / kTurn)));
+  const Vec halves = hn::Round(hn::Add(turns, turns));
+  const Vec angle = hn::Mul(hn::NegMulAdd(halves, number(0.5), turns), number(kTurn));
+  const Vec odd = hn::NegMulAdd(hn::Round(hn::Mul(halves, number(0.5))), number(2), halves);
+  const Vec sign = hn::NegMulAdd(hn::Abs(odd), number(2), number(1));
+  const Vec x2 = hn::Mul(angle, angle);
+  Vec sine = number(1.0 / 6227020800);
+  sine = hn::MulAdd(sine, x2, number(-1.0 / 39916800));
+  sine = hn::MulAdd(sine, x2, number(1.0 / 362880));
+  sine = hn::MulAdd(sine, x2, number(-1.0 / 5040));
+  sine = hn::MulAdd(sine, x2, number(1.0 / 120));
+  sine = hn::MulAdd(sine, x2, number(-1.0 / 6));
+  sine = hn::MulAdd(hn::Mul(sine, x2), angle, angle);
+  Vec cosine = number(1.0 / 479001600);
+  cosine = hn::MulAdd(cosine, x2, number(-1.0 / 3628800));
+  cosine = hn::MulAdd(cosine, x2, number(1.0 / 40320));
+  cosine = hn::MulAdd(cosine, x2, number(-1.0 / 720));
+  cosine = hn::MulAdd(cosine, x2, number(1.0 / 24));
+  cosine = hn::MulAdd(cosine, x2, number(-0.5));
+  cosine = hn::MulAdd(cosine, x2, number(1));
+  return {hn::Mul(cosine, sign), hn::Mul(sine, sign)};
 }
 
 HWY_INLINE Vec phaseOf(const Quadruple& phases, size_t k) {
