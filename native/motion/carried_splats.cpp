@@ -1,7 +1,6 @@
 // What a deformed mesh makes of the splats that are bound to it.
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <string>
 
 #include "base/error.h"
@@ -33,6 +32,15 @@ std::vector<TriangleMotion> motionsOf(const SurfaceBinding& binding,
   return motions;
 }
 
+Mat3d matrixOf(const std::array<float, 9>& entries) {
+  Mat3d matrix;
+  for (size_t k = 0; k < 9; ++k) {
+    matrix(static_cast<Eigen::Index>(k / 3), static_cast<Eigen::Index>(k % 3)) =
+        static_cast<double>(entries[k]);
+  }
+  return matrix;
+}
+
 /// One row's place, and the deformation of its shape.
 struct Carried {
   std::array<float, 3> place{};
@@ -42,7 +50,6 @@ struct Carried {
 Carried carriedRow(const std::vector<TriangleMotion>& motions, const SurfaceBinding& binding,
                    size_t row, const float* at) {
   Carried carried;
-  Mat3d shape = Mat3d::Zero();
   for (size_t i = 0; i < binding.influences; ++i) {
     const size_t index = row * binding.influences + i;
     const TriangleMotion& motion = motions[binding.bound[index]];
@@ -58,37 +65,13 @@ Carried carriedRow(const std::vector<TriangleMotion>& motions, const SurfaceBind
   }
   if (binding.influences == 1) return carried;
   // A sum of deformations that turn differently shrinks; far apart it may even flatten.
-  for (size_t k = 0; k < 9; ++k) {
-    shape(static_cast<Eigen::Index>(k / 3), static_cast<Eigen::Index>(k % 3)) =
-        static_cast<double>(carried.shape[k]);
-  }
-  const Mat3d bounded = boundedStretch(shape);
+  const Mat3d bounded = boundedStretch(matrixOf(carried.shape));
   for (size_t k = 0; k < 9; ++k) {
     carried.shape[k] = static_cast<float>(
         bounded(static_cast<Eigen::Index>(k / 3), static_cast<Eigen::Index>(k % 3)));
   }
   return carried;
 }
-
-/// Turns the harmonics of a row by the rotation nearest to its deformation. `last` keeps what was
-/// made for the row before, which mostly lies on the same triangle.
-struct HarmonicTurn {
-  std::array<float, 9> shape{};
-  std::optional<HarmonicRotation> rotation;
-
-  void apply(const std::array<float, 9>& deformation, int degree, float* coefficients) {
-    if (!rotation || shape != deformation) {
-      shape = deformation;
-      Mat3d linear;
-      for (size_t k = 0; k < 9; ++k) {
-        linear(static_cast<Eigen::Index>(k / 3), static_cast<Eigen::Index>(k % 3)) =
-            static_cast<double>(deformation[k]);
-      }
-      rotation.emplace(nearestOrthogonal(linear));
-    }
-    rotation->apply(degree, coefficients);
-  }
-};
 
 }  // namespace
 
@@ -113,13 +96,13 @@ SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
   SplatCloud carried = cloud;
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     std::vector<float> shapes(9 * kGrain);
-    HarmonicTurn harmonics;
     for (size_t row = begin; row < end; ++row) {
       const Carried one = carriedRow(motions, binding, row, &cloud.positions[3 * row]);
       std::copy(one.place.begin(), one.place.end(), &carried.positions[3 * row]);
       for (size_t k = 0; k < 9; ++k) shapes[k * kGrain + row - begin] = one.shape[k];
       if (cloud.sh_degree > 0) {
-        harmonics.apply(one.shape, cloud.sh_degree, &carried.sh[row * cloud.shStride()]);
+        rotateHarmonics(nearestOrthogonal(matrixOf(one.shape)), cloud.sh_degree,
+                        &carried.sh[row * cloud.shStride()]);
       }
     }
     kernel.deform({shapes.data(), kGrain, &cloud.rotations[4 * begin], &cloud.scales[3 * begin],

@@ -43,7 +43,7 @@ Mat3d boundedStretch(const Mat3d& linear) {
   // the largest one's, and the determinant over the two largest below the smallest one.
   const double squared = linear.squaredNorm();
   const double determinant = linear.determinant();
-  if (squared <= kLargestStretch * kLargestStretch &&
+  if (squared <= kLargestStretch * kLargestStretch && determinant > 0 &&
       determinant >= squared / 2 / kLargestStretch) {
     return linear;
   }
