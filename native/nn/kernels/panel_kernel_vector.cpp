@@ -97,6 +97,9 @@ void multiplyRows(const PanelProduct& product, Piece piece, size_t row_end) {
     } else if (left >= 6) {
       multiplyPiece<6>(product, piece);
       piece.row += 6;
+    } else if (left >= 4) {
+      multiplyPiece<4>(product, piece);
+      piece.row += 4;
     } else if (left >= 3) {
       multiplyPiece<3>(product, piece);
       piece.row += 3;
