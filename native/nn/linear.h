@@ -20,7 +20,7 @@ enum class LinearBias { kNeeded, kNone };
 class Linear {
  public:
   /// So many rows are few.
-  static constexpr size_t kFewRows = 64;
+  static constexpr size_t kFewRows = 256;
 
   Linear() = default;
   /// Reads `name`.weight and `name`.bias. In: inputs, outputs: as the network needs them, kAnySize
