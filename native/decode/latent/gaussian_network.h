@@ -30,8 +30,8 @@ class GaussianNetwork {
   LatentKeys keysOf(const NetworkRun& run, const Latent& latent) const;
   uint64_t keyBytes(uint64_t token_count) const;
   /// In: keys, of keysOf(); points [rows,3] in the unit cube. Returns [rows, 15 K] in the order of
-  /// SplatLayout. Errors: kFormat where a result is not finite; kCancelled. Threads and determinism: parallel; same bits for any number of
-  /// threads. Cost: O(rows^2 + rows * tokens).
+  /// SplatLayout. Errors: kFormat where a result is not finite; kCancelled. Threads and
+  /// determinism: parallel; same bits for any number of threads. Cost: O(rows^2 + rows * tokens).
   std::vector<float> features(const NetworkRun& run, const LatentKeys& keys, size_t rows,
                               const float* points) const;
   /// Bytes that features() holds at most, its result included.

@@ -116,8 +116,8 @@ void OctreeNetwork::logits(const NetworkRun& asked, const LatentKeys& keys, int 
       const Block& block = blocks_[i];
       if (run.progress) run.progress->throwIfCancelled();
       layerNorm(before_attention, rows, tokens.data(), room.data());
-      block.attention.apply(run, rows, room.data(), keys.rows, keys.rates[i],
-                            scratch.data(), room.data());
+      block.attention.apply(run, rows, room.data(), keys.rows, keys.rates[i], scratch.data(),
+                            room.data());
       addScaled(rows, width, part(2), room.data(), tokens.data());
       layerNorm(before_mlp, rows, tokens.data(), room.data());
       block.mlp.apply(run, rows, room.data(), hidden.data(), room.data());

@@ -32,8 +32,8 @@ class OctreeNetwork {
   /// Errors: kFormat where a result is not finite; kCancelled.
   /// Threads and determinism: parallel; same bits for any number of threads, and whatever cells are
   /// asked about together.
-  void logits(const NetworkRun& run, const LatentKeys& keys, int level, std::span<const uint64_t> cells,
-              std::span<float> out) const;
+  void logits(const NetworkRun& run, const LatentKeys& keys, int level,
+              std::span<const uint64_t> cells, std::span<float> out) const;
 
   /// Middles of cells in the unit cube, [cells, 3].
   static std::vector<float> centresOf(int level, std::span<const uint64_t> cells);

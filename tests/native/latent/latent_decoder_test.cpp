@@ -45,9 +45,8 @@ TEST_F(LatentDecoderTest, MakesThirtyTwoValidSplatsOfEachAnchorNearIt) {
   EXPECT_EQ(cloud.frame, Frame::kRFU);
   EXPECT_EQ(cloud.antialias, Antialias::kMip);
   EXPECT_EQ(cloud.colour_space, ColourSpace::kDisplay);
-  const std::vector<float> features =
-      networks_.gaussians->features({}, networks_.gaussians->keysOf({}, *latent_), 200,
-                                    drawn.positions.data());
+  const std::vector<float> features = networks_.gaussians->features(
+      {}, networks_.gaussians->keysOf({}, *latent_), 200, drawn.positions.data());
   for (size_t n = 0; n < cloud.size(); ++n) {
     // Raw spreads stand last; the softplus of one and its bias bounds what a Gaussian may move.
     const double raw = static_cast<double>(features[n / 32 * 480 + 448 + n % 32]);
