@@ -47,7 +47,8 @@ struct LayerKernel {
   /// To the nearest bfloat16, of two as near the even one. Infinities and usual NaN stay.
   void (*narrow)(size_t count, const float* from, uint16_t* to);
   /// Numbers of a tensor, of a type that is not kOther, from any address: as widen() of
-  /// data/weight_table.h, at the speed of memory.
+  /// data/weight_table.h, at the speed of memory. What is not finite, which layers refuse before, may
+  /// become any number.
   void (*widen)(WeightType type, size_t count, const uint8_t* bytes, float* to);
 };
 
