@@ -121,7 +121,8 @@ void Linear::applyFew(const NetworkRun& run, size_t rows, const float* in, size_
       }
       for (size_t column = 0; column < columns; column += strip) {
         PanelProduct product;
-        product.shape = {outputs, count, strip};
+        // Whole vectors, which a strip has two of.
+        product.shape = {outputs, count, 2 * (rows - column) <= strip ? strip / 2 : strip};
         product.a = wide;
         product.a_stride = kFewInputs;
         product.b = strips.data() + column * inputs_ + input * strip;
