@@ -160,12 +160,14 @@ void run(uint64_t tokens, uint64_t anchors, uint64_t blocks) {
   std::vector<float> out(8 * cells.size());
   const auto c = static_cast<double>(kWidth), m = static_cast<double>(tokens);
   const double keys = kDensityBlocks * m * 2 * c * 2 * kLatentWidth;
+  // Queries and weights of 16 heads meet the tokens' numbers, and a 1.
+  const double shared = 16 * m * (2 * kLatentWidth + 1);
   measure("keys of the latent", keys, [&] {
     const uint64_t root = 0;
     density.childLogProbabilities(0, std::span(&root, 1), std::span(out).first(8));
   });
   // A linear layer behind the points; query, output, MLP and both products of attention.
-  const double cell = 2 * (c * c + kDensityBlocks * (10 * c * c + 2 * m * c));
+  const double cell = 2 * (c * c + kDensityBlocks * (10 * c * c + shared));
   measure("a question to the density", cell * static_cast<double>(cells.size()),
           [&] { density.childLogProbabilities(7, cells, out); });
 
@@ -180,7 +182,7 @@ void run(uint64_t tokens, uint64_t anchors, uint64_t blocks) {
   request.anchors = &set;
   request.gaussians_per_anchor = networks.gaussians->gaussians();
   const auto p = static_cast<double>(anchors), b = static_cast<double>(blocks);
-  const double anchor = 2 * (c * c + b * (14 * c * c + 2 * (m + p) * c));
+  const double anchor = 2 * (c * c + b * (14 * c * c + shared + 2 * p * c));
   const double latent_keys = b * m * 2 * c * 2 * kLatentWidth;
   measure("a decode", anchor * p + latent_keys, [&] { decoder.decode(request); });
 
