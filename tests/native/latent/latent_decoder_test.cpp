@@ -120,6 +120,23 @@ TEST_F(LatentDecoderTest, StopsInTheMiddleWhenCancelled) {
   EXPECT_LT(progress.fraction(), 1.0);
 }
 
+TEST_F(LatentDecoderTest, DecodesTheSameAgainAndAfterACancelThatStoppedTheFirst) {
+  const AnchorSet drawn = anchors(20);
+  Progress cancelled;
+  cancelled.cancel();
+  EXPECT_THROW(decode(drawn, &cancelled), Error);
+  const SplatCloud first = decode(drawn), second = decode(drawn);
+  const LatentDecoder other(networks_.gaussians, latent_);
+  DecodeRequest request;
+  request.anchors = &drawn;
+  request.gaussians_per_anchor = 32;
+  const SplatCloud fresh = other.decode(request);
+  EXPECT_EQ(first.positions, second.positions);
+  EXPECT_EQ(first.sh, second.sh);
+  EXPECT_EQ(first.positions, fresh.positions);
+  EXPECT_EQ(first.sh, fresh.sh);
+}
+
 TEST_F(LatentDecoderTest, RefusesAnotherNumberOfGaussians) {
   const AnchorSet drawn = anchors(10);
   DecodeRequest request;
