@@ -42,7 +42,7 @@ class WatchedDensity final : public DensityModel {
  private:
   LatentDensity density_;
   std::shared_ptr<const OctreeNetwork> network_;
-  OctreeNetwork::Keys keys_;
+  LatentKeys keys_;
 };
 
 std::string levelName(const char* stem, int level) {
@@ -88,9 +88,10 @@ void decoderStages(const GoldenFile& file, StageReport& report) {
   const LatentDecoder decoder(networks.gaussians, latent);
   const std::vector<float> points = file.floats("expect.points");
   const std::vector<float> features = file.floats("expect.features");
+  const LatentKeys keys = networks.gaussians->keysOf({}, *latent);
   report.compare("features",
-                 networks.gaussians->features({}, *latent, points.size() / 3, points.data()),
-                 features, kNetworkCall);
+                 networks.gaussians->features({}, keys, points.size() / 3, points.data()), features,
+                 kNetworkCall);
   compareSplats("activated ", file, decoder.splatsOf(points, features), kFormula, report);
   DecodeRequest request;
   request.anchors = &anchors;
