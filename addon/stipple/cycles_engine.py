@@ -104,6 +104,10 @@ def _make_engine():
                     # Cycles' passes tell nothing of what it holds out, and of shadow catchers only what falls on them.
                     self._holdouts = mattes.gather(depsgraph, 'HOLDOUTS')
                     self._catchers = mattes.gather(depsgraph, 'CATCHERS')
+            except CancelledError as error:
+                self._failed = True
+                self.report({'INFO'}, str(error))
+                return
             except StippleError as error:
                 self._failed = True
                 self._fail(error)

@@ -39,6 +39,15 @@ class NativeWork:
             self._say(fraction, stage)
             time.sleep(POLL_SECONDS)
 
+    def _wait_decoding(self, name, job):
+        """Until the splats of an object are decoded, or what they need is read."""
+        self._stats = f"Decoding the splats of '{name}'"
+        try:
+            self._wait(job)
+        except CancelledError:
+            raise CancelledError(f"The render was cancelled while the splats of '{name}' were decoded; nothing has "
+                                 "changed.") from None
+
     def _cancelled(self):
         return self.test_break()
 
@@ -55,7 +64,10 @@ class NativeWork:
 
     def _take_instances(self, depsgraph):
         """Decodes the splats of the view layer. Errors: StippleError."""
-        found = instances.gather_keyed(depsgraph, 'RENDER', self._warn)
+        try:
+            found = instances.gather_keyed(depsgraph, 'RENDER', self._warn, self._wait_decoding)
+        finally:
+            self._stats = ''
         self._keys = [entry[0] for entry in found]
         self._instances = [entry[3] for entry in found]
         # By what the object index pass of the renderer has: 0 for none, then the instances.
@@ -120,6 +132,8 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
             wanted = 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS'
             self._mattes = mattes.gather(depsgraph, wanted)
             self._take_instances(depsgraph)
+        except CancelledError as error:
+            self.report({'INFO'}, str(error))
         except StippleError as error:
             self._fail(error)
 

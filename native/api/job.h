@@ -2,6 +2,7 @@
 
 #include <stipple/stipple.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <memory>
@@ -42,6 +43,8 @@ StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> 
 }  // namespace stipple::api
 
 struct StippleJob {
+  using Clock = std::chrono::steady_clock;
+
   ~StippleJob();
 
   stipple::api::Context context;
@@ -49,12 +52,14 @@ struct StippleJob {
   std::shared_ptr<stipple::FitSession> fit;              ///< null of other jobs
   std::shared_ptr<stipple::GenerateSession> generation;  ///< likewise
   std::thread thread;
+  const Clock::time_point begin = Clock::now();
 
   mutable std::mutex mutex;  ///< of what follows
   mutable std::condition_variable ended;
   StippleJobState state = STIPPLE_JOB_RUNNING;
   StippleStatus status = STIPPLE_OK;
   std::string message;
+  Clock::time_point end;  ///< of a job that has ended
   stipple::api::JobResult result;
 };
 
