@@ -2,7 +2,6 @@
 
 #include <stipple/stipple.h>
 
-#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <memory>
@@ -14,6 +13,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "base/progress.h"
+#include "base/stopwatch.h"
 
 namespace stipple {
 
@@ -43,8 +43,6 @@ StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> 
 }  // namespace stipple::api
 
 struct StippleJob {
-  using Clock = std::chrono::steady_clock;
-
   ~StippleJob();
 
   stipple::api::Context context;
@@ -52,14 +50,14 @@ struct StippleJob {
   std::shared_ptr<stipple::FitSession> fit;              ///< null of other jobs
   std::shared_ptr<stipple::GenerateSession> generation;  ///< likewise
   std::thread thread;
-  const Clock::time_point begin = Clock::now();
+  const stipple::Stopwatch watch;
 
   mutable std::mutex mutex;  ///< of what follows
   mutable std::condition_variable ended;
   StippleJobState state = STIPPLE_JOB_RUNNING;
   StippleStatus status = STIPPLE_OK;
   std::string message;
-  Clock::time_point end;  ///< of a job that has ended
+  double seconds = 0.0;  ///< that it took, of one that has ended
   stipple::api::JobResult result;
 };
 

@@ -87,17 +87,19 @@ def test_a_blend_file_opens_without_weights_and_shows_what_it_holds(stipple, spl
 
 
 def test_what_takes_long_is_decoded_beside_blender(stipple, splats):
-    sources, data = stipple.scene.source.sources, splats.data
+    decoded, data = stipple.scene.source.decoded, splats.data
 
     def wanted(anchors):
         return stipple.binding.model.DecodeSettings(anchors, EACH)
 
     assert not decoded.is_decoded(data, wanted(3000), 0.0)
-    first = sources._decoding[data.name_full].job
+    first = decoded._beside[data.name_full].job
     assert decoded.is_decoding() and 0 <= decoded.decoding_share(data) <= 1
     # Other settings take the place of what was wanted before.
     assert not decoded.is_decoded(data, wanted(2000), 0.0)
-    assert first.pointer is None and sources._decoding[data.name_full].job is not first
+    assert data.name_full not in decoded._beside or decoded._beside[data.name_full].job is not first
+    with pytest.raises(stipple.binding.errors.CancelledError):
+        first.wait()
     end = time.monotonic() + 60
     while not decoded.is_decoded(data, wanted(2000), 0.0):
         assert time.monotonic() < end
@@ -109,7 +111,7 @@ def test_what_takes_long_is_decoded_beside_blender(stipple, splats):
 
 
 def test_what_nobody_takes_is_forgotten(stipple, splats):
-    sources = stipple.scene.source.sources
+    decoded = stipple.scene.source.decoded
     decoded.is_decoded(splats.data, stipple.binding.model.DecodeSettings(50, EACH), 0.0)
     end = time.monotonic() + 60
     while decoded.is_decoding():

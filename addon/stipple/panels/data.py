@@ -9,7 +9,7 @@ import bpy
 
 from . import source_state
 from ..scene import geometry
-from ..scene.source import decoded, erased, exporting, masks, source_settings, sources, splat_data, sync
+from ..scene.source import decoded, erased, exporting, frame_budgets, masks, source_settings, sources, splat_data, sync
 from ..scene.view import viewed
 from .text import draw_anchors
 
@@ -133,6 +133,8 @@ def _draw_budget(self, context):
     draw_anchors(column, stipple, 'anchors_render', each, "Render")
     if known.has_seed:
         column.prop(stipple, 'seed')
+    if frame_budgets.is_animated(data):
+        column.operator('stipple.decode_budgets', icon='RENDER_ANIMATION')
     _draw_decoding(column, data)
     if known.is_learned:
         used = (stipple.anchors, stipple.anchors_render or stipple.anchors)
@@ -152,6 +154,11 @@ def _draw_decoding(layout, data):
         row = layout.row(align=True)
         row.label(text="Decoding was cancelled", icon='INFO')
         row.operator('stipple.decoding_resume')
+    count, size = decoded.cached(data)
+    if count:
+        row = layout.row()
+        row.active = False
+        row.label(text=f"{count} budget{'' if count == 1 else 's'} kept{SEPARATOR}{exporting.megabytes(size)}")
 
 
 def _draw_fixed(layout, name, value):

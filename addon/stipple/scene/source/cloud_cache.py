@@ -36,19 +36,20 @@ class CloudCache:
         with self._lock:
             self._entries[key] = (cloud, bytes_of(info.count, info.sh_degree))
             self._entries.move_to_end(key)
-            while self.size() > limit and len(self._entries) > 1:
+            while self._size() > limit and len(self._entries) > 1:
                 self._entries.popitem(last=False)
 
     def __contains__(self, key):
         return key in self._entries
 
-    def __len__(self):
-        return len(self._entries)
-
-    def size(self):
-        """Bytes of all clouds."""
+    def measure(self, counts):
+        """(number, bytes) of the clouds whose key counts(key)."""
         with self._lock:
-            return sum(size for _, size in self._entries.values())
+            found = [size for key, (_, size) in self._entries.items() if counts(key)]
+        return len(found), sum(found)
+
+    def _size(self):
+        return sum(size for _, size in self._entries.values())
 
     def rename(self, changed):
         """Gives clouds other keys. changed(key): the new one, or None where it stays."""

@@ -105,9 +105,15 @@ def cache_limit():
     return min(chosen.budget_cache << 20, allowed)
 
 
-def cached():
-    """(number, bytes) of the clouds that are kept."""
-    return len(_kept), _kept.size()
+def cached(data=None):
+    """(number, bytes) of the clouds that are kept, over all sources or of a datablock's."""
+    if data is None:
+        return _kept.measure(lambda key: True)
+    try:
+        source = sources.source_key(data)
+    except StippleError:
+        return 0, 0
+    return _kept.measure(lambda key: key[0] == source)
 
 
 def decode(data, settings, wait=None):

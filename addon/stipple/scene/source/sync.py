@@ -206,7 +206,7 @@ def on_limit_change(_scene, _context):
     if bpy.app.background:
         sync_all()
     else:
-        _complete_later()
+        follow_later()
 
 
 def follow(obj):
@@ -215,10 +215,11 @@ def follow(obj):
     # The first move after a file is opened does not wait for a tree of gigabytes either.
     if sources.is_at_hand(obj.data, MOVE_SECONDS):
         try_sync(obj, None, 'VIEWPORT', most, beside=True)
-    _complete_later()
+    follow_later()
 
 
-def _complete_later():
+def follow_later():
+    """What is shown follows its settings when no more of them change, without anybody waiting for it."""
     if bpy.app.timers.is_registered(complete):
         bpy.app.timers.unregister(complete)
     bpy.app.timers.register(complete, first_interval=REST_SECONDS)
@@ -244,18 +245,13 @@ def complete():
     return POLL_SECONDS if is_busy else None
 
 
-def follow_later():
-    """What is shown follows its settings soon, without anybody waiting for it."""
-    _complete_later()
-
-
 def _follow_all(depsgraph=None):
     """Everything follows its settings: at once what is quick, and all in background mode; else what takes long is
     decoded beside Blender."""
     beside = not bpy.app.background
     sync_all(depsgraph, beside=beside)
-    if beside and (decoded.is_decoding() or sources.is_reading()):
-        _complete_later()
+    if beside and (decoded.is_decoding() or sources.is_reading()) and not bpy.app.timers.is_registered(complete):
+        bpy.app.timers.register(complete, first_interval=POLL_SECONDS)
 
 
 def try_sync(obj, depsgraph, mode, most=None, share=None, beside=False, wait=None):
