@@ -4,7 +4,7 @@
 import bpy
 
 from .. import version
-from ..binding.errors import StippleError
+from ..binding.errors import CancelledError, StippleError
 from ..binding.structs import Status
 from . import grades, limits, shown
 from .sequence import sequences
@@ -80,7 +80,7 @@ def _cloud_of(obj, mode, scene, most, wait):
         try:
             if stipple.is_sequence:
                 cloud = sequences.frame_of(original, stipple, scene.frame_current, mode, most).cloud()
-            elif mode == 'RENDER' or bpy.app.background or decoded.is_quick(original, settings):
+            elif _waits(mode) or decoded.is_quick(original, settings):
                 cloud = decoded.decode(original, settings, wait and (lambda job: wait(obj.name, job)))
             else:
                 # Nobody waits for a view: it shows what is stored, and what is wanted when that is there.
@@ -88,11 +88,18 @@ def _cloud_of(obj, mode, scene, most, wait):
                     sync.follow_later()
                 return _stored(obj, mode)
             return cloud and grades.apply(cloud, stipple)
+        except CancelledError:
+            raise
         except StippleError as error:
             # Without what the source needs beside its file, what is stored is still what it gives.
             if error.status != Status.ERROR_UNAVAILABLE or not sync.is_stored(original, settings):
                 raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
     return _stored(obj, mode)
+
+
+def _waits(mode):
+    """Whether an image is worth nothing without the splats that are wanted: it is no view of a window."""
+    return mode == 'RENDER' or bpy.app.background
 
 
 def _stored(obj, mode):

@@ -245,10 +245,15 @@ def complete():
     return POLL_SECONDS if is_busy else None
 
 
+def _has_views():
+    """Whether somebody looks on while splats are decoded."""
+    return not bpy.app.background
+
+
 def _follow_all(depsgraph=None):
     """Everything follows its settings: at once what is quick, and all in background mode; else what takes long is
     decoded beside Blender."""
-    beside = not bpy.app.background
+    beside = _has_views()
     sync_all(depsgraph, beside=beside)
     if beside and (decoded.is_decoding() or sources.is_reading()) and not bpy.app.timers.is_registered(complete):
         bpy.app.timers.register(complete, first_interval=POLL_SECONDS)
