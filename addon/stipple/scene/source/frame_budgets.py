@@ -19,6 +19,7 @@ def gather(context, data):
     in the order of the frames. Decodes nothing; the scene is at its own frame at the end. Errors: StippleError for
     settings out of range."""
     scene = context.scene
+    data.update_tag()  # what a script has set may not be evaluated yet
     # Max Splats may be animated, and shares of it change with what others show.
     changes = (is_animated(data) or source_settings.of(data.stipple).has_time or scene.render.use_simplify
                or scene.animation_data is not None)
