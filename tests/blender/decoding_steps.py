@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Steps of test_decoding_window.py inside the Blender with a window; window.py runs them."""
+
+import ctypes
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from window_steps import addon  # noqa: E402
+
+folder, weights, asset = (Path(sys.argv[sys.argv.index('--') + i]) for i in (2, 4, 5))
+EACH = 32
+FEW, MANY = 64, 31250  # anchors: MANY take a long time, even with this small network
+facts = {'counts': [], 'decoded': [], 'said': []}
+
+
+def package(name):
+    return sys.modules[f'{addon().__name__}.{name}']
+
+
+def splats():
+    return bpy.data.objects['thing']
+
+
+def count():
+    data = splats().data
+    return len(data.vertices) if hasattr(data, 'vertices') else len(data.points)
+
+
+def decoded():
+    return package('scene.source.decoded')
+
+
+def build(window):
+    """The splats, seen from the front, and the budget in the Properties editor."""
+    package('preferences').get().weights_folder = str(weights)
+    sources = package('scene.source.sources')
+    first = sources.first_settings
+    sources.first_settings = lambda settings: package('binding.model').DecodeSettings(FEW, EACH)
+    bpy.data.objects.remove(bpy.data.objects['Cube'])
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / 'a.blend'))
+    with window.context():
+        bpy.ops.stipple.splats_import(filepath=str(asset))
+        bpy.ops.view3d.view_all()
+    sources.first_settings = first
+    editor = next(area for area in window.window.screen.areas if area.type == 'PROPERTIES')
+    editor.spaces.active.context = 'DATA'
+    facts['editor'] = editor.x, editor.y, editor.width, editor.height
+    bpy.context.preferences.view.render_display_type = 'NONE'  # redraws of the 3D view are what steps wait for
+    write = package('scene.source.splat_data').write
+    package('scene.source.splat_data').write = lambda data, arrays, *more, **named: (
+        facts['counts'].append(arrays.count) or write(data, arrays, *more, **named))
+    model = package('binding.model').Model
+    for name in ('decode', 'decode_start'):
+        setattr(model, name, lambda self, settings, original=getattr(model, name):
+                facts['decoded'].append(settings.anchors) or original(self, settings))
+    report(window)
+
+
+def report(window):
+    """What operators and renders report is in Blender's log."""
+    window.window.workspace  # the window is there
+
+
+def shown(_window):
+    return 'few'
+
+
+def move(_window):
+    begin = time.perf_counter()
+    splats().data.stipple.anchors = MANY
+    facts['move_seconds'] = time.perf_counter() - begin
+    facts['count_after_move'] = count()
+
+
+def busy(_window):
+    """Until the panel has something to say."""
+    share = decoded().decoding_share(splats().data)
+    return None if share is not None and share > 0 and package('scene.source.decode_progress')._state['watched'] else False
+
+
+def decoding(_window):
+    facts['count_while_decoding'] = count()
+    return 'decoding'
+
+
+def escape(window):
+    window.window.event_simulate(type='ESC', value='PRESS', x=10, y=10)
+    window.window.event_simulate(type='ESC', value='RELEASE', x=10, y=10)
+
+
+def stopped(_window):
+    return False if decoded().names() or bpy.app.timers.is_registered(package('scene.source.sync').complete) else None
+
+
+def cancelled(_window):
+    facts['declined'] = decoded().is_declined(splats().data)
+    facts['count_after_esc'] = count()
+    facts['counts'].clear()
+    return 'cancelled'
+
+
+def several_moves(_window):
+    for anchors in (MANY, 20000, 25000, 500):
+        splats().data.stipple.anchors = anchors
+
+
+def followed(_window):
+    return False if count() != 500 * EACH or decoded().is_decoding() else None
+
+
+def animate(window):
+    facts['counts_of_moves'] = list(facts['counts'])
+    settings = splats().data.stipple
+    for frame, anchors in ((1, 100), (3, 300)):
+        settings.anchors = anchors
+        settings.keyframe_insert('anchors', frame=frame)
+    settings.anchors_render = MANY
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 3
+    scene.frame_set(1)
+    decoded().forget()
+    with window.context():
+        bpy.ops.stipple.decode_budgets('INVOKE_DEFAULT')
+
+
+def preparing_begins(_window):
+    """Until the large budget is the one that is decoded."""
+    return None if facts['decoded'] and facts['decoded'][-1] == MANY else False
+
+
+def preparing(_window):
+    return 'preparing'
+
+
+def preparing_cancelled(window):
+    """Until the operator has ended: one budget is kept."""
+    facts['kept_after_esc'] = decoded().cached()[0]
+    settings = splats().data.stipple
+    settings.anchors_render = 250
+    facts['decoded'].clear()
+    with window.context():
+        bpy.ops.stipple.decode_budgets('INVOKE_DEFAULT')
+
+
+def prepared(_window):
+    return None if decoded().cached()[0] == 4 else False
+
+
+def play(_window):
+    facts['prepared'] = sorted(facts['decoded'])
+    facts['decoded'].clear()
+    facts['played'] = []
+    for frame in (1, 2, 3, 1):
+        bpy.context.scene.frame_set(frame)
+        facts['played'].append(count())
+
+
+def played(_window):
+    facts['decoded_while_playing'] = list(facts['decoded'])
+    return 'prepared'
+
+
+def press_escape():
+    """A real key, which Blender's renders look for. Returns whether it can be pressed."""
+    try:
+        x, test = ctypes.CDLL('libX11.so.6'), ctypes.CDLL('libXtst.so.6')
+    except OSError:
+        return False
+    x.XOpenDisplay.restype = ctypes.c_void_p
+    screen = ctypes.c_void_p(x.XOpenDisplay(os.environ['DISPLAY'].encode()))
+    x.XKeysymToKeycode.argtypes = [ctypes.c_void_p, ctypes.c_ulong]
+    key = x.XKeysymToKeycode(screen, 0xff1b)
+    test.XTestFakeMotionEvent(screen, -1, 300, 300, 0)
+    test.XTestFakeKeyEvent(screen, key, 1, 0)
+    test.XTestFakeKeyEvent(screen, key, 0, 0)
+    x.XFlush(screen)
+    x.XCloseDisplay(screen)
+    return True
+
+
+def begin_render(engine):
+    def begin(window):
+        scene = bpy.context.scene
+        scene.render.engine = engine
+        scene.cycles.samples = 1
+        scene.render.resolution_x = scene.render.resolution_y = 64
+        splats().data.stipple.anchors_render = MANY
+        facts['decoded'].clear()
+        facts[f'{engine} ended'] = []
+        for name in ('render_complete', 'render_cancel'):
+            getattr(bpy.app.handlers, name).append(lambda *_, name=name: facts[f'{engine} ended'].append(name))
+        with window.context():
+            bpy.ops.render.render('INVOKE_DEFAULT')
+    return begin
+
+
+def rendering(_window):
+    return None if MANY in facts['decoded'] else False
+
+
+def render_shown(name):
+    return lambda _window: name
+
+
+def press(_window):
+    facts['has_keys'] = press_escape()
+    if not facts['has_keys']:  # nothing can end the render: it takes its time
+        return None
+    return None
+
+
+def render_ended(engine):
+    def ended(_window):
+        if not facts[f'{engine} ended']:
+            return False
+        facts[f'{engine} count'] = count()
+        for name in ('render_complete', 'render_cancel'):
+            getattr(bpy.app.handlers, name).pop()
+        return None
+    return ended
+
+
+def delete(window):
+    """The object goes while its budget is decoded."""
+    splats().animation_data_clear()
+    data = splats().data
+    data.animation_data_clear()
+    data.stipple.anchors = MANY - 1
+    facts['names_before_delete'] = len(decoded().names())
+    bpy.data.objects.remove(splats())
+
+
+def deleted(_window):
+    return False if decoded().names() or bpy.app.timers.is_registered(package('scene.source.sync').complete) else None
+
+
+def undo(window):
+    """The object is back, and its budget of before."""
+    with window.context():
+        bpy.ops.ed.undo_push(message='deleted')
+    bpy.ops.wm.open_mainfile(filepath=str(folder / 'b.blend'), load_ui=False)
+
+
+def save(window):
+    splats().data.stipple.anchors_render = 0
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / 'b.blend'), copy=True)
+
+
+def load_while_preparing(window):
+    """Another file is opened while budgets are prepared, and while a slider is followed."""
+    decoded().forget()
+    splats().data.animation_data_clear()
+    splats().data.stipple.anchors_render = MANY
+    facts['decoded'].clear()
+    bpy.context.view_layer.objects.active = splats()
+    with window.context():
+        bpy.ops.stipple.decode_budgets('INVOKE_DEFAULT')
+    splats().data.stipple.anchors = MANY - 2
+
+
+def load(_window):
+    if MANY not in facts['decoded']:
+        return False
+    bpy.ops.wm.open_mainfile(filepath=str(folder / 'b.blend'), load_ui=False)
+    facts['names_after_load'] = len(decoded().names())
+    facts['count_after_load'] = count()
+    return None
+
+
+def end(_window):
+    (folder / 'facts.json').write_text(json.dumps(facts))
+    return 'end'
+
+
+def wait(_window):
+    return None
+
+
+steps = [build, wait, shown, move, busy, decoding, escape, stopped, wait, cancelled,
+         several_moves, followed, save, animate, preparing_begins, wait, preparing, escape, wait, stopped,
+         preparing_cancelled, prepared, wait, play, played,
+         begin_render('STIPPLE'), rendering, wait, render_shown('rendering'), press, render_ended('STIPPLE'), wait,
+         begin_render('CYCLES'), rendering, wait, render_shown('rendering_cycles'), press, render_ended('CYCLES'), wait,
+         delete, deleted, undo, wait, load_while_preparing, load, wait, end]
