@@ -38,7 +38,8 @@ def decoded():
 
 def build(window):
     """The splats, seen from the front, and the budget in the Properties editor."""
-    package('preferences').get().weights_folder = str(weights)
+    chosen = package('preferences').get()
+    chosen.weights_folder, chosen.threads = str(weights), 1
     sources = package('scene.source.sources')
     first = sources.first_settings
     sources.first_settings = lambda settings: package('binding.model').DecodeSettings(FEW, EACH)
@@ -59,12 +60,6 @@ def build(window):
     for name in ('decode', 'decode_start'):
         setattr(model, name, lambda self, settings, original=getattr(model, name):
                 facts['decoded'].append(settings.anchors) or original(self, settings))
-    report(window)
-
-
-def report(window):
-    """What operators and renders report is in Blender's log."""
-    window.window.workspace  # the window is there
 
 
 def shown(_window):
@@ -282,9 +277,21 @@ def wait(_window):
     return None
 
 
+def patient(step):
+    """A step that waits for something, for so long at most."""
+    begun = []
+
+    def waited(window):
+        begun.append(time.monotonic())
+        assert begun[-1] - begun[0] < 60, f'{step.__name__} waits in vain: {facts}'
+        return step(window)
+    return waited
+
+
 steps = [build, wait, shown, move, busy, decoding, escape, stopped, wait, cancelled,
          several_moves, followed, save, animate, preparing_begins, wait, preparing, escape, wait, stopped,
          preparing_cancelled, prepared, wait, play, played,
          begin_render('STIPPLE'), rendering, wait, render_shown('rendering'), press, render_ended('STIPPLE'), wait,
          begin_render('CYCLES'), rendering, wait, render_shown('rendering_cycles'), press, render_ended('CYCLES'), wait,
          delete, deleted, undo, wait, load_while_preparing, load, wait, end]
+steps = [patient(step) for step in steps]
