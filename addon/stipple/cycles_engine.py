@@ -88,7 +88,7 @@ def _make_engine():
                 self.register_pass(scene, srl, _SHADOW_PASS, 3, 'RGB', 'COLOR')
 
         def update(self, data=None, depsgraph=None):
-            """Decodes the splats of the view layer, then hands the rest to Cycles."""
+            """Reads the splats of the view layer, then hands the rest to Cycles."""
             self._instances, self._holdouts, self._catchers, self._failed = [], [], [], False
             if self.is_preview:
                 super().update(data, depsgraph)
@@ -123,6 +123,8 @@ def _make_engine():
                 return
             if not self._instances:
                 super().render(depsgraph)
+                return
+            if not self._decode_instances():
                 return
             # Cycles frees the depsgraph as soon as it has its own copy, unless data are persistent: nothing of it is
             # touched after the last image.

@@ -53,6 +53,9 @@ def build(window):
     editor.spaces.active.context = 'DATA'
     facts['editor'] = editor.x, editor.y, editor.width, editor.height
     bpy.context.preferences.view.render_display_type = 'NONE'  # redraws of the 3D view are what steps wait for
+    operator = package('jobs').JobOperator
+    failed = operator._failed
+    operator._failed = lambda self, error: facts['said'].append(str(error)) or failed(self, error)
     write = package('scene.source.splat_data').write
     package('scene.source.splat_data').write = lambda data, arrays, *more, **named: (
         facts['counts'].append(arrays.count) or write(data, arrays, *more, **named))
@@ -161,22 +164,26 @@ def played(_window):
     return 'prepared'
 
 
-def press_escape():
-    """A real key, which Blender's renders look for. Returns whether it can be pressed."""
+def has_keys():
     try:
-        x, test = ctypes.CDLL('libX11.so.6'), ctypes.CDLL('libXtst.so.6')
+        ctypes.CDLL('libXtst.so.6')
     except OSError:
         return False
+    return True
+
+
+def press(_window):
+    """A real key, which Blender's renders look for."""
+    x, test = ctypes.CDLL('libX11.so.6'), ctypes.CDLL('libXtst.so.6')
     x.XOpenDisplay.restype = ctypes.c_void_p
     screen = ctypes.c_void_p(x.XOpenDisplay(os.environ['DISPLAY'].encode()))
     x.XKeysymToKeycode.argtypes = [ctypes.c_void_p, ctypes.c_ulong]
     key = x.XKeysymToKeycode(screen, 0xff1b)
-    test.XTestFakeMotionEvent(screen, -1, 300, 300, 0)
+    test.XTestFakeMotionEvent(screen, ctypes.c_int(-1), 300, 300, 0)
     test.XTestFakeKeyEvent(screen, key, 1, 0)
     test.XTestFakeKeyEvent(screen, key, 0, 0)
     x.XFlush(screen)
-    x.XCloseDisplay(screen)
-    return True
+    x.XCloseDisplay(ctypes.c_void_p(screen.value))
 
 
 def begin_render(engine):
@@ -201,13 +208,6 @@ def rendering(_window):
 
 def render_shown(name):
     return lambda _window: name
-
-
-def press(_window):
-    facts['has_keys'] = press_escape()
-    if not facts['has_keys']:  # nothing can end the render: it takes its time
-        return None
-    return None
 
 
 def render_ended(engine):
@@ -288,10 +288,17 @@ def patient(step):
     return waited
 
 
+def renders(engine, name):
+    """Without keys nothing ends a render."""
+    if not has_keys():
+        return []
+    return [begin_render(engine), rendering, wait, render_shown(name), press, render_ended(engine), wait]
+
+
+facts['has_keys'] = has_keys()
 steps = [build, wait, shown, move, busy, decoding, escape, stopped, wait, cancelled,
          several_moves, followed, save, animate, preparing_begins, wait, preparing, escape, wait, stopped,
          preparing_cancelled, prepared, wait, play, played,
-         begin_render('STIPPLE'), rendering, wait, render_shown('rendering'), press, render_ended('STIPPLE'), wait,
-         begin_render('CYCLES'), rendering, wait, render_shown('rendering_cycles'), press, render_ended('CYCLES'), wait,
+         *renders('STIPPLE', 'rendering'), *renders('CYCLES', 'rendering_cycles'),
          delete, deleted, undo, wait, load_while_preparing, load, wait, end]
 steps = [patient(step) for step in steps]

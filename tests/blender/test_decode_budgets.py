@@ -179,6 +179,7 @@ def test_splats_of_meshes_and_trees_are_prepared_too(source, decodes, tmp_path):
         obj.data.stipple.anchors = anchors
         obj.data.stipple.keyframe_insert('anchors', frame=frame)
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
+    bpy.context.scene.frame_set(1)
     source.decoded.forget()
     decodes.clear()
     assert bpy.ops.stipple.decode_budgets() == {'FINISHED'}

@@ -129,8 +129,8 @@ def test_every_engine_follows_the_limit(stipple, pair, tmp_path, engine, monkeyp
     scene.render.engine = engine
     scene.cycles.samples, scene.cycles.use_denoising = 1, False
     seen = []
-    decode = stipple.scene.source.decoded.decode
-    monkeypatch.setattr(stipple.scene.source.decoded, 'decode',
+    decode = stipple.scene.source.decoded.begin
+    monkeypatch.setattr(stipple.scene.source.decoded, 'begin',
                         lambda data, settings, *more: seen.append(settings.anchors) or decode(data, settings, *more))
 
     def note(*_):

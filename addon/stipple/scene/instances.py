@@ -5,6 +5,7 @@ import bpy
 
 from .. import version
 from ..binding.errors import CancelledError, StippleError
+from ..binding.grade import graded
 from ..binding.structs import Status
 from . import grades, limits, shown
 from .sequence import sequences
@@ -28,7 +29,8 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
 
 def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
     """The same with a key before each, which stays while it is the same instance: matrices() has it at other times.
-    wait: called with (name of an object, job) where decoding takes long, to wait for the job."""
+    wait: called with (name of an object, job) where a source has to be read, to wait for the job; then what is not
+    decoded yet is a LaterCloud, for decode_later()."""
     clouds, found = {}, []
     share, splats = limits.share(depsgraph, mode), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
@@ -50,6 +52,30 @@ def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
             found.append((_key_of(entry, owner, original), owner, original,
                           (clouds[key], matrix, shown.holds_out(entry, depsgraph))))
     return found
+
+
+class LaterCloud:
+    """The splats of an object that are yet to be decoded. It never touches Blender."""
+
+    def __init__(self, name, pending, grade):
+        self._name, self._pending, self._grade, self._cloud = name, pending, grade, None
+
+    def cloud(self, wait):
+        """wait: called with (name of the object, job) where decoding takes long. Errors: StippleError."""
+        if self._cloud is None:
+            try:
+                made = self._pending.cloud(lambda job: wait(self._name, job))
+            except CancelledError:
+                raise
+            except StippleError as error:
+                raise StippleError(f"Splat object '{self._name}': {error}", error.status) from None
+            self._cloud = graded(made, self._grade)
+        return self._cloud
+
+
+def decode_later(placed, wait):
+    """What gather() gives, with all splats decoded. wait: as LaterCloud.cloud() has it. Errors: StippleError."""
+    return [(entry[0].cloud(wait) if isinstance(entry[0], LaterCloud) else entry[0], *entry[1:]) for entry in placed]
 
 
 def matrices(depsgraph):
@@ -81,7 +107,10 @@ def _cloud_of(obj, mode, scene, most, wait):
             if stipple.is_sequence:
                 cloud = sequences.frame_of(original, stipple, scene.frame_current, mode, most).cloud()
             elif _waits(mode) or decoded.is_quick(original, settings):
-                cloud = decoded.decode(original, settings, wait and (lambda job: wait(obj.name, job)))
+                pending = decoded.begin(original, settings, wait and (lambda job: wait(obj.name, job)))
+                if wait is not None:
+                    return LaterCloud(obj.name, pending, grades.settings_of(stipple))
+                cloud = pending.cloud()
             else:
                 # Nobody waits for a view: it shows what is stored, and what is wanted when that is there.
                 if original.get(sync.WRITTEN_KEY) != sync.written_key(original, settings):

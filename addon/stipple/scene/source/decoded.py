@@ -116,19 +116,39 @@ def cached(data=None):
     return _kept.measure(lambda key: key[0] == source)
 
 
-def decode(data, settings, wait=None):
-    """The cloud of a datablock's model at these settings, for an image. wait(job): called with what takes long, to
-    wait for it; None for without a word. Errors: StippleError, also for a source that has changed."""
+class Pending:
+    """A datablock's cloud at these settings that is yet to be decoded, unless it is kept. Once it is made it never
+    touches Blender."""
+
+    def __init__(self, data, settings, wait=None):
+        """wait(job): called with the job that reads the source, where it has to be read. Errors: StippleError."""
+        self._decoder, self._settings = Decoder(data), settings
+        self._begun = _take(data, settings)
+        if self._begun is None and not self._decoder.is_kept(settings):
+            self._decoder.model(wait or Job.wait)
+
+    def cloud(self, wait=None, is_image=True):
+        """wait, is_image: as Decoder.cloud() has them. Errors: StippleError."""
+        begun, self._begun = self._begun, None
+        if begun is None:
+            return self._decoder.cloud(self._settings, wait, is_image)
+        if wait is not None:
+            wait(begun)
+        return self._decoder.finish(self._settings, begun, is_image)
+
+
+def begin(data, settings, wait=None):
+    """The Pending of a datablock's model, for an image. Errors: StippleError, also for a source that has changed."""
     sources.check_unchanged(data)
-    return _made(data, settings, wait, True)
+    return Pending(data, settings, wait)
 
 
 def decode_data(data, settings, wait=None):
-    """The cloud that a datablock's source gives at these settings, without what was hidden or erased. wait: as
-    decode() has it. Errors: StippleError."""
+    """The cloud that a datablock's source gives at these settings, without what was hidden or erased. wait(job): called
+    with what takes long, to wait for it; None for without a word. Errors: StippleError."""
     if source_settings.of(data.stipple).as_they_are:
         return sources.masked(sources.whole_cloud(data), data)
-    return _made(data, settings, wait, False)
+    return Pending(data, settings, wait).cloud(wait, is_image=False)
 
 
 def full_cloud(data):
@@ -301,15 +321,6 @@ def forget():
     _kept.clear()
     times.forget()
     sources.forget()
-
-
-def _made(data, settings, wait, is_image):
-    begun = _take(data, settings)
-    if begun is None:
-        return Decoder(data).cloud(settings, wait, is_image)
-    if wait is not None:
-        wait(begun)
-    return Decoder(data).finish(settings, begun, is_image)
 
 
 def _take(data, settings):
