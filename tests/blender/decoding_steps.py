@@ -79,7 +79,8 @@ def move(_window):
 def busy(_window):
     """Until the panel has something to say."""
     share = decoded().decoding_share(splats().data)
-    return None if share is not None and share > 0 and package('scene.source.decode_progress')._state['watched'] else False
+    is_watched = bool(package('scene.source.decode_progress')._state['watched'])
+    return None if share is not None and share > 0 and is_watched else False
 
 
 def decoding(_window):
@@ -123,13 +124,14 @@ def animate(window):
     scene.frame_start, scene.frame_end = 1, 3
     scene.frame_set(1)
     decoded().forget()
+    facts['decoded'].clear()
     with window.context():
         bpy.ops.stipple.decode_budgets('INVOKE_DEFAULT')
 
 
 def preparing_begins(_window):
     """Until the large budget is the one that is decoded."""
-    return None if facts['decoded'] and facts['decoded'][-1] == MANY else False
+    return None if MANY in facts['decoded'] else False
 
 
 def preparing(_window):
@@ -138,12 +140,15 @@ def preparing(_window):
 
 def preparing_cancelled(window):
     """Until the operator has ended: one budget is kept."""
+    if not facts['said']:
+        return False
     facts['kept_after_esc'] = decoded().cached()[0]
     settings = splats().data.stipple
     settings.anchors_render = 250
     facts['decoded'].clear()
     with window.context():
         bpy.ops.stipple.decode_budgets('INVOKE_DEFAULT')
+    return None
 
 
 def prepared(_window):
@@ -283,7 +288,7 @@ def patient(step):
 
     def waited(window):
         begun.append(time.monotonic())
-        assert begun[-1] - begun[0] < 60, f'{step.__name__} waits in vain: {facts}'
+        assert begun[-1] - begun[0] < 120, f'{step.__name__} waits in vain: {facts}'
         return step(window)
     return waited
 

@@ -57,10 +57,10 @@ class STIPPLE_OT_decode_budgets(JobOperator, bpy.types.Operator):
                 raise StippleError(f"{self._what()} and their decoding take {exporting.megabytes(needed)}; the memory "
                                    f"limit is {exporting.megabytes(allowed)}.", Status.ERROR_MEMORY_LIMIT)
             for i, one in enumerate(settings):
-                begins, ends_at, stage = ends[i] / ends[-1], ends[i + 1] / ends[-1], f'budget {i + 1} of {len(settings)}'
-                task.advance(begins, stage)
+                part, stage = (ends[i] / ends[-1], ends[i + 1] / ends[-1]), f'budget {i + 1} of {len(settings)}'
+                task.advance(part[0], stage)
                 made += not decoder.is_kept(one)
-                decoder.cloud(one, lambda job: task.run(job, begins, ends_at, stage))
+                decoder.cloud(one, lambda job: task.run(job, *part, stage))
                 ready = i + 1
         except CancelledError:
             raise CancelledError(f"Cancelled: of {self._what()}, {ready} are decoded and stay so") from None

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames a conversion writes, and the splats of each: read in a worker. Files of series do not go through the cache
-of what is shown, which belongs to Blender's own thread; decoded budgets that are kept are taken as they are."""
+"""Which frames a conversion writes, and the splats of each, read in a worker.
+
+Files of series do not go through the cache of what is shown, which belongs to Blender's own thread. Decoded budgets
+that are kept are taken as they are.
+"""
 
 from dataclasses import dataclass
 
