@@ -25,7 +25,7 @@ def shots(tmp_path_factory):
     pipeline_weights.write_large_decoder(weights / 'decoder.safetensors')
     asset = weights.parent / 'thing.stipple.safetensors'
     pipeline_weights.write_latent(asset, weights / 'decoder.safetensors')
-    pictures, text = screen.run_steps(STEPS, folder, bpy.app.binary_path, size=(1600, 1000), timeout=400,
+    pictures, text = screen.run_steps(STEPS, folder, bpy.app.binary_path, size=(1600, 1000), timeout=500,
                                       arguments=[str(weights), str(asset)], options=['--enable-event-simulate'])
     return pictures, json.loads((folder / 'facts.json').read_text()), text
 
