@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Steps of test_decoding_window.py inside the Blender with a window; window.py runs them."""
 
-import ctypes
 import json
-import os
 import sys
 import time
 from pathlib import Path
@@ -169,110 +167,6 @@ def played(_window):
     return 'prepared'
 
 
-def has_keys():
-    try:
-        ctypes.CDLL('libXtst.so.6')
-    except OSError:
-        return False
-    return True
-
-
-def press(_window):
-    """A real key, which Blender's renders look for."""
-    x, test = ctypes.CDLL('libX11.so.6'), ctypes.CDLL('libXtst.so.6')
-    x.XOpenDisplay.restype = ctypes.c_void_p
-    screen = ctypes.c_void_p(x.XOpenDisplay(os.environ['DISPLAY'].encode()))
-    x.XKeysymToKeycode.argtypes = [ctypes.c_void_p, ctypes.c_ulong]
-    key = x.XKeysymToKeycode(screen, 0xff1b)
-    test.XTestFakeMotionEvent(screen, ctypes.c_int(-1), 300, 300, 0)
-    test.XTestFakeKeyEvent(screen, key, 1, 0)
-    test.XTestFakeKeyEvent(screen, key, 0, 0)
-    x.XFlush(screen)
-    x.XCloseDisplay(ctypes.c_void_p(screen.value))
-
-
-def begin_render(engine):
-    def begin(window):
-        scene = bpy.context.scene
-        scene.render.engine = engine
-        scene.cycles.samples = 1
-        scene.render.resolution_x = scene.render.resolution_y = 64
-        splats().data.stipple.anchors_render = MANY
-        facts['decoded'].clear()
-        facts[f'{engine} ended'] = []
-        for name in ('render_complete', 'render_cancel'):
-            getattr(bpy.app.handlers, name).append(lambda *_, name=name: facts[f'{engine} ended'].append(name))
-        with window.context():
-            bpy.ops.render.render('INVOKE_DEFAULT')
-    return begin
-
-
-def rendering(_window):
-    return None if MANY in facts['decoded'] else False
-
-
-def render_shown(name):
-    return lambda _window: name
-
-
-def render_ended(engine):
-    def ended(_window):
-        if not facts[f'{engine} ended']:
-            return False
-        facts[f'{engine} count'] = count()
-        for name in ('render_complete', 'render_cancel'):
-            getattr(bpy.app.handlers, name).pop()
-        return None
-    return ended
-
-
-def delete(window):
-    """The object goes while its budget is decoded."""
-    splats().animation_data_clear()
-    data = splats().data
-    data.animation_data_clear()
-    data.stipple.anchors = MANY - 1
-    facts['names_before_delete'] = len(decoded().names())
-    bpy.data.objects.remove(splats())
-
-
-def deleted(_window):
-    return False if decoded().names() or bpy.app.timers.is_registered(package('scene.source.sync').complete) else None
-
-
-def undo(window):
-    """The object is back, and its budget of before."""
-    with window.context():
-        bpy.ops.ed.undo_push(message='deleted')
-    bpy.ops.wm.open_mainfile(filepath=str(folder / 'b.blend'), load_ui=False)
-
-
-def save(window):
-    splats().data.stipple.anchors_render = 0
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / 'b.blend'), copy=True)
-
-
-def load_while_preparing(window):
-    """Another file is opened while budgets are prepared, and while a slider is followed."""
-    decoded().forget()
-    splats().data.animation_data_clear()
-    splats().data.stipple.anchors_render = MANY
-    facts['decoded'].clear()
-    bpy.context.view_layer.objects.active = splats()
-    with window.context():
-        bpy.ops.stipple.decode_budgets('INVOKE_DEFAULT')
-    splats().data.stipple.anchors = MANY - 2
-
-
-def load(_window):
-    if MANY not in facts['decoded']:
-        return False
-    bpy.ops.wm.open_mainfile(filepath=str(folder / 'b.blend'), load_ui=False)
-    facts['names_after_load'] = len(decoded().names())
-    facts['count_after_load'] = count()
-    return None
-
-
 def end(_window):
     (folder / 'facts.json').write_text(json.dumps(facts))
     return 'end'
@@ -293,17 +187,6 @@ def patient(step):
     return waited
 
 
-def renders(engine, name):
-    """Without keys nothing ends a render."""
-    if not has_keys():
-        return []
-    return [begin_render(engine), rendering, wait, render_shown(name), press, render_ended(engine), wait]
-
-
-facts['has_keys'] = has_keys()
-steps = [build, wait, shown, move, busy, decoding, escape, stopped, wait, cancelled,
-         several_moves, followed, save, animate, preparing_begins, wait, preparing, escape, wait, stopped,
-         preparing_cancelled, prepared, wait, play, played,
-         *renders('STIPPLE', 'rendering'), *renders('CYCLES', 'rendering_cycles'),
-         delete, deleted, undo, wait, load_while_preparing, load, wait, end]
+steps = [build, wait, shown, move, busy, decoding, escape, stopped, wait, cancelled, several_moves, followed, animate,
+         preparing_begins, wait, preparing, escape, wait, stopped, preparing_cancelled, prepared, wait, play, played, end]
 steps = [patient(step) for step in steps]
