@@ -11,9 +11,9 @@ NETWORKS = ('dino', 'vae', 'flow', 'decoder')
 CANVAS, TOKENS, STEPS = 64, 64, 4  # that the golden was made with
 
 
-def read():
-    """{name: (dtype, shape, bytes)} of the golden."""
-    data = GOLDEN.read_bytes()
+def read(golden=GOLDEN):
+    """{name: (dtype, shape, bytes)} of a golden."""
+    data = golden.read_bytes()
     length = struct.unpack('<Q', data[:8])[0]
     header = json.loads(data[8:8 + length])
     found = {}
@@ -41,6 +41,13 @@ def split(folder):
         prefix = f'weights.{network}.'
         write(Path(folder) / f'{network}.safetensors',
               {name[len(prefix):]: value for name, value in tensors.items() if name.startswith(prefix)})
+
+
+def write_large_decoder(path):
+    """Writes the weights of another golden's decoder, which takes some 14 seconds of a processor for 31,250 anchors."""
+    prefix = 'weights.'
+    write(path, {name[len(prefix):]: value for name, value in read(GOLDEN.with_name('deg_decoder_b.safetensors')).items()
+                 if name.startswith(prefix)})
 
 
 def write_latent(path, decoder, tokens=TOKENS):

@@ -88,7 +88,7 @@ def _make_engine():
                 self.register_pass(scene, srl, _SHADOW_PASS, 3, 'RGB', 'COLOR')
 
         def update(self, data=None, depsgraph=None):
-            """Decodes the splats of the view layer, then hands the rest to Cycles."""
+            """Reads the splats of the view layer, then hands the rest to Cycles."""
             self._instances, self._holdouts, self._catchers, self._failed = [], [], [], False
             if self.is_preview:
                 super().update(data, depsgraph)
@@ -104,6 +104,10 @@ def _make_engine():
                     # Cycles' passes tell nothing of what it holds out, and of shadow catchers only what falls on them.
                     self._holdouts = mattes.gather(depsgraph, 'HOLDOUTS')
                     self._catchers = mattes.gather(depsgraph, 'CATCHERS')
+            except CancelledError as error:
+                self._failed = True
+                self.report({'INFO'}, str(error))
+                return
             except StippleError as error:
                 self._failed = True
                 self._fail(error)
@@ -119,6 +123,8 @@ def _make_engine():
                 return
             if not self._instances:
                 super().render(depsgraph)
+                return
+            if not self._decode_instances():
                 return
             # Cycles frees the depsgraph as soon as it has its own copy, unless data are persistent: nothing of it is
             # touched after the last image.

@@ -39,6 +39,30 @@ class NativeWork:
             self._say(fraction, stage)
             time.sleep(POLL_SECONDS)
 
+    def _decode_instances(self):
+        """Decodes what is not decoded yet: not while the views of the window wait, as they do for update(). Returns
+        whether the render goes on."""
+        try:
+            self._instances = instances.decode_later(self._instances, self._wait_decoding)
+        except CancelledError as error:
+            self.report({'INFO'}, str(error))
+            return False
+        except StippleError as error:
+            self._fail(error)
+            return False
+        return True
+
+    def _wait_decoding(self, name, job):
+        """Until the splats of an object are decoded, or what they need is read."""
+        self._stats = f"Decoding the splats of '{name}'"
+        try:
+            self._wait(job)
+        except CancelledError:
+            raise CancelledError(f"The render was cancelled while the splats of '{name}' were decoded; nothing has "
+                                 "changed.") from None
+        finally:
+            self._stats = ''
+
     def _cancelled(self):
         return self.test_break()
 
@@ -54,8 +78,8 @@ class NativeWork:
         self.update_memory_stats(memory_used=mebibytes, memory_peak=mebibytes)
 
     def _take_instances(self, depsgraph):
-        """Decodes the splats of the view layer. Errors: StippleError."""
-        found = instances.gather_keyed(depsgraph, 'RENDER', self._warn)
+        """Reads what the view layer shows of splats. Errors: StippleError."""
+        found = instances.gather_keyed(depsgraph, 'RENDER', self._warn, self._wait_decoding)
         self._keys = [entry[0] for entry in found]
         self._instances = [entry[3] for entry in found]
         # By what the object index pass of the renderer has: 0 for none, then the instances.
@@ -113,18 +137,20 @@ class STIPPLE_RE_engine(NativeWork, bpy.types.RenderEngine):
             self.register_pass(scene, renderlayer, version.OBJECT_INDEX_PASS, 1, 'X', 'VALUE')
 
     def update(self, data=None, depsgraph=None):
-        """Decodes what the view layer shows, from the evaluated settings."""
+        """Reads what the view layer shows, from the evaluated settings."""
         self._instances = None
         try:
             facts.refuse_stereo(depsgraph.scene.render)
             wanted = 'ALL' if depsgraph.scene.stipple.meshes_as_mattes else 'HOLDOUTS'
             self._mattes = mattes.gather(depsgraph, wanted)
             self._take_instances(depsgraph)
+        except CancelledError as error:
+            self.report({'INFO'}, str(error))
         except StippleError as error:
             self._fail(error)
 
     def render(self, depsgraph):
-        if self._instances is None:
+        if self._instances is None or not self._decode_instances():
             return
         scene = depsgraph.scene
         try:

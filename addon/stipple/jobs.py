@@ -56,8 +56,9 @@ class Task:
         if self._cancelled.is_set():
             raise CancelledError()
 
-    def run(self, job, start=0.0, end=1.0):
-        """For the work: a native job as the part of it between two fractions; returns the job when it is done."""
+    def run(self, job, start=0.0, end=1.0, said=None):
+        """For the work: a native job as the part of it between two fractions; returns the job when it is done. said:
+        the stage that is shown, None for the job's own."""
         while True:
             state, fraction, stage = job.poll()
             if state != JobState.RUNNING:
@@ -65,7 +66,7 @@ class Task:
                 return job
             if self._cancelled.is_set():
                 job.cancel()
-            self._progress = (start + (end - start) * fraction, stage)
+            self._progress = (start + (end - start) * fraction, said or stage)
             time.sleep(POLL_SECONDS / 10)
 
     def _run(self, work):

@@ -38,6 +38,9 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
     cache_folder: StringProperty(name="Cache Folder", description="Where sources of files that are not saved yet are "
                                  "kept, empty for Blender's user folder", subtype='DIR_PATH',
                                  options=version.RELATIVE_PATH)
+    budget_cache: IntProperty(name="Budget Cache", description="Mebibytes of memory in which splats of budgets are kept "
+                              "once they are decoded, over all objects, so that going back to a budget takes no time; "
+                              "0 for a quarter of Memory Limit", default=0, min=0)
     sequence_cache: IntProperty(name="Sequence Cache", description="Mebibytes of memory in which files of splat "
                                 "sequences are kept, over all objects", default=1024, min=0)
     read_ahead: IntProperty(name="Read Ahead", description="Files of a splat sequence that are read before they are "
@@ -64,6 +67,7 @@ class STIPPLE_AP_preferences(bpy.types.AddonPreferences):
         column.prop(self, 'memory_limit', text="Memory Limit (MiB)")
         column.prop(self, 'points_above')
         column.prop(self, 'cache_folder')
+        column.prop(self, 'budget_cache', text="Budget Cache (MiB)")
         column.prop(self, 'sequence_cache', text="Sequence Cache (MiB)")
         column.prop(self, 'read_ahead')
         column.prop(self, 'library_path')

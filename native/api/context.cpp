@@ -41,6 +41,13 @@ StippleStatus stipple_context_set_weights_folder(StippleContext* context, const 
   });
 }
 
+StippleStatus stipple_context_memory_limit(const StippleContext* context, uint64_t* bytes) {
+  return guarded([&] {
+    const uint64_t limit = require(context, "context").state->memory_limit_bytes;
+    require(bytes, "bytes") = limit;
+  });
+}
+
 void stipple_context_free(StippleContext* context) {
   delete context;
 }

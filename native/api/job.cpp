@@ -21,6 +21,7 @@ void run(StippleJob& job, JobWork work) {
   std::lock_guard<std::mutex> lock(job.mutex);
   job.status = status;
   job.message = message;
+  job.seconds = job.watch.seconds();
   if (status == STIPPLE_OK) {
     job.result = std::move(result);
     job.state = STIPPLE_JOB_DONE;
@@ -64,6 +65,7 @@ StippleStatus stipple_job_poll(const StippleJob* job, StippleJobProgress* progre
     {
       std::lock_guard<std::mutex> lock(job->mutex);
       out.state = job->state;
+      out.seconds = out.state == STIPPLE_JOB_RUNNING ? job->watch.seconds() : job->seconds;
     }
     if (out.state == STIPPLE_JOB_DONE) out.fraction = 1.0;
     deliver(progress, out, "progress");

@@ -13,6 +13,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "base/progress.h"
+#include "base/stopwatch.h"
 
 namespace stipple {
 
@@ -49,12 +50,14 @@ struct StippleJob {
   std::shared_ptr<stipple::FitSession> fit;              ///< null of other jobs
   std::shared_ptr<stipple::GenerateSession> generation;  ///< likewise
   std::thread thread;
+  const stipple::Stopwatch watch;
 
   mutable std::mutex mutex;  ///< of what follows
   mutable std::condition_variable ended;
   StippleJobState state = STIPPLE_JOB_RUNNING;
   StippleStatus status = STIPPLE_OK;
   std::string message;
+  double seconds = 0.0;  ///< that it took, of one that has ended
   stipple::api::JobResult result;
 };
 

@@ -52,7 +52,7 @@ def test_suzanne(stipple, tmp_path, model):
     seconds, busy = time.perf_counter() - start, time.process_time() - busy
     figures = fitting.state.figures
     result = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
-    cloud = stipple.scene.source.sources.decode_data(result.data,
+    cloud = stipple.scene.source.decoded.decode_data(result.data,
                                                      stipple.scene.source.sources.decode_settings(result.data.stipple))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     poses = rigs.poses('AROUND', bpy.context.scene, depsgraph, rigs.bounds_of([obj], depsgraph), HELD_OUT, seed=5)

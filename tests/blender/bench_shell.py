@@ -84,7 +84,7 @@ def test_shell(stipple, tmp_path, scene):
         assert bpy.ops.stipple.splats_fit() == {'FINISHED'}
         busy = time.process_time() - before
         obj = next(o for o in bpy.data.objects if o.name.endswith(' Fit'))
-        cloud = stipple.scene.source.sources.decode_data(obj.data,
+        cloud = stipple.scene.source.decoded.decode_data(obj.data,
                                                          stipple.scene.source.sources.decode_settings(obj.data.stipple))
         row.append((shell, cloud))
         farthest = np.abs(cloud.read().positions).max()

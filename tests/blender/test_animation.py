@@ -15,11 +15,11 @@ import bpy, sys
 bpy.ops.preferences.addon_enable(module='stipple')
 package = sys.modules['stipple']
 scene = bpy.context.scene
-decode = package.scene.instances.sources.decode
-def noted(path, settings):
+decode = package.scene.instances.decoded.begin
+def noted(path, settings, *more):
     print('DECODED', scene.frame_current, settings.anchors, flush=True)
-    return decode(path, settings)
-package.scene.instances.sources.decode = noted
+    return decode(path, settings, *more)
+package.scene.instances.decoded.begin = noted
 def stored(scene, *_):
     obj = next(o for o in bpy.data.objects if package.scene.source.splat_data.is_splat_object(o))
     print('STORED', scene.frame_current, package.scene.source.splat_data.count(obj.data), flush=True)

@@ -224,7 +224,7 @@ def test_lost_source_keeps_the_stored_splats(stipple, tmp_path):
     path = tmp_path / 'a.stipple.safetensors'
     obj = scenes.make_splats(scenes.quad(), anchors=500, source_path=str(path))
     path.unlink()
-    stipple.scene.source.sources.forget()
+    stipple.scene.source.decoded.forget()
     obj.data.stipple.anchors = 600
     assert 'a.stipple.safetensors' in stipple.scene.source.sync.problems[obj.data.name]
     assert stipple.scene.source.splat_data.count(obj.data) == 500

@@ -80,16 +80,16 @@ def test_renders_have_their_own_budget(stipple, budgeted, tmp_path):
     scene = bpy.context.scene
     scene.render.engine = 'STIPPLE'
     decoded = []
-    decode = stipple.scene.instances.sources.decode
+    decode = stipple.scene.instances.decoded.begin
 
-    def noted(data, wanted):
+    def noted(data, wanted, *more):
         decoded.append(wanted.anchors)
-        return decode(data, wanted)
-    stipple.scene.instances.sources.decode = noted
+        return decode(data, wanted, *more)
+    stipple.scene.instances.decoded.begin = noted
     try:
         pixels = scenes.render_pixels(tmp_path)
     finally:
-        stipple.scene.instances.sources.decode = decode
+        stipple.scene.instances.decoded.begin = decode
     assert decoded == [COUNT // 2] and pixels[..., 3].max() > 0.5
 
 

@@ -87,7 +87,7 @@ def test_renders_have_a_budget_of_their_own(stipple, weights, picture):
     bpy.ops.stipple.splats_from_image(filepath=str(picture), **SMALL)
     data = bpy.context.object.data
     data.stipple.anchors_render = 70
-    assert stipple.scene.source.sources.full_cloud(data).info().count == 70 * EACH
+    assert stipple.scene.source.decoded.full_cloud(data).info().count == 70 * EACH
 
 
 def test_seeds_stand_side_by_side_and_differ(stipple, weights, picture):

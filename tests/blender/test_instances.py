@@ -200,11 +200,11 @@ SPY = '''
 import bpy, sys
 bpy.ops.preferences.addon_enable(module='stipple')
 package = sys.modules['stipple']
-decode = package.scene.instances.sources.decode
-def noted(data, settings):
+decode = package.scene.instances.decoded.begin
+def noted(data, settings, *more):
     print('DECODED', bpy.context.scene.frame_current, settings.anchors, flush=True)
-    return decode(data, settings)
-package.scene.instances.sources.decode = noted
+    return decode(data, settings, *more)
+package.scene.instances.decoded.begin = noted
 '''
 
 

@@ -38,7 +38,7 @@ def count(stipple, obj):
 
 
 def take_weights_away(stipple, tmp_path):
-    stipple.scene.source.sources.forget()
+    stipple.scene.source.decoded.forget()
     (tmp_path / 'weights' / 'decoder.safetensors').rename(tmp_path / 'decoder.safetensors')
 
 
@@ -87,35 +87,37 @@ def test_a_blend_file_opens_without_weights_and_shows_what_it_holds(stipple, spl
 
 
 def test_what_takes_long_is_decoded_beside_blender(stipple, splats):
-    sources, data = stipple.scene.source.sources, splats.data
+    decoded, data = stipple.scene.source.decoded, splats.data
 
     def wanted(anchors):
         return stipple.binding.model.DecodeSettings(anchors, EACH)
 
-    assert not sources.is_decoded(data, wanted(3000), 0.0)
-    first = sources._decoding[data.name_full].job
-    assert sources.is_decoding() and 0 <= sources.decoding_share(data) <= 1
+    assert not decoded.is_decoded(data, wanted(3000), 0.0)
+    first = decoded._beside[data.name_full].job
+    assert decoded.is_decoding() and 0 <= decoded.decoding_share(data) <= 1
     # Other settings take the place of what was wanted before.
-    assert not sources.is_decoded(data, wanted(2000), 0.0)
-    assert first.pointer is None and sources._decoding[data.name_full].job is not first
+    assert not decoded.is_decoded(data, wanted(2000), 0.0)
+    assert data.name_full not in decoded._beside or decoded._beside[data.name_full].job is not first
+    with pytest.raises(stipple.binding.errors.CancelledError):
+        first.wait()
     end = time.monotonic() + 60
-    while not sources.is_decoded(data, wanted(2000), 0.0):
+    while not decoded.is_decoded(data, wanted(2000), 0.0):
         assert time.monotonic() < end
         time.sleep(0.01)
-    beside = sources.decode_data(data, wanted(2000)).columns()
-    assert not sources.is_decoding() and sources.decoding_share(data) is None
-    direct = sources.decode_data(data, wanted(2000)).columns()
+    beside = decoded.decode_data(data, wanted(2000)).columns()
+    assert not decoded.is_decoding() and decoded.decoding_share(data) is None
+    direct = decoded.decode_data(data, wanted(2000)).columns()
     np.testing.assert_array_equal(beside.column('positions'), direct.column('positions'))
 
 
 def test_what_nobody_takes_is_forgotten(stipple, splats):
-    sources = stipple.scene.source.sources
-    sources.is_decoded(splats.data, stipple.binding.model.DecodeSettings(50, EACH), 0.0)
+    decoded = stipple.scene.source.decoded
+    decoded.is_decoded(splats.data, stipple.binding.model.DecodeSettings(50, EACH), 0.0)
     end = time.monotonic() + 60
-    while sources.is_decoding():
+    while decoded.is_decoding():
         assert time.monotonic() < end
         time.sleep(0.01)
-    assert sources.decoding_share(splats.data) is None
+    assert decoded.decoding_share(splats.data) is None
 
 
 def test_a_resting_slider_is_followed_without_waiting(stipple, splats):

@@ -129,9 +129,9 @@ def test_every_engine_follows_the_limit(stipple, pair, tmp_path, engine, monkeyp
     scene.render.engine = engine
     scene.cycles.samples, scene.cycles.use_denoising = 1, False
     seen = []
-    decode = stipple.scene.source.sources.decode
-    monkeypatch.setattr(stipple.scene.source.sources, 'decode',
-                        lambda data, settings: seen.append(settings.anchors) or decode(data, settings))
+    decode = stipple.scene.source.decoded.begin
+    monkeypatch.setattr(stipple.scene.source.decoded, 'begin',
+                        lambda data, settings, *more: seen.append(settings.anchors) or decode(data, settings, *more))
 
     def note(*_):
         if engine == 'CYCLES':  # it draws what is stored

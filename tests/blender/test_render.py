@@ -120,8 +120,8 @@ def test_objects_in_an_excluded_collection_are_left_out(square, tmp_path):
 
 def test_render_budget_is_used_and_nothing_is_written(square, tmp_path, stipple, monkeypatch):
     asked = []
-    decode = stipple.binding.model.Model.decode
-    monkeypatch.setattr(stipple.binding.model.Model, 'decode',
+    decode = stipple.binding.model.Model.decode_start
+    monkeypatch.setattr(stipple.binding.model.Model, 'decode_start',
                         lambda self, settings: asked.append(settings.anchors) or decode(self, settings))
     square.data.stipple.anchors_render = 30000
     before = stipple.scene.source.splat_data.fingerprint(square.data)

@@ -144,9 +144,9 @@ def test_time_is_seconds_since_the_start(moving, source):
 def test_the_native_cache_tells_times_apart(moving, source):
     settings = source.sources.decode_settings(moving.data.stipple)
     assert hash(settings) != hash(replace(settings, time=1.0)) and settings != replace(settings, time=1.0)
-    first = source.sources.decode(moving.data, settings)
-    assert source.sources.decode(moving.data, settings) is first
-    assert source.sources.decode(moving.data, replace(settings, time=1.0)) is not first
+    first = source.decoded.begin(moving.data, settings).cloud()
+    assert source.decoded.begin(moving.data, settings).cloud() is first
+    assert source.decoded.begin(moving.data, replace(settings, time=1.0)).cloud() is not first
 
 
 def test_a_time_that_is_not_finite_is_refused(stipple, moving, source):

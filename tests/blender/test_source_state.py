@@ -330,11 +330,11 @@ def one_mebibyte(stipple):
 
     def limit():
         chosen.memory_limit = 1
-        stipple.scene.source.sources.forget()
+        stipple.scene.source.decoded.forget()
 
     yield limit
     chosen.memory_limit = 0
-    stipple.scene.source.sources.forget()
+    stipple.scene.source.decoded.forget()
 
 
 def test_work_beyond_the_memory_limit_is_refused(stipple, tmp_path, one_mebibyte, unchanged):  # noqa: F811

@@ -65,8 +65,8 @@ def decodes(stipple, *names):
         data = bpy.data.objects[name].data
         assert stipple.scene.source.sources.state(data) == 'FINE', (name,
                                                                     stipple.scene.source.source_paths.file_of(data))
-        stipple.scene.source.sources.forget()
-        assert stipple.scene.source.sources.full_cloud(data).info().count == COUNT
+        stipple.scene.source.decoded.forget()
+        assert stipple.scene.source.decoded.full_cloud(data).info().count == COUNT
 
 
 def stored(*names):
@@ -110,7 +110,7 @@ def test_save_as_elsewhere_and_a_copy(stipple, tmp_path, cache, monkeypatch):
     assert stored(*names) == before  # this file goes on as it was
     decodes(stipple, *names)
     made = []
-    monkeypatch.setattr(stipple.scene.source.sources, 'decode_data', lambda *_: made.append(1))
+    monkeypatch.setattr(stipple.scene.source.decoded, 'decode_data', lambda *_: made.append(1))
     save(tmp_path / 'b' / 'shot.blend')
     assert stored(*names)[1] == '//../a/stipple/tree.stipple.safetensors'
     stipple.scene.source.sync.sync_all()
@@ -270,7 +270,7 @@ def test_files_of_versions_that_kept_a_text(stipple, tmp_path, library, monkeypa
     save(path)
     monkeypatch.undo()
     made = []
-    monkeypatch.setattr(stipple.scene.source.sources, 'decode_data', lambda *_: made.append(1))
+    monkeypatch.setattr(stipple.scene.source.decoded, 'decode_data', lambda *_: made.append(1))
     reopen(path)
     monkeypatch.undo()
     assert not made and all(file.startswith('//') for file in stored(*names))

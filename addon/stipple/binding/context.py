@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The context: threads and memory that native work may use."""
 
-from ctypes import byref
+from ctypes import byref, c_uint64
 
 from .errors import invalid
 from .handle import Handle, new_handle, path_bytes
@@ -28,6 +28,12 @@ class Context(Handle):
             self._check(self.library.stipple_context_set_weights_folder(self.pointer,
                                                                         path_bytes(folder) if folder else None))
             self._weights_folder = folder
+
+    def memory_limit(self):
+        """Bytes that native work may take."""
+        size = c_uint64()
+        self._check(self.library.stipple_context_memory_limit(self.pointer, byref(size)))
+        return size.value
 
     def version(self):
         return self.library.stipple_version_string().decode()

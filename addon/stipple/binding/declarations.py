@@ -29,6 +29,7 @@ FUNCTIONS = {
     'stipple_context_options_init': (None, [_to(s.StippleContextOptions)]),
     'stipple_context_create': (_status, [_to(s.StippleContextOptions), _out_handle]),
     'stipple_context_set_weights_folder': (_status, [_handle, _path]),
+    'stipple_context_memory_limit': (_status, [_handle, _to(c_uint64)]),
     'stipple_context_free': (None, [_handle]),
     # jobs
     'stipple_job_poll': (_status, [_handle, _to(s.StippleJobProgress)]),

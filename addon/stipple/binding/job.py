@@ -20,9 +20,12 @@ class Job(Handle):
 
     def poll(self):
         """(state, fraction 0..1, stage). Never waits."""
-        progress = StippleJobProgress()
-        self._check(self.library.stipple_job_poll(self.pointer, byref(progress)))
+        progress = self._progress()
         return JobState(progress.state), progress.fraction, progress.stage.decode('utf-8', 'replace')
+
+    def seconds(self):
+        """That it has taken so far, or until its end."""
+        return self._progress().seconds
 
     def cancel(self):
         """Asks the work to stop soon. Does not wait."""
@@ -31,3 +34,8 @@ class Job(Handle):
     def wait(self):
         """Waits for the end; raises what went wrong, CancelledError after a cancel."""
         self._check(self.library.stipple_job_wait(self.pointer))
+
+    def _progress(self):
+        progress = StippleJobProgress()
+        self._check(self.library.stipple_job_poll(self.pointer, byref(progress)))
+        return progress

@@ -35,7 +35,8 @@ class StippleContextOptions(_Sized):
 
 
 class StippleJobProgress(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('state', c_uint32), ('fraction', c_double), ('stage', c_char * 64)]
+    _fields_ = [('struct_size', c_uint32), ('state', c_uint32), ('fraction', c_double), ('stage', c_char * 64),
+                ('seconds', c_double)]
 
 
 class StippleCloudArrays(_Sized):

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene import geometry
-from ..scene.source import masks, source_paths, source_settings, sources, splat_data, sync
+from ..scene.source import decoded, masks, source_paths, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
@@ -51,7 +51,7 @@ class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
             visible = sources.visible_count(data.stipple)
             data.stipple.ratio = min(1.0, sources.FIRST_COUNT / visible)
         settings = sources.decode_settings(data.stipple)
-        sync.write_decoded(data, sources.decode_data(data, settings).columns())
+        sync.write_decoded(data, decoded.decode_data(data, settings).columns())
         self.report({'INFO'}, f"'{obj.name}' shows {settings.anchors:,} of {visible:,} splats")
 
     def _new_object(self, context):

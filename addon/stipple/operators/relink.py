@@ -10,7 +10,7 @@ from ..binding.errors import StippleError, invalid
 from ..binding.model import Model
 from ..jobs import JobOperator
 from ..scene.sequence import numbered
-from ..scene.source import (formats, masks, selections, source_paths, source_settings, sources, splat_data,
+from ..scene.source import (decoded, formats, masks, selections, source_paths, source_settings, sources, splat_data,
                             sync)
 
 
@@ -111,7 +111,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
             return
         if clears_mask:
             masks.clear(data)
-        splats = sources.masked(made, data) if source_settings.of(stipple).as_they_are else sources.decode_data(
+        splats = sources.masked(made, data) if source_settings.of(stipple).as_they_are else decoded.decode_data(
             data, sources.decode_settings(stipple))
         sync.write_decoded(data, splats.columns())
 

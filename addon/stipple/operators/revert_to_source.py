@@ -4,7 +4,7 @@
 import bpy
 
 from ..jobs import JobOperator
-from ..scene.source import sources, splat_data, sync
+from ..scene.source import decoded, sources, splat_data, sync
 
 
 class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
@@ -24,7 +24,7 @@ class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
         if data.stipple.is_sequence:
             self._splats = None
             return None
-        self._splats = sources.decode_data(data, sources.decode_settings(data.stipple)).columns()
+        self._splats = decoded.decode_data(data, sources.decode_settings(data.stipple)).columns()
         return None
 
     def finish(self, context, _job):

@@ -6,7 +6,7 @@ from bpy.props import IntProperty, StringProperty
 
 from ..jobs import JobOperator
 from ..scene.fit import densifying, fitting, strategies
-from ..scene.source import edits, masks, source_paths, sources, splat_data, sync
+from ..scene.source import decoded, edits, masks, source_paths, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
@@ -39,7 +39,7 @@ class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
         strategy = self.strategy or strategies.text_of(settings)
         strategies.require(strategy)
         objects = [] if settings.views_from == 'DATASET' else fitting.seen_objects(context)
-        cloud = sources.full_cloud(self._object.data)
+        cloud = decoded.full_cloud(self._object.data)
         self._count = cloud.info().count
         chosen = {'strategy': strategy, 'event_count': self.events,
                   'max_splats': self.max_splats, 'seed': settings.seed}

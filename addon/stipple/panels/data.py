@@ -9,7 +9,7 @@ import bpy
 
 from . import source_state
 from ..scene import geometry
-from ..scene.source import erased, exporting, masks, source_settings, sources, splat_data, sync
+from ..scene.source import decoded, erased, exporting, frame_budgets, masks, source_settings, sources, splat_data, sync
 from ..scene.view import viewed
 from .text import draw_anchors
 
@@ -133,14 +133,32 @@ def _draw_budget(self, context):
     draw_anchors(column, stipple, 'anchors_render', each, "Render")
     if known.has_seed:
         column.prop(stipple, 'seed')
-    share = sources.decoding_share(data)
-    if share is not None:
-        column.label(text=f"Decoding: {share:.0%}", icon='SORTTIME')
+    if frame_budgets.is_animated(data):
+        column.operator('stipple.decode_budgets', icon='RENDER_ANIMATION')
+    _draw_decoding(column, data)
     if known.is_learned:
         used = (stipple.anchors, stipple.anchors_render or stipple.anchors)
         is_beyond = max(used) > known.most_learned or min(used) < known.least_learned
         column.label(text=f"Learned for {known.least_learned:,} to {known.most_learned:,}",
                      icon='INFO' if is_beyond else 'BLANK1')
+
+
+def _draw_decoding(layout, data):
+    """What is being decoded beside Blender, and what was cancelled."""
+    share = decoded.decoding_share(data)
+    if share is not None:
+        row = layout.row(align=True)
+        row.label(text=f"Decoding: {share:.0%} (Esc cancels)", icon='SORTTIME')
+        row.operator('stipple.decoding_cancel', text="", icon='X')
+    elif decoded.is_declined(data):
+        row = layout.row(align=True)
+        row.label(text="Decoding was cancelled", icon='INFO')
+        row.operator('stipple.decoding_resume')
+    count, size = decoded.cached(data)
+    if count:
+        row = layout.row()
+        row.active = False
+        row.label(text=f"{count} budget{'' if count == 1 else 's'} kept{SEPARATOR}{exporting.megabytes(size)}")
 
 
 def _draw_fixed(layout, name, value):

@@ -4,11 +4,12 @@
 import bpy
 
 from .. import version
-from ..binding.errors import StippleError
+from ..binding.errors import CancelledError, StippleError
+from ..binding.grade import graded
 from ..binding.structs import Status
 from . import grades, limits, shown
 from .sequence import sequences
-from .source import placement, source_settings, sources, splat_data, sync
+from .source import decoded, placement, source_settings, sources, splat_data, sync
 from .view import viewed
 
 
@@ -26,8 +27,10 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
     return [entry[1:] for entry in gather_keyed(depsgraph, mode, warn)]
 
 
-def gather_keyed(depsgraph, mode, warn=lambda message: None):
-    """The same with a key before each, which stays while it is the same instance: matrices() has it at other times."""
+def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
+    """The same with a key before each, which stays while it is the same instance: matrices() has it at other times.
+    wait: called with (name of an object, job) where a source has to be read, to wait for the job; then what is not
+    decoded yet is a LaterCloud, for decode_later()."""
     clouds, found = {}, []
     share, splats = limits.share(depsgraph, mode), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
@@ -42,13 +45,37 @@ def gather_keyed(depsgraph, mode, warn=lambda message: None):
             continue
         key = obj.data.as_pointer()
         if key not in clouds:
-            clouds[key] = _cloud_of(obj, mode, depsgraph.scene, share.most(obj.original.data))
+            clouds[key] = _cloud_of(obj, mode, depsgraph.scene, share.most(obj.original.data), wait)
         if clouds[key] is not None:
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
             found.append((_key_of(entry, owner, original), owner, original,
                           (clouds[key], matrix, shown.holds_out(entry, depsgraph))))
     return found
+
+
+class LaterCloud:
+    """The splats of an object that are yet to be decoded. It never touches Blender."""
+
+    def __init__(self, name, pending, grade):
+        self._name, self._pending, self._grade, self._cloud = name, pending, grade, None
+
+    def cloud(self, wait):
+        """wait: called with (name of the object, job) where decoding takes long. Errors: StippleError."""
+        if self._cloud is None:
+            try:
+                made = self._pending.cloud(lambda job: wait(self._name, job))
+            except CancelledError:
+                raise
+            except StippleError as error:
+                raise StippleError(f"Splat object '{self._name}': {error}", error.status) from None
+            self._cloud = graded(made, self._grade)
+        return self._cloud
+
+
+def decode_later(placed, wait):
+    """What gather() gives, with all splats decoded. wait: as LaterCloud.cloud() has it. Errors: StippleError."""
+    return [(entry[0].cloud(wait) if isinstance(entry[0], LaterCloud) else entry[0], *entry[1:]) for entry in placed]
 
 
 def matrices(depsgraph):
@@ -66,7 +93,7 @@ def _key_of(entry, owner, original):
     return (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
 
 
-def _cloud_of(obj, mode, scene, most):
+def _cloud_of(obj, mode, scene, most, wait):
     """Native splats of an evaluated object at the frame of the scene, `most` at most, or None for none."""
     data, original = obj.data, obj.original.data
     stipple = data.stipple
@@ -79,15 +106,36 @@ def _cloud_of(obj, mode, scene, most):
         try:
             if stipple.is_sequence:
                 cloud = sequences.frame_of(original, stipple, scene.frame_current, mode, most).cloud()
+            elif _waits(mode) or decoded.is_quick(original, settings):
+                pending = decoded.begin(original, settings, wait and (lambda job: wait(obj.name, job)))
+                if wait is not None:
+                    return LaterCloud(obj.name, pending, grades.settings_of(stipple))
+                cloud = pending.cloud()
             else:
-                cloud = sources.decode(original, settings)
+                # Nobody waits for a view: it shows what is stored, and what is wanted when that is there.
+                if original.get(sync.WRITTEN_KEY) != sync.written_key(original, settings):
+                    sync.follow_later()
+                return _stored(obj, mode)
             return cloud and grades.apply(cloud, stipple)
+        except CancelledError:
+            raise
         except StippleError as error:
             # Without what the source needs beside its file, what is stored is still what it gives.
             if error.status != Status.ERROR_UNAVAILABLE or not sync.is_stored(original, settings):
                 raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
-    if splat_data.count(data) == 0:
+    return _stored(obj, mode)
+
+
+def _waits(mode):
+    """Whether an image is worth nothing without the splats that are wanted: it is no view of a window."""
+    return mode == 'RENDER' or bpy.app.background
+
+
+def _stored(obj, mode):
+    """The splats of an evaluated object's attributes, or None for none."""
+    if splat_data.count(obj.data) == 0:
         return None
+    original, stipple = obj.original.data, obj.data.stipple
     if _has_modifiers(obj) or mode == 'VIEWPORT' and grades.is_shown(original, grades.settings_of(stipple)):
         # Attributes carry the grade, and modifiers see them. Views are drawn again whenever anything changes: theirs
         # are kept.

@@ -93,6 +93,8 @@ StippleStatus stipple_context_create(const StippleContextOptions* options, Stipp
  * It holds for what is loaded from then on. NULL: the folder that the environment variable STIPPLE_WEIGHTS names, as
  * it is in a context where this was never called. */
 StippleStatus stipple_context_set_weights_folder(StippleContext* context, const char* folder_utf8);
+/* Bytes: what the options said, or 60 % of the machine's memory. */
+StippleStatus stipple_context_memory_limit(const StippleContext* context, uint64_t* bytes);
 void stipple_context_free(StippleContext* context);
 
 /* ---- jobs -------------------------------------------------------------------------------------- */
@@ -109,6 +111,7 @@ typedef struct StippleJobProgress {
   uint32_t state;    /* StippleJobState */
   double fraction;   /* 0..1 */
   char stage[64];    /* short English text, ends with a zero */
+  double seconds;    /* by the clock, since the job began; of one that has ended: until then */
 } StippleJobProgress;
 
 /* Never waits. In: progress->struct_size set. */

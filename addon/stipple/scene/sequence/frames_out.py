@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames a conversion writes, and the splats of each: read in a worker, without the cache of what is shown."""
+"""Which frames a conversion writes, and the splats of each, read in a worker.
+
+Files of series do not go through the cache of what is shown, which belongs to Blender's own thread. Decoded budgets
+that are kept are taken as they are.
+"""
 
 from dataclasses import dataclass
 
@@ -10,8 +14,8 @@ from ...binding.errors import StippleError, invalid
 from ...binding.grade import GradeSettings, graded
 from .. import grades
 from . import sequences
-from ..source import erased, placement, source_settings, sources, splat_data, sync
-from ..source.erased import Erased
+from ..source import placement, source_settings, sources, splat_data, sync
+from ..source.decoded import Decoder
 
 FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
           ('SERIES', "Whole Series",
@@ -23,12 +27,11 @@ FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
 class Decoded:
     """A model at the budget of one frame, without what was erased."""
 
-    model: object
+    decoder: Decoder
     settings: object
-    erased: Erased
 
     def read_anew(self, _native):
-        return self.erased.applied(self.model.decode(self.settings))
+        return self.decoder.cloud(self.settings, is_image=False)
 
 
 @dataclass
@@ -108,7 +111,7 @@ def _at_frame(data, stipple, number, budget):
         return sequences.frame_of(data, stipple, number, budget)
     settings = sources.decode_settings(stipple, budget)
     settings.check()
-    return Decoded(sources.model_of(data), settings, erased.read(data))
+    return Decoded(Decoder(data), settings)
 
 
 def _fixed_clouds(objects, with_models):

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...binding.cloud import Cloud
 from ...binding.errors import invalid
-from . import erased, masks, selections, source_settings, sources, splat_data, sync
+from . import decoded, erased, masks, selections, source_settings, sources, splat_data, sync
 
 
 @dataclass
@@ -128,7 +128,7 @@ def show(data, cloud=None):
     if source_settings.of(data.stipple).as_they_are and cloud is not None:
         splats = sources.masked(cloud, data)
     else:
-        splats = sources.decode_data(data, settings)
+        splats = decoded.decode_data(data, settings)
     sync.write(data, splats.columns(), sync.written_key(data, settings))
 
 

@@ -12,7 +12,7 @@ from ...binding.errors import StippleError, invalid
 from ...binding.structs import Status
 from .. import grades
 from ..sequence import frames, sequences
-from . import formats, placement, source_settings, sources, splat_data, sync
+from . import decoded, formats, placement, source_settings, sources, splat_data, sync
 
 
 BUDGETS = (('VIEWPORT', "Viewport", "The splats that are shown now"),
@@ -103,8 +103,8 @@ def _decoded(obj, data, budget):
     if data.stipple.is_sequence:
         return sequences.frame_of(data, obj.data.stipple, bpy.context.scene.frame_current, budget).cloud()
     if budget == 'FULL':
-        return sources.full_cloud(data)
-    return sources.decode_data(data, sources.decode_settings(data.stipple, 'RENDER'))
+        return decoded.full_cloud(data)
+    return decoded.decode_data(data, sources.decode_settings(data.stipple, 'RENDER'))
 
 
 def size_label(context, operator):

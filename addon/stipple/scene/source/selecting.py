@@ -14,7 +14,7 @@ from ...binding import cloud_edit, regions
 from ...binding.errors import StippleError, invalid
 from ...binding.regions import Region, RegionKind, RegionOperation
 from ..view import viewed
-from . import edits, erased, masks, placement, selections, source_settings, sources, splat_data, sync
+from . import decoded, edits, erased, masks, placement, selections, source_settings, sources, splat_data, sync
 
 # Splats of what was decoded last, for the strokes that come after: {name of the data: (state, cloud)}.
 _decoded = {}
@@ -124,7 +124,7 @@ class RegionTarget:
 
     def selected_cloud(self):
         """What is selected at the render budget. Errors: StippleError where that is nothing."""
-        full = sources.full_cloud(self.obj.data)
+        full = decoded.full_cloud(self.obj.data)
         mask = regions.select(full, self.regions)
         if not np.any(mask):
             raise invalid(f"Nothing of '{self.obj.name}' is selected at its render budget; choose a larger one.")
@@ -136,7 +136,7 @@ class RegionTarget:
     def ground(self):
         data = self.obj.data
         if self.regions:
-            whole = sources.full_cloud(data)
+            whole = decoded.full_cloud(data)
             left = 1 - regions.select(whole, self.regions)
         elif erased.any_of(data):
             whole = sources.model_of(data).decode(sources.decode_settings(data.stipple, 'RENDER'))

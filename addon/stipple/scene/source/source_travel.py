@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ...binding.errors import StippleError
 from .. import handlers
-from . import setting_paths, source_files, source_packing, source_paths, sources, splat_data, sync
+from . import decoded, setting_paths, source_files, source_packing, source_paths, sources, splat_data, sync
 from .source_paths import log
 
 # told: whether this Blender tells the path before it saves. before: the path until then.
@@ -39,7 +39,7 @@ def point_at(file, path):
     old = os.path.normpath(bpy.path.abspath(file.filepath))
     file.filepath = source_paths.stored(path)
     if os.path.exists(old):
-        sources.follow(old, path)
+        decoded.follow(old, path)
 
 
 def follow_texts():

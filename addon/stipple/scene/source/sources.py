@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sources of splats: the native context, models read from asset files, clouds decoded from them.
+"""Sources of splats: the native context, and models read from asset files.
 
-Both caches are native memory, keyed by the file's identity and the settings. Nothing here writes
+Models are kept in native memory, keyed by the file's identity. decoded.py makes clouds of them. Nothing here writes
 Blender data.
 """
 
@@ -10,7 +10,7 @@ import os
 import time
 import zlib
 from collections import OrderedDict
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 
@@ -30,8 +30,6 @@ from .source_paths import MODEL_SUFFIX
 _MAX_MODELS = 4
 # Splats that the viewport shows at first of a tree.
 FIRST_COUNT = 500_000
-# Splats kept decoded over all cached clouds; 60 bytes each, so 1.2 GB at most.
-_MAX_CACHED_SPLATS = 20_000_000
 
 # What tells whether a file has changed: its size and this many samples, the first and the last byte among them.
 _SAMPLE_BYTES = 1 << 16
@@ -41,8 +39,6 @@ _contexts = {}
 _stamps = {}
 _models = OrderedDict()
 _reading = {}  # jobs of models that were asked for, by the same keys
-_clouds = OrderedDict()
-_decoding = {}  # _Decoding of clouds that take long, by datablock
 _whole = {}  # the cloud of whole_cloud() that was asked for last: one edit of a source comes after another
 _whole_ahead = {}  # what is being read for it, by the same key
 
@@ -72,16 +68,12 @@ def context():
 
 
 def forget():
-    """Gives all native memory back."""
+    """Gives the memory of sources back; decoded.forget() gives all."""
     for job in _reading.values():
         job.close()
     _reading.clear()
-    for decoding in _decoding.values():
-        decoding.job.close()
-    _decoding.clear()
     _whole.clear()
     _whole_ahead.clear()
-    _clouds.clear()
     _models.clear()
     _contexts.clear()
 
@@ -135,17 +127,41 @@ def _stamp_of(path, size):
 
 def model(path):
     """The model of an asset file, read once. Errors: StippleError for a missing or broken file."""
-    key = _file_key(path)
-    known = _models.get(key)
-    if known is None:
-        job = _reading.pop(key, None)
-        if job is None:
-            known = Model.load(context(), path)
-        else:
-            job.wait()
-            known = Model.of_job(job)
-        remember_model(path, known)
-    _models.move_to_end(key)
+    return _reader(path, '', None)(Job.wait)
+
+
+def model_reader(data):
+    """A function of wait(job) that gives model_of(data) and never touches Blender, so that a worker may call it. wait:
+    called with the job that reads the file, where it has to be read. Errors: StippleError, by the function too."""
+    hidden = masks.key(data)
+    return _reader(source_paths.file_of(data), hidden, masks.read(data) if hidden else None)
+
+
+def _reader(path, hidden, mask):
+    """hidden: the key of the mask, '' for none."""
+    file = _file_key(path)
+    key = (*file, hidden) if hidden else file
+    native = None if key in _models or file in _models else context()
+
+    def read(wait):
+        known = _models.get(key)
+        if known is None:
+            known = _models.get(file)
+            if known is None:
+                known = _of_file(path, file, native or context(), wait)
+            if mask is not None:
+                known = known.masked(mask)
+        _keep_model(key, known)
+        return known
+    return read
+
+
+def _of_file(path, key, native, wait):
+    job = _reading.pop(key, None) or Model.load_start(native, path)
+    wait(job)
+    job.wait()
+    known = Model.of_job(job)
+    _keep_model(key, known)
     return known
 
 
@@ -179,13 +195,17 @@ def is_reading():
 
 def follow(old, new):
     """A file was copied: what is known of it holds for the copy."""
+    renamed = moved(old, new)
+    for key in list(_models):
+        if renamed(key) is not None:
+            _models[renamed(key)] = _models.pop(key)
+
+
+def moved(old, new):
+    """A function from a key that begins with a file's identity to the one of the copied file; it gives None for keys of
+    other files."""
     status = os.stat(new)
-    for cache in (_models, _clouds):
-        for key in list(cache):
-            file = key[0] if cache is _clouds else key
-            if file[0] == old:
-                moved = (new, status.st_mtime_ns, status.st_size, *file[3:])
-                cache[(moved, key[1]) if cache is _clouds else moved] = cache.pop(key)
+    return lambda key: (new, status.st_mtime_ns, status.st_size, *key[3:]) if key[0] == old else None
 
 
 def _is_running(job):
@@ -197,106 +217,21 @@ def remember_model(path, loaded):
 
 
 def _keep_model(key, loaded):
-    _models[key] = loaded
+    _models.pop(key, None)
+    _models[key] = loaded  # at the end
     while len(_models) > _MAX_MODELS:
         _models.popitem(last=False)
 
 
 def model_of(data):
     """The model of a datablock's source, without what its mask hides; masked ones are kept like others."""
-    path, hidden = source_paths.file_of(data), masks.key(data)
-    if not hidden:
-        return model(path)
-    key = (*_file_key(path), hidden)
-    if key not in _models:
-        _keep_model(key, model(path).masked(masks.read(data)))
-    _models.move_to_end(key)
-    return _models[key]
+    return model_reader(data)(Job.wait)
 
 
-def decode(data, settings):
-    """The cloud of a datablock's model at these settings; kept for the next image. Errors: StippleError, also for a
-    source that has changed."""
-    check_unchanged(data)
-    key = _cloud_key(data, settings)
-    cloud = _clouds.get(key)
-    if cloud is None:
-        cloud = _decoded(data, settings)
-        _clouds[key] = cloud
-        total = sum(k[1].anchors * k[1].gaussians_per_anchor for k in _clouds)
-        while total > _MAX_CACHED_SPLATS and len(_clouds) > 1:
-            (_, old), _dropped = _clouds.popitem(last=False)
-            total -= old.anchors * old.gaussians_per_anchor
-    _clouds.move_to_end(key)
-    return cloud
-
-
-def decode_data(data, settings):
-    """The cloud that a datablock's source gives at these settings, without what was hidden or erased."""
-    if source_settings.of(data.stipple).as_they_are:
-        return masked(whole_cloud(data), data)
-    return _decoded(data, settings)
-
-
-def _decoded(data, settings):
-    decoding = _decoding.get(data.name_full)
-    if decoding is None or decoding.key != _cloud_key(data, settings):
-        return erased.read(data).applied(model_of(data).decode(settings))
-    del _decoding[data.name_full]
-    decoding.job.wait()
-    return erased.read(data).applied(Cloud.of_job(decoding.job))
-
-
-def _cloud_key(data, settings):
-    """What tells clouds apart."""
-    return _file_key(source_paths.file_of(data)) + (masks.key(data), erased.key(data)), settings
-
-
-@dataclass
-class _Decoding:
-    key: tuple
-    job: Job
-    ended: bool = False  # when is_decoding() asked last
-
-
-def is_decoded(data, settings, patience):
-    """Whether decode_data() will not take long. Where it would, decoding goes on in the library's own thread, for a
-    later call; what was being decoded for the datablock at other settings is cancelled. patience: seconds that are
-    waited for what begins now."""
-    if not source_settings.of(data.stipple).counts_anchors or data.stipple.is_sequence:
-        return True
-    decoding = _decoding.get(data.name_full)
-    try:
-        key = _cloud_key(data, settings)
-        if decoding is not None and decoding.key == key:
-            return not _is_running(decoding.job)
-        if decoding is not None:
-            _decoding.pop(data.name_full).job.close()
-        decoding = _decoding[data.name_full] = _Decoding(key, model_of(data).decode_start(settings))
-    except StippleError:
-        return True  # decoding says what is wrong
-    until = time.perf_counter() + patience
-    while _is_running(decoding.job):
-        if time.perf_counter() >= until:
-            return False
-        time.sleep(0.001)
-    return True
-
-
-def is_decoding():
-    """Whether clouds are being decoded that is_decoded() has been asked for. What nobody has taken since it was done is
-    forgotten."""
-    for name, decoding in list(_decoding.items()):
-        if decoding.ended:
-            del _decoding[name]
-        decoding.ended = not _is_running(decoding.job)
-    return bool(_decoding)
-
-
-def decoding_share(data):
-    """How much of a datablock's decoding is done, 0 to 1; None where none goes on."""
-    decoding = _decoding.get(data.name_full)
-    return None if decoding is None else decoding.job.poll()[1]
+def source_key(data):
+    """What tells a datablock's source from others, and from itself with other splats hidden or erased; its path comes
+    first. Errors: StippleError."""
+    return _file_key(source_paths.file_of(data)) + (masks.key(data), erased.key(data))
 
 
 def whole_cloud(data):
@@ -334,16 +269,6 @@ def _whole_reader(data, path):
         return lambda: tree.decode(settings)
     native = context()
     return lambda: Cloud.load(native, path)
-
-
-def full_cloud(data):
-    """A datablock at full count: the whole source without what is hidden, splats of meshes at the render budget, and
-    what is stored where there is no source. Not graded."""
-    stipple = data.stipple
-    settings = source_settings.of(stipple)
-    if not settings.has_source or stipple.edited:
-        return splat_data.ungraded_cloud(context(), data)
-    return decode_data(data, decode_settings(stipple, 'FULL' if settings.counts_splats else 'RENDER'))
 
 
 def count_of(data, budget):

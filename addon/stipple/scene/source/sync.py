@@ -12,10 +12,10 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from ...binding.errors import StippleError
+from ...binding.errors import CancelledError, StippleError
 from .. import grades, handlers, limits, meshes
 from ..sequence import sequences
-from . import erased, masks, selections, source_paths, source_settings, sources, splat_data
+from . import decode_progress, decoded, erased, masks, selections, source_paths, source_settings, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -24,14 +24,15 @@ ENGINE = 'STIPPLE'
 CYCLES_ENGINE = 'STIPPLE_CYCLES'
 MOVE_SECONDS = 0.05  # that one move of a slider may take
 REST_SECONDS = 0.25  # after which a slider rests
-PREVIEW_SECONDS = 0.2  # that a move may take where it was meant to take MOVE_SECONDS
+POLL_SECONDS = 0.1   # between two looks at what is decoded beside Blender
 FEW = 1000           # fewer splats say nothing about the time that each takes
 
 log = logging.getLogger('stipple')
 # What is wrong with a datablock, by name, for the panel; empty while all is well.
 problems = {}
 # limited: whether Max Splats counted when the viewport was evaluated last.
-# seconds_per_splat: how long decoding and writing took last; the first value is a slow machine's.
+# seconds_per_splat: how long decoding and writing took last, of what takes time in proportion to its splats; the first
+# value is a slow machine's.
 _state = {'paused': 0, 'rendering': False, 'seconds_per_splat': 1e-6, 'limited': False}
 
 
@@ -45,14 +46,14 @@ class paused:
         _state['paused'] -= 1
 
 
-def sync(obj, depsgraph, mode, most=None, share=None, patience=None):
+def sync(obj, depsgraph, mode, most=None, share=None, beside=False, wait=None):
     """Writes the attributes that an object's data should have now. Returns True where it wrote.
 
     depsgraph: evaluated settings (animation, drivers) are read through it; None: the settings as they are.
     mode: 'VIEWPORT' or 'RENDER'. most: splats that are written at most while a slider is dragged, None for all.
-    share: of Max Splats, None to look it up. patience: seconds that decoding may take; where it takes longer it goes on
-    beside Blender, and a later call writes (sources.is_decoding). None for as long as it takes. Errors: StippleError,
-    with the splats as they were.
+    share: of Max Splats, None to look it up. beside: decoding that takes long goes on beside Blender, and a later call
+    writes (decoded.is_decoding); else wait(job) is called with what takes long, where it is given. Errors:
+    StippleError, with the splats as they were.
     """
     data = obj.data
     stipple = data.stipple
@@ -63,42 +64,48 @@ def sync(obj, depsgraph, mode, most=None, share=None, patience=None):
         # Nobody sees a panel that says what is wrong, so old splats must not pass for the source's.
         sources.check_unchanged(data)
     limit = (limits.share(depsgraph, mode) if share is None else share).most(data)
-    most = min((number for number in (most, limit) if number is not None), default=None)
-    key, decode, is_ready = _wanted(data, depsgraph, mode, most)
+    key, decode, is_ready = _wanted(data, depsgraph, mode, most, limit, wait)
     if data.get(WRITTEN_KEY) == key:
+        if beside:
+            decoded.settle(data)
         return regrade(data, grade)
     if is_edited(data):
         stipple.edited = True
         raise StippleError(f"The splats of '{data.name}' were edited by hand; use them as a new source, or revert to "
                            'the source, to change their settings.')
     begin = time.perf_counter()
-    if patience is not None and not is_ready(patience):
+    if beside and not is_ready():
         return False
     splats = decode()
     write(data, splats, key, grade)
-    if splats.count >= FEW:
+    if splats.count >= FEW and not source_settings.of(stipple).is_learned:
         _state['seconds_per_splat'] = (time.perf_counter() - begin) / splats.count
     return True
 
 
-def _wanted(data, depsgraph, mode, most):
-    """(key of the splats that a datablock should have now, function that makes them, function that says whether that is
-    done within some seconds)."""
+def _wanted(data, depsgraph, mode, most, limit, wait):
+    """(key of the splats that a datablock should have now, function that makes them, function that says whether that
+    takes no time). most: while a slider is dragged. limit: of Max Splats."""
     stipple = _evaluated(data, depsgraph)
     scene = bpy.context.scene if depsgraph is None else depsgraph.scene
     if stipple.is_sequence:
-        frame = sequences.frame_of(data, stipple, scene.frame_current, mode, most)
-        return frame.key, frame.splats, lambda patience: True
-    least = source_settings.of(stipple).least_budget
-    settings = sources.at_most(sources.decode_settings(stipple, mode, scene), most, least)
-    return (written_key(data, settings), lambda: _decoded(data, settings),
-            lambda patience: sources.is_decoded(data, settings, patience))
+        least = min((number for number in (most, limit) if number is not None), default=None)
+        frame = sequences.frame_of(data, stipple, scene.frame_current, mode, least)
+        return frame.key, frame.splats, lambda: True
+    known = source_settings.of(stipple)
+    settings = sources.at_most(sources.decode_settings(stipple, mode, scene), limit, known.least_budget)
+    # What networks make of few anchors is another picture: there is none before one that takes long, and no smaller
+    # one than they have learned.
+    if most is not None and (not known.is_learned or decoded.is_quick(data, settings)):
+        settings = sources.at_most(settings, most, max(known.least_budget, known.least_learned))
+    return (written_key(data, settings), lambda: _decoded(data, settings, wait),
+            lambda: decoded.is_decoded(data, settings))
 
 
-def _decoded(data, settings):
+def _decoded(data, settings, wait):
     settings.check()
     sources.check_unchanged(data)
-    made = sources.decode_data(data, settings).columns()
+    made = decoded.decode_data(data, settings, wait).columns()
     if not masks.key(data) and not erased.any_of(data):
         made.seen = splat_data.kept_seen(data, source_paths.identity(data.stipple), made.count)
     return made
@@ -181,6 +188,7 @@ def on_property_change(stipple, _context):
     if _state['paused'] or _state['rendering']:
         return
     data = stipple.id_data
+    decoded.allow(data)
     users = [obj for obj in bpy.data.objects if obj.data == data]
     if users and bpy.app.background:
         if limits.limit(bpy.context.scene, 'VIEWPORT') is None:
@@ -198,7 +206,7 @@ def on_limit_change(_scene, _context):
     if bpy.app.background:
         sync_all()
     else:
-        _complete_later()
+        follow_later()
 
 
 def follow(obj):
@@ -206,11 +214,12 @@ def follow(obj):
     most = int(MOVE_SECONDS / _state['seconds_per_splat'])
     # The first move after a file is opened does not wait for a tree of gigabytes either.
     if sources.is_at_hand(obj.data, MOVE_SECONDS):
-        try_sync(obj, None, 'VIEWPORT', most, patience=PREVIEW_SECONDS)
-    _complete_later()
+        try_sync(obj, None, 'VIEWPORT', most, beside=True)
+    follow_later()
 
 
-def _complete_later():
+def follow_later():
+    """What is shown follows its settings when no more of them change, without anybody waiting for it."""
     if bpy.app.timers.is_registered(complete):
         bpy.app.timers.unregister(complete)
     bpy.app.timers.register(complete, first_interval=REST_SECONDS)
@@ -221,23 +230,36 @@ def complete():
     end."""
     if sources.is_reading():
         return REST_SECONDS
-    if not _state['rendering']:
-        sync_all(patience=REST_SECONDS)
-        if sources.is_decoding():
-            _show_progress()
-            return REST_SECONDS
-    return None
+    if _state['rendering']:
+        return None  # its end calls again
+    alive = {obj.data.name_full for obj in splat_objects()}
+    for name in decoded.names():
+        if name not in alive:
+            decoded.stop(name)
+    if decoded.has_ended():
+        sync_all(beside=True)
+    is_busy = decoded.is_decoding()
+    decode_progress.show(is_busy)
+    if sources.is_reading():
+        return REST_SECONDS
+    return POLL_SECONDS if is_busy else None
 
 
-def _show_progress():
-    """Has panels drawn again, which show it."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == 'PROPERTIES':
-                area.tag_redraw()
+def _has_views():
+    """Whether somebody looks on while splats are decoded."""
+    return not bpy.app.background
 
 
-def try_sync(obj, depsgraph, mode, most=None, share=None, patience=None):
+def _follow_all(depsgraph=None):
+    """Everything follows its settings: at once what is quick, and all in background mode; else what takes long is
+    decoded beside Blender."""
+    beside = _has_views()
+    sync_all(depsgraph, beside=beside)
+    if beside and (decoded.is_decoding() or sources.is_reading()) and not bpy.app.timers.is_registered(complete):
+        bpy.app.timers.register(complete, first_interval=POLL_SECONDS)
+
+
+def try_sync(obj, depsgraph, mode, most=None, share=None, beside=False, wait=None):
     """sync() for callers that cannot fail: what goes wrong is kept for the panel and logged once.
 
     In background a render has no panel, and an engine of Blender's own draws what is stored: there the process ends
@@ -245,8 +267,10 @@ def try_sync(obj, depsgraph, mode, most=None, share=None, patience=None):
     """
     name = obj.data.name
     try:
-        sync(obj, depsgraph, mode, most, share, patience)
+        sync(obj, depsgraph, mode, most, share, beside, wait)
         problems.pop(name, None)
+    except CancelledError:
+        problems.pop(name, None)  # the splats are as they were, by somebody's wish
     except StippleError as error:
         if mode == 'RENDER' and bpy.app.background:
             sys.exit(f'Error: {name}: {error}')
@@ -264,13 +288,13 @@ def splat_objects():
     return found.values()
 
 
-def sync_all(depsgraph=None, mode='VIEWPORT', patience=None):
+def sync_all(depsgraph=None, mode='VIEWPORT', beside=False, wait=None):
     if _state['paused']:
         return
     objects = list(splat_objects())
     share = limits.share(depsgraph, mode) if objects else None
     for obj in objects:
-        try_sync(obj, depsgraph, mode, share=share, patience=patience)
+        try_sync(obj, depsgraph, mode, share=share, beside=beside, wait=wait)
 
 
 def _evaluated(data, depsgraph):
@@ -286,10 +310,10 @@ def _frame_change_post(scene, depsgraph):
     """
     if depsgraph.mode == 'VIEWPORT':
         _follow_limit(scene, depsgraph)
-        sync_all(depsgraph, 'VIEWPORT')
+        _follow_all(depsgraph)
     elif scene.render.engine not in {ENGINE, CYCLES_ENGINE}:
         # Our engines decode and grade for themselves; every other one draws the stored attributes.
-        sync_all(depsgraph, 'RENDER')
+        sync_all(depsgraph, 'RENDER', wait=decode_progress.wait_in_render)
     else:
         _regrade_modified(depsgraph)
 
@@ -310,7 +334,7 @@ def _render_init(_scene, _=None):
 def _render_end(_scene, _=None):
     """Gives the viewport its budget back: a still that was rendered in a window changes no frame."""
     _state['rendering'] = False
-    sync_all()
+    _follow_all()
 
 
 @persistent
@@ -320,7 +344,13 @@ def _restored(*_):
     limits.forget()
     _state['rendering'] = False
     _show_boxes(True)
-    sync_all()
+    _follow_all()
+
+
+@persistent
+def _load_pre(*_):
+    decoded.abandon()
+    decode_progress.forget()
 
 
 @persistent
@@ -356,7 +386,7 @@ def _depsgraph_update_post(scene, depsgraph):
     if _state['rendering'] or depsgraph.mode != 'VIEWPORT':
         return
     if _follow_limit(scene, depsgraph) and not bpy.app.timers.is_registered(complete):
-        sync_all(depsgraph)
+        _follow_all(depsgraph)
     if not any(update.is_updated_geometry for update in depsgraph.updates):
         return
     changed = {update.id.original for update in depsgraph.updates
@@ -372,7 +402,7 @@ def _depsgraph_update_post(scene, depsgraph):
 
 _HANDLERS = (('frame_change_post', _frame_change_post), ('render_init', _render_init),
              ('render_complete', _render_end), ('render_cancel', _render_end), ('undo_post', _restored),
-             ('redo_post', _restored), ('load_post', _restored), ('save_pre', _save_pre),
+             ('redo_post', _restored), ('load_pre', _load_pre), ('load_post', _restored), ('save_pre', _save_pre),
              ('save_post', _save_post), ('depsgraph_update_post', _depsgraph_update_post))
 
 
@@ -386,4 +416,4 @@ def unregister():
         bpy.app.timers.unregister(complete)
     problems.clear()
     sequences.forget()
-    sources.forget()
+    decoded.forget()
