@@ -23,16 +23,17 @@ constexpr StageTolerance kFormula = {1e-6, 1e-6};
 class WatchedDensity final : public DensityModel {
  public:
   WatchedDensity(std::shared_ptr<const OctreeNetwork> network, std::shared_ptr<const Latent> latent,
-                 int leaf_level)
-      : density_(network, latent, {}, leaf_level),
+                 const NetworkRun& run, int leaf_level)
+      : density_(network, latent, run, leaf_level),
         network_(std::move(network)),
-        keys_(network_->keysOf({}, *latent)) {}
+        run_(run),
+        keys_(network_->keysOf(run, *latent)) {}
   int leafLevel() const override { return density_.leafLevel(); }
   const RootCube& root() const override { return density_.root(); }
   void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
                              Progress* progress) const override {
     std::vector<float> logits(8 * cells.size());
-    network_->logits({}, keys_, level, cells, logits);
+    network_->logits(run_, keys_, level, cells, logits);
     seen.push_back(std::move(logits));
     density_.childLogProbabilities(level, cells, out, progress);
   }
@@ -42,6 +43,7 @@ class WatchedDensity final : public DensityModel {
  private:
   LatentDensity density_;
   std::shared_ptr<const OctreeNetwork> network_;
+  NetworkRun run_;
   OctreeNetwork::Keys keys_;
 };
 
@@ -52,7 +54,7 @@ std::string levelName(const char* stem, int level) {
 AnchorSet sampleStages(const GoldenFile& file, const LatentNetworks& networks,
                        std::shared_ptr<const Latent> latent, StageReport& report) {
   const int leaf_level = file.config().at("level").get<int>();
-  const WatchedDensity density(networks.octree, std::move(latent), leaf_level);
+  const WatchedDensity density(networks.octree, std::move(latent), file.run(), leaf_level);
   RecordedUniformSource source(recordedUniforms(file));
   const uint64_t count = file.config().at("num_points").get<uint64_t>();
   AnchorSet anchors = sampleAnchors(density, {.count = count}, source);
@@ -85,12 +87,13 @@ void decoderStages(const GoldenFile& file, StageReport& report) {
   latent->tokens = file.floats(latent_name);
   const AnchorSet anchors = sampleStages(file, networks, latent, report);
 
-  const LatentDecoder decoder(networks.gaussians, latent);
+  const LatentDecoder decoder(networks.gaussians, latent, file.run());
   const std::vector<float> points = file.floats("expect.points");
   const std::vector<float> features = file.floats("expect.features");
-  report.compare("features",
-                 networks.gaussians->features({}, *latent, points.size() / 3, points.data()),
-                 features, kNetworkCall);
+  report.compare(
+      "features",
+      networks.gaussians->features(file.run(), *latent, points.size() / 3, points.data()), features,
+      kNetworkCall);
   compareSplats("activated ", file, decoder.splatsOf(points, features), kFormula, report);
   DecodeRequest request;
   request.anchors = &anchors;
