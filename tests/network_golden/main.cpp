@@ -7,7 +7,7 @@
 //
 // --precision: products of matrices have factors of so many bits; --weights: weights are rounded
 // first. With either of them errors are told and not judged: the largest, and the root of their
-// mean square over that of the numbers.
+// mean square over that of the numbers. Cells and anchors are the recorded ones then.
 
 #include <cstdio>
 #include <exception>

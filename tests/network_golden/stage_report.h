@@ -35,6 +35,7 @@ class StageReport {
   /// A stage that could not be run.
   void failed(const std::string& stage, const std::string& reason);
 
+  StageJudgement judgement() const { return judgement_; }
   size_t stageCount() const { return stage_count_; }
   size_t failureCount() const { return failure_count_; }
 

@@ -2,13 +2,14 @@
 """`stipple generate` in the published sizes, with weights that are made up: seconds, memory and how soon it stops.
 
     full_size_runs.py BUILD FOLDER run TOKENS CANVAS STEPS [ANCHORS...]
+    full_size_runs.py BUILD FOLDER decode TOKENS ANCHORS...
     full_size_runs.py BUILD FOLDER cancel TOKENS CANVAS SECONDS...
     full_size_runs.py BUILD FOLDER table
 
 BUILD: the build folder; FOLDER: of files of weights (full_size_weights), of results and of an image with alpha,
 image.png, which is made where it is missing. `run` generates a latent, then decodes it with so many anchors each. It
-prints and keeps each stage's seconds and operations, the rate of the library's own products of matrices in between, and
-the most memory. `cancel` sends SIGINT after so many seconds each and prints how long the tool takes to end. `table`
+prints and keeps each stage's seconds and operations, the rate of the library's own products of matrices before and
+after, and the most memory. `decode` decodes such a latent again. `cancel` sends SIGINT after so many seconds each and prints how long the tool takes to end. `table`
 makes a table of all runs that were kept.
 
 STIPPLE_PRIORITY is put before each command ("chrt -f 10": other programs wait).
@@ -17,6 +18,7 @@ STIPPLE_PRIORITY is put before each command ("chrt -f 10": other programs wait).
 import json
 import os
 import platform
+import resource
 import shlex
 import signal
 import struct
@@ -42,6 +44,8 @@ class Watched:
         self.most = {'anonymous': 0.0, 'mapped': 0.0}
         self.stages = []  # (seconds since the start, what the tool says it does)
         self._start = time.monotonic()
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        self._used_before = used.ru_utime + used.ru_stime
         self.process = subprocess.Popen([*_PRIORITY, *map(str, arguments)], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True)
         threading.Thread(target=self._watch, daemon=True).start()
@@ -67,14 +71,16 @@ class Watched:
             self.stages.append((time.monotonic() - self._start, line.rstrip()))
 
     def finish(self):
-        """(stdout, seconds)."""
+        """(stdout, seconds, processor seconds)."""
         out = self.process.stdout.read()
         code = self.process.wait()
         self._reader.join()
         seconds = time.monotonic() - self._start
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        processor = used.ru_utime + used.ru_stime - self._used_before
         if code != 0:
             sys.exit(f'exit status {code}: ' + '\n'.join(self.errors))
-        return out, seconds
+        return out, seconds, processor
 
 
 def machine():
@@ -115,25 +121,40 @@ def stages_of(figures):
             for name, value in figures.items() if name.endswith('.seconds')}
 
 
+def model_path(folder, tokens):
+    return folder / 'results' / f'latent_{tokens}.stipple.safetensors'
+
+
+def decodes_of(build, folder, tokens, anchors):
+    decodes = []
+    for count in anchors:
+        decoding = Watched([build / 'bin' / 'stipple', '--weights', folder, 'decode', model_path(folder, tokens),
+                            folder / 'results' / 'decoded.ply', '--anchors', count])
+        _, seconds, processor = decoding.finish()
+        decodes.append({'anchors': count, 'seconds': seconds, 'processor_seconds': processor, 'memory': decoding.most,
+                        'operations': rate(build, tokens, count)['decodes'][0]})
+    return decodes
+
+
+def decode(build, folder, tokens, anchors):
+    found = {'rate': rate(build)['rate'], 'decodes': decodes_of(build, folder, tokens, anchors)}
+    (folder / 'results' / f'decode_{tokens}_{"_".join(map(str, anchors))}.json').write_text(json.dumps(found, indent=1))
+    print(f"{tokens} tokens; products of matrices {found['rate'] / 1e9:.0f} GFLOP/s")
+    show_decodes(found)
+
+
 def run(build, folder, tokens, canvas, steps, anchors):
     (folder / 'results').mkdir(exist_ok=True)
-    model = folder / 'results' / f'latent_{tokens}.stipple.safetensors'
+    model = model_path(folder, tokens)
     before = rate(build)
     watched = Watched(generate_arguments(build, folder, model, tokens, canvas, steps))
-    out, seconds = watched.finish()
+    out, seconds, processor = watched.finish()
     stages = stages_of(json.loads(out))
-    decodes, sizes = [], []
-    for count in anchors:
-        decoding = Watched([build / 'bin' / 'stipple', '--weights', folder, 'decode', model,
-                            folder / 'results' / 'decoded.ply', '--anchors', count])
-        decodes.append({'anchors': count, 'seconds': decoding.finish()[1], 'memory': decoding.most})
-        sizes += [tokens, count]
-    after = rate(build, *sizes)
-    for decode, cost in zip(decodes, after['decodes']):
-        decode['operations'] = cost
+    decodes = decodes_of(build, folder, tokens, anchors)
+    after = rate(build)
     found = {'machine': machine(), 'backend': after['backend'], 'instruction_sets': after['instruction_sets'],
              'threads': after['threads'], 'tokens': tokens, 'canvas': canvas, 'steps': steps,
-             'rate': (before['rate'] + after['rate']) / 2, 'rates': [before['rate'], after['rate']], 'seconds': seconds,
+             'processor_seconds': processor, 'rate': (before['rate'] + after['rate']) / 2, 'rates': [before['rate'], after['rate']], 'seconds': seconds,
              'stages': stages, 'memory': watched.most, 'decodes': decodes}
     (folder / 'results' / f'run_{tokens}_{canvas}_{steps}.json').write_text(json.dumps(found, indent=1))
     show(found)
@@ -166,18 +187,22 @@ def show(found):
         speed = f' {work / 1e12:8.3f} TFLOP {work / seconds / 1e9:6.0f} GFLOP/s' if work and seconds else ''
         print(f'  {name:22s} {seconds:8.2f} s{speed}')
     of = parts(found)
-    print(f"  whole process {found['seconds']:.2f} s: image {of['image']:.2f}, {found['steps']} steps of {of['step']:.2f}, "
+    print(f"  whole process {found['seconds']:.2f} s, {found['processor_seconds']:.2f} processor s: image {of['image']:.2f}, {found['steps']} steps of {of['step']:.2f}, "
           f"all else {of['rest']:.2f}")
     print(f"  memory at most: anonymous {found['memory']['anonymous']:.0f} MiB, mapped {found['memory']['mapped']:.0f} MiB")
     for steps in (10, 20):
         seconds, work, ratio = whole(found, steps)
         print(f'  {steps} steps: {seconds:.0f} s for {work / 1e12:.1f} TFLOP, {ratio:.2f} times products of matrices')
-    for decode in found['decodes']:
-        work = sum(decode['operations'].values())
-        print(f"  {decode['anchors']} anchors: {decode['seconds']:.2f} s, at most {work / 1e12:.2f} TFLOP "
-              f"({decode['operations']['levels'] / 1e12:.2f} of levels), "
-              f"{decode['seconds'] * found['rate'] / work:.2f} times products; anonymous "
-              f"{decode['memory']['anonymous']:.0f} MiB, mapped {decode['memory']['mapped']:.0f} MiB")
+    show_decodes(found)
+
+
+def show_decodes(found):
+    for one in found['decodes']:
+        work = sum(one['operations'].values())
+        print(f"  {one['anchors']} anchors: {one['seconds']:.2f} s, {one['processor_seconds']:.2f} processor s, at most "
+              f"{work / 1e12:.2f} TFLOP ({one['operations']['levels'] / 1e12:.2f} of levels), "
+              f"{one['seconds'] * found['rate'] / work:.2f} times products; anonymous {one['memory']['anonymous']:.0f} MiB, "
+              f"mapped {one['memory']['mapped']:.0f} MiB")
 
 
 def cancel(build, folder, tokens, canvas, moments):
@@ -217,6 +242,8 @@ def main(arguments):
     if what == 'run':
         tokens, canvas, steps, *anchors = map(int, arguments[3:])
         run(build, folder, tokens, canvas, steps, anchors)
+    elif what == 'decode':
+        decode(build, folder, int(arguments[3]), [int(count) for count in arguments[4:]])
     elif what == 'cancel':
         cancel(build, folder, int(arguments[3]), int(arguments[4]), [float(moment) for moment in arguments[5:]])
     elif what == 'table':

@@ -51,7 +51,8 @@ void addEstimate(const StippleGenerateEstimate& estimate, Report& report) {
 }
 
 /// What passed by in the networks, as a table for people, or among the figures.
-void addStages(const Job& job, bool json, Report& report) {
+/// In: prefix: of figures, which tells seeds apart; empty where there is one.
+void addStages(const Job& job, const std::string& prefix, bool json, Report& report) {
   auto figures = sized<StippleGenerateFigures>();
   check(stipple_generate_figures(job.get(), &figures));
   if (!json) {
@@ -61,7 +62,7 @@ void addStages(const Job& job, bool json, Report& report) {
   for (uint32_t i = 0; i < figures.stage_count; ++i) {
     auto stage = sized<StippleGenerateStage>();
     check(stipple_generate_stage(job.get(), i, &stage));
-    const std::string name = stage.name_utf8;
+    const std::string name = prefix + stage.name_utf8;
     if (!json) {
       std::printf("%-28s %12llu %13.6g %13.6g %13.6g %13.6g %9.3f\n", stage.name_utf8,
                   static_cast<unsigned long long>(stage.count), stage.minimum, stage.maximum,
@@ -78,7 +79,8 @@ void addStages(const Job& job, bool json, Report& report) {
 }
 
 /// Seconds and operations of what passed by.
-void addTimings(const Job& job, double decode_seconds, bool json, Report& report) {
+void addTimings(const Job& job, const std::string& prefix, double decode_seconds, bool json,
+                Report& report) {
   auto figures = sized<StippleGenerateFigures>();
   check(stipple_generate_figures(job.get(), &figures));
   const auto line = [](const char* name, double seconds, double operations) {
@@ -91,7 +93,7 @@ void addTimings(const Job& job, double decode_seconds, bool json, Report& report
   for (uint32_t i = 0; i < figures.stage_count; ++i) {
     auto stage = sized<StippleGenerateStage>();
     check(stipple_generate_stage(job.get(), i, &stage));
-    const std::string name = stage.name_utf8;
+    const std::string name = prefix + stage.name_utf8;
     if (!json) {
       line(stage.name_utf8, stage.seconds, stage.operations);
       continue;
@@ -99,7 +101,7 @@ void addTimings(const Job& job, double decode_seconds, bool json, Report& report
     report.add(name + ".seconds", stage.seconds);
     report.add(name + ".operations", stage.operations);
   }
-  if (json) return report.add("decoding.seconds", decode_seconds);
+  if (json) return report.add(prefix + "decoding.seconds", decode_seconds);
   if (decode_seconds > 0) line("decoding", decode_seconds, 0);
 }
 
@@ -131,7 +133,7 @@ std::string withSeed(const std::string& path, uint64_t seed) {
 
 /// Writes what a job has made. Returns the seconds of decoding, 0 for a model.
 double save(const Job& job, const std::string& out, const std::optional<int64_t>& anchors,
-            Report& report) {
+            const std::string& prefix, Report& report) {
   const auto model = make<Model>(stipple_job_model, const_cast<const StippleJob*>(job.get()));
   if (hasModelExtension(out)) {
     check(stipple_model_save(model.get(), out.c_str()));
@@ -143,7 +145,7 @@ double save(const Job& job, const std::string& out, const std::optional<int64_t>
   check(stipple_cloud_save(cloud.get(), out.c_str(), nullptr));
   auto info = sized<StippleCloudInfo>();
   check(stipple_cloud_info(cloud.get(), &info));
-  report.add("gaussians", info.count);
+  report.add(prefix + "gaussians", info.count);
   return seconds;
 }
 
@@ -155,6 +157,7 @@ struct Pictures {
 Job generated(const Context& context, const Pictures& pictures, const Arguments& arguments,
               uint64_t seed, const Job& before, Report& report) {
   const bool is_one = arguments.seeds == 1;
+  const std::string prefix = is_one ? "" : "seed" + std::to_string(seed) + ".";
   const std::string out = is_one ? arguments.out : withSeed(arguments.out, seed);
   std::string checkpoint = arguments.checkpoint;
   if (!is_one && !checkpoint.empty()) checkpoint = withSeed(checkpoint, seed);
@@ -166,11 +169,11 @@ Job generated(const Context& context, const Pictures& pictures, const Arguments&
                        const_cast<const StippleImage*>(pictures.image.get()),
                        const_cast<const StippleImage*>(pictures.mask.get()), &options);
   finish(job);
-  const double decode_seconds = save(job, out, arguments.anchors, report);
+  const double decode_seconds = save(job, out, arguments.anchors, prefix, report);
   std::error_code ignored;
   if (!checkpoint.empty()) std::filesystem::remove(checkpoint, ignored);
-  if (arguments.check) addStages(job, arguments.json, report);
-  if (arguments.timings) addTimings(job, decode_seconds, arguments.json, report);
+  if (arguments.check) addStages(job, prefix, arguments.json, report);
+  if (arguments.timings) addTimings(job, prefix, decode_seconds, arguments.json, report);
   return job;
 }
 
