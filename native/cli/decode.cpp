@@ -17,7 +17,7 @@ constexpr int64_t kMaxRefineSteps = 1'000'000;
 
 struct Arguments {
   std::string in, out, order = "systematic";
-  int64_t anchors = 20000;
+  std::optional<int64_t> anchors;  // the model's own where there are none
   std::optional<double> ratio;
   int64_t refine = 0;
   int64_t gaussians_per_anchor = 1;
@@ -65,7 +65,7 @@ uint64_t counted(int64_t value, const char* name, int64_t last) {
 
 /// What can be said of the options before a long job begins.
 void checkBudget(const Arguments& arguments) {
-  counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
+  if (arguments.anchors) counted(*arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
   if (arguments.ratio && !(*arguments.ratio > 0 && *arguments.ratio <= 1)) {
     throw Failure("--ratio is " + std::to_string(*arguments.ratio) +
                   "; above 0 and up to 1 is allowed");
@@ -79,10 +79,12 @@ StippleModelSettings settingsOf(const Model& model) {
   return settings;
 }
 
-/// The budget as it was asked for: a count, or a share of an existing cloud.
+/// The budget as it was asked for: a count, or a share of an existing cloud; else what the model
+/// has by itself.
 uint64_t budgetOf(const Model& model, const Arguments& arguments) {
-  if (!arguments.ratio) return counted(arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
+  if (arguments.anchors) return counted(*arguments.anchors, "--anchors", STIPPLE_MAX_ANCHORS);
   const StippleModelSettings settings = settingsOf(model);
+  if (!arguments.ratio) return settings.default_budget;
   if (settings.budget_unit != STIPPLE_BUDGET_SPLATS) {
     throw Failure("--ratio is a share of existing splats; a mesh takes --anchors");
   }
@@ -163,8 +165,10 @@ void addDecode(CLI::App& app, const Context& context) {
                    "Splats (.ply), or the model itself "
                    "(.stipple.safetensors)")
       ->required();
-  auto* anchors =
-      command->add_option("--anchors", arguments->anchors, "Anchor budget")->capture_default_str();
+  auto* anchors = command->add_option(
+      "--anchors", arguments->anchors,
+      "Anchor budget; without it what suits the model: 20,000 of a mesh, all existing splats, of a "
+      "fitted field and of generated splats a number that it has learned with");
   command->add_option("--ratio", arguments->ratio, "Budget as a share of existing splats, 0..1")
       ->excludes(anchors);
   command->add_option("--refine", arguments->refine,

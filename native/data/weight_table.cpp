@@ -36,10 +36,6 @@ bool shapeFits(const std::vector<uint64_t>& seen, std::span<const uint64_t> aske
   return true;
 }
 
-uint64_t bytesOf(WeightType type) {
-  return type == WeightType::kFloat32 ? 4 : 2;
-}
-
 /// The value of a binary16 number, by whole numbers where it is a normal one. A subnormal one is
 /// made by a subtraction of normal numbers, so that a thread that flushes small numbers to 0 keeps
 /// it. Branches are choices of lanes, so that compilers make vectors of a loop around it.
@@ -68,7 +64,7 @@ bool anyNotFinite(const uint8_t* bytes, uint64_t count, T exponent) {
 }
 
 bool anyNotFinite(const WeightTensor& tensor, uint64_t first, uint64_t count) {
-  const uint8_t* bytes = tensor.bytes + first * bytesOf(tensor.type);
+  const uint8_t* bytes = tensor.bytes + first * bytesOfNumber(tensor.type);
   switch (tensor.type) {
     case WeightType::kFloat32:
       return anyNotFinite<uint32_t>(bytes, count, 0x7f800000u);
@@ -80,6 +76,10 @@ bool anyNotFinite(const WeightTensor& tensor, uint64_t first, uint64_t count) {
 }
 
 }  // namespace
+
+uint64_t bytesOfNumber(WeightType type) {
+  return type == WeightType::kFloat32 ? 4 : 2;
+}
 
 uint64_t WeightTensor::count() const {
   uint64_t result = 1;
@@ -196,7 +196,7 @@ const std::string& WeightTable::source() const {
 }
 
 void widen(const WeightTensor& tensor, uint64_t first, std::span<float> out) {
-  const uint8_t* bytes = tensor.bytes + first * bytesOf(tensor.type);
+  const uint8_t* bytes = tensor.bytes + first * bytesOfNumber(tensor.type);
   if (tensor.type == WeightType::kFloat32) {
     if (!out.empty()) std::memcpy(out.data(), bytes, out.size_bytes());
     return;

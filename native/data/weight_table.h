@@ -13,6 +13,8 @@
 namespace stipple {
 
 enum class WeightType { kFloat32, kFloat16, kBfloat16, kOther };
+/// Of one number. In: not kOther.
+uint64_t bytesOfNumber(WeightType type);
 
 /// One tensor of a network as it lies in its file: row-major, little-endian, at any address.
 struct WeightTensor {

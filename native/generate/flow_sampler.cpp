@@ -59,7 +59,7 @@ const Tensor& tensorOf(const TensorTable& table, const std::string& name) {
 }
 
 template <typename T>
-const std::vector<T>& numbersOf(const TensorTable& table, const std::string& name, size_t count) {
+std::vector<T> numbersOf(const TensorTable& table, const std::string& name, size_t count) {
   const Tensor& tensor = tensorOf(table, name);
   const auto* values = std::get_if<std::vector<T>>(&tensor.values);
   if (values == nullptr || values->size() != count) {
@@ -77,7 +77,8 @@ void putLatent(const Latent& latent, const std::string& name, TensorTable& table
 }
 
 Latent takeLatent(const TensorTable& table, const std::string& name) {
-  const Tensor& tensor = tensorOf(table, name + ".tokens");
+  const std::string tokens_name = name + ".tokens";
+  const Tensor& tensor = tensorOf(table, tokens_name);
   const auto* tokens = std::get_if<std::vector<float>>(&tensor.values);
   const std::vector<uint64_t>& shape = tensor.shape;
   if (tokens == nullptr || shape.size() != 2 || shape[0] > kMostFlowTokens || shape[1] == 0 ||
@@ -90,7 +91,7 @@ Latent takeLatent(const TensorTable& table, const std::string& name) {
   latent.token_count = shape[0];
   latent.width = static_cast<uint32_t>(shape[1]);
   latent.tokens = *tokens;
-  const std::vector<float>& camera = numbersOf<float>(table, name + ".camera", kCameraWidth);
+  const std::vector<float> camera = numbersOf<float>(table, name + ".camera", kCameraWidth);
   for (size_t i = 0; i < kCameraWidth; ++i) latent.camera[i] = camera[i];
   for (const std::vector<float>* numbers : {tokens, &camera}) {
     for (const float value : *numbers) {
@@ -212,7 +213,7 @@ TensorTable tensorsOfSampler(const SamplerState& state) {
 
 SamplerState samplerOfTensors(const TensorTable& table) {
   SamplerState state;
-  const std::vector<double>& settings = numbersOf<double>(table, "flow.settings", 3);
+  const std::vector<double> settings = numbersOf<double>(table, "flow.settings", 3);
   if (!std::isfinite(settings[0]) || settings[0] < 1 || settings[0] > kMostSteps) {
     fail(ErrorCode::kFormat, "the state of a sampler has " + numberText(settings[0]) +
                                  " steps in flow.settings; 1 to " + std::to_string(kMostSteps) +

@@ -26,7 +26,8 @@ class HarmonicRotation {
   std::array<std::array<double, 81>, 5> bands_;
 };
 
-/// HarmonicRotation for one set of coefficients [(degree+1)^2,3].
+/// HarmonicRotation for one set of coefficients [(degree+1)^2,3], in a tenth of the time that making
+/// one takes: the turned function's values in as many directions as there are coefficients.
 void rotateHarmonics(const Mat3d& rotation, int degree, float* coefficients);
 
 }  // namespace stipple

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "nn/kernels/layer_kernel.h"
 #include "nn/kernels/panel_kernel.h"
 
 namespace stipple {
@@ -26,13 +27,16 @@ class HighwayBackend : public MatrixBackend {
     constexpr size_t kPiece = 64;
     float piece[kPiece];
     const size_t strip = chosenPanelKernel().strip;
+    const auto widen = chosenLayerKernel().widen;
+    const uint64_t bytes = bytesOfNumber(weight.type);
     for (size_t first = 0; first < outputs; first += strip) {
       const size_t count = std::min(strip, outputs - first);
       if (count < strip) std::fill_n(packed, inputs * strip, 0.0f);
       for (size_t begin = 0; begin < inputs; begin += kPiece) {
         const size_t width = std::min(kPiece, inputs - begin);
         for (size_t c = 0; c < count; ++c) {
-          widen(weight, (first_output + first + c) * inputs + begin, {piece, width});
+          const size_t number = (first_output + first + c) * inputs + begin;
+          widen(weight.type, width, weight.bytes + number * bytes, piece);
           for (size_t k = 0; k < width; ++k) packed[(begin + k) * strip + c] = piece[k];
         }
       }

@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "nn/kernels/layer_kernel.h"
+#include "nn/kernels/panel_kernel.h"
 #include "nn/matrix_backend.h"
 #include "nn/scratch.h"
 
@@ -22,6 +23,28 @@ constexpr size_t kMostPacked = size_t{1} << 22;
 /// Numbers of the input that are rounded to bfloat16 at a time: 32 MiB of them.
 constexpr size_t kMostNarrow = size_t{1} << 24;
 constexpr size_t kNarrowRows = 16;
+
+/// Outputs of a task of few rows, a multiple of what kernels take at once (12), and inputs of a
+/// piece: 96 KiB of widened weights stay in the second cache. Shorter pieces of a row of weights
+/// come from memory by up to a third slower.
+constexpr size_t kFewOutputs = 24;
+constexpr size_t kFewInputs = 1024;
+/// Inputs whose strips a task packs.
+constexpr size_t kStripInputs = 128;
+
+/// Strips of the rows' numbers, whose columns are the rows.
+void packInputs(size_t strip, size_t inputs, size_t rows, const float* in, size_t in_stride,
+                float* strips) {
+  const size_t pieces = rangeCount(inputs, kStripInputs);
+  parallelFor(rangeCount(rows, strip) * pieces, 1, [&](size_t begin, size_t end) {
+    for (size_t task = begin; task < end; ++task) {
+      const size_t row = task / pieces * strip;
+      const size_t input = task % pieces * kStripInputs;
+      packColumns(strip, std::min(kStripInputs, inputs - input), std::min(strip, rows - row),
+                  in + row * in_stride + input, in_stride, strips + row * inputs + input * strip);
+    }
+  });
+}
 
 size_t roundedUp(size_t count, size_t unit) {
   return (count + unit - 1) / unit * unit;
@@ -43,6 +66,7 @@ Linear::Linear(const WeightTable& weights, const std::string& name, uint64_t inp
 void Linear::apply(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,
                    float* out, size_t out_stride) const {
   if (precisionOf(run) == FactorPrecision::kFloat32) {
+    if (rows <= kFewRows) return applyFew(run, rows, in, in_stride, out, out_stride);
     return applyRows(run, rows, in, in_stride, nullptr, out, out_stride);
   }
   // Each number of `in` is rounded once, not for each panel again.
@@ -60,6 +84,60 @@ void Linear::apply(const NetworkRun& run, size_t rows, const float* in, size_t i
     });
     applyRows(run, count, from, in_stride, narrow, out + first * out_stride, out_stride);
   }
+}
+
+// The product of panels turned around: weights are the rows and the rows are the columns, so that
+// weights are used in the order in which they lie. Each sum has the same terms in the same order as
+// there: the bias, and then the inputs one after the other.
+void Linear::applyFew(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,
+                      float* out, size_t out_stride) const {
+  if (rows == 0) return;
+  const PanelKernel& kernel = chosenPanelKernel();
+  const auto widen = chosenLayerKernel().widen;
+  const size_t strip = kernel.strip;
+  const size_t columns = roundedUp(rows, strip);
+  const uint64_t bytes = bytesOfNumber(weight_->type);
+  const bool is_checked = is_checked_->load(std::memory_order_relaxed);
+  Scratch strips(columns * inputs_);
+  packInputs(strip, inputs_, rows, in, in_stride, strips.data());
+  parallelFor(rangeCount(outputs_, kFewOutputs), 1, [&](size_t begin, size_t) {
+    if (run.progress != nullptr) run.progress->throwIfCancelled();
+    const size_t first = begin * kFewOutputs;
+    const size_t outputs = std::min(kFewOutputs, outputs_ - first);
+    if (!is_checked) {
+      weights_.requireFinite(name_, *weight_, first * inputs_, outputs * inputs_);
+    }
+    Scratch room(kFewOutputs * (kFewInputs + columns));
+    float* wide = room.data();
+    float* sums = wide + kFewOutputs * kFewInputs;
+    for (size_t o = 0; o < outputs; ++o) {
+      std::fill_n(sums + o * columns, columns, bias_.empty() ? 0.0f : bias_[first + o]);
+    }
+    for (size_t input = 0; input < inputs_; input += kFewInputs) {
+      const size_t count = std::min(kFewInputs, inputs_ - input);
+      for (size_t o = 0; o < outputs; ++o) {
+        const uint64_t number = (first + o) * inputs_ + input;
+        widen(weight_->type, count, weight_->bytes + number * bytes, wide + o * kFewInputs);
+      }
+      for (size_t column = 0; column < columns; column += strip) {
+        PanelProduct product;
+        // Whole vectors, which a strip has two of.
+        product.shape = {outputs, count, 2 * (rows - column) <= strip ? strip / 2 : strip};
+        product.a = wide;
+        product.a_stride = kFewInputs;
+        product.b = strips.data() + column * inputs_ + input * strip;
+        product.start = PanelStart::kSums;
+        product.c = sums + column;
+        product.c_stride = columns;
+        kernel.multiply(product);
+      }
+    }
+    for (size_t row = 0; row < rows; ++row) {
+      float* to = out + row * out_stride + first;
+      for (size_t o = 0; o < outputs; ++o) to[o] = sums[o * columns + row];
+    }
+  });
+  is_checked_->store(true, std::memory_order_relaxed);
 }
 
 void Linear::applyRows(const NetworkRun& run, size_t rows, const float* in, size_t in_stride,

@@ -51,7 +51,7 @@ def browse(_window):
 
 def choose(_window):
     window, area = browser()
-    with bpy.context.temp_override(window=window, screen=window.screen, area=area,
+    with bpy.context.temp_override(window=window, area=area,
                                    region=next(r for r in area.regions if r.type == 'WINDOW')):
         bpy.ops.file.execute()
 

@@ -248,7 +248,7 @@ def quad_drag(window):
 
 def in_circle(region):
     """Splats that a click in the middle of a region should select."""
-    positions = np.array([vertex.co for vertex in data().vertices])
+    positions = addon('scene.source.splat_data').read(data()).positions
     matrix = np.array(region.data.perspective_matrix) @ np.array(bpy.context.object.matrix_world)
     clip = np.c_[positions, np.ones(len(positions))] @ matrix.T
     pixels = (0.5 + 0.5 * clip[:, :2] / clip[:, 3:]) * (region.width, region.height)

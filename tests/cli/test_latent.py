@@ -36,6 +36,11 @@ def test_a_latent_decodes_to_any_budget(asset, tmp_path):
     assert 'generated splats' in told and '1024' in told and '8192' in told
 
 
+def test_without_a_budget_it_is_one_that_the_networks_learned_with(asset, tmp_path):
+    run('decode', asset, tmp_path / 'usual.ply', weights=tmp_path / 'weights')
+    assert figures('info', tmp_path / 'usual.ply')['count'] == 32 * 2048
+
+
 def test_the_order_and_the_seed_change_what_is_drawn(asset, tmp_path):
     def decoded(name, *options):
         run('decode', asset, tmp_path / name, '--anchors', 64, *options, weights=tmp_path / 'weights')

@@ -148,6 +148,8 @@ def test_splats_come_down_to_any_share_of_themselves(scene):
     run('decode', scene / 'tree.stipple.safetensors', scene / 'all.ply', '--anchors', 5000)
     result = figures('compare', scene / 'cube.ply', scene / 'all.ply')
     assert result['same_order'] == 1 and result['max_position'] == 0 and result['max_sh'] == 0
+    run('decode', scene / 'tree.stipple.safetensors', scene / 'usual.ply')
+    assert figures('info', scene / 'usual.ply')['count'] == 5000
     run('decode', scene / 'tree.stipple.safetensors', scene / 'refined.ply', '--anchors', 100, '--refine', 2)
     assert figures('info', scene / 'refined.ply')['count'] == 100
     for ratio in (1.5, 0, -0.1, 'nan'):

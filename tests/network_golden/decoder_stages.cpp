@@ -47,7 +47,7 @@ class WatchedDensity final : public DensityModel {
   LatentDensity density_;
   std::shared_ptr<const OctreeNetwork> network_;
   NetworkRun run_;
-  OctreeNetwork::Keys keys_;
+  LatentKeys keys_;
 };
 
 std::string levelName(const char* stem, int level) {
@@ -81,7 +81,7 @@ AnchorSet sampleStages(const GoldenFile& file, const LatentNetworks& networks,
 AnchorSet recordedCellStages(const GoldenFile& file, const LatentNetworks& networks,
                              const Latent& latent, StageReport& report) {
   const int leaf_level = file.config().at("level").get<int>();
-  const OctreeNetwork::Keys keys = networks.octree->keysOf(file.run(), latent);
+  const LatentKeys keys = networks.octree->keysOf(file.run(), latent);
   const std::vector<int64_t> leaves = recordedLeaves(file);
   for (int level = 1; level <= leaf_level; ++level) {
     std::vector<uint64_t> parents;
@@ -116,10 +116,10 @@ void decoderStages(const GoldenFile& file, StageReport& report) {
   const LatentDecoder decoder(networks.gaussians, latent, file.run());
   const std::vector<float> points = file.floats("expect.points");
   const std::vector<float> features = file.floats("expect.features");
-  report.compare(
-      "features",
-      networks.gaussians->features(file.run(), *latent, points.size() / 3, points.data()), features,
-      kNetworkCall);
+  const LatentKeys keys = networks.gaussians->keysOf(file.run(), *latent);
+  report.compare("features",
+                 networks.gaussians->features(file.run(), keys, points.size() / 3, points.data()),
+                 features, kNetworkCall);
   compareSplats("activated ", file, decoder.splatsOf(points, features), kFormula, report);
   DecodeRequest request;
   request.anchors = &anchors;

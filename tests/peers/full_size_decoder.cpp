@@ -4,11 +4,13 @@
 //   full_size_decoder TOKENS ANCHORS BLOCKS
 //
 // TOKENS of a latent (8192), ANCHORS (1024), BLOCKS of the Gaussian network (16). Asks the density
-// once about as many cells as a sampler does, decodes ANCHORS random anchors, and cancels one
-// decode. Prints seconds, processor seconds, operations and memory.
+// once about as many cells as a sampler does, decodes ANCHORS random anchors, cancels one decode,
+// and then draws and decodes small budgets again and again: the best of some turns. Prints seconds,
+// processor seconds, operations and memory.
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <thread>
@@ -19,6 +21,7 @@
 #include "decode/latent/latent_decoder.h"
 #include "decode/latent/latent_density.h"
 #include "decode/latent/latent_networks.h"
+#include "density/anchor_sampling.h"
 #include "peers/full_size_clock.h"
 #include "peers/full_size_files.h"
 #include "peers/full_size_shapes.h"
@@ -41,9 +44,30 @@ void measure(const char* name, double operations, const Work& work) {
               usage.ru_maxrss >> 10);
 }
 
+/// Draws and decodes budgets that a slider may have, the best of some turns.
+void measureSmallBudgets(const LatentDensity& density, const LatentDecoder& decoder,
+                         DecodeRequest request) {
+  constexpr int kTurns = 7;
+  request.progress = nullptr;
+  for (const uint64_t count : {32, 64, 128, 256}) {
+    double draw = 1e300, decode = 1e300;
+    for (int turn = 0; turn < kTurns; ++turn) {
+      const double begin = seconds();
+      const AnchorSet anchors = sampleAnchors(density, {.count = count, .seed = 1});
+      const double middle = seconds();
+      request.anchors = &anchors;
+      decoder.decode(request);
+      draw = std::min(draw, middle - begin);
+      decode = std::min(decode, seconds() - middle);
+    }
+    std::printf("%3llu anchors, warm: %.3f s to draw, %.3f s to decode\n",
+                static_cast<unsigned long long>(count), draw, decode);
+  }
+}
+
 void run(uint64_t tokens, uint64_t anchors, uint64_t blocks) {
   printMachine();
-  const LatentNetworks networks = readLatentNetworks(sharedWeights(decoderShapes(blocks)));
+  const LatentNetworks networks = readLatentNetworks(ownWeights(decoderShapes(blocks)));
   auto latent = std::make_shared<Latent>();
   latent->token_count = tokens;
   latent->width = kLatentWidth;
@@ -56,12 +80,14 @@ void run(uint64_t tokens, uint64_t anchors, uint64_t blocks) {
   std::vector<float> out(8 * cells.size());
   const auto c = static_cast<double>(kFlowChannels), m = static_cast<double>(tokens);
   const double keys = kDensityBlocks * m * 2 * c * 2 * kLatentWidth;
+  // Queries and weights of 16 heads meet the tokens' numbers, and a 1.
+  const double shared = 16 * m * (2 * kLatentWidth + 1);
   measure("keys of the latent", keys, [&] {
     const uint64_t root = 0;
     density.childLogProbabilities(0, std::span(&root, 1), std::span(out).first(8));
   });
   // A linear layer behind the points; query, output, MLP and both products of attention.
-  const double cell = 2 * (c * c + kDensityBlocks * (10 * c * c + 2 * m * c));
+  const double cell = 2 * (c * c + kDensityBlocks * (10 * c * c + shared));
   measure("a question to the density", cell * static_cast<double>(cells.size()),
           [&] { density.childLogProbabilities(7, cells, out); });
 
@@ -76,7 +102,7 @@ void run(uint64_t tokens, uint64_t anchors, uint64_t blocks) {
   request.anchors = &set;
   request.gaussians_per_anchor = networks.gaussians->gaussians();
   const auto p = static_cast<double>(anchors), b = static_cast<double>(blocks);
-  const double anchor = 2 * (c * c + b * (14 * c * c + 2 * (m + p) * c));
+  const double anchor = 2 * (c * c + b * (14 * c * c + shared + 2 * p * c));
   const double latent_keys = b * m * 2 * c * 2 * kLatentWidth;
   measure("a decode", anchor * p + latent_keys, [&] { decoder.decode(request); });
 
@@ -94,6 +120,7 @@ void run(uint64_t tokens, uint64_t anchors, uint64_t blocks) {
     std::printf("%.3f s from cancelling to the end\n", seconds() - cancelled);
   }
   canceller.join();
+  measureSmallBudgets(density, decoder, request);
 }
 
 }  // namespace

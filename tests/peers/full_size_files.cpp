@@ -78,6 +78,14 @@ void makeNumbers(const Range& range, uint64_t key, uint64_t first, uint64_t coun
   });
 }
 
+/// Any sign and 1/64 to 1/32, so that sums of 1024 are about as large as what goes in.
+void fillHalves(uint64_t key, std::vector<uint16_t>& out) {
+  constexpr uint64_t kExponent = 9 << 10, kSignAndFraction = 0x83ff;
+  for (size_t i = 0; i < out.size(); ++i) {
+    out[i] = static_cast<uint16_t>((mixBits(key + i) & kSignAndFraction) | kExponent);
+  }
+}
+
 std::string headerOf(const WeightShapes& shapes, WeightType type) {
   std::ostringstream table;
   uint64_t size = 0;
@@ -140,16 +148,24 @@ WeightTable sharedWeights(const WeightShapes& shapes) {
   uint64_t most = 0;
   for (const auto& [name, shape] : shapes) most = std::max(most, countOf(shape));
   auto numbers = std::make_shared<std::vector<uint16_t>>(most + kOffsets);
-  for (size_t i = 0; i < numbers->size(); ++i) {
-    // Any sign and 1/64 to 1/32, so that sums of 1024 are about as large as what goes in.
-    constexpr uint64_t kExponent = 9 << 10, kSignAndFraction = 0x83ff;
-    (*numbers)[i] = static_cast<uint16_t>((mixBits(i) & kSignAndFraction) | kExponent);
-  }
+  fillHalves(0, *numbers);
   std::map<std::string, WeightTensor> tensors;
   for (const auto& [name, shape] : shapes) {
     const size_t offset = (37 * tensors.size()) % kOffsets;
     tensors[name] = {WeightType::kFloat16, "F16", shape,
                      reinterpret_cast<const uint8_t*>(numbers->data() + offset)};
+  }
+  return WeightTable("made up", std::move(tensors), numbers);
+}
+
+WeightTable ownWeights(const WeightShapes& shapes) {
+  auto numbers = std::make_shared<std::vector<std::vector<uint16_t>>>();
+  std::map<std::string, WeightTensor> tensors;
+  for (const auto& [name, shape] : shapes) {
+    std::vector<uint16_t>& own = numbers->emplace_back(countOf(shape));
+    fillHalves(uint64_t{numbers->size()} << 32, own);
+    tensors[name] = {WeightType::kFloat16, "F16", shape,
+                     reinterpret_cast<const uint8_t*>(own.data())};
   }
   return WeightTable("made up", std::move(tensors), numbers);
 }

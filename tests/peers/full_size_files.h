@@ -19,6 +19,8 @@ void writeWeights(const std::string& path, const WeightShapes& shapes, WeightTyp
 
 /// The same names and shapes in memory, of float16, where all tensors share the same few megabytes.
 WeightTable sharedWeights(const WeightShapes& shapes);
+/// Likewise, each tensor at its own place: no cache has them all, as it has none of a file.
+WeightTable ownWeights(const WeightShapes& shapes);
 
 // The four files, in the types of the published ones. Each returns the path of one that is in the
 // folder, and writes it where it is missing or of another size.

@@ -1,9 +1,11 @@
 // Layers of networks at the sizes of the flow network: products of matrices against what the
 // processor multiplies at most, layers and attention against those products, two threads against
-// one. All reference rates are of the same run.
+// one; few rows, which memory limits, against a copy of the weights. All reference rates are of the
+// same run.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +17,7 @@
 #include "nn/attention.h"
 #include "nn/linear.h"
 #include "nn/matrix_backend.h"
+#include "nn/shared_attention.h"
 
 namespace stipple::bench {
 namespace {
@@ -178,6 +181,54 @@ void attend(benchmark::State& state, const MatrixBackend& backend, FactorPrecisi
   });
 }
 
+/// Few rows go through layers that are too many for any cache, on two threads, against a copy of
+/// what is read of their weights.
+void fewRows(benchmark::State& state, size_t rows) {
+  constexpr size_t kLayers = 16, kInputs = 1024, kOutputs = 4096;
+  constexpr size_t kBytes = kLayers * kInputs * kOutputs * sizeof(uint16_t);
+  constexpr size_t kPiece = size_t{1} << 20;
+  std::vector<WeightTable> tables;
+  std::vector<Linear> layers;
+  for (size_t i = 0; i < kLayers; ++i) {
+    tables.push_back(weightOf(kInputs, kOutputs));
+    layers.emplace_back(tables.back(), "fc", kInputs, kOutputs, LinearBias::kNone);
+  }
+  const std::vector<float> in = numbers(rows * kInputs, 1);
+  std::vector<float> out(rows * kOutputs);
+  const auto ours = [&] {
+    for (const Linear& layer : layers) layer.apply({}, rows, in.data(), out.data());
+  };
+  const std::vector<uint8_t> from(kBytes, 1);
+  std::vector<uint8_t> to(kBytes);
+  const auto copy = [&] {
+    parallelFor(kBytes / kPiece, 1, [&](size_t begin, size_t) {
+      std::memcpy(&to[begin * kPiece], &from[begin * kPiece], kPiece);
+    });
+  };
+  withThreads(2, [&] {
+    ours();
+    compare(state, "copy", ours, copy);
+  });
+  state.SetLabel(matrixBackends().front()->instructionSets());
+}
+
+/// Queries of 16 heads of 64 meet rows of 16 numbers.
+void attendShared(benchmark::State& state, size_t queries, size_t row_count) {
+  constexpr size_t kHeads = 16, kWidth = 64, kRowWidth = 16;
+  const std::vector<float> maps = numbers(kHeads * kWidth * (kRowWidth + 1), 1);
+  const std::vector<float> rates(kHeads * row_count, 0.1f);
+  const std::vector<float> values = numbers(row_count * kRowWidth, 2);
+  const std::vector<float> q = numbers(queries * kHeads * kWidth, 3);
+  std::vector<float> out(q.size());
+  const SharedRows rows(row_count, kRowWidth, values.data());
+  const SharedHeads heads = {kHeads, kWidth, maps, maps, rates};
+  const double operations =
+      2.0 * (2 * kRowWidth + 1) * static_cast<double>(kHeads * queries * row_count);
+  compareWithProduct(state, *matrixBackends().front(), FactorPrecision::kFloat32, operations, [&] {
+    sharedAttention({}, heads, rows, queries, q.data(), kHeads * kWidth, out.data());
+  });
+}
+
 template <class Function>
 void add(const std::string& name, const Function& function) {
   benchmark::RegisterBenchmark(name.c_str(), function)
@@ -187,6 +238,14 @@ void add(const std::string& name, const Function& function) {
 }
 
 const bool registered = [] {
+  for (const size_t rows : {1, 32}) {
+    add("nn.few_rows." + std::to_string(rows) + "x1024x4096",
+        [=](benchmark::State& state) { fewRows(state, rows); });
+  }
+  for (const size_t queries : {32, 1024}) {
+    add("nn.shared_attention." + std::to_string(queries) + "x8192_16x64",
+        [=](benchmark::State& state) { attendShared(state, queries, 8192); });
+  }
   for (const MatrixBackend* backend : matrixBackends()) {
     for (const FactorPrecision precision :
          {FactorPrecision::kFloat32, FactorPrecision::kBfloat16}) {

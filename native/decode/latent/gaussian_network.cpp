@@ -36,6 +36,13 @@ uint32_t readGaussians(const WeightTable& network) {
   return static_cast<uint32_t>(count);
 }
 
+/// Multiplications of the attention to a latent for each number of a token, of which rows and
+/// queries of a head meet twice.
+double sharedWork(const TokenHeads& heads, const SharedRows& latent) {
+  return static_cast<double>(2 * latent.count * (latent.width + 1)) /
+         static_cast<double>(heads.width);
+}
+
 /// Progress by multiplications that are done, in arbitrary units.
 class WorkDone {
  public:
@@ -75,9 +82,20 @@ GaussianNetwork::GaussianNetwork(const WeightTable& network)
   }
 }
 
-std::vector<float> GaussianNetwork::features(const NetworkRun& run, const Latent& latent,
-                                             size_t rows, const float* points) const {
+LatentKeys GaussianNetwork::keysOf(const NetworkRun& run, const Latent& latent) const {
   requireLatent(latent, latentWidth());
+  LatentKeys keys;
+  keys.rows = SharedRows(latent.token_count, latent.width, latent.tokens.data());
+  for (const Block& block : blocks_) keys.rates.push_back(block.cross.ratesOf(run, latent));
+  return keys;
+}
+
+uint64_t GaussianNetwork::keyBytes(uint64_t token_count) const {
+  return latentKeyBytes(token_count, latentWidth(), blocks_.size(), heads_);
+}
+
+std::vector<float> GaussianNetwork::features(const NetworkRun& run, const LatentKeys& keys,
+                                             size_t rows, const float* points) const {
   const size_t width = heads_.tokenWidth();
   const size_t hidden_width = blocks_.front().mlp.hiddenWidth();
   const size_t mlp_rows = std::min(rows, kMlpRows);
@@ -85,21 +103,22 @@ std::vector<float> GaussianNetwork::features(const NetworkRun& run, const Latent
   std::vector<float> scratch(std::max(rows * 3 * width, mlp_rows * hidden_width));
   // Multiplications for each number of a token.
   const double self = static_cast<double>(4 * width + 2 * rows);
-  const double cross = static_cast<double>(2 * width + 2 * latent.token_count);
+  const double cross = static_cast<double>(2 * width) + sharedWork(heads_, keys.rows);
   const double mlp = static_cast<double>(2 * hidden_width);
   WorkDone work(run.progress, static_cast<double>(blocks_.size()) * (self + cross + mlp));
   work.add(0);
   embedding_.apply(run, rows, points, scratch.data(), tokens.data());
   const LayerNorm plain = {width, kBlockEpsilon, {}, {}, {}, {}};
-  for (const Block& block : blocks_) {
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    const Block& block = blocks_[i];
     layerNorm(plain, rows, tokens.data(), room.data());
     block.self.apply(run, rows, room.data(), scratch.data(), room.data());
     addScaled(rows, width, {}, room.data(), tokens.data());
     work.add(self);
-    const std::vector<float> keys = block.cross.keysOf(run, latent);
     layerNorm({width, kBlockEpsilon, block.cross_weight, block.cross_bias, {}, {}}, rows,
               tokens.data(), room.data());
-    block.cross.apply(run, rows, room.data(), keys, scratch.data(), room.data());
+    block.cross.apply(run, rows, room.data(), keys.rows, keys.rates[i], scratch.data(),
+                      room.data());
     addScaled(rows, width, {}, room.data(), tokens.data());
     work.add(cross);
     for (size_t begin = 0; begin < rows; begin += mlp_rows) {
@@ -123,11 +142,11 @@ std::vector<float> GaussianNetwork::features(const NetworkRun& run, const Latent
   return features;
 }
 
-uint64_t GaussianNetwork::memoryBound(uint64_t rows, uint64_t token_count) const {
+uint64_t GaussianNetwork::memoryBound(uint64_t rows) const {
   const uint64_t width = heads_.tokenWidth();
   const uint64_t mlp_rows = std::min<uint64_t>(rows, kMlpRows);
   const uint64_t scratch = std::max(rows * 3 * width, mlp_rows * blocks_.front().mlp.hiddenWidth());
-  return (rows * (2 * width + out_.outputs()) + scratch + token_count * 2 * width) * sizeof(float);
+  return (rows * (2 * width + out_.outputs()) + scratch) * sizeof(float);
 }
 
 }  // namespace stipple

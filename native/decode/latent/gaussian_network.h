@@ -25,14 +25,17 @@ class GaussianNetwork {
   float spreadBias() const { return spread_bias_; }
   const std::string& source() const { return source_; }
 
-  /// In: points [rows,3] in the unit cube. Returns [rows, 15 K] in the order of SplatLayout.
-  /// Errors: kInvalidArgument for a latent that requireLatent() refuses; kFormat where a result is
-  /// not finite; kCancelled. Threads and determinism: parallel; same bits for any number of
-  /// threads. Cost: O(rows^2 + rows * tokens).
-  std::vector<float> features(const NetworkRun& run, const Latent& latent, size_t rows,
+  /// What anchors see of a latent. Errors: kInvalidArgument for one that requireLatent() refuses;
+  /// kCancelled.
+  LatentKeys keysOf(const NetworkRun& run, const Latent& latent) const;
+  uint64_t keyBytes(uint64_t token_count) const;
+  /// In: keys, of keysOf(); points [rows,3] in the unit cube. Returns [rows, 15 K] in the order of
+  /// SplatLayout. Errors: kFormat where a result is not finite; kCancelled. Threads and
+  /// determinism: parallel; same bits for any number of threads. Cost: O(rows^2 + rows * tokens).
+  std::vector<float> features(const NetworkRun& run, const LatentKeys& keys, size_t rows,
                               const float* points) const;
   /// Bytes that features() holds at most, its result included.
-  uint64_t memoryBound(uint64_t rows, uint64_t token_count) const;
+  uint64_t memoryBound(uint64_t rows) const;
 
  private:
   struct Block {

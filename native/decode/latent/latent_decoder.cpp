@@ -35,8 +35,9 @@ SplatCloud LatentDecoder::decode(const DecodeRequest& request) const {
   NetworkRun run = run_;
   run.progress = request.progress;
   const AnchorSet& anchors = *request.anchors;
+  const auto keys = keys_.get([&] { return network_->keysOf(run, *latent_); });
   const std::vector<float> features =
-      network_->features(run, *latent_, anchors.size(), anchors.positions.data());
+      network_->features(run, *keys, anchors.size(), anchors.positions.data());
   SplatCloud cloud = splatsOf(anchors.positions, features);
   place(latent_->placement, cloud);
   advance(request.progress, 1.0, "Decoding splats");
@@ -65,7 +66,8 @@ uint64_t LatentDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_pe
   const uint64_t splats = anchor_count * (gaussians_per_anchor * kSplat + sizeof(float));
   // Packed weights and tiles of scores of each thread.
   constexpr uint64_t kLayers = uint64_t{64} << 20;
-  return network_->memoryBound(anchor_count, latent_->token_count) + splats + kLayers;
+  return network_->keyBytes(latent_->token_count) + network_->memoryBound(anchor_count) + splats +
+         kLayers;
 }
 
 void place(const LatentPlacement& placement, SplatCloud& cloud) {

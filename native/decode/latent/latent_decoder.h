@@ -9,7 +9,9 @@ namespace stipple {
 
 /// Anchors become K Gaussians each by a network that sees all anchors and a latent. Splats are in
 /// the cube of side 1 around the origin or up to 0.75 of their spread outside it, z up, and then
-/// where the latent's placement has them.
+/// where the latent's placement has them. What anchors see of the latent is computed by the first
+/// decode and kept: a float for each token, head and block, and the tokens twice (9 MiB for the
+/// published network and 8,192 tokens).
 class LatentDecoder final : public Decoder {
  public:
   /// In: run: how the network is run; its progress is not looked at.
@@ -31,6 +33,7 @@ class LatentDecoder final : public Decoder {
   std::shared_ptr<const GaussianNetwork> network_;
   std::shared_ptr<const Latent> latent_;
   NetworkRun run_;
+  KeptKeys keys_;
 };
 
 /// Moves splats of the networks to where they shall stand.

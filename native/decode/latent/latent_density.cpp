@@ -27,18 +27,6 @@ LatentDensity::LatentDensity(std::shared_ptr<const OctreeNetwork> network,
   run_.progress = nullptr;
 }
 
-std::shared_ptr<const OctreeNetwork::Keys> LatentDensity::keys(const NetworkRun& run) const {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (keys_) return keys_;
-  }
-  // Not under the lock: whoever waits for parallel work may be handed a task that wants it, too.
-  auto made = std::make_shared<const OctreeNetwork::Keys>(network_->keysOf(run, *latent_));
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (!keys_) keys_ = std::move(made);
-  return keys_;
-}
-
 void LatentDensity::childLogProbabilities(int level, std::span<const uint64_t> cells,
                                           std::span<float> out, Progress* progress) const {
   if (level < 0 || level >= leaf_level_) {
@@ -47,7 +35,8 @@ void LatentDensity::childLogProbabilities(int level, std::span<const uint64_t> c
   }
   NetworkRun run = run_;
   run.progress = progress;
-  network_->logits(run, *keys(run), level, cells, out);
+  const auto keys = keys_.get([&] { return network_->keysOf(run, *latent_); });
+  network_->logits(run, *keys, level, cells, out);
   for (size_t i = 0; i < cells.size(); ++i) {
     float* logits = &out[i * 8];
     const double most = static_cast<double>(*std::max_element(logits, logits + 8));

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 
 #include "decode/latent/octree_network.h"
 #include "density/density_model.h"
@@ -10,8 +9,8 @@ namespace stipple {
 
 /// The density of a latent's object over the cube of side 1 around the origin, or where the
 /// latent's placement has that cube, as a network tells it. What cells see of the latent is
-/// computed at the first question and kept: 2 * width floats for each token and block (256 MiB for
-/// the published network and 8,192 tokens).
+/// computed at the first question and kept: a float for each token, head and block, and the tokens
+/// twice (3 MiB for the published network and 8,192 tokens).
 class LatentDensity final : public DensityModel {
  public:
   /// In: run: how the network is run; its progress is not looked at.
@@ -29,15 +28,12 @@ class LatentDensity final : public DensityModel {
   uint64_t answerMemoryBound() const override;
 
  private:
-  std::shared_ptr<const OctreeNetwork::Keys> keys(const NetworkRun& run) const;
-
   std::shared_ptr<const OctreeNetwork> network_;
   std::shared_ptr<const Latent> latent_;
   NetworkRun run_;
   int leaf_level_;
   RootCube root_;
-  mutable std::mutex mutex_;  // of keys_
-  mutable std::shared_ptr<const OctreeNetwork::Keys> keys_;
+  KeptKeys keys_;
 };
 
 }  // namespace stipple

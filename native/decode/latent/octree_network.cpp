@@ -9,6 +9,8 @@
 #include "base/error.h"
 #include "math/morton.h"
 #include "nn/activations.h"
+#include "nn/highway_backend.h"
+#include "nn/matrix_backend.h"
 #include "nn/norms.h"
 #include "nn/positions.h"
 
@@ -23,6 +25,13 @@ constexpr double kLongestLevel = 1024;
 /// What the blocks' norms and the last one add to variances.
 constexpr float kBlockEpsilon = 1e-6f;
 constexpr float kLastEpsilon = 1e-5f;
+
+/// In float32 by our own kernels, which alone add up few rows in the order of many. They are within
+/// some hundredths of the fastest.
+NetworkRun withSameSums(NetworkRun run) {
+  if (precisionOf(run) == FactorPrecision::kFloat32) run.backend = &highwayBackend();
+  return run;
+}
 
 }  // namespace
 
@@ -45,15 +54,16 @@ OctreeNetwork::OctreeNetwork(const WeightTable& network)
   }
 }
 
-OctreeNetwork::Keys OctreeNetwork::keysOf(const NetworkRun& run, const Latent& latent) const {
+LatentKeys OctreeNetwork::keysOf(const NetworkRun& run, const Latent& latent) const {
   requireLatent(latent, latentWidth());
-  Keys keys;
-  for (const Block& block : blocks_) keys.push_back(block.attention.keysOf(run, latent));
+  LatentKeys keys;
+  keys.rows = SharedRows(latent.token_count, latent.width, latent.tokens.data());
+  for (const Block& block : blocks_) keys.rates.push_back(block.attention.ratesOf(run, latent));
   return keys;
 }
 
 uint64_t OctreeNetwork::keyBytes(uint64_t token_count) const {
-  return blocks_.size() * token_count * 2 * heads_.tokenWidth() * sizeof(float);
+  return latentKeyBytes(token_count, latentWidth(), blocks_.size(), heads_);
 }
 
 uint64_t OctreeNetwork::workBytes() const {
@@ -86,8 +96,9 @@ std::vector<float> OctreeNetwork::modulationOf(const NetworkRun& run, int level)
   return modulation;
 }
 
-void OctreeNetwork::logits(const NetworkRun& run, const Keys& keys, int level,
+void OctreeNetwork::logits(const NetworkRun& asked, const LatentKeys& keys, int level,
                            std::span<const uint64_t> cells, std::span<float> out) const {
+  const NetworkRun run = withSameSums(asked);
   const size_t width = heads_.tokenWidth();
   const std::vector<float> modulation = modulationOf(run, level);
   const auto part = [&](size_t i) { return std::span(modulation).subspan(i * width, width); };
@@ -105,7 +116,8 @@ void OctreeNetwork::logits(const NetworkRun& run, const Keys& keys, int level,
       const Block& block = blocks_[i];
       if (run.progress) run.progress->throwIfCancelled();
       layerNorm(before_attention, rows, tokens.data(), room.data());
-      block.attention.apply(run, rows, room.data(), keys[i], scratch.data(), room.data());
+      block.attention.apply(run, rows, room.data(), keys.rows, keys.rates[i], scratch.data(),
+                            room.data());
       addScaled(rows, width, part(2), room.data(), tokens.data());
       layerNorm(before_mlp, rows, tokens.data(), room.data());
       block.mlp.apply(run, rows, room.data(), hidden.data(), room.data());

@@ -22,9 +22,7 @@ class OctreeNetwork {
   explicit OctreeNetwork(const WeightTable& network);
 
   size_t latentWidth() const { return blocks_.front().attention.latentWidth(); }
-  /// What cells see of a latent: for each block [tokens, 2 width].
-  using Keys = std::vector<std::vector<float>>;
-  Keys keysOf(const NetworkRun& run, const Latent& latent) const;
+  LatentKeys keysOf(const NetworkRun& run, const Latent& latent) const;
   uint64_t keyBytes(uint64_t token_count) const;
   /// Bytes that logits() holds at most beside its result.
   uint64_t workBytes() const;
@@ -34,8 +32,8 @@ class OctreeNetwork {
   /// Errors: kFormat where a result is not finite; kCancelled.
   /// Threads and determinism: parallel; same bits for any number of threads, and whatever cells are
   /// asked about together.
-  void logits(const NetworkRun& run, const Keys& keys, int level, std::span<const uint64_t> cells,
-              std::span<float> out) const;
+  void logits(const NetworkRun& run, const LatentKeys& keys, int level,
+              std::span<const uint64_t> cells, std::span<float> out) const;
 
   /// Middles of cells in the unit cube, [cells, 3].
   static std::vector<float> centresOf(int level, std::span<const uint64_t> cells);

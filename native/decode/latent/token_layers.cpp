@@ -3,9 +3,11 @@
 // are those of the published files.
 #include "decode/latent/token_layers.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "nn/activations.h"
 #include "nn/attention.h"
 #include "nn/norms.h"
@@ -21,6 +23,19 @@ constexpr size_t kLeastWidth = 12;
 std::vector<float> readGamma(const WeightTable& weights, const char* name,
                              const TokenHeads& heads) {
   return weights.floats(name, {heads.count, heads.width});
+}
+
+/// Tokens whose keys are made at a time, and of a task among them.
+constexpr size_t kKeyRows = 1024;
+constexpr size_t kKeyGrain = 16;
+
+/// As rmsNormHeads() has it.
+float inverseLength(size_t count, const float* values) {
+  double squares = 0;
+  for (size_t i = 0; i < count; ++i) {
+    squares += static_cast<double>(values[i]) * static_cast<double>(values[i]);
+  }
+  return static_cast<float>(1.0 / std::max(std::sqrt(squares), 1e-12));
 }
 
 }  // namespace
@@ -64,30 +79,68 @@ void PointEmbedding::apply(const NetworkRun& run, size_t rows, const float* poin
   out_.apply(run, rows, scratch, tokens);
 }
 
+uint64_t latentKeyBytes(uint64_t token_count, size_t latent_width, size_t blocks,
+                        const TokenHeads& heads) {
+  const uint64_t made = std::min<uint64_t>(token_count, kKeyRows) * 2 * heads.tokenWidth();
+  return SharedRows::bytes(token_count, latent_width) +
+         (blocks * heads.count * token_count + made) * sizeof(float);
+}
+
 CrossAttention::CrossAttention(const WeightTable& weights, const TokenHeads& heads)
     : heads_(heads),
       to_queries_(weights, "to_q", heads.tokenWidth(), heads.tokenWidth()),
       to_keys_(weights, "to_kv", kAnySize, 2 * heads.tokenWidth()),
       to_out_(weights, "to_out", heads.tokenWidth(), heads.tokenWidth()),
-      query_gamma_(readGamma(weights, "q_rms_norm.gamma", heads)),
-      key_gamma_(readGamma(weights, "k_rms_norm.gamma", heads)) {}
+      query_gamma_(readGamma(weights, "q_rms_norm.gamma", heads)) {
+  const size_t inputs = latentWidth(), mapped = inputs + 1, width = heads_.tokenWidth();
+  const std::vector<float> weight = weights.floats("to_kv.weight", {2 * width, inputs});
+  const std::vector<float> bias = weights.floats("to_kv.bias", {2 * width});
+  const std::vector<float> gamma = readGamma(weights, "k_rms_norm.gamma", heads_);
+  key_maps_.resize(width * mapped);
+  value_maps_.resize(width * mapped);
+  for (size_t output = 0; output < width; ++output) {
+    const size_t head = output / heads_.width, i = output % heads_.width;
+    float* key = &key_maps_[head * mapped * heads_.width + i];
+    float* value = &value_maps_[output * mapped];
+    for (size_t k = 0; k < inputs; ++k) {
+      key[k * heads_.width] = gamma[output] * weight[output * inputs + k];
+      value[k] = weight[(width + output) * inputs + k];
+    }
+    key[inputs * heads_.width] = gamma[output] * bias[output];
+    value[inputs] = bias[width + output];
+  }
+}
 
-std::vector<float> CrossAttention::keysOf(const NetworkRun& run, const Latent& latent) const {
+std::vector<float> CrossAttention::ratesOf(const NetworkRun& run, const Latent& latent) const {
   const size_t stride = to_keys_.outputs();
-  std::vector<float> keys(latent.token_count * stride);
-  to_keys_.apply(run, latent.token_count, latent.tokens.data(), keys.data());
-  rmsNormHeads(latent.token_count, heads_.count, heads_.width, key_gamma_, keys.data(), stride);
-  return keys;
+  const size_t most = std::min(latent.token_count, kKeyRows);
+  std::vector<float> keys(most * stride);
+  std::vector<float> rates(heads_.count * latent.token_count);
+  for (size_t first = 0; first < latent.token_count; first += most) {
+    const size_t count = std::min(most, latent.token_count - first);
+    to_keys_.apply(run, count, latent.tokens.data() + first * latent.width, keys.data());
+    parallelFor(count, kKeyGrain, [&](size_t begin, size_t end) {
+      for (size_t row = begin; row < end; ++row) {
+        for (size_t head = 0; head < heads_.count; ++head) {
+          const float* key = &keys[row * stride + head * heads_.width];
+          rates[head * latent.token_count + first + row] = inverseLength(heads_.width, key);
+        }
+      }
+    });
+  }
+  return rates;
 }
 
 void CrossAttention::apply(const NetworkRun& run, size_t rows, const float* in,
-                           std::span<const float> keys, float* scratch, float* out) const {
+                           const SharedRows& latent, std::span<const float> rates, float* scratch,
+                           float* out) const {
   const size_t width = heads_.tokenWidth();
   to_queries_.apply(run, rows, in, scratch);
+  // Of the length of gamma times the root of the width, as keys are, whose root the scale of
+  // attention takes away again.
   rmsNormHeads(rows, heads_.count, heads_.width, query_gamma_, scratch, width);
-  const AttentionShape shape = {heads_.count, heads_.width, rows, keys.size() / (2 * width)};
-  attention(run, shape, {scratch, width}, {keys.data(), 2 * width},
-            {keys.data() + width, 2 * width}, scratch, width);
+  const SharedHeads heads = {heads_.count, heads_.width, key_maps_, value_maps_, rates};
+  sharedAttention(run, heads, latent, rows, scratch, width, scratch);
   to_out_.apply(run, rows, scratch, out);
 }
 

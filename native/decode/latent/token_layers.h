@@ -1,14 +1,19 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/latent.h"
 #include "data/weight_table.h"
 #include "nn/linear.h"
 #include "nn/network_run.h"
+#include "nn/shared_attention.h"
 
 namespace stipple {
 
@@ -45,6 +50,39 @@ class PointEmbedding {
   Linear in_, out_;
 };
 
+/// What the blocks of a network see of a latent. A key has the length that its head's factors give
+/// it, which is all that is kept of it.
+struct LatentKeys {
+  SharedRows rows;                        ///< the latent's tokens
+  std::vector<std::vector<float>> rates;  ///< for each block [heads, tokens]: 1 / |key|
+};
+
+/// Bytes of those of `blocks` blocks, and what it takes to make them.
+uint64_t latentKeyBytes(uint64_t token_count, size_t latent_width, size_t blocks,
+                        const TokenHeads& heads);
+
+/// Keys of one latent, made where they are first wanted and then kept.
+class KeptKeys {
+ public:
+  /// In: make, which returns them. Errors: those of make(), after which there are none.
+  template <class Make>
+  std::shared_ptr<const LatentKeys> get(const Make& make) const {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (keys_) return keys_;
+    }
+    // Not under the lock: whoever waits for parallel work may be handed a task that wants it, too.
+    auto made = std::make_shared<const LatentKeys>(make());
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!keys_) keys_ = std::move(made);
+    return keys_;
+  }
+
+ private:
+  mutable std::mutex mutex_;  // of keys_
+  mutable std::shared_ptr<const LatentKeys> keys_;
+};
+
 /// Tokens look at a latent. Queries and keys are normalised for each head.
 class CrossAttention {
  public:
@@ -52,18 +90,18 @@ class CrossAttention {
   CrossAttention(const WeightTable& weights, const TokenHeads& heads);
 
   size_t latentWidth() const { return to_keys_.inputs(); }
-  /// What a latent's tokens are looked at as: [tokens, 2 width], keys and behind them values. The
-  /// same for all that look at it.
-  std::vector<float> keysOf(const NetworkRun& run, const Latent& latent) const;
-  /// In: in [rows, width]; keys, as keysOf() returns them; scratch [rows, width].
-  /// Out: out [rows, width]; it may be `in`.
-  void apply(const NetworkRun& run, size_t rows, const float* in, std::span<const float> keys,
-             float* scratch, float* out) const;
+  /// 1 / |key| of the latent's tokens, [heads, tokens]. Errors: kCancelled.
+  std::vector<float> ratesOf(const NetworkRun& run, const Latent& latent) const;
+  /// In: in [rows, width]; latent, and the rates that ratesOf() returns for it; scratch
+  /// [rows, width]. Out: out [rows, width]; it may be `in`.
+  void apply(const NetworkRun& run, size_t rows, const float* in, const SharedRows& latent,
+             std::span<const float> rates, float* scratch, float* out) const;
 
  private:
   TokenHeads heads_;
   Linear to_queries_, to_keys_, to_out_;
-  std::vector<float> query_gamma_, key_gamma_;
+  std::vector<float> query_gamma_;
+  std::vector<float> key_maps_, value_maps_;  // as SharedHeads has them
 };
 
 /// Tokens look at each other.

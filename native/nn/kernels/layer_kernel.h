@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "data/weight_table.h"
 #include "nn/activations.h"
 
 namespace stipple {
@@ -22,6 +23,19 @@ struct SoftmaxRow {
   uint16_t* narrow = nullptr;
 };
 
+/// Scores of queries beside each other while their tiles of keys go by: column c of each row is of
+/// query c, and no column hears of another.
+struct SoftmaxColumns {
+  float* scores = nullptr;  ///< [keys, columns] of this tile; becomes exp(rate score - peak)
+  size_t keys = 0;
+  size_t columns = 0;
+  const float* rates = nullptr;  ///< [keys], finite
+  float* peaks = nullptr;        ///< [columns]: the largest so far, any finite number at first
+  float* sums = nullptr;         ///< [columns]: of exponentials so far, relative to the peak
+  float* out = nullptr;          ///< [width, columns] so far; brought to the new peaks
+  size_t width = 0;
+};
+
 /// What layers do to numbers one by one, on this thread.
 struct LayerKernel {
   const char* target;  ///< "scalar", or Highway's name of an instruction set
@@ -29,8 +43,13 @@ struct LayerKernel {
   /// out[i] = silu(gate[i]) up[i].
   void (*siluGate)(size_t count, const float* gate, const float* up, float* out);
   void (*softmax)(SoftmaxRow& row);
+  void (*softmaxColumns)(const SoftmaxColumns& tile);
   /// To the nearest bfloat16, of two as near the even one. Infinities and usual NaN stay.
   void (*narrow)(size_t count, const float* from, uint16_t* to);
+  /// Numbers of a tensor, of a type that is not kOther, from any address: as widen() of
+  /// data/weight_table.h, at the speed of memory. What is not finite, which layers refuse before, may
+  /// become any number.
+  void (*widen)(WeightType type, size_t count, const uint8_t* bytes, float* to);
 };
 
 /// The kernel to use: the best for this processor, or what STIPPLE_FORCE_TARGET names.

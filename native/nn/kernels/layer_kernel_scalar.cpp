@@ -65,10 +65,34 @@ void softmaxScalar(SoftmaxRow& row) {
   for (size_t i = 0; i < row.width; ++i) row.out[i] *= shrink;
 }
 
+void softmaxColumnsScalar(const SoftmaxColumns& tile) {
+  for (size_t column = 0; column < tile.columns; ++column) {
+    float peak = tile.peaks[column];
+    for (size_t i = 0; i < tile.keys; ++i) {
+      peak = std::max(peak, tile.rates[i] * tile.scores[i * tile.columns + column]);
+    }
+    float sum = 0.0f;
+    for (size_t i = 0; i < tile.keys; ++i) {
+      float& score = tile.scores[i * tile.columns + column];
+      score = std::exp(tile.rates[i] * score - peak);
+      sum += score;
+    }
+    const float shrink = std::exp(tile.peaks[column] - peak);
+    tile.peaks[column] = peak;
+    tile.sums[column] = tile.sums[column] * shrink + sum;
+    for (size_t i = 0; i < tile.width; ++i) tile.out[i * tile.columns + column] *= shrink;
+  }
+}
+
+void widenScalar(WeightType type, size_t count, const uint8_t* bytes, float* to) {
+  widen({type, "", {}, bytes}, 0, {to, count});
+}
+
 }  // namespace
 
 LayerKernel scalarLayerKernel() {
-  return {"scalar", activateScalar, siluGateScalar, softmaxScalar, narrowScalar};
+  return {"scalar",     activateScalar, siluGateScalar, softmaxScalar, softmaxColumnsScalar,
+          narrowScalar, widenScalar};
 }
 
 }  // namespace stipple

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstring>
 
 #include "nn/kernels/layer_kernel.h"
 
@@ -127,14 +128,15 @@ void siluGateVector(size_t count, const float* gate, const float* up, float* out
 /// exp(t) for t <= 0, to 2e-7 (1 + |t|) of itself; 0 below -87, where float32 has no normal number:
 /// 2^n times a polynomial for 2^r, r in -1/2..1/2, of the smallest greatest relative error
 /// (1.9e-9), fitted as in scaledErfc(). Half of what hn::Exp takes, which is right for large t too.
-HWY_INLINE Vec expOfNotPositive(Tag d, Vec t) {
-  const hn::RebindToSigned<Tag> whole;
-  const Vec power = hn::Mul(t, hn::Set(d, 1.44269504f));
-  const Vec lowest = hn::Set(d, -126.0f);
-  const Vec held = hn::Max(power, lowest);
-  const Vec n = hn::Round(held);
-  const Vec r = hn::Sub(held, n);
-  Vec sum = hn::Set(d, 1.534581195e-04f);
+template <class D>
+HWY_INLINE hn::Vec<D> expOfNotPositive(D d, hn::Vec<D> t) {
+  const hn::RebindToSigned<D> whole;
+  const auto power = hn::Mul(t, hn::Set(d, 1.44269504f));
+  const auto lowest = hn::Set(d, -126.0f);
+  const auto held = hn::Max(power, lowest);
+  const auto n = hn::Round(held);
+  const auto r = hn::Sub(held, n);
+  auto sum = hn::Set(d, 1.534581195e-04f);
   sum = hn::MulAdd(sum, r, hn::Set(d, 1.339993122e-03f));
   sum = hn::MulAdd(sum, r, hn::Set(d, 9.618488957e-03f));
   sum = hn::MulAdd(sum, r, hn::Set(d, 5.550328777e-02f));
@@ -233,10 +235,103 @@ void softmaxVector(SoftmaxRow& row) {
   for (; i < row.width; ++i) row.out[i] *= factor;
 }
 
+/// The columns of one vector.
+template <class D>
+HWY_INLINE void softmaxLanes(D d, const SoftmaxColumns& tile, size_t column) {
+  using V = hn::Vec<D>;
+  const size_t stride = tile.columns;
+  float* scores = tile.scores + column;
+  const V before = hn::LoadU(d, tile.peaks + column);
+  V peak = before;
+  for (size_t i = 0; i < tile.keys; ++i) {
+    peak = hn::Max(peak, hn::Mul(hn::Set(d, tile.rates[i]), hn::LoadU(d, scores + i * stride)));
+  }
+  V sum = hn::Zero(d);
+  for (size_t i = 0; i < tile.keys; ++i) {
+    const V score = hn::Mul(hn::Set(d, tile.rates[i]), hn::LoadU(d, scores + i * stride));
+    const V power = expOfNotPositive(d, hn::Sub(score, peak));
+    sum = hn::Add(sum, power);
+    hn::StoreU(power, d, scores + i * stride);
+  }
+  const V shrink = expOfNotPositive(d, hn::Sub(before, peak));
+  hn::StoreU(peak, d, tile.peaks + column);
+  hn::StoreU(hn::MulAdd(hn::LoadU(d, tile.sums + column), shrink, sum), d, tile.sums + column);
+  for (size_t i = 0; i < tile.width; ++i) {
+    float* out = tile.out + i * stride + column;
+    hn::StoreU(hn::Mul(hn::LoadU(d, out), shrink), d, out);
+  }
+}
+
+void softmaxColumnsVector(const SoftmaxColumns& tile) {
+  const Tag d;
+  const size_t lanes = hn::Lanes(d);
+  size_t column = 0;
+  for (; column + lanes <= tile.columns; column += lanes) softmaxLanes(d, tile, column);
+  for (; column < tile.columns; ++column) softmaxLanes(hn::CappedTag<float, 1>(), tile, column);
+}
+
+/// Numbers of 16 bits, `lanes` of them from an address that need not be even.
+HWY_INLINE hn::Vec<Half> loadHalves(const uint8_t* bytes) {
+  const Half half;
+#if HWY_TARGET == HWY_SCALAR
+  uint16_t number;
+  std::memcpy(&number, bytes, sizeof(number));
+  return hn::Set(half, number);
+#else
+  return hn::BitCast(half, hn::LoadU(hn::Repartition<uint8_t, Half>(), bytes));
+#endif
+}
+
+struct FromHalf {
+  static HWY_INLINE Vec of(Tag d, hn::Vec<Half> halves) {
+    const hn::Rebind<hwy::float16_t, Tag> narrow;
+    return hn::PromoteTo(d, hn::BitCast(narrow, halves));
+  }
+};
+
+struct FromBfloat16 {
+  static HWY_INLINE Vec of(Tag d, hn::Vec<Half> halves) {
+    const hn::RebindToUnsigned<Tag> whole;
+    return hn::BitCast(d, hn::ShiftLeft<16>(hn::PromoteTo(whole, halves)));
+  }
+};
+
+template <class From>
+void widenHalves(size_t count, const uint8_t* bytes, float* to) {
+  const Tag d;
+  const size_t lanes = hn::Lanes(d);
+  size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    hn::StoreU(From::of(d, loadHalves(bytes + 2 * i)), d, to + i);
+  }
+  if (i == count) return;
+  HWY_ALIGN uint8_t rest[2 * hn::MaxLanes(d)] = {};
+  HWY_ALIGN float wide[hn::MaxLanes(d)];
+  std::copy(bytes + 2 * i, bytes + 2 * count, rest);
+  hn::Store(From::of(d, loadHalves(rest)), d, wide);
+  std::copy_n(wide, count - i, to + i);
+}
+
+void widenVector(WeightType type, size_t count, const uint8_t* bytes, float* to) {
+  switch (type) {
+    case WeightType::kFloat16:
+      return widenHalves<FromHalf>(count, bytes, to);
+    case WeightType::kBfloat16:
+      return widenHalves<FromBfloat16>(count, bytes, to);
+    default:
+      if (count > 0) std::memcpy(to, bytes, count * sizeof(float));
+  }
+}
+
 /// Highway's own one-lane target is not the plain kernel, which has the name "scalar".
 LayerKernel namedLayerKernel() {
-  return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET), activateVector,
-          siluGateVector, softmaxVector, narrowVector};
+  return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET),
+          activateVector,
+          siluGateVector,
+          softmaxVector,
+          softmaxColumnsVector,
+          narrowVector,
+          widenVector};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -28,20 +28,21 @@ constexpr size_t kMostRows = HWY_MAX_BYTES >= 64 ? 12 : 6;
 constexpr size_t kInner = 256;
 constexpr size_t kBlockRows = 96;
 
-/// One strip, kRows rows, `inner` steps.
-template <size_t kRows>
+/// One strip or its first vector, kRows rows, `inner` steps.
+template <size_t kRows, size_t kVectors>
 HWY_INLINE void multiplyTile(size_t inner, const float* a, size_t a_stride, const float* strip,
-                             Vec (&sums)[kRows][2]) {
+                             Vec (&sums)[kRows][kVectors]) {
   const Tag d;
   const size_t lanes = hn::Lanes(d);
   for (size_t k = 0; k < inner; ++k) {
-    const Vec b0 = hn::LoadU(d, strip);
-    const Vec b1 = hn::LoadU(d, strip + lanes);
+    Vec b[kVectors];
+    for (size_t v = 0; v < kVectors; ++v) b[v] = hn::LoadU(d, strip + v * lanes);
     strip += 2 * lanes;
     for (size_t row = 0; row < kRows; ++row) {
       const Vec factor = hn::Set(d, a[row * a_stride + k]);
-      sums[row][0] = hn::MulAdd(factor, b0, sums[row][0]);
-      sums[row][1] = hn::MulAdd(factor, b1, sums[row][1]);
+      for (size_t v = 0; v < kVectors; ++v) {
+        sums[row][v] = hn::MulAdd(factor, b[v], sums[row][v]);
+      }
     }
   }
 }
@@ -51,28 +52,27 @@ struct Piece {
   size_t row, column, begin, end;
 };
 
-template <size_t kRows>
+/// In: kVectors: 2, or 1 where one vector has all columns that are left.
+template <size_t kRows, size_t kVectors>
 HWY_NOINLINE void multiplyPiece(const PanelProduct& product, const Piece& piece) {
   const Tag d;
   const size_t lanes = hn::Lanes(d);
-  const size_t width = std::min(2 * lanes, product.shape.columns - piece.column);
-  const bool is_whole = width == 2 * lanes;
+  const size_t width = std::min(kVectors * lanes, product.shape.columns - piece.column);
+  const bool is_whole = width == kVectors * lanes;
   const bool has_sums = product.start == PanelStart::kSums || piece.begin > 0;
   float* c = product.c + piece.row * product.c_stride + piece.column;
-  HWY_ALIGN float edge[2 * hn::MaxLanes(d)] = {};
-  Vec sums[kRows][2];
+  HWY_ALIGN float edge[kVectors * hn::MaxLanes(d)] = {};
+  Vec sums[kRows][kVectors];
   if (!has_sums) {
     if (product.bias != nullptr) std::copy_n(product.bias + piece.column, width, edge);
     for (size_t row = 0; row < kRows; ++row) {
-      sums[row][0] = hn::Load(d, edge);
-      sums[row][1] = hn::Load(d, edge + lanes);
+      for (size_t v = 0; v < kVectors; ++v) sums[row][v] = hn::Load(d, edge + v * lanes);
     }
   } else {
     for (size_t row = 0; row < kRows; ++row) {
       const float* from = c + row * product.c_stride;
       if (!is_whole) from = std::copy_n(from, width, edge) - width;
-      sums[row][0] = hn::LoadU(d, from);
-      sums[row][1] = hn::LoadU(d, from + lanes);
+      for (size_t v = 0; v < kVectors; ++v) sums[row][v] = hn::LoadU(d, from + v * lanes);
     }
   }
   const float* strip = product.b + piece.column * product.shape.inner + piece.begin * 2 * lanes;
@@ -81,27 +81,30 @@ HWY_NOINLINE void multiplyPiece(const PanelProduct& product, const Piece& piece)
                       strip, sums);
   for (size_t row = 0; row < kRows; ++row) {
     float* to = is_whole ? c + row * product.c_stride : edge;
-    hn::StoreU(sums[row][0], d, to);
-    hn::StoreU(sums[row][1], d, to + lanes);
+    for (size_t v = 0; v < kVectors; ++v) hn::StoreU(sums[row][v], d, to + v * lanes);
     if (!is_whole) std::copy_n(edge, width, c + row * product.c_stride);
   }
 }
 
 /// As many rows as registers hold, then what is left.
+template <size_t kVectors>
 void multiplyRows(const PanelProduct& product, Piece piece, size_t row_end) {
   while (piece.row < row_end) {
     const size_t left = row_end - piece.row;
     if (left >= kMostRows) {
-      multiplyPiece<kMostRows>(product, piece);
+      multiplyPiece<kMostRows, kVectors>(product, piece);
       piece.row += kMostRows;
     } else if (left >= 6) {
-      multiplyPiece<6>(product, piece);
+      multiplyPiece<6, kVectors>(product, piece);
       piece.row += 6;
+    } else if (left >= 4) {
+      multiplyPiece<4, kVectors>(product, piece);
+      piece.row += 4;
     } else if (left >= 3) {
-      multiplyPiece<3>(product, piece);
+      multiplyPiece<3, kVectors>(product, piece);
       piece.row += 3;
     } else {
-      multiplyPiece<1>(product, piece);
+      multiplyPiece<1, kVectors>(product, piece);
       piece.row += 1;
     }
   }
@@ -117,7 +120,12 @@ void multiplyVector(const PanelProduct& product) {
     for (size_t row = 0; row < shape.rows; row += kBlockRows) {
       const size_t row_end = std::min(shape.rows, row + kBlockRows);
       for (size_t column = 0; column < shape.columns; column += strip) {
-        multiplyRows(product, {row, column, begin, end}, row_end);
+        const Piece piece = {row, column, begin, end};
+        if (2 * (shape.columns - column) <= strip) {
+          multiplyRows<1>(product, piece, row_end);
+        } else {
+          multiplyRows<2>(product, piece, row_end);
+        }
       }
     }
   }

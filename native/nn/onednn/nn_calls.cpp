@@ -253,8 +253,16 @@ const char* stipple_nn_instruction_set(void) {
       return "avx512_core_bf16";
     case dnnl_cpu_isa_avx512_core_amx:
       return "avx512_core_amx";
+    case dnnl_cpu_isa_avx2_vnni:
+      return "avx2_vnni";
+#if DNNL_VERSION_MAJOR >= 3
+    case dnnl_cpu_isa_avx512_core_fp16:
+      return "avx512_core_fp16";
+    case dnnl_cpu_isa_avx512_core_amx_fp16:
+      return "avx512_core_amx_fp16";
+#endif
     default:
-      return dnnl::get_effective_cpu_isa() == dnnl::cpu_isa::all ? "best" : "other";
+      return "other";
   }
 }
 

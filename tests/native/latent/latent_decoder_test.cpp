@@ -45,8 +45,8 @@ TEST_F(LatentDecoderTest, MakesThirtyTwoValidSplatsOfEachAnchorNearIt) {
   EXPECT_EQ(cloud.frame, Frame::kRFU);
   EXPECT_EQ(cloud.antialias, Antialias::kMip);
   EXPECT_EQ(cloud.colour_space, ColourSpace::kDisplay);
-  const std::vector<float> features =
-      networks_.gaussians->features({}, *latent_, 200, drawn.positions.data());
+  const std::vector<float> features = networks_.gaussians->features(
+      {}, networks_.gaussians->keysOf({}, *latent_), 200, drawn.positions.data());
   for (size_t n = 0; n < cloud.size(); ++n) {
     // Raw spreads stand last; the softplus of one and its bias bounds what a Gaussian may move.
     const double raw = static_cast<double>(features[n / 32 * 480 + 448 + n % 32]);
@@ -118,6 +118,23 @@ TEST_F(LatentDecoderTest, StopsInTheMiddleWhenCancelled) {
   }
   canceller.join();
   EXPECT_LT(progress.fraction(), 1.0);
+}
+
+TEST_F(LatentDecoderTest, DecodesTheSameAgainAndAfterACancelThatStoppedTheFirst) {
+  const AnchorSet drawn = anchors(20);
+  Progress cancelled;
+  cancelled.cancel();
+  EXPECT_THROW(decode(drawn, &cancelled), Error);
+  const SplatCloud first = decode(drawn), second = decode(drawn);
+  const LatentDecoder other(networks_.gaussians, latent_);
+  DecodeRequest request;
+  request.anchors = &drawn;
+  request.gaussians_per_anchor = 32;
+  const SplatCloud fresh = other.decode(request);
+  EXPECT_EQ(first.positions, second.positions);
+  EXPECT_EQ(first.sh, second.sh);
+  EXPECT_EQ(first.positions, fresh.positions);
+  EXPECT_EQ(first.sh, fresh.sh);
 }
 
 TEST_F(LatentDecoderTest, RefusesAnotherNumberOfGaussians) {

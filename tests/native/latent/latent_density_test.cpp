@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -69,6 +70,12 @@ TEST(LatentDensity, AnswersForACellWhateverIsAskedBesideIt) {
   const std::vector<uint64_t> cells = manyCells();
   std::vector<float> together(8 * cells.size());
   density.childLogProbabilities(5, cells, together);
+  // Layers take other ways for few rows than for many.
+  for (const size_t count : {size_t{2}, size_t{33}, Linear::kFewRows, Linear::kFewRows + 1}) {
+    std::vector<float> some(8 * count);
+    density.childLogProbabilities(5, std::span(cells).first(count), some);
+    EXPECT_TRUE(std::equal(some.begin(), some.end(), together.begin())) << count;
+  }
   for (const size_t i : {size_t{0}, size_t{77}, OctreeNetwork::kRows, cells.size() - 1}) {
     float alone[8];
     density.childLogProbabilities(5, std::span(&cells[i], 1), alone);
@@ -184,8 +191,11 @@ TEST(LatentDensity, RefusesWhatItCannotAnswer) {
 
 TEST(LatentDensity, SaysHowMuchMemoryAnAnswerTakes) {
   const LatentDensity density = tinyDensity();
-  // Keys of 32 tokens; 1,024 rows of tokens and two rooms of 64, an MLP of 256, points.
-  EXPECT_EQ(density.answerMemoryBound(), (32u * 2 * 64 + 1024u * (3 * 64 + 256 + 3)) * 4);
+  // 32 tokens of 16 numbers, once with a 1 behind them; a rate of each for 4 heads of one block, and
+  // the keys and values that it comes from; 1,024 rows of tokens and two rooms of 64, an MLP of 256,
+  // points.
+  EXPECT_EQ(density.answerMemoryBound(),
+            (32u * 33 + 32 * 4 + 32 * 2 * 64 + 1024u * (3 * 64 + 256 + 3)) * 4);
 }
 
 }  // namespace

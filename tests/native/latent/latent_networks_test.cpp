@@ -127,7 +127,8 @@ TEST(LatentNetworks, SaysThatWeightsAreNotFinite) {
     const LatentNetworks networks =
         readLatentNetworks(WeightTable("lying.safetensors", tensors, nullptr));
     const std::array<float, 3> point = {0.5f, 0.5f, 0.5f};
-    networks.gaussians->features({}, *tinyLatent(kFile), 1, point.data());
+    const LatentKeys keys = networks.gaussians->keysOf({}, *tinyLatent(kFile));
+    networks.gaussians->features({}, keys, 1, point.data());
     FAIL() << "not refused";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kFormat);

@@ -19,10 +19,12 @@ struct Case {
   size_t rows, inputs, outputs;
 };
 
-// On both sides of rows that kernels take at once (1, 3, 6, 12), of blocks of rows (96, 192), of
-// steps (256), strips (8 to 32 columns) and panels (256); and empty.
-const Case kCases[] = {{1, 1, 1},      {2, 257, 33},   {13, 64, 31},  {97, 300, 8},
-                       {193, 16, 257}, {23, 512, 600}, {12, 256, 32}, {0, 4, 4}};
+// On both sides of rows that kernels take at once (1, 3, 4, 6, 12), of blocks of rows (96, 192), of
+// rows that are few (256), of steps (256, 1024), strips (8 to 32 columns), panels (256) and outputs
+// of a task (24); and empty.
+const Case kCases[] = {{1, 1, 1},       {2, 257, 33},   {13, 64, 31},  {97, 300, 8},
+                       {256, 40, 25},   {33, 1030, 49}, {257, 300, 8}, {385, 16, 257},
+                       {268, 512, 300}, {12, 256, 32},  {0, 4, 4}};
 
 /// Each output against a sum in double; in [rows, inputs] and out [rows, outputs] may have gaps.
 void expectProduct(const Case& c, const std::vector<float>& in, size_t in_stride,
@@ -117,18 +119,19 @@ TEST(Linear, EveryBackendAgreesWithSumsInDouble) {
 }
 
 TEST(Linear, TakesWeightsOfSixteenBitsAndNoBias) {
-  const Case c = {5, 70, 40};
-  const std::vector<float> weight = numbers(c.outputs * c.inputs, 4);
-  const WeightTable table = TableBuilder().addBfloat16("fc.weight", {40, 70}, weight).table();
-  std::vector<float> cut(weight.size());
-  widen(table.require("fc.weight", {40, 70}), 0, cut);
-  const std::vector<float> in = numbers(c.rows * c.inputs, 5);
-  for (const MatrixBackend* backend : matrixBackends()) {
-    std::vector<float> out(c.rows * c.outputs);
-    NetworkRun run;
-    run.backend = backend;
-    Linear(table, "fc", 70, 40, LinearBias::kNone).apply(run, c.rows, in.data(), out.data());
-    expectProduct(c, in, c.inputs, cut, {}, out, c.outputs, 6e-8, backend->name());
+  for (const Case& c : {Case{5, 70, 40}, Case{Linear::kFewRows + 5, 70, 40}}) {
+    const std::vector<float> weight = numbers(c.outputs * c.inputs, 4);
+    const WeightTable table = TableBuilder().addBfloat16("fc.weight", {40, 70}, weight).table();
+    std::vector<float> cut(weight.size());
+    widen(table.require("fc.weight", {40, 70}), 0, cut);
+    const std::vector<float> in = numbers(c.rows * c.inputs, 5);
+    for (const MatrixBackend* backend : matrixBackends()) {
+      std::vector<float> out(c.rows * c.outputs);
+      NetworkRun run;
+      run.backend = backend;
+      Linear(table, "fc", 70, 40, LinearBias::kNone).apply(run, c.rows, in.data(), out.data());
+      expectProduct(c, in, c.inputs, cut, {}, out, c.outputs, 6e-8, backend->name());
+    }
   }
 }
 
