@@ -38,7 +38,7 @@ constexpr uint64_t kFirstColourChannels = 128;
 constexpr uint64_t kLayerBytes = uint64_t{96} << 20;
 constexpr double kLargestSize = 1e6;  // metres
 // Of the whole work, what comes before the encoders and behind the last step.
-constexpr double kPreparationShare = 0.01, kSampledShare = 0.96;
+constexpr double kPreparationShare = 0.01, kSampledShare = 0.96, kMeasuredShare = 0.98;
 
 FlowSettings flowSettings(const GenerateOptions& options) {
   return {options.steps, options.guidance, options.shift};
@@ -77,6 +77,13 @@ struct Networks {
   StageCost samplingCost(const GenerateOptions& options) const {
     return flowSamplingCost(flow.sizes(), options.token_count, rows(options),
                             flowSettings(options));
+  }
+  StageCost stepCost(const GenerateOptions& options) const {
+    GenerateOptions one = options;
+    one.steps = 1;
+    StageCost cost = samplingCost(one);
+    cost.flops -= flowContextCost(flow.sizes(), rows(options)).flops;
+    return cost;
   }
   uint64_t rows(const GenerateOptions& options) const {
     const uint32_t size = options.preparation.canvas_size;
@@ -133,6 +140,27 @@ std::string keyOf(const Networks& networks, const GenerateOptions& options,
   return key + "]}";
 }
 
+/// What the features of an image depend on.
+std::string featuresKeyOf(const Networks& networks, const GenerateOptions& options,
+                          const PreparedImage& prepared) {
+  Sha256 image;
+  image.add(prepared.rgb.data(), prepared.rgb.size());
+  std::string key = image.finish() + " " + std::to_string(prepared.size) + " " +
+                    std::to_string(options.structure_head_width);
+  for (const WeightsRole role : {WeightsRole::kStructureEncoder, WeightsRole::kColourEncoder}) {
+    const WeightsFile& file = networks.folder.of(role);
+    key +=
+        "\n" + file.path + " " + std::to_string(file.bytes) + " " + std::to_string(file.modified);
+  }
+  return key;
+}
+
+/// Features with what they depend on.
+struct KeyedFeatures {
+  std::string key;
+  ImageFeatures features;
+};
+
 StageValues valuesOf(std::string name, std::span<const float> numbers) {
   StageValues values;
   values.name = std::move(name);
@@ -164,22 +192,28 @@ struct GenerateSession::Work {
   void run(Progress& progress);
   /// The state that a checkpoint keeps, or that of the noise.
   SamplerState firstState(const std::string& key, const GenerationNoise& noise);
-  /// In: end: of the encoders' part of the whole work.
-  FlowContext contextOf(const NetworkRun& run, const PreparedImage& prepared,
+  /// Those of another session, or the encoders'. In: end: of the encoders' part of the whole work.
+  std::shared_ptr<const KeyedFeatures> featuresFor(const NetworkRun& run,
+                                                   const PreparedImage& prepared,
+                                                   const std::string& features_key, double end);
+  /// Notes what passes by in the encoders: all of it, or their results alone.
+  StageListener layerListener();
+  FlowContext contextOf(const NetworkRun& run, const ImageFeatures& image_features,
                         std::span<const float> noise, double end);
   void sample(const NetworkRun& run, const FlowContext& context, const std::string& key,
               SamplerState& state, const ProgressShare& share);
   void keep(const std::string& key, const SamplerState& state) const;
-  void showPreview(const FlowPreview& preview);
+  void showPreview(const FlowPreview& preview, Progress& progress);
   /// In: weights: the decoder's, which the model's file names; settings, as JSON.
   std::shared_ptr<const SplatModel> modelOf(const Latent& latent, const WeightsReference& weights,
                                             const std::string& settings) const;
   /// The splats of a preview.
-  SplatCloud decoded(const SplatModel& model) const;
+  SplatCloud decoded(const SplatModel& model, Progress& progress, double begin, double end) const;
   void finish(Latent latent, const std::string& settings, Progress& progress);
 
-  void note(const std::string& name, std::span<const float> numbers) {
+  void note(const std::string& name, std::span<const float> numbers, double operations = 0) {
     StageValues values = valuesOf(name, numbers);
+    values.operations = operations;
     const std::lock_guard<std::mutex> lock(mutex);
     values.seconds = watch.lap();
     stages.push_back(std::move(values));
@@ -204,6 +238,7 @@ struct GenerateSession::Work {
   GenerateStatus status;
   std::deque<StageValues> stages;            ///< they stay where they are
   std::shared_ptr<const SplatCloud> newest;  ///< preview, until it is taken
+  std::shared_ptr<const KeyedFeatures> features;
 };
 
 GenerateSession::GenerateSession(ByteImage image, std::optional<ByteImage> mask,
@@ -215,6 +250,16 @@ GenerateSession::GenerateSession(ByteImage image, std::optional<ByteImage> mask,
 }
 
 GenerateSession::~GenerateSession() = default;
+
+void GenerateSession::takeFeatures(const GenerateSession& other) {
+  std::shared_ptr<const KeyedFeatures> taken;
+  {
+    const std::lock_guard<std::mutex> lock(other.work_->mutex);
+    taken = other.work_->features;
+  }
+  const std::lock_guard<std::mutex> lock(work_->mutex);
+  work_->features = std::move(taken);
+}
 
 uint64_t GenerateSession::memoryBound() const {
   return workBytes(work_->networks, work_->options);
@@ -241,13 +286,13 @@ std::shared_ptr<const SplatModel> GenerateSession::Work::modelOf(
                           {settings, {}});
 }
 
-SplatCloud GenerateSession::Work::decoded(const SplatModel& model) const {
+SplatCloud GenerateSession::Work::decoded(const SplatModel& model, Progress& progress, double begin,
+                                          double end) const {
   const ModelSettings allowed = model.settings();
   ModelRequest request;
   request.budget =
       std::clamp(options.preview_anchors, allowed.minimum_budget, allowed.maximum_budget);
-  // So few that nobody waits for a cancel, and decoding would begin the bar anew.
-  return model.decode(request);
+  return model.decode(request, &progress, begin, end);
 }
 
 SamplerState GenerateSession::Work::firstState(const std::string& key,
@@ -273,8 +318,10 @@ void GenerateSession::Work::keep(const std::string& key, const SamplerState& sta
   writeCheckpoint(key, tensorsOfSampler(state), options.checkpoint_path);
 }
 
-void GenerateSession::Work::showPreview(const FlowPreview& preview) {
-  auto cloud = std::make_shared<SplatCloud>(decoded(*modelOf(preview.latent, {}, "{}")));
+void GenerateSession::Work::showPreview(const FlowPreview& preview, Progress& progress) {
+  const double now = progress.fraction();
+  auto cloud =
+      std::make_shared<SplatCloud>(decoded(*modelOf(preview.latent, {}, "{}"), progress, now, now));
   if (options.size > 0) place(standingOnBase(*cloud, options.size), *cloud);
   const std::lock_guard<std::mutex> lock(mutex);
   newest = std::move(cloud);
@@ -282,18 +329,18 @@ void GenerateSession::Work::showPreview(const FlowPreview& preview) {
 }
 
 void GenerateSession::Work::finish(Latent latent, const std::string& settings, Progress& progress) {
-  progress.enterPart(kSampledShare, 1);
-  const std::string& path = networks.folder.of(WeightsRole::kDecoder).path;
-  const WeightsReference weights = referenceOf(path, &progress);
   if (options.size > 0) {
-    const SplatCloud cloud = decoded(*modelOf(latent, weights, settings));
+    const SplatCloud cloud =
+        decoded(*modelOf(latent, {}, settings), progress, kSampledShare, kMeasuredShare);
     note("splats.positions", cloud.positions);
     note("splats.scales", cloud.scales);
     note("splats.opacities", cloud.opacities);
     note("splats.colours", cloud.sh);
     latent.placement = standingOnBase(cloud, options.size);
   }
-  result = modelOf(latent, weights, settings);
+  progress.enterPart(kMeasuredShare, 1);
+  const std::string& path = networks.folder.of(WeightsRole::kDecoder).path;
+  result = modelOf(latent, referenceOf(path, &progress), settings);
   progress.enterPart(0, 1);
 }
 
@@ -319,54 +366,82 @@ void GenerateSession::Work::run(Progress& progress) {
   if (options.uses_mean_colour) noise.colour.clear();
   SamplerState state = firstState(key, noise);
 
-  const double encoding = networks.encoderWork(size);
+  const std::string features_key = featuresKeyOf(networks, options, prepared);
+  if (features && features->key != features_key) features = nullptr;
+  const double encoding = features ? 0 : networks.encoderWork(size);
   const double sampling = networks.samplingCost(options).flops;
   const double middle =
       kPreparationShare + (kSampledShare - kPreparationShare) * encoding / (encoding + sampling);
-  const FlowContext context = contextOf(run, prepared, noise.colour, middle);
+  const std::shared_ptr<const KeyedFeatures> found =
+      featuresFor(run, prepared, features_key, middle);
+  const FlowContext context = contextOf(run, found->features, noise.colour, middle);
   sample(run, context, key, state, {middle, kSampledShare});
-  note("latent", state.latent.tokens);
-  note("camera", state.latent.camera);
   finish(std::move(state.latent), key, progress);
 }
 
-FlowContext GenerateSession::Work::contextOf(const NetworkRun& run, const PreparedImage& prepared,
-                                             std::span<const float> noise, double end) {
-  StageListener listener;
-  std::vector<float> rows;
-  if (options.watches_layers) {
-    listener = [&](const std::string& stage, const StageNumbers& numbers) {
-      rows.resize(numbers.rows * numbers.width);
-      for (size_t i = 0; i < numbers.rows; ++i) {
-        const float* row = numbers.values + i * numbers.stride;
-        std::copy(row, row + numbers.width,
-                  rows.begin() + static_cast<ptrdiff_t>(i * numbers.width));
-      }
-      note(stage, rows);
-    };
+StageListener GenerateSession::Work::layerListener() {
+  return [this](const std::string& stage, const StageNumbers& numbers) {
+    const bool is_structure = stage == "structure.feature1", is_colour = stage == "colour.moments";
+    if (!options.watches_layers && !is_structure && !is_colour) return;
+    std::vector<float> rows(numbers.rows * numbers.width);
+    for (size_t i = 0; i < numbers.rows; ++i) {
+      const float* row = numbers.values + i * numbers.stride;
+      std::copy(row, row + numbers.width, rows.begin() + static_cast<ptrdiff_t>(i * numbers.width));
+    }
+    const size_t size = options.preparation.canvas_size;
+    if (is_structure) {
+      note("structure.features", rows, networks.structure.flops(size, size));
+    } else {
+      note(stage, rows, is_colour ? networks.colour.flops(size, size) : 0);
+    }
+  };
+}
+
+std::shared_ptr<const KeyedFeatures> GenerateSession::Work::featuresFor(
+    const NetworkRun& run, const PreparedImage& prepared, const std::string& features_key,
+    double end) {
+  if (features) {
+    note("structure.features", features->features.structure);
+    note("colour.moments", features->features.moments.values);
+    return features;
   }
-  const ImageCondition condition = encodeImage(run, networks.structure, networks.colour, prepared,
-                                               noise, {kPreparationShare, end}, listener);
-  note("structure.features", condition.structure);
+  auto found = std::make_shared<const KeyedFeatures>(
+      KeyedFeatures{features_key, featuresOf(run, networks.structure, networks.colour, prepared,
+                                             {kPreparationShare, end}, layerListener())});
+  const std::lock_guard<std::mutex> lock(mutex);
+  features = found;
+  return found;
+}
+
+FlowContext GenerateSession::Work::contextOf(const NetworkRun& run,
+                                             const ImageFeatures& image_features,
+                                             std::span<const float> noise, double end) {
+  const StageListener listener = options.watches_layers ? layerListener() : StageListener();
+  const ImageCondition condition =
+      conditionOf(networks.structure, networks.colour, image_features, noise, listener);
   note("colour.features", condition.colour);
-  return networks.flow.context(run, condition, {end, end});
+  FlowContext context = networks.flow.context(run, condition, {end, end});
+  note("image.context", context.values,
+       flowContextCost(networks.flow.sizes(), condition.rows).flops);
+  return context;
 }
 
 void GenerateSession::Work::sample(const NetworkRun& run, const FlowContext& context,
                                    const std::string& key, SamplerState& state,
                                    const ProgressShare& share) {
   const uint32_t first = state.step;
+  const double step_operations = networks.stepCost(options).flops;
   step_watch = {};
   FlowListener listener;
   listener.preview_every = 1;
   listener.preview = [&](const FlowPreview& preview) {
     const std::string name = "step" + std::to_string(preview.step);
-    note(name + ".tokens", state.latent.tokens);
+    note(name + ".tokens", state.latent.tokens, step_operations);
     note(name + ".camera", state.latent.camera);
     finishStep(preview.step, first);
     keep(key, state);
     const uint32_t every = options.preview_steps;
-    if (every > 0 && preview.step % every == 0) showPreview(preview);
+    if (every > 0 && preview.step % every == 0) showPreview(preview, *run.progress);
   };
   try {
     sampleLatent(run, networks.flow, context, state, listener, share);
@@ -375,6 +450,8 @@ void GenerateSession::Work::sample(const NetworkRun& run, const FlowContext& con
     if (error.code() == ErrorCode::kCancelled) keep(key, state);
     throw;
   }
+  note("latent", state.latent.tokens, first < state.step ? step_operations : 0);
+  note("camera", state.latent.camera);
   finishStep(state.step, first);
   keep(key, state);
 }

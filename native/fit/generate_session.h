@@ -23,6 +23,8 @@ struct StageValues {
   uint64_t count = 0;
   double minimum = 0, maximum = 0, mean = 0, deviation = 0;
   double seconds = 0;  ///< from the stage before to this one
+  /// Multiplications and additions of networks in these seconds; 0: not counted.
+  double operations = 0;
 };
 
 /// How a generation is doing.
@@ -56,6 +58,10 @@ class GenerateSession {
   GenerateSession(ByteImage image, std::optional<ByteImage> mask, const GenerateOptions& options);
   ~GenerateSession();
 
+  /// What the image encoders said in another session is taken over, where it was of the same
+  /// prepared image and by the same files; else this one asks them itself. Before run(). Sessions
+  /// of several seeds then ask once. In: other: its run() may go on or have ended.
+  void takeFeatures(const GenerateSession& other);
   /// About what run() allocates, bytes.
   uint64_t memoryBound() const;
   /// What a session takes on this machine, whose speed is measured by a short product of matrices,

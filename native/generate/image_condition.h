@@ -7,6 +7,7 @@
 
 #include "generate/progress_share.h"
 #include "generate/stage_listener.h"
+#include "nn/feature_map.h"
 #include "nn/network_run.h"
 
 namespace stipple {
@@ -25,12 +26,30 @@ struct ImageCondition {
   std::vector<float> colour;     ///< [rows, colour_width]
 };
 
-/// Encodes an image by both networks. The colours of the tokens that belong to the whole image are
-/// zeros.
-/// In: noise: of VaeEncoder::noiseCount() for the image, normally distributed, or empty: the
-/// image's mean latent (VaeEncoder::encode()); share: of whose progress (Progress::enterPart());
-/// listener: hears of the stages of both, with "structure." and "colour." before their names.
+/// What both networks say of an image, whatever the noise is: one serves all seeds.
+struct ImageFeatures {
+  std::vector<float> structure;  ///< [rows, structure_width]
+  FeatureMap moments;            ///< VaeEncoder::momentsOf()
+};
+
+/// Asks both networks. In: share: of whose progress (Progress::enterPart()); listener: hears of the
+/// stages of both, with "structure." and "colour." before their names.
 /// Errors: kFormat for networks whose patches differ; those of the encoders.
+/// Threads and determinism: as of the encoders. Cost: the sum of both; memory: the larger one's.
+ImageFeatures featuresOf(const NetworkRun& run, const DinoEncoder& structure,
+                         const VaeEncoder& colour, const PreparedImage& image,
+                         const ProgressShare& share = {}, const StageListener& listener = {});
+/// In: noise: of VaeEncoder::noiseCount() for the image, normally distributed, or empty: the
+/// image's mean latent. Errors: kInvalidArgument for features of other networks.
+ImageCondition conditionOf(const DinoEncoder& structure, const VaeEncoder& colour,
+                           const ImageFeatures& features, std::span<const float> noise,
+                           const StageListener& listener = {});
+
+/// Both of these: encodes an image by both networks. The colours of the tokens that belong to the
+/// whole image are zeros. In: noise: of VaeEncoder::noiseCount() for the image, normally
+/// distributed, or empty: the image's mean latent (VaeEncoder::encode()); share: of whose progress
+/// (Progress::enterPart()); listener: hears of the stages of both, with "structure." and "colour."
+/// before their names. Errors: kFormat for networks whose patches differ; those of the encoders.
 /// Threads and determinism: as of the encoders. Cost: the sum of both; memory: the larger one's.
 ImageCondition encodeImage(const NetworkRun& run, const DinoEncoder& structure,
                            const VaeEncoder& colour, const PreparedImage& image,

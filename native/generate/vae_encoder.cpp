@@ -194,7 +194,7 @@ class VaeEncoder::Pass {
   double done_ = 0.0;
 };
 
-std::vector<float> VaeEncoder::tokensOf(const FeatureMap& latent) const {
+std::vector<float> VaeEncoder::packed(const FeatureMap& latent) const {
   const size_t channels = latent.channels, width = tokenWidth();
   std::vector<float> tokens(latent.pixelCount() / 4 * width);
   const size_t columns = latent.width / 2;
@@ -208,9 +208,24 @@ std::vector<float> VaeEncoder::tokensOf(const FeatureMap& latent) const {
   return tokens;
 }
 
+void VaeEncoder::requireNoise(std::span<const float> noise, size_t height, size_t width) const {
+  if (!noise.empty() && noise.size() != noiseCount(height, width)) {
+    fail(ErrorCode::kInvalidArgument, "The noise has " + std::to_string(noise.size()) +
+                                          " numbers; it needs " +
+                                          std::to_string(noiseCount(height, width)) + ", or 0.");
+  }
+  requireFinite(noise.data(), noise.size(), 1, "the noise");
+}
+
 std::vector<float> VaeEncoder::encode(const NetworkRun& run, std::span<const float> rgb,
                                       size_t height, size_t width, std::span<const float> noise,
                                       const StageListener& listener) const {
+  requireNoise(noise, height, width);
+  return tokensOf(momentsOf(run, rgb, height, width, listener), noise, listener);
+}
+
+FeatureMap VaeEncoder::momentsOf(const NetworkRun& run, std::span<const float> rgb, size_t height,
+                                 size_t width, const StageListener& listener) const {
   if (height == 0 || width == 0 || height % tokenSize() != 0 || width % tokenSize() != 0) {
     fail(ErrorCode::kInvalidArgument, "The image has " + sizeText(width, height) +
                                           " pixels; multiples of " + std::to_string(tokenSize()) +
@@ -222,12 +237,6 @@ std::vector<float> VaeEncoder::encode(const NetworkRun& run, std::span<const flo
                                           std::to_string(height * width * 3) + ".");
   }
   requireFinite(rgb.data(), height * width, 3, "the image");
-  if (!noise.empty() && noise.size() != noiseCount(height, width)) {
-    fail(ErrorCode::kInvalidArgument, "The noise has " + std::to_string(noise.size()) +
-                                          " numbers; it needs " +
-                                          std::to_string(noiseCount(height, width)) + ", or 0.");
-  }
-  requireFinite(noise.data(), noise.size(), 1, "the noise");
   Pass pass(run, flops(height, width), listener);
   pass.map() = FeatureMap::ofSize(height, width, 3);
   for (size_t i = 0; i < rgb.size(); ++i) pass.map().values[i] = 2.0f * rgb[i] - 1.0f;
@@ -253,9 +262,20 @@ std::vector<float> VaeEncoder::encode(const NetworkRun& run, std::span<const flo
   pass.saySoFar("conv_out");
   pass.convolve(moments_);
   pass.saySoFar("moments");
+  return std::move(pass.map());
+}
 
-  const FeatureMap& moments = pass.map();
+std::vector<float> VaeEncoder::tokensOf(const FeatureMap& moments, std::span<const float> noise,
+                                        const StageListener& listener) const {
   const size_t channels = latentChannels(), pixels = moments.pixelCount();
+  if (moments.channels != 2 * channels || moments.height % 2 != 0 || moments.width % 2 != 0) {
+    fail(ErrorCode::kInvalidArgument,
+         "The moments are of " + sizeText(moments.width, moments.height) + " pixels and " +
+             std::to_string(moments.channels) + " channels; even numbers of pixels and " +
+             std::to_string(2 * channels) + " channels are needed.");
+  }
+  const size_t scale = tokenSize() / 2;
+  requireNoise(noise, moments.height * scale, moments.width * scale);
   FeatureMap latent = FeatureMap::ofSize(moments.height, moments.width, channels);
   for (size_t i = 0; i < pixels; ++i) {
     const float* from = moments.values.data() + 2 * i * channels;
@@ -265,7 +285,7 @@ std::vector<float> VaeEncoder::encode(const NetworkRun& run, std::span<const flo
     }
   }
   say(listener, "latent", latent);
-  std::vector<float> tokens = tokensOf(latent);
+  std::vector<float> tokens = packed(latent);
   if (listener) {
     listener("tokens", {tokens.size() / tokenWidth(), tokenWidth(), tokenWidth(), tokens.data()});
   }

@@ -56,6 +56,13 @@ class VaeEncoder {
   std::vector<float> encode(const NetworkRun& run, std::span<const float> rgb, size_t height,
                             size_t width, std::span<const float> noise,
                             const StageListener& listener = {}) const;
+  /// The part of encode() that knows nothing of noise, which is nearly all of it: means of the
+  /// latent and behind them logarithms of variances, of [height / 8, width / 8] pixels.
+  FeatureMap momentsOf(const NetworkRun& run, std::span<const float> rgb, size_t height,
+                       size_t width, const StageListener& listener = {}) const;
+  /// The rest of it. In: moments, as momentsOf() gives them. Errors: kInvalidArgument.
+  std::vector<float> tokensOf(const FeatureMap& moments, std::span<const float> noise,
+                              const StageListener& listener = {}) const;
 
  private:
   class Pass;
@@ -81,7 +88,8 @@ class VaeEncoder {
     Linear query, key, value, output;
   };
 
-  std::vector<float> tokensOf(const FeatureMap& latent) const;
+  void requireNoise(std::span<const float> noise, size_t height, size_t width) const;
+  std::vector<float> packed(const FeatureMap& latent) const;
 
   Convolution in_;
   std::vector<Level> levels_;

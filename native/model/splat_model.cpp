@@ -24,6 +24,14 @@ uint32_t gaussiansOf(const ModelRequest& request, const ModelSettings& settings)
   return is_own ? settings.default_gaussians_per_anchor : request.gaussians_per_anchor;
 }
 
+AnchorSamplingOptions samplingOf(const ModelRequest& request) {
+  AnchorSamplingOptions sampling;
+  sampling.count = request.budget;
+  sampling.order = request.order;
+  sampling.seed = request.seed;
+  return sampling;
+}
+
 }  // namespace
 
 std::shared_ptr<const SplatModel> SplatModel::keep(std::span<const uint8_t>) const {
@@ -39,7 +47,8 @@ ModelSettings SplatModel::settings() const {
   return settings;
 }
 
-SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress) const {
+SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress, double begin,
+                              double end) const {
   requireFinite(request.time, "the time");
   const ModelSettings allowed = settings();
   if (request.budget < allowed.minimum_budget || request.budget > allowed.maximum_budget) {
@@ -55,15 +64,14 @@ SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress) c
   wanted.seed = request.seed;
   wanted.progress = progress;
   const std::shared_ptr<const DensityModel> sampled = density();
-  if (!sampled) return decoder().decode(wanted);
-  AnchorSamplingOptions sampling;
-  sampling.count = request.budget;
-  sampling.order = request.order;
-  sampling.seed = request.seed;
-  if (progress) progress->enterPart(0, kSamplingShare);
-  const AnchorSet anchors = drawLearned(*sampled, sampling, draws(), progress);
-  wanted.anchors = &anchors;
-  if (progress) progress->enterPart(kSamplingShare, 1);
+  const double middle = sampled ? begin + kSamplingShare * (end - begin) : begin;
+  AnchorSet anchors;
+  if (sampled) {
+    if (progress) progress->enterPart(begin, middle);
+    anchors = drawLearned(*sampled, samplingOf(request), draws(), progress);
+    wanted.anchors = &anchors;
+  }
+  if (progress) progress->enterPart(middle, end);
   SplatCloud cloud = decoder().decode(wanted);
   if (progress) progress->enterPart(0, 1);
   return cloud;

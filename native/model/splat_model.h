@@ -78,9 +78,11 @@ class SplatModel {
   /// Which settings it has: those of its kind, with its own ranges.
   ModelSettings settings() const;
   /// The splats of a request. Errors: kInvalidArgument for a budget or a K outside settings(), a
-  /// time that is not finite; kCancelled. Progress runs from 0 to 1 of the whole work.
+  /// time that is not finite; kCancelled. Progress runs from begin to end of the whole work, and is
+  /// left without parts.
   /// Threads and determinism: parallel; same result for any number of threads.
-  SplatCloud decode(const ModelRequest& request, Progress* progress = nullptr) const;
+  SplatCloud decode(const ModelRequest& request, Progress* progress = nullptr, double begin = 0,
+                    double end = 1) const;
   /// Bytes that decode() holds at most, without the model itself.
   uint64_t memoryBound(const ModelRequest& request) const;
   /// Refuses a request beyond the limit, with the budget that fits. Errors: kMemoryLimit.

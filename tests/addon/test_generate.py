@@ -54,6 +54,21 @@ def test_an_image_becomes_a_model(context, weights, image):
     assert cloud.info().count == 40 * 32
 
 
+def test_another_seed_takes_over_what_the_encoders_said(context, weights, image):
+    def started(seed, encoded_by=None):
+        job = Generation.start(context, image, None, generate_options(context.library, weights, seed=seed, **SMALL),
+                               encoded_by)
+        job.wait()
+        return job
+    first = started(42)
+    second, alone = started(43, first), started(43)
+    for job, encodes in ((first, True), (second, False), (alone, True)):
+        stages = dict(job.stages())
+        assert (stages['structure.features'].operations > 1e6) == encodes
+        assert (stages['colour.moments'].operations > 1e6) == encodes
+    assert dict(second.stages())['latent'].mean == dict(alone.stages())['latent'].mean
+
+
 def test_noise_of_another_kind_gives_another_object(context, weights, image):
     made = []
     for source in NoiseSource:

@@ -104,6 +104,29 @@ def test_check_says_whether_files_are_published_and_what_passes_by(files):
     assert 'structure.features' in table and 'SHA-256' in table
 
 
+def test_several_seeds_are_those_of_single_runs_and_encode_the_image_once(files):
+    figures = json.loads(generate(files, 'image.png', 'of.ply', '--anchors', 40, '--seed', 5, '--seeds', 2, '--timings',
+                                  '--json').stdout)
+    assert figures['seed5.structure.features.operations'] > 1e6 and figures['seed5.colour.moments.operations'] > 1e6
+    assert figures['seed6.structure.features.operations'] == figures['seed6.colour.moments.operations'] == 0
+    for seed in (5, 6):
+        generate(files, 'image.png', 'alone.ply', '--anchors', 40, '--seed', seed)
+        assert (files / f'of_{seed}.ply').read_bytes() == (files / 'alone.ply').read_bytes()
+    assert not (files / 'of.ply').exists()
+
+
+def test_timings_add_up_to_the_whole(files):
+    figures = json.loads(generate(files, 'image.png', 't.ply', '--anchors', 40, '--timings', '--json').stdout)
+    steps = [figures[f'step{step}.tokens.operations'] for step in (1, 2, 3)] + [figures['latent.operations']]
+    assert len(set(steps)) == 1 and steps[0] > 1e6
+    counted = sum(value for name, value in figures.items() if name.endswith('.operations'))
+    assert abs(counted / figures['operations'] - 1) < 1e-9
+    stages = sum(value for name, value in figures.items() if name.endswith('.seconds'))
+    assert 0 < figures['decoding.seconds'] < stages < figures['seconds']
+    table = generate(files, 'image.png', 't.ply', '--anchors', 40, '--timings').stdout
+    assert 'GFLOP/s' in table and 'decoding' in table
+
+
 def test_estimate_alone_writes_nothing(files):
     figures = json.loads(run(files / 'image.png', '--weights', files / 'weights', *SMALL, '--estimate', '--json').stdout)
     assert figures['weight_bytes'] == sum(f.stat().st_size for f in (files / 'weights').iterdir())

@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "decode/latent/latent_decoder.h"
@@ -23,16 +26,17 @@ constexpr StageTolerance kFormula = {1e-6, 1e-6};
 class WatchedDensity final : public DensityModel {
  public:
   WatchedDensity(std::shared_ptr<const OctreeNetwork> network, std::shared_ptr<const Latent> latent,
-                 int leaf_level)
-      : density_(network, latent, {}, leaf_level),
+                 const NetworkRun& run, int leaf_level)
+      : density_(network, latent, run, leaf_level),
         network_(std::move(network)),
-        keys_(network_->keysOf({}, *latent)) {}
+        run_(run),
+        keys_(network_->keysOf(run, *latent)) {}
   int leafLevel() const override { return density_.leafLevel(); }
   const RootCube& root() const override { return density_.root(); }
   void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
                              Progress* progress) const override {
     std::vector<float> logits(8 * cells.size());
-    network_->logits({}, keys_, level, cells, logits);
+    network_->logits(run_, keys_, level, cells, logits);
     seen.push_back(std::move(logits));
     density_.childLogProbabilities(level, cells, out, progress);
   }
@@ -42,6 +46,7 @@ class WatchedDensity final : public DensityModel {
  private:
   LatentDensity density_;
   std::shared_ptr<const OctreeNetwork> network_;
+  NetworkRun run_;
   LatentKeys keys_;
 };
 
@@ -52,7 +57,7 @@ std::string levelName(const char* stem, int level) {
 AnchorSet sampleStages(const GoldenFile& file, const LatentNetworks& networks,
                        std::shared_ptr<const Latent> latent, StageReport& report) {
   const int leaf_level = file.config().at("level").get<int>();
-  const WatchedDensity density(networks.octree, std::move(latent), leaf_level);
+  const WatchedDensity density(networks.octree, std::move(latent), file.run(), leaf_level);
   RecordedUniformSource source(recordedUniforms(file));
   const uint64_t count = file.config().at("num_points").get<uint64_t>();
   AnchorSet anchors = sampleAnchors(density, {.count = count}, source);
@@ -72,6 +77,27 @@ AnchorSet sampleStages(const GoldenFile& file, const LatentNetworks& networks,
   return anchors;
 }
 
+/// Logits of the cells that were recorded, whatever this network would draw.
+AnchorSet recordedCellStages(const GoldenFile& file, const LatentNetworks& networks,
+                             const Latent& latent, StageReport& report) {
+  const int leaf_level = file.config().at("level").get<int>();
+  const LatentKeys keys = networks.octree->keysOf(file.run(), latent);
+  const std::vector<int64_t> leaves = recordedLeaves(file);
+  for (int level = 1; level <= leaf_level; ++level) {
+    std::vector<uint64_t> parents;
+    for (const int64_t leaf : leaves) {
+      parents.push_back(static_cast<uint64_t>(leaf) >> 3 * (leaf_level - level + 1));
+    }
+    std::sort(parents.begin(), parents.end());
+    parents.erase(std::unique(parents.begin(), parents.end()), parents.end());
+    std::vector<float> logits(8 * parents.size());
+    networks.octree->logits(file.run(), keys, level - 1, parents, logits);
+    const std::string name = levelName("logits.level", level);
+    report.compare(name, logits, file.floats("expect." + name), kNetworkCall);
+  }
+  return recordedAnchors(file);
+}
+
 }  // namespace
 
 void decoderStages(const GoldenFile& file, StageReport& report) {
@@ -83,15 +109,17 @@ void decoderStages(const GoldenFile& file, StageReport& report) {
   latent->token_count = file.shape(latent_name).at(1);
   latent->width = static_cast<uint32_t>(file.shape(latent_name).at(2));
   latent->tokens = file.floats(latent_name);
-  const AnchorSet anchors = sampleStages(file, networks, latent, report);
+  const AnchorSet anchors = report.judgement() == StageJudgement::kErrors
+                                ? recordedCellStages(file, networks, *latent, report)
+                                : sampleStages(file, networks, latent, report);
 
-  const LatentDecoder decoder(networks.gaussians, latent);
+  const LatentDecoder decoder(networks.gaussians, latent, file.run());
   const std::vector<float> points = file.floats("expect.points");
   const std::vector<float> features = file.floats("expect.features");
-  const LatentKeys keys = networks.gaussians->keysOf({}, *latent);
+  const LatentKeys keys = networks.gaussians->keysOf(file.run(), *latent);
   report.compare("features",
-                 networks.gaussians->features({}, keys, points.size() / 3, points.data()), features,
-                 kNetworkCall);
+                 networks.gaussians->features(file.run(), keys, points.size() / 3, points.data()),
+                 features, kNetworkCall);
   compareSplats("activated ", file, decoder.splatsOf(points, features), kFormula, report);
   DecodeRequest request;
   request.anchors = &anchors;

@@ -86,15 +86,16 @@ void dinoStages(const GoldenFile& file, StageReport& report) {
       file.floats("input.pixel_values"),
       [&](float value, size_t channel) { return value * deviation[channel] + mean[channel]; });
   report.compare("pixels", rgb, seen, kPixelTolerance);
-  encoder.encode(
-      {}, rgb, shape[2], shape[3], [&](const std::string& stage, const StageNumbers& numbers) {
-        const std::string name = "expect." + stage;
-        if (!file.has(name)) return;
-        const std::vector<float> expected = file.floats(name);
-        const bool has_heads = stage.ends_with("_rope");
-        report.compare(stage, has_heads ? headsFirst(numbers, options.head_width) : rowsOf(numbers),
+  encoder.encode(file.run(), rgb, shape[2], shape[3],
+                 [&](const std::string& stage, const StageNumbers& numbers) {
+                   const std::string name = "expect." + stage;
+                   if (!file.has(name)) return;
+                   const std::vector<float> expected = file.floats(name);
+                   const bool has_heads = stage.ends_with("_rope");
+                   report.compare(
+                       stage, has_heads ? headsFirst(numbers, options.head_width) : rowsOf(numbers),
                        expected, kDinoTolerance);
-      });
+                 });
 }
 
 void vaeStages(const GoldenFile& file, StageReport& report) {
@@ -108,7 +109,7 @@ void vaeStages(const GoldenFile& file, StageReport& report) {
   const std::vector<float> rgb =
       channelsLast(file.floats("input.image"), [](float value, size_t) { return value; });
   const std::vector<float> tokens = encoder.encode(
-      {}, rgb, shape[2], shape[3], file.floats("input.noise"),
+      file.run(), rgb, shape[2], shape[3], file.floats("input.noise"),
       [&](const std::string& stage, const StageNumbers& numbers) {
         const std::string name = "expect." + stage;
         if (!file.has(name)) return;
@@ -122,7 +123,7 @@ void vaeStages(const GoldenFile& file, StageReport& report) {
     report.compare("feature2", feature, file.floats("expect.feature2"), kVaeTolerance);
   }
   if (file.has("expect.tokens_mean")) {
-    report.compare("tokens_mean", encoder.encode({}, rgb, shape[2], shape[3], {}),
+    report.compare("tokens_mean", encoder.encode(file.run(), rgb, shape[2], shape[3], {}),
                    file.floats("expect.tokens_mean"), kVaeTolerance);
   }
 }
@@ -173,7 +174,7 @@ void conditionStages(const GoldenFile& file, StageReport& report) {
   options.erode_radius = file.config().at("erode_radius").get<uint32_t>();
   const PreparedImage image = prepareImage(byteImage(file, "input.image_rgba"), nullptr, options);
   const ImageCondition condition =
-      encodeImage({}, structure, colour, image, file.floats("input.vae_noise"));
+      encodeImage(file.run(), structure, colour, image, file.floats("input.vae_noise"));
   report.compare("feature1", condition.structure, file.floats("expect.feature1"), kDinoTolerance);
   report.compare("feature2", condition.colour, file.floats("expect.feature2"), kVaeTolerance);
 }

@@ -60,13 +60,13 @@ FlowSettings settingsOf(const GoldenFile& file) {
           .shift = file.config().at("shift").get<double>()};
 }
 
-Latent sampled(const FlowNetwork& network, const FlowContext& context, const Latent& noise,
-               const FlowSettings& settings) {
+Latent sampled(const NetworkRun& run, const FlowNetwork& network, const FlowContext& context,
+               const Latent& noise, const FlowSettings& settings) {
   GenerationNoise numbers;
   numbers.tokens = noise.tokens;
   numbers.camera.assign(noise.camera.begin(), noise.camera.end());
   SamplerState state = startSampling(network, noise.token_count, numbers, settings);
-  sampleLatent({}, network, context, state);
+  sampleLatent(run, network, context, state);
   return state.latent;
 }
 
@@ -77,11 +77,12 @@ void callStages(const GoldenFile& file, StageReport& report) {
   const Latent noise = latentOf(file, "input");
   report.compare("sobol", sobolPoints(noise.token_count), file.floats("input.sobol"), {0.0, 0.0});
   const FlowContext context =
-      network.context({}, conditionOf(file, "input.feature1", "input.feature2"));
+      network.context(file.run(), conditionOf(file, "input.feature1", "input.feature2"));
   Latent velocity;
-  network.velocity({}, noise, file.config().at("velocity_t").get<double>(), context, velocity);
+  network.velocity(file.run(), noise, file.config().at("velocity_t").get<double>(), context,
+                   velocity);
   compareLatents("velocity", velocity, file, kCallTolerance, report);
-  compareLatents("sample", sampled(network, context, noise, settingsOf(file)), file,
+  compareLatents("sample", sampled(file.run(), network, context, noise, settingsOf(file)), file,
                  kSampleTolerance, report);
 }
 
@@ -112,16 +113,16 @@ void stepStages(const GoldenFile& file, StageReport& report) {
   report.compare("model_times", model_times, file.floats("expect.model_times"), kTimeTolerance);
 
   const FlowContext context =
-      network.context({}, conditionOf(file, "expect.feature1", "expect.feature2"));
-  const FlowContext nothing = network.emptyContext({}, context.rows);
+      network.context(file.run(), conditionOf(file, "expect.feature1", "expect.feature2"));
+  const FlowContext nothing = network.emptyContext(file.run(), context.rows);
   for (uint32_t step = 0; step < settings.steps; ++step) {
     const std::string name = "step" + std::to_string(step);
     const Latent before =
         step == 0 ? noise : latentOf(file, "expect.step" + std::to_string(step - 1) + ".x");
     Latent velocity;
-    network.velocity({}, before, times[step], context, velocity);
+    network.velocity(file.run(), before, times[step], context, velocity);
     compareLatents(name + ".cond", velocity, file, kCallTolerance, report);
-    network.velocity({}, before, times[step], nothing, velocity);
+    network.velocity(file.run(), before, times[step], nothing, velocity);
     compareLatents(name + ".uncond", velocity, file, kCallTolerance, report);
     SamplerState state;
     state.settings = settings;
@@ -129,16 +130,18 @@ void stepStages(const GoldenFile& file, StageReport& report) {
     state.latent = before;
     // Sampling goes on to the end; what it has after one step is what cancelling then leaves.
     Progress progress;
+    NetworkRun run = file.run();
+    run.progress = &progress;
     const FlowListener listener = {[&](const FlowPreview&) { progress.cancel(); }, 1};
     try {
-      sampleLatent({.progress = &progress}, network, context, state, listener);
+      sampleLatent(run, network, context, state, listener);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::kCancelled) throw;
     }
     compareLatents(name + ".x", state.latent, file, kCallTolerance, report);
   }
-  compareLatents("sample", sampled(network, context, noise, settings), file, kSampleTolerance,
-                 report);
+  compareLatents("sample", sampled(file.run(), network, context, noise, settings), file,
+                 kSampleTolerance, report);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "io/assets/weight_file.h"
+#include "network_golden/rounded_weights.h"
 
 namespace stipple {
 namespace {
@@ -45,8 +46,8 @@ std::vector<int64_t> integersOf(const WeightTensor& tensor) {
 
 }  // namespace
 
-GoldenFile::GoldenFile(const std::string& path)
-    : path_(path), tensors_(openWeightFile(path)), config_(readConfig(path)) {}
+GoldenFile::GoldenFile(const std::string& path, const GoldenNumbers& numbers)
+    : path_(path), numbers_(numbers), tensors_(openWeightFile(path)), config_(readConfig(path)) {}
 
 bool GoldenFile::hasUnder(const std::string& prefix) const {
   for (const std::string& name : tensors_.names()) {
@@ -95,7 +96,8 @@ std::vector<uint8_t> GoldenFile::bytes(const std::string& name) const {
 }
 
 WeightTable GoldenFile::weights(const std::string& prefix) const {
-  return tensors_.under("weights." + prefix);
+  const WeightTable weights = tensors_.under("weights." + prefix);
+  return numbers_.weights ? roundedWeights(weights, *numbers_.weights) : weights;
 }
 
 }  // namespace stipple

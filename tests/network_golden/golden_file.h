@@ -2,12 +2,21 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "data/weight_table.h"
+#include "nn/network_run.h"
 
 namespace stipple {
+
+/// The numbers that networks are run in.
+struct GoldenNumbers {
+  FactorPrecision precision = FactorPrecision::kFloat32;  ///< of products
+  /// Weights are rounded to this type of 16 bits first; none: they are what the file has.
+  std::optional<WeightType> weights;
+};
 
 /// A file that holds a small network, what goes into it and what must come out, as made by other
 /// programs: safetensors with tensors "weights." + the name in a published file, "input.…",
@@ -16,7 +25,7 @@ namespace stipple {
 class GoldenFile {
  public:
   /// Errors: kIo, kFormat.
-  explicit GoldenFile(const std::string& path);
+  explicit GoldenFile(const std::string& path, const GoldenNumbers& numbers = {});
 
   const std::string& path() const { return path_; }
   /// An empty object where the file has none.
@@ -36,11 +45,14 @@ class GoldenFile {
   std::vector<uint8_t> bytes(const std::string& name) const;
   /// The weights whose names begin with "weights." + prefix ("dino."), by the rest of their names.
   WeightTable weights(const std::string& prefix = "") const;
+  /// How its networks are run.
+  NetworkRun run() const { return {.precision = numbers_.precision}; }
 
  private:
   const WeightTensor& tensor(const std::string& name) const;
 
   std::string path_;
+  GoldenNumbers numbers_;
   WeightTable tensors_;
   nlohmann::json config_;
 };

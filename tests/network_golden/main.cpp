@@ -1,22 +1,66 @@
 // Runs every stage that a golden file of a network has numbers for, and compares.
 //
-//   network_golden FILE...
+//   network_golden [--precision float32|bfloat16] [--weights float16|bfloat16] FILE...
 //
 // Prints the largest error of each stage beside what is allowed. Exits with 1 where a stage is
 // beyond its tolerance, and where a file has no stage that is known here.
+//
+// --precision: products of matrices have factors of so many bits; --weights: weights are rounded
+// first. With either of them errors are told and not judged: the largest, and the root of their
+// mean square over that of the numbers. Cells and anchors are the recorded ones then.
 
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <vector>
 
+#include "base/error.h"
 #include "network_golden/stages.h"
+#include "nn/matrix_backend.h"
 
 namespace stipple {
 namespace {
 
-bool runFile(const char* path) {
+struct Arguments {
+  GoldenNumbers numbers;
+  StageJudgement judgement = StageJudgement::kTolerances;
+  std::vector<const char*> paths;
+};
+
+/// Errors: kInvalidArgument.
+Arguments read(int count, char** words) {
+  Arguments arguments;
+  for (int i = 1; i < count; ++i) {
+    const std::string word = words[i];
+    if (word != "--precision" && word != "--weights") {
+      arguments.paths.push_back(words[i]);
+      continue;
+    }
+    const std::string value = i + 1 < count ? words[++i] : "";
+    if (word == "--precision" && (value == "float32" || value == "bfloat16")) {
+      arguments.numbers.precision =
+          value == "float32" ? FactorPrecision::kFloat32 : FactorPrecision::kBfloat16;
+    } else if (word == "--weights" && (value == "float16" || value == "bfloat16")) {
+      arguments.numbers.weights = value == "float16" ? WeightType::kFloat16 : WeightType::kBfloat16;
+    } else {
+      fail(ErrorCode::kInvalidArgument, word + " is '" + value + "'; " +
+                                            (word == "--weights" ? "float16" : "float32") +
+                                            " or bfloat16 is allowed");
+    }
+    arguments.judgement = StageJudgement::kErrors;
+  }
+  const NetworkRun run = {.precision = arguments.numbers.precision};
+  if (precisionOf(run) != arguments.numbers.precision) {
+    fail(ErrorCode::kUnsupported,
+         std::string(backendOf(run).name()) + " has no products of bfloat16 on this machine");
+  }
+  return arguments;
+}
+
+bool runFile(const char* path, const Arguments& arguments) {
   std::printf("%s\n", path);
-  StageReport report;
-  const GoldenFile file(path);
+  StageReport report(arguments.judgement);
+  const GoldenFile file(path, arguments.numbers);
   struct Group {
     const char* name;
     void (*run)(const GoldenFile&, StageReport&);
@@ -44,15 +88,25 @@ bool runFile(const char* path) {
 }  // namespace
 }  // namespace stipple
 
-int main(int count, char** arguments) {
-  if (count < 2) {
-    std::fprintf(stderr, "network_golden FILE...\n");
+int main(int count, char** words) {
+  using namespace stipple;
+  Arguments arguments;
+  try {
+    arguments = read(count, words);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  }
+  if (arguments.paths.empty()) {
+    std::fprintf(stderr,
+                 "network_golden [--precision float32|bfloat16] [--weights float16|bfloat16] "
+                 "FILE...\n");
     return 2;
   }
   bool passed = true;
-  for (int i = 1; i < count; ++i) {
+  for (const char* path : arguments.paths) {
     try {
-      passed &= stipple::runFile(arguments[i]);
+      passed &= runFile(path, arguments);
     } catch (const std::exception& error) {
       std::printf("FAIL  %s\n", error.what());
       passed = false;

@@ -38,6 +38,18 @@ std::vector<int64_t> recordedLeaves(const GoldenFile& file) {
   return leaves;
 }
 
+AnchorSet recordedAnchors(const GoldenFile& file) {
+  AnchorSet anchors;
+  const std::vector<float> points = file.floats("expect.points");
+  const std::vector<float> log_q = file.floats("expect.log_probs");
+  anchors.positions.assign(points.begin(), points.end());
+  anchors.log_q.assign(log_q.begin(), log_q.end());
+  for (const int64_t leaf : recordedLeaves(file)) {
+    anchors.leaves.push_back(static_cast<uint64_t>(leaf));
+  }
+  return anchors;
+}
+
 void compareSplats(const std::string& stem, const GoldenFile& file, const SplatCloud& cloud,
                    StageTolerance tolerance, StageReport& report) {
   const auto compare = [&](const char* name, std::span<const float> seen) {

@@ -26,6 +26,7 @@ void StageReport::compare(const std::string& stage, std::span<const float> seen,
     return;
   }
   double largest = 0.0, worst = 0.0;  // error; error / what is allowed
+  double errors = 0.0, squares = 0.0;
   size_t worst_index = 0;
   for (size_t i = 0; i < seen.size(); ++i) {
     const double want = static_cast<double>(expected[i]);
@@ -33,12 +34,20 @@ void StageReport::compare(const std::string& stage, std::span<const float> seen,
     double ratio = error / (tolerance.absolute + tolerance.relative * std::abs(want));
     if (!std::isfinite(error)) error = ratio = HUGE_VAL;
     largest = std::max(largest, error);
+    errors += error * error;
+    squares += want * want;
     if (ratio > worst) {
       worst = ratio;
       worst_index = i;
     }
   }
   char text[160];
+  if (judgement_ == StageJudgement::kErrors) {
+    std::snprintf(text, sizeof(text),
+                  "largest error %.2e, root of mean square %.2e of the numbers'", largest,
+                  squares > 0.0 ? std::sqrt(errors / squares) : std::sqrt(errors));
+    return print(stage, std::isfinite(errors), text);
+  }
   std::snprintf(text, sizeof(text),
                 "largest error %.2e, allowed %.0e + %.0e |x|: %.0f %% of it at %zu (%g for %g)",
                 largest, tolerance.absolute, tolerance.relative, 100.0 * worst, worst_index,
@@ -63,7 +72,7 @@ void StageReport::compareIntegers(const std::string& stage, std::span<const T> s
     print(stage, true, "all " + std::to_string(seen.size()) + " are equal");
     return;
   }
-  print(stage, false,
+  print(stage, judgement_ == StageJudgement::kErrors,
         std::to_string(differing) + " of " + std::to_string(seen.size()) +
             " differ, the first at " + std::to_string(first) + " (" + std::to_string(seen[first]) +
             " for " + std::to_string(expected[first]) + ")");

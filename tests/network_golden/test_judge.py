@@ -117,3 +117,53 @@ def test_what_is_no_such_file_fails_with_a_sentence(tmp_path):
     for path in (tmp_path / 'text.safetensors', tmp_path / 'missing.safetensors'):
         code, output = judge(path)
         assert code == 1 and path.name in output
+
+
+def measured(*arguments):
+    """Exit status, {file: {stage: root of the mean square of errors over that of numbers}}."""
+    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=120)
+    found = {}
+    for line in done.stdout.splitlines():
+        if line.endswith('.safetensors'):
+            stages = found.setdefault(Path(line).name, {})
+        elif 'root of mean square' in line:
+            stages[' '.join(line.split('largest')[0].split()[1:])] = float(line.split('root of mean square ')[1].split()[0])
+    return done.returncode, found
+
+
+# Rounding to float16 moves a weight by at most 2^-11 of it, and by 2^-11 / sqrt(3) of it, at the most, in the root of the
+# mean square. Sums of many such products are off by the same share, since errors have any sign. What layers add to each
+# other grows with the root of their number: the small networks have at most 40 matrices one behind the other, four steps
+# of the sampler add up to twice that, and guidance 3 multiplies errors by sqrt(3^2 + 2^2) at the most.
+FLOAT16_BOUND = 2**-11 / 3**0.5 * 40**0.5 * 2 * 13**0.5
+
+
+def test_weights_of_16_bits_are_off_by_no_more_than_their_rounding_explains():
+    goldens = sorted(GOLDENS.glob('*.safetensors'))
+    code, found = measured('--weights', 'float16', *goldens)
+    assert code == 0 and len(found) == len(goldens)
+    for name, stages in found.items():
+        assert max(stages.values()) < FLOAT16_BOUND, (name, stages)
+    for name, stage in (('deg_vae_a', 'tokens'), ('deg_flow_a', 'velocity.latent'), ('deg_decoder_a', 'features')):
+        assert found[f'{name}.safetensors'][stage] > 1e-5  # they are rounded, as float32 would not show
+    # Eight times as coarse, so that the errors are about eight times as large.
+    _, coarse = measured('--weights', 'bfloat16', *goldens)
+    for name, stage in (('deg_vae_a', 'tokens'), ('deg_flow_a', 'velocity.latent'), ('deg_decoder_a', 'features')):
+        ratio = coarse[f'{name}.safetensors'][stage] / found[f'{name}.safetensors'][stage]
+        assert 4 < ratio < 20, (name, ratio)
+
+
+def test_products_of_bfloat16_are_told_from_those_of_float32():
+    golden = GOLDENS / 'deg_flow_a.safetensors'
+    code, found = measured('--precision', 'float32', golden)
+    assert code == 0 and found[golden.name]['velocity.latent'] < 1e-5
+    code, found = measured('--precision', 'bfloat16', golden)
+    if code == 2:
+        pytest.skip('no products of bfloat16 on this machine')
+    assert code == 0 and 1e-4 < found[golden.name]['velocity.latent'] < 3e-2
+
+
+def test_numbers_that_are_unknown_are_refused_with_those_that_are_allowed():
+    done = subprocess.run([PROGRAM, '--weights', 'float8', GOLDENS / 'deg_vae_a.safetensors'], capture_output=True, text=True,
+                          timeout=120)
+    assert done.returncode == 2 and "'float8'" in done.stderr and 'float16 or bfloat16' in done.stderr

@@ -48,9 +48,9 @@ Latent latentStages(const GoldenFile& file, StageReport& report) {
       drawNoise({.colour = colour.noiseCount(image.size, image.size),
                  .tokens = token_count * network.sizes().token_width},
                 {NoiseSource::kTorchCpu, file.config().at("torch_cpu_seed").get<uint64_t>()});
-  const ImageCondition condition = encodeImage({}, structure, colour, image, noise.colour);
+  const ImageCondition condition = encodeImage(file.run(), structure, colour, image, noise.colour);
   SamplerState state = startSampling(network, token_count, noise, settings);
-  sampleLatent({}, network, network.context({}, condition), state);
+  sampleLatent(file.run(), network, network.context(file.run(), condition), state);
   report.compare("whole.latent", state.latent.tokens, file.floats("expect.sample.latent"),
                  kWholeTolerance);
   report.compare("whole.camera", state.latent.camera, file.floats("expect.sample.camera"),
@@ -58,21 +58,31 @@ Latent latentStages(const GoldenFile& file, StageReport& report) {
   return state.latent;
 }
 
-void splatStages(const GoldenFile& file, Latent whole, StageReport& report) {
-  if (!file.hasUnder("weights.decoder.") || !file.has("expect.gaussians.position")) return;
-  const LatentNetworks networks = readLatentNetworks(file.weights("decoder."));
-  const auto latent = std::make_shared<const Latent>(std::move(whole));
-  const LatentDensity density(networks.octree, latent, {}, file.config().at("level").get<int>());
+AnchorSet drawnAnchors(const GoldenFile& file, const LatentNetworks& networks,
+                       std::shared_ptr<const Latent> latent, StageReport& report) {
+  const LatentDensity density(networks.octree, latent, file.run(),
+                              file.config().at("level").get<int>());
   RecordedUniformSource source(recordedUniforms(file));
-  const AnchorSet anchors =
+  AnchorSet anchors =
       sampleAnchors(density, {.count = file.config().at("num_points").get<uint64_t>()}, source);
   report.compareExactly("whole.leaves",
                         std::vector<int64_t>(anchors.leaves.begin(), anchors.leaves.end()),
                         recordedLeaves(file));
+  return anchors;
+}
+
+void splatStages(const GoldenFile& file, Latent whole, StageReport& report) {
+  if (!file.hasUnder("weights.decoder.") || !file.has("expect.gaussians.position")) return;
+  const LatentNetworks networks = readLatentNetworks(file.weights("decoder."));
+  const auto latent = std::make_shared<const Latent>(std::move(whole));
+  const AnchorSet anchors = report.judgement() == StageJudgement::kErrors
+                                ? recordedAnchors(file)
+                                : drawnAnchors(file, networks, latent, report);
   DecodeRequest request;
   request.anchors = &anchors;
   request.gaussians_per_anchor = networks.gaussians->gaussians();
-  compareSplats("whole.", file, LatentDecoder(networks.gaussians, latent).decode(request),
+  compareSplats("whole.", file,
+                LatentDecoder(networks.gaussians, latent, file.run()).decode(request),
                 kWholeTolerance, report);
 }
 

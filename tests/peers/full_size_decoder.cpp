@@ -11,11 +11,8 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <map>
-#include <string>
 #include <thread>
 #include <vector>
 
@@ -25,91 +22,14 @@
 #include "decode/latent/latent_density.h"
 #include "decode/latent/latent_networks.h"
 #include "density/anchor_sampling.h"
+#include "peers/full_size_clock.h"
+#include "peers/full_size_files.h"
+#include "peers/full_size_shapes.h"
 
 namespace stipple {
 namespace {
 
-constexpr uint64_t kWidth = 1024;
-constexpr uint64_t kLatentWidth = 16;
 constexpr uint64_t kDensityBlocks = 4;
-
-/// Random numbers of half precision, each tensor at its own place: no cache has them all, as it has
-/// none of a file of 576 MB.
-class MadeDecoder {
- public:
-  explicit MadeDecoder(uint64_t blocks) {
-    addLinear("octree.l_embedder.mlp.0", kWidth, 256);
-    addLinear("octree.l_embedder.mlp.2", kWidth, kWidth);
-    addLinear("octree.adaLN_modulation.1", 6 * kWidth, kWidth);
-    addNetwork("octree.", 8, kDensityBlocks);
-    add("gs.points_offset_perturbation", {32, 3});
-    add("gs.base_offset_scale", {});
-    addNetwork("gs.", 480, blocks);
-    for (uint64_t i = 0; i < blocks; ++i) {
-      const std::string block = "gs.blocks." + std::to_string(i) + ".";
-      add(block + "norm2.weight", {kWidth});
-      add(block + "norm2.bias", {kWidth});
-      addLinear(block + "self_attn.to_qkv", 3 * kWidth, kWidth);
-      addLinear(block + "self_attn.to_out", kWidth, kWidth);
-      addGammas(block + "self_attn.");
-    }
-  }
-
-  WeightTable table() const { return WeightTable("made up", tensors_, nullptr); }
-
- private:
-  void add(const std::string& name, std::vector<uint64_t> shape) {
-    WeightTensor& tensor = tensors_[name];
-    tensor = {WeightType::kFloat16, "F16", std::move(shape), nullptr};
-    std::vector<uint16_t>& numbers = numbers_.emplace_back(tensor.count());
-    for (size_t i = 0; i < numbers.size(); ++i) {
-      // Any sign and 1/64 to 1/32, so that sums of 1024 are about as large as what goes in.
-      constexpr uint64_t kExponent = 9 << 10, kSignAndFraction = 0x83ff;
-      const uint64_t bits = mixBits(i + (uint64_t{numbers_.size()} << 32));
-      numbers[i] = static_cast<uint16_t>((bits & kSignAndFraction) | kExponent);
-    }
-    tensor.bytes = reinterpret_cast<const uint8_t*>(numbers.data());
-  }
-  void addLinear(const std::string& name, uint64_t outputs, uint64_t inputs) {
-    add(name + ".weight", {outputs, inputs});
-    add(name + ".bias", {outputs});
-  }
-  void addGammas(const std::string& attention) {
-    add(attention + "q_rms_norm.gamma", {16, 64});
-    add(attention + "k_rms_norm.gamma", {16, 64});
-  }
-  void addNetwork(const std::string& prefix, uint64_t outputs, uint64_t blocks) {
-    addLinear(prefix + "in_proj", kWidth, 3);
-    addLinear(prefix + "input_layer", kWidth, kWidth);
-    addLinear(prefix + "out_proj", outputs, kWidth);
-    for (uint64_t i = 0; i < blocks; ++i) {
-      const std::string block = prefix + "blocks." + std::to_string(i) + ".";
-      addLinear(block + "cross_attn.to_q", kWidth, kWidth);
-      addLinear(block + "cross_attn.to_kv", 2 * kWidth, kLatentWidth);
-      addLinear(block + "cross_attn.to_out", kWidth, kWidth);
-      addGammas(block + "cross_attn.");
-      addLinear(block + "mlp.mlp.0", 4 * kWidth, kWidth);
-      addLinear(block + "mlp.mlp.2", kWidth, 4 * kWidth);
-    }
-  }
-
-  std::vector<std::vector<uint16_t>> numbers_;
-  std::map<std::string, WeightTensor> tensors_;
-};
-
-double seconds() {
-  const auto now = std::chrono::steady_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(now).count();
-}
-
-double processorSeconds() {
-  rusage usage = {};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto of = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
-  return of(usage.ru_utime) + of(usage.ru_stime);
-}
 
 /// In: operations, multiplications and additions.
 template <typename Work>
@@ -146,8 +66,8 @@ void measureSmallBudgets(const LatentDensity& density, const LatentDecoder& deco
 }
 
 void run(uint64_t tokens, uint64_t anchors, uint64_t blocks) {
-  const MadeDecoder made(blocks);
-  const LatentNetworks networks = readLatentNetworks(made.table());
+  printMachine();
+  const LatentNetworks networks = readLatentNetworks(ownWeights(decoderShapes(blocks)));
   auto latent = std::make_shared<Latent>();
   latent->token_count = tokens;
   latent->width = kLatentWidth;
@@ -158,7 +78,7 @@ void run(uint64_t tokens, uint64_t anchors, uint64_t blocks) {
   std::vector<uint64_t> cells(OctreeNetwork::kRows);
   for (size_t i = 0; i < cells.size(); ++i) cells[i] = 1000 * i;
   std::vector<float> out(8 * cells.size());
-  const auto c = static_cast<double>(kWidth), m = static_cast<double>(tokens);
+  const auto c = static_cast<double>(kFlowChannels), m = static_cast<double>(tokens);
   const double keys = kDensityBlocks * m * 2 * c * 2 * kLatentWidth;
   // Queries and weights of 16 heads meet the tokens' numbers, and a 1.
   const double shared = 16 * m * (2 * kLatentWidth + 1);

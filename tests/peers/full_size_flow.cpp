@@ -13,116 +13,20 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <map>
-#include <string>
 #include <thread>
 #include <vector>
 
 #include "base/error.h"
-#include "base/parallel.h"
 #include "base/random.h"
 #include "generate/flow_cost.h"
 #include "generate/flow_network.h"
 #include "generate/flow_sampler.h"
-#include "nn/matrix_backend.h"
+#include "peers/full_size_clock.h"
+#include "peers/full_size_files.h"
+#include "peers/full_size_shapes.h"
 
 namespace stipple {
 namespace {
-
-/// Random numbers of half precision that all tensors share: a network of 741 MB in 13.
-class MadeNetwork {
- public:
-  explicit MadeNetwork(size_t block_count) : numbers_(6 * kChannels * kChannels + kOffsets) {
-    for (size_t i = 0; i < numbers_.size(); ++i) {
-      // Any sign and 1/64 to 1/32, so that sums of 1024 are about as large as what goes in.
-      constexpr uint64_t kExponent = 9 << 10, kSignAndFraction = 0x83ff;
-      numbers_[i] = static_cast<uint16_t>((mixBits(i) & kSignAndFraction) | kExponent);
-    }
-    addEnds();
-    for (size_t i = 0; i < 2; ++i) {
-      addBlock("noise_refiner.", "noise_repo_layers.", i, FlowModulation::kTime);
-      addBlock("context_refiner.", "context_repo_layers.", i, FlowModulation::kNone);
-    }
-    for (size_t i = 0; i < block_count; ++i) {
-      addBlock("blocks.", "repo_layers.", i, FlowModulation::kTime);
-    }
-  }
-
-  WeightTable table() const { return WeightTable("made up", tensors_, nullptr); }
-
- private:
-  static constexpr uint64_t kChannels = 1024;
-  static constexpr size_t kOffsets = 4096;
-
-  void add(const std::string& name, std::vector<uint64_t> shape) {
-    const size_t offset = (37 * tensors_.size()) % kOffsets;
-    tensors_[name] = {WeightType::kFloat16, "F16", std::move(shape),
-                      reinterpret_cast<const uint8_t*>(numbers_.data() + offset)};
-  }
-  void addLinear(const std::string& name, uint64_t outputs, uint64_t inputs) {
-    add(name + ".weight", {outputs, inputs});
-    add(name + ".bias", {outputs});
-  }
-  void addEnds() {
-    constexpr uint64_t c = kChannels;
-    addLinear("t_embedder.mlp.0", c, 256);
-    addLinear("t_embedder.mlp.2", c, c);
-    addLinear("adaLN_modulation.1", 6 * c, c);
-    addLinear("input_layer", c, 16);
-    addLinear("cond_embedder", c, 1280);
-    addLinear("cond_embedder2", c, 128);
-    addLinear("cam_refiner.mlp.0", c, kCameraWidth);
-    addLinear("cam_refiner.mlp.2", c, c);
-    addLinear("out_layer", 16, c);
-    addLinear("cam_out_layer", kCameraWidth, c);
-    add("shift_table", {1, 2, c});
-  }
-  void addBlock(const std::string& block_list, const std::string& rotary_list, size_t index,
-                FlowModulation modulation) {
-    constexpr uint64_t c = kChannels;
-    const std::string rotary = rotary_list + std::to_string(index);
-    const std::string block = block_list + std::to_string(index);
-    add(rotary + ".norm.weight", {c});
-    add(rotary + ".norm.bias", {c});
-    add(rotary + ".gate_map.weight", {128, c});
-    add(rotary + ".content_map.weight", {128, c});
-    add(rotary + ".final_map.weight", {48, 128});
-    add(rotary + ".freqs_0", {10});
-    add(rotary + ".freqs_1", {10});
-    add(rotary + ".freqs_2", {12});
-    addLinear(block + ".attn.qkv", 3 * c, c);
-    addLinear(block + ".attn.out", c, c);
-    add(block + ".attn.q_norm.gamma", {16, 64});
-    add(block + ".attn.k_norm.gamma", {16, 64});
-    addLinear(block + ".mlp.mlp.0", 4 * c, c);
-    addLinear(block + ".mlp.mlp.2", c, 4 * c);
-    if (modulation == FlowModulation::kTime) {
-      add(block + ".shift_table", {1, 6 * c});
-      return;
-    }
-    for (const char* norm : {".norm1", ".norm2"}) {
-      add(block + norm + ".weight", {c});
-      add(block + norm + ".bias", {c});
-    }
-  }
-
-  std::vector<uint16_t> numbers_;
-  std::map<std::string, WeightTensor> tensors_;
-};
-
-double seconds() {
-  const auto now = std::chrono::steady_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(now).count();
-}
-
-double processorSeconds() {
-  rusage usage = {};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto of = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
-  return of(usage.ru_utime) + of(usage.ru_stime);
-}
 
 /// The most memory that this process has had, MiB.
 double mostMemory() {
@@ -145,12 +49,11 @@ void measure(const char* name, const StageCost& cost, const Work& work) {
 }
 
 int run(uint64_t tokens, uint64_t rows, size_t blocks, int cancels) {
-  const MadeNetwork made(blocks);
-  const FlowNetwork network(made.table());
+  const FlowNetwork network(sharedWeights(flowShapes(blocks)));
   const FlowSizes& sizes = network.sizes();
-  std::printf("%s %s, %zu threads; %zu tokens, %zu rows, %zu blocks\n",
-              defaultMatrixBackend().name(), defaultMatrixBackend().instructionSets().c_str(),
-              threadLimit(), static_cast<size_t>(tokens), static_cast<size_t>(rows), blocks);
+  printMachine();
+  std::printf("%zu tokens, %zu rows, %zu blocks\n", static_cast<size_t>(tokens),
+              static_cast<size_t>(rows), blocks);
   ImageCondition condition;
   condition.rows = rows;
   condition.structure_width = static_cast<uint32_t>(sizes.structure_width);

@@ -48,6 +48,12 @@ GenerateOptions generateOptionsFrom(const StippleContext& context,
   return options;
 }
 
+const StippleJob* encodedBy(const StippleGenerateOptions* given) {
+  StippleGenerateOptions defaults;
+  stipple_generate_options_init(&defaults);
+  return completed(given, defaults, "options").encoded_by;
+}
+
 StippleGenerateEstimate estimateTo(const GenerateEstimate& estimate) {
   StippleGenerateEstimate out = {};
   out.bytes = estimate.bytes;
@@ -89,6 +95,7 @@ StippleStatus stipple_generate_start(StippleContext* context, const StippleImage
     if (mask) shown = toMask(toByteImage(*mask->image));
     auto session = std::make_shared<GenerateSession>(toByteImage(*image->image), std::move(shown),
                                                      generateOptionsFrom(*context, options));
+    if (const StippleJob* other = encodedBy(options)) session->takeFeatures(sessionOf(other));
     context->state->requireMemory(session->memoryBound(), "this generation");
     *job = startJob(
         context->state,
@@ -139,6 +146,7 @@ StippleStatus stipple_generate_stage(const StippleJob* job, uint32_t index,
     out.deviation = seen.deviation;
     out.seconds = seen.seconds;
     out.name_utf8 = seen.name.c_str();
+    out.operations = seen.operations;
     deliver(stage, out, "stage");
   });
 }

@@ -17,10 +17,10 @@ namespace {
 struct Arguments {
   std::string image, out, weights, mask, checkpoint, seed_mode = "keyed";
   uint64_t seed = 42;
-  int64_t steps = 20, tokens = 8192, canvas = 1024, erode = 1;
+  int64_t steps = 20, tokens = 8192, canvas = 1024, erode = 1, seeds = 1;
   double guidance = 3.0, shift = 3.0, size = 1.0;
   std::optional<int64_t> anchors;
-  bool mean_colour = false, check = false, estimate = false, json = false;
+  bool mean_colour = false, check = false, timings = false, estimate = false, json = false;
 };
 
 StippleGenerateOptions optionsOf(const Arguments& arguments) {
@@ -51,7 +51,8 @@ void addEstimate(const StippleGenerateEstimate& estimate, Report& report) {
 }
 
 /// What passed by in the networks, as a table for people, or among the figures.
-void addStages(const Job& job, bool json, Report& report) {
+/// In: prefix: of figures, which tells seeds apart; empty where there is one.
+void addStages(const Job& job, const std::string& prefix, bool json, Report& report) {
   auto figures = sized<StippleGenerateFigures>();
   check(stipple_generate_figures(job.get(), &figures));
   if (!json) {
@@ -61,7 +62,7 @@ void addStages(const Job& job, bool json, Report& report) {
   for (uint32_t i = 0; i < figures.stage_count; ++i) {
     auto stage = sized<StippleGenerateStage>();
     check(stipple_generate_stage(job.get(), i, &stage));
-    const std::string name = stage.name_utf8;
+    const std::string name = prefix + stage.name_utf8;
     if (!json) {
       std::printf("%-28s %12llu %13.6g %13.6g %13.6g %13.6g %9.3f\n", stage.name_utf8,
                   static_cast<unsigned long long>(stage.count), stage.minimum, stage.maximum,
@@ -75,6 +76,33 @@ void addStages(const Job& job, bool json, Report& report) {
     report.add(name + ".deviation", stage.deviation);
     report.add(name + ".seconds", stage.seconds);
   }
+}
+
+/// Seconds and operations of what passed by.
+void addTimings(const Job& job, const std::string& prefix, double decode_seconds, bool json,
+                Report& report) {
+  auto figures = sized<StippleGenerateFigures>();
+  check(stipple_generate_figures(job.get(), &figures));
+  const auto line = [](const char* name, double seconds, double operations) {
+    std::printf("%-28s %9.3f s", name, seconds);
+    if (operations > 0) {
+      std::printf(" %9.4f TFLOP %7.1f GFLOP/s", operations * 1e-12, operations * 1e-9 / seconds);
+    }
+    std::printf("\n");
+  };
+  for (uint32_t i = 0; i < figures.stage_count; ++i) {
+    auto stage = sized<StippleGenerateStage>();
+    check(stipple_generate_stage(job.get(), i, &stage));
+    const std::string name = prefix + stage.name_utf8;
+    if (!json) {
+      line(stage.name_utf8, stage.seconds, stage.operations);
+      continue;
+    }
+    report.add(name + ".seconds", stage.seconds);
+    report.add(name + ".operations", stage.operations);
+  }
+  if (json) return report.add(prefix + "decoding.seconds", decode_seconds);
+  if (decode_seconds > 0) line("decoding", decode_seconds, 0);
 }
 
 /// Splats at a budget: the one that was asked for, or the model's own.
@@ -95,9 +123,64 @@ void requireOut(const std::string& out) {
                 " or .stipple.safetensors is expected");
 }
 
+/// A path with the seed behind its name: "chair_43.ply" of "chair.ply".
+std::string withSeed(const std::string& path, uint64_t seed) {
+  const size_t folder = path.find_last_of('/') + 1;  // 0 where there is none
+  const size_t end = path.find('.', folder + 1);
+  const size_t at = end == std::string::npos ? path.size() : end;
+  return path.substr(0, at) + "_" + std::to_string(seed) + path.substr(at);
+}
+
+/// Writes what a job has made. Returns the seconds of decoding, 0 for a model.
+double save(const Job& job, const std::string& out, const std::optional<int64_t>& anchors,
+            const std::string& prefix, Report& report) {
+  const auto model = make<Model>(stipple_job_model, const_cast<const StippleJob*>(job.get()));
+  if (hasModelExtension(out)) {
+    check(stipple_model_save(model.get(), out.c_str()));
+    return 0;
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const Cloud cloud = decoded(model, anchors);
+  const double seconds = secondsSince(start);
+  check(stipple_cloud_save(cloud.get(), out.c_str(), nullptr));
+  auto info = sized<StippleCloudInfo>();
+  check(stipple_cloud_info(cloud.get(), &info));
+  report.add(prefix + "gaussians", info.count);
+  return seconds;
+}
+
+struct Pictures {
+  Image image, mask;
+};
+
+/// One seed. In: before: the job of another one, or null. Returns its job.
+Job generated(const Context& context, const Pictures& pictures, const Arguments& arguments,
+              uint64_t seed, const Job& before, Report& report) {
+  const bool is_one = arguments.seeds == 1;
+  const std::string prefix = is_one ? "" : "seed" + std::to_string(seed) + ".";
+  const std::string out = is_one ? arguments.out : withSeed(arguments.out, seed);
+  std::string checkpoint = arguments.checkpoint;
+  if (!is_one && !checkpoint.empty()) checkpoint = withSeed(checkpoint, seed);
+  StippleGenerateOptions options = optionsOf(arguments);
+  options.seed = seed;
+  options.encoded_by = before.get();
+  if (!checkpoint.empty()) options.checkpoint_path_utf8 = checkpoint.c_str();
+  auto job = make<Job>(stipple_generate_start, context.get(),
+                       const_cast<const StippleImage*>(pictures.image.get()),
+                       const_cast<const StippleImage*>(pictures.mask.get()), &options);
+  finish(job);
+  const double decode_seconds = save(job, out, arguments.anchors, prefix, report);
+  std::error_code ignored;
+  if (!checkpoint.empty()) std::filesystem::remove(checkpoint, ignored);
+  if (arguments.check) addStages(job, prefix, arguments.json, report);
+  if (arguments.timings) addTimings(job, prefix, decode_seconds, arguments.json, report);
+  return job;
+}
+
 void generate(const Context& context, const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   const StippleGenerateOptions options = optionsOf(arguments);
+  const int64_t seeds = counted32(arguments.seeds, "--seeds");
   Report report;
   auto estimate = sized<StippleGenerateEstimate>();
   check(stipple_generate_estimate(context.get(), &options, &estimate));
@@ -106,30 +189,19 @@ void generate(const Context& context, const Arguments& arguments) {
   if (arguments.estimate) return report.print(arguments.json);
   if (arguments.out.empty()) throw Failure("out is missing; splats or a model is expected");
   requireOut(arguments.out);
-  const auto image = make<Image>(stipple_image_load, context.get(), arguments.image.c_str());
-  Image mask;
+  Pictures pictures;
+  pictures.image = make<Image>(stipple_image_load, context.get(), arguments.image.c_str());
   if (!arguments.mask.empty()) {
-    mask = make<Image>(stipple_image_load, context.get(), arguments.mask.c_str());
+    pictures.mask = make<Image>(stipple_image_load, context.get(), arguments.mask.c_str());
   }
-  std::fprintf(stderr, "about %.0f s and %.0f MiB of memory on this machine\n", estimate.seconds,
+  std::fprintf(stderr, "about %.0f s and %.0f MiB of memory on this machine\n",
+               estimate.seconds * static_cast<double>(seeds),
                static_cast<double>(estimate.bytes) / (1 << 20));
-  const auto job =
-      make<Job>(stipple_generate_start, context.get(), const_cast<const StippleImage*>(image.get()),
-                const_cast<const StippleImage*>(mask.get()), &options);
-  finish(job);
-  const auto model = make<Model>(stipple_job_model, const_cast<const StippleJob*>(job.get()));
-  if (hasModelExtension(arguments.out)) {
-    check(stipple_model_save(model.get(), arguments.out.c_str()));
-  } else {
-    const Cloud cloud = decoded(model, arguments.anchors);
-    check(stipple_cloud_save(cloud.get(), arguments.out.c_str(), nullptr));
-    auto info = sized<StippleCloudInfo>();
-    check(stipple_cloud_info(cloud.get(), &info));
-    report.add("gaussians", info.count);
+  Job job;
+  for (int64_t i = 0; i < seeds; ++i) {
+    job = generated(context, pictures, arguments, arguments.seed + static_cast<uint64_t>(i), job,
+                    report);
   }
-  std::error_code ignored;
-  if (!arguments.checkpoint.empty()) std::filesystem::remove(arguments.checkpoint, ignored);
-  if (arguments.check) addStages(job, arguments.json, report);
   report.add("seconds", secondsSince(start));
   report.print(arguments.json);
 }
@@ -149,6 +221,11 @@ void addGenerate(CLI::App& app, const Context& context) {
                       "Folder with the files of weights; default: that of the tool's --weights");
   command->add_option("--mask", to.mask, "Image that is white, or opaque, on the object");
   command->add_option("--seed", to.seed)->capture_default_str();
+  command
+      ->add_option("--seeds", to.seeds,
+                   "How many, from --seed on: each writes a file of its own, with the seed in its "
+                   "name. The image is encoded once")
+      ->capture_default_str();
   command
       ->add_option("--seed-mode", to.seed_mode,
                    "keyed, the same everywhere; or torch-cpu, PyTorch's noise on a CPU")
@@ -176,6 +253,7 @@ void addGenerate(CLI::App& app, const Context& context) {
   command->add_flag("--check", to.check,
                     "Says for a report whether the files are those published, and what passes by "
                     "in every layer");
+  command->add_flag("--timings", to.timings, "Seconds and operations of each stage");
   command->add_flag("--estimate", to.estimate, "Only says what it would take");
   command->add_flag("--json", to.json, "Figures as JSON");
   command->callback([arguments, &context] { generate(context, *arguments); });

@@ -2231,6 +2231,9 @@ typedef struct StippleGenerateOptions {
   const char* weights_folder_utf8;  /* NULL, the default: the context's (stipple_context_set_weights_folder) */
   const char* checkpoint_path_utf8; /* NULL, the default: none. A file that keeps the state after every step; the same
                                        image, settings and weights go on from it, and others are refused. It stays */
+  const StippleJob* encoded_by;     /* NULL, the default: none. Another job of stipple_generate_start: where it has
+                                       encoded the same image by the same files, this one does not. It may be freed
+                                       when stipple_generate_start has returned */
 } StippleGenerateOptions;
 void stipple_generate_options_init(StippleGenerateOptions* options);
 
@@ -2265,6 +2268,7 @@ typedef struct StippleGenerateStage {
   double deviation;
   double seconds;        /* from the stage before to this one */
   const char* name_utf8; /* "step3.latent"; lives as long as the job */
+  double operations;     /* multiplications and additions of networks in these seconds; 0: not counted */
 } StippleGenerateStage;
 
 /* Turns the object in an image into a latent, which decodes to splats at any budget (stipple_job_model), as a job.

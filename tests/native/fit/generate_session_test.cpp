@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -140,6 +141,58 @@ TEST_F(GenerateSessionOfGolden, NotesTheValuesOfTheGoldensFeatures) {
     return;
   }
   FAIL() << "no stage of features";
+}
+
+TEST_F(GenerateSessionOfGolden, EncodesAnImageOnceForAllSeeds) {
+  const auto encoded = [](const GenerateSession& session) {
+    double operations = 0;
+    for (size_t i = 0; i < session.status().stage_count; ++i) {
+      const StageValues& stage = session.stageAt(i);
+      if (stage.name == "structure.features" || stage.name == "colour.moments") {
+        operations += stage.operations;
+      }
+    }
+    return operations;
+  };
+  Progress progress;
+  GenerateSession first(image_, std::nullopt, options_);
+  first.run(progress);
+  EXPECT_GT(encoded(first), 1e6);
+  options_.noise.seed = 43;
+  const Latent alone = generated(options_);
+  GenerateSession second(image_, std::nullopt, options_);
+  second.takeFeatures(first);
+  second.run(progress);
+  EXPECT_EQ(encoded(second), 0);
+  EXPECT_EQ(latentOf(second).tokens, alone.tokens);
+  // Another image is another matter.
+  ByteImage mirrored = image_;
+  std::reverse(mirrored.pixels.begin(), mirrored.pixels.end());
+  for (size_t i = 0; i < mirrored.pixels.size(); i += 4) {
+    std::reverse(mirrored.pixels.begin() + static_cast<ptrdiff_t>(i),
+                 mirrored.pixels.begin() + static_cast<ptrdiff_t>(i) + 4);
+  }
+  GenerateSession other(mirrored, std::nullopt, options_);
+  other.takeFeatures(first);
+  other.run(progress);
+  EXPECT_GT(encoded(other), 1e6);
+}
+
+TEST_F(GenerateSessionOfGolden, IsCancelledWhileTheSizeIsMeasured) {
+  options_.size = 1.0;
+  options_.preview_anchors = 20000;  // seconds, if nobody stopped it
+  GenerateSession session(image_, std::nullopt, options_);
+  Progress progress;
+  std::thread canceller([&] {
+    while (progress.stage() != "Decoding splats" && progress.fraction() < 0.99) {
+      std::this_thread::yield();
+    }
+    progress.cancel();
+  });
+  expectError(ErrorCode::kCancelled, {"cancelled"}, [&] { session.run(progress); });
+  canceller.join();
+  EXPECT_EQ(progress.stage(), "Decoding splats");
+  EXPECT_GE(progress.fraction(), 0.96);
 }
 
 TEST_F(GenerateSessionOfGolden, ShowsPreviewsAndGivesEachOnce) {

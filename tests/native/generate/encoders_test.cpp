@@ -272,6 +272,34 @@ TEST(ImageCondition, PutsZerosBesideTheTokensOfTheWholeImage) {
   EXPECT_EQ(progress.fraction(), 1.0);
 }
 
+TEST(ImageCondition, OfFeaturesIsThatOfTheImageForEveryNoise) {
+  const DinoEncoder structure(madeDino(32, 48, 1).table(), kSmallHeads);
+  const VaeEncoder colour(madeVae({32, 32, 32, 32}, 2).table());
+  PreparedImage image;
+  image.size = 48;
+  for (const float value : picture(48, 48)) {
+    image.rgb.push_back(static_cast<uint8_t>(255.0f * value));
+  }
+  const ImageFeatures features = featuresOf({}, structure, colour, image);
+  for (const uint32_t seed : {4, 5}) {
+    const std::vector<float> noise = numbers(colour.noiseCount(48, 48), seed);
+    const ImageCondition once = conditionOf(structure, colour, features, noise);
+    const ImageCondition anew = encodeImage({}, structure, colour, image, noise);
+    EXPECT_EQ(once.structure, anew.structure);
+    EXPECT_EQ(once.colour, anew.colour);
+    EXPECT_EQ(once.rows, anew.rows);
+  }
+  EXPECT_THAT(
+      messageOf(ErrorCode::kInvalidArgument,
+                [&] { conditionOf(structure, colour, features, std::vector<float>(7, 0.0f)); }),
+      HasSubstr("The noise has 7 numbers"));
+  ImageFeatures other = features;
+  other.structure.pop_back();
+  EXPECT_THAT(
+      messageOf(ErrorCode::kInvalidArgument, [&] { conditionOf(structure, colour, other, {}); }),
+      HasSubstr("14 rows of 32"));
+}
+
 TEST(ImageCondition, TellsProgressAsAPartOfTheWhole) {
   const DinoEncoder structure(madeDino(32, 48, 1).table(), kSmallHeads);
   const VaeEncoder colour(madeVae({32, 32, 32, 32}, 2).table());

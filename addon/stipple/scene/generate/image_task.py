@@ -78,6 +78,7 @@ class ImageTask(Task):
         self._checkpoints = [_checkpoint_path(identity, one) for one in self._settings]
         self._anchors = anchors
         self._running = None  # (index, Generation)
+        self._encoded = None  # a Generation of this image that has ended: seeds differ in what comes behind encoders
         super().__init__(self._work)
 
     def preview(self):
@@ -97,12 +98,13 @@ class ImageTask(Task):
         middle = end - _DECODE_SHARE * (end - begin)
         path = self._checkpoints[index]
         options = generate_options(self._native.library, self._folder, path, **settings.fields())
-        job = Generation.start(self._native, self._image, self._mask, options)
+        job = Generation.start(self._native, self._image, self._mask, options, self._encoded)
         self._running = index, job
         try:
             task.run(job, begin, middle)
         finally:
             self._running = None
+        self._encoded = job
         model = Model.of_job(job)
         if os.path.exists(path):
             os.remove(path)
