@@ -4,6 +4,7 @@
 #include "generate/flow_sampler.h"
 
 #include <cmath>
+#include <span>
 #include <string>
 #include <variant>
 
@@ -59,7 +60,7 @@ const Tensor& tensorOf(const TensorTable& table, const std::string& name) {
 }
 
 template <typename T>
-std::vector<T> numbersOf(const TensorTable& table, const std::string& name, size_t count) {
+std::span<const T> numbersOf(const TensorTable& table, const std::string& name, size_t count) {
   const Tensor& tensor = tensorOf(table, name);
   const auto* values = std::get_if<std::vector<T>>(&tensor.values);
   if (values == nullptr || values->size() != count) {
@@ -91,10 +92,10 @@ Latent takeLatent(const TensorTable& table, const std::string& name) {
   latent.token_count = shape[0];
   latent.width = static_cast<uint32_t>(shape[1]);
   latent.tokens = *tokens;
-  const std::vector<float> camera = numbersOf<float>(table, name + ".camera", kCameraWidth);
+  const std::span<const float> camera = numbersOf<float>(table, name + ".camera", kCameraWidth);
   for (size_t i = 0; i < kCameraWidth; ++i) latent.camera[i] = camera[i];
-  for (const std::vector<float>* numbers : {tokens, &camera}) {
-    for (const float value : *numbers) {
+  for (const std::span<const float> numbers : {std::span<const float>(*tokens), camera}) {
+    for (const float value : numbers) {
       if (std::isfinite(value)) continue;
       fail(ErrorCode::kFormat, "the state of a sampler has " + std::to_string(value) + " in " +
                                    name + "; finite numbers are allowed");
@@ -213,7 +214,7 @@ TensorTable tensorsOfSampler(const SamplerState& state) {
 
 SamplerState samplerOfTensors(const TensorTable& table) {
   SamplerState state;
-  const std::vector<double> settings = numbersOf<double>(table, "flow.settings", 3);
+  const std::span<const double> settings = numbersOf<double>(table, "flow.settings", 3);
   if (!std::isfinite(settings[0]) || settings[0] < 1 || settings[0] > kMostSteps) {
     fail(ErrorCode::kFormat, "the state of a sampler has " + numberText(settings[0]) +
                                  " steps in flow.settings; 1 to " + std::to_string(kMostSteps) +

@@ -233,6 +233,11 @@ struct TailColumns {
   }
 };
 
+/// std::copy_n, of which GCC 16 says here that it may copy more than there is memory.
+HWY_INLINE void copyFloats(const float* from, size_t count, float* to) {
+  for (size_t i = 0; i < count; ++i) to[i] = from[i];
+}
+
 /// Calls visit(column of `from`, column of `to`, its width) for each column.
 template <class From, class To, class Visit>
 void eachColumn(const From& from, const To& to, const Visit& visit) {
@@ -253,7 +258,7 @@ MotionColumns<const float> tailOf(const MotionColumns<const float>& splats, size
   MotionColumns<float> tail;
   room.place(tail);
   eachColumn(splats, tail, [&](const float* from, float* to, size_t width) {
-    std::copy_n(from + begin * width, count * width, to);
+    copyFloats(from + begin * width, count * width, to);
   });
   MotionColumns<const float> given;
   room.place(given);
@@ -273,9 +278,9 @@ void momentsVector(const MotionColumns<const float>& splats, const TimeWindow& w
   MotionColumns<float> out;
   made.place(out);
   momentLanes(d, tail, window, time, 0, {out.positions, out.rotations, out.opacities});
-  std::copy_n(out.positions, 3 * count, moments.positions + 3 * row);
-  std::copy_n(out.rotations, 4 * count, moments.rotations + 4 * row);
-  std::copy_n(out.opacities, count, moments.opacities + row);
+  copyFloats(out.positions, 3 * count, moments.positions + 3 * row);
+  copyFloats(out.rotations, 4 * count, moments.rotations + 4 * row);
+  copyFloats(out.opacities, count, moments.opacities + row);
 }
 
 void gradientsVector(const MotionColumns<const float>& splats, const TimeWindow& window, float time,
@@ -294,12 +299,12 @@ void gradientsVector(const MotionColumns<const float>& splats, const TimeWindow&
   MotionColumns<float> by, out;
   given.place(by);
   made.place(out);
-  std::copy_n(by_moments.positions + 3 * row, 3 * count, by.positions);
-  std::copy_n(by_moments.rotations + 4 * row, 4 * count, by.rotations);
-  std::copy_n(by_moments.opacities + row, count, by.opacities);
+  copyFloats(by_moments.positions + 3 * row, 3 * count, by.positions);
+  copyFloats(by_moments.rotations + 4 * row, 4 * count, by.rotations);
+  copyFloats(by_moments.opacities + row, count, by.opacities);
   gradientLanes(d, tail, window, time, 0, {by.positions, by.rotations, by.opacities}, out);
   eachColumn(out, by_splats, [&](const float* from, float* to, size_t width) {
-    std::copy_n(from, count * width, to + row * width);
+    copyFloats(from, count * width, to + row * width);
   });
 }
 
