@@ -142,7 +142,7 @@ def test_field_kinds_match(header):
              'const float*': POINTER(c_float), 'float*': POINTER(c_float), 'const uint32_t*': POINTER(c_uint32),
              'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
              'const StippleCloud*': c_void_p, 'const StippleGrade*': POINTER(structs.StippleGrade),
-             'const StippleMesh*': c_void_p, 'const char*': c_char_p,
+             'const StippleMesh*': c_void_p, 'const StippleJob*': c_void_p, 'const char*': c_char_p,
              'const double*': POINTER(c_double), 'const StippleAperture*': POINTER(structs.StippleAperture),
              'const StippleShutter*': POINTER(structs.StippleShutter),
              'const StippleAccuracy*': POINTER(structs.StippleAccuracy),
