@@ -273,7 +273,9 @@ GenerateEstimate GenerateSession::estimate(const GenerateOptions& options) {
   const MachineSpeed& speed = machineSpeed();
   GenerateEstimate estimate;
   estimate.operations = encoding + sampling.flops;
-  estimate.seconds = (encoding + sampling.flops - sampling.attention_flops) / speed.products +
+  estimate.image_seconds = encoding / speed.products;
+  estimate.seconds = estimate.image_seconds +
+                     (sampling.flops - sampling.attention_flops) / speed.products +
                      sampling.attention_flops / speed.attention;
   estimate.bytes = workBytes(networks, options);
   for (const WeightsFile& file : networks.folder.files) estimate.weight_bytes += file.bytes;

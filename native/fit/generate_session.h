@@ -41,8 +41,9 @@ struct GenerateStatus {
 /// What a generation will take, about.
 struct GenerateEstimate {
   double seconds = 0;
-  double operations = 0;  ///< multiplications and additions
-  uint64_t bytes = 0;     ///< of memory; weights, which are read from their files, come on top
+  double image_seconds = 0;  ///< of them for the image, which several seeds share
+  double operations = 0;     ///< multiplications and additions
+  uint64_t bytes = 0;        ///< of memory; weights, which are read from their files, come on top
   uint64_t weight_bytes = 0;
 };
 

@@ -501,7 +501,7 @@ class StippleGenerateOptions(_Sized):
 
 class StippleGenerateEstimate(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('bytes', c_uint64), ('weight_bytes', c_uint64),
-                ('seconds', c_double), ('operations', c_double)]
+                ('seconds', c_double), ('operations', c_double), ('image_seconds', c_double)]
 
 
 class StippleGenerateFigures(_Sized):

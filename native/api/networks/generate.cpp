@@ -60,6 +60,7 @@ StippleGenerateEstimate estimateTo(const GenerateEstimate& estimate) {
   out.weight_bytes = estimate.weight_bytes;
   out.seconds = estimate.seconds;
   out.operations = estimate.operations;
+  out.image_seconds = estimate.image_seconds;
   return out;
 }
 

@@ -45,6 +45,7 @@ StippleGenerateOptions optionsOf(const Arguments& arguments) {
 
 void addEstimate(const StippleGenerateEstimate& estimate, Report& report) {
   report.add("estimated_seconds", estimate.seconds);
+  report.add("estimated_image_seconds", estimate.image_seconds);
   report.add("estimated_bytes", estimate.bytes);
   report.add("weight_bytes", estimate.weight_bytes);
   report.add("operations", estimate.operations);
@@ -195,7 +196,8 @@ void generate(const Context& context, const Arguments& arguments) {
     pictures.mask = make<Image>(stipple_image_load, context.get(), arguments.mask.c_str());
   }
   std::fprintf(stderr, "about %.0f s and %.0f MiB of memory on this machine\n",
-               estimate.seconds * static_cast<double>(seeds),
+               estimate.image_seconds +
+                   static_cast<double>(seeds) * (estimate.seconds - estimate.image_seconds),
                static_cast<double>(estimate.bytes) / (1 << 20));
   Job job;
   for (int64_t i = 0; i < seeds; ++i) {

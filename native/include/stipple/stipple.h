@@ -2244,6 +2244,7 @@ typedef struct StippleGenerateEstimate {
   uint64_t weight_bytes; /* of those files */
   double seconds;        /* about, on this machine */
   double operations;     /* multiplications and additions */
+  double image_seconds;  /* those of the seconds that several seeds of an image share, see encoded_by */
 } StippleGenerateEstimate;
 
 typedef struct StippleGenerateFigures {

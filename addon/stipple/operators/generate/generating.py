@@ -136,6 +136,7 @@ class GenerateOperator(JobOperator):
         except StippleError as error:
             draw_text(box, context, str(error), 'ERROR', width_px=width_px)
             return
-        draw_text(box, context, f'About {duration(cost.seconds * self.seed_count)} and {size(cost.bytes)} of memory here',
+        seconds = cost.image_seconds + self.seed_count * (cost.seconds - cost.image_seconds)
+        draw_text(box, context, f'About {duration(seconds)} and {size(cost.bytes)} of memory here',
                   'TIME', width_px=width_px)
         draw_text(box, context, weights_table.NOT_TRIED, 'INFO', width_px=width_px)
