@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "data/clouds/splat_bytes.h"
 #include "math/principal_axes.h"
 #include "math/spherical_harmonics.h"
 #include "motion/shape_kernel.h"
@@ -110,6 +111,11 @@ SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
                   end - begin);
   });
   return carried;
+}
+
+uint64_t carriedMemoryBound(const SplatCloud& cloud, const SurfaceBinding& binding) {
+  return splatBytes(cloud.size(), cloud.sh_degree) +
+         binding.triangles.size() / 3 * (sizeof(TriangleMotion) + 1);
 }
 
 }  // namespace stipple
