@@ -10,7 +10,7 @@ from .binding.errors import StippleError
 from .scene import overlays, selection_settings
 from .scene.fit import fit_proposal, fitting, strategies
 from .scene.sequence import sequences
-from .scene.source import setting_paths, source_paths, source_settings, sources, sync
+from .scene.source import bound, setting_paths, source_paths, source_settings, sources, sync
 from .scene.view import effects, photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
@@ -134,6 +134,20 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                                  override=_OVERRIDABLE, update=sync.on_property_change)
     fit_report: PointerProperty(name="Fit Report", description="Curves of the fit that made the splats",
                                 type=bpy.types.Image)
+    # What the splats follow: scene/source/bound.py.
+    bind_object: PointerProperty(name="Mesh", description="Mesh that the splats follow", type=bpy.types.Object,
+                                 options={'HIDDEN'}, override=_OVERRIDABLE)
+    bind_rest: PointerProperty(type=bpy.types.Mesh, options={'HIDDEN'})  # its shape when they were bound
+    bind_rest_render: PointerProperty(type=bpy.types.Mesh, options={'HIDDEN'})  # in renders, where they differ
+    bind_reach: EnumProperty(name="Bind", description="Which part of the mesh each splat follows",
+                             items=bound.REACHES, options={'HIDDEN'})
+    bind_matrix: FloatVectorProperty(size=16, options={'HIDDEN'})  # from the mesh's space to the splats', row by row
+    bind_topology: StringProperty(options={'HIDDEN'})  # of its faces
+    bind_topology_render: StringProperty(options={'HIDDEN'})
+    bind_key: StringProperty(options={'HIDDEN'})       # tells bindings apart
+    bind_follow: BoolProperty(name="Follow Mesh", description="The splats follow the mesh. Off, they rest where they were "
+                              "bound, and can be edited", default=True, options=set(), override=_OVERRIDABLE,
+                              update=sync.on_property_change)
     edited: BoolProperty(name="Edited", description="The splats were edited by hand", options={'HIDDEN'})
 
 

@@ -9,7 +9,7 @@ from ..binding.grade import graded
 from ..binding.structs import Status
 from . import grades, limits, shown
 from .sequence import sequences
-from .source import decoded, placement, source_settings, sources, splat_data, sync
+from .source import bound, decoded, placement, source_settings, sources, splat_data, sync
 from .view import viewed
 
 
@@ -45,7 +45,7 @@ def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
             continue
         key = obj.data.as_pointer()
         if key not in clouds:
-            clouds[key] = _cloud_of(obj, mode, depsgraph.scene, share.most(obj.original.data), wait)
+            clouds[key] = _cloud_of(obj, mode, depsgraph, share.most(obj.original.data), wait)
         if clouds[key] is not None:
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
@@ -93,27 +93,31 @@ def _key_of(entry, owner, original):
     return (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
 
 
-def _cloud_of(obj, mode, scene, most, wait):
-    """Native splats of an evaluated object at the frame of the scene, `most` at most, or None for none."""
-    data, original = obj.data, obj.original.data
+def _cloud_of(obj, mode, depsgraph, most, wait):
+    """Native splats of an evaluated object at the depsgraph's time, `most` at most, or None for none."""
+    data, original, scene = obj.data, obj.original.data, depsgraph.scene
     stipple = data.stipple
     if mode == 'RENDER' and bpy.app.background and not stipple.edited:
         # Stored splats of a file that is gone or has changed: nobody would see the panel that says so.
         sources.check_unchanged(original)
-    if limits.has_budget(stipple) and not _has_modifiers(obj) and not _is_edited(original, mode):
+    # A view shows the splats of a bound file that follow their mesh already.
+    moves = limits.has_budget(stipple) or bound.follows(original) and mode == 'RENDER'
+    if moves and not _has_modifiers(obj) and not _is_edited(original, mode):
         least = source_settings.of(stipple).least_budget
         settings = sources.at_most(sources.decode_settings(stipple, mode, scene), most, least)
+        carrier = None
         try:
+            carrier = bound.carrier(original, depsgraph)
             if stipple.is_sequence:
                 cloud = sequences.frame_of(original, stipple, scene.frame_current, mode, most).cloud()
             elif _waits(mode) or decoded.is_quick(original, settings):
-                pending = decoded.begin(original, settings, wait and (lambda job: wait(obj.name, job)))
+                pending = decoded.begin(original, settings, wait and (lambda job: wait(obj.name, job)), carrier)
                 if wait is not None:
                     return LaterCloud(obj.name, pending, grades.settings_of(stipple))
                 cloud = pending.cloud()
             else:
                 # Nobody waits for a view: it shows what is stored, and what is wanted when that is there.
-                if original.get(sync.WRITTEN_KEY) != sync.written_key(original, settings):
+                if original.get(sync.WRITTEN_KEY) != sync.written_key(original, settings, carrier):
                     sync.follow_later()
                 return _stored(obj, mode)
             return cloud and grades.apply(cloud, stipple)
@@ -121,7 +125,7 @@ def _cloud_of(obj, mode, scene, most, wait):
             raise
         except StippleError as error:
             # Without what the source needs beside its file, what is stored is still what it gives.
-            if error.status != Status.ERROR_UNAVAILABLE or not sync.is_stored(original, settings):
+            if error.status != Status.ERROR_UNAVAILABLE or not sync.is_stored(original, settings, carrier):
                 raise StippleError(f"Splat object '{obj.name}': {error}", error.status) from None
     return _stored(obj, mode)
 

@@ -95,8 +95,8 @@ StippleStatus stipple_cloud_carry(const StippleCloud* cloud, const StippleBindin
     const Context& context = cloud->context;
     context->requireMemory(carriedMemoryBound(splats, bound), "these splats on a mesh");
     withThreads(context->thread_count, [&] {
-      *carried = new StippleCloud{context, std::make_shared<const SplatCloud>(carriedSplats(
-                                               splats, bound, {deformed, length}))};
+      *carried = new StippleCloud{context, std::make_shared<const SplatCloud>(
+                                               carriedSplats(splats, bound, {deformed, length}))};
     });
   });
 }
