@@ -50,7 +50,7 @@ def c_structs(header):
     for name, body in re.findall(r'typedef struct (\w+) \{(.*?)\}', header, flags=re.S):
         fields = []
         for statement in body.split(';'):
-            names = re.sub(r'^\s*(const\s+)?\w+\s*\**\s*', '', statement.strip())
+            names = re.sub(r'^\s*(const\s+)?\w+\s*(\*(\s*const\b)?\s*)*', '', statement.strip())
             fields += [re.sub(r'\[.*\]', '', part).strip() for part in names.split(',') if part.strip()]
         found[name] = fields
     return found
