@@ -54,8 +54,8 @@ void ChangingClouds::validateValues() const {
   for (const Track& track : tracks_) {
     for (size_t s = 0; s < track.steps.size(); ++s) {
       if (!read.insert(track.steps[s]).second) continue;
-      const std::string name = "instance " + std::to_string(track.instance) +
-                               ": the cloud of step " + std::to_string(s);
+      const std::string name =
+          "instance " + std::to_string(track.instance) + ": the cloud of step " + std::to_string(s);
       validate(*track.steps[s], name.c_str());
     }
   }

@@ -34,7 +34,8 @@ void CloudCuts::cut(Instances& instances, Shutter& shutter, double share, Progre
   std::erase_if(entries_,
                 [](const Entry& entry) { return entry.hierarchy->leaves().use_count() == 1; });
   // By the tree and the cloud of a step: instances may share both.
-  std::map<std::pair<const SplatCloud*, const SplatCloud*>, std::shared_ptr<const SplatCloud>> moved;
+  std::map<std::pair<const SplatCloud*, const SplatCloud*>, std::shared_ptr<const SplatCloud>>
+      moved;
   const size_t count = instances.list.size();
   for (size_t i = 0; i < count; ++i) {
     const std::shared_ptr<const SplatCloud> own = instances.shares[i];

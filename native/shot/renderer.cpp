@@ -103,8 +103,8 @@ RenderMemory Renderer::memory(const Instances& instances, const Camera& camera,
       settings.method == ShotMethod::kRaysUnlimited
           ? rayMemory(instances.list, camera, settings.options)
           : factory_->imageMemory(instances.list, camera, settings.options, accuracyOf(settings));
-  memory.other_bytes += CloudCuts::memoryBound(instances, settings.sampling.shutter,
-                                              settings.budget_share);
+  memory.other_bytes +=
+      CloudCuts::memoryBound(instances, settings.sampling.shutter, settings.budget_share);
   if (settings.surroundings.pixels) {
     memory.other_bytes += surroundingsSeenBytes(camera);
   }

@@ -124,7 +124,8 @@ class MovingScene {
     return placedAt(point);
   }
 
-  /// The same without what changes of the splats themselves: the instances have any of their clouds.
+  /// The same without what changes of the splats themselves: the instances have any of their
+  /// clouds.
   PictureMoment placedAt(const SamplePoint& point) {
     PictureMoment moment{instances_, camera_, {}};
     for (size_t i = 0; i < instances_.size(); ++i) {
@@ -228,7 +229,8 @@ double pathLength(const Camera& camera, const Vec3d& from, const Vec3d& to) {
   return focal * std::atan2(crossProduct(from, to).norm(), from.dot(to));
 }
 
-/// The value that 19 of 20 do not exceed. Places that are not finite are for the renderer to refuse.
+/// The value that 19 of 20 do not exceed. Places that are not finite are for the renderer to
+/// refuse.
 double nineteenOfTwenty(std::vector<double>& values) {
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
   if (values.empty()) return 0;
@@ -280,8 +282,7 @@ uint32_t automaticSamples(std::span<const SplatInstance> instances, const Camera
     const PictureMoment moment = scene.placedAt(point);
     size_t row = 0, looked = 0;
     for (size_t i = 0; i < instances.size(); ++i) {
-      const Mat4d to_camera =
-          moment.camera.world_to_camera * moment.instances[i].object_to_world;
+      const Mat4d to_camera = moment.camera.world_to_camera * moment.instances[i].object_to_world;
       for (; row < instances[i].cloud->size(); row += stride, ++looked) {
         const Vec3d place = scene.clouds().positionAt(i, row, point.time);
         const Vec3d here = linearPart(to_camera) * place + translationPart(to_camera);

@@ -24,15 +24,14 @@ constexpr uint32_t kMaxSamples = 1 << 16;
 /// Whether more than one picture is needed, or one at another moment.
 bool isSampled(const Sampling& sampling);
 
-/// Refuses more than kMaxSamples, an aperture outside its range, and what validate(Shutter) refuses.
-/// Errors: kInvalidArgument.
+/// Refuses more than kMaxSamples, an aperture outside its range, and what validate(Shutter)
+/// refuses. Errors: kInvalidArgument.
 void validate(const Sampling& sampling, std::span<const SplatInstance> instances);
 
 /// A power of two from 16 to 256: enough that the copies of a splat in the picture lie at most two
-/// pixels apart where the lens spreads it, and one where it moves, by the matrices or by a motion of
-/// its own, for 19 of 20 splats. What else changes of a splat (shape, opacity, colour) asks for no
-/// more.
-/// Cost: at most 2048 splats are looked at.
+/// pixels apart where the lens spreads it, and one where it moves, by the matrices or by a motion
+/// of its own, for 19 of 20 splats. What else changes of a splat (shape, opacity, colour) asks for
+/// no more. Cost: at most 2048 splats are looked at.
 uint32_t automaticSamples(std::span<const SplatInstance> instances, const Camera& camera,
                           const Sampling& sampling);
 
@@ -53,9 +52,8 @@ using DrawMoment =
 /// the plane of focus stands still (orthographic: space is sheared); else rays start across each
 /// of them. Same bits for any number of threads if the renderer's are. Cost: that of as many
 /// pictures. Memory: renderSampledBytes beside the renderer's own.
-/// Errors: validate(Sampling), values of clouds of the shutter that validate(SplatCloud) refuses; the
-/// renderer's.
-/// Based on: Haeberli and Akeley, The Accumulation Buffer, SIGGRAPH 1990.
+/// Errors: validate(Sampling), values of clouds of the shutter that validate(SplatCloud) refuses;
+/// the renderer's. Based on: Haeberli and Akeley, The Accumulation Buffer, SIGGRAPH 1990.
 void renderSampled(std::span<const SplatInstance> instances, const Camera& camera,
                    const RenderOptions& options, const Sampling& sampling, const DrawMoment& draw,
                    RenderResult& result, Progress* progress = nullptr);

@@ -70,8 +70,9 @@ void validateClouds(const Shutter& shutter, std::span<const SplatInstance> insta
     }
     if (cloud.colour_space == own.colour_space && cloud.antialias == own.antialias) continue;
     fail(ErrorCode::kInvalidArgument,
-         name + " has another colour space or low-pass than the instance's own splats; all of its "
-                "steps must have the same");
+         name +
+             " has another colour space or low-pass than the instance's own splats; all of its "
+             "steps must have the same");
   }
 }
 

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "effect_cases.h"
-#include "splat/render/accurate_render.h"
 #include "shot/sampled_render.h"
+#include "splat/render/accurate_render.h"
 #include "wide_reference.h"
 
 namespace stipple::testing {
@@ -388,16 +388,17 @@ std::vector<EffectCase> effectCases() {
   add("a shutter curve of 1e-300", "motion blur", "squares under the root underflow",
       "the curve is scaled by a power of two first", "the same curve at 1", 1e-6, faintCurveError);
   add("quaternions of the other sign", "splats that change",
-      "halfway between the two is a rotation of no length", "the shorter way: dot product below 0, sign changed",
-      "standing still", 1e-6, flippedSignsError);
+      "halfway between the two is a rotation of no length",
+      "where their dot product is below 0, one changes its sign", "standing still", 1e-6,
+      flippedSignsError);
   add("half a turn about an axis of their own", "splats that change",
       "of two ways that are as short rounding chooses, and halfway lies near 0",
       "unit quaternions of one half space are at most a right angle apart", "standing still", 2e-4,
       halfTurnOfSplatsError);
   add("growing from scales of 0", "splats that change", "the logarithm of a scale of 0 is infinite",
-      "scales go straight", kDouble, kSingleError, growingError);
+      "scales are interpolated linearly", kDouble, kSingleError, growingError);
   add("opacity from 0 to 1", "splats that change", "the logit of both is infinite",
-      "opacities go straight", "half of it, from outside", 4e-3, appearingError);
+      "opacities are interpolated linearly", "half of its alpha", 4e-3, appearingError);
   add("two at one place, one empty, one far, one huge", "objects apart",
       "a mean depth of 0/0, and of equal ones rounding chooses",
       "an object without splats is not in the order; ties by place in the scene", kDouble,

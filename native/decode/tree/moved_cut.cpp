@@ -90,8 +90,9 @@ class MergeBelow {
     const size_t second_at = harmonics_.size() - stride_;
     float* first_sh = &harmonics_[second_at - stride_];
     for (size_t k = 0; k < stride_; ++k) {
-      first_sh[k] = static_cast<float>(share * static_cast<double>(first_sh[k]) +
-                                       (1 - share) * static_cast<double>(harmonics_[second_at + k]));
+      first_sh[k] =
+          static_cast<float>(share * static_cast<double>(first_sh[k]) +
+                             (1 - share) * static_cast<double>(harmonics_[second_at + k]));
     }
     harmonics_.resize(second_at);
   }

@@ -205,12 +205,12 @@ TEST_F(EffectsApi, ASplatThatMovesByItsCloudsIsAnObjectThatMoves) {
   STIPPLE_ASSERT_OK(stipple_renderer_create(context_, &renderer));
   uint32_t samples = 0;
   options_.samples = 0;
-  STIPPLE_ASSERT_OK(stipple_renderer_sample_count(renderer, &instance, 1, &camera_, &options_,
-                                                  &samples));
+  STIPPLE_ASSERT_OK(
+      stipple_renderer_sample_count(renderer, &instance, 1, &camera_, &options_, &samples));
   EXPECT_EQ(samples, 16u);
   options_.samples = 64;
-  STIPPLE_ASSERT_OK(stipple_renderer_render_start(renderer, &instance, 1, &camera_, &options_,
-                                                  &buffers, &job));
+  STIPPLE_ASSERT_OK(
+      stipple_renderer_render_start(renderer, &instance, 1, &camera_, &options_, &buffers, &job));
   stipple_cloud_free(after);
   STIPPLE_ASSERT_OK(stipple_job_wait(job));
   EXPECT_EQ(colour, by_clouds);

@@ -136,9 +136,10 @@ TEST(CloudBlend, RefusesCloudsOfOtherSplats) {
     blendClouds(cloudOf(3, 1), cloudOf(4, 1), 0.5, out);
     FAIL();
   } catch (const Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "clouds of 3 splats of degree 2 and of 4 of degree 2 have nothing between them; as "
-                 "many of one degree are needed");
+    EXPECT_STREQ(
+        error.what(),
+        "clouds of 3 splats of degree 2 and of 4 of degree 2 have nothing between them; as "
+        "many of one degree are needed");
   }
   EXPECT_THROW(blendClouds(cloudOf(3, 1, 1), cloudOf(3, 1, 2), 0.5, out), Error);
 }

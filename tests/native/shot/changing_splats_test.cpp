@@ -141,7 +141,8 @@ TEST(ChangingSplats, ArePicturesOfTheExactMomentsAveragedByHand) {
     for (const Mat4d& matrix : {instances[0].object_to_world, shifted, Mat4d(Mat4d::Identity())}) {
       sampling.shutter.instances.push_back(matrix);
     }
-    for (const Share& cloud : {steps[s], Share(), Share()}) sampling.shutter.clouds.push_back(cloud);
+    for (const Share& cloud : {steps[s], Share(), Share()})
+      sampling.shutter.clouds.push_back(cloud);
   }
   size_t pictures = 0;
   const RenderResult picture =
@@ -205,8 +206,9 @@ TEST(ChangingSplats, AStillDeformationHasTheBitsOfNone) {
   const Share equal = std::make_shared<const SplatCloud>(cloud);
   Sampling sampling = opened(3);
   const RenderResult none = sampled({&instance, 1}, sampling);
-  for (const std::vector<Share>& clouds :
-       {std::vector<Share>{nullptr, nullptr, nullptr}, {same, same, same}, {same, equal, nullptr}}) {
+  for (const std::vector<Share>& clouds : {std::vector<Share>{nullptr, nullptr, nullptr},
+                                           {same, same, same},
+                                           {same, equal, nullptr}}) {
     sampling.shutter.clouds = clouds;
     expectSamePicture(sampled({&instance, 1}, sampling), none);
   }
@@ -276,8 +278,7 @@ TEST(ChangingSplats, OfWhichEachInstanceHasItsOwnAreDrawnInOneWorkspace) {
   sampling.shutter.clouds = {nullptr, nullptr, other, other, other, third};
   RenderWorkspace workspace;
   const auto reusing = [&](std::span<const SplatInstance> drawn, const Camera& camera,
-                           const RenderOptions& options, RenderResult& result,
-                           Progress* progress) {
+                           const RenderOptions& options, RenderResult& result, Progress* progress) {
     EXPECT_EQ(drawn[0].cloud, drawn[1].cloud);
     EXPECT_NE(drawn[0].cloud, drawn[2].cloud);
     EXPECT_TRUE(drawn[2].values_are_checked);
@@ -344,8 +345,9 @@ TEST(ChangingSplats, OfOtherCountsDegreesAndValuesAreRefusedByName) {
   wrong = beside;
   wrong.opacities[5] = 1.5f;
   withSecond(wrong);
-  EXPECT_NE(refusalOf(instances, sampling).find("instance 1: the cloud of step 1: opacity of splat"),
-            std::string::npos);
+  EXPECT_NE(
+      refusalOf(instances, sampling).find("instance 1: the cloud of step 1: opacity of splat"),
+      std::string::npos);
   wrong.opacities[5] = std::nanf("");
   withSecond(wrong);
   EXPECT_NE(refusalOf(instances, sampling).find("instance 1: the cloud of step 1"),
