@@ -134,8 +134,9 @@ TEST(Renderer, TheFactoryDrawsWhatIsNotADefinition) {
   for (const bool is_blurred : {false, true}) {
     settings.sampling.aperture.radius = is_blurred ? 0.1 : 0;
     settings.sampling.samples = is_blurred ? 2 : 0;
-    for (const ShotMethod method : {ShotMethod::kTiled, ShotMethod::kRays, ShotMethod::kReference,
-                                    ShotMethod::kRaysUnlimited}) {
+    for (const ShotMethod method :
+         {ShotMethod::kTiled, ShotMethod::kRays, ShotMethod::kReference,
+          ShotMethod::kRaysUnlimited}) {
       settings.method = method;
       const std::vector<float> colour = colourOf(renderer, instances, settings);
       const bool is_plain = std::all_of(colour.begin(), colour.end(), [](float value) {
@@ -254,8 +255,7 @@ TEST(Renderer, AnImageOfOneColourBehindSplatsIsThatBackground) {
   for (const OutputColour output : {OutputColour::kSceneLinear, OutputColour::kComposited}) {
     for (const bool has_matte : {false, true}) {
       ShotSettings settings;
-      if (has_matte)
-        settings.options.surface = {kWidth, kHeight, wall.data(), nullptr, some.data()};
+      if (has_matte) settings.options.surface = {kWidth, kHeight, wall.data(), nullptr, some.data()};
       ShotSettings plain = settings;
       plain.options.with_background = true;
       for (size_t c = 0; c < 3; ++c) plain.options.background[c] = static_cast<double>(behind[c]);
