@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "data/clouds/splat_bytes.h"
+#include "data/clouds/cloud_bytes.h"
 #include "math/principal_axes.h"
 #include "math/spherical_harmonics.h"
 #include "motion/shape_kernel.h"
@@ -114,7 +114,7 @@ SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
 }
 
 uint64_t carriedMemoryBound(const SplatCloud& cloud, const SurfaceBinding& binding) {
-  return splatBytes(cloud.size(), cloud.sh_degree) +
+  return cloudBytes(cloud.size(), cloud.sh_degree) +
          binding.triangles.size() / 3 * (sizeof(TriangleMotion) + 1);
 }
 

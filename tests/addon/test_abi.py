@@ -50,7 +50,7 @@ def c_structs(header):
     for name, body in re.findall(r'typedef struct (\w+) \{(.*?)\}', header, flags=re.S):
         fields = []
         for statement in body.split(';'):
-            names = re.sub(r'^\s*(const\s+)?\w+\s*\**\s*', '', statement.strip())
+            names = re.sub(r'^\s*(const\s+)?\w+\s*(\*(\s*const\b)?\s*)*', '', statement.strip())
             fields += [re.sub(r'\[.*\]', '', part).strip() for part in names.split(',') if part.strip()]
         found[name] = fields
     return found
@@ -140,8 +140,9 @@ def test_field_kinds_match(header):
     kinds = {'uint32_t': c_uint32, 'uint64_t': c_uint64, 'int64_t': ctypes.c_int64, 'double': c_double,
              'float': c_float, 'char': ctypes.c_char,
              'const float*': POINTER(c_float), 'float*': POINTER(c_float), 'const uint32_t*': POINTER(c_uint32),
-             'uint32_t*': POINTER(c_uint32), 'constuint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
-             'const StippleCloud*': c_void_p, 'const StippleGrade*': POINTER(structs.StippleGrade),
+             'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
+             'const StippleCloud*': c_void_p, 'const StippleCloud* const*': POINTER(c_void_p),
+             'const StippleGrade*': POINTER(structs.StippleGrade),
              'const StippleMesh*': c_void_p, 'const StippleJob*': c_void_p, 'const char*': c_char_p,
              'const double*': POINTER(c_double), 'const StippleAperture*': POINTER(structs.StippleAperture),
              'const StippleShutter*': POINTER(structs.StippleShutter),
@@ -151,7 +152,7 @@ def test_field_kinds_match(header):
     for name, body in re.findall(r'typedef struct (\w+) \{(.*?)\}', header, flags=re.S):
         mine = dict(structs.STRUCTS[name]._fields_)
         for statement in filter(None, (' '.join(part.split()) for part in body.split(';'))):
-            kind, names = re.match(r'((?:const )?\w+\*?) (.*)', statement).groups()
+            kind, names = re.match(r'((?:const )?\w+\*?(?: const\*)?) (.*)', statement).groups()
             for field in names.split(','):
                 field, _, length = field.strip().partition('[')
                 expected = kinds[kind] * int(length.rstrip(']')) if length else kinds[kind]

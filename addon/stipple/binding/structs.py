@@ -235,7 +235,8 @@ class StippleAperture(_Sized):
 
 class StippleShutter(_Sized):
     _fields_ = [('struct_size', c_uint32), ('step_count', c_uint32), ('cameras', POINTER(c_double)),
-                ('instances', POINTER(c_double)), ('curve', POINTER(c_double)), ('curve_count', c_uint64)]
+                ('instances', POINTER(c_double)), ('curve', POINTER(c_double)), ('curve_count', c_uint64),
+                ('clouds', POINTER(c_void_p))]
 
 
 class StippleRenderOptions(_Sized):

@@ -988,9 +988,10 @@ typedef struct StippleAperture {
   double ratio;           /* height over width; 0: 1 */
 } StippleAperture;
 
-/* What moves while the shutter is open: matrices at steps that are spread evenly over that time, the first when
- * it opens, the last when it closes. Between steps rotations are interpolated at an even speed (slerp), and the
- * rest of the matrices linearly. All arrays are read during the call. */
+/* What moves and changes while the shutter is open: matrices and splats at steps that are spread evenly over that
+ * time, the first when it opens, the last when it closes. Between steps rotations of matrices are interpolated at an
+ * even speed (slerp), and the rest of the matrices linearly; of splats, positions, scales, opacities and harmonics
+ * linearly, row by row, and rotations the shorter way. All arrays are read during the call. */
 typedef struct StippleShutter {
   uint32_t struct_size;
   uint32_t step_count;        /* 2..1025 */
@@ -998,6 +999,11 @@ typedef struct StippleShutter {
   const double* instances;    /* [steps,count,16] object to world; NULL: they stand still */
   const double* curve;        /* [curve_count] 0 or more: how far it is open, at even steps; NULL: fully, always */
   uint64_t curve_count;       /* 2 or more, with curve */
+  /* [steps,count] the splats of each instance, which may be freed once the call is over; NULL at a step: the
+   * instance's own. All have as many splats as those, of the same degree, colour space and low-pass, in the same
+   * rows. An accuracy with a budget_share below 1 merges the same splats at every step. NULL: no splat changes.
+   * Cost: each image reads two clouds and writes one; memory: one cloud for each instance that changes. */
+  const StippleCloud* const* clouds;
 } StippleShutter;
 
 typedef struct StippleRenderOptions {

@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "data/clouds/cloud_transform.h"
-#include "data/clouds/splat_bytes.h"
+#include "data/clouds/cloud_bytes.h"
 
 namespace stipple {
 
@@ -106,8 +106,8 @@ uint64_t mergeMemoryBound(std::span<const SplatInstance> instances) {
   uint64_t total = 0;
   uint64_t largest = 0;
   for (const SplatInstance& instance : instances) {
-    total += splatBytes(instance.cloud->size(), degree);
-    largest = std::max(largest, splatBytes(instance.cloud->size(), instance.cloud->sh_degree));
+    total += cloudBytes(instance.cloud->size(), degree);
+    largest = std::max(largest, cloudBytes(instance.cloud->size(), instance.cloud->sh_degree));
   }
   return total + largest;
 }
