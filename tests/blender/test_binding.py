@@ -386,3 +386,59 @@ def test_a_series_is_refused(stipple, tmp_path):
     splats = series.load(series.write(stipple, tmp_path / 'swarm', range(1, 4)))
     scenes.select(splats, scenes.quad())
     scenes.refuses(bpy.ops.stipple.bind_to_mesh, 'is a series of files')
+
+
+# ---- motion blur --------------------------------------------------------------------------------
+
+def test_deformation_is_blurred(stipple, tmp_path):
+    """A square that rises by 2 m in the ten frames: over a shutter of two frames its splats are spread as far as it
+    moves, and half as much light is anywhere as where it would stand still."""
+    mesh = scenes.quad()
+    scenes.material('White', (1.0, 1.0, 1.0), mesh)
+    animate_up(mesh, 2.0)
+    splats = scenes.make_splats(mesh, anchors=COUNT)
+    assert bpy.ops.stipple.bind_to_mesh() == {'FINISHED'}
+    scene = bpy.context.scene
+    scene.frame_set(6)
+    scene.render.use_motion_blur = False
+    heights = side_heights(tmp_path, 'sharp')
+    assert heights.std() < 0.06
+    scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 2.0
+    scene.stipple.blur_samples = 64
+    blurred = side_heights(tmp_path, 'blurred')
+    # Frames 5 to 7: what the shape key says there.
+    low, high = (np.float64(mesh_height(mesh, frame)) for frame in (5, 7))
+    assert high - low > 0.5
+    assert blurred.mean() == pytest.approx(heights.mean(), abs=0.03)
+    # Evenly spread light has a deviation of a twelfth of its square.
+    assert blurred.std() == pytest.approx((high - low) / np.sqrt(12), rel=0.15)
+    scene.frame_set(6)
+    if hasattr(splats, 'cycles') and hasattr(splats.cycles, 'use_deform_motion'):
+        splats.cycles.use_deform_motion = False
+        assert side_heights(tmp_path, 'off').std() < 0.06
+
+
+def mesh_height(mesh, frame):
+    bpy.context.scene.frame_set(frame)
+    evaluated = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    height = evaluated.data.vertices[0].co.z
+    bpy.context.scene.frame_set(6)
+    return height
+
+
+class side_heights:
+    """Mean and deviation of the heights at which a side view has light."""
+
+    def __init__(self, tmp_path, name):
+        scene = bpy.context.scene
+        scene.render.engine, scene.render.film_transparent = 'STIPPLE', True
+        scenes.camera((0, -6, 1), (np.pi / 2, 0, 0), width=64, height=64, type='ORTHO', ortho_scale=4.0)
+        opacity = scenes.render_pixels(tmp_path, name)[..., 3].sum(axis=1)
+        self._heights = (np.arange(64) + 0.5 - 32) / 64 * 4 + 1
+        self._shares = opacity / opacity.sum()
+
+    def mean(self):
+        return self._shares @ self._heights
+
+    def std(self):
+        return np.sqrt(self._shares @ np.square(self._heights - self.mean()))

@@ -18,20 +18,21 @@ def gather(depsgraph, mode, warn=lambda message: None):
 
     mode: 'VIEWPORT' or 'RENDER', which budget. warn: called with a sentence per object that is left out.
     """
-    return [placed for _, _, _, placed in gather_keyed(depsgraph, mode, warn)]
+    return [entry[3] for entry in gather_keyed(depsgraph, mode, warn)]
 
 
 def gather_owned(depsgraph, mode, warn=lambda message: None):
     """[(owner, object, placed)], placed as gather has it, with the original object, and the original one that it is
     selected and hidden with: itself or its instancer."""
-    return [entry[1:] for entry in gather_keyed(depsgraph, mode, warn)]
+    return [entry[1:4] for entry in gather_keyed(depsgraph, mode, warn)]
 
 
 def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
-    """The same with a key before each, which stays while it is the same instance: matrices() has it at other times.
-    wait: called with (name of an object, job) where a source has to be read, to wait for the job; then what is not
-    decoded yet is a LaterCloud, for decode_later()."""
-    clouds, found = {}, []
+    """The same with a key before each, which stays while it is the same instance: matrices() has it at other times. And
+    with a BoundSplats behind those that follow a mesh, None behind others. wait: called with (name of an object, job)
+    where a source has to be read, to wait for the job; then what is not decoded yet is a LaterCloud, for
+    decode_later()."""
+    clouds, found, carried = {}, [], {}
     share, splats = limits.share(depsgraph, mode), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
         obj = splats.of(entry)
@@ -45,13 +46,29 @@ def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
             continue
         key = obj.data.as_pointer()
         if key not in clouds:
-            clouds[key] = _cloud_of(obj, mode, depsgraph, share.most(obj.original.data), wait)
+            clouds[key] = _cloud_of(obj, mode, depsgraph, share.most(obj.original.data), wait, carried)
         if clouds[key] is not None:
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
             found.append((_key_of(entry, owner, original), owner, original,
-                          (clouds[key], matrix, shown.holds_out(entry, depsgraph))))
+                          (clouds[key], matrix, shown.holds_out(entry, depsgraph)), carried.get(original.data.name_full)))
     return found
+
+
+class BoundSplats:
+    """The splats of a datablock that follow a mesh, to have them at other times."""
+
+    def __init__(self, data, pending, grade):
+        self._data, self._pending, self._grade = data, pending, grade
+
+    def carrier(self, depsgraph):
+        """What carries them at the depsgraph's present time. Errors: StippleError."""
+        return bound.carrier(self._data, depsgraph)
+
+    def cloud_at(self, carrier):
+        """The splats as they are in an image, carried to another shape. It never touches Blender. Errors:
+        StippleError."""
+        return graded(self._pending.cloud_at(carrier), self._grade)
 
 
 class LaterCloud:
@@ -93,8 +110,9 @@ def _key_of(entry, owner, original):
     return (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
 
 
-def _cloud_of(obj, mode, depsgraph, most, wait):
-    """Native splats of an evaluated object at the depsgraph's time, `most` at most, or None for none."""
+def _cloud_of(obj, mode, depsgraph, most, wait, carried):
+    """Native splats of an evaluated object at the depsgraph's time, `most` at most, or None for none. Those that follow
+    a mesh are added to `carried` (BoundSplats by the name of their datablock)."""
     data, original, scene = obj.data, obj.original.data, depsgraph.scene
     stipple = data.stipple
     if mode == 'RENDER' and bpy.app.background and not stipple.edited:
@@ -112,6 +130,8 @@ def _cloud_of(obj, mode, depsgraph, most, wait):
                 cloud = sequences.frame_of(original, stipple, scene.frame_current, mode, most).cloud()
             elif _waits(mode) or decoded.is_quick(original, settings):
                 pending = decoded.begin(original, settings, wait and (lambda job: wait(obj.name, job)), carrier)
+                if carrier is not None:
+                    carried[original.name_full] = BoundSplats(original, pending, grades.settings_of(stipple))
                 if wait is not None:
                     return LaterCloud(obj.name, pending, grades.settings_of(stipple))
                 cloud = pending.cloud()
