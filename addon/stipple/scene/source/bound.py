@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ... import version
 from ...binding.errors import StippleError
 from ...binding.job import Job
 from ...binding.structs import BindingReach, Status
@@ -75,14 +76,8 @@ def unbind(data):
 
 def _stored(data, shape):
     """A mesh of the .blend that keeps a shape, of triangles."""
-    rest, triangles = bpy.data.meshes.new(f'{data.name} at rest'), shape.triangles
-    rest.vertices.add(len(shape.vertices))
-    rest.vertices.foreach_set('co', shape.vertices.reshape(-1))
-    rest.loops.add(3 * len(triangles))
-    rest.loops.foreach_set('vertex_index', triangles.reshape(-1).astype(np.int32))
-    rest.polygons.add(len(triangles))
-    rest.polygons.foreach_set('loop_start', np.arange(0, 3 * len(triangles), 3, dtype=np.int32))
-    rest.polygons.foreach_set('loop_total', np.full(len(triangles), 3, np.int32))
+    rest = bpy.data.meshes.new(f'{data.name} at rest')
+    version.set_triangles(rest, shape.vertices, shape.triangles)
     return rest
 
 
