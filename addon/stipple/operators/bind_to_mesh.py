@@ -6,7 +6,7 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 
 from ..binding.errors import StippleError, invalid
-from ..scene.source import bound, edits, placement, splat_data, sync
+from ..scene.source import bound, decoded, edits, placement, sources, splat_data, sync
 
 
 def _is_mesh(obj):
@@ -73,12 +73,12 @@ class STIPPLE_OT_bind_to_mesh(bpy.types.Operator):
                 bound.hold(user, mesh)
                 if self.parent and user.parent != mesh:
                     _make_child(user, mesh)
+        context.view_layer.update()
         try:
-            sync.sync(obj, context.evaluated_depsgraph_get(), 'VIEWPORT')
+            _write(data, bound.carrier(data))
         except StippleError:
             _release(data)
             raise
-        sync.problems.pop(data.name, None)
 
 
 class STIPPLE_OT_unbind(bpy.types.Operator):
@@ -100,8 +100,21 @@ class STIPPLE_OT_unbind(bpy.types.Operator):
                 self.report({'ERROR'}, f"'{obj.name}' is linked from another file; make it local first.")
                 return {'CANCELLED'}
             _release(obj.data)
-            sync.try_sync(obj, context.evaluated_depsgraph_get(), 'VIEWPORT')
+            sync.problems.pop(obj.data.name, None)
+            if obj.data.stipple.edited or sync.is_edited(obj.data):
+                continue  # what was changed by hand is never written over
+            try:
+                _write(obj.data, None)
+            except StippleError as error:
+                self.report({'WARNING'}, f"'{obj.name}' follows no mesh now, but its source cannot be shown: {error}")
         return {'FINISHED'}
+
+
+def _write(data, carrier):
+    """Stores what the source gives now."""
+    settings = sources.decode_settings(data.stipple)
+    splats = decoded.decode_data(data, settings, carrier=carrier).columns()
+    sync.write(data, splats, sync.written_key(data, settings, carrier))
 
 
 def _release(data):

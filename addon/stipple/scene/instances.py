@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splat objects that a view layer shows, with their instances, as native clouds."""
 
+from dataclasses import dataclass, replace
+
 import bpy
 
 from .. import version
 from ..binding.errors import CancelledError, StippleError
 from ..binding.grade import graded
+from ..binding.model import DecodeSettings
 from ..binding.structs import Status
 from . import grades, limits, shown
 from .sequence import sequences
@@ -29,10 +32,10 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
 
 def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
     """The same with a key before each, which stays while it is the same instance: matrices() has it at other times. And
-    with a BoundSplats behind those that follow a mesh, None behind others. wait: called with (name of an object, job)
+    with a ChangingSplats behind those that a frame changes beside their matrix, None behind others. wait: called with (name of an object, job)
     where a source has to be read, to wait for the job; then what is not decoded yet is a LaterCloud, for
     decode_later()."""
-    clouds, found, carried = {}, [], {}
+    clouds, found, changing = {}, [], {}
     share, splats = limits.share(depsgraph, mode), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
         obj = splats.of(entry)
@@ -46,29 +49,45 @@ def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
             continue
         key = obj.data.as_pointer()
         if key not in clouds:
-            clouds[key] = _cloud_of(obj, mode, depsgraph, share.most(obj.original.data), wait, carried)
+            clouds[key] = _cloud_of(obj, mode, depsgraph, share.most(obj.original.data), wait, changing)
         if clouds[key] is not None:
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
             found.append((_key_of(entry, owner, original), owner, original,
-                          (clouds[key], matrix, shown.holds_out(entry, depsgraph)), carried.get(original.data.name_full)))
+                          (clouds[key], matrix, shown.holds_out(entry, depsgraph)), changing.get(original.data.name_full)))
     return found
 
 
-class BoundSplats:
-    """The splats of a datablock that follow a mesh, to have them at other times."""
+@dataclass(frozen=True)
+class Moment:
+    """How splats change: their settings at a time, and what carries them."""
 
-    def __init__(self, data, pending, grade):
-        self._data, self._pending, self._grade = data, pending, grade
+    settings: DecodeSettings
+    carrier: object  # bound.Carrier, or None
 
-    def carrier(self, depsgraph):
-        """What carries them at the depsgraph's present time. Errors: StippleError."""
-        return bound.carrier(self._data, depsgraph)
+    @property
+    def key(self):
+        """Equal for equal splats of a datablock."""
+        return self.settings, self.carrier and self.carrier.key
 
-    def cloud_at(self, carrier):
-        """The splats as they are in an image, carried to another shape. It never touches Blender. Errors:
-        StippleError."""
-        return graded(self._pending.cloud_at(carrier), self._grade)
+
+class ChangingSplats:
+    """The splats of a datablock that move or follow a mesh, at the budget of an image, to have them at other times."""
+
+    def __init__(self, data, settings, grade):
+        self._data, self._settings, self._grade = data, settings, grade
+
+    def moment(self, depsgraph):
+        """How they are at the depsgraph's present time. Errors: StippleError."""
+        settings = self._settings
+        if source_settings.of(self._data.stipple).has_time:
+            stipple = self._data.evaluated_get(depsgraph).stipple
+            settings = replace(settings, time=sources.seconds(stipple, depsgraph.scene))
+        return Moment(settings, bound.carrier(self._data, depsgraph))
+
+    def cloud_at(self, moment):
+        """The splats of a moment, with the grade of the image. Errors: StippleError."""
+        return graded(decoded.decode_data(self._data, moment.settings, carrier=moment.carrier), self._grade)
 
 
 class LaterCloud:
@@ -110,9 +129,9 @@ def _key_of(entry, owner, original):
     return (owner.name_full, original.name_full, *(entry.persistent_id if entry.is_instance else ()))
 
 
-def _cloud_of(obj, mode, depsgraph, most, wait, carried):
-    """Native splats of an evaluated object at the depsgraph's time, `most` at most, or None for none. Those that follow
-    a mesh are added to `carried` (BoundSplats by the name of their datablock)."""
+def _cloud_of(obj, mode, depsgraph, most, wait, changing):
+    """Native splats of an evaluated object at the depsgraph's time, `most` at most, or None for none. Those that a
+    frame changes are added to `changing` (ChangingSplats by the name of their datablock)."""
     data, original, scene = obj.data, obj.original.data, depsgraph.scene
     stipple = data.stipple
     if mode == 'RENDER' and bpy.app.background and not stipple.edited:
@@ -130,8 +149,8 @@ def _cloud_of(obj, mode, depsgraph, most, wait, carried):
                 cloud = sequences.frame_of(original, stipple, scene.frame_current, mode, most).cloud()
             elif _waits(mode) or decoded.is_quick(original, settings):
                 pending = decoded.begin(original, settings, wait and (lambda job: wait(obj.name, job)), carrier)
-                if carrier is not None:
-                    carried[original.name_full] = BoundSplats(original, pending, grades.settings_of(stipple))
+                if carrier is not None or source_settings.of(stipple).has_time:
+                    changing[original.name_full] = ChangingSplats(original, settings, grades.settings_of(stipple))
                 if wait is not None:
                     return LaterCloud(obj.name, pending, grades.settings_of(stipple))
                 cloud = pending.cloud()

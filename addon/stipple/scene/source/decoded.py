@@ -155,11 +155,7 @@ class Carried:
 
     def cloud(self, wait=None, is_image=True):
         """wait, is_image: as Decoder.cloud() has them. Errors: StippleError."""
-        return self.cloud_at(self._carrier, wait, is_image)
-
-    def cloud_at(self, carrier, wait=None, is_image=True):
-        """cloud() at another shape of the mesh, of a carrier of the same datablock."""
-        return carrier.carried(self._key, lambda: self._make(wait, is_image), wait or Job.wait)
+        return self._carrier.carried(self._key, lambda: self._make(wait, is_image), wait or Job.wait)
 
     def read_anew(self, _native):
         """cloud() for one of many frames."""

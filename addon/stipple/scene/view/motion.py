@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves while the shutter is open: cameras, splat objects and splats that follow meshes, at sub-frames, as Cycles
-has them."""
+"""What moves while the shutter is open: cameras, splat objects, and splats that move or follow meshes, at sub-frames, as
+Cycles has them."""
 
 import math
 from dataclasses import dataclass
@@ -47,17 +47,17 @@ def sample(scene, depsgraph, camera_object, entries, set_frame):
     the end, whatever happens. Errors: StippleError for a mesh that splats cannot follow there.
     """
     keys = [entry[0] for entry in entries]
-    bound = {i: entry[4] for i, entry in enumerate(entries) if entry[4] is not None and _deforms(entry[2])}
+    changing = {i: entry[4] for i, entry in enumerate(entries) if entry[4] is not None and _deforms(entry[2])}
     frame, subframe = scene.frame_current, scene.frame_subframe
     count = max([_steps(camera_object)] + [_steps(scene_object) for scene_object in _objects(keys)])
-    cameras_at, placed_at, carriers_at = [], [], []
+    cameras_at, placed_at, moments_at = [], [], []
     try:
         for time in times(scene, count):
             set_frame(math.floor(time), time - math.floor(time))
             # References to evaluated things do not outlive a change of frame.
             cameras_at.append(cameras.world_to_camera(camera_object.evaluated_get(depsgraph).matrix_world))
             placed_at.append(instances.matrices(depsgraph))
-            carriers_at.append({i: splats.carrier(depsgraph) for i, splats in bound.items()})
+            moments_at.append({i: splats.moment(depsgraph) for i, splats in changing.items()})
     finally:
         set_frame(frame, subframe)
     here = instances.matrices(depsgraph)
@@ -67,11 +67,11 @@ def sample(scene, depsgraph, camera_object, entries, set_frame):
     cameras_at = np.array(cameras_at)
     moving = np.abs(moved - moved[:1]).max(axis=(0, 2, 3)) > STANDS_STILL if keys else np.zeros(0, bool)
     camera_moves = _blurs(camera_object) and np.abs(cameras_at - cameras_at[0]).max() > STANDS_STILL
-    changing = [i for i in bound if len({carriers[i].key for carriers in carriers_at}) > 1]
-    clouds = [[bound[i].cloud_at(carriers[i]) if i in changing else None for i in range(len(keys))]
-              for carriers in carriers_at] if changing else None
+    blurred = [i for i in changing if len({moments[i].key for moments in moments_at}) > 1]
+    clouds = [[changing[i].cloud_at(moments[i]) if i in blurred else None for i in range(len(keys))]
+              for moments in moments_at] if blurred else None
     moved = moved if moving.any() else None
-    moving[changing] = True
+    moving[blurred] = True
     return Shutter(cameras_at if camera_moves else None, moved, clouds, _curve(scene),
                    scene.render.motion_blur_shutter, int(moving.sum()))
 
@@ -95,7 +95,7 @@ def _blurs(obj):
 
 
 def _deforms(obj):
-    """Whether an object's splats are blurred as their mesh deforms; Cycles' own setting, of splats that are meshes."""
+    """Whether an object's splats are blurred as they change; Cycles' own setting, of splats that are meshes."""
     return _blurs(obj) and getattr(getattr(obj, 'cycles', None), 'use_deform_motion', True)
 
 
