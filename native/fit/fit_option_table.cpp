@@ -54,7 +54,7 @@ const FitOption kTable[] = {
      .stored_of = kOfSplats,
      .presets = {{"adaptive", "improved", "improved"},
                  {"", "", ""},
-                 {"adaptive", "adaptive", "adaptive"}}},
+                 {"temporal", "temporal", "temporal"}}},
     {.name = "start_splats",
      .kind = FitOptionKind::kCount,
      .member = member<&FitOptions::start_splats>(),

@@ -72,7 +72,7 @@ def test_a_splat_file_of_it_is_its_begin(moving, model, tmp_path):
 
 def test_images_without_times_are_refused_with_what_is_missing(dataset, tmp_path):  # noqa: F811
     message = error('fit', dataset, tmp_path / 'm.stipple.safetensors', *FEW)
-    assert "1 different times" in message and "'time' of a frame in transforms.json" in message
+    assert "all views have the same time" in message and "'time' of a frame in transforms.json" in message
 
 
 def test_options_of_fields_are_refused(moving, tmp_path):

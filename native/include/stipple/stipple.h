@@ -1782,7 +1782,7 @@ typedef struct StippleFitOptions {
   const char* strategy_utf8;   /* how splats are added and removed: a strategy that stipple_strategy_info lists,
                                   with its settings, and parts beside or instead of its own:
                                   "adaptive(threshold=0.0003)+long_axis_split". NULL, the default:
-                                  "adaptive"; of a field, as density_gradient says. Presets of explicit splats set
+                                  "adaptive", of motion "temporal"; of a field, as density_gradient says. Presets of explicit splats set
                                   it: "adaptive" where fast, else "improved" */
   uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
   uint64_t max_splats;         /* explicit and motion: hard cap, 1..2^28 */

@@ -80,7 +80,11 @@ class ExplicitModel final : public FitModel, private Regulariser {
     report.ssim = value.ssim;
     report.seconds.backward = watch.lap();
 
-    if (request.any()) observeView(*backend_, *strategy_, moment_, view.index);
+    if (request.any()) {
+      lifespans_.clear();
+      if (request.lifespans && motion_) motion_->lifespansInUse(backend_->splats(), lifespans_);
+      observeView(*backend_, *strategy_, moment_, view.index, lifespans_);
+    }
     report.seconds.edit = watch.lap();
     if (strategy_->stepGate(moment_)) {
       setRates();
@@ -154,7 +158,11 @@ class ExplicitModel final : public FitModel, private Regulariser {
   }
 
   /// Gives the splats the numbers of their motion, behind what the strategy trains beside them.
-  void beginMotion(const MotionClip& clip) {
+  void beginMotion(MotionClip clip) {
+    TimeStretch stretch;
+    strategy_->adjustStretch(stretch);
+    clip.window_frames = stretch.frames;
+    clip.window_share = stretch.share;
     TrainingState state = backend_->state();
     motion_extra_ = state.splats.extra_lengths.size();
     motion_ = std::make_unique<MovingParameterisation>(clip, strategy_->parameterisation(),
@@ -233,6 +241,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
   std::unique_ptr<Strategy> strategy_;  ///< outlives the backend, which draws by its activations
   std::unique_ptr<MovingParameterisation> motion_;  ///< the same; null: splats stand still
   size_t motion_extra_ = 0;                         ///< the first of its extras
+  std::vector<float> lifespans_;                    ///< [N] of the step under way, where asked for
   ExplicitModelOptions options_;
   std::unique_ptr<RenderBackend> backend_;
   LearningRates rates_;

@@ -27,7 +27,7 @@ struct ExplicitModelOptions {
   uint64_t seed = 0;
   uint64_t iterations = 30000;  ///< of the fit, which what it begins with may depend on
   /// Splats move over this clip: each view is drawn as they are at its time, and their motion is
-  /// trained with them.
+  /// trained with them. Its window is what the strategy says (TimeStretch).
   std::optional<MotionClip> clip = {};
 };
 

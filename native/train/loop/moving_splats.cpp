@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "base/random.h"
 #include "motion/lifespan.h"
@@ -36,6 +37,10 @@ constexpr double kLifespanRate = 3e-3;
 constexpr uint32_t kFramesBetweenMoments = 20;
 constexpr float kStartLifespan = 1;  ///< raw
 
+/// Seconds: a rate of frames is a number then, however many there are.
+constexpr double kShortestClip = 1e-9;
+constexpr double kLongestClip = 1e12;
+
 /// out[i] = map(i) for i < count, by all threads.
 template <class Map>
 void fillInParallel(size_t count, float* out, const Map& map) {
@@ -53,14 +58,20 @@ MotionClip clipOfViews(const ViewSource& views) {
   times.erase(std::unique(times.begin(), times.end()), times.end());
   if (times.size() < 2) {
     fail(ErrorCode::kInvalidArgument,
-         "the views have " + std::to_string(times.size()) +
-             " different times; splats that move need views of at least 2 ('time' of a frame in "
-             "transforms.json)");
+         "all views have the same time; splats that move need views of 2 times or more ('time' of a "
+         "frame in transforms.json)");
   }
   MotionClip clip;
   clip.begin = times.front();
   clip.frame_count = static_cast<uint32_t>(times.size());
-  clip.frames_per_second = (clip.frame_count - 1) / (times.back() - times.front());
+  const double seconds = times.back() - times.front();
+  if (!(seconds >= kShortestClip && seconds <= kLongestClip)) {
+    fail(ErrorCode::kInvalidArgument, "the views are of " + numberText(times.front()) + " to " +
+                                          numberText(times.back()) + " s; clips of " +
+                                          numberText(kShortestClip) + " to " +
+                                          numberText(kLongestClip) + " s can be fitted");
+  }
+  clip.frames_per_second = (clip.frame_count - 1) / seconds;
   return clip;
 }
 
@@ -126,6 +137,19 @@ MotionColumns<const float> MovingParameterisation::columnsOf(const RawSplats& ra
   columns.lifespans = lifespans_.data();
   columns.centres = extras[kCentres].data();
   return columns;
+}
+
+void MovingParameterisation::lifespansInUse(const RawSplats& raw,
+                                            std::vector<float>& lifespans) const {
+  const double unit = lifespanUnit(clip_.frame_count);
+  const auto time = static_cast<float>(clip_.partOf(seconds_));
+  const std::vector<float>& both = raw.extras[first_extra_ + kLifespans];
+  const std::vector<float>& centres = raw.extras[first_extra_ + kCentres];
+  lifespans.resize(raw.size());
+  // Stretching keeps the sign of an offset.
+  fillInParallel(raw.size(), lifespans.data(), [&](size_t i) {
+    return lifespanOf(both[2 * i + (time < centres[i] ? 0 : 1)], unit);
+  });
 }
 
 MotionCloud MovingParameterisation::cloudOf(const RawSplats& raw) const {

@@ -12,7 +12,8 @@
 namespace stipple {
 
 /// The clip that the times of views tell: from the first to the last, with as many frames as there
-/// are times that differ. Errors: kInvalidArgument for views of one time.
+/// are times that differ. Errors: kInvalidArgument for views of one time, and for clips that are
+/// shorter than a nanosecond or longer than 10^12 s.
 MotionClip clipOfViews(const ViewSource& views);
 
 /// How a fit of splats that move gets from raw numbers to splats at one time. Raw splats have the
@@ -39,6 +40,9 @@ class MovingParameterisation final : public Parameterisation {
   /// The extras of splats that begin to move: they stand still, and their moments are drawn among
   /// every 20th frame and the last one.
   std::vector<std::vector<float>> initialExtras(size_t count, uint64_t seed) const;
+  /// The temporal scale of each splat that fades it at the present time, in stretched time. Out:
+  /// lifespans [N].
+  void lifespansInUse(const RawSplats& raw, std::vector<float>& lifespans) const;
   /// All that raw splats with these extras say.
   MotionCloud cloudOf(const RawSplats& raw) const;
 

@@ -81,6 +81,8 @@ TEST(ClipOfViews, HasAFrameForEveryTimeThatDiffers) {
   EXPECT_EQ(clip.frame_count, 3u);
   EXPECT_EQ(clip.frames_per_second, 1);
   EXPECT_EQ(clip.end(), 2.5);
+  add(1e13);
+  EXPECT_THROW(clipOfViews(views), Error);
 }
 
 TEST(MovingParameterisation, DrawsMomentsAmongEvery20thFrameAndTheLast) {
@@ -333,6 +335,78 @@ TEST(FitOfMovingSplats, ShowsTimesThatItNeverSawWhereAStillOneCannot) {
     EXPECT_EQ(seen.scales, drawn_then.scales);
     EXPECT_EQ(seen.sh, drawn_then.sh);
   }
+}
+
+/// Asks for temporal scales in every second iteration, and notes what it gets.
+class Asking final : public Strategy {
+ public:
+  Asking(std::vector<std::vector<float>>& seen, TimeStretch stretch)
+      : seen_(seen), stretch_(stretch) {}
+  const char* name() const override { return "asking"; }
+  void adjustStretch(TimeStretch& stretch) const override { stretch = stretch_; }
+  StatisticRequest requests(const FitMoment& moment) const override {
+    StatisticRequest request;
+    request.screen_gradients = true;
+    request.lifespans = moment.iteration % 2 == 0;
+    return request;
+  }
+  void observe(const FitMoment&, const ViewStatistics& view) override {
+    seen_.emplace_back(view.splats.lifespans.begin(), view.splats.lifespans.end());
+  }
+
+ private:
+  std::vector<std::vector<float>>& seen_;
+  TimeStretch stretch_;
+};
+
+TEST(FitOfMovingSplats, TellsAStrategyTheTemporalScalesThatAreInUse) {
+  const auto views = viewsOfClip(swingingBall());
+  std::vector<std::vector<float>> seen;
+  ExplicitModelOptions options;
+  options.sh_degree = 0;
+  options.clip = clipOf(kFrames);
+  const TimeStretch stretch = {7, 0.6};
+  const auto model =
+      makeExplicitModel(*cpuBackends(), ballOfSplats(40, 1),
+                        std::make_unique<Asking>(seen, stretch), options);
+  // Other scales before a splat's moment than after it.
+  TensorTable state = model->state();
+  auto& raw = numbersOf(state, "raw.extra10");
+  for (size_t i = 0; i < raw.size(); ++i) raw[i] = i % 2 == 0 ? -1.0f : -2.0f;
+  model->restore(state);
+  const MotionCloud before = *motionResult(*model);
+  EXPECT_EQ(before.clip.window_frames, 7);
+  EXPECT_EQ(before.clip.window_share, 0.6);
+  const SplatCloud start = model->splatsAt(0, 2.0);
+  EXPECT_EQ(start.opacities, splatsAt(before, 2.0).opacities);
+  Fit fit(*views, *model, 1000);
+  fit.run(2);
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_TRUE(seen[0].empty());
+  ASSERT_EQ(seen[1].size(), 40u);
+  const double time = before.clip.partOf(fit.moment().time);
+  size_t sooner = 0;
+  for (size_t i = 0; i < 40; ++i) {
+    const bool is_before = time < static_cast<double>(before.centres[i]);
+    sooner += is_before;
+    // One step of 3e-3 has been taken: less than half a hundredth.
+    EXPECT_NEAR(seen[1][i] / before.lifespans[2 * i + (is_before ? 0 : 1)], 1, 0.005);
+  }
+  EXPECT_GT(sooner, 5u);
+  EXPECT_LT(sooner, 35u);
+}
+
+TEST(FitOfMovingSplats, GrowsByItsOwnStrategy) {
+  const auto views = viewsOfClip(swingingBall());
+  FitObserver nobody;
+  const auto fit = trainerOf(views, true, "temporal(threshold=2e-5)", 4000);
+  fit->run(nobody);
+  RecordProperty("psnr", std::to_string(fit->history().by_budget.back().psnr));
+  EXPECT_GT(fit->model().budgets()[0], 60u);
+  EXPECT_GT(fit->history().by_budget.back().psnr, 27.5);
+  const MotionCloud found = *motionResult(fit->model());
+  EXPECT_EQ(found.clip.window_frames, kWindowFrames);
+  EXPECT_EQ(found.clip.window_share, kWindowShare);
 }
 
 void expectSame(const TensorTable& one, const TensorTable& other) {
