@@ -182,8 +182,8 @@ class StepOfMovingSplats : public ::testing::TestWithParam<const char*> {
 
   /// By differences, of one number.
   double slope(const std::string& name, size_t i) {
-    // Numbers are float32, so that each drawn splat is off by 1e-7 of its size: 1e-4 of the slope
-    // at this distance, about as much as the third derivative does.
+    // Numbers are float32, so that each drawn splat is off by 1e-7 of its size: about 1e-4 of the
+    // slope at this distance, as much as the third derivative does.
     constexpr float kStep = 2e-3f;
     TensorTable moved = state_;
     float& value = numbersOf(moved, name)[i];
@@ -229,7 +229,7 @@ TEST_P(StepOfMovingSplats, AgreesWithDifferencesOfTheLossInEveryNumber) {
       worst = std::max(worst, std::abs(10 * static_cast<double>(moments[i]) - expected));
     }
     RecordProperty(name, std::to_string(worst / largest));
-    EXPECT_LT(worst, 2e-3 * largest) << name;
+    EXPECT_LT(worst, 1e-3 * largest) << name;  // measured: 1.5e-4
   }
 }
 
@@ -318,9 +318,8 @@ TEST(FitOfMovingSplats, ShowsTimesThatItNeverSawWhereAStillOneCannot) {
   const double psnr_moving = moving->history().by_budget.back().psnr;
   RecordProperty("still", std::to_string(psnr_still));
   RecordProperty("moving", std::to_string(psnr_moving));
-  // Measured: 24.5 and 28.5 dB. A still splat can at best be the mean of where it has been, which no
-  // number of steps changes (24.2 dB after 1,500, 24.5 after 12,000); the other fit has not ended
-  // then (32.6 dB after 12,000).
+  // Measured: 24.5 and 29.5 dB. A still splat can at best be the mean of where it has been, which no
+  // number of steps changes (24.2 dB after 1,500, 24.5 after 12,000); the other fit still gains.
   EXPECT_GT(psnr_moving, psnr_still + 3);
   const std::optional<MotionCloud> found = motionResult(moving->model());
   ASSERT_TRUE(found);
@@ -403,7 +402,7 @@ TEST(FitOfMovingSplats, GrowsByItsOwnStrategy) {
   fit->run(nobody);
   RecordProperty("psnr", std::to_string(fit->history().by_budget.back().psnr));
   EXPECT_GT(fit->model().budgets()[0], 60u);
-  EXPECT_GT(fit->history().by_budget.back().psnr, 27.5);
+  EXPECT_GT(fit->history().by_budget.back().psnr, 28);  // measured: 30.2; that of still ones is 24.5
   const MotionCloud found = *motionResult(fit->model());
   EXPECT_EQ(found.clip.window_frames, kWindowFrames);
   EXPECT_EQ(found.clip.window_share, kWindowShare);
