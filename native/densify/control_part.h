@@ -35,8 +35,8 @@ struct ControlMoment : FitMoment {
   uint64_t event_count = 0;  ///< of the whole fit
   uint64_t interval = 100;   ///< iterations from one event to the next
   uint64_t until_event = 0;  ///< iterations to the next one; UINT64_MAX: there is none any more
-  /// [N] where candidates are asked for: share of the threshold at which each splat multiplies, > 0;
-  /// empty: 1.
+  /// [N] where candidates are asked for: share of the threshold at which each splat multiplies,
+  /// above 0; empty: 1.
   std::span<const float> threshold_shares = {};
 
   /// Whether this is what iteration `published` of a fit of 30,000 is here.

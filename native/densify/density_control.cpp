@@ -23,7 +23,8 @@ std::vector<uint32_t> staying(std::span<const uint8_t> goes) {
 /// Refuses thresholds that nobody goes by.
 void requireHeed(const ControlPart& part, const ControlAssembly& assembly) {
   for (const auto& other : assembly.parts) {
-    if (!(other->owns() & roles(ControlRole::kMultiplication)) || other->heedsThresholds()) continue;
+    const bool multiplies = other->owns() & roles(ControlRole::kMultiplication);
+    if (!multiplies || other->heedsThresholds()) continue;
     fail(ErrorCode::kInvalidArgument, std::string(part.name()) + " does not go with " +
                                           other->name() + ", which decides without a threshold");
   }

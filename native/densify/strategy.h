@@ -74,8 +74,8 @@ struct LearningRates {
 
 /// How time is stretched about the moment of each splat that moves (motion/time_window.h).
 struct TimeStretch {
-  double frames = 0;  ///< of the window that gets more of the time; 0: time is not stretched
-  double share = 0.7; ///< of the whole range, that the window gets
+  double frames = 0;   ///< of the window that gets more of the time; 0: time is not stretched
+  double share = 0.7;  ///< of the whole range, that the window gets
 };
 
 /// Derivatives of splats by their stored values, shaped as SplatCloud is.

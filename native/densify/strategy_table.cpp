@@ -156,7 +156,7 @@ const std::vector<StrategyEntry>& strategyEntries() {
        .make = revisedControl},
       {.name = "temporal",
        .label = "Temporal",
-       .summary = "As adaptive, for splats that move: asks what is seen for a short time alone, too",
+       .summary = "As adaptive, for splats that move: what lives for a short time multiplies, too",
        .make = temporalControl},
       // Further strategies go here.
   };

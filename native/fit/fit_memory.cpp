@@ -46,8 +46,7 @@ uint64_t fitMemoryBound(const FitOptions& options, const ViewSource& views) {
   const bool is_field = options.model == FitKind::kField;
   const uint64_t count =
       is_field ? options.most_anchors * options.gaussians_per_anchor : options.max_splats;
-  return pictureMemoryBound(views, options.picture_bytes) +
-         count * bytesOfSplat(options);
+  return pictureMemoryBound(views, options.picture_bytes) + count * bytesOfSplat(options);
 }
 
 void holdToMemory(FitOptions& options, const ViewSource& views) {

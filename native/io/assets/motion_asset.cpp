@@ -56,8 +56,8 @@ void validateAsset(const MotionAsset& asset, const std::string& name, ErrorCode 
   const auto requireColumn = [&](const std::string& what, const std::vector<float>& values,
                                  size_t width) {
     if (values.size() != count * width) {
-      fail(code, name + ": " + what + " has " + std::to_string(values.size() / width) +
-                     " rows; " + std::to_string(count) + " are needed, one for each splat");
+      fail(code, name + ": " + what + " has " + std::to_string(values.size() / width) + " rows; " +
+                     std::to_string(count) + " are needed, one for each splat");
     }
     for (const float value : values) {
       if (std::isfinite(value)) continue;

@@ -16,13 +16,13 @@ struct MotionAsset {
   /// Cosines of the first harmonic, sines of the first, cosines of the second and so on.
   static constexpr size_t kWaves = 8;
 
-  SplatCloud splats;                                ///< [N] what does not change with time
-  std::array<std::vector<float>, kWaves> waves{};   ///< [N,3] metres each
-  std::vector<float> phases;                        ///< [N,4] radians
-  std::vector<float> spins;                         ///< [N,4]
-  std::vector<float> lifespans;                     ///< [N,2] above 0
-  std::vector<float> centres;                       ///< [N] 0..1, parts of the clip
-  double begin = 0;                                 ///< seconds of the first frame
+  SplatCloud splats;                               ///< [N] what does not change with time
+  std::array<std::vector<float>, kWaves> waves{};  ///< [N,3] metres each
+  std::vector<float> phases;                       ///< [N,4] radians
+  std::vector<float> spins;                        ///< [N,4]
+  std::vector<float> lifespans;                    ///< [N,2] above 0
+  std::vector<float> centres;                      ///< [N] 0..1, parts of the clip
+  double begin = 0;                                ///< seconds of the first frame
   double frames_per_second = 24;
   uint32_t frame_count = 1;
   double window_frames = 0;  ///< of stretched time; 0: it is not stretched

@@ -40,8 +40,8 @@ class ViewMeasure {
   /// count for nothing.
   /// In: splats, each view's at its time; chosen: views of the store, at least one. Out: PSNR, SSIM
   /// and the count; the rest is left alone.
-  FitMeasure measure(SplatsOverTime& splats, PictureStore& pictures,
-                     std::span<const size_t> chosen, const double background[3]);
+  FitMeasure measure(SplatsOverTime& splats, PictureStore& pictures, std::span<const size_t> chosen,
+                     const double background[3]);
   FitMeasure measure(const SplatCloud& cloud, PictureStore& pictures,
                      std::span<const size_t> chosen, const double background[3]);
   /// PSNR of the same alone.
@@ -49,8 +49,8 @@ class ViewMeasure {
                   const double background[3]);
 
  private:
-  FitMeasure sumOver(SplatsOverTime& splats, PictureStore& pictures,
-                     std::span<const size_t> chosen, const double background[3], bool with_ssim);
+  FitMeasure sumOver(SplatsOverTime& splats, PictureStore& pictures, std::span<const size_t> chosen,
+                     const double background[3], bool with_ssim);
 
   std::unique_ptr<ImageRenderer> images_;
   RenderResult drawn_;

@@ -57,9 +57,10 @@ MotionClip clipOfViews(const ViewSource& views) {
   std::sort(times.begin(), times.end());
   times.erase(std::unique(times.begin(), times.end()), times.end());
   if (times.size() < 2) {
-    fail(ErrorCode::kInvalidArgument,
-         "all views have the same time; splats that move need views of 2 times or more ('time' of a "
-         "frame in transforms.json)");
+    fail(
+        ErrorCode::kInvalidArgument,
+        "all views have the same time; splats that move need views of 2 times or more ('time' of a "
+        "frame in transforms.json)");
   }
   MotionClip clip;
   clip.begin = times.front();

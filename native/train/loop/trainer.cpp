@@ -113,8 +113,8 @@ Trainer::Trainer(const BackendFactory& backends, std::shared_ptr<const ViewSourc
   extent_ = extentOfCameras(pictures_.views(), split_.training);
   double background[3];
   backgroundOf(0, background);
-  evaluator_ = std::make_unique<FitViewEvaluator>(
-      backends, splatsOf(0), pictures_, split_.training, background, options.ssim_share);
+  evaluator_ = std::make_unique<FitViewEvaluator>(backends, splatsOf(0), pictures_, split_.training,
+                                                  background, options.ssim_share);
   history_.measured_on_held_out = !split_.held_out.empty();
   history_.training_view_count = split_.training.size();
 }

@@ -23,10 +23,9 @@ FitViewEvaluator::FitViewEvaluator(const BackendFactory& backends,
                                    std::function<SplatCloud()> splats, PictureStore& pictures,
                                    const std::vector<size_t>& training, const double background[3],
                                    double ssim_share)
-    : FitViewEvaluator(
-          backends,
-          SplatsOverTime([make = std::move(splats)](double) { return make(); }, false), pictures,
-          training, background, ssim_share) {}
+    : FitViewEvaluator(backends,
+                       SplatsOverTime([make = std::move(splats)](double) { return make(); }, false),
+                       pictures, training, background, ssim_share) {}
 
 const Camera& FitViewEvaluator::camera(size_t view) const {
   if (view >= training_.size()) {

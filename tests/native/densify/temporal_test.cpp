@@ -46,8 +46,8 @@ std::vector<float> scoresOf(Strategy& strategy, const std::vector<Shown>& views,
 TEST(VisibilityWeightedScore, AveragesPullsByHowOpaqueTheSplatIs) {
   const auto strategy = makeStrategy("adaptive+visibility_weighted_score");
   // By hand, of 2e-4: (0.5 1e-4 + 1 4e-4) / 1.5 = 3e-4.
-  const std::vector<float> scores = scoresOf(
-      *strategy, {{Seen({1e-4f}), {0.5f}, {}}, {Seen({-4e-4f}), {1.0f}, {}}}, 1);
+  const std::vector<float> scores =
+      scoresOf(*strategy, {{Seen({1e-4f}), {0.5f}, {}}, {Seen({-4e-4f}), {1.0f}, {}}}, 1);
   ASSERT_EQ(scores.size(), 1u);
   EXPECT_NEAR(scores[0], 1.5, 1e-6);  // a few roundings of float32
 }

@@ -318,8 +318,8 @@ TEST(FitOfMovingSplats, ShowsTimesThatItNeverSawWhereAStillOneCannot) {
   const double psnr_moving = moving->history().by_budget.back().psnr;
   RecordProperty("still", std::to_string(psnr_still));
   RecordProperty("moving", std::to_string(psnr_moving));
-  // Measured: 24.5 and 29.5 dB. A still splat can at best be the mean of where it has been, which no
-  // number of steps changes (24.2 dB after 1,500, 24.5 after 12,000); the other fit still gains.
+  // Measured: 24.5 and 29.5 dB. A still splat can at best be the mean of where it has been, which
+  // no number of steps changes (24.2 dB after 1,500, 24.5 after 12,000); the other fit still gains.
   EXPECT_GT(psnr_moving, psnr_still + 3);
   const std::optional<MotionCloud> found = motionResult(moving->model());
   ASSERT_TRUE(found);
@@ -365,9 +365,8 @@ TEST(FitOfMovingSplats, TellsAStrategyTheTemporalScalesThatAreInUse) {
   options.sh_degree = 0;
   options.clip = clipOf(kFrames);
   const TimeStretch stretch = {7, 0.6};
-  const auto model =
-      makeExplicitModel(*cpuBackends(), ballOfSplats(40, 1),
-                        std::make_unique<Asking>(seen, stretch), options);
+  const auto model = makeExplicitModel(*cpuBackends(), ballOfSplats(40, 1),
+                                       std::make_unique<Asking>(seen, stretch), options);
   // Other scales before a splat's moment than after it.
   TensorTable state = model->state();
   auto& raw = numbersOf(state, "raw.extra10");
@@ -402,7 +401,8 @@ TEST(FitOfMovingSplats, GrowsByItsOwnStrategy) {
   fit->run(nobody);
   RecordProperty("psnr", std::to_string(fit->history().by_budget.back().psnr));
   EXPECT_GT(fit->model().budgets()[0], 60u);
-  EXPECT_GT(fit->history().by_budget.back().psnr, 28);  // measured: 30.2; that of still ones is 24.5
+  EXPECT_GT(fit->history().by_budget.back().psnr,
+            28);  // measured: 30.2; that of still ones is 24.5
   const MotionCloud found = *motionResult(fit->model());
   EXPECT_EQ(found.clip.window_frames, kWindowFrames);
   EXPECT_EQ(found.clip.window_share, kWindowShare);
