@@ -59,6 +59,11 @@ def test_it_decodes_at_any_time_and_always_whole(model, tmp_path):
     assert f'{count} to {count} is allowed' in error('decode', model, tmp_path / 'few.ply', '--anchors', count - 1)
 
 
+def test_a_conversion_would_lose_the_motion(model, tmp_path):
+    assert error('convert', model, tmp_path / 'still.ply').endswith(
+        'holds splats that move; stipple decode --time makes those of one time')
+
+
 def test_it_comes_back_from_a_copy_bit_for_bit(model, tmp_path):
     run('decode', model, tmp_path / 'copy.stipple.safetensors')
     assert (tmp_path / 'copy.stipple.safetensors').read_bytes() == model.read_bytes()
