@@ -115,7 +115,11 @@ StippleFitOptionInfo infoOf(size_t index) {
   info.minimum = option.minimum;
   info.maximum = option.maximum;
   info.default_utf8 = defaultFitText(index);
+  static_assert(sizeof(option.presets) ==
+                sizeof(info.presets_utf8) + sizeof(info.motion_presets_utf8));
   std::memcpy(info.presets_utf8, option.presets, sizeof(info.presets_utf8));
+  std::memcpy(info.motion_presets_utf8, option.presets[STIPPLE_FIT_MOTION],
+              sizeof(info.motion_presets_utf8));
   static_assert(std::size(info.alias_units) == kFitAliasCount);
   for (size_t i = 0; i < kFitAliasCount; ++i) {
     info.aliases_utf8[i] = option.aliases[i].name;

@@ -39,6 +39,7 @@ enum class RandomUse : uint32_t {
   kStartChoice = 21,
   kStartPoint = 22,
   kBackground = 13,
+  kStartMoment = 14,
   kNetworkStart = 30,
   kFieldStart = 31,
   kAnchorBudget = 32,

@@ -46,6 +46,10 @@ Source sourceOf(const Context& context, const std::string& path) {
       throw Failure("'" + path +
                     "' holds a model of any budget and no splats; stipple decode makes them");
     }
+    if (settings.has_time) {
+      throw Failure("'" + path +
+                    "' holds splats that move; stipple decode --time makes those of one time");
+    }
     source.cloud = cutOf(source.hierarchy, settings.maximum_budget);
   }
   auto info = sized<StippleCloudInfo>();

@@ -167,16 +167,16 @@ struct Result {
 
 void save(const Context& context, const Job& job, const Result& result) {
   const bool is_asset = !hasSplatExtension(result.out);
-  if (result.model == STIPPLE_FIT_FIELD && is_asset) {
-    const auto field = make<Model>(stipple_fit_model, job.get());
-    check(stipple_model_save(field.get(), result.out.c_str()));
+  if (result.model != STIPPLE_FIT_EXPLICIT && is_asset) {
+    const auto model = make<Model>(stipple_fit_model, job.get());
+    check(stipple_model_save(model.get(), result.out.c_str()));
     return;
   }
   auto cloud = make<Cloud>(stipple_fit_cloud, job.get(), result.budget);
   auto info = sized<StippleCloudInfo>();
   check(stipple_cloud_info(cloud.get(), &info));
   const bool is_cut = result.budget > 0 && result.budget < info.count;
-  if (result.model == STIPPLE_FIT_EXPLICIT && (is_asset || is_cut)) {
+  if (result.model != STIPPLE_FIT_FIELD && (is_asset || is_cut)) {
     const Model tree = hierarchyOf(context, cloud, result.seed);
     if (is_asset) {
       check(stipple_model_save(tree.get(), result.out.c_str()));

@@ -26,7 +26,9 @@ std::vector<std::string> wordsOf(const StippleFitOptionInfo& info) {
 }
 
 const char* groupOf(const StippleFitOptionInfo& info) {
-  if (info.models == 1u << STIPPLE_FIT_EXPLICIT) return "Options of explicit splats";
+  if (info.models == (1u << STIPPLE_FIT_EXPLICIT | 1u << STIPPLE_FIT_MOTION)) {
+    return "Options of explicit splats";
+  }
   if (info.models == 1u << STIPPLE_FIT_FIELD) return "Options of fields";
   return "Options";
 }
@@ -40,7 +42,8 @@ const char* typeOf(const StippleFitOptionInfo& info) {
 /// presets of the model have none.
 std::string presetText(const StippleFitOptionInfo& info, uint32_t model) {
   const size_t count = kQualities.size();
-  const char* const* texts = info.presets_utf8 + model * count;
+  const char* const* texts =
+      model == STIPPLE_FIT_MOTION ? info.motion_presets_utf8 : info.presets_utf8 + model * count;
   if ((info.models & (1u << model)) == 0 || !texts[0] || !*texts[0]) return "";
   std::string all;
   bool is_one = true;
@@ -59,6 +62,8 @@ std::string helpOf(const StippleFitOptionInfo& info) {
   if (!of_splats.empty() && !of_fields.empty() && of_splats != of_fields) {
     preset += "; of a field " + of_fields;
   }
+  const std::string of_moving = presetText(info, STIPPLE_FIT_MOTION);
+  if (!of_moving.empty() && of_moving != of_splats) preset += "; of motion " + of_moving;
   std::string help = info.help_utf8;
   if (!preset.empty()) help += " Default: " + preset + ".";
   const bool has_end = info.maximum < std::numeric_limits<uint32_t>::max();
@@ -125,7 +130,7 @@ void FitFlags::requireModel(const Flag& flag, uint32_t model) const {
   const bool is_default = flag.text && *flag.text == flag.info.default_utf8 && !isPreset(flag.info);
   if (!flag.isGiven() || is_default || (flag.info.models & (1u << model)) != 0) return;
   throw Failure(flag.name + " belongs to --model " +
-                (model == STIPPLE_FIT_EXPLICIT ? "field" : "explicit"));
+                (model == STIPPLE_FIT_FIELD ? "explicit" : "field"));
 }
 
 StippleFitOptions FitFlags::options(const std::string& checkpoint) const {

@@ -108,6 +108,10 @@ const char* wordsOf(ControlRole role) {
       return "how splats are filtered";
     case ControlRole::kSecondSplit:
       return "which splats are split once more";
+    case ControlRole::kThreshold:
+      return "how strong a pull must be";
+    case ControlRole::kTime:
+      return "how time is stretched";
   }
   return "";
 }

@@ -35,6 +35,9 @@ struct ControlMoment : FitMoment {
   uint64_t event_count = 0;  ///< of the whole fit
   uint64_t interval = 100;   ///< iterations from one event to the next
   uint64_t until_event = 0;  ///< iterations to the next one; UINT64_MAX: there is none any more
+  /// [N] where candidates are asked for: share of the threshold at which each splat multiplies,
+  /// above 0; empty: 1.
+  std::span<const float> threshold_shares = {};
 
   /// Whether this is what iteration `published` of a fit of 30,000 is here.
   bool isAt(uint64_t published) const { return iteration == scaleSchedule(published, iterations); }
@@ -69,9 +72,11 @@ enum class ControlRole : uint32_t {
   kParameterisation = 1u << 11,  ///< how raw numbers become splats
   kFilter = 1u << 12,            ///< what is done to splats after that, before they are drawn
   kSecondSplit = 1u << 13,       ///< which splats are split after that, children too
+  kThreshold = 1u << 14,         ///< how little of a pull is enough to multiply, splat by splat
+  kTime = 1u << 15,              ///< how time is stretched, of splats that move
 };
 /// Roles are bits 0 to this, without a gap.
-constexpr uint32_t kControlRoleCount = 14;
+constexpr uint32_t kControlRoleCount = 16;
 using ControlRoles = uint32_t;
 constexpr ControlRoles roles(ControlRole role) {
   return static_cast<ControlRoles>(role);
@@ -109,6 +114,12 @@ class ControlPart : public FitHooks<ControlMoment> {
   // ---- at an event -------------------------------------------------------------------------------
   /// kMultiplication without kChildren: who may multiply, rising rows, each once.
   virtual std::vector<Candidate> candidates(const ControlMoment&, const RawSplats&) { return {}; }
+  /// The same: whether it goes by ControlMoment::threshold_shares.
+  virtual bool heedsThresholds() const { return false; }
+  /// kThreshold: those shares, [N] > 0.
+  virtual std::vector<float> thresholdShares(const ControlMoment&, size_t count) {
+    return std::vector<float>(count, 1.0f);
+  }
   /// kScore: how much each candidate is worth, >= 0. As many as there is room for are drawn without
   /// replacement, by these weights; those of weight 0 are not.
   virtual std::vector<double> score(const ControlMoment&, const RawSplats&,

@@ -20,6 +20,16 @@ std::vector<uint32_t> staying(std::span<const uint8_t> goes) {
   return rows;
 }
 
+/// Refuses thresholds that nobody goes by.
+void requireHeed(const ControlPart& part, const ControlAssembly& assembly) {
+  for (const auto& other : assembly.parts) {
+    const bool multiplies = other->owns() & roles(ControlRole::kMultiplication);
+    if (!multiplies || other->heedsThresholds()) continue;
+    fail(ErrorCode::kInvalidArgument, std::string(part.name()) + " does not go with " +
+                                          other->name() + ", which decides without a threshold");
+  }
+}
+
 /// Refuses parts that nobody would ask.
 void requireUse(const char* name, const ControlAssembly& assembly) {
   constexpr ControlRoles kWhole = roles(ControlRole::kMultiplication, ControlRole::kChildren);
@@ -34,6 +44,7 @@ void requireUse(const char* name, const ControlAssembly& assembly) {
                                               ": nothing there decides " + wordsOf(role));
       }
     }
+    if (part->owns() & roles(ControlRole::kThreshold)) requireHeed(*part, assembly);
     if ((part->owns() & kWhole) != kWhole) continue;
     for (const auto& other : assembly.parts) {
       if (other == part || !(other->owns() & kOfIt)) continue;
@@ -63,6 +74,9 @@ class DensityControl final : public Strategy {
   }
   void adjustRates(LearningRates& rates) const override {
     for (const auto& part : parts_) part->adjustRates(rates);
+  }
+  void adjustStretch(TimeStretch& stretch) const override {
+    if (const ControlPart* part = owner(ControlRole::kTime)) part->adjustStretch(stretch);
   }
 
   std::vector<ExtraParameter> parameters() const override {
@@ -255,7 +269,13 @@ class DensityControl final : public Strategy {
       return;
     }
     ControlPart* children = owner(ControlRole::kChildren);
-    std::vector<Candidate> chosen = part->candidates(moment, splats);
+    ControlMoment judged = moment;
+    std::vector<float> shares;
+    if (ControlPart* threshold = owner(ControlRole::kThreshold)) {
+      shares = threshold->thresholdShares(moment, splats.size());
+      judged.threshold_shares = shares;
+    }
+    std::vector<Candidate> chosen = part->candidates(judged, splats);
     dropHopeless(moment, splats, *children, goes, chosen);
     chooseFirst(moment, splats, goes, room, chosen);
     edit.append = children->children(moment, splats, chosen);

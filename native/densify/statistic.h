@@ -57,12 +57,14 @@ struct StatisticRequest {
   bool structure_errors = false;
   /// Splats as they are drawn, for ViewStatistics::splats: they are copied out for it.
   bool drawn_splats = false;
+  /// Temporal scales of splats that move, for DrawnSplats::lifespans.
+  bool lifespans = false;
   /// Pictures for ViewStatistics::errors: nothing is gathered of splats.
   bool error_maps = false;
 
   bool any() const {
     return contributions || blending_weights || screen_gradients || absolute_screen_gradients ||
-           structure_errors || drawn_splats || error_maps || covered || errors_of ||
+           structure_errors || drawn_splats || lifespans || error_maps || covered || errors_of ||
            !edge_weights.empty() || !errors.empty();
   }
 };

@@ -72,6 +72,12 @@ struct LearningRates {
   double higher_colour = 2.5e-3 / 20;
 };
 
+/// How time is stretched about the moment of each splat that moves (motion/time_window.h).
+struct TimeStretch {
+  double frames = 0;   ///< of the window that gets more of the time; 0: time is not stretched
+  double share = 0.7;  ///< of the whole range, that the window gets
+};
+
 /// Derivatives of splats by their stored values, shaped as SplatCloud is.
 struct CloudGradient {
   std::span<float> positions;  ///< [N,3]
@@ -100,6 +106,9 @@ struct DrawnSplats {
   std::span<const float> rotations;  ///< [N,4]
   std::span<const float> scales;     ///< [N,3]
   std::span<const float> opacities;  ///< [N]
+  /// [N] the temporal scale that fades each splat at the time of the view, in stretched time, where
+  /// StatisticRequest::lifespans asks for it; empty where splats do not move.
+  std::span<const float> lifespans = {};
 };
 
 /// What one view told about the splats. Arrays live as long as the call.
@@ -183,6 +192,8 @@ class FitHooks {
   /// densified), and how fast it learns.
   virtual void prepare(RawSplats&, uint64_t /*iterations*/) const {}
   virtual void adjustRates(LearningRates&) const {}
+  /// Of splats that move. Of parts: kTime.
+  virtual void adjustStretch(TimeStretch&) const {}
   /// The splats start with these, and the parameterisation stays. Of parts, the owner of
   /// kParameterisation is asked.
   virtual std::vector<ExtraParameter> parameters() const { return {}; }

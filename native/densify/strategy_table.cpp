@@ -1,10 +1,13 @@
 #include "densify/parts/edge_aware_score.h"
 #include "densify/parts/filter_3d.h"
 #include "densify/parts/growth_control.h"
+#include "densify/parts/lifespan_threshold.h"
 #include "densify/parts/long_axis_split.h"
 #include "densify/parts/multi_step_update.h"
+#include "densify/parts/offset_warp.h"
 #include "densify/parts/opacity_correction.h"
 #include "densify/parts/recovery_pruning.h"
+#include "densify/parts/screen_pull.h"
 #include "densify/strategies.h"
 #include "densify/strategies/absolute.h"
 #include "densify/strategies/adaptive.h"
@@ -15,6 +18,7 @@
 #include "densify/strategies/metropolis.h"
 #include "densify/strategies/revised.h"
 #include "densify/strategies/taming.h"
+#include "densify/strategies/temporal.h"
 #include "densify/strategies/volumetric.h"
 
 namespace stipple {
@@ -78,6 +82,28 @@ ControlAssembly volumeSplitPart(StrategySettings& settings) {
   return assemblyOf(volumeSplit(settings));
 }
 
+ControlAssembly visibilityWeightedScore(StrategySettings& settings) {
+  ScreenPullOptions options;
+  options.copy_threshold = options.split_threshold =
+      settings.number("threshold", options.split_threshold, 1e-9, 1e9);
+  options.least_opacity = settings.number("opacity", kVisibleOpacity, 0, 1);
+  return assemblyOf(makeScreenPull(options));
+}
+
+ControlAssembly lifespanThreshold(StrategySettings& settings) {
+  LifespanThresholdOptions options;
+  options.least = settings.number("least", options.least, 0.01, 1);
+  options.power = settings.number("power", options.power, 0.01, 100);
+  return assemblyOf(makeLifespanThreshold(options));
+}
+
+ControlAssembly offsetWarp(StrategySettings& settings) {
+  TimeStretch stretch = kPublishedStretch;
+  stretch.frames = settings.number("frames", stretch.frames, 1, 1e6);
+  stretch.share = settings.number("share", stretch.share, 0.01, 0.99);
+  return assemblyOf(makeOffsetWarp(stretch));
+}
+
 ControlAssembly filter3dPart(StrategySettings& settings) {
   return assemblyOf(filter3d(settings));
 }
@@ -128,6 +154,10 @@ const std::vector<StrategyEntry>& strategyEntries() {
        .label = "Revised",
        .summary = "Multiplies the splats with the largest errors of the images, at a steady pace",
        .make = revisedControl},
+      {.name = "temporal",
+       .label = "Temporal",
+       .summary = "As adaptive, for splats that move: what lives for a short time multiplies, too",
+       .make = temporalControl},
       // Further strategies go here.
   };
   return kEntries;
@@ -176,6 +206,21 @@ const std::vector<StrategyEntry>& partEntries() {
            "Makes no splat finer than the images can show, so that zooming in stays smooth",
        .make = filter3dPart,
        .bit = 7},
+      {.name = "visibility_weighted_score",
+       .label = "Visibility Weighted Score",
+       .summary = "Counts an image by how opaque a splat is in it, so that fading hides no pull",
+       .make = visibilityWeightedScore,
+       .bit = 8},
+      {.name = "lifespan_threshold",
+       .label = "Lifespan Threshold",
+       .summary = "Lets splats that live for a short time multiply at a weaker pull",
+       .make = lifespanThreshold,
+       .bit = 9},
+      {.name = "offset_warp",
+       .label = "Offset Warp",
+       .summary = "Stretches time about each splat's moment, where it is seen and moves most",
+       .make = offsetWarp,
+       .bit = 10},
       // Further parts go here, each with the next bit.
   };
   return kEntries;

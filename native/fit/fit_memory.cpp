@@ -24,6 +24,10 @@ constexpr uint64_t kDensifyRows = 10;
 /// What drawing a splat keeps.
 constexpr uint64_t kDrawingBytes = 150;
 
+uint64_t bytesOfSplat(const FitOptions& options) {
+  return bytesPerSplat(static_cast<int>(options.sh_degree), options.model == FitKind::kMotion);
+}
+
 }  // namespace
 
 uint64_t pictureMemoryBound(const ViewSource& views, uint64_t picture_bytes) {
@@ -42,8 +46,7 @@ uint64_t fitMemoryBound(const FitOptions& options, const ViewSource& views) {
   const bool is_field = options.model == FitKind::kField;
   const uint64_t count =
       is_field ? options.most_anchors * options.gaussians_per_anchor : options.max_splats;
-  return pictureMemoryBound(views, options.picture_bytes) +
-         count * bytesPerSplat(static_cast<int>(options.sh_degree));
+  return pictureMemoryBound(views, options.picture_bytes) + count * bytesOfSplat(options);
 }
 
 void holdToMemory(FitOptions& options, const ViewSource& views) {
@@ -62,7 +65,7 @@ void holdToMemory(FitOptions& options, const ViewSource& views) {
   }
   const uint64_t pictures = pictureMemoryBound(views, options.picture_bytes);
   const uint64_t room = limit > pictures ? limit - pictures : 0;
-  const uint64_t each = bytesPerSplat(static_cast<int>(options.sh_degree));
+  const uint64_t each = bytesOfSplat(options);
   if (room < each) refuse(pictures + each, "one splat");
   options.max_splats = std::min(options.max_splats, room / each);
   options.start_splats = std::min(options.start_splats, options.max_splats);

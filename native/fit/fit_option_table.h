@@ -27,7 +27,10 @@ using FitValue = std::variant<uint64_t, double, std::string>;
 /// Bits of a set of models.
 constexpr uint32_t kOfExplicit = 1u << static_cast<uint32_t>(FitKind::kExplicit);
 constexpr uint32_t kOfField = 1u << static_cast<uint32_t>(FitKind::kField);
-constexpr uint32_t kOfEveryModel = kOfExplicit | kOfField;
+constexpr uint32_t kOfMotion = 1u << static_cast<uint32_t>(FitKind::kMotion);
+/// Whose splats have parameters of their own.
+constexpr uint32_t kOfSplats = kOfExplicit | kOfMotion;
+constexpr uint32_t kOfEveryModel = kOfSplats | kOfField;
 constexpr uint32_t kOfNoModel = 0;
 
 /// How an option lies in FitOptions.

@@ -77,7 +77,8 @@ FitOptions resolved(FitOptions options) {
   if (options.model == FitKind::kField) {
     options.density_gradient = options.density_gradient || !options.strategy.empty();
   } else if (options.strategy.empty()) {
-    options.strategy = ExplicitModelOptions().strategy;
+    options.strategy =
+        options.model == FitKind::kMotion ? "temporal" : ExplicitModelOptions().strategy;
   }
   return options;
 }

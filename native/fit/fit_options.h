@@ -14,8 +14,9 @@ namespace stipple {
 enum class FitKind : uint32_t {
   kExplicit = 0,  ///< splats with parameters of their own
   kField = 1,     ///< a learned density and a field of attributes
+  kMotion = 2,    ///< splats with parameters of their own that move, to views with times
 };
-constexpr uint32_t kFitKindCount = 2;
+constexpr uint32_t kFitKindCount = 3;
 
 /// A user's choice of quality, as presets have it.
 enum class FitQuality : uint32_t { kFast = 0, kBalanced = 1, kFineDetail = 2 };
@@ -63,7 +64,7 @@ void applyPreset(FitOptions& options, FitKind model, FitQuality quality);
 void requireFitOptions(const FitOptions& options);
 
 /// The same options with everything that follows from others written out: the strategy of explicit
-/// splats, and density_gradient of a field whose strategy is named.
+/// splats, moving ones too, and density_gradient of a field whose strategy is named.
 FitOptions resolved(FitOptions options);
 
 }  // namespace stipple

@@ -11,8 +11,10 @@
 #include "io/assets/checkpoint.h"
 #include "io/reports/fit_report.h"
 #include "model/field_splats.h"
+#include "model/motion_splats.h"
 #include "train/loop/explicit_model.h"
 #include "train/loop/field_model.h"
+#include "train/loop/moving_splats.h"
 
 namespace stipple {
 
@@ -23,7 +25,7 @@ TrainerOptions trainerOptions(const FitOptions& options) {
   trainer.iterations = options.iterations;
   trainer.background = options.background;
   trainer.seed = options.seed;
-  trainer.max_splats = options.model == FitKind::kExplicit ? options.max_splats : 0;
+  trainer.max_splats = options.model == FitKind::kField ? 0 : options.max_splats;
   trainer.picture_bytes = options.picture_bytes;
   trainer.ssim_share = options.ssim_share;
   trainer.measure_interval = options.measure_interval;
@@ -48,7 +50,7 @@ FieldModelOptions fieldOptions(const FitOptions& options) {
   return field;
 }
 
-ExplicitModelOptions explicitOptions(const FitOptions& options) {
+ExplicitModelOptions explicitOptions(const FitOptions& options, const ViewSource& views) {
   ExplicitModelOptions model;
   model.strategy = options.strategy;
   model.start_splats = options.start_splats;
@@ -58,6 +60,7 @@ ExplicitModelOptions explicitOptions(const FitOptions& options) {
   model.ssim_share = options.ssim_share;
   model.seed = options.seed;
   model.iterations = options.iterations;
+  if (options.model == FitKind::kMotion) model.clip = clipOfViews(views);
   return model;
 }
 
@@ -67,7 +70,8 @@ std::unique_ptr<FitModel> makeModel(const BackendFactory& backends, const ViewSo
   if (options.model == FitKind::kField) {
     return makeFieldModel(backends, views, split.training, fieldOptions(options), progress);
   }
-  return makeExplicitModel(backends, views, split.training, explicitOptions(options), progress);
+  return makeExplicitModel(backends, views, split.training, explicitOptions(options, views),
+                           progress);
 }
 
 FitOptions preparedOptions(const FitOptions& options, const ViewSource& views) {
@@ -186,11 +190,14 @@ SeenCloud FitSession::decode(uint64_t budget) const {
 std::shared_ptr<const SplatModel> FitSession::model() const {
   FitModel& model = ended().model();
   std::optional<FieldResult> learned;
+  std::optional<MotionCloud> moving;
   {
     // The density is frozen by the first who asks for it, and a decode may be that one.
     std::lock_guard<std::mutex> lock(decode_mutex_);
     learned = fieldResult(model);
+    moving = motionResult(model);
   }
+  if (moving) return makeMotionSplats(std::move(*moving), {settings_json_, {}});
   if (!learned) {
     fail(ErrorCode::kUnsupported, std::string("the ") + model.name() +
                                       " model has no field; its splats can be made a hierarchy");
@@ -202,7 +209,7 @@ std::shared_ptr<const SplatModel> FitSession::model() const {
 void FitSession::saveReport(const std::string& path) const {
   FitReportHead head;
   head.model = ended().model().name();
-  if (options_.model == FitKind::kExplicit) head.strategy = options_.strategy;
+  if (options_.model != FitKind::kField) head.strategy = options_.strategy;
   head.settings_json = settings_json_;
   requireFitReportPlace(path);
   writeFitReport(head, history(), path);

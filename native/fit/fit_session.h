@@ -56,7 +56,8 @@ class FitSession final : public FitObserver {
   /// The result at a budget. May be called by several threads. This and what follows, errors:
   /// kInvalidArgument where the fit has not ended, or ended before its first step.
   SeenCloud decode(uint64_t budget) const;
-  /// The result for any budget. Errors: kUnsupported for explicit splats.
+  /// The result for any budget, or of splats that move for any time. Errors: kUnsupported for
+  /// explicit splats that stand still.
   std::shared_ptr<const SplatModel> model() const;
   /// What the result was fitted with, as JSON.
   const std::string& settingsJson() const { return settings_json_; }

@@ -29,7 +29,7 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
-/// Tells sets of views apart by their names and cameras.
+/// Tells sets of views apart by their names, cameras and times.
 uint64_t keyOf(const ViewSource& views) {
   uint64_t key = views.count();
   const auto mix = [&key](const void* bytes, size_t count) {
@@ -48,6 +48,9 @@ uint64_t keyOf(const ViewSource& views) {
     mix(name.data(), name.size());
     mix(numbers, sizeof(numbers));
     mix(camera.world_to_camera.data(), 16 * sizeof(double));
+    // Keys of views without times are those of checkpoints from before there were any.
+    const double time = views.time(v);
+    if (time != 0) mix(&time, sizeof(time));
   }
   return key;
 }

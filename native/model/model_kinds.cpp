@@ -9,6 +9,7 @@ std::shared_ptr<const SplatModel> readSurfaceSplats(const std::string& path, con
 std::shared_ptr<const SplatModel> readHierarchySplats(const std::string& path, const ReadingAid&);
 std::shared_ptr<const SplatModel> readFieldSplats(const std::string& path, const ReadingAid&);
 std::shared_ptr<const SplatModel> readLatentSplats(const std::string& path, const ReadingAid&);
+std::shared_ptr<const SplatModel> readMotionSplats(const std::string& path, const ReadingAid&);
 
 std::span<const ModelKind> modelKinds() {
   static const std::array kinds = {
@@ -32,6 +33,11 @@ std::span<const ModelKind> modelKinds() {
                 3,
                 {.budget_unit = BudgetUnit::kAnchors, .has_order = true, .has_seed = true},
                 readLatentSplats},
+      ModelKind{"motion",
+                "moving splats",
+                4,
+                {.budget_unit = BudgetUnit::kSplats},
+                readMotionSplats},
   };
   return kinds;
 }

@@ -53,8 +53,11 @@ void requireClip(const MotionClip& clip, const char* what) {
 }  // namespace
 
 double MotionClip::partOf(double seconds) const {
-  const double frame = (seconds - begin) * frames_per_second;
-  return std::clamp(frame, 0.0, static_cast<double>(frame_count - 1)) / frame_count;
+  const double last = static_cast<double>(frame_count - 1);
+  // Beyond the clip, times of any size: their product with a rate may be no number.
+  if (seconds <= begin) return 0;
+  if (seconds >= end()) return last / frame_count;
+  return std::clamp((seconds - begin) * frames_per_second, 0.0, last) / frame_count;
 }
 
 MotionColumns<const float> MotionCloud::columns() const {

@@ -14,6 +14,7 @@
 #include "density/octree_density.h"
 #include "io/assets/hierarchy_asset.h"
 #include "io/assets/latent_asset.h"
+#include "io/assets/motion_asset.h"
 #include "io/assets/surface_asset.h"
 #include "io/glb_builder.h"
 #include "io/image_channels.h"
@@ -356,6 +357,23 @@ std::vector<std::string> hierarchySeeds(const fs::path& folder) {
   return made;
 }
 
+std::vector<std::string> motionSeeds(const fs::path& folder) {
+  std::vector<std::string> made;
+  for (const int degree : {0, 2}) {
+    MotionAsset asset;
+    asset.splats = randomCloud(3, degree, 1);
+    for (auto& wave : asset.waves) wave.assign(9, 0.25f);
+    asset.phases.assign(12, 0.5f);
+    asset.spins.assign(12, 0.1f);
+    asset.lifespans.assign(6, 0.75f);
+    asset.centres.assign(3, 0.5f);
+    asset.frame_count = 9;
+    writeMotionAsset(asset, (folder / "seed").string());
+    made.push_back(load(folder / "seed"));
+  }
+  return made;
+}
+
 std::vector<std::string> latentSeeds(const fs::path& folder) {
   LatentAsset asset;
   asset.latent.token_count = 3;
@@ -364,6 +382,11 @@ std::vector<std::string> latentSeeds(const fs::path& folder) {
   asset.weights = {"decoder.safetensors", 576148442, std::string(64, 'a')};
   writeLatentAsset(asset, (folder / "seed").string());
   return {load(folder / "seed")};
+}
+
+void readMotion(const fs::path& path) {
+  const MotionAsset asset = readMotionAsset(path.string());
+  keepsPromises([&] { writeMotionAsset(asset, (path.parent_path() / "again").string()); });
 }
 
 void readLatent(const fs::path& path) {
@@ -484,7 +507,7 @@ std::vector<std::string> transformsSeeds(const fs::path&) {
       "{\"fl_x\":500,\"fl_y\":510,\"cx\":300.5,\"cy\":250,\"w\":640,\"h\":480,\"k1\":0.0,"
       "\"camera_model\":\"OPENCV\"," +
           frames,
-      "{\"camera_angle_x\":1.2," + frames,
+      "{\"camera_angle_x\":1.2,\"time\":0.25," + frames,
       "{\"fl_x\":50,\"w\":64,\"h\":48,\"camera_model\":\"OPENCV\",\"k1\":-0.1,\"k3\":0.01,\"k5\":0."
       "1,\"p2\":"
       "0.001,\"ply_file_path\":\"p.ply\",\"test_filenames\":[\"b\"]," +
@@ -510,6 +533,9 @@ std::vector<Reader> makeReaders() {
                  JsonPlace::kSafetensorsHeader});
   all.push_back({"hierarchy", nullptr, storeAs(asset),
                  [asset](const fs::path& folder) { readHierarchy(folder / asset); }, hierarchySeeds,
+                 JsonPlace::kSafetensorsHeader});
+  all.push_back({"motion", nullptr, storeAs(asset),
+                 [asset](const fs::path& folder) { readMotion(folder / asset); }, motionSeeds,
                  JsonPlace::kSafetensorsHeader});
   all.push_back({"latent", nullptr, storeAs(asset),
                  [asset](const fs::path& folder) { readLatent(folder / asset); }, latentSeeds,

@@ -6,6 +6,7 @@
 #include "train/fit_scene.h"
 #include "train/loop/densify_cloud.h"
 #include "train/loop/explicit_model.h"
+#include "train/loop/moving_splats.h"
 #include "train/loop/picture_store.h"
 #include "train/loop/view_evaluator.h"
 
@@ -93,6 +94,33 @@ TEST(FittingStability, FlatViewsByEveryStrategy) {
     options.strategy = name;
     EXPECT_GT(fitted(*constantViews(0.5f, 1, 4), 700, options)->splats(0).size(), 0u);
     EXPECT_GT(fitted(*constantViews(0.5f, 0, 1), 500, options, 0.0)->splats(0).size(), 0u);
+  }
+}
+
+/// Two views of one clip that say different things: at the same place in time almost, far away from
+/// each other and from 0, and with nothing to see.
+TEST(FittingStability, MovingSplatsOfHardClips) {
+  for (const char* strategy : {"temporal", "frequency", "adaptive+filter_3d", "mcmc+offset_warp"}) {
+    for (const double apart : {1e-9, 1.0, 1e12}) {
+      for (const float alpha : {0.0f, 1.0f}) {
+        SCOPED_TRACE(std::string(strategy) + ", " + std::to_string(apart));
+        auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+        for (size_t v = 0; v < 4; ++v) {
+          const auto one = constantViews(v % 2 == 0 ? 0.2f : 0.9f, alpha, 1);
+          views->add(camerasAround(4, 24)[v], one->load(0), {}, static_cast<double>(v % 2) * apart);
+        }
+        views->setPoints(pointsOf(ballOfSplats(50, 3), 0, 1));
+        ExplicitModelOptions options = small();
+        options.strategy = strategy;
+        options.clip = clipOfViews(*views);
+        const auto model = fitted(*views, 400, options);
+        const MotionCloud moving = *motionResult(*model);
+        validate(moving, "moving");
+        for (const double time : {-1e300, 0.0, apart / 3, apart, 1e300}) {
+          validate(splatsAt(moving, time), "at a time");
+        }
+      }
+    }
   }
 }
 

@@ -12,9 +12,9 @@ STORED = {'MODEL', 'CLOUD', 'TREE'}
 ENUMERATION = 'ModelKind'
 FILES_ALLOWED = 2
 # In C++: classes and functions of a kind, and the header's numbers.
-CPP_KIND = re.compile(r'(Surface|Hierarchy|Field|Latent)(Model|Splats|Decoder|Source|Asset)|'
-                      r'STIPPLE_MODEL_(SURFACE|HIERARCHY|FIELD|LATENT)'
-                      r'|"(surface|hierarchy|field|latent)"')
+CPP_KIND = re.compile(r'(Surface|Hierarchy|Field|Latent|Motion)(Model|Splats|Decoder|Source|Asset)|'
+                      r'STIPPLE_MODEL_(SURFACE|HIERARCHY|FIELD|LATENT|MOTION)'
+                      r'|"(surface|hierarchy|field|latent|motion)"')
 
 
 def names_a_kind(text):

@@ -7,6 +7,7 @@ from enum import IntEnum
 class FitModel(IntEnum):
     EXPLICIT = 0
     FIELD = 1
+    MOTION = 2
 
 
 class FitQuality(IntEnum):

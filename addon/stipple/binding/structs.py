@@ -426,7 +426,7 @@ class StippleFitOptionInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('kind', c_uint32), ('models', c_uint32), ('fixed_models', c_uint32),
                 ('name_utf8', c_char_p), ('help_utf8', c_char_p), ('choices_utf8', c_char_p), ('minimum', c_double),
                 ('maximum', c_double), ('default_utf8', c_char_p), ('presets_utf8', c_char_p * 6),
-                ('aliases_utf8', c_char_p * 3), ('alias_units', c_double * 3)]
+                ('aliases_utf8', c_char_p * 3), ('alias_units', c_double * 3), ('motion_presets_utf8', c_char_p * 3)]
 
 
 class StippleFitFigures(_Sized):

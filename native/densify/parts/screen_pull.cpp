@@ -1,6 +1,7 @@
 // Based on: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting for Real-Time Radiance
 // Field Rendering, SIGGRAPH 2023, section 5.2; two statistics: Ye, Li, Liu, Dou, Zhang, Zhang,
-// AbsGS, ACM MM 2024, section 4.
+// AbsGS, ACM MM 2024, section 4; views that count by opacity: Sandu, Pathak, Soundararajan, TAD-GS,
+// arXiv 2606.23212, by its released program.
 
 #include "densify/parts/screen_pull.h"
 
@@ -16,14 +17,17 @@ namespace {
 class ScreenPull final : public ControlPart {
  public:
   explicit ScreenPull(const ScreenPullOptions& options)
-      : options_(options), copy_window_(options.copy_statistic) {
+      : options_(options), copy_window_(options.copy_statistic, options.least_opacity) {
     if (options.split_statistic != options.copy_statistic) {
-      split_window_.emplace(options.split_statistic);
+      split_window_.emplace(options.split_statistic, options.least_opacity);
     }
   }
 
-  const char* name() const override { return "screen_pull"; }
+  const char* name() const override {
+    return options_.least_opacity ? "visibility_weighted_score" : "screen_pull";
+  }
   ControlRoles owns() const override { return roles(ControlRole::kMultiplication); }
+  bool heedsThresholds() const override { return true; }
 
   void request(const ControlMoment& moment, StatisticRequest& request) const override {
     if (!moment.is_learning) return;
@@ -31,6 +35,7 @@ class ScreenPull final : public ControlPart {
       (one == Statistic::kScreenGradients ? request.screen_gradients
                                           : request.absolute_screen_gradients) = true;
     }
+    if (options_.least_opacity) request.drawn_splats = true;
   }
 
   void observe(const ControlMoment& moment, const ViewStatistics& view) override {
@@ -54,8 +59,10 @@ class ScreenPull final : public ControlPart {
     score_.assign(splats.size(), 0.0f);
     for (uint32_t i = 0; i < splats.size(); ++i) {
       const bool is_large = largestLogScale(splats, i) > small;
-      const float pull = is_large ? split_window.average(i) / split_threshold
-                                  : copy_window_.average(i) / copy_threshold;
+      const float own = moment.threshold_shares.empty() ? 1.0f : moment.threshold_shares[i];
+      const float pull = (is_large ? split_window.average(i) / split_threshold
+                                   : copy_window_.average(i) / copy_threshold) /
+                         own;
       score_[i] = pull;
       if (pull >= 1) found.push_back({i, pull, is_large});
     }

@@ -23,12 +23,20 @@ void GradientWindow::add(const ViewStatistics& view) {
   const std::span<const float> gradients = view.of(statistic_);
   const float half_width = 0.5f * static_cast<float>(view.width);
   const float half_height = 0.5f * static_cast<float>(view.height);
+  const std::span<const float> opacities = view.splats.opacities;
+  const float least = static_cast<float>(least_opacity_.value_or(0));
   const auto add_range = [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       if (!view.visible[i]) continue;
       const float x = gradients[i * 2] * half_width;
       const float y = gradients[i * 2 + 1] * half_height;
-      sums_[i] += std::hypot(x, y);
+      if (least_opacity_) {
+        if (!(opacities[i] > least)) continue;
+        sums_[i] += opacities[i] * std::hypot(x, y);
+        weights_[i] += opacities[i];
+      } else {
+        sums_[i] += std::hypot(x, y);
+      }
       ++counts_[i];
     }
   };
@@ -50,6 +58,7 @@ void GradientWindow::edited(const ControlMoment& moment, const SplatEdit& edit,
 
 void GradientWindow::reset(size_t count) {
   sums_.assign(count, 0.0f);
+  if (least_opacity_) weights_.assign(count, 0.0f);
   counts_.assign(count, 0);
 }
 
@@ -62,12 +71,18 @@ std::vector<float> GradientWindow::averages() const {
 void GradientWindow::put(TensorTable& table) const {
   table["gradient_sums"] = {{sums_.size()}, sums_};
   table["visible_counts"] = {{counts_.size()}, counts_};
+  if (least_opacity_) table["opacity_sums"] = {{weights_.size()}, weights_};
 }
 
 void GradientWindow::take(const TensorTable& table) {
   std::vector<float> sums = stateSums<float>(table, "gradient_sums");
   std::vector<uint32_t> counts = stateArray<uint32_t>(table, "visible_counts");
   requireAsMany(sums.size(), "gradient_sums", counts.size(), "visible_counts");
+  if (least_opacity_) {
+    std::vector<float> weights = stateSums<float>(table, "opacity_sums");
+    requireAsMany(sums.size(), "gradient_sums", weights.size(), "opacity_sums");
+    weights_ = std::move(weights);
+  }
   sums_ = std::move(sums);
   counts_ = std::move(counts);
 }

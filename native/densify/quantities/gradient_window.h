@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "data/tensor_table.h"
@@ -17,7 +18,10 @@ namespace stipple {
 class GradientWindow {
  public:
   /// In: statistic: kScreenGradients or kAbsoluteScreenGradients, whose lengths are averaged.
-  explicit GradientWindow(Statistic statistic) : statistic_(statistic) {}
+  /// least_opacity: where given, a view counts by how opaque the splat is drawn in it, and not at
+  /// all up to this; views must have drawn splats then.
+  explicit GradientWindow(Statistic statistic, std::optional<double> least_opacity = {})
+      : statistic_(statistic), least_opacity_(least_opacity) {}
 
   /// Errors: kInternal for another number of splats than before.
   void add(const ViewStatistics& view);
@@ -36,18 +40,22 @@ class GradientWindow {
   uint32_t viewCount(size_t splat) const { return counts_[splat]; }
   /// 0 where no view has seen the splat.
   float average(size_t splat) const {
-    return counts_[splat] == 0 ? 0.0f : sums_[splat] / static_cast<float>(counts_[splat]);
+    if (counts_[splat] == 0) return 0.0f;
+    return sums_[splat] / (least_opacity_ ? weights_[splat] : static_cast<float>(counts_[splat]));
   }
 
   std::vector<float> averages() const;  ///< [N]
 
-  /// "gradient_sums" and "visible_counts". Errors of take: kFormat.
+  /// "gradient_sums" and "visible_counts", of opacities also "opacity_sums". Errors of take:
+  /// kFormat.
   void put(TensorTable& table) const;
   void take(const TensorTable& table);
 
  private:
   Statistic statistic_;
+  std::optional<double> least_opacity_;
   std::vector<float> sums_;       ///< [N]
+  std::vector<float> weights_;    ///< [N] of opacities, where views count by them
   std::vector<uint32_t> counts_;  ///< [N]
 };
 

@@ -87,6 +87,7 @@ class DirectionPull final : public ControlPart {
 
   const char* name() const override { return "direction_pull"; }
   ControlRoles owns() const override { return roles(ControlRole::kMultiplication); }
+  bool heedsThresholds() const override { return true; }
 
   void request(const ControlMoment& moment, StatisticRequest& request) const override {
     if (!moment.is_learning) return;
@@ -108,7 +109,9 @@ class DirectionPull final : public ControlPart {
     for (uint32_t i = 0; i < splats.size(); ++i) {
       const bool is_large = largestLogScale(splats, i) > small;
       const double weight = directionWeight(options_, coherence_.coherence(i));
-      const double gradient = static_cast<double>(pull_.average(i)) / options_.threshold;
+      const double own =
+          moment.threshold_shares.empty() ? 1.0 : static_cast<double>(moment.threshold_shares[i]);
+      const double gradient = static_cast<double>(pull_.average(i)) / (own * options_.threshold);
       score_[i] = static_cast<float>(is_large ? gradient * weight : gradient / weight);
       if (score_[i] >= 1) found.push_back({i, score_[i], is_large});
     }

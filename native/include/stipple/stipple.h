@@ -534,7 +534,8 @@ typedef enum StippleModelKind {
   STIPPLE_MODEL_SURFACE = 0,  /* of a mesh: density and surface */
   STIPPLE_MODEL_HIERARCHY = 1, /* of a cloud: its merge tree; any budget up to its count */
   STIPPLE_MODEL_FIELD = 2,    /* learned from views: density and a field of attributes */
-  STIPPLE_MODEL_LATENT = 3    /* generated: a latent that two networks turn into a density and splats */
+  STIPPLE_MODEL_LATENT = 3,   /* generated: a latent that two networks turn into a density and splats */
+  STIPPLE_MODEL_MOTION = 4    /* splats that move; always all of them, at any time of their clip */
 } StippleModelKind;
 
 typedef struct StippleModelInfo {
@@ -1790,7 +1791,8 @@ StippleStatus stipple_image_loss(StippleContext* context, uint32_t width, uint32
 
 typedef enum StippleFitModel {
   STIPPLE_FIT_EXPLICIT = 0, /* splats with parameters of their own; a strategy adds and removes them */
-  STIPPLE_FIT_FIELD = 1     /* a learned density and a field of attributes: decodes at any budget */
+  STIPPLE_FIT_FIELD = 1,    /* a learned density and a field of attributes: decodes at any budget */
+  STIPPLE_FIT_MOTION = 2    /* explicit splats that move, of views with times: decodes at any time */
 } StippleFitModel;
 
 typedef enum StippleFitQuality {
@@ -1821,11 +1823,11 @@ typedef struct StippleFitOptions {
   const char* strategy_utf8;   /* how splats are added and removed: a strategy that stipple_strategy_info lists,
                                   with its settings, and parts beside or instead of its own:
                                   "adaptive(threshold=0.0003)+long_axis_split". NULL, the default:
-                                  "adaptive"; of a field, as density_gradient says. Presets of explicit splats set
+                                  "adaptive", of motion "temporal"; of a field, as density_gradient says. Presets of explicit splats set
                                   it: "adaptive" where fast, else "improved" */
   uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
-  uint64_t max_splats;         /* explicit: hard cap, 1..2^28 */
-  uint64_t start_splats;       /* explicit; 0, the default: as many as points are known */
+  uint64_t max_splats;         /* explicit and motion: hard cap, 1..2^28 */
+  uint64_t start_splats;       /* explicit and motion; 0, the default: as many as points are known */
   uint64_t min_anchors;      /* field: the budgets of training, from min_anchors to max_anchors,
                                 1..STIPPLE_MAX_ANCHORS; default 1,024 to what the quality says: 8,192, 16,384 or
                                 32,768 */
@@ -1890,10 +1892,11 @@ typedef struct StippleFitOptionInfo {
   double minimum;              /* of numbers; infinity: no limit */
   double maximum;
   const char* default_utf8;    /* as stipple_fit_options_set takes it */
-  const char* presets_utf8[6]; /* what stipple_fit_options_preset sets: [3 * StippleFitModel + StippleFitQuality];
-                                  NULL: it is left alone */
+  const char* presets_utf8[6]; /* what stipple_fit_options_preset sets: [3 * StippleFitModel + StippleFitQuality]
+                                  of the first two models; NULL: it is left alone */
   const char* aliases_utf8[3]; /* other names in settings and flags, former ones too; "" where there is none */
   double alias_units[3];       /* how much 1 is under each: 1048576 of "image_memory" */
+  const char* motion_presets_utf8[3]; /* as presets_utf8, of STIPPLE_FIT_MOTION: [StippleFitQuality] */
 } StippleFitOptionInfo;
 StippleStatus stipple_fit_option_count(uint64_t* count);
 /* index 0..count-1, in the order in which settings have them. */
@@ -1946,12 +1949,13 @@ StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud);
  * fit. With 1 the fit draws 8 views for every preview; its steps are the same either way. */
 StippleStatus stipple_fit_watch_contributions(StippleJob* job, uint32_t watched);
 /* Gives the result of a job that has ended, however it ended: the state that did best on views it learned from,
- * decoded at a budget (anchors of a field; 0: the largest; explicit splats have one size). INVALID_ARGUMENT
+ * decoded at a budget (anchors of a field; 0: the largest; explicit splats have one size; splats that move are
+ * as they are when their clip begins). INVALID_ARGUMENT
  * where no step was taken. */
 StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud);
-/* Gives the result of a field as a model, which stipple_model_save writes and stipple_model_decode turns into
- * splats at any budget. UNSUPPORTED for explicit splats: stipple_model_from_cloud_start makes a model of their
- * cloud. */
+/* Gives the result of a field, or of splats that move, as a model, which stipple_model_save writes and
+ * stipple_model_decode turns into splats at any budget or time. UNSUPPORTED for explicit splats that stand still:
+ * stipple_model_from_cloud_start makes a model of their cloud. */
 StippleStatus stipple_fit_model(const StippleJob* job, StippleModel** model);
 /* Whether a fit may write its report and its checkpoints to these places, to be asked before it starts; NULL for what
  * is not wanted. Nothing is written. Errors: IO where they cannot be written; INVALID_ARGUMENT where a file of another

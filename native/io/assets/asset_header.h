@@ -13,6 +13,7 @@ constexpr char kAssetSurface[] = "surface";
 constexpr char kAssetHierarchy[] = "hierarchy";
 constexpr char kAssetField[] = "field";
 constexpr char kAssetLatent[] = "latent";
+constexpr char kAssetMotion[] = "motion";
 constexpr char kAssetCheckpoint[] = "checkpoint";
 
 /// Text of the metadata. Errors: kFormat where it is missing.

@@ -2,60 +2,15 @@
 
 #include "base/error.h"
 #include "io/assets/asset_header.h"
+#include "io/assets/cloud_tensors.h"
 #include "io/bytes/safetensors.h"
-#include "io/splats/ply/ply_file.h"
 
 namespace stipple {
 
 namespace {
 
-constexpr char kMip[] = "mip";
-constexpr char kClassic[] = "classic";
 constexpr char kLeaves[] = "tree.leaves.";
 constexpr char kNodes[] = "tree.nodes.";
-
-void addCloud(SafeTensorsWriter& file, const std::string& stem, const SplatCloud& cloud) {
-  file.add(stem + "positions", cloud.positions, 3);
-  file.add(stem + "rotations", cloud.rotations, 4);
-  file.add(stem + "scales", cloud.scales, 3);
-  file.add(stem + "opacities", cloud.opacities, 1);
-  file.add(stem + "sh", cloud.sh, cloud.shStride());
-}
-
-/// In: `like` gives degree, colour space, antialias flag and frame.
-SplatCloud readCloud(const SafeTensorsReader& file, const std::string& stem,
-                     const SplatCloud& like) {
-  SplatCloud cloud = like;
-  cloud.positions = file.readFloats(stem + "positions", 3);
-  cloud.rotations = file.readFloats(stem + "rotations", 4);
-  cloud.scales = file.readFloats(stem + "scales", 3);
-  cloud.opacities = file.readFloats(stem + "opacities", 1);
-  cloud.sh = file.readFloats(stem + "sh", cloud.shStride());
-  return cloud;
-}
-
-SplatCloud readFlags(const SafeTensorsReader& file) {
-  SplatCloud flags;
-  flags.colour_space = isFirstText(file, "colour_space", kColourSpaceDisplay, kColourSpaceLinear)
-                           ? ColourSpace::kDisplay
-                           : ColourSpace::kLinear;
-  flags.antialias =
-      isFirstText(file, "antialias", kMip, kClassic) ? Antialias::kMip : Antialias::kClassic;
-  const std::string& frame = requireText(file, "frame");
-  const auto known = frameFromName(frame);
-  if (!known) {
-    fail(ErrorCode::kFormat, file.path() + " has the frame '" + frame.substr(0, 40) +
-                                 "'; three letters such as RDF, or 'unknown', are needed");
-  }
-  flags.frame = *known;
-  const std::string& degree = requireText(file, "sh_degree");
-  if (degree.size() != 1 || degree[0] < '0' || degree[0] > '0' + kMaxShDegree) {
-    fail(ErrorCode::kFormat,
-         file.path() + " has sh_degree = " + degree.substr(0, 40) + "; 0 to 4 is needed");
-  }
-  flags.sh_degree = degree[0] - '0';
-  return flags;
-}
 
 /// Sizes that agree and splats that are splats, for an asset from either side.
 void validateAsset(const HierarchyAsset& asset, const std::string& name, ErrorCode code) {
@@ -83,15 +38,10 @@ void writeHierarchyAsset(const HierarchyAsset& asset, const std::string& path) {
   validateAsset(asset, "asset", ErrorCode::kInvalidArgument);
   SafeTensorsWriter file;
   setAssetKind(file, kAssetHierarchy);
-  const SplatCloud& leaves = asset.leaves;
-  const bool display = leaves.colour_space == ColourSpace::kDisplay;
-  file.setMetadata("colour_space", display ? kColourSpaceDisplay : kColourSpaceLinear);
-  file.setMetadata("antialias", leaves.antialias == Antialias::kMip ? kMip : kClassic);
-  file.setMetadata("frame", frameName(leaves.frame));
-  file.setMetadata("sh_degree", std::to_string(leaves.sh_degree));
+  setCloudFlags(file, asset.leaves);
   file.setMetadata("settings", asset.settings_json);
-  addCloud(file, kLeaves, leaves);
-  addCloud(file, kNodes, asset.nodes);
+  addCloudTensors(file, kLeaves, asset.leaves);
+  addCloudTensors(file, kNodes, asset.nodes);
   file.add("tree.parents", asset.parents, 1);
   file.add("tree.errors", asset.errors, 1);
   addAssetExtras(file, asset.extras);
@@ -101,10 +51,10 @@ void writeHierarchyAsset(const HierarchyAsset& asset, const std::string& path) {
 HierarchyAsset readHierarchyAsset(const std::string& path) {
   const SafeTensorsReader file(path);
   requireAssetKind(file, kAssetHierarchy);
-  const SplatCloud flags = readFlags(file);
+  const SplatCloud flags = readCloudFlags(file);
   HierarchyAsset asset;
-  asset.leaves = readCloud(file, kLeaves, flags);
-  asset.nodes = readCloud(file, kNodes, flags);
+  asset.leaves = readCloudTensors(file, kLeaves, flags);
+  asset.nodes = readCloudTensors(file, kNodes, flags);
   asset.parents = file.readUint32s("tree.parents", 1);
   asset.errors = file.readFloats("tree.errors", 1);
   asset.settings_json = requireText(file, "settings");

@@ -46,6 +46,7 @@ class FrameReader {
     view.image_path = text("file_path").value_or("");
     view.mask_path = text("mask_path").value_or("");
     view.depth_path = text("depth_file_path").value_or("");
+    view.time = number("time").value_or(0.0);
     readModel(view);
     readIntrinsics(view.camera);
     readPose(view.camera);

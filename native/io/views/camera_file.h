@@ -18,6 +18,7 @@ struct CameraView {
   std::string mask_path{};     ///< as image_path
   std::string depth_path{};    ///< as image_path
   ViewRole role = ViewRole::kNone;
+  double time = 0;  ///< when the picture was taken, seconds
 };
 
 /// Cameras whose lens is not a pinhole's.
@@ -31,6 +32,8 @@ enum class Distorted { kRefuse, kKeep };
 /// In a transforms.json keys of a frame win over those of the file. Besides perspective cameras it
 /// knows ours: `"camera_model": "ORTHOGRAPHIC"` with `"ortho_scale"`, the metres across the
 /// picture's width.
+///
+/// A frame's `time` is when its picture was taken, in seconds (D-NeRF has it from 0 to 1).
 ///
 /// A file without `w` and `h` (NeRF-synthetic) gives cameras of width and height 0, whose
 /// intrinsics are in units of the picture: fx = fy = 0.5 / tan(angle / 2), the focal length in

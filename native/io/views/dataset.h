@@ -40,6 +40,7 @@ class Dataset final : public ViewSource {
   std::string name(size_t view) const override { return views_[view].view.image_path; }
   ColourSpace colourSpace() const override { return colour_space_; }
   ViewRole role(size_t view) const override { return views_[view].view.role; }
+  double time(size_t view) const override { return views_[view].view.time; }
   /// Errors: kFormat for files that are truncated or of another size than their camera says, with
   /// their path; kInvalidArgument for a pixel that is not finite. Two threads that want one picture
   /// may both read it.

@@ -60,8 +60,8 @@ class HostBackend final : public RenderBackend {
   }
 
   void parameterise(const Parameterisation* how) override {
+    if (how != how_) by_raw_ = {};  // the same at another time keeps its room
     how_ = how;
-    by_raw_ = {};
     changed();
   }
 

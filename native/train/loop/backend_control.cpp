@@ -25,10 +25,12 @@ std::vector<double> beginControl(RenderBackend& backend, const Strategy& strateg
   return rates;
 }
 
-void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment, size_t view) {
+void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment, size_t view,
+                 std::span<const float> lifespans) {
   ViewStatistics statistics;
   statistics.view = view;
   backend.lendStatistics(statistics);
+  statistics.splats.lifespans = lifespans;
   strategy.observe(moment, statistics);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "densify/strategy.h"
@@ -14,8 +15,10 @@ namespace stipple {
 /// Returns: rates of the extra parameters.
 std::vector<double> beginControl(RenderBackend& backend, const Strategy& strategy);
 
-/// Shows the strategy what the last backward pass has gathered. In: view: as ViewEvaluator counts.
-void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment, size_t view);
+/// Shows the strategy what the last backward pass has gathered. In: view: as ViewEvaluator counts;
+/// lifespans: of DrawnSplats.
+void observeView(RenderBackend& backend, Strategy& strategy, const FitMoment& moment, size_t view,
+                 std::span<const float> lifespans = {});
 
 /// Valid until the backend's next call.
 SplatStore storeOf(const RenderBackend& backend);

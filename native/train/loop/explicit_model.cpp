@@ -11,6 +11,7 @@
 #include "base/stopwatch.h"
 #include "densify/strategies.h"
 #include "train/loop/backend_control.h"
+#include "train/loop/moving_splats.h"
 #include "train/loop/splat_tables.h"
 #include "train/prior/start_splats.h"
 
@@ -46,9 +47,10 @@ class ExplicitModel final : public FitModel, private Regulariser {
     if (begins) prepare();
     step_options_.extra_rates = beginControl(*backend_, *strategy_);
     strategy_->adjustRates(rates_);
+    if (options.clip) beginMotion(*options.clip);
   }
 
-  const char* name() const override { return "explicit"; }
+  const char* name() const override { return motion_ ? "motion" : "explicit"; }
 
   StepReport step(const FitMoment& given, const StepView& view, ViewEvaluator* views,
                   Progress* progress) override {
@@ -64,6 +66,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     report.splat_count = backend_->splatCount();
     transmittance_weight_ = view.is_opaque ? strategy_->transmittanceWeight(moment_) : 0.0;
     Stopwatch watch;
+    showTime(view.time);
     backend_->forward(*view.camera, renderOptions(view), progress);
     report.seconds.render = watch.lap();
 
@@ -77,7 +80,11 @@ class ExplicitModel final : public FitModel, private Regulariser {
     report.ssim = value.ssim;
     report.seconds.backward = watch.lap();
 
-    if (request.any()) observeView(*backend_, *strategy_, moment_, view.index);
+    if (request.any()) {
+      lifespans_.clear();
+      if (request.lifespans && motion_) motion_->lifespansInUse(backend_->splats(), lifespans_);
+      observeView(*backend_, *strategy_, moment_, view.index, lifespans_);
+    }
     report.seconds.edit = watch.lap();
     if (strategy_->stepGate(moment_)) {
       setRates();
@@ -93,14 +100,25 @@ class ExplicitModel final : public FitModel, private Regulariser {
     apply(strategy_->afterStep(moment_, storeOf(*backend_)));
     if (views && strategy_->wantsSweep(moment_)) {
       strategy_->sweep(moment_, *views);
-      if (strategy_->parameterisation()) backend_->parameterise(strategy_->parameterisation());
+      if (how()) backend_->parameterise(how());
     }
     apply(strategy_->edit(moment_, storeOf(*backend_)));
     report.seconds.edit += watch.lap();
     return report;
   }
 
-  SplatCloud splats(uint64_t) override { return backend_->download(); }
+  SplatCloud splats(uint64_t budget) override {
+    return splatsAt(budget, motion_ ? motion_->clip().begin : 0);
+  }
+  bool moves() const override { return motion_ != nullptr; }
+  SplatCloud splatsAt(uint64_t, double seconds) override {
+    showTime(seconds);
+    return backend_->download();
+  }
+  std::optional<MotionCloud> moving() const {
+    if (!motion_) return std::nullopt;
+    return motion_->cloudOf(backend_->state().splats);
+  }
   std::vector<uint64_t> budgets() const override { return {backend_->splatCount()}; }
   SplatQuantities seen() const override { return strategy_->seen(backend_->splatCount()); }
 
@@ -139,6 +157,40 @@ class ExplicitModel final : public FitModel, private Regulariser {
     backend_->restore(state);
   }
 
+  /// Gives the splats the numbers of their motion, behind what the strategy trains beside them.
+  void beginMotion(MotionClip clip) {
+    TimeStretch stretch;
+    strategy_->adjustStretch(stretch);
+    clip.window_frames = stretch.frames;
+    clip.window_share = stretch.share;
+    TrainingState state = backend_->state();
+    motion_extra_ = state.splats.extra_lengths.size();
+    motion_ = std::make_unique<MovingParameterisation>(clip, strategy_->parameterisation(),
+                                                       motion_extra_);
+    for (const size_t length : MovingParameterisation::extraLengths()) {
+      state.splats.extra_lengths.push_back(length);
+    }
+    for (auto& values : motion_->initialExtras(state.splats.size(), options_.seed)) {
+      state.splats.extras.push_back(std::move(values));
+    }
+    state.first_moments = state.second_moments = zerosLike(state.splats);
+    backend_->restore(state);
+    backend_->parameterise(motion_.get());
+  }
+
+  /// From raw numbers to splats, where that is not the usual way; else null.
+  const Parameterisation* how() const {
+    return motion_ ? motion_.get() : strategy_->parameterisation();
+  }
+
+  /// What is drawn from now on is as it is at this time. A time is to the backend what a changed
+  /// formula from raw numbers to splats is.
+  void showTime(double seconds) {
+    if (!motion_) return;
+    motion_->setTime(seconds);
+    backend_->parameterise(motion_.get());
+  }
+
   RenderOptions renderOptions(const StepView& view) const {
     RenderOptions options;
     options.with_depth = false;
@@ -170,6 +222,12 @@ class ExplicitModel final : public FitModel, private Regulariser {
     set(ParameterGroup::kLogits, rates_.logit);
     set(ParameterGroup::kShFirst, rates_.colour);
     set(ParameterGroup::kShOthers, rates_.higher_colour);
+    if (!motion_) return;
+    step_options_.extra_rates.resize(motion_extra_);
+    for (const double rate :
+         MovingParameterisation::rates(moment_.position_rate, std::max(moment_.extent, 0.0))) {
+      step_options_.extra_rates.push_back(std::min(rate, kMaxLearningRate));
+    }
   }
 
   /// The strategy's part of the loss, called by the backend.
@@ -181,6 +239,9 @@ class ExplicitModel final : public FitModel, private Regulariser {
   double transmittanceWeight() const override { return transmittance_weight_; }
 
   std::unique_ptr<Strategy> strategy_;  ///< outlives the backend, which draws by its activations
+  std::unique_ptr<MovingParameterisation> motion_;  ///< the same; null: splats stand still
+  size_t motion_extra_ = 0;                         ///< the first of its extras
+  std::vector<float> lifespans_;                    ///< [N] of the step under way, where asked for
   ExplicitModelOptions options_;
   std::unique_ptr<RenderBackend> backend_;
   LearningRates rates_;
@@ -192,10 +253,11 @@ class ExplicitModel final : public FitModel, private Regulariser {
 
 }  // namespace
 
-uint64_t bytesPerSplat(int sh_degree) {
-  constexpr uint64_t kOthers = 11;      // place, turn, size, opacity
+uint64_t bytesPerSplat(int sh_degree, bool moves) {
+  uint64_t others = 11;  // place, turn, size, opacity
+  for (const size_t length : MovingParameterisation::extraLengths()) others += moves ? length : 0;
   constexpr uint64_t kOfDrawing = 250;  // with statistics
-  const uint64_t row = (kOthers + shCoefficientCount(sh_degree) * 3) * sizeof(float);
+  const uint64_t row = (others + shCoefficientCount(sh_degree) * 3) * sizeof(float);
   return row * 13 + kOfDrawing;
 }
 
@@ -223,6 +285,11 @@ std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, cons
                                             const ExplicitModelOptions& options) {
   requireOptions(options);
   return std::make_unique<ExplicitModel>(backends, start, std::move(strategy), options, false);
+}
+
+std::optional<MotionCloud> motionResult(const FitModel& model) {
+  const auto* explicit_model = dynamic_cast<const ExplicitModel*>(&model);
+  return explicit_model ? explicit_model->moving() : std::nullopt;
 }
 
 }  // namespace stipple

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -10,6 +11,7 @@
 #include "data/clouds/splat_cloud.h"
 #include "data/views/view_source.h"
 #include "densify/strategy.h"
+#include "motion/motion_cloud.h"
 #include "train/backend/backend_factory.h"
 #include "train/loop/fit_model.h"
 
@@ -24,12 +26,15 @@ struct ExplicitModelOptions {
   double ssim_share = 0.2;
   uint64_t seed = 0;
   uint64_t iterations = 30000;  ///< of the fit, which what it begins with may depend on
+  /// Splats move over this clip: each view is drawn as they are at its time, and their motion is
+  /// trained with them. Its window is what the strategy says (TimeStretch).
+  std::optional<MotionClip> clip = {};
 };
 
 /// Bytes that a fit takes for each splat at its largest, about: parameters, two moments and
 /// derivatives, the first three once more as the best state and once more in a checkpoint, what
-/// drawing keeps, and a quarter of spare room where arrays grow.
-uint64_t bytesPerSplat(int sh_degree);
+/// drawing keeps, and a quarter of spare room where arrays grow. In: moves: whether they move.
+uint64_t bytesPerSplat(int sh_degree, bool moves = false);
 
 /// Splats with parameters of their own, started from what the views know of surfaces: their points,
 /// else their depth, else the volume that the cameras share (start_splats.h).
@@ -42,10 +47,13 @@ std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, cons
                                             const ExplicitModelOptions& options,
                                             Progress* progress = nullptr);
 
-/// The same from splats that are there, with a strategy of the caller's; of options, seed and
-/// start_splats count for nothing.
+/// The same from splats that are there, with a strategy of the caller's; of options start_splats
+/// counts for nothing, and the seed for the moments of splats that move alone.
 std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,
                                             std::unique_ptr<Strategy> strategy,
                                             const ExplicitModelOptions& options);
+
+/// What a fit of splats that move has learned; empty for any other model.
+std::optional<MotionCloud> motionResult(const FitModel& model);
 
 }  // namespace stipple

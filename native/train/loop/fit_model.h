@@ -53,7 +53,7 @@ class FitModel {
  public:
   virtual ~FitModel() = default;
 
-  /// "explicit" or "field".
+  /// "explicit", "field" or "motion".
   virtual const char* name() const = 0;
 
   /// One iteration. views draws other views for strategies that sweep.
@@ -61,9 +61,12 @@ class FitModel {
                           Progress* progress) = 0;
 
   /// The splats at a budget (of a field: its anchors); 0: all that there are, or the largest budget
-  /// that was trained. A model
-  /// of one size gives that, whatever is asked.
+  /// that was trained. A model of one size gives that, whatever is asked. Of splats that move: as
+  /// they are when their clip begins.
   virtual SplatCloud splats(uint64_t budget) = 0;
+  /// Whether they move, and the same at a time, seconds.
+  virtual bool moves() const { return false; }
+  virtual SplatCloud splatsAt(uint64_t budget, double /*seconds*/) { return splats(budget); }
   /// Budgets at which held-out views are worth measuring, ascending; one for a model of one size.
   virtual std::vector<uint64_t> budgets() const = 0;
   /// Scores and ages of splats(0), where density control has any.

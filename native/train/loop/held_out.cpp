@@ -92,7 +92,13 @@ double extentOfCameras(const ViewSource& views, std::span<const size_t> chosen) 
 
 FitMeasure ViewMeasure::measure(const SplatCloud& cloud, PictureStore& pictures,
                                 std::span<const size_t> chosen, const double background[3]) {
-  FitMeasure mean = sumOver(cloud, pictures, chosen, background, true);
+  SplatsOverTime splats(cloud);
+  return measure(splats, pictures, chosen, background);
+}
+
+FitMeasure ViewMeasure::measure(SplatsOverTime& splats, PictureStore& pictures,
+                                std::span<const size_t> chosen, const double background[3]) {
+  FitMeasure mean = sumOver(splats, pictures, chosen, background, true);
   const double count = static_cast<double>(chosen.size());
   mean.psnr /= count;
   mean.foreground_psnr /= count;
@@ -100,26 +106,27 @@ FitMeasure ViewMeasure::measure(const SplatCloud& cloud, PictureStore& pictures,
   return mean;
 }
 
-double ViewMeasure::meanPsnr(const SplatCloud& cloud, PictureStore& pictures,
+double ViewMeasure::meanPsnr(SplatsOverTime& splats, PictureStore& pictures,
                              std::span<const size_t> chosen, const double background[3]) {
-  return sumOver(cloud, pictures, chosen, background, false).psnr /
+  return sumOver(splats, pictures, chosen, background, false).psnr /
          static_cast<double>(chosen.size());
 }
 
-FitMeasure ViewMeasure::sumOver(const SplatCloud& cloud, PictureStore& pictures,
+FitMeasure ViewMeasure::sumOver(SplatsOverTime& splats, PictureStore& pictures,
                                 std::span<const size_t> chosen, const double background[3],
                                 bool with_ssim) {
   FitMeasure sum;
-  sum.splat_count = cloud.size();
   RenderOptions options;
   options.with_depth = false;
   options.with_background = true;
   std::copy_n(background, 3, options.background);
-  const SplatInstance instance{&cloud};
   const ColourSpace space = pictures.views().colourSpace();
   for (size_t k = 0; k < chosen.size(); ++k) {
     pictures.load(chosen[k], background, target_);
     if (k + 1 < chosen.size()) pictures.prefetch(chosen[k + 1]);
+    const SplatCloud& cloud = splats.at(pictures.views().time(chosen[k]));
+    const SplatInstance instance{&cloud};
+    sum.splat_count = cloud.size();
     images_->render({&instance, 1}, pictures.views().camera(chosen[k]), options, {}, drawn_);
     seen_.resize(target_.colour.size());
     foreground_ = target_.alpha;

@@ -10,6 +10,7 @@
 #include "data/views/view_source.h"
 #include "train/backend/backend_factory.h"
 #include "train/loop/picture_store.h"
+#include "train/loop/splats_over_time.h"
 #include "train/optimiser/image_loss.h"
 
 namespace stipple {
@@ -37,17 +38,19 @@ class ViewMeasure {
   /// Mean PSNR and SSIM over views. Colours are held to 0..1 and compared in display space; SSIM as
   /// image_loss.h has it. Views with alpha stand over `background`. Pixels that a mask leaves out
   /// count for nothing.
-  /// In: chosen: views of the store, at least one. Out: PSNR, SSIM and the count; the rest is left
-  /// alone.
+  /// In: splats, each view's at its time; chosen: views of the store, at least one. Out: PSNR, SSIM
+  /// and the count; the rest is left alone.
+  FitMeasure measure(SplatsOverTime& splats, PictureStore& pictures, std::span<const size_t> chosen,
+                     const double background[3]);
   FitMeasure measure(const SplatCloud& cloud, PictureStore& pictures,
                      std::span<const size_t> chosen, const double background[3]);
   /// PSNR of the same alone.
-  double meanPsnr(const SplatCloud& cloud, PictureStore& pictures, std::span<const size_t> chosen,
+  double meanPsnr(SplatsOverTime& splats, PictureStore& pictures, std::span<const size_t> chosen,
                   const double background[3]);
 
  private:
-  FitMeasure sumOver(const SplatCloud& cloud, PictureStore& pictures,
-                     std::span<const size_t> chosen, const double background[3], bool with_ssim);
+  FitMeasure sumOver(SplatsOverTime& splats, PictureStore& pictures, std::span<const size_t> chosen,
+                     const double background[3], bool with_ssim);
 
   std::unique_ptr<ImageRenderer> images_;
   RenderResult drawn_;

@@ -113,9 +113,8 @@ Trainer::Trainer(const BackendFactory& backends, std::shared_ptr<const ViewSourc
   extent_ = extentOfCameras(pictures_.views(), split_.training);
   double background[3];
   backgroundOf(0, background);
-  evaluator_ = std::make_unique<FitViewEvaluator>(
-      backends, [this] { return model_->splats(0); }, pictures_, split_.training, background,
-      options.ssim_share);
+  evaluator_ = std::make_unique<FitViewEvaluator>(backends, splatsOf(0), pictures_, split_.training,
+                                                  background, options.ssim_share);
   history_.measured_on_held_out = !split_.held_out.empty();
   history_.training_view_count = split_.training.size();
 }
@@ -173,7 +172,7 @@ void Trainer::step(Pace& pace) {
 }
 
 void Trainer::measure() {
-  FitMeasure measure = measureOf(model_->splats(0), measured_);
+  FitMeasure measure = measureOf(0, measured_);
   measure.iteration = iteration_;
   // Views that are held out judge the result; who chose it by them would flatter it.
   double best = -std::numeric_limits<double>::infinity();
@@ -184,8 +183,14 @@ void Trainer::measure() {
   best_.reset();
 }
 
+SplatsOverTime Trainer::splatsOf(uint64_t budget) {
+  return {[this, budget](double seconds) { return model_->splatsAt(budget, seconds); },
+          model_->moves()};
+}
+
 /// In: views: that the figures are of; the choice of the best looks at others.
-FitMeasure Trainer::measureOf(const SplatCloud& splats, std::span<const size_t> views) {
+FitMeasure Trainer::measureOf(uint64_t budget, std::span<const size_t> views) {
+  SplatsOverTime splats = splatsOf(budget);
   double background[3];
   backgroundOf(0, background);
   FitMeasure measure = measure_.measure(splats, pictures_, views, background);
@@ -206,7 +211,7 @@ void Trainer::measureBudgets() {
   history_.measured_view_count = views.size();
   history_.by_budget.clear();
   for (const uint64_t budget : model_->budgets()) {
-    FitMeasure measure = measureOf(model_->splats(budget), views);
+    FitMeasure measure = measureOf(budget, views);
     measure.iteration = history_.best_iteration;
     measure.budget = budget;
     history_.by_budget.push_back(measure);

@@ -120,7 +120,8 @@ class Trainer {
   void step(Pace& pace);
   bool measureIsDue() const;
   void measure();
-  FitMeasure measureOf(const SplatCloud& splats, std::span<const size_t> views);
+  FitMeasure measureOf(uint64_t budget, std::span<const size_t> views);
+  SplatsOverTime splatsOf(uint64_t budget);
   void save(FitObserver& observer, Pace& pace);
   void report(FitObserver& observer, const Pace& pace) const;
   void keepBest();

@@ -8,10 +8,9 @@
 
 namespace stipple {
 
-FitViewEvaluator::FitViewEvaluator(const BackendFactory& backends,
-                                   std::function<SplatCloud()> splats, PictureStore& pictures,
-                                   const std::vector<size_t>& training, const double background[3],
-                                   double ssim_share)
+FitViewEvaluator::FitViewEvaluator(const BackendFactory& backends, SplatsOverTime splats,
+                                   PictureStore& pictures, const std::vector<size_t>& training,
+                                   const double background[3], double ssim_share)
     : splats_(std::move(splats)),
       pictures_(pictures),
       training_(training),
@@ -20,6 +19,14 @@ FitViewEvaluator::FitViewEvaluator(const BackendFactory& backends,
   std::copy_n(background, 3, background_);
 }
 
+FitViewEvaluator::FitViewEvaluator(const BackendFactory& backends,
+                                   std::function<SplatCloud()> splats, PictureStore& pictures,
+                                   const std::vector<size_t>& training, const double background[3],
+                                   double ssim_share)
+    : FitViewEvaluator(backends,
+                       SplatsOverTime([make = std::move(splats)](double) { return make(); }, false),
+                       pictures, training, background, ssim_share) {}
+
 const Camera& FitViewEvaluator::camera(size_t view) const {
   if (view >= training_.size()) {
     fail(ErrorCode::kInvalidArgument,
@@ -27,11 +34,6 @@ const Camera& FitViewEvaluator::camera(size_t view) const {
              std::to_string(training_.size()) + " to learn from, counted from 0");
   }
   return pictures_.views().camera(training_[view]);
-}
-
-const SplatCloud& FitViewEvaluator::splats() {
-  if (!cloud_) cloud_ = splats_();
-  return *cloud_;
 }
 
 void FitViewEvaluator::load(size_t view) {
@@ -44,7 +46,8 @@ void FitViewEvaluator::draw(size_t view) {
   options.with_depth = false;
   options.with_background = true;
   std::copy_n(background_, 3, options.background);
-  pass_->forward(splats(), camera(view), options);
+  const Camera& seen_by = camera(view);
+  pass_->forward(splats_.at(pictures_.views().time(training_[view])), seen_by, options);
 }
 
 std::vector<float> FitViewEvaluator::target(size_t view) {

@@ -122,9 +122,30 @@ def latent():
            'settings': '{"seed": 42}', 'provenance': 'written by hand'}, tensors)
 
 
+def motion():
+    count, degree = 3, 1
+    rotations = numpy.zeros((count, 4), '<f4')
+    rotations[:, 1] = 1
+    tensors = {'motion.positions': f32(numbers(count, 3, 1)), 'motion.rotations': f32(rotations),
+               'motion.scales': f32(numbers(count, 3, 8)), 'motion.opacities': f32(numbers(count, 1, 20)[:, 0]),
+               'motion.sh': f32(numbers(count, 3 * (degree + 1)**2, 14)), 'motion.phases': f32(numbers(count, 4, 3)),
+               'motion.spins': f32(numbers(count, 4, 4)), 'motion.lifespans': f32(numbers(count, 2, 5)),
+               'motion.centres': f32(numbers(count, 1, 6)[:, 0]),
+               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+    for harmonic in range(1, 5):
+        tensors[f'motion.cosines.{harmonic}'] = f32(numbers(count, 3, 30 + harmonic))
+        tensors[f'motion.sines.{harmonic}'] = f32(numbers(count, 3, 40 + harmonic))
+    write('motion_1.0.stipple.safetensors',
+          {'stipple_version': '1.0', 'kind': 'motion', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
+           'frame': 'RUB', 'sh_degree': str(degree),
+           'clip': '{"begin": 0.5, "frames": 9, "frames_per_second": 4, "window_frames": 50, "window_share": 0.75}',
+           'settings': '{"seed": 42, "time": {"begin": 0.5, "end": 2.5}}', 'provenance': 'written by hand'}, tensors)
+
+
 if __name__ == '__main__':
     surface()
     hierarchy()
     field()
     whole_field()
     latent()
+    motion()

@@ -495,7 +495,7 @@ TEST_F(FitTest, TellsEveryOption) {
   auto info = sized<StippleFitOptionInfo>();
   STIPPLE_ASSERT_OK(stipple_fit_option_info(0, &info));
   EXPECT_STREQ(info.name_utf8, "model");
-  EXPECT_STREQ(info.choices_utf8, "explicit,field");
+  EXPECT_STREQ(info.choices_utf8, "explicit,field,motion");
   EXPECT_EQ(info.kind, uint32_t{STIPPLE_FIT_OPTION_CHOICE});
   expectRefused(stipple_fit_option_info(count, &info), STIPPLE_ERROR_INVALID_ARGUMENT, "index is");
 }

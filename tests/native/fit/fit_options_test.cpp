@@ -65,7 +65,7 @@ TEST(FitOptionTable, DefaultsAndPresetsAreInRange) {
     SCOPED_TRACE(option.name);
     requireInRange(option, option.member.get(defaultFitOptions()), option.name);
   }
-  for (const FitKind model : {FitKind::kExplicit, FitKind::kField}) {
+  for (const FitKind model : {FitKind::kExplicit, FitKind::kField, FitKind::kMotion}) {
     for (const FitQuality quality :
          {FitQuality::kFast, FitQuality::kBalanced, FitQuality::kFineDetail}) {
       FitOptions options = defaultFitOptions();
@@ -154,7 +154,7 @@ TEST(FitOptions, AreRefusedWhereTheyDoNotGoTogether) {
   options = defaultFitOptions();
   options.model = static_cast<FitKind>(77);
   EXPECT_EQ(messageOf([&] { requireFitOptions(options); }),
-            "options->model is 77; explicit (0) or field (1) is allowed");
+            "options->model is 77; explicit (0), field (1) or motion (2) is allowed");
   options = defaultFitOptions();
   options.resume = true;
   EXPECT_NE(messageOf([&] { requireFitOptions(options); }).find("no checkpoint_path is given"),
@@ -171,6 +171,8 @@ TEST(FitOptions, AreRefusedWhereTheyDoNotGoTogether) {
 TEST(FitOptions, AFieldsStrategySaysHowItsDensityIsLearned) {
   FitOptions options = defaultFitOptions();
   EXPECT_EQ(resolved(options).strategy, "adaptive");
+  options.model = FitKind::kMotion;
+  EXPECT_EQ(resolved(options).strategy, "temporal");
   options.model = FitKind::kField;
   options.density_gradient = false;
   EXPECT_FALSE(resolved(options).density_gradient);

@@ -80,7 +80,10 @@ FitValue otherValue(const FitOption& option, const FitOptions& options) {
 }
 
 TEST(FitSettings, ComeBackAsTheyWereWritten) {
-  for (FitOptions options : {resolved(defaultFitOptions()), resolved(fieldOptions())}) {
+  FitOptions moving = defaultFitOptions();
+  moving.model = FitKind::kMotion;
+  for (FitOptions options :
+       {resolved(defaultFitOptions()), resolved(fieldOptions()), resolved(moving)}) {
     const uint32_t model = 1u << static_cast<uint32_t>(options.model);
     for (const FitOption& option : fitOptionTable()) {
       const bool is_stored = (option.stored_of & model) != 0;

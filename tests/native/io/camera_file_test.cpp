@@ -55,6 +55,14 @@ TEST_F(CameraFile, ReadsNerfstudioIntrinsicsAndLetsFramesOverride) {
   EXPECT_EQ(view.camera.cy, 250);
 }
 
+TEST_F(CameraFile, ReadsWhenAPictureWasTaken) {
+  EXPECT_EQ(readOne("\"fl_x\": 500, \"w\": 640, \"h\": 480").time, 0);
+  EXPECT_EQ(readOne("\"camera_angle_x\": 1.2", "\"time\": 0.25").time, 0.25);
+  EXPECT_EQ(readOne("\"camera_angle_x\": 1.2, \"time\": 3", "\"time\": -1.5").time, -1.5);
+  expectError(ErrorCode::kFormat, {"frame 0", "'time'"},
+              [&] { readOne("\"camera_angle_x\": 1.2", "\"time\": \"noon\""); });
+}
+
 TEST_F(CameraFile, ReadsAnglesWithAndWithoutASize) {
   const Camera sized = readOne("\"camera_angle_x\": 1.2, \"w\": 800, \"h\": 600").camera;
   EXPECT_DOUBLE_EQ(sized.fx, 400.0 / std::tan(0.6));

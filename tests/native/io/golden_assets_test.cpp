@@ -8,6 +8,7 @@
 #include "io/assets/field_asset.h"
 #include "io/assets/hierarchy_asset.h"
 #include "io/assets/latent_asset.h"
+#include "io/assets/motion_asset.h"
 #include "io/assets/surface_asset.h"
 #include "scratch_folder.h"
 
@@ -165,6 +166,32 @@ TEST_F(GoldenAssets, ReadsALatentOfVersion1AndKeepsAllOfIt) {
   expectLatent(asset);
   writeLatentAsset(asset, path("again"));
   expectLatent(readLatentAsset(path("again")));
+}
+
+void expectMotion(const MotionAsset& asset) {
+  expectSplats(asset.splats, 3, 1);
+  for (size_t harmonic = 1; harmonic <= 4; ++harmonic) {
+    EXPECT_EQ(asset.waves[2 * harmonic - 2], numbers(3, 3, 30 + static_cast<int>(harmonic)));
+    EXPECT_EQ(asset.waves[2 * harmonic - 1], numbers(3, 3, 40 + static_cast<int>(harmonic)));
+  }
+  EXPECT_EQ(asset.phases, numbers(3, 4, 3));
+  EXPECT_EQ(asset.spins, numbers(3, 4, 4));
+  EXPECT_EQ(asset.lifespans, numbers(3, 2, 5));
+  EXPECT_EQ(asset.centres, numbers(3, 1, 6));
+  EXPECT_EQ(asset.begin, 0.5);
+  EXPECT_EQ(asset.frame_count, 9u);
+  EXPECT_EQ(asset.frames_per_second, 4);
+  EXPECT_EQ(asset.window_frames, 50);
+  EXPECT_EQ(asset.window_share, 0.75);
+  EXPECT_NE(asset.settings_json.find("42"), std::string::npos);
+  expectExtras(asset.extras);
+}
+
+TEST_F(GoldenAssets, ReadsMovingSplatsOfVersion1AndKeepsAllOfThem) {
+  const MotionAsset asset = readMotionAsset(golden("motion_1.0"));
+  expectMotion(asset);
+  writeMotionAsset(asset, path("again"));
+  expectMotion(readMotionAsset(path("again")));
 }
 
 TEST_F(GoldenAssets, ReadsAFieldThatSaysHowItsAnchorsAreDrawn) {

@@ -19,6 +19,7 @@ TEST_F(ModelKinds, HaveTheNumbersOfTheHeader) {
   EXPECT_EQ(modelKind("hierarchy").number, static_cast<uint32_t>(STIPPLE_MODEL_HIERARCHY));
   EXPECT_EQ(modelKind("field").number, static_cast<uint32_t>(STIPPLE_MODEL_FIELD));
   EXPECT_EQ(modelKind("latent").number, static_cast<uint32_t>(STIPPLE_MODEL_LATENT));
+  EXPECT_EQ(modelKind("motion").number, static_cast<uint32_t>(STIPPLE_MODEL_MOTION));
 }
 
 TEST_F(ModelKinds, HaveNamesAndNumbersOfTheirOwn) {
@@ -45,7 +46,8 @@ TEST_F(ModelKinds, ThatNobodyKnowsAreRefusedWithThoseThatCanBeRead) {
   SafeTensorsWriter file;
   setAssetKind(file, "later");
   file.write(path("later"));
-  expectError(ErrorCode::kUnsupported, {"'later'", "'surface', 'hierarchy', 'field', 'latent'"},
+  expectError(ErrorCode::kUnsupported,
+              {"'later'", "'surface', 'hierarchy', 'field', 'latent', 'motion'"},
               [&] { loadModel(path("later")); });
 }
 

@@ -116,6 +116,7 @@ class Fit {
       const ViewPicture& picture = pictures_[index];
       StepView view;
       view.index = index;
+      view.time = moment_.time = views_.time(index);
       view.camera = &views_.camera(index);
       const double grey =
           picture.alpha.empty() ? 0.0 : 0.1 * static_cast<double>(moment_.iteration % 11);

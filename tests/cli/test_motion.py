@@ -1,0 +1,85 @@
+"""Splats that move, from images with times to splats at a time."""
+import json
+import math
+
+import pytest
+from fit_dataset import dataset, error, figures, run  # noqa: F401
+
+FEW = ('--model', 'motion', '--iterations', 150, '--gaussians', 300, '--sh-degree', 0)
+
+
+@pytest.fixture(scope='module')
+def moving(dataset, tmp_path_factory):  # noqa: F811
+    """The same object, which goes up and down while the images are taken, one at each time: a camera that is lower by
+    as much sees the same image."""
+    folder = tmp_path_factory.mktemp('moving')
+    scene = json.loads((dataset / 'transforms.json').read_text())
+    distance = math.dist(*[[row[3] for row in scene['frames'][i]['transform_matrix'][:3]] for i in (0, 6)]) / 2
+    for i, frame in enumerate(scene['frames']):
+        frame['time'] = i / 11
+        frame['transform_matrix'][1][3] -= 0.1 * distance * math.sin(math.tau * i / 11)
+    (folder / 'lower.json').write_text(json.dumps(scene))
+    (folder / 'images').mkdir()
+    for i, frame in enumerate(scene['frames']):
+        run('render', dataset / 'truth.ply', '--camera', folder / 'lower.json', '--view', i, '--colour', 'display', '-o',
+            folder / 'images' / f'{i:02}.png')
+        frame['transform_matrix'][1][3] += 0.1 * distance * math.sin(math.tau * i / 11)
+    (folder / 'transforms.json').write_text(json.dumps(scene))
+    return folder
+
+
+@pytest.fixture(scope='module')
+def model(moving, tmp_path_factory):
+    path = tmp_path_factory.mktemp('model') / 'm.stipple.safetensors'
+    report = path.with_name('r.json')
+    seen = figures(run('fit', moving, path, *FEW, '--report', report).stdout)
+    assert float(seen['held_out_psnr']) > 12  # 3 dB above images of nothing
+    report = json.loads(report.read_text())
+    assert report['model'] == 'motion'
+    assert report['settings']['model'] == 'motion'
+    assert report['strategy']
+    return path
+
+
+def test_a_fit_of_moving_splats_is_a_model_with_times(model):
+    info = json.loads(run('info', model, '--json').stdout)
+    assert info['kind'] == 'moving splats'
+    assert 0 < info['count'] <= 300
+    assert (info['time_begin'], info['time_end']) == (0, 1)
+
+
+def test_it_decodes_at_any_time_and_always_whole(model, tmp_path):
+    count = json.loads(run('info', model, '--json').stdout)['count']
+    for name, seconds in (('begin', 0), ('again', -7), ('middle', 0.27), ('end', 1)):
+        run('decode', model, tmp_path / f'{name}.ply', '--time', seconds)
+        assert json.loads(run('info', tmp_path / f'{name}.ply', '--json').stdout)['count'] == count
+    files = {name: (tmp_path / f'{name}.ply').read_bytes() for name in ('begin', 'again', 'middle', 'end')}
+    assert files['begin'] == files['again']
+    assert len(set(files.values())) == 3
+    assert f'{count} to {count} is allowed' in error('decode', model, tmp_path / 'few.ply', '--anchors', count - 1)
+
+
+def test_a_conversion_would_lose_the_motion(model, tmp_path):
+    assert error('convert', model, tmp_path / 'still.ply').endswith(
+        'holds splats that move; stipple decode --time makes those of one time')
+
+
+def test_it_comes_back_from_a_copy_bit_for_bit(model, tmp_path):
+    run('decode', model, tmp_path / 'copy.stipple.safetensors')
+    assert (tmp_path / 'copy.stipple.safetensors').read_bytes() == model.read_bytes()
+
+
+def test_a_splat_file_of_it_is_its_begin(moving, model, tmp_path):
+    run('fit', moving, tmp_path / 'fitted.ply', *FEW)
+    run('decode', model, tmp_path / 'decoded.ply', '--time', 0)
+    assert (tmp_path / 'fitted.ply').read_bytes() == (tmp_path / 'decoded.ply').read_bytes()
+
+
+def test_images_without_times_are_refused_with_what_is_missing(dataset, tmp_path):  # noqa: F811
+    message = error('fit', dataset, tmp_path / 'm.stipple.safetensors', *FEW)
+    assert "all views have the same time" in message and "'time' of a frame in transforms.json" in message
+
+
+def test_options_of_fields_are_refused(moving, tmp_path):
+    assert error('fit', moving, tmp_path / 'm.stipple.safetensors', *FEW, '--anchors', 64).endswith(
+        'belongs to --model field')

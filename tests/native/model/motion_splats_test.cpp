@@ -1,0 +1,174 @@
+#include "model/motion_splats.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "base/error.h"
+#include "io/assets/motion_asset.h"
+#include "io/scratch_folder.h"
+#include "model/model_kinds.h"
+#include "moving_cloud.h"
+
+namespace stipple {
+namespace {
+
+using MotionSplatsFile = ScratchFolder;
+
+constexpr uint64_t kCount = 40;
+
+ModelRequest at(double seconds) {
+  ModelRequest request;
+  request.budget = kCount;
+  request.time = seconds;
+  return request;
+}
+
+TEST(MotionSplats, GivesItsSplatsAtEveryTime) {
+  const MotionCloud moving = test::movingCloud(kCount);
+  const auto model = makeMotionSplats(moving);
+  for (const double time : {2.0, 2.6, 3.375, 17.0}) {
+    const SplatCloud wanted = splatsAt(moving, time);
+    const SplatCloud seen = model->decode(at(time));
+    EXPECT_EQ(seen.positions, wanted.positions);
+    EXPECT_EQ(seen.rotations, wanted.rotations);
+    EXPECT_EQ(seen.opacities, wanted.opacities);
+    EXPECT_EQ(seen.scales, moving.splats.scales);
+    EXPECT_EQ(seen.sh, moving.splats.sh);
+    EXPECT_EQ(seen.frame, Frame::kRFU);
+  }
+  EXPECT_NE(model->decode(at(2)).positions, model->decode(at(2.6)).positions);
+  // Before the first frame and after the last one everything stands.
+  EXPECT_EQ(model->decode(at(-9)).positions, model->decode(at(2)).positions);
+  EXPECT_EQ(model->decode(at(3.375)).positions, model->decode(at(1e6)).positions);
+}
+
+TEST(MotionSplats, TellsItsClipAndHasOneBudget) {
+  const auto model = makeMotionSplats(test::movingCloud(kCount));
+  const ModelSettings settings = model->settings();
+  EXPECT_EQ(settings.budget_unit, BudgetUnit::kSplats);
+  EXPECT_EQ(settings.minimum_budget, kCount);
+  EXPECT_EQ(settings.maximum_budget, kCount);
+  EXPECT_EQ(settings.default_budget, kCount);
+  EXPECT_FALSE(settings.has_order || settings.has_seed || settings.takes_mask);
+  ASSERT_TRUE(settings.time);
+  EXPECT_EQ(settings.time->begin, 2);
+  EXPECT_EQ(settings.time->end, 2 + 11 / 8.0);
+  EXPECT_EQ(model->density(), nullptr);
+  EXPECT_EQ(model->info().leaf_count, kCount);
+  EXPECT_EQ(model->info().sh_degree, 1);
+  ModelRequest half = at(2);
+  half.budget = kCount / 2;
+  try {
+    model->decode(half);
+    FAIL() << "a budget of half the splats is accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    EXPECT_NE(std::string(error.what()).find("20 splats; 40 to 40 is allowed"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(MotionSplats, RefusesWhatDoesNotMove) {
+  EXPECT_THROW(makeMotionSplats({}), Error);
+  MotionCloud moving = test::movingCloud(3);
+  moving.lifespans[2] = 0;
+  EXPECT_THROW(makeMotionSplats(moving), Error);
+}
+
+TEST_F(MotionSplatsFile, ComesBackBitForBitWithItsClipAndSettings) {
+  const MotionCloud moving = test::movingCloud(kCount);
+  makeMotionSplats(moving, {R"({"seed":7})", {}})->save(path("a"));
+  const MotionAsset seen = readMotionAsset(path("a"));
+  EXPECT_EQ(seen.splats.positions, moving.splats.positions);
+  EXPECT_EQ(seen.splats.rotations, moving.splats.rotations);
+  EXPECT_EQ(seen.splats.scales, moving.splats.scales);
+  EXPECT_EQ(seen.splats.opacities, moving.splats.opacities);
+  EXPECT_EQ(seen.splats.sh, moving.splats.sh);
+  EXPECT_EQ(seen.splats.antialias, Antialias::kMip);
+  EXPECT_EQ(seen.splats.frame, Frame::kRFU);
+  EXPECT_EQ(seen.waves, moving.waves);
+  EXPECT_EQ(seen.phases, moving.phases);
+  EXPECT_EQ(seen.spins, moving.spins);
+  EXPECT_EQ(seen.lifespans, moving.lifespans);
+  EXPECT_EQ(seen.centres, moving.centres);
+  EXPECT_EQ(seen.begin, 2);
+  EXPECT_EQ(seen.frames_per_second, 8);
+  EXPECT_EQ(seen.frame_count, 12u);
+  EXPECT_EQ(seen.window_frames, kWindowFrames);
+  EXPECT_EQ(seen.window_share, kWindowShare);
+  EXPECT_EQ(seen.settings_json, R"({"seed":7,"time":{"begin":2.0,"end":3.375}})");
+  EXPECT_EQ(loadModel(path("a"))->decode(at(2.6)).positions, splatsAt(moving, 2.6).positions);
+}
+
+TEST_F(MotionSplatsFile, EveryTruncatedPrefixIsRefused) {
+  makeMotionSplats(test::movingCloud(3))->save(path("a"));
+  const std::string bytes = load(path("a"));
+  for (size_t length = 0; length < bytes.size(); length += 1 + length / 40) {
+    EXPECT_THROW(loadModel(store("cut", bytes.substr(0, length))), Error) << length;
+  }
+}
+
+TEST_F(MotionSplatsFile, SaysWhatIsWrongWithADamagedOne) {
+  makeMotionSplats(test::movingCloud(3))->save(path("a"));
+  const std::string good = load(path("a"));
+  // Of the same length, so that what follows stays where it is.
+  const auto refused = [&](const std::string& from, const std::string& to,
+                           std::initializer_list<const char*> words) {
+    std::string bytes = good;
+    ASSERT_EQ(from.size(), to.size());
+    const size_t place = bytes.find(from);
+    ASSERT_NE(place, std::string::npos) << from;
+    bytes.replace(place, from.size(), to);
+    expectError(ErrorCode::kFormat, words, [&] { loadModel(store("bad", bytes)); });
+  };
+  refused("motion.phases", "motion.phazes", {"motion.phases"});
+  refused("motion.sines.3", "motion.sines.9", {"motion.sines.3"});
+  refused("\"shape\":[3,4]", "\"shape\":[4,3]", {"motion.phases"});
+  refused("frames\\\":12", "frames\\\":-2", {"clip of -2 frames"});
+  refused("frames\\\":12", "frames\\\":.2", {"clip"});
+  refused("frames_per_second\\\":8.0", "frames_per_second\\\":0.0", {"at 0 a second"});
+  refused("window_share\\\":0.7", "window_share\\\":1.7", {"share of 1.7"});
+  refused("window_frames\\\"", "window_framez\\\"", {"'window_frames'"});
+  refused("begin\\\":2.0,", "begin\\\":[2],", {"'begin'"});
+  refused("sh_degree\":\"1", "sh_degree\":\"2", {"motion.sh"});
+}
+
+TEST_F(MotionSplatsFile, RefusesNumbersThatNoSplatHas) {
+  const auto refused = [&](const auto& spoil, std::initializer_list<const char*> words) {
+    makeMotionSplats(test::movingCloud(3))->save(path("a"));
+    MotionAsset asset = readMotionAsset(path("a"));
+    spoil(asset);
+    writeMotionAsset(asset, path("a"));
+    expectError(ErrorCode::kFormat, words, [&] { loadModel(path("a")); });
+  };
+  // What the file may hold, as finite numbers of the right sizes, and the splats may not.
+  refused([](MotionAsset& asset) { asset.lifespans[1] = -1; }, {"lifespans", "-1", "1.1"});
+  refused([](MotionAsset& asset) { asset.centres[0] = 2; }, {"centres", "2", "0 to 1"});
+  refused([](MotionAsset& asset) { asset.phases[4] = 3.2e38f; }, {"phases"});
+}
+
+TEST_F(MotionSplatsFile, IsNotWrittenWithPartsThatDoNotFit) {
+  makeMotionSplats(test::movingCloud(3))->save(path("a"));
+  const MotionAsset good = readMotionAsset(path("a"));
+  const auto refused = [&](const auto& spoil, std::initializer_list<const char*> words) {
+    MotionAsset asset = good;
+    spoil(asset);
+    expectError(ErrorCode::kInvalidArgument, words,
+                [&] { writeMotionAsset(asset, path("never")); });
+    EXPECT_TRUE(load(path("never")).empty());
+  };
+  refused([](MotionAsset& asset) { asset.waves[3].pop_back(); }, {"motion.sines.2", "3"});
+  refused([](MotionAsset& asset) { asset.centres.push_back(0); }, {"motion.centres", "4 rows"});
+  refused([](MotionAsset& asset) { asset.spins[0] = std::numeric_limits<float>::infinity(); },
+          {"motion.spins", "inf"});
+  refused([](MotionAsset& asset) { asset.frame_count = 0; }, {"0 frames"});
+  refused([](MotionAsset& asset) { asset.frames_per_second = 0; }, {"at 0 a second"});
+  refused([](MotionAsset& asset) { asset.window_share = 1; }, {"share of 1"});
+  refused([](MotionAsset& asset) { asset.splats.opacities[1] = 2; }, {"motion"});
+}
+
+}  // namespace
+}  // namespace stipple
