@@ -6,11 +6,10 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "data/clouds/cloud_bytes.h"
-#include "math/principal_axes.h"
-#include "math/spherical_harmonics.h"
 #include "motion/shape_kernel.h"
 #include "motion/surface_binding.h"
 #include "motion/triangle_motion.h"
+#include "motion/turn_kernel.h"
 
 namespace stipple {
 
@@ -94,6 +93,7 @@ SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
   }
   const std::vector<TriangleMotion> motions = motionsOf(binding, deformed);
   const ShapeKernel kernel = chosenShapeKernel();
+  const TurnKernel turns = chosenTurnKernel();
   SplatCloud carried = cloud;
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     std::vector<float> shapes(9 * kGrain);
@@ -101,14 +101,14 @@ SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
       const Carried one = carriedRow(motions, binding, row, &cloud.positions[3 * row]);
       std::copy(one.place.begin(), one.place.end(), &carried.positions[3 * row]);
       for (size_t k = 0; k < 9; ++k) shapes[k * kGrain + row - begin] = one.shape[k];
-      if (cloud.sh_degree > 0) {
-        rotateHarmonics(nearestOrthogonal(matrixOf(one.shape)), cloud.sh_degree,
-                        &carried.sh[row * cloud.shStride()]);
-      }
     }
     kernel.deform({shapes.data(), kGrain, &cloud.rotations[4 * begin], &cloud.scales[3 * begin],
                    &carried.rotations[4 * begin], &carried.scales[3 * begin]},
                   end - begin);
+    if (cloud.sh_degree > 0) {
+      turns.turn({shapes.data(), kGrain, &carried.sh[begin * cloud.shStride()], cloud.sh_degree},
+                 end - begin);
+    }
   });
   return carried;
 }
