@@ -306,10 +306,18 @@ def gaussians_per_anchor(stipple):
 
 
 def seconds(stipple, scene=None):
-    """The time of splats that move: 0 where their series starts, as frame_start and frame_speed have it."""
-    scene = bpy.context.scene if scene is None else scene
-    frames = scene.frame_current + scene.frame_subframe - stipple.frame_start
-    return frames * stipple.frame_speed * scene.render.fps_base / scene.render.fps
+    """The time of splats that move, of their own clip: its begin at frame_start, the other settings as in a series of
+    files."""
+    scene, known = bpy.context.scene if scene is None else scene, source_settings.of(stipple)
+    frame = scene.render.fps_base / scene.render.fps
+    frames = (scene.frame_current + scene.frame_subframe - stipple.frame_start) * stipple.frame_speed
+    passed, length = (frames + stipple.frame_offset) * frame, known.time_end - known.time_begin
+    if length > 0 and stipple.time_mode == 'REPEAT':
+        passed %= length + frame  # the last moment lasts a frame, like all others
+    elif length > 0 and stipple.time_mode == 'PING_PONG':
+        passed %= 2 * length
+        passed = min(passed, 2 * length - passed)
+    return known.time_begin + passed
 
 
 def at_most(settings, most, least=1):
