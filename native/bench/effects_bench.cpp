@@ -6,8 +6,8 @@
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
 #include "data/clouds/cloud_transform.h"
-#include "splat/render/ray_render.h"
 #include "shot/sampled_render.h"
+#include "splat/render/ray_render.h"
 
 // What effects cost, as ratios to the picture without them.
 
@@ -95,8 +95,8 @@ void changingSplats(benchmark::State& state, const SplatCase& c) {
   after(0, 3) = 0.1;
   Sampling by_clouds = by_matrices;
   by_matrices.shutter.instances = {Mat4d::Identity(), after};
-  by_clouds.shutter.clouds = {
-      nullptr, std::make_shared<const SplatCloud>(transformed(cloudOf(c), after))};
+  by_clouds.shutter.clouds = {nullptr,
+                              std::make_shared<const SplatCloud>(transformed(cloudOf(c), after))};
   compareWithAll(state, [&] { drawer.sampled(by_matrices); },
                  {{"clouds_to_matrices", [&] { drawer.sampled(by_clouds); }}});
 }
@@ -163,8 +163,10 @@ const bool registered = [] {
   };
   add("effects.passes.100k", passes, 7);
   add("effects.lens_and_shutter.100k", lensAndShutter, 3);
-  add("effects.changing_splats.100k", [](benchmark::State& s) { changingSplats(s, kCase); }, 3);
-  add("effects.changing_splats.100k_sh3", [](benchmark::State& s) { changingSplats(s, kColoured); },
+  add(
+      "effects.changing_splats.100k", [](benchmark::State& s) { changingSplats(s, kCase); }, 3);
+  add(
+      "effects.changing_splats.100k_sh3", [](benchmark::State& s) { changingSplats(s, kColoured); },
       3);
   add("effects.wide_cameras.10k", wideCameras, 3);
   add("effects.object_order.10x100k", objectOrder, 7);

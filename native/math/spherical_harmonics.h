@@ -37,8 +37,8 @@ struct HarmonicTelling {
 };
 const HarmonicTelling& harmonicTelling();
 
-/// HarmonicRotation for one set of coefficients [(degree+1)^2,3], in a tenth of the time that making
-/// one takes: the turned function's values in as many directions as there are coefficients.
+/// HarmonicRotation for one set of coefficients [(degree+1)^2,3], in a tenth of the time that
+/// making one takes: the turned function's values in as many directions as there are coefficients.
 void rotateHarmonics(const Mat3d& rotation, int degree, float* coefficients);
 
 }  // namespace stipple

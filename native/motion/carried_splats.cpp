@@ -94,7 +94,13 @@ SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
   const std::vector<TriangleMotion> motions = motionsOf(binding, deformed);
   const ShapeKernel kernel = chosenShapeKernel();
   const TurnKernel turns = chosenTurnKernel();
-  SplatCloud carried = cloud;
+  SplatCloud carried;
+  carried.sh_degree = cloud.sh_degree;
+  carried.colour_space = cloud.colour_space;
+  carried.antialias = cloud.antialias;
+  carried.frame = cloud.frame;
+  carried.resize(cloud.size());
+  const size_t sh_stride = cloud.shStride();
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     std::vector<float> shapes(9 * kGrain);
     for (size_t row = begin; row < end; ++row) {
@@ -105,8 +111,13 @@ SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
     kernel.deform({shapes.data(), kGrain, &cloud.rotations[4 * begin], &cloud.scales[3 * begin],
                    &carried.rotations[4 * begin], &carried.scales[3 * begin]},
                   end - begin);
+    std::copy(&cloud.opacities[begin], &cloud.opacities[begin] + (end - begin),
+              &carried.opacities[begin]);
+    std::copy(&cloud.sh[begin * sh_stride],
+              &cloud.sh[begin * sh_stride] + (end - begin) * sh_stride,
+              &carried.sh[begin * sh_stride]);
     if (cloud.sh_degree > 0) {
-      turns.turn({shapes.data(), kGrain, &carried.sh[begin * cloud.shStride()], cloud.sh_degree},
+      turns.turn({shapes.data(), kGrain, &carried.sh[begin * sh_stride], cloud.sh_degree},
                  end - begin);
     }
   });

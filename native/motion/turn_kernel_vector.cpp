@@ -72,7 +72,7 @@ HWY_INLINE Matrix cofactors(const Matrix& a) {
            minor(1, 5, 2, 4), minor(2, 3, 0, 5), minor(0, 4, 1, 3)}};
 }
 
-/// Stretches of a hundred to one need six steps, all but the first few of quadratic convergence.
+/// Stretches of a hundred to one need five steps; the others are for rounding.
 constexpr int kMostSteps = 10;
 /// Squared length of a step after which the next one is below the rounding of float32.
 constexpr double kLastStep = 1e-8;

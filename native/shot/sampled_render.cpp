@@ -250,6 +250,14 @@ bool isInView(const Camera& camera, const Vec3d& point) {
   return x >= 0 && x <= camera.width && y >= 0 && y <= camera.height;
 }
 
+/// Moments at which paths are looked at: each step, as far as there are not too many, and some of
+/// the arcs between few.
+uint32_t lookedAtTimes(uint32_t step_count) {
+  constexpr uint32_t kLeast = 8, kMost = 128;
+  const uint32_t pieces = step_count - 1;
+  return std::min(pieces * ((kLeast + pieces - 1) / pieces), kMost) + 1;
+}
+
 }  // namespace
 
 bool isSampled(const Sampling& sampling) {
@@ -268,15 +276,14 @@ void validate(const Sampling& sampling, std::span<const SplatInstance> instances
 uint32_t automaticSamples(std::span<const SplatInstance> instances, const Camera& camera,
                           const Sampling& sampling) {
   constexpr size_t kLookedAt = 2048;
-  constexpr int kTimes = 9;
   MovingScene scene(instances, camera, sampling);
   size_t total = 0;
   for (const SplatInstance& instance : instances) total += instance.cloud->size();
   const size_t stride = std::max<size_t>(1, (total + kLookedAt - 1) / kLookedAt);
   std::vector<Vec3d> before;
   std::vector<double> paths, radii;
-  const int times = moves(sampling) ? kTimes : 1;
-  for (int k = 0; k < times; ++k) {
+  const uint32_t times = moves(sampling) ? lookedAtTimes(sampling.shutter.step_count) : 1;
+  for (uint32_t k = 0; k < times; ++k) {
     SamplePoint point;
     if (times > 1) point.time = static_cast<double>(k) / (times - 1);
     const PictureMoment moment = scene.placedAt(point);

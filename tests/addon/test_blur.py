@@ -68,7 +68,7 @@ def test_a_shutter_draws_a_streak(context, cloud):
     cameras = np.stack([np.array(view().world_to_camera).reshape(4, 4)] * 2)
     same = draw(context, cloud, view(), Blur(cameras=cameras, samples=1)).colour[..., 3]
     assert np.array_equal(same, still)
-    with pytest.raises(StippleError, match='as many of both'):
+    with pytest.raises(StippleError, match='as many of each'):
         Blur(cameras=cameras, instances=steps[:1, None])
 
 
@@ -114,7 +114,7 @@ def test_clouds_of_other_splats_are_refused_by_name(context, cloud):
         draw(context, cloud, view(), Blur(clouds=[[None], [two]]))
     with pytest.raises(StippleError, match='have 1 to 2 clouds'):
         Blur(clouds=[[None], [None, None]])
-    with pytest.raises(StippleError, match='3 steps of instances and 2 steps of clouds; as many of both'):
+    with pytest.raises(StippleError, match='3 steps of instances and 2 steps of clouds; as many of each'):
         Blur(clouds=[[None], [None]], instances=np.tile(np.eye(4), (3, 1, 1, 1)))
 
 

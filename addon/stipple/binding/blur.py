@@ -38,7 +38,7 @@ class Blur:
             steps = next(iter(moving.values()))
             if any(count != steps for count in moving.values()):
                 counts = ' and '.join(f'{count} {name}' for name, count in moving.items())
-                raise invalid(f'The shutter has {counts}; as many of both are allowed.')
+                raise invalid(f'The shutter has {counts}; as many of each are allowed.')
             self.shutter = StippleShutter(step_count=steps, cameras=pointer_to(self.cameras),
                                           instances=pointer_to(self.instances), curve=pointer_to(self.curve),
                                           curve_count=0 if self.curve is None else self.curve.size,

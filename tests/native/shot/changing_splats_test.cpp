@@ -245,6 +245,12 @@ TEST(ChangingSplats, ThatAllMoveAlikeAreAnObjectThatMoves) {
   by_clouds.shutter.step_count = 3;
   by_clouds.shutter.clouds.push_back(nullptr);
   EXPECT_EQ(automaticSamples({&instance, 1}, view(), by_clouds), 128u);
+  // And to and fro in every one of 18 steps, however little in each.
+  by_clouds.shutter.step_count = 18;
+  by_clouds.shutter.clouds.clear();
+  const Share near = std::make_shared<const SplatCloud>(after);
+  for (size_t s = 0; s < 18; ++s) by_clouds.shutter.clouds.push_back(s % 2 == 0 ? nullptr : near);
+  EXPECT_EQ(automaticSamples({&instance, 1}, view(), by_clouds), 256u);
 }
 
 TEST(ChangingSplats, AddUpWithTheMotionOfTheirObject) {
