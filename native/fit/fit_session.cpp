@@ -77,6 +77,7 @@ std::unique_ptr<FitModel> makeModel(const BackendFactory& backends, const ViewSo
 FitOptions preparedOptions(const FitOptions& options, const ViewSource& views) {
   requireFitOptions(options);
   FitOptions held = resolved(options);
+  if (held.model == FitKind::kMotion) clipOfViews(views);  // says now what times are missing
   holdToMemory(held, views);
   return held;
 }

@@ -32,8 +32,9 @@ struct FitStatus {
 /// on one thread; all else may be called by others at any time.
 class FitSession final : public FitObserver {
  public:
-  /// Holds the options to their memory. Errors: those of requireFitOptions() and holdToMemory(),
-  /// and kInvalidArgument where a checkpoint would replace a file of another kind.
+  /// Holds the options to their memory. Errors: those of requireFitOptions(), holdToMemory() and,
+  /// of splats that move, clipOfViews(), and kInvalidArgument where a checkpoint would replace a
+  /// file of another kind.
   FitSession(std::shared_ptr<const BackendFactory> backends,
              std::shared_ptr<const ViewSource> views, const FitOptions& options);
 

@@ -1925,8 +1925,8 @@ typedef struct StippleFitFigures {
  * A cancel, and an error of a step or an image, end the fit with the best that it had measured: the result can be
  * read either way (stipple_fit_cloud). Checkpoints appear under their name when they are whole; a job that ends
  * early leaves one. Where one cannot be written, that is a note and the fit goes on.
- * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without images, a
- * checkpoint's path with a file of another kind; MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
+ * Errors of the start: INVALID_ARGUMENT for options out of range, an unknown strategy, views without images, of one
+ * time where splats move, a checkpoint's path with a file of another kind; MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for views that nothing can be learned from (no cameras, all black,
  * transparent or masked out, cameras that see none of the points); those of reading images; with resume IO,
  * FORMAT, UNSUPPORTED, and INVALID_ARGUMENT for a checkpoint of other options or views (says which).
  * Threads and determinism: the same bits for any number of threads, any image_bytes, and wherever it was stopped

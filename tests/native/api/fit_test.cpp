@@ -436,8 +436,10 @@ TEST_F(FitTest, RefusesOptionsOutOfRange) {
   };
   options_.iterations = 0;
   refused("options->iterations is 0; 1 to 10000000 is allowed");
-  options_.model = 2;
-  refused("options->model is 2");
+  options_.model = 3;
+  refused("options->model is 3");
+  options_.model = STIPPLE_FIT_MOTION;
+  refused("all views have the same time");
   options_.max_splats = 0;
   refused("options->max_splats is 0");
   options_.sh_degree = 5;
@@ -496,6 +498,13 @@ TEST_F(FitTest, TellsEveryOption) {
   STIPPLE_ASSERT_OK(stipple_fit_option_info(0, &info));
   EXPECT_STREQ(info.name_utf8, "model");
   EXPECT_STREQ(info.choices_utf8, "explicit,field,motion");
+  for (uint64_t i = 0; i < count; ++i) {
+    STIPPLE_ASSERT_OK(stipple_fit_option_info(i, &info));
+    if (std::string(info.name_utf8) != "iterations") continue;
+    EXPECT_STREQ(info.presets_utf8[3 * STIPPLE_FIT_FIELD + STIPPLE_FIT_BALANCED], "2000");
+    EXPECT_STREQ(info.motion_presets_utf8[STIPPLE_FIT_BALANCED], "4000");
+  }
+  STIPPLE_ASSERT_OK(stipple_fit_option_info(0, &info));
   EXPECT_EQ(info.kind, uint32_t{STIPPLE_FIT_OPTION_CHOICE});
   expectRefused(stipple_fit_option_info(count, &info), STIPPLE_ERROR_INVALID_ARGUMENT, "index is");
 }
