@@ -56,6 +56,14 @@ def test_a_clip_plays_on_the_timeline(stipple, clip):
                                atol=1e-6)
 
 
+def test_all_splats_are_shown_at_any_budget(stipple, clip):
+    """They have no budget: whatever an animation or a script says, all of them come."""
+    count = len(shown(stipple, clip))
+    clip.data.stipple.ratio = 0.1
+    assert len(shown(stipple, clip)) == count
+    assert not stipple.scene.source.sync.problems
+
+
 def test_images_and_files_are_of_their_frame(stipple, clip, tmp_path):
     scene = bpy.context.scene
     settings = model(stipple, clip).settings()

@@ -144,7 +144,8 @@ def _draw_budget(self, context):
     _draw_warnings(box, data)
     known = source_settings.of(stipple)
     if known.counts_splats or stipple.is_sequence:
-        _draw_tree_budget(box, stipple)
+        if stipple.is_sequence or known.least_budget < sources.visible_count(stipple):
+            _draw_tree_budget(box, stipple)
         return
     if not known.has_budget:
         box.operator('stipple.add_budget', icon='MOD_DECIM')

@@ -291,7 +291,7 @@ def decode_settings(stipple, mode='VIEWPORT', scene=None):
     tells the time, None for the present one. What the source does not have is as it is in new settings."""
     known = source_settings.of(stipple)
     if known.counts_splats:
-        budget = _tree_budget(stipple, mode)
+        budget = max(_tree_budget(stipple, mode), known.least_budget)
     else:
         budget = (mode == 'RENDER' and stipple.anchors_render) or stipple.anchors
     return DecodeSettings(budget, gaussians_per_anchor(stipple),
