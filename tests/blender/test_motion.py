@@ -106,14 +106,16 @@ def test_motion_blur_is_of_the_motion_itself(stipple, tmp_path):
     scene.frame_set(5)
     sharp = scenes.render_pixels(tmp_path, 'sharp')
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 2.0
-    scene.stipple.blur_samples = 64
+    scene.stipple.blur_samples = 256
+    clip.cycles.motion_steps = 3  # of Cycles' scale: nine shapes, straight in between
     blurred = scenes.render_pixels(tmp_path, 'blurred')
     scene.render.use_motion_blur = False
     between = []
     for step in np.linspace(4.0, 6.0, 17):
         scene.frame_set(int(step), subframe=float(step % 1))
         between.append(scenes.render_pixels(tmp_path, 'step'))
-    mean = np.mean(between, axis=0)
+    # Evenly open: the two ends are half as long as the steps between.
+    mean = np.average(between, axis=0, weights=[0.5, *[1.0] * 15, 0.5])
     assert np.abs(sharp - mean).max() > 0.1
-    # Three steps of the shutter, straight in between: nearer to the mean than to the sharp image by far.
-    assert np.abs(blurred - mean).mean() < 0.2 * np.abs(sharp - mean).mean()
+    # Measured: 0.06 with nine shapes, 0.22 with Cycles' three, which cut the bend of the paths short.
+    assert np.abs(blurred - mean).mean() < 0.1 * np.abs(sharp - mean).mean()
