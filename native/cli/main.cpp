@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
   addRender(app, context);
   addVoxelize(app, context);
   addMesh(app, context);
+  addCarry(app, context);
   addFit(app, context);
   addDensify(app, context);
   addGenerate(app, context);
