@@ -304,6 +304,67 @@ def test_a_new_source_is_at_rest_in_the_present_shape(stipple, bound):
     np.testing.assert_allclose(positions(stipple, splats)[:, 2], 0.0, atol=1e-5)
 
 
+def test_a_budget_is_added_to_the_source_at_rest(stipple, tmp_path):
+    """Not to what the mesh has made of it."""
+    splats, mesh = scan(stipple, tmp_path), cage()
+    rest = positions(stipple, splats)
+    scenes.select(mesh, splats)
+    assert bpy.ops.stipple.bind_to_mesh(reach='AROUND') == {'FINISHED'}
+    bpy.context.scene.frame_set(11)
+    scenes.select(splats)
+    assert bpy.ops.stipple.add_budget() == {'FINISHED'}
+    order = np.lexsort(positions(stipple, splats).round(4).T)
+    wanted = rest + np.float32([0, 0, 1])
+    np.testing.assert_allclose(positions(stipple, splats)[order], wanted[np.lexsort(wanted.round(4).T)], atol=2e-4)
+    bpy.context.scene.frame_set(1)
+    assert abs(positions(stipple, splats)[:, 2].mean() - rest[:, 2].mean()) < 1e-4
+
+
+def test_hand_edits_become_the_rest(stipple, bound):
+    """Use as New Source keeps the splats that are shown, and they follow from there."""
+    splats, _ = bound
+    bpy.context.scene.frame_set(11)
+    data = splats.data
+    arrays = splats_of(stipple, splats)
+    arrays.positions[:, 0] += 0.25
+    stipple.scene.source.splat_data.write(data, arrays)
+    scenes.select(splats)
+    with bpy.context.temp_override(object=splats):
+        assert bpy.ops.stipple.use_as_new_source() == {'FINISHED'}
+    np.testing.assert_allclose(positions(stipple, splats), arrays.positions, atol=1e-6)
+    bpy.context.scene.frame_set(1)
+    np.testing.assert_allclose(positions(stipple, splats), arrays.positions - np.float32([0, 0, 1]), atol=2e-6)
+
+
+def test_merged_splats_follow_no_mesh_and_keep_their_shape(stipple, bound):
+    splats, _ = bound
+    other = scenes.make_splats(scenes.quad('Other'), anchors=100)
+    bpy.context.scene.frame_set(11)
+    scenes.select(splats, other)
+    assert bpy.ops.stipple.merge_splats() == {'FINISHED'}
+    assert splats.data.stipple.bind_object is None and len(splats.constraints) == 0
+    before = positions(stipple, splats)
+    bpy.context.scene.frame_set(1)
+    np.testing.assert_array_equal(positions(stipple, splats), before)
+
+
+def test_a_mesh_in_edit_mode_is_followed(stipple, bound):
+    """While somebody moves its vertices."""
+    splats, mesh = bound
+    mesh.hide_set(False)
+    scenes.select(mesh)
+    bpy.ops.object.mode_set(mode='EDIT')
+    bpy.ops.mesh.select_all(action='SELECT')
+    bpy.ops.transform.translate(value=(0, 0, 0.75))
+    bpy.context.view_layer.update()
+    bpy.ops.object.mode_set(mode='OBJECT')
+    bpy.context.view_layer.update()
+    assert stipple.scene.source.sync.problems == {}
+    bpy.context.scene.frame_set(2)
+    bpy.context.scene.frame_set(1)
+    np.testing.assert_allclose(positions(stipple, splats)[:, 2], 0.75, atol=1e-5)
+
+
 # ---- what goes wrong ----------------------------------------------------------------------------
 
 def problem_of(stipple, obj):

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty
 from ..binding.model import Model
 from ..jobs import JobOperator, Task
 from ..scene import geometry
-from ..scene.source import decoded, masks, source_paths, source_settings, sources, splat_data, sync
+from ..scene.source import bound, decoded, masks, source_paths, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
@@ -46,8 +46,11 @@ class STIPPLE_OT_add_budget(JobOperator, bpy.types.Operator):
         data = obj.data
         if not source_settings.of(data.stipple).has_source:
             masks.clear(data)
+        is_carried = bound.follows(data) and data.stipple.edited  # else the tree is of the source, at rest
         with sync.paused():
             sources.attach_tree(data, path, count)
+            if is_carried:
+                bound.rebind(data)
             visible = sources.visible_count(data.stipple)
             data.stipple.ratio = min(1.0, sources.FIRST_COUNT / visible)
         settings = sources.decode_settings(data.stipple)

@@ -8,7 +8,7 @@ from bpy.props import EnumProperty
 from ..binding import cloud_edit
 from ..binding.errors import invalid
 from ..jobs import JobOperator, Task
-from ..scene.source import edits, exporting, masks, placement, sources, splat_data, sync
+from ..scene.source import bound, edits, exporting, masks, placement, sources, splat_data, sync
 
 
 class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
@@ -58,6 +58,9 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
             sources.attach_cloud(data, path)
         splats = job.result.columns()
         sync.write(data, splats, masks.key(data))
+        if bound.is_bound(active.data):
+            bound.hold(active, None)
+            self.report({'WARNING'}, f"'{active.name}' follows no mesh now; bind it again where all of it shall follow.")
         active.data = data
         for obj in self._objects[1:]:
             bpy.data.objects.remove(obj)

@@ -6,7 +6,7 @@ from bpy.props import IntProperty, StringProperty
 
 from ..jobs import JobOperator
 from ..scene.fit import densifying, fitting, strategies
-from ..scene.source import decoded, edits, masks, source_paths, sources, splat_data, sync
+from ..scene.source import bound, decoded, edits, masks, source_paths, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
@@ -60,6 +60,8 @@ class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
         with sync.paused():
             masks.clear(data)
             sources.attach_tree(data, path, count)
+            if bound.follows(data):
+                bound.rebind(data)
             data.stipple.ratio = data.stipple.ratio_render = 1.0
         sync.write_decoded(data, cloud.read())
         obj.data = data

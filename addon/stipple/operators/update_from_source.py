@@ -7,7 +7,7 @@ from ..binding.errors import invalid
 from ..binding.model import Model
 from ..jobs import JobOperator
 from ..scene import meshes
-from ..scene.source import erased, source_paths, sources, splat_data, sync
+from ..scene.source import bound, erased, source_paths, sources, splat_data, sync
 
 
 class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
@@ -48,6 +48,7 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
         sources.remember_model(path, model)
         with sync.paused():
             sources.attach_model(data, path, self._sources, model.settings())
+            bound.rebind(data)
         sync.write_decoded(data, splats)
         for note in self._notes:
             self.report({'WARNING'}, note)

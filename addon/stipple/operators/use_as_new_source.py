@@ -5,7 +5,7 @@ import bpy
 
 from ..jobs import JobOperator
 from ..scene import grades
-from ..scene.source import sources, splat_data, sync
+from ..scene.source import bound, sources, splat_data, sync
 
 
 class STIPPLE_OT_use_as_new_source(JobOperator, bpy.types.Operator):
@@ -32,6 +32,8 @@ class STIPPLE_OT_use_as_new_source(JobOperator, bpy.types.Operator):
         data = context.object.data
         with sync.paused():
             sources.attach_cloud(data, self._path)
+            if bound.follows(data):
+                bound.rebind(data)
             if self._bakes:
                 grades.clear(data.stipple)
         sync.write(data, self._arrays, '')

@@ -101,7 +101,7 @@ def _rendered_shape(obj, depsgraph):
 
 
 def rebind(data, depsgraph=None):
-    """A datablock has got other splats, in the present shape of its mesh: that is their rest now."""
+    """A datablock that is bound has got other splats, in the present shape of its mesh: that is their rest now."""
     stipple = data.stipple
     if not is_bound(data):
         return

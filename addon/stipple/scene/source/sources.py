@@ -24,7 +24,7 @@ from ...binding.model import DecodeSettings, Model
 from ...binding.structs import AnchorOrder, JobState, Status
 from .. import meshes
 from .ahead import Ahead
-from . import bound, erased, masks, selections, source_paths, source_settings, splat_data
+from . import erased, masks, selections, source_paths, source_settings, splat_data
 from .source_paths import MODEL_SUFFIX
 
 _MAX_MODELS = 4
@@ -394,12 +394,9 @@ def attach_cloud(data, path):
 
 
 def _end_edits(data):
-    """A new source of splats holds what was left of the one before, as a mesh carried it, and nothing of it is
-    selected."""
+    """A new source of splats holds what was left of the one before, and nothing of it is selected."""
     erased.clear(data)
     selections.clear(data)
-    if bound.follows(data):
-        bound.rebind(data)
 
 
 def _save(write, path, suffix, overwrite):
@@ -451,7 +448,6 @@ def attach_model(data, path, objects, settings):
     """Notes a model as the source of a datablock, with the meshes and settings that it was made from. In: settings,
     StippleModelSettings."""
     stipple = data.stipple
-    bound.rebind(data)
     source_settings.note_model(stipple, source_settings.of_model(settings))
     stipple.source = source_paths.stored(path)
     stipple.source_stamp = stamp(path)
