@@ -492,6 +492,31 @@ TEST(FitOfMovingSplats, GoesOnBitForBitAndIsTheSameForAnyNumberOfThreads) {
   expectSame(whole, resumed);
 }
 
+TEST(FitOfMovingSplats, ASplatTakesAsManyBytesAsItCounts) {
+  for (const int degree : {0, 3}) {
+    uint64_t bytes[2];
+    const size_t counts[2] = {2000, 12000};
+    for (int k = 0; k < 2; ++k) {
+      SplatCloud cloud = ballOfSplats(counts[k], 4, 0.01);
+      cloud.sh_degree = degree;
+      cloud.sh.resize(counts[k] * cloud.shStride());
+      const auto views = viewsOf(ballOfSplats(30, 1), camerasAround(2, 32));
+      ExplicitModelOptions options;
+      options.clip = clipOf(10);
+      const auto model =
+          makeExplicitModel(*cpuBackends(), cloud, makeStrategy("temporal"), options);
+      Fit(*views, *model, 3000).run(3);
+      bytes[k] = model->memoryBytes();
+    }
+    // A fit holds the model, its best state and a checkpoint: less than three times as much, as
+    // what drawing keeps is there once.
+    const double each = 3.0 * static_cast<double>(bytes[1] - bytes[0]) / 10000;
+    EXPECT_LE(each, 1.2 * static_cast<double>(bytesPerSplat(degree, true))) << degree;
+    EXPECT_GE(each, 0.5 * static_cast<double>(bytesPerSplat(degree, true))) << degree;
+    EXPECT_GT(bytesPerSplat(degree, true), bytesPerSplat(degree));
+  }
+}
+
 TEST(FitOfMovingSplats, RefusesTheStateOfOneThatStandsStill) {
   const auto views = viewsOfClip(swingingBall());
   ExplicitModelOptions options;
