@@ -80,7 +80,7 @@ class NativeWork:
     def _take_instances(self, depsgraph):
         """Reads what the view layer shows of splats. Errors: StippleError."""
         found = instances.gather_keyed(depsgraph, 'RENDER', self._warn, self._wait_decoding)
-        self._keys = [entry[0] for entry in found]
+        self._entries = found
         self._instances = [entry[3] for entry in found]
         # By what the object index pass of the renderer has: 0 for none, then the instances.
         self._indices = np.array([0] + [entry[2].pass_index for entry in found], np.float32)
@@ -93,7 +93,7 @@ class NativeWork:
         """What moves while the shutter is open, or None without motion blur."""
         if not motion.is_wanted(depsgraph.scene, depsgraph.view_layer):
             return None
-        return motion.sample(depsgraph.scene, depsgraph, camera_object, self._keys, self.frame_set)
+        return motion.sample(depsgraph.scene, depsgraph, camera_object, self._entries, self.frame_set)
 
     def _blur(self, depsgraph, camera_object, shutter):
         return picture_options.blur(depsgraph.scene, effects.aperture_of(camera_object, depsgraph), shutter)

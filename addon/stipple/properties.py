@@ -10,7 +10,7 @@ from .binding.errors import StippleError
 from .scene import overlays, selection_settings
 from .scene.fit import fit_proposal, fitting, strategies
 from .scene.sequence import sequences
-from .scene.source import setting_paths, source_paths, source_settings, sources, sync
+from .scene.source import bound, setting_paths, source_paths, source_settings, sources, sync
 from .scene.view import effects, photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
@@ -19,6 +19,9 @@ _CHANGEABLE = {'ANIMATABLE'}
 ORDERS = (('SYSTEMATIC', "Systematic", "Anchors are spread most evenly at every budget"),
           ('PROGRESSIVE', "Progressive", "The anchors of a smaller budget are a part of those of a larger one, so a "
                                          "moving budget adds and removes anchors; splats shift a little"))
+TIME_MODES = (('HOLD', "Hold", "The splats stand still"),
+              ('REPEAT', "Repeat", "The clip starts anew after its end"),
+              ('PING_PONG', "Ping-Pong", "The clip plays forward and backward alternately"))
 COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: textures, color attributes, plain colors; "
                   "other node trees are baked"),
                  ('BAKED', "Baked Lighting", "Colors as lit by the scene, baked by Cycles"),
@@ -100,18 +103,20 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     series_files: CollectionProperty(type=STIPPLE_PG_source_file)  # of a packed series: scene/source/source_packing.py
     frame_duration: IntProperty(name="Frames", description="Number of files of the series that are used", default=1,
                                 min=1, options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
-    frame_start: IntProperty(name="Start", description="Frame of the scene at which the series starts", default=1,
+    frame_start: IntProperty(name="Start", description="Frame of the scene at which the series or clip starts", default=1,
                              options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
-    frame_offset: IntProperty(name="Offset", description="Added to the number of the file that is shown; keyframes "
-                              "here time the series freely", default=0, options=_CHANGEABLE, override=_OVERRIDABLE,
+    frame_offset: IntProperty(name="Offset", description="Added to the number of the file or of the clip's frame that is "
+                              "shown; keyframes here time it freely", default=0, options=_CHANGEABLE, override=_OVERRIDABLE,
                               update=sync.on_property_change)
-    frame_speed: FloatProperty(name="Speed", description="Number of files that pass in each frame of the scene; a "
-                                                         "negative number plays backward",
+    frame_speed: FloatProperty(name="Speed", description="Number of files, or of the clip's frames, that pass in each "
+                                                         "frame of the scene; a negative number plays backward",
                                default=1.0, soft_min=-4.0, soft_max=4.0, options=set(), override=_OVERRIDABLE,
                                update=sync.on_property_change)
     sequence_mode: EnumProperty(name="Mode", description="What is shown before the first and after the last file",
                                 items=sequences.MODES, options=set(), override=_OVERRIDABLE,
                                 update=sync.on_property_change)
+    time_mode: EnumProperty(name="Mode", description="What splats that move do before and after their clip",
+                            items=TIME_MODES, options=set(), override=_OVERRIDABLE, update=sync.on_property_change)
     missing_frames: EnumProperty(name="Missing Files", description="What happens where a file of the series is "
                                                                    "missing",
                                  items=sequences.GAPS, options=set(), override=_OVERRIDABLE,
@@ -134,6 +139,20 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                                  override=_OVERRIDABLE, update=sync.on_property_change)
     fit_report: PointerProperty(name="Fit Report", description="Curves of the fit that made the splats",
                                 type=bpy.types.Image)
+    # What the splats follow: scene/source/bound.py.
+    bind_object: PointerProperty(name="Mesh", description="Mesh that the splats follow", type=bpy.types.Object,
+                                 options={'HIDDEN'}, override=_OVERRIDABLE)
+    bind_rest: PointerProperty(type=bpy.types.Mesh, options={'HIDDEN'})  # its shape when they were bound
+    bind_rest_render: PointerProperty(type=bpy.types.Mesh, options={'HIDDEN'})  # in renders, where they differ
+    bind_reach: EnumProperty(name="Bind", description="Which part of the mesh each splat follows",
+                             items=bound.REACHES, options={'HIDDEN'})
+    bind_matrix: FloatVectorProperty(size=16, options={'HIDDEN'})  # from the mesh's space to the splats', row by row
+    bind_topology: StringProperty(options={'HIDDEN'})  # of its faces
+    bind_topology_render: StringProperty(options={'HIDDEN'})
+    bind_key: StringProperty(options={'HIDDEN'})       # tells bindings apart
+    bind_follow: BoolProperty(name="Follow Mesh", description="The splats follow the mesh. Off, they rest where they were "
+                              "bound, and can be edited", default=True, options=set(), override=_OVERRIDABLE,
+                              update=sync.on_property_change)
     edited: BoolProperty(name="Edited", description="The splats were edited by hand", options={'HIDDEN'})
 
 

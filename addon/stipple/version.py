@@ -93,6 +93,19 @@ def corner_normals(mesh, loop_indices, triangle_vertices):
     return _get(mesh.loops, 'normal', len(mesh.loops), 3)[loop_indices]
 
 
+def set_triangles(mesh, vertices, triangles):
+    """Fills an empty mesh with vertices [V,3] and triangles [T,3]."""
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set('co', np.ascontiguousarray(vertices, np.float32).reshape(-1))
+    mesh.loops.add(3 * len(triangles))
+    mesh.loops.foreach_set('vertex_index', triangles.reshape(-1).astype(np.int32))
+    mesh.polygons.add(len(triangles))
+    mesh.polygons.foreach_set('loop_start', np.arange(0, 3 * len(triangles), 3, dtype=np.int32))
+    if VERSION < (4, 1, 0):  # later ones tell it by the next polygon's start
+        mesh.polygons.foreach_set('loop_total', np.full(len(triangles), 3, np.int32))
+    mesh.update()
+
+
 def loop_uvs(layer, count):
     """UVs [count,2] of a UV layer."""
     if VERSION >= (3, 5, 0):

@@ -1,6 +1,7 @@
 #include "api/conversions.h"
 
 #include <algorithm>
+#include <cstddef>
 
 namespace stipple::api {
 
@@ -31,6 +32,15 @@ std::vector<Mat4d> matricesFrom(const double* matrices, size_t count) {
   return made;
 }
 
+std::vector<std::shared_ptr<const SplatCloud>> cloudsFrom(const StippleCloud* const* clouds,
+                                                          size_t count) {
+  std::vector<std::shared_ptr<const SplatCloud>> made;
+  for (size_t i = 0; clouds && i < count; ++i) {
+    made.push_back(clouds[i] ? clouds[i]->cloud : nullptr);
+  }
+  return made;
+}
+
 Shutter shutterFrom(const StippleShutter& shutter, size_t instance_count) {
   Shutter made;
   made.step_count = shutter.step_count;
@@ -41,6 +51,7 @@ Shutter shutterFrom(const StippleShutter& shutter, size_t instance_count) {
   }
   made.camera = matricesFrom(shutter.cameras, made.step_count);
   made.instances = matricesFrom(shutter.instances, made.step_count * instance_count);
+  made.clouds = cloudsFrom(shutter.clouds, made.step_count * instance_count);
   if (shutter.curve) made.curve.assign(shutter.curve, shutter.curve + shutter.curve_count);
   return made;
 }
@@ -54,10 +65,11 @@ Sampling samplingFrom(const StippleRenderOptions& given, const Instances& instan
                          aperture.rotation, aperture.ratio == 0 ? 1.0 : aperture.ratio};
   }
   if (given.shutter) {
-    sampling.shutter =
-        shutterFrom(complete(given.shutter, "options->shutter"), instances.list.size());
+    const StippleShutter shutter =
+        completeUpTo(given.shutter, offsetof(StippleShutter, clouds), "options->shutter");
+    sampling.shutter = shutterFrom(shutter, instances.list.size());
   }
-  validate(sampling, instances.list.size());
+  validate(sampling, instances.list);
   return sampling;
 }
 

@@ -26,6 +26,7 @@
 #include "io/views/camera_file.h"
 #include "measure/picture_accuracy.h"
 #include "model/splat_model.h"
+#include "motion/surface_binding.h"
 #include "shot/mesh_layers.h"
 #include "shot/renderer.h"
 #include "train/backend/backend_table.h"
@@ -123,6 +124,11 @@ struct StippleLayers {
 struct StippleWeights {
   stipple::api::Context context;
   std::shared_ptr<const stipple::WeightsFolder> folder;
+};
+
+struct StippleBinding {
+  stipple::api::Context context;
+  std::shared_ptr<const stipple::SurfaceBinding> binding;
 };
 
 struct StippleAccuracyReport {

@@ -25,11 +25,13 @@ class GenerateSession;
 namespace stipple::api {
 
 /// What a job leaves: nothing (it filled the caller's buffers), a model, a cloud, what density
-/// control saw with it, a volume, a mesh, a report of accuracy or what is known of weights.
+/// control saw with it, a volume, a mesh, a report of accuracy, what is known of weights or how splats
+/// are bound to a mesh.
 using JobResult = std::variant<std::monostate, std::shared_ptr<const SplatModel>,
                                std::shared_ptr<const SplatCloud>, std::shared_ptr<const SparseVolume>,
                                std::shared_ptr<const TriMesh>, std::shared_ptr<const MeasuredAccuracy>,
-                               SeenCloud, std::shared_ptr<const WeightsFolder>>;
+                               SeenCloud, std::shared_ptr<const WeightsFolder>,
+                               std::shared_ptr<const SurfaceBinding>>;
 
 /// Work of a job: runs on the job's own thread within the context's thread limit. It owns shares of
 /// all that it uses, apart from the caller's buffers.

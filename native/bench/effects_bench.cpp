@@ -1,11 +1,13 @@
+#include <memory>
 #include <numbers>
 #include <vector>
 
 #include "base/parallel.h"
 #include "bench/comparison.h"
 #include "bench/splat_scene.h"
-#include "splat/render/ray_render.h"
+#include "data/clouds/cloud_transform.h"
 #include "shot/sampled_render.h"
+#include "splat/render/ray_render.h"
 
 // What effects cost, as ratios to the picture without them.
 
@@ -13,6 +15,7 @@ namespace stipple::bench {
 namespace {
 
 constexpr SplatCase kCase = {"100k", 100'000, 640, 480, 1, 1.0};
+constexpr SplatCase kColoured = {"100k", 100'000, 640, 480, 3, 1.0};
 constexpr SplatCase kFew = {"10k", 10'000, 320, 160, 1, 1.0};
 
 /// Draws into memory that is there already, as engines do.
@@ -79,6 +82,25 @@ void lensAndShutter(benchmark::State& state) {
                   {"shutter_to_16_pictures", [&] { drawer.sampled(shutter); }}});
 }
 
+/// 16 pictures of splats that change, each read from two clouds and written into a third, against
+/// as many with matrices only. The splats go the way that the matrices have, so that both draw the
+/// same.
+void changingSplats(benchmark::State& state, const SplatCase& c) {
+  Drawer drawer(c);
+  drawer.plain();
+  Sampling by_matrices;
+  by_matrices.samples = 16;
+  by_matrices.shutter.step_count = 2;
+  Mat4d after = Mat4d::Identity();
+  after(0, 3) = 0.1;
+  Sampling by_clouds = by_matrices;
+  by_matrices.shutter.instances = {Mat4d::Identity(), after};
+  by_clouds.shutter.clouds = {nullptr,
+                              std::make_shared<const SplatCloud>(transformed(cloudOf(c), after))};
+  compareWithAll(state, [&] { drawer.sampled(by_matrices); },
+                 {{"clouds_to_matrices", [&] { drawer.sampled(by_clouds); }}});
+}
+
 /// Panorama and fisheye along rays against a perspective picture along rays, of as many pixels.
 void wideCameras(benchmark::State& state) {
   const Drawer drawer(kFew);
@@ -141,6 +163,11 @@ const bool registered = [] {
   };
   add("effects.passes.100k", passes, 7);
   add("effects.lens_and_shutter.100k", lensAndShutter, 3);
+  add(
+      "effects.changing_splats.100k", [](benchmark::State& s) { changingSplats(s, kCase); }, 3);
+  add(
+      "effects.changing_splats.100k_sh3", [](benchmark::State& s) { changingSplats(s, kColoured); },
+      3);
   add("effects.wide_cameras.10k", wideCameras, 3);
   add("effects.object_order.10x100k", objectOrder, 7);
   add("effects.object_order.100k", oneObject, 15);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 namespace stipple::cli {
 
@@ -53,6 +54,9 @@ void addLensOptions(CLI::App& command, LensArguments& arguments) {
       ->capture_default_str();
   command.add_option("--moves-to", arguments.moves_to,
                      "The view where the camera is when the shutter closes: motion blur");
+  command.add_option("--changes-to", arguments.changes_to,
+                     "The splats of each file when the shutter closes, as many and in the same "
+                     "order: one file for each of in");
   command.add_option(
       "--blur-samples", arguments.samples,
       "Number of images that are averaged over aperture, time and pixel, 1 to 65536; default: by "
@@ -60,9 +64,11 @@ void addLensOptions(CLI::App& command, LensArguments& arguments) {
 }
 
 LensSettings::LensSettings(const Context& context, const CameraArguments& camera_arguments,
-                           const LensArguments& arguments, StippleCamera& camera)
+                           const LensArguments& arguments, uint64_t cloud_count,
+                           StippleCamera& camera)
     : aperture_(sized<StippleAperture>()),
       shutter_(sized<StippleShutter>()),
+      last_(context, arguments.changes_to),
       samples_(arguments.samples.value_or(0)) {
   takeModel(arguments, camera);
   if (arguments.samples && samples_ == 0) {
@@ -76,6 +82,16 @@ LensSettings::LensSettings(const Context& context, const CameraArguments& camera
   aperture_.blades = arguments.blades;
   aperture_.rotation = arguments.rotation * kPi / 180;
   aperture_.ratio = arguments.ratio;
+  if (!arguments.changes_to.empty()) {
+    if (last_.count() != cloud_count) {
+      throw Failure("--changes-to names " + std::to_string(last_.count()) + " files; " +
+                    std::to_string(cloud_count) + " are rendered, and each needs one");
+    }
+    clouds_.assign(cloud_count, nullptr);
+    for (uint64_t i = 0; i < cloud_count; ++i) clouds_.push_back(last_.instances()[i].cloud);
+    shutter_.clouds = clouds_.data();
+    shutter_.step_count = 2;
+  }
   if (!arguments.moves_to) return;
   CameraArguments last = camera_arguments;
   last.view = *arguments.moves_to;
@@ -88,7 +104,7 @@ LensSettings::LensSettings(const Context& context, const CameraArguments& camera
 
 void LensSettings::putInto(StippleRenderOptions& options) const {
   if (aperture_.aperture_radius != 0) options.aperture = &aperture_;
-  if (!cameras_.empty()) options.shutter = &shutter_;
+  if (shutter_.step_count > 0) options.shutter = &shutter_;
   options.samples = samples_;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/camera_options.h"
+#include "cli/placed_clouds.h"
 
 namespace stipple::cli {
 
@@ -19,6 +20,7 @@ struct LensArguments {
   double rotation = 0;  ///< degrees
   double ratio = 1;
   std::optional<uint64_t> moves_to;  ///< a view
+  std::vector<std::string> changes_to;  ///< splat files
   std::optional<uint32_t> samples;
 };
 
@@ -30,9 +32,10 @@ class LensSettings {
   LensSettings(const LensSettings&) = delete;
   LensSettings& operator=(const LensSettings&) = delete;
 
-  /// Changes the camera to the model that is asked for. Errors: Failure.
+  /// Changes the camera to the model that is asked for. In: cloud_count, of files that are rendered.
+  /// Errors: Failure.
   LensSettings(const Context& context, const CameraArguments& camera_arguments,
-               const LensArguments& arguments, StippleCamera& camera);
+               const LensArguments& arguments, uint64_t cloud_count, StippleCamera& camera);
 
   /// Valid as long as this.
   void putInto(StippleRenderOptions& options) const;
@@ -41,6 +44,8 @@ class LensSettings {
   StippleAperture aperture_;
   StippleShutter shutter_;
   std::vector<double> cameras_;
+  PlacedClouds last_;                        ///< when the shutter closes
+  std::vector<const StippleCloud*> clouds_;  ///< [2, count] of both steps, or none
   uint32_t samples_;
 };
 

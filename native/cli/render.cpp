@@ -73,7 +73,7 @@ void render(const Context& context, const Arguments& arguments) {
     throw Failure("'" + arguments.out + "' is not an image; .png or .exr is expected");
   }
   StippleCamera camera = cameraOf(context, arguments.camera);
-  const LensSettings lens(context, arguments.camera, arguments.lens, camera);
+  const LensSettings lens(context, arguments.camera, arguments.lens, arguments.in.size(), camera);
   const StippleAccuracy accuracy = accuracyOf(arguments.accuracy);
   StippleRenderOptions options = optionsOf(arguments, accuracy);
   lens.putInto(options);

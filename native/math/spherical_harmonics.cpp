@@ -33,44 +33,31 @@ std::array<GaussPoint, 5> gaussLegendre5() {
            {outer, outer_weight}}};
 }
 
-/// Directions of which the first 2l + 1 tell the coefficients of degree l apart: their matrices of
-/// basis functions have condition numbers of 3.
-const std::array<Vec3d, 9>& tellingDirections() {
-  static const std::array<Vec3d, 9> directions = [] {
-    std::array<Vec3d, 9> all = {
-        Vec3d{0.41, 0.91, -0.07},   Vec3d{0.22, 0.27, -0.94},  Vec3d{0.72, 0.24, 0.65},
-        Vec3d{-0.06, -0.96, -0.28}, Vec3d{0.65, -0.37, 0.66},  Vec3d{-0.11, 0.66, -0.74},
-        Vec3d{0.94, 0.34, 0.08},    Vec3d{0.63, -0.08, -0.77}, Vec3d{-0.92, 0.29, -0.25}};
-    for (Vec3d& direction : all) direction.normalize();
-    return all;
-  }();
-  return directions;
-}
-
-/// For degree l, what gives coefficients from values in the first 2l + 1 of these directions.
-/// [2l+1,2l+1], row-major
-const std::array<std::array<double, 81>, 5>& coefficientsOfValues() {
-  static const std::array<std::array<double, 81>, 5> inverses = [] {
-    std::array<std::array<double, 81>, 5> made{};
-    for (int l = 1; l <= kMaxDegree; ++l) {
-      const int side = 2 * l + 1;
-      Eigen::MatrixXd basis(side, side);
-      std::array<double, 25> values;
+HarmonicTelling makeTelling() {
+  HarmonicTelling made = {
+      {Vec3d{0.41, 0.91, -0.07}, Vec3d{0.22, 0.27, -0.94}, Vec3d{0.72, 0.24, 0.65},
+       Vec3d{-0.06, -0.96, -0.28}, Vec3d{0.65, -0.37, 0.66}, Vec3d{-0.11, 0.66, -0.74},
+       Vec3d{0.94, 0.34, 0.08}, Vec3d{0.63, -0.08, -0.77}, Vec3d{-0.92, 0.29, -0.25}},
+      {}};
+  for (Vec3d& direction : made.directions) direction.normalize();
+  for (int l = 1; l <= kMaxDegree; ++l) {
+    const int side = 2 * l + 1;
+    Eigen::MatrixXd basis(side, side);
+    std::array<double, 25> values;
+    for (int k = 0; k < side; ++k) {
+      const Vec3d& d = made.directions[static_cast<size_t>(k)];
+      harmonicBasis(kMaxDegree, d.x(), d.y(), d.z(), values.data());
+      for (int j = 0; j < side; ++j) basis(k, j) = values[static_cast<size_t>(l * l + j)];
+    }
+    const Eigen::MatrixXd inverse = basis.inverse();
+    for (int i = 0; i < side; ++i) {
       for (int k = 0; k < side; ++k) {
-        const Vec3d& d = tellingDirections()[static_cast<size_t>(k)];
-        harmonicBasis(kMaxDegree, d.x(), d.y(), d.z(), values.data());
-        for (int j = 0; j < side; ++j) basis(k, j) = values[static_cast<size_t>(l * l + j)];
-      }
-      const Eigen::MatrixXd inverse = basis.inverse();
-      for (int i = 0; i < side; ++i) {
-        for (int k = 0; k < side; ++k) {
-          made[static_cast<size_t>(l)][static_cast<size_t>(i * side + k)] = inverse(i, k);
-        }
+        made.coefficients[static_cast<size_t>(l)][static_cast<size_t>(i * side + k)] =
+            inverse(i, k);
       }
     }
-    return made;
-  }();
-  return inverses;
+  }
+  return made;
 }
 
 }  // namespace
@@ -127,16 +114,22 @@ void HarmonicRotation::apply(int degree, double* coefficients) const {
   applyTo(degree, coefficients);
 }
 
+const HarmonicTelling& harmonicTelling() {
+  static const HarmonicTelling telling = makeTelling();
+  return telling;
+}
+
 void rotateHarmonics(const Mat3d& rotation, int degree, float* coefficients) {
+  const HarmonicTelling& telling = harmonicTelling();
   const auto direction_count = static_cast<size_t>(2 * degree + 1);
   std::array<std::array<double, 25>, 9> turned;
   for (size_t k = 0; k < direction_count; ++k) {
-    const Vec3d back = rotation.transpose() * tellingDirections()[k];
+    const Vec3d back = rotation.transpose() * telling.directions[k];
     harmonicBasis(degree, back.x(), back.y(), back.z(), turned[k].data());
   }
   for (int l = 1; l <= degree; ++l) {
     const auto side = static_cast<size_t>(2 * l + 1), first = static_cast<size_t>(l * l);
-    const std::array<double, 81>& inverse = coefficientsOfValues()[static_cast<size_t>(l)];
+    const std::array<double, 81>& inverse = telling.coefficients[static_cast<size_t>(l)];
     float* band = coefficients + first * 3;
     std::array<double, 27> values{};
     for (size_t k = 0; k < side; ++k) {

@@ -26,8 +26,19 @@ class HarmonicRotation {
   std::array<std::array<double, 81>, 5> bands_;
 };
 
-/// HarmonicRotation for one set of coefficients [(degree+1)^2,3], in a tenth of the time that making
-/// one takes: the turned function's values in as many directions as there are coefficients.
+/// Directions in which the values of a function tell its coefficients.
+struct HarmonicTelling {
+  /// Unit. The first 2l + 1 tell the coefficients of degree l apart: their matrices of basis
+  /// functions have condition numbers of 3.
+  std::array<Vec3d, 9> directions;
+  /// For degree l, what gives coefficients from values in the first 2l + 1 of these directions.
+  /// [2l+1,2l+1], row-major
+  std::array<std::array<double, 81>, 5> coefficients;
+};
+const HarmonicTelling& harmonicTelling();
+
+/// HarmonicRotation for one set of coefficients [(degree+1)^2,3], in a tenth of the time that
+/// making one takes: the turned function's values in as many directions as there are coefficients.
 void rotateHarmonics(const Mat3d& rotation, int degree, float* coefficients);
 
 }  // namespace stipple

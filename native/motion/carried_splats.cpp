@@ -5,11 +5,11 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "math/principal_axes.h"
-#include "math/spherical_harmonics.h"
+#include "data/clouds/cloud_bytes.h"
 #include "motion/shape_kernel.h"
 #include "motion/surface_binding.h"
 #include "motion/triangle_motion.h"
+#include "motion/turn_kernel.h"
 
 namespace stipple {
 
@@ -93,23 +93,40 @@ SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
   }
   const std::vector<TriangleMotion> motions = motionsOf(binding, deformed);
   const ShapeKernel kernel = chosenShapeKernel();
-  SplatCloud carried = cloud;
+  const TurnKernel turns = chosenTurnKernel();
+  SplatCloud carried;
+  carried.sh_degree = cloud.sh_degree;
+  carried.colour_space = cloud.colour_space;
+  carried.antialias = cloud.antialias;
+  carried.frame = cloud.frame;
+  carried.resize(cloud.size());
+  const size_t sh_stride = cloud.shStride();
   parallelFor(cloud.size(), kGrain, [&](size_t begin, size_t end) {
     std::vector<float> shapes(9 * kGrain);
     for (size_t row = begin; row < end; ++row) {
       const Carried one = carriedRow(motions, binding, row, &cloud.positions[3 * row]);
       std::copy(one.place.begin(), one.place.end(), &carried.positions[3 * row]);
       for (size_t k = 0; k < 9; ++k) shapes[k * kGrain + row - begin] = one.shape[k];
-      if (cloud.sh_degree > 0) {
-        rotateHarmonics(nearestOrthogonal(matrixOf(one.shape)), cloud.sh_degree,
-                        &carried.sh[row * cloud.shStride()]);
-      }
     }
     kernel.deform({shapes.data(), kGrain, &cloud.rotations[4 * begin], &cloud.scales[3 * begin],
                    &carried.rotations[4 * begin], &carried.scales[3 * begin]},
                   end - begin);
+    std::copy(&cloud.opacities[begin], &cloud.opacities[begin] + (end - begin),
+              &carried.opacities[begin]);
+    std::copy(&cloud.sh[begin * sh_stride],
+              &cloud.sh[begin * sh_stride] + (end - begin) * sh_stride,
+              &carried.sh[begin * sh_stride]);
+    if (cloud.sh_degree > 0) {
+      turns.turn({shapes.data(), kGrain, &carried.sh[begin * sh_stride], cloud.sh_degree},
+                 end - begin);
+    }
   });
   return carried;
+}
+
+uint64_t carriedMemoryBound(const SplatCloud& cloud, const SurfaceBinding& binding) {
+  return cloudBytes(cloud.size(), cloud.sh_degree) +
+         binding.triangles.size() / 3 * (sizeof(TriangleMotion) + 1);
 }
 
 }  // namespace stipple

@@ -128,6 +128,17 @@ SurfaceBinding bindToSurface(std::span<const float> positions, std::span<const f
   return binding;
 }
 
+uint64_t bindingMemoryBound(uint64_t splat_count, uint64_t vertex_count, uint64_t triangle_count,
+                            BindingReach reach) {
+  const uint64_t influences = reach == BindingReach::kSurface ? 1 : kAroundTriangles;
+  // Places as they are given and as they are kept. Of a triangle: its corners given, kept, and with
+  // its number among those that have an area; SurfaceSearch with the centroids that it is built by.
+  constexpr uint64_t kVertexBytes = 2 * 12;
+  constexpr uint64_t kTriangleBytes = 3 * 12 + 4 + 60 + 12;
+  return splat_count * influences * (sizeof(uint32_t) + sizeof(float)) +
+         vertex_count * kVertexBytes + triangle_count * kTriangleBytes;
+}
+
 void validate(const SurfaceBinding& binding, size_t splat_count, const char* what) {
   const auto refuse = [what](const std::string& why) {
     fail(ErrorCode::kInvalidArgument, std::string(what) + " " + why);

@@ -48,6 +48,10 @@ SurfaceBinding bindToSurface(std::span<const float> positions, std::span<const f
                              std::span<const uint32_t> triangles, BindingReach reach,
                              Progress* progress = nullptr);
 
+/// Bytes that bindToSurface() holds at most, its result included.
+uint64_t bindingMemoryBound(uint64_t splat_count, uint64_t vertex_count, uint64_t triangle_count,
+                            BindingReach reach);
+
 /// Refuses bindings that do not belong to so many splats, or lead outside of their own mesh.
 /// `what` names it. Errors: kInvalidArgument.
 void validate(const SurfaceBinding& binding, size_t splat_count, const char* what);
@@ -60,5 +64,8 @@ void validate(const SurfaceBinding& binding, size_t splat_count, const char* wha
 /// Threads and determinism: parallel; same result for any number of threads.
 SplatCloud carriedSplats(const SplatCloud& cloud, const SurfaceBinding& binding,
                          std::span<const float> deformed);
+
+/// Bytes that carriedSplats() holds at most, its result included.
+uint64_t carriedMemoryBound(const SplatCloud& cloud, const SurfaceBinding& binding);
 
 }  // namespace stipple

@@ -9,6 +9,7 @@
 #include "base/progress.h"
 #include "decode/tree/hierarchy_decoder.h"
 #include "shot/instances.h"
+#include "shot/shutter.h"
 
 namespace stipple {
 
@@ -19,14 +20,20 @@ class CloudCuts {
   /// there yet is made; what is of clouds that nobody else holds any more goes.
   void cut(Instances& instances, double share, Progress* progress);
 
+  /// The same of the clouds of the shutter's steps: which splats are merged is that of the
+  /// instance's own cloud, at every step, so that rows stay the same splats. These are not kept.
+  void cut(Instances& instances, Shutter& shutter, double share, Progress* progress);
+
   /// Bytes that `cut` allocates at most, whatever is there already.
   static uint64_t memoryBound(const Instances& instances, double share);
+  static uint64_t memoryBound(const Instances& instances, const Shutter& shutter, double share);
 
  private:
   struct Entry {
     std::shared_ptr<const HierarchyDecoder> hierarchy;                       ///< holds the cloud
     std::vector<std::pair<double, std::shared_ptr<const SplatCloud>>> made;  ///< newest last
   };
+  Entry& entryOf(const std::shared_ptr<const SplatCloud>& cloud, Progress* progress);
   std::shared_ptr<const SplatCloud> cutOf(const std::shared_ptr<const SplatCloud>& cloud,
                                           double share, Progress* progress);
 

@@ -46,7 +46,7 @@ void Renderer::render(Instances instances, const Camera& camera, const ShotSetti
     behind = surroundingsSeen(asked.surroundings, camera);
     settings.background_image = behind.data();
   }
-  cuts_.cut(instances, settings.budget_share, &progress);
+  cuts_.cut(instances, settings.sampling.shutter, settings.budget_share, &progress);
   if (isSampled(settings.sampling)) {
     renderBlurred(instances, camera, settings, passes, progress);
   } else if (settings.method == ShotMethod::kReference) {
@@ -103,13 +103,14 @@ RenderMemory Renderer::memory(const Instances& instances, const Camera& camera,
       settings.method == ShotMethod::kRaysUnlimited
           ? rayMemory(instances.list, camera, settings.options)
           : factory_->imageMemory(instances.list, camera, settings.options, accuracyOf(settings));
-  memory.other_bytes += CloudCuts::memoryBound(instances, settings.budget_share);
+  memory.other_bytes +=
+      CloudCuts::memoryBound(instances, settings.sampling.shutter, settings.budget_share);
   if (settings.surroundings.pixels) {
     memory.other_bytes += surroundingsSeenBytes(camera);
   }
   if (isSampled(settings.sampling)) {
     memory.other_bytes +=
-        renderSampledBytes(instances.list.size(), camera, settings.options, settings.sampling);
+        renderSampledBytes(instances.list, camera, settings.options, settings.sampling);
   }
   return memory;
 }

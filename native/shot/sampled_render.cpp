@@ -11,6 +11,7 @@
 #include "math/cross_product.h"
 #include "math/low_discrepancy.h"
 #include "math/moving_frame.h"
+#include "shot/changing_clouds.h"
 #include "splat/render/pixel_passes.h"
 #include "splat/render/surface.h"
 
@@ -99,6 +100,7 @@ class MovingScene {
       : sampling_(sampling),
         still_(instances),
         instances_(instances.begin(), instances.end()),
+        clouds_(instances, sampling.shutter),
         camera_(camera) {
     const Shutter& shutter = sampling.shutter;
     std::vector<Mat4d> steps(shutter.step_count);
@@ -114,8 +116,17 @@ class MovingScene {
     }
   }
 
+  const ChangingClouds& clouds() const { return clouds_; }
+
   /// Valid until the next call.
   PictureMoment at(const SamplePoint& point) {
+    clouds_.placeAt(point.time, instances_);
+    return placedAt(point);
+  }
+
+  /// The same without what changes of the splats themselves: the instances have any of their
+  /// clouds.
+  PictureMoment placedAt(const SamplePoint& point) {
     PictureMoment moment{instances_, camera_, {}};
     for (size_t i = 0; i < instances_.size(); ++i) {
       instances_[i].object_to_world =
@@ -159,6 +170,7 @@ class MovingScene {
   const Sampling& sampling_;
   std::span<const SplatInstance> still_;
   std::vector<SplatInstance> instances_;
+  ChangingClouds clouds_;
   Camera camera_;
   std::vector<MovingFrame> camera_frame_;  ///< one, or none: camera to world
   std::vector<MovingFrame> frames_;        ///< one per instance, or none
@@ -217,8 +229,10 @@ double pathLength(const Camera& camera, const Vec3d& from, const Vec3d& to) {
   return focal * std::atan2(crossProduct(from, to).norm(), from.dot(to));
 }
 
-/// The value that 19 of 20 do not exceed.
+/// The value that 19 of 20 do not exceed. Places that are not finite are for the renderer to
+/// refuse.
 double nineteenOfTwenty(std::vector<double>& values) {
+  std::erase_if(values, [](double value) { return !std::isfinite(value); });
   if (values.empty()) return 0;
   const size_t place = (values.size() - 1) * 19 / 20;
   std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(place), values.end());
@@ -236,58 +250,12 @@ bool isInView(const Camera& camera, const Vec3d& point) {
   return x >= 0 && x <= camera.width && y >= 0 && y <= camera.height;
 }
 
-void validateShutter(const Shutter& shutter, size_t instance_count) {
-  if (shutter.step_count == 1 || shutter.step_count > kMaxShutterSteps) {
-    fail(ErrorCode::kInvalidArgument,
-         "the shutter has " + std::to_string(shutter.step_count) + " steps; 2 to 1025 are allowed");
-  }
-  if (!shutter.camera.empty() && shutter.camera.size() != shutter.step_count) {
-    fail(ErrorCode::kInvalidArgument, "the shutter has " + std::to_string(shutter.camera.size()) +
-                                          " cameras; one for each of its " +
-                                          std::to_string(shutter.step_count) + " steps is allowed");
-  }
-  if (!shutter.instances.empty() &&
-      shutter.instances.size() != shutter.step_count * instance_count) {
-    fail(ErrorCode::kInvalidArgument,
-         "the shutter has " + std::to_string(shutter.instances.size()) +
-             " matrices of instances; one for each of " + std::to_string(instance_count) +
-             " instances in each of its " + std::to_string(shutter.step_count) +
-             " steps is allowed");
-  }
-  Camera somewhere;
-  somewhere.width = somewhere.height = 1;
-  somewhere.fx = somewhere.fy = 1;
-  for (const Mat4d& matrix : shutter.camera) {
-    somewhere.world_to_camera = matrix;
-    validate(somewhere);
-  }
-  for (size_t i = 0; i < shutter.instances.size(); ++i) {
-    const std::string name = "instance " + std::to_string(i % instance_count) +
-                             ": matrix of step " + std::to_string(i / instance_count);
-    validateAffine(shutter.instances[i], name.c_str());
-    // Between two steps that mirror and do not, an object would be flat for a moment.
-    if (i < instance_count) continue;
-    const Mat3d before = linearPart(shutter.instances[i - instance_count]);
-    if (determinant(before) * determinant(linearPart(shutter.instances[i])) > 0) continue;
-    fail(ErrorCode::kInvalidArgument,
-         name +
-             " mirrors and that of the step before does not, or the other way round; all of an "
-             "instance's steps must do the same");
-  }
-  double sum = 0;
-  for (const double open : shutter.curve) {
-    requireFinite(open, "shutter.curve");
-    if (open < 0 || open > 1e6) {
-      fail(ErrorCode::kInvalidArgument,
-           "shutter.curve has " + std::to_string(open) + "; 0 to 1e6 is allowed");
-    }
-    sum += open;
-  }
-  if (shutter.curve.size() == 1 || (!shutter.curve.empty() && !(sum > 0))) {
-    fail(ErrorCode::kInvalidArgument, "shutter.curve has " + std::to_string(shutter.curve.size()) +
-                                          " values of the sum " + std::to_string(sum) +
-                                          "; 2 or more, not all 0, are allowed");
-  }
+/// Moments at which paths are looked at: each step, as far as there are not too many, and some of
+/// the arcs between few.
+uint32_t lookedAtTimes(uint32_t step_count) {
+  constexpr uint32_t kLeast = 8, kMost = 128;
+  const uint32_t pieces = step_count - 1;
+  return std::min(pieces * ((kLeast + pieces - 1) / pieces), kMost) + 1;
 }
 
 }  // namespace
@@ -296,50 +264,48 @@ bool isSampled(const Sampling& sampling) {
   return sampling.samples > 1 || hasLens(sampling) || moves(sampling);
 }
 
-void validate(const Sampling& sampling, size_t instance_count) {
+void validate(const Sampling& sampling, std::span<const SplatInstance> instances) {
   if (sampling.samples > kMaxSamples) {
     fail(ErrorCode::kInvalidArgument,
          "samples is " + std::to_string(sampling.samples) + "; 0 to 65536 is allowed");
   }
   validate(sampling.aperture);
-  validateShutter(sampling.shutter, instance_count);
+  validate(sampling.shutter, instances);
 }
 
 uint32_t automaticSamples(std::span<const SplatInstance> instances, const Camera& camera,
                           const Sampling& sampling) {
   constexpr size_t kLookedAt = 2048;
-  constexpr int kTimes = 9;
   MovingScene scene(instances, camera, sampling);
   size_t total = 0;
   for (const SplatInstance& instance : instances) total += instance.cloud->size();
   const size_t stride = std::max<size_t>(1, (total + kLookedAt - 1) / kLookedAt);
   std::vector<Vec3d> before;
   std::vector<double> paths, radii;
-  const int times = moves(sampling) ? kTimes : 1;
-  for (int k = 0; k < times; ++k) {
+  const uint32_t times = moves(sampling) ? lookedAtTimes(sampling.shutter.step_count) : 1;
+  for (uint32_t k = 0; k < times; ++k) {
     SamplePoint point;
     if (times > 1) point.time = static_cast<double>(k) / (times - 1);
-    const PictureMoment moment = scene.at(point);
-    size_t row = 0, place = 0;
-    for (const SplatInstance& instance : moment.instances) {
-      const Mat4d to_camera = moment.camera.world_to_camera * instance.object_to_world;
-      for (; row < instance.cloud->size(); row += stride, ++place) {
-        const float* at = &instance.cloud->positions[row * 3];
-        const Vec4d seen = to_camera * Vec4d(at[0], at[1], at[2], 1);
-        const Vec3d here = seen.head<3>();
+    const PictureMoment moment = scene.placedAt(point);
+    size_t row = 0, looked = 0;
+    for (size_t i = 0; i < instances.size(); ++i) {
+      const Mat4d to_camera = moment.camera.world_to_camera * moment.instances[i].object_to_world;
+      for (; row < instances[i].cloud->size(); row += stride, ++looked) {
+        const Vec3d place = scene.clouds().positionAt(i, row, point.time);
+        const Vec3d here = linearPart(to_camera) * place + translationPart(to_camera);
         if (k == 0) {
           before.push_back(here);
           paths.push_back(0);
         } else {
-          paths[place] += pathLength(camera, before[place], here);
-          before[place] = here;
+          paths[looked] += pathLength(camera, before[looked], here);
+          before[looked] = here;
         }
         if (k == times / 2 && isInView(camera, here)) {
           radii.push_back(
               blurRadius(camera, sampling.aperture, hasImagePlane(camera) ? here[2] : here.norm()));
         }
       }
-      row -= instance.cloud->size();
+      row -= instances[i].cloud->size();
     }
   }
   double wanted = 16;
@@ -356,10 +322,11 @@ void renderSampled(std::span<const SplatInstance> instances, const Camera& camer
                    const RenderOptions& options, const Sampling& sampling, const DrawMoment& draw,
                    RenderResult& result, Progress* progress) {
   validate(camera);
-  validate(sampling, instances.size());
+  validate(sampling, instances);
+  MovingScene scene(instances, camera, sampling);
+  scene.clouds().validateValues();
   const uint32_t samples =
       sampling.samples > 0 ? sampling.samples : automaticSamples(instances, camera, sampling);
-  MovingScene scene(instances, camera, sampling);
   if (samples == 1) {
     const PictureMoment middle = scene.at({});
     draw(middle.instances, middle.camera, options, result, progress);
@@ -398,14 +365,16 @@ void renderSampled(std::span<const SplatInstance> instances, const Camera& camer
   if (progress) progress->enterPart(0, 1);
 }
 
-uint64_t renderSampledBytes(size_t instance_count, const Camera& camera,
+uint64_t renderSampledBytes(std::span<const SplatInstance> instances, const Camera& camera,
                             const RenderOptions& options, const Sampling& sampling) {
+  const size_t instance_count = instances.size();
   const uint64_t pixels = static_cast<uint64_t>(camera.width) * camera.height;
   const uint64_t averaged =
       4u + (options.with_transmittance ? 1u : 0u) + (hasSurface(options) ? 1u : 0u);
   // Sums, and one picture beside the result.
   return pixels * averaged * (sizeof(double) + sizeof(float)) +
          2 * renderMemory({}, camera, options).result_bytes +
+         ChangingClouds::memoryBound(instances, sampling.shutter) +
          instance_count * (sizeof(SplatInstance) + sizeof(MovingFrame)) +
          // The steps' matrices, each taken apart.
          (instance_count + 1) * (sampling.shutter.step_count + 1) * 3 * sizeof(Mat4d);

@@ -50,7 +50,7 @@ def c_structs(header):
     for name, body in re.findall(r'typedef struct (\w+) \{(.*?)\}', header, flags=re.S):
         fields = []
         for statement in body.split(';'):
-            names = re.sub(r'^\s*(const\s+)?\w+\s*\**\s*', '', statement.strip())
+            names = re.sub(r'^\s*(const\s+)?\w+\s*(\*(\s*const\b)?\s*)*', '', statement.strip())
             fields += [re.sub(r'\[.*\]', '', part).strip() for part in names.split(',') if part.strip()]
         found[name] = fields
     return found
@@ -84,7 +84,7 @@ def ctype_of(text, enums):
     plain = {'void': None, 'constchar*': c_char_p, 'constchar**': POINTER(c_char_p), 'uint32_t': c_uint32,
              'uint64_t': c_uint64, 'constfloat*': POINTER(c_float), 'float*': POINTER(c_float),
              'constdouble*': POINTER(c_double), 'double*': POINTER(c_double), 'double': c_double, 'float': c_float,
-             'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'uint8_t*': POINTER(c_uint8),
+             'uint32_t*': POINTER(c_uint32), 'constuint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'uint8_t*': POINTER(c_uint8),
              'constuint8_t*': POINTER(c_uint8), 'constuint64_t*': POINTER(c_uint64)}
     if text in plain:
         return plain[text]
@@ -119,7 +119,7 @@ def test_functions_match(header):
 def test_every_free_accepts_null(library):
     """One that does not ends the process."""
     frees = [name for name in declarations.FUNCTIONS if name.endswith('_free')]
-    assert len(frees) == 15
+    assert len(frees) == 16
     for name in frees:
         assert getattr(library, name)(None) is None
 
@@ -141,7 +141,8 @@ def test_field_kinds_match(header):
              'float': c_float, 'char': ctypes.c_char,
              'const float*': POINTER(c_float), 'float*': POINTER(c_float), 'const uint32_t*': POINTER(c_uint32),
              'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
-             'const StippleCloud*': c_void_p, 'const StippleGrade*': POINTER(structs.StippleGrade),
+             'const StippleCloud*': c_void_p, 'const StippleCloud* const*': POINTER(c_void_p),
+             'const StippleGrade*': POINTER(structs.StippleGrade),
              'const StippleMesh*': c_void_p, 'const StippleJob*': c_void_p, 'const char*': c_char_p,
              'const double*': POINTER(c_double), 'const StippleAperture*': POINTER(structs.StippleAperture),
              'const StippleShutter*': POINTER(structs.StippleShutter),
@@ -151,7 +152,7 @@ def test_field_kinds_match(header):
     for name, body in re.findall(r'typedef struct (\w+) \{(.*?)\}', header, flags=re.S):
         mine = dict(structs.STRUCTS[name]._fields_)
         for statement in filter(None, (' '.join(part.split()) for part in body.split(';'))):
-            kind, names = re.match(r'((?:const )?\w+\*?) (.*)', statement).groups()
+            kind, names = re.match(r'((?:const )?\w+\*?(?: const\*)?) (.*)', statement).groups()
             for field in names.split(','):
                 field, _, length = field.strip().partition('[')
                 expected = kinds[kind] * int(length.rstrip(']')) if length else kinds[kind]

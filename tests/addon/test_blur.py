@@ -68,8 +68,54 @@ def test_a_shutter_draws_a_streak(context, cloud):
     cameras = np.stack([np.array(view().world_to_camera).reshape(4, 4)] * 2)
     same = draw(context, cloud, view(), Blur(cameras=cameras, samples=1)).colour[..., 3]
     assert np.array_equal(same, still)
-    with pytest.raises(StippleError, match='as many of both'):
+    with pytest.raises(StippleError, match='as many of each'):
         Blur(cameras=cameras, instances=steps[:1, None])
+
+
+def shifted(cloud, x):
+    matrix = np.eye(4)
+    matrix[0, 3] = x
+    return cloud.transformed(matrix)
+
+
+def test_splats_that_change_are_blurred(context, cloud):
+    still = draw(context, cloud, view()).colour
+    steps = np.stack([np.eye(4), np.eye(4)])
+    steps[0, 0, 3], steps[1, 0, 3] = -0.8, 0.8
+    by_matrices = draw(context, cloud, view(), Blur(instances=steps[:, None], samples=128)).colour
+    blur = Blur(clouds=[[shifted(cloud, -0.8)], [shifted(cloud, 0.8)]], samples=128)
+    by_clouds = draw(context, cloud, view(), blur).colour
+    assert np.abs(by_clouds - still).max() > 0.3
+    # Places are float32 in the clouds and double in the matrices.
+    assert np.allclose(by_clouds, by_matrices, atol=1e-4)
+    # From the splats themselves to others, beside an object that moves.
+    renderer, faint = Renderer(context), shifted(cloud, 0.3)
+    instances = [(cloud, np.eye(4)), (faint, np.eye(4))]
+    both = Blur(clouds=[[None, None], [faint, None]], instances=np.tile(np.eye(4), (2, 2, 1, 1)), samples=0)
+    assert renderer.sample_count(instances, view(), renderer.options(), both) == 16
+    far = Blur(clouds=[[None, None], [shifted(cloud, 3.0), None]])
+    # 45 px.
+    assert renderer.sample_count(instances[:1], view(), renderer.options(),
+                                 Blur(clouds=[[None], [shifted(cloud, 3.0)]])) == 64
+    task = renderer.start(instances, view(), renderer.options(), blur=far)
+    del far  # the task holds what it needs
+    task.job.wait()
+    # No clouds that differ: the bits of the picture without.
+    same = draw(context, cloud, view(), Blur(clouds=[[None], [cloud]], samples=16)).colour
+    assert np.array_equal(same, draw(context, cloud, view(), Blur(
+        cameras=np.stack([np.array(view().world_to_camera).reshape(4, 4)] * 2), samples=16)).colour)
+
+
+def test_clouds_of_other_splats_are_refused_by_name(context, cloud):
+    arrays = cloud.read()
+    two = Cloud.create(context, SplatArrays(*(np.concatenate([array, array]) for array in (
+        arrays.positions, arrays.rotations, arrays.scales, arrays.opacities, arrays.sh))))
+    with pytest.raises(StippleError, match='instance 0: the cloud of step 1 has 2 splats .* itself are 1 of'):
+        draw(context, cloud, view(), Blur(clouds=[[None], [two]]))
+    with pytest.raises(StippleError, match='have 1 to 2 clouds'):
+        Blur(clouds=[[None], [None, None]])
+    with pytest.raises(StippleError, match='3 steps of instances and 2 steps of clouds; as many of each'):
+        Blur(clouds=[[None], [None]], instances=np.tile(np.eye(4), (3, 1, 1, 1)))
 
 
 def test_passes_name_the_object_and_turn_to_the_camera(context, cloud):

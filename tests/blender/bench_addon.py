@@ -69,6 +69,35 @@ def textured_ball(triangles):
     return obj
 
 
+def test_splats_on_a_mesh(stipple):
+    """A frame of 200,000 splats that follow a ball of 20,000 triangles by a shape key: evaluation of the mesh, native
+    carrying, and attributes; against the same frames without splats."""
+    ball = textured_ball(20_000)
+    ball.shape_key_add(name='Basis')
+    key = ball.shape_key_add(name='Longer')
+    for point in key.data:
+        point.co.z *= 1.5
+    for frame, value in ((1, 0.0), (101, 1.0)):
+        key.value = value
+        key.keyframe_insert('value', frame=frame)
+    scene = bpy.context.scene
+    scene.frame_set(1)
+    splats = scenes.make_splats(ball, anchors=200_000)
+    frames = iter(range(2, 10_000))
+
+    def next_frame():
+        scene.frame_set(2 + next(frames) % 100)
+    plain = best_of(20, next_frame)
+    for reach in ('SURFACE', 'AROUND'):
+        scene.frame_set(1)
+        scenes.select(splats)
+        assert bpy.ops.stipple.bind_to_mesh(reach=reach) == {'FINISHED'}
+        next_frame()
+        report(f'200,000 splats on a mesh, {reach.lower()}, a frame', best_of(20, next_frame), 0.04)
+        assert bpy.ops.stipple.unbind() == {'FINISHED'}
+    print(f'a frame of the mesh alone: {plain[0] * 1e3:.1f} ms')
+
+
 def test_slider_and_surface(stipple, tmp_path):
     ball = textured_ball(500_000)
     ball.data.calc_loop_triangles()

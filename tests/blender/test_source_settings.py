@@ -141,6 +141,25 @@ def test_time_is_seconds_since_the_start(moving, source):
     assert seconds() == 2
 
 
+def test_clips_hold_repeat_and_turn_round(moving, source):
+    """A clip from second 10 to 12, at 24 frames a second: 49 frames."""
+    stipple = moving.data.stipple
+    known = replace(source.source_settings.of(stipple), time_begin=10.0, time_end=12.0)
+    source.source_settings.note_model(stipple, known)
+
+    def seconds(frame):
+        bpy.context.scene.frame_set(frame)
+        return pytest.approx(source.sources.decode_settings(stipple).time)
+
+    assert seconds(1) == 10 and seconds(49) == 12 and seconds(73) == 13  # the model stands still there
+    stipple.time_mode = 'REPEAT'
+    assert seconds(1) == 10 and seconds(49) == 12 and seconds(50) == 10 and seconds(0) == 12
+    stipple.time_mode = 'PING_PONG'
+    assert seconds(49) == 12 and seconds(50) == 12 - 1 / 24 and seconds(97) == 10 and seconds(98) == 10 + 1 / 24
+    stipple.frame_offset = 24
+    assert seconds(1) == 11
+
+
 def test_the_native_cache_tells_times_apart(moving, source):
     settings = source.sources.decode_settings(moving.data.stipple)
     assert hash(settings) != hash(replace(settings, time=1.0)) and settings != replace(settings, time=1.0)

@@ -4,6 +4,7 @@ import math
 import os
 import struct
 import subprocess
+from array import array
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,16 @@ def write_camera(path, distance=3.0):
         'camera_model': 'PINHOLE', 'w': 96, 'h': 64, 'fl_x': 90.0, 'fl_y': 90.0, 'cx': 48.0, 'cy': 32.0,
         'frames': [{'file_path': 'a.png', 'transform_matrix': [
             [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, distance], [0, 0, 0, 1]]}]}))
+
+
+def write_shifted(source, path, x):
+    """The splats of a PLY file, whose properties are floats and begin with the place, moved along x."""
+    header, end, data = source.read_bytes().partition(b'end_header\n')
+    assert header.count(b'property') == header.count(b'property float')
+    values = array('f', data)
+    for row in range(0, len(values), header.count(b'property')):
+        values[row] += x
+    path.write_bytes(header + end + values.tobytes())
 
 
 @pytest.fixture(scope='module')
@@ -250,6 +261,15 @@ def test_render_looks_through_lenses_and_all_around(scene):
     (scene / 'two.json').write_text(json.dumps(document))
     run('render', scene / 'cube.ply', '--camera', scene / 'two.json', '--moves-to', 1, '-o', scene / 'moving.exr')
     assert figures('compare', scene / 'sharp.exr', scene / 'moving.exr')['psnr'] < 30
+    # Splats that are elsewhere when the shutter closes; and the same ones, which are not.
+    for name, x in (('there', 0), ('elsewhere', 0.5)):
+        write_shifted(scene / 'cube.ply', scene / f'{name}.ply', x)
+        run('render', scene / 'cube.ply', *view, '--changes-to', scene / f'{name}.ply', '--blur-samples', 64, '-o',
+            scene / f'{name}.exr')
+    run('render', scene / 'cube.ply', *view, '--blur-samples', 64, '-o', scene / 'still.exr')
+    there, elsewhere = (figures('compare', scene / 'still.exr', scene / f'{name}.exr')['psnr']
+                        for name in ('there', 'elsewhere'))
+    assert elsewhere < 30 < there
 
 
 def test_render_refuses_what_no_lens_and_no_camera_is(scene):
@@ -264,6 +284,7 @@ def test_render_refuses_what_no_lens_and_no_camera_is(scene):
                                                          '--field-of-view', 400)
     assert '--focus-distance' in refused('--aperture', 0.1)
     assert '1 to 65536' in refused('--blur-samples', 0)
+    assert '2 files; 1 are rendered' in refused('--changes-to', scene / 'cube.ply', scene / 'cube.ply')
     assert 'blades is 2' in refused('--aperture', 0.1, '--focus-distance', 1, '--blades', 2)
     assert '.exr is expected' in refused('--depth', scene / 'z.png')
 

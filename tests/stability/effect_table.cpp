@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "effect_cases.h"
-#include "splat/render/accurate_render.h"
 #include "shot/sampled_render.h"
+#include "splat/render/accurate_render.h"
 #include "wide_reference.h"
 
 namespace stipple::testing {
@@ -267,6 +267,71 @@ SplatCloud farAway() {
 
 }  // namespace
 
+Sampling changing(std::vector<SplatCloud> steps) {
+  Sampling sampling;
+  sampling.shutter.step_count = static_cast<uint32_t>(steps.size());
+  for (SplatCloud& step : steps) {
+    sampling.shutter.clouds.push_back(std::make_shared<const SplatCloud>(std::move(step)));
+  }
+  sampling.samples = 16;
+  return sampling;
+}
+
+/// What is drawn while the splats change against what is drawn while they do not.
+double changingError(const SplatCloud& cloud, const Sampling& sampling) {
+  const Camera camera = frontCamera(40, 30, 30, 3);
+  Sampling still = changing({cloud, cloud});
+  return worstDifference(sampled(cloud, camera, sampling, Precision::kFloat).colour,
+                         sampled(cloud, camera, still, Precision::kFloat).colour);
+}
+
+/// Quaternions of the other sign are the same rotation.
+double flippedSignsError() {
+  const SplatCloud cloud = randomCloud({}, 24);
+  SplatCloud flipped = cloud;
+  for (float& value : flipped.rotations) value = -value;
+  return changingError(cloud, changing({cloud, flipped, cloud}));
+}
+
+/// Half a turn about an axis of its own leaves a splat as it is, and on the way there a round
+/// one too.
+double halfTurnOfSplatsError() {
+  const SplatCloud cloud = withScales(150, 0.2f, 0.05f, 0.05f, 25);
+  SplatCloud turned = cloud;
+  for (size_t i = 0; i < cloud.size(); ++i) {
+    const float* q = &cloud.rotations[4 * i];
+    const float about_x[4] = {-q[1], q[0], q[3], -q[2]};  // q times (0, 1, 0, 0)
+    std::copy_n(about_x, 4, &turned.rotations[4 * i]);
+  }
+  return changingError(cloud, changing({cloud, turned}));
+}
+
+/// Splats of no size at first, single against double.
+double growingError() {
+  const SplatCloud cloud = randomCloud({}, 26);
+  SplatCloud nothing = cloud;
+  std::fill(nothing.scales.begin(), nothing.scales.end(), 0.0f);
+  const Sampling sampling = changing({nothing, cloud});
+  const Camera camera = frontCamera(40, 30, 30, 3);
+  return worstDifference(sampled(cloud, camera, sampling, Precision::kFloat).colour,
+                         sampled(cloud, camera, sampling, Precision::kDouble).colour);
+}
+
+/// One splat that appears, before nothing else, against the mean of its opacities: alpha is linear
+/// in them.
+double appearingError() {
+  SplatCloud shown = oneSplat(0.3f, 1.0f), hidden = oneSplat(0.3f, 0.0f);
+  Sampling sampling = changing({hidden, shown});
+  sampling.samples = 4096;
+  const Camera camera = frontCamera(9, 9, 9, 3);
+  const RenderResult picture = sampled(hidden, camera, sampling, Precision::kDouble);
+  Sampling still;
+  still.samples = 4096;
+  const RenderResult whole = sampled(shown, camera, still, Precision::kDouble);
+  return std::abs(static_cast<double>(picture.colour[(4 * 9 + 4) * 4 + 3]) -
+                  0.5 * static_cast<double>(whole.colour[(4 * 9 + 4) * 4 + 3]));
+}
+
 std::vector<EffectCase> effectCases() {
   const Models all = {CameraModel::kEquirectangular, CameraModel::kFisheyeEquidistant,
                       CameraModel::kFisheyeEquisolid};
@@ -322,6 +387,18 @@ std::vector<EffectCase> effectCases() {
       [] { return sampledError(shrinking()); });
   add("a shutter curve of 1e-300", "motion blur", "squares under the root underflow",
       "the curve is scaled by a power of two first", "the same curve at 1", 1e-6, faintCurveError);
+  add("quaternions of the other sign", "splats that change",
+      "halfway between the two is a rotation of no length",
+      "where their dot product is below 0, one changes its sign", "standing still", 1e-6,
+      flippedSignsError);
+  add("half a turn about an axis of their own", "splats that change",
+      "of two ways that are as short rounding chooses, and halfway lies near 0",
+      "unit quaternions of one half space are at most a right angle apart", "standing still", 2e-4,
+      halfTurnOfSplatsError);
+  add("growing from scales of 0", "splats that change", "the logarithm of a scale of 0 is infinite",
+      "scales are interpolated linearly", kDouble, kSingleError, growingError);
+  add("opacity from 0 to 1", "splats that change", "the logit of both is infinite",
+      "opacities are interpolated linearly", "half of its alpha", 4e-3, appearingError);
   add("two at one place, one empty, one far, one huge", "objects apart",
       "a mean depth of 0/0, and of equal ones rounding chooses",
       "an object without splats is not in the order; ties by place in the scene", kDouble,

@@ -72,7 +72,7 @@ TEST(EffectsStability, LensesOfNothingAndOfAKilometre) {
         sampling.aperture = {radius, focus, blades, 1.0, 1e-3};
         sampling.samples = 3;
         if (radius > 1e6 * focus) {
-          EXPECT_THROW(validate(sampling, 1), Error);
+          EXPECT_THROW(validate(sampling, {&instance, 1}), Error);
           continue;
         }
         RenderResult result;
@@ -122,6 +122,46 @@ TEST(EffectsStability, ShuttersOfNoTimeAndOfFarJumps) {
              Progress* progress) { out = renderTiled(instances, at, options, progress); },
           result);
       expectWithinTheHull(result, brightestOf(cloud));
+    }
+  }
+}
+
+TEST(EffectsStability, SplatsThatChangeIntoAnythingAreSplatsOnTheWay) {
+  const SplatCloud hard = hardCloud();
+  std::vector<SplatCloud> others(6, hard);
+  for (float& value : others[0].rotations) value = -value;
+  std::fill(others[1].scales.begin(), others[1].scales.end(), 0.0f);
+  std::fill(others[2].opacities.begin(), others[2].opacities.end(), 0.0f);
+  for (float& value : others[3].positions) value = value < 0 ? 3e38f : -3e38f;
+  for (float& value : others[4].rotations) value *= 1e-30f;
+  for (size_t i = 0; i + 3 < others[5].rotations.size(); i += 4) {
+    float* q = &others[5].rotations[i];  // half a turn about x, from anything
+    const float turned[4] = {-q[1], q[0], q[3], -q[2]};
+    std::copy_n(turned, 4, q);
+  }
+  const Camera camera = frontCamera(17, 17, 20, 2);
+  for (const SplatCloud& other : others) {
+    for (const SplatCloud& first : {hard, other}) {
+      SplatInstance instance;
+      instance.cloud = &hard;
+      Sampling sampling;
+      sampling.shutter.step_count = 3;
+      sampling.shutter.clouds = {std::make_shared<const SplatCloud>(first), nullptr,
+                                 std::make_shared<const SplatCloud>(other)};
+      sampling.samples = 5;
+      RenderResult result;
+      renderSampled(
+          {&instance, 1}, camera, everything(), sampling,
+          [](std::span<const SplatInstance> instances, const Camera& at,
+             const RenderOptions& options, RenderResult& out, Progress* progress) {
+            validate(*instances[0].cloud, "between");
+            out = renderTiled(instances, at, options, progress);
+          },
+          result);
+      expectWithinTheHull(result, brightestOf(hard));
+      const uint32_t samples = automaticSamples({&instance, 1}, camera, sampling);
+      EXPECT_GE(samples, 16u);
+      EXPECT_LE(samples, 256u);
     }
   }
 }

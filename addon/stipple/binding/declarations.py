@@ -41,6 +41,7 @@ FUNCTIONS = {
     'stipple_job_volume': (_status, [_handle, _out_handle]),
     'stipple_job_mesh': (_status, [_handle, _out_handle]),
     'stipple_job_weights': (_status, [_handle, _out_handle]),
+    'stipple_job_binding': (_status, [_handle, _out_handle]),
     # splat clouds
     'stipple_cloud_create': (_status, [_handle, _to(s.StippleCloudArrays), _out_handle]),
     'stipple_cloud_free': (None, [_handle]),
@@ -203,6 +204,12 @@ FUNCTIONS = {
     'stipple_fill_options_init': (None, [_to(s.StippleFillOptions)]),
     'stipple_cloud_fill_start': (_status, [_handle, _to(s.StippleFillOptions), _mask, c_uint64,
                                            _to(s.StippleFillReport), _out_handle]),
+    # splats that a mesh carries
+    'stipple_cloud_bind_start': (_status, [_handle, _floats, c_uint64, POINTER(c_uint32), c_uint64, c_uint32,
+                                           _out_handle]),
+    'stipple_binding_free': (None, [_handle]),
+    'stipple_binding_info': (_status, [_handle, _to(s.StippleBindingInfo)]),
+    'stipple_cloud_carry': (_status, [_handle, _handle, _floats, c_uint64, _out_handle]),
     # differentiable rendering
     'stipple_renderer_backward_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                   _to(s.StippleRenderOptions), _to(s.StippleBackwardInput),

@@ -183,6 +183,11 @@ class Side(IntEnum):
     OUTSIDE = 1
 
 
+class BindingReach(IntEnum):
+    SURFACE = 0
+    AROUND = 1
+
+
 class RegionKind(IntEnum):
     ALL = 0
     BRUSH = 1
@@ -253,6 +258,7 @@ ENUMS = {
     'StippleEffect': (Effect, 'STIPPLE_EFFECT_'),
     'StippleEffectChoice': (EffectChoice, 'STIPPLE_EFFECT_'),
     'StippleSide': (Side, 'STIPPLE_SIDE_'),
+    'StippleBindingReach': (BindingReach, 'STIPPLE_BIND_'),
     'StippleRegionKind': (RegionKind, 'STIPPLE_REGION_'),
     'StippleRegionOperation': (RegionOperation, 'STIPPLE_REGION_'),
     'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),

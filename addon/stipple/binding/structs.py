@@ -4,7 +4,7 @@
 from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p,
                     sizeof)
 
-from .enums import (AccuracyLevel, AnchorOrder, Antialias, BlendSpace, BudgetUnit, CameraModel, ColourSpace, ENUMS,
+from .enums import (AccuracyLevel, AnchorOrder, Antialias, BindingReach, BlendSpace, BudgetUnit, CameraModel, ColourSpace, ENUMS,
                     Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, Frame, JobState,
                     LowPass, MaterialColour, NoiseSource, ObjectOrder, OutputColour, Precision, Projection, RegionKind,
                     RegionOperation, RenderMethod, Sampling, Side, SplatOrder, SplatQuantity, Status, Transfer,
@@ -235,7 +235,8 @@ class StippleAperture(_Sized):
 
 class StippleShutter(_Sized):
     _fields_ = [('struct_size', c_uint32), ('step_count', c_uint32), ('cameras', POINTER(c_double)),
-                ('instances', POINTER(c_double)), ('curve', POINTER(c_double)), ('curve_count', c_uint64)]
+                ('instances', POINTER(c_double)), ('curve', POINTER(c_double)), ('curve_count', c_uint64),
+                ('clouds', POINTER(c_void_p))]
 
 
 class StippleRenderOptions(_Sized):
@@ -362,6 +363,11 @@ class StippleFillReport(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('hole_count', c_uint64),
                 ('filled_count', c_uint64), ('no_ring_count', c_uint64), ('no_plane_count', c_uint64),
                 ('covered_count', c_uint64), ('splat_count', c_uint64), ('radius', c_double)]
+
+
+class StippleBindingInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('influences', c_uint32), ('splat_count', c_uint64),
+                ('vertex_count', c_uint64), ('triangle_count', c_uint64), ('topology', c_uint64)]
 
 
 class StippleBackwardInput(_Sized):

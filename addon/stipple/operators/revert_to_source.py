@@ -29,11 +29,11 @@ class STIPPLE_OT_revert_to_source(JobOperator, bpy.types.Operator):
 
     def finish(self, context, _job):
         data = context.object.data
+        data.stipple.edited = False
         if data.stipple.is_sequence:
             sync.write_shown(data)
         else:
             sync.write_decoded(data, self._splats)
-        data.stipple.edited = False
         self.report({'INFO'}, f"{splat_data.count(data):,} splats from their source")
 
 

@@ -9,7 +9,7 @@ import bpy
 
 from . import source_state
 from ..scene import geometry
-from ..scene.source import decoded, erased, exporting, frame_budgets, masks, source_settings, sources, splat_data, sync
+from ..scene.source import bound, decoded, erased, exporting, frame_budgets, masks, source_settings, sources, splat_data, sync
 from ..scene.view import viewed
 from .text import draw_anchors
 
@@ -81,6 +81,29 @@ class STIPPLE_PT_clean_up(_SplatPanel, bpy.types.Panel):
         column.operator('stipple.crop_by_mesh')
 
 
+class STIPPLE_PT_binding(_SplatPanel, bpy.types.Panel):
+    bl_label = "Splat Binding"
+
+    def draw(self, context):
+        layout = self.layout
+        data = context.object.data
+        if not bound.is_bound(data):
+            if not data.stipple.source_objects:
+                layout.label(text="Select the mesh as well")
+            layout.operator_context = 'INVOKE_DEFAULT'
+            layout.operator('stipple.bind_to_mesh', icon='MOD_MESHDEFORM')
+            return
+        stipple = data.stipple
+        column = layout.column()
+        name = stipple.bind_object.name if stipple.bind_object is not None else "nothing: the mesh is gone"
+        column.label(text=f"Bound to {name}", icon='MOD_MESHDEFORM')
+        reach = next(text for key, text, _ in bound.REACHES if key == stipple.bind_reach)
+        _draw_fixed(column, "Bind", reach)
+        column.enabled = not stipple.edited
+        column.prop(stipple, 'bind_follow')
+        layout.operator('stipple.unbind', icon='X')
+
+
 class STIPPLE_PT_advanced(_SplatPanel, bpy.types.Panel):
     bl_label = "Splat Advanced"
 
@@ -121,7 +144,8 @@ def _draw_budget(self, context):
     _draw_warnings(box, data)
     known = source_settings.of(stipple)
     if known.counts_splats or stipple.is_sequence:
-        _draw_tree_budget(box, stipple)
+        if stipple.is_sequence or known.least_budget < sources.visible_count(stipple):
+            _draw_tree_budget(box, stipple)
         return
     if not known.has_budget:
         box.operator('stipple.add_budget', icon='MOD_DECIM')
@@ -275,4 +299,4 @@ def unregister():
             host.remove(_draw_foreign)
 
 
-classes = (STIPPLE_PT_source, STIPPLE_PT_grade, STIPPLE_PT_clean_up, STIPPLE_PT_advanced)
+classes = (STIPPLE_PT_source, STIPPLE_PT_grade, STIPPLE_PT_clean_up, STIPPLE_PT_binding, STIPPLE_PT_advanced)

@@ -40,6 +40,9 @@ class STIPPLE_MT_object(bpy.types.Menu):
         layout.operator('stipple.add_budget', icon='MOD_DECIM')
         layout.operator('stipple.merge_splats', icon='AUTOMERGE_OFF')
         layout.operator('stipple.apply_transform', icon='OBJECT_ORIGIN')
+        layout.separator()
+        layout.operator('stipple.bind_to_mesh', icon='MOD_MESHDEFORM')
+        layout.operator('stipple.unbind', icon='BLANK1')
 
 
 class STIPPLE_MT_select(bpy.types.Menu):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Object Data: timing of a series of splat files."""
+"""Object Data: timing of a series of splat files, and of splats that move."""
 
 import os
 
@@ -7,14 +7,17 @@ import bpy
 
 from ..binding.errors import StippleError
 from ..scene.sequence import sequences
-from ..scene.source import source_settings, splat_data
+from ..scene.source import source_settings, sources, splat_data
 
 
-class STIPPLE_PT_sequence(bpy.types.Panel):
-    bl_label = "Splat Sequence"
+class _TimingPanel:
     bl_space_type = 'PROPERTIES'
     bl_region_type = 'WINDOW'
     bl_context = 'data'
+
+
+class STIPPLE_PT_sequence(_TimingPanel, bpy.types.Panel):
+    bl_label = "Splat Sequence"
 
     @classmethod
     def poll(cls, context):
@@ -39,6 +42,32 @@ class STIPPLE_PT_sequence(bpy.types.Panel):
             layout.operator('stipple.prepare_budgets', icon='MOD_DECIM')
 
 
+class STIPPLE_PT_motion(_TimingPanel, bpy.types.Panel):
+    bl_label = "Splat Motion"
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.object
+        return (splat_data.is_splat_object(obj) and not obj.data.stipple.is_sequence
+                and source_settings.of(obj.data.stipple).has_time)
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        stipple, scene = context.object.data.stipple, context.scene
+        known = source_settings.of(stipple)
+        length = known.time_end - known.time_begin
+        if length > 0:
+            now = min(max(sources.seconds(stipple, scene), known.time_begin), known.time_end) - known.time_begin
+            layout.label(text=f"{now:.2f} s of {length:.2f} s", icon='TIME')
+        column = layout.column()
+        column.enabled = not stipple.edited
+        column.prop(stipple, 'frame_start')
+        column.prop(stipple, 'frame_offset')
+        column.prop(stipple, 'frame_speed')
+        column.prop(stipple, 'time_mode')
+
+
 def _shown(data, frame):
     """(text, icon) for the file of a frame."""
     try:
@@ -50,4 +79,4 @@ def _shown(data, frame):
     return os.path.basename(path), 'FILE'
 
 
-classes = (STIPPLE_PT_sequence,)
+classes = (STIPPLE_PT_sequence, STIPPLE_PT_motion)

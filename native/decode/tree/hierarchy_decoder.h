@@ -18,6 +18,18 @@ class HierarchyDecoder final : public Decoder {
   SplatCloud decode(const DecodeRequest& request) const override;
   uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
 
+  /// The cut of as many nodes when the leaves are elsewhere, or of other shapes and colours: the
+  /// nodes of cut(budget), row by row as decode() has them, merged anew from where their leaves are
+  /// now. Axes keep the order of those of the node as it was. In: moved: as many splats of the same
+  /// degree, accepted by validate(); visibilities of the tree count as 1 and its low-pass as
+  /// automatic. Errors: kInvalidArgument; kCancelled. Same bits for any number of threads.
+  /// Cost: about 1 us per leaf below an inner node of the cut.
+  SplatCloud decodeMoved(const SplatCloud& moved, uint64_t budget,
+                         Progress* progress = nullptr) const;
+
+  /// Bytes that decodeMoved() takes at most, beside its result.
+  static uint64_t movedMemoryBound(uint64_t leaf_count);
+
   /// Ids of the nodes of the cut (data of MergeTree), ascending. In: budget 1..N.
   std::vector<uint32_t> cut(uint64_t budget) const;
 

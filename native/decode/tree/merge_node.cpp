@@ -150,11 +150,13 @@ double mergeError(const MergeNode& a, const MergeNode& b, const MergeNode& merge
   return errorOfMerge<double>(a, b, merged, scale.footprint);
 }
 
-void writeNode(const MergeNode& node, const MergeScale& scale, SplatCloud& cloud, size_t index) {
+void writeNode(const MergeNode& node, const MergeScale& scale, SplatCloud& cloud, size_t index,
+               const float* like) {
   const auto& c = node.covariance;
   Mat3d covariance;
   covariance << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
   covariance *= node.inflation;
+  if (like) covariance = (covariance * rotationFromQuaternion<double>(like)).eval();
   // Of a symmetric matrix without negative eigenvalues, lengths are the eigenvalues.
   const PrincipalAxes principal = principalAxes(covariance);
   const Vec4d quaternion = quaternionFromRotation(principal.axes);

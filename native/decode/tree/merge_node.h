@@ -118,7 +118,9 @@ class Surrounding {
 double mergeError(const MergeNode& a, const MergeNode& b, const MergeNode& merged,
                   const MergeScale& scale);
 
-/// Writes what a node looks like into splat `index` of a cloud, all but the harmonics.
-void writeNode(const MergeNode& node, const MergeScale& scale, SplatCloud& cloud, size_t index);
+/// Writes what a node looks like into splat `index` of a cloud, all but the harmonics. `like`: a
+/// quaternion whose axes those of the splat are nearest to, in their order; null: those of space.
+void writeNode(const MergeNode& node, const MergeScale& scale, SplatCloud& cloud, size_t index,
+               const float* like = nullptr);
 
 }  // namespace stipple

@@ -75,6 +75,7 @@ typedef struct StippleImage StippleImage;
 typedef struct StippleImageChannels StippleImageChannels; /* named channels of an EXR file */
 typedef struct StippleJob StippleJob;           /* long work in the background */
 typedef struct StippleWeights StippleWeights;   /* which files of networks' weights a folder has */
+typedef struct StippleBinding StippleBinding;   /* splats bound to a mesh at rest */
 
 /* ---- context ----------------------------------------------------------------------------------- */
 
@@ -129,6 +130,7 @@ StippleStatus stipple_job_cloud(const StippleJob* job, StippleCloud** cloud);
 StippleStatus stipple_job_volume(const StippleJob* job, StippleVolume** volume);
 StippleStatus stipple_job_mesh(const StippleJob* job, StippleMesh** mesh);
 StippleStatus stipple_job_weights(const StippleJob* job, StippleWeights** weights);
+StippleStatus stipple_job_binding(const StippleJob* job, StippleBinding** binding);
 
 /* ---- splat clouds ------------------------------------------------------------------------------ */
 
@@ -987,9 +989,10 @@ typedef struct StippleAperture {
   double ratio;           /* height over width; 0: 1 */
 } StippleAperture;
 
-/* What moves while the shutter is open: matrices at steps that are spread evenly over that time, the first when
- * it opens, the last when it closes. Between steps rotations are interpolated at an even speed (slerp), and the
- * rest of the matrices linearly. All arrays are read during the call. */
+/* What moves and changes while the shutter is open: matrices and splats at steps that are spread evenly over that
+ * time, the first when it opens, the last when it closes. Between steps rotations of matrices are interpolated at an
+ * even speed (slerp), and the rest of the matrices linearly; of splats, positions, scales, opacities and harmonics
+ * linearly, row by row, and rotations the shorter way. All arrays are read during the call. */
 typedef struct StippleShutter {
   uint32_t struct_size;
   uint32_t step_count;        /* 2..1025 */
@@ -997,6 +1000,11 @@ typedef struct StippleShutter {
   const double* instances;    /* [steps,count,16] object to world; NULL: they stand still */
   const double* curve;        /* [curve_count] 0 or more: how far it is open, at even steps; NULL: fully, always */
   uint64_t curve_count;       /* 2 or more, with curve */
+  /* [steps,count] the splats of each instance, which may be freed once the call is over; NULL at a step: the
+   * instance's own. All have as many splats as those, of the same degree, colour space and low-pass, in the same
+   * rows. An accuracy with a budget_share below 1 merges the same splats at every step. NULL: no splat changes.
+   * Cost: each image reads two clouds and writes one; memory: one cloud for each instance that changes. */
+  const StippleCloud* const* clouds;
 } StippleShutter;
 
 typedef struct StippleRenderOptions {
@@ -1639,6 +1647,39 @@ typedef struct StippleFillReport {
 StippleStatus stipple_cloud_fill_start(const StippleCloud* cloud, const StippleFillOptions* options,
                                        const uint8_t* mask, uint64_t mask_count, StippleFillReport* report,
                                        StippleJob** job);
+
+/* ---- splats that a mesh carries ----------------------------------------------------------------- */
+
+/* What a splat that is bound to a mesh follows. */
+typedef enum StippleBindingReach {
+  STIPPLE_BIND_SURFACE = 0, /* the nearest triangle: splats that lie on the mesh stay where they are on it */
+  STIPPLE_BIND_AROUND = 1   /* several near triangles, smoothly: scans inside a cage or near a mesh */
+} StippleBindingReach;
+
+typedef struct StippleBindingInfo {
+  uint32_t struct_size;
+  uint32_t influences;     /* triangles that each splat follows */
+  uint64_t splat_count;
+  uint64_t vertex_count;   /* of the mesh */
+  uint64_t triangle_count;
+  uint64_t topology;       /* equal for meshes of as many vertices and the same triangles */
+} StippleBindingInfo;
+
+/* Binds the splats of a cloud to a mesh at rest, as a job (stipple_job_binding). In: rest [vertex_count,3] in the frame
+ * of the cloud, triangles [triangle_count,3]; both are read before this returns; reach, StippleBindingReach. Errors:
+ * INVALID_ARGUMENT for places that are not finite, indices out of range, a mesh without a triangle of some area;
+ * MEMORY_LIMIT. Cost: O(N log T). */
+StippleStatus stipple_cloud_bind_start(const StippleCloud* cloud, const float* rest, uint64_t vertex_count,
+                                       const uint32_t* triangles, uint64_t triangle_count, uint32_t reach,
+                                       StippleJob** job);
+void stipple_binding_free(StippleBinding* binding);
+StippleStatus stipple_binding_info(const StippleBinding* binding, StippleBindingInfo* info);
+/* Gives the splats as the deformed mesh carries them, in the same order: places follow their triangles, shapes stretch
+ * with them as far as ten times each way, harmonics turn, opacities and colours stay. In: the cloud that was bound, or
+ * one of as many splats in the same places; deformed [vertex_count,3]. Errors: INVALID_ARGUMENT for another number of
+ * splats or of vertices and for places that are not finite; MEMORY_LIMIT. Cost: O(N). */
+StippleStatus stipple_cloud_carry(const StippleCloud* cloud, const StippleBinding* binding, const float* deformed,
+                                  uint64_t vertex_count, StippleCloud** carried);
 
 /* ---- differentiable rendering ------------------------------------------------------------------- */
 

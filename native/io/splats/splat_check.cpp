@@ -23,11 +23,6 @@ void RowCheck::require() const {
   fail(ErrorCode::kInternal, std::string(what_) + " was doubted without a reason");
 }
 
-uint64_t cloudBytes(uint64_t count, int sh_degree) {
-  constexpr uint64_t kBesideHarmonics = 11;  // position, rotation, scale, opacity
-  return count * (kBesideHarmonics + shCoefficientCount(sh_degree) * 3) * sizeof(float);
-}
-
 void requireAllowedSplats(uint64_t count, int sh_degree, uint64_t file_bytes,
                           const std::string& name) {
   // No file has as many; the product of what a damaged one claims may not fit.

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "data/clouds/cloud_bytes.h"
 #include "data/clouds/splat_cloud.h"
 
 namespace stipple {
@@ -27,9 +28,6 @@ class RowCheck {
   const char* what_;
   std::atomic<bool> valid_{true};
 };
-
-/// Bytes of so many splats of a degree as the arrays of a cloud.
-uint64_t cloudBytes(uint64_t count, int sh_degree);
 
 /// Refuses a count of splats that is more than a file of so many bytes may have, before they are
 /// allocated. In: name, of the file. Errors: kFormat with both numbers.

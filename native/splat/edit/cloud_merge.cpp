@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "data/clouds/cloud_transform.h"
+#include "data/clouds/cloud_bytes.h"
 
 namespace stipple {
 
@@ -67,10 +68,6 @@ void append(const SplatCloud& cloud, SplatCloud& result) {
   }
 }
 
-uint64_t bytesOf(const SplatCloud& cloud, int degree) {
-  return cloud.size() * (11 + shCoefficientCount(degree) * 3) * sizeof(float);
-}
-
 }  // namespace
 
 SplatCloud merged(std::span<const SplatInstance> instances, Frame frame) {
@@ -109,8 +106,8 @@ uint64_t mergeMemoryBound(std::span<const SplatInstance> instances) {
   uint64_t total = 0;
   uint64_t largest = 0;
   for (const SplatInstance& instance : instances) {
-    total += bytesOf(*instance.cloud, degree);
-    largest = std::max(largest, bytesOf(*instance.cloud, instance.cloud->sh_degree));
+    total += cloudBytes(instance.cloud->size(), degree);
+    largest = std::max(largest, cloudBytes(instance.cloud->size(), instance.cloud->sh_degree));
   }
   return total + largest;
 }

@@ -12,7 +12,8 @@
 namespace stipple {
 
 /// Draws images of placed splats, and orders splats for who draws them by himself. It keeps its
-/// memory from one image to the next. One call at a time.
+/// memory from one image to the next, and nothing that it knows of splats: a cloud may hold others
+/// in the next call, at the same address. One call at a time.
 /// Errors of both: those of renderAccurate and orderForDrawing, which say what a call gives.
 /// Determinism: the same calls give the same bits, for any number of threads.
 class ImageRenderer {

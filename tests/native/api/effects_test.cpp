@@ -174,5 +174,71 @@ TEST_F(EffectsApi, LensesAndShuttersThatAreNoneAreRefused) {
   EXPECT_EQ(refusal(), "samples is 100000; 0 to 65536 is allowed");
 }
 
+TEST_F(EffectsApi, ASplatThatMovesByItsCloudsIsAnObjectThatMoves) {
+  const std::vector<float> sharp = colours();
+  StippleCloud* after = nullptr;
+  const double shift[16] = {1, 0, 0, 0.4, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  STIPPLE_ASSERT_OK(stipple_cloud_transform(cloud_, shift, &after));
+  auto shutter = sized<StippleShutter>();
+  shutter.step_count = 2;
+  double matrices[32] = {};
+  const StippleInstance instance = placed(cloud_);
+  std::copy_n(instance.matrix, 16, matrices);
+  std::copy_n(shift, 16, matrices + 16);
+  shutter.instances = matrices;
+  options_.shutter = &shutter;
+  options_.samples = 64;
+  const std::vector<float> by_matrices = colours();
+  const StippleCloud* clouds[2] = {nullptr, after};
+  shutter.instances = nullptr;
+  shutter.clouds = clouds;
+  const std::vector<float> by_clouds = colours();
+  EXPECT_NE(by_clouds, sharp);
+  // Places are float32 in the clouds and double in the matrices.
+  for (size_t i = 0; i < kPixels * 4; ++i) ASSERT_NEAR(by_clouds[i], by_matrices[i], 1e-4f);
+  // The clouds of the steps are shared with the job, and may be freed when it has been started.
+  auto buffers = sized<StippleRenderBuffers>();
+  std::vector<float> colour(kPixels * 4);
+  buffers.colour = colour.data();
+  StippleRenderer* renderer = nullptr;
+  StippleJob* job = nullptr;
+  STIPPLE_ASSERT_OK(stipple_renderer_create(context_, &renderer));
+  uint32_t samples = 0;
+  options_.samples = 0;
+  STIPPLE_ASSERT_OK(
+      stipple_renderer_sample_count(renderer, &instance, 1, &camera_, &options_, &samples));
+  EXPECT_EQ(samples, 16u);
+  options_.samples = 64;
+  STIPPLE_ASSERT_OK(
+      stipple_renderer_render_start(renderer, &instance, 1, &camera_, &options_, &buffers, &job));
+  stipple_cloud_free(after);
+  STIPPLE_ASSERT_OK(stipple_job_wait(job));
+  EXPECT_EQ(colour, by_clouds);
+  stipple_job_free(job);
+  stipple_renderer_free(renderer);
+  // Who is older than the clouds has none, whatever lies behind the end of his struct.
+  shutter.struct_size = offsetof(StippleShutter, clouds);
+  shutter.clouds = reinterpret_cast<const StippleCloud* const*>(8);
+  shutter.instances = matrices;
+  EXPECT_EQ(colours(), by_matrices);
+  shutter.struct_size = 16;
+  EXPECT_NE(refusal().find("options->shutter"), std::string::npos);
+}
+
+TEST_F(EffectsApi, CloudsOfAShutterThatHoldOtherSplatsAreRefused) {
+  StippleCloud* two = nullptr;
+  const StippleInstance pair[2] = {placed(cloud_), placed(cloud_)};
+  STIPPLE_ASSERT_OK(stipple_cloud_merge(pair, 2, STIPPLE_FRAME_UNKNOWN, &two));
+  const StippleCloud* clouds[3] = {cloud_, nullptr, two};
+  auto shutter = sized<StippleShutter>();
+  shutter.step_count = 3;
+  shutter.clouds = clouds;
+  options_.shutter = &shutter;
+  EXPECT_EQ(refusal(),
+            "instance 0: the cloud of step 2 has 2 splats of harmonic degree 0; those of the "
+            "instance itself are 1 of degree 0, and all of its steps must have the same splats");
+  stipple_cloud_free(two);
+}
+
 }  // namespace
 }  // namespace stipple::test

@@ -192,6 +192,41 @@ TEST(Renderer, PicturesThatAreMadeAtOnceHaveTheBitsOfThoseMadeAlone) {
   EXPECT_EQ(second.get(), sharp_alone);
 }
 
+TEST(Renderer, BlursSplatsThatChangeWithEveryMethodAndShare) {
+  const Instances instances = placed();
+  SplatCloud after = *instances.shares[0];
+  for (size_t i = 0; i < after.size(); ++i) after.positions[3 * i] += 0.4f;
+  Renderer renderer(cpuImages());
+  ShotSettings settings = settingsFor(instances, OutputColour::kSceneLinear);
+  settings.sampling.shutter.step_count = 2;
+  settings.sampling.samples = 8;
+  for (const double share : {1.0, 0.5}) {
+    for (const ShotMethod method : {ShotMethod::kTiled, ShotMethod::kReference, ShotMethod::kRays,
+                                    ShotMethod::kRaysUnlimited}) {
+      settings.method = method;
+      settings.budget_share = share;
+      ShotSettings by_clouds = settings, by_matrices = settings;
+      by_clouds.sampling.shutter.clouds = {nullptr, std::make_shared<const SplatCloud>(after)};
+      Mat4d last = Mat4d::Identity();
+      last(0, 3) = 0.4;
+      by_matrices.sampling.shutter.instances = {Mat4d::Identity(), last};
+      const std::vector<float> still = colourOf(renderer, instances, settings);
+      const std::vector<float> changed = colourOf(renderer, instances, by_clouds);
+      const std::vector<float> moved = colourOf(renderer, instances, by_matrices);
+      double from_still = 0, from_moved = 0;
+      for (size_t i = 0; i < still.size(); ++i) {
+        from_still += static_cast<double>(std::abs(changed[i] - still[i]));
+        from_moved += static_cast<double>(std::abs(changed[i] - moved[i]));
+      }
+      // Places of float32, and splats at the rim of 1/255 in one of 8 pictures.
+      EXPECT_LT(from_moved, 1e-3 * from_still) << static_cast<int>(method) << " at " << share;
+      EXPECT_GT(from_still, 10);
+      EXPECT_GT(renderer.memory(instances, view(), by_clouds).sum(),
+                renderer.memory(instances, view(), by_matrices).sum() + 300 * 14 * 4 * share - 1);
+    }
+  }
+}
+
 TEST(Renderer, CountsTheSamplesOfABlurredPictureAlone) {
   const Instances instances = placed(10);
   ShotSettings settings;

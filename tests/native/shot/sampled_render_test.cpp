@@ -530,8 +530,10 @@ TEST(SampledRender, StopsWhenCancelledAndTellsHowFarItIs) {
 }
 
 std::string refusalOf(const Sampling& sampling, size_t instance_count = 1) {
+  const SplatCloud cloud = oneSplat(0.5f, 0.9f);
+  const std::vector<SplatInstance> instances(instance_count, instanceOf(cloud));
   try {
-    validate(sampling, instance_count);
+    validate(sampling, instances);
   } catch (const Error& error) {
     return error.what();
   }

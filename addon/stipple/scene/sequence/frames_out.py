@@ -14,8 +14,8 @@ from ...binding.errors import StippleError, invalid
 from ...binding.grade import GradeSettings, graded
 from .. import grades
 from . import sequences
-from ..source import placement, source_settings, sources, splat_data, sync
-from ..source.decoded import Decoder
+from ..source import bound, placement, source_settings, sources, splat_data, sync
+from ..source.decoded import Carried, Decoder
 
 FRAMES = (('CURRENT', "Current Frame", "The splats as they are shown now"),
           ('SERIES', "Whole Series",
@@ -36,8 +36,8 @@ class Decoded:
 
 @dataclass
 class FrameOut:
-    """One frame: its number, and [(source, 4x4 object to world, grade)]; a source is a Cloud, a Frame of a series or
-    Decoded."""
+    """One frame: its number, and [(source, 4x4 object to world, grade)]; a source is a Cloud, a Frame of a series,
+    Decoded or Carried."""
 
     number: int
     placed: list
@@ -92,7 +92,7 @@ def _of_scene(context, objects, budget, apply_grade):
                 placed = []
                 for obj in objects:
                     evaluated = obj.evaluated_get(depsgraph)
-                    source = fixed.get(obj) or _at_frame(obj.data, evaluated.data.stipple, number, budget)
+                    source = fixed.get(obj) or _at_frame(obj.data, evaluated.data.stipple, number, budget, depsgraph)
                     if not placement.is_flat(evaluated.matrix_world):
                         placed.append((source, np.array(evaluated.matrix_world),
                                        _grade_of(evaluated, apply_grade)))
@@ -106,12 +106,13 @@ def _grade_of(evaluated, apply_grade):
     return grades.settings_of(evaluated.data.stipple) if apply_grade else GradeSettings()
 
 
-def _at_frame(data, stipple, number, budget):
+def _at_frame(data, stipple, number, budget, depsgraph):
     if stipple.is_sequence:
         return sequences.frame_of(data, stipple, number, budget)
     settings = sources.decode_settings(stipple, budget)
     settings.check()
-    return Decoded(Decoder(data), settings)
+    carrier = bound.carrier(data, depsgraph)
+    return Decoded(Decoder(data), settings) if carrier is None else Carried(data, settings, carrier)
 
 
 def _fixed_clouds(objects, with_models):
@@ -119,7 +120,8 @@ def _fixed_clouds(objects, with_models):
     fixed = {}
     for obj in objects:
         stipple = obj.data.stipple
-        changes = stipple.is_sequence or (source_settings.of(stipple).has_budget and not with_models)
+        changes = stipple.is_sequence or (not with_models and (source_settings.of(stipple).has_budget
+                                                               or bound.follows(obj.data)))
         if not changes or stipple.edited or sync.is_edited(obj.data):
             fixed[obj] = sources.ungraded_cloud(obj)
     return fixed

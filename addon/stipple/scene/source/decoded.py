@@ -13,7 +13,7 @@ from ...binding.cloud import Cloud
 from ...binding.errors import StippleError
 from ...binding.job import Job
 from ...binding.structs import JobState
-from . import erased, source_settings, sources, splat_data
+from . import bound, erased, source_settings, sources, splat_data
 from .cloud_cache import CloudCache
 from .decode_times import DecodeTimes
 
@@ -137,28 +137,64 @@ class Pending:
         return self._decoder.finish(self._settings, begun, is_image)
 
 
-def begin(data, settings, wait=None):
-    """The Pending of a datablock's model, for an image. Errors: StippleError, also for a source that has changed."""
+class Carried:
+    """A datablock's cloud at these settings and at one shape of the mesh that it follows. Once it is made it never
+    touches Blender."""
+
+    def __init__(self, data, settings, carrier, wait=None):
+        """carrier: bound.Carrier. wait: as Pending has it. Errors: StippleError."""
+        self._carrier, self._key = carrier, _key_of(data, settings)
+        held = carrier.held(self._key)
+        if held is not None:
+            self._make = lambda wait, is_image: held[0]
+        elif source_settings.of(data.stipple).as_they_are:
+            whole = sources.masked(sources.whole_cloud(data), data)
+            self._make = lambda wait, is_image: whole
+        else:
+            self._make = Pending(data, settings, wait).cloud
+
+    def cloud(self, wait=None, is_image=True):
+        """wait, is_image: as Decoder.cloud() has them. Errors: StippleError."""
+        return self._carrier.carried(self._key, lambda: self._make(wait, is_image), wait or Job.wait)
+
+    def read_anew(self, _native):
+        """cloud() for one of many frames."""
+        return self.cloud(is_image=False)
+
+
+def _key_of(data, settings):
+    """What tells the clouds of datablocks apart before a mesh carries them. Errors: StippleError."""
+    return sources.source_key(data), None if source_settings.of(data.stipple).as_they_are else settings
+
+
+def begin(data, settings, wait=None, carrier=None):
+    """What gives a datablock's cloud for an image, by cloud(). carrier: of the mesh that it follows. Errors:
+    StippleError, also for a source that has changed."""
     sources.check_unchanged(data)
-    return Pending(data, settings, wait)
+    return Pending(data, settings, wait) if carrier is None else Carried(data, settings, carrier, wait)
 
 
-def decode_data(data, settings, wait=None):
-    """The cloud that a datablock's source gives at these settings, without what was hidden or erased. wait(job): called
-    with what takes long, to wait for it; None for without a word. Errors: StippleError."""
+def decode_data(data, settings, wait=None, carrier=None):
+    """The cloud that a datablock's source gives at these settings, without what was hidden or erased; as a mesh carries
+    it where a carrier is given. wait(job): called with what takes long, to wait for it; None for without a word.
+    Errors: StippleError."""
+    if carrier is not None:
+        return Carried(data, settings, carrier, wait).cloud(wait, is_image=False)
     if source_settings.of(data.stipple).as_they_are:
         return sources.masked(sources.whole_cloud(data), data)
     return Pending(data, settings, wait).cloud(wait, is_image=False)
 
 
-def full_cloud(data):
+def full_cloud(data, depsgraph=None):
     """A datablock at full count: the whole source without what is hidden, splats of meshes at the render budget, and
-    what is stored where there is no source. Not graded."""
+    what is stored where there is no source; as its mesh has it at the time of a depsgraph, None for the window's. Not
+    graded."""
     stipple = data.stipple
     settings = source_settings.of(stipple)
     if not settings.has_source or stipple.edited:
         return splat_data.ungraded_cloud(sources.context(), data)
-    return decode_data(data, sources.decode_settings(stipple, 'FULL' if settings.counts_splats else 'RENDER'))
+    wanted = sources.decode_settings(stipple, 'FULL' if settings.counts_splats else 'RENDER')
+    return decode_data(data, wanted, carrier=bound.carrier(data, depsgraph))
 
 
 def is_quick(data, settings):
@@ -184,7 +220,7 @@ def is_decoded(data, settings, patience=None):
         if begun is not None and begun.key == key:
             return not is_running(begun.job)
         stop(name)
-        if decoder.is_kept(settings):
+        if decoder.is_kept(settings) or bound.is_held(data, key):
             return True
         if _declined.get(name) == key:
             return False
@@ -268,7 +304,7 @@ def names():
 
 def is_kept(data, settings):
     """Whether decode_data() takes no decoding. Errors: StippleError."""
-    return Decoder(data).is_kept(settings)
+    return Decoder(data).is_kept(settings) or bound.is_held(data, _key_of(data, settings))
 
 
 def is_ending():
@@ -320,6 +356,7 @@ def forget():
     _declined.clear()
     _kept.clear()
     times.forget()
+    bound.forget()
     sources.forget()
 
 

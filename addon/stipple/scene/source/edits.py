@@ -7,7 +7,7 @@ import numpy as np
 
 from ...binding.cloud import Cloud
 from ...binding.errors import invalid
-from . import decoded, erased, masks, selections, source_settings, sources, splat_data, sync
+from . import bound, decoded, erased, masks, selections, source_settings, sources, splat_data, sync
 
 
 @dataclass
@@ -145,6 +145,9 @@ def check_editable(obj, is_edited=sync.is_edited):
     if data.library is not None:
         raise invalid(f"'{obj.name}' is linked from another file; make it local first.")
     refuse_sequence(obj)
+    if bound.follows(data):
+        raise invalid(f"'{obj.name}' follows a mesh, and its splats are edited where they were bound; turn Follow Mesh "
+                      'off in its Splat Binding panel first.')
     if data.stipple.edited or is_edited(data):
         raise invalid(f"'{obj.name}' was edited by hand; choose Use as New Source or Revert to Source first.")
 
@@ -160,11 +163,16 @@ def _check(obj):
     check_editable(obj)
 
 
-def source_of(obj):
-    """The whole cloud of the source; splats that have none get a file of their own first."""
+def give_source(obj):
+    """Splats that have no source get a file of their own."""
     data = obj.data
     if not source_settings.of(data.stipple).has_source or not data.stipple.source:
         path = sources.save_cloud(sources.ungraded_cloud(obj), obj.name)
         with sync.paused():
             sources.attach_cloud(data, path)
-    return sources.whole_cloud(data)
+
+
+def source_of(obj):
+    """The whole cloud of the source; splats that have none get one first."""
+    give_source(obj)
+    return sources.whole_cloud(obj.data)

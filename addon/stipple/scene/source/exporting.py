@@ -12,7 +12,7 @@ from ...binding.errors import StippleError, invalid
 from ...binding.structs import Status
 from .. import grades
 from ..sequence import frames, sequences
-from . import decoded, formats, placement, source_settings, sources, splat_data, sync
+from . import bound, decoded, formats, placement, source_settings, sources, splat_data, sync
 
 
 BUDGETS = (('VIEWPORT', "Viewport", "The splats that are shown now"),
@@ -104,7 +104,7 @@ def _decoded(obj, data, budget):
         return sequences.frame_of(data, obj.data.stipple, bpy.context.scene.frame_current, budget).cloud()
     if budget == 'FULL':
         return decoded.full_cloud(data)
-    return decoded.decode_data(data, sources.decode_settings(data.stipple, 'RENDER'))
+    return decoded.decode_data(data, sources.decode_settings(data.stipple, 'RENDER'), carrier=bound.carrier(data))
 
 
 def size_label(context, operator):

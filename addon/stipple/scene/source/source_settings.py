@@ -38,6 +38,8 @@ class SourceSettings:
     has_order: bool = False
     has_seed: bool = False
     has_time: bool = False       # its splats move
+    time_begin: float = 0.0      # seconds: from when
+    time_end: float = 0.0        # and to when; both stand still outside
     least_budget: int = 1        # that it takes
 
     @property
@@ -65,7 +67,8 @@ def of_model(settings):
         True, True, settings.budget_unit == BudgetUnit.SPLATS, bool(settings.takes_mask), settings.default_budget,
         settings.minimum_learned_budget, settings.maximum_learned_budget, settings.minimum_gaussians_per_anchor,
         settings.maximum_gaussians_per_anchor, settings.default_gaussians_per_anchor, bool(settings.has_order),
-        bool(settings.has_seed), bool(settings.has_time), settings.minimum_budget)
+        bool(settings.has_seed), bool(settings.has_time), settings.time_begin, settings.time_end,
+        settings.minimum_budget)
 
 
 def of(stipple):

@@ -24,7 +24,7 @@ from ...binding.model import DecodeSettings, Model
 from ...binding.structs import AnchorOrder, JobState, Status
 from .. import meshes
 from .ahead import Ahead
-from . import erased, masks, selections, source_paths, source_settings, splat_data
+from . import bound, erased, masks, selections, source_paths, source_settings, splat_data
 from .source_paths import MODEL_SUFFIX
 
 _MAX_MODELS = 4
@@ -291,7 +291,7 @@ def decode_settings(stipple, mode='VIEWPORT', scene=None):
     tells the time, None for the present one. What the source does not have is as it is in new settings."""
     known = source_settings.of(stipple)
     if known.counts_splats:
-        budget = _tree_budget(stipple, mode)
+        budget = max(_tree_budget(stipple, mode), known.least_budget)
     else:
         budget = (mode == 'RENDER' and stipple.anchors_render) or stipple.anchors
     return DecodeSettings(budget, gaussians_per_anchor(stipple),
@@ -306,10 +306,18 @@ def gaussians_per_anchor(stipple):
 
 
 def seconds(stipple, scene=None):
-    """The time of splats that move: 0 where their series starts, as frame_start and frame_speed have it."""
-    scene = bpy.context.scene if scene is None else scene
-    frames = scene.frame_current + scene.frame_subframe - stipple.frame_start
-    return frames * stipple.frame_speed * scene.render.fps_base / scene.render.fps
+    """The time of splats that move, of their own clip: its begin at frame_start, the other settings as in a series of
+    files."""
+    scene, known = bpy.context.scene if scene is None else scene, source_settings.of(stipple)
+    frame = scene.render.fps_base / scene.render.fps
+    frames = (scene.frame_current + scene.frame_subframe - stipple.frame_start) * stipple.frame_speed
+    passed, length = (frames + stipple.frame_offset) * frame, known.time_end - known.time_begin
+    if length > 0 and stipple.time_mode == 'REPEAT':
+        passed %= length + frame  # the last moment lasts a frame, like all others
+    elif length > 0 and stipple.time_mode == 'PING_PONG':
+        passed %= 2 * length
+        passed = min(passed, 2 * length - passed)
+    return known.time_begin + passed
 
 
 def at_most(settings, most, least=1):
@@ -386,9 +394,12 @@ def attach_cloud(data, path):
 
 
 def _end_edits(data):
-    """A new source of splats holds what was left of the one before, and nothing of it is selected."""
+    """A new source of splats holds what was left of the one before, as a mesh carried it, and nothing of it is
+    selected."""
     erased.clear(data)
     selections.clear(data)
+    if bound.follows(data):
+        bound.rebind(data)
 
 
 def _save(write, path, suffix, overwrite):
@@ -440,6 +451,7 @@ def attach_model(data, path, objects, settings):
     """Notes a model as the source of a datablock, with the meshes and settings that it was made from. In: settings,
     StippleModelSettings."""
     stipple = data.stipple
+    bound.rebind(data)
     source_settings.note_model(stipple, source_settings.of_model(settings))
     stipple.source = source_paths.stored(path)
     stipple.source_stamp = stamp(path)

@@ -15,7 +15,7 @@ from bpy.app.handlers import persistent
 from ...binding.errors import CancelledError, StippleError
 from .. import grades, handlers, limits, meshes
 from ..sequence import sequences
-from . import decode_progress, decoded, erased, masks, selections, source_paths, source_settings, sources, splat_data
+from . import bound, decode_progress, decoded, erased, masks, selections, source_paths, source_settings, sources, splat_data
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'
@@ -98,14 +98,15 @@ def _wanted(data, depsgraph, mode, most, limit, wait):
     # one than they have learned.
     if most is not None and (not known.is_learned or decoded.is_quick(data, settings)):
         settings = sources.at_most(settings, most, max(known.least_budget, known.least_learned))
-    return (written_key(data, settings), lambda: _decoded(data, settings, wait),
+    carrier = bound.carrier(data, depsgraph)
+    return (written_key(data, settings, carrier), lambda: _decoded(data, settings, wait, carrier),
             lambda: decoded.is_decoded(data, settings))
 
 
-def _decoded(data, settings, wait):
+def _decoded(data, settings, wait, carrier):
     settings.check()
     sources.check_unchanged(data)
-    made = decoded.decode_data(data, settings, wait).columns()
+    made = decoded.decode_data(data, settings, wait, carrier).columns()
     if not masks.key(data) and not erased.any_of(data):
         made.seen = splat_data.kept_seen(data, source_paths.identity(data.stipple), made.count)
     return made
@@ -131,9 +132,12 @@ def write(data, splats, key, grade=None):
 
 
 def write_decoded(data, splats):
-    """Stores splats that were decoded with the present settings."""
+    """Stores splats that were decoded with the present settings; their mesh carries them from there."""
     splat_data.keep_seen(data, source_paths.identity(data.stipple), splats.seen)
     write(data, splats, written_key(data, sources.decode_settings(data.stipple)))
+    users = [obj for obj in bpy.data.objects if obj.data == data]
+    if users and bound.follows(data):
+        try_sync(users[0], None, 'VIEWPORT')
 
 
 def write_shown(data):
@@ -142,11 +146,11 @@ def write_shown(data):
     write(data, frame.splats(), frame.key)
 
 
-def written_key(data, settings):
-    """A text that is equal for equal splats."""
+def written_key(data, settings, carrier=None):
+    """A text that is equal for equal splats. carrier: of the mesh that carries them."""
     known = source_settings.of(data.stipple)
     if known.as_they_are:
-        return masks.key(data)
+        return masks.key(data) if carrier is None else f'{masks.key(data)}|{carrier.key}'
     parts = [source_paths.identity(data.stipple), settings.anchors]
     if known.counts_anchors:
         parts += [settings.gaussians_per_anchor, int(settings.order), settings.seed]
@@ -156,6 +160,8 @@ def written_key(data, settings):
         parts.append(f'{settings.time!r} s')
     if erased.any_of(data):
         parts.append(erased.key(data))
+    if carrier is not None:
+        parts.append(carrier.key)
     return '|'.join(map(str, parts))
 
 
@@ -172,9 +178,9 @@ def copy_settings(old, new):
         new.animation_data_create().action = old.animation_data.action
 
 
-def is_stored(data, settings):
+def is_stored(data, settings, carrier=None):
     """Whether the attributes are the splats of these settings."""
-    return data.get(WRITTEN_KEY) == written_key(data, settings) and not is_edited(data)
+    return data.get(WRITTEN_KEY) == written_key(data, settings, carrier) and not is_edited(data)
 
 
 def is_edited(data):
@@ -393,6 +399,9 @@ def _depsgraph_update_post(scene, depsgraph):
                if update.is_updated_geometry and isinstance(update.id, bpy.types.Object)}
     for obj in splat_objects():
         stipple = obj.data.stipple
+        if bound.follows(obj.data) and stipple.bind_object in changed:
+            # By a handler of changed frames where that made it: then this finds nothing to do.
+            try_sync(obj, depsgraph, 'VIEWPORT', beside=_has_views())
         if stipple.source_changed or obj.data.library is not None:
             continue
         objects = [entry.object for entry in stipple.source_objects if entry.object is not None]

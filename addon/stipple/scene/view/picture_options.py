@@ -20,5 +20,6 @@ def blur(scene, aperture, shutter):
         return None
     given = {} if aperture is None else vars(aperture)
     if moves:
-        given = {**given, 'cameras': shutter.cameras, 'instances': shutter.instances, 'curve': shutter.curve}
+        given = {**given, 'cameras': shutter.cameras, 'instances': shutter.instances, 'clouds': shutter.clouds,
+                 'curve': shutter.curve}
     return Blur(samples=scene.stipple.blur_samples, **given)

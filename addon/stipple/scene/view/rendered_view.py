@@ -34,7 +34,7 @@ def gather(context, mode='RENDER'):
                            Status.ERROR_INVALID_ARGUMENT)
     shutter = None
     if motion.is_wanted(scene, view_layer):
-        shutter = motion.sample(scene, depsgraph, scene.camera, [entry[0] for entry in found],
+        shutter = motion.sample(scene, depsgraph, scene.camera, found,
                                 lambda frame, subframe: scene.frame_set(frame, subframe=subframe))
         depsgraph = context.evaluated_depsgraph_get()
     wanted = 'ALL' if scene.stipple.meshes_as_mattes and scene.render.engine == 'STIPPLE' else 'HOLDOUTS'

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splats that a mesh carries along as it deforms."""
+
+from ctypes import byref
+
+import numpy as np
+
+from .cloud import Cloud
+from .errors import invalid
+from .handle import Handle, contiguous, new_handle, pointer_to
+from .job import Job
+from .structs import BindingReach, StippleBindingInfo
+
+
+class SurfaceBinding(Handle):
+    """How the splats of a cloud follow a mesh."""
+
+    free_function = 'stipple_binding_free'
+    job_function = 'stipple_job_binding'
+
+    @staticmethod
+    def start(cloud, rest, triangles, reach=BindingReach.SURFACE):
+        """A job that binds splats to a mesh at rest. In: rest [V,3] in the frame of the cloud, triangles [T,3]."""
+        rest, triangles = _places(rest), contiguous(triangles, np.uint32).reshape(-1, 3)
+        return Job(cloud.library,
+                   new_handle(cloud.library, 'stipple_cloud_bind_start', cloud.pointer, pointer_to(rest), len(rest),
+                              pointer_to(triangles), len(triangles), int(reach)))
+
+    def info(self):
+        info = StippleBindingInfo()
+        self._check(self.library.stipple_binding_info(self.pointer, byref(info)))
+        return info
+
+    def carry(self, cloud, deformed):
+        """The splats as the mesh carries them at another shape. In: the cloud that was bound, or one of the same
+        splats; deformed [V,3]. Errors: StippleError for other numbers of splats or vertices."""
+        deformed = _places(deformed)
+        return Cloud(self.library, new_handle(self.library, 'stipple_cloud_carry', cloud.pointer, self.pointer,
+                                              pointer_to(deformed), len(deformed)))
+
+
+def _places(values):
+    values = contiguous(values)
+    if values.ndim != 2 or values.shape[1] != 3:
+        raise invalid(f'The vertices of a mesh have the shape {values.shape}; [V,3] is needed.')
+    return values
