@@ -1,9 +1,11 @@
 """Splats that move, from images with times to splats at a time."""
 import json
 import math
+import subprocess
+import time
 
 import pytest
-from fit_dataset import dataset, error, figures, run  # noqa: F401
+from fit_dataset import TOOL, dataset, error, figures, run  # noqa: F401
 
 FEW = ('--model', 'motion', '--iterations', 150, '--gaussians', 300, '--sh-degree', 0)
 
@@ -73,6 +75,32 @@ def test_a_splat_file_of_it_is_its_begin(moving, model, tmp_path):
     run('fit', moving, tmp_path / 'fitted.ply', *FEW)
     run('decode', model, tmp_path / 'decoded.ply', '--time', 0)
     assert (tmp_path / 'fitted.ply').read_bytes() == (tmp_path / 'decoded.ply').read_bytes()
+
+
+def test_a_killed_fit_resumes_bit_for_bit(moving, tmp_path):
+    steps = ('--model', 'motion', '--iterations', 400, '--gaussians', 300, '--sh-degree', 0)
+    whole, out = (tmp_path / f'{name}.stipple.safetensors' for name in ('whole', 'out'))
+    run('fit', moving, whole, *steps)
+    checkpoint = tmp_path / (out.name + '.checkpoint.safetensors')
+    process = subprocess.Popen([TOOL, *map(str, ('fit', moving, out, *steps, '--checkpoint-every', 5))],
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while not checkpoint.exists() and time.monotonic() < deadline:
+        time.sleep(0.001)
+    process.kill()
+    process.wait(timeout=60)
+    assert checkpoint.exists() and not out.exists()
+    # Of other times it is another fit.
+    scene = json.loads((moving / 'transforms.json').read_text())
+    scene['frames'][3]['time'] += 0.01
+    other = tmp_path / 'other'
+    other.mkdir()
+    (other / 'images').symlink_to(moving / 'images')
+    (other / 'transforms.json').write_text(json.dumps(scene))
+    assert 'is of a fit to other views' in error('fit', other, out, *steps, '--resume')
+    run('fit', moving, out, *steps, '--resume')
+    assert out.read_bytes() == whole.read_bytes()
+    assert not checkpoint.exists()
 
 
 def test_images_without_times_are_refused_with_what_is_missing(dataset, tmp_path):  # noqa: F811

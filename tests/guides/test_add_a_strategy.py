@@ -43,4 +43,4 @@ def test_the_guide_adds_a_part_and_a_strategy(dataset, tmp_path):  # noqa: F811
     listed = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True, timeout=60)
     assert listed.returncode == 0, listed.stderr
     assert listed.stdout.splitlines() == [
-        "Even Growth;8;how many splats there may be;[('splats', 100000.0)]", 'Brisk']
+        "Even Growth;11;how many splats there may be;[('splats', 100000.0)]", 'Brisk']
