@@ -43,7 +43,9 @@ def build(window):
     square = scenes.quad('Square')
     scenes.material('Red', obj=square)
     square.shape_key_add(name='Basis')
-    for point in square.shape_key_add(name='Up').data:
+    key = square.shape_key_add(name='Up')
+    key.value = 0.0  # from Blender 5 on they begin at 1
+    for point in key.data:
         point.co.z += 1.5
     scenes.make_splats(square, anchors=2000)
     with window.context():
