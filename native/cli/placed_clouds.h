@@ -7,10 +7,11 @@
 
 namespace stipple::cli {
 
-/// Splat files, each where it was made.
+/// Splat files, each where it was made, and models at the budget that shows them well.
 class PlacedClouds {
  public:
-  PlacedClouds(const Context& context, const std::vector<std::string>& paths);
+  /// In: seconds, the time of splats that move.
+  PlacedClouds(const Context& context, const std::vector<std::string>& paths, double seconds = 0);
 
   const StippleInstance* instances() const { return instances_.data(); }
   uint64_t count() const { return instances_.size(); }

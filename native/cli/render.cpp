@@ -22,6 +22,7 @@ struct Arguments {
   AccuracyArguments accuracy;
   CameraArguments camera;
   std::vector<double> background;
+  double time = 0;
 };
 
 StippleRenderOptions optionsOf(const Arguments& arguments, const StippleAccuracy& accuracy) {
@@ -77,7 +78,7 @@ void render(const Context& context, const Arguments& arguments) {
   const StippleAccuracy accuracy = accuracyOf(arguments.accuracy);
   StippleRenderOptions options = optionsOf(arguments, accuracy);
   lens.putInto(options);
-  const PlacedClouds clouds(context, arguments.in);
+  const PlacedClouds clouds(context, arguments.in, arguments.time);
   Pass depth(arguments.depth, camera, 1), normal(arguments.normal, camera, 3);
   Pass index(arguments.index, camera, 1);
   std::vector<float> colour(size_t{camera.width} * camera.height * 4);
@@ -115,7 +116,13 @@ void render(const Context& context, const Arguments& arguments) {
 void addRender(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("render", "Draws an image of splats");
-  command->add_option("in", arguments->in, "Splat files, rendered together")->required();
+  command
+      ->add_option("in", arguments->in,
+                   "Splat files and models (.stipple.safetensors), rendered together; models at "
+                   "the budget that shows them well")
+      ->required();
+  command->add_option("--time", arguments->time, "Seconds, of splats that move")
+      ->capture_default_str();
   addCameraOptions(*command, arguments->camera);
   addLensOptions(*command, arguments->lens);
   addAccuracyOptions(*command, arguments->accuracy);

@@ -61,6 +61,16 @@ def test_it_decodes_at_any_time_and_always_whole(model, tmp_path):
     assert f'{count} to {count} is allowed' in error('decode', model, tmp_path / 'few.ply', '--anchors', count - 1)
 
 
+def test_an_image_is_of_its_time(moving, model, tmp_path):
+    for name, seconds in (('begin', 0), ('middle', 0.27)):
+        run('decode', model, tmp_path / f'{name}.ply', '--time', seconds)
+        camera = ('--camera', moving / 'transforms.json', '--view', 0, '--colour', 'display')
+        run('render', tmp_path / f'{name}.ply', *camera, '-o', tmp_path / f'{name}_file.png')
+        run('render', model, *camera, '--time', seconds, '-o', tmp_path / f'{name}.png')
+        assert (tmp_path / f'{name}.png').read_bytes() == (tmp_path / f'{name}_file.png').read_bytes()
+    assert (tmp_path / 'begin.png').read_bytes() != (tmp_path / 'middle.png').read_bytes()
+
+
 def test_a_conversion_would_lose_the_motion(model, tmp_path):
     assert error('convert', model, tmp_path / 'still.ply').endswith(
         'holds splats that move; stipple decode --time makes those of one time')
