@@ -164,6 +164,15 @@ def picture_height(tmp_path, engine='STIPPLE'):
     return (opacity @ (np.arange(64) + 0.5) / opacity.sum() - 32) / 64 * 4
 
 
+def test_cycles_and_stipple_follow_too(stipple, bound, tmp_path):
+    mesh = bound[1]
+    mesh.hide_render = True
+    bpy.context.scene.frame_set(11)
+    bpy.context.scene.cycles.samples = 2
+    bpy.context.scene.cycles.use_denoising = False
+    assert picture_height(tmp_path, 'STIPPLE_CYCLES') == pytest.approx(1.0, abs=0.05)
+
+
 # ---- images -------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize('kind', ['file', 'budget', 'model'])
