@@ -52,9 +52,8 @@ void requireSmallScene(std::string_view text, const std::string& path) {
   const uint64_t cost = size.values + size.objects * (kValuesOfObject - 1);
   const uint64_t allowed = kAlwaysAllowedValues + text.size();
   if (cost > allowed) {
-    fail(ErrorCode::kFormat, path + " describes " + std::to_string(size.objects) +
-                                 " objects in " + std::to_string(text.size()) +
-                                 " bytes of JSON; at most " +
+    fail(ErrorCode::kFormat, path + " describes " + std::to_string(size.objects) + " objects in " +
+                                 std::to_string(text.size()) + " bytes of JSON; at most " +
                                  std::to_string(allowed / kValuesOfObject) + " are allowed");
   }
 }
@@ -64,11 +63,29 @@ std::string jsonPart(const InputFile& file) {
   std::array<uint8_t, kGlbHeadBytes> head;
   if (file.size() < head.size()) return "";
   file.readAt(0, head.data(), head.size());
-  std::string text(static_cast<size_t>(std::min<uint64_t>(
-                       loadLittleEndian<uint32_t>(&head[12]), file.size() - head.size())),
+  std::string text(static_cast<size_t>(std::min<uint64_t>(loadLittleEndian<uint32_t>(&head[12]),
+                                                          file.size() - head.size())),
                    '\0');
   file.readAt(head.size(), text.data(), text.size());
   return text;
+}
+
+/// Refuses a GLB whose binary part is longer than what is left of the file: tinygltf reads as much
+/// as the part says that it has. What is wrong before that part tinygltf has words for.
+void requireWholeBinaryPart(const InputFile& file, const std::string& path) {
+  std::array<uint8_t, kGlbHeadBytes> head;
+  if (file.size() < head.size()) return;
+  file.readAt(0, head.data(), head.size());
+  const uint64_t binary_head = head.size() + uint64_t{loadLittleEndian<uint32_t>(&head[12])};
+  if (binary_head >= file.size()) return;
+  const uint64_t left = file.size() - binary_head;
+  std::array<uint8_t, kChunkHeadBytes> chunk = {};
+  file.readAt(binary_head, chunk.data(), std::min<uint64_t>(chunk.size(), left));
+  const uint64_t bytes = loadLittleEndian<uint32_t>(&chunk[0]);
+  if (left >= chunk.size() && bytes <= left - chunk.size()) return;
+  failLoading(path, "its binary part says that it has " + std::to_string(bytes) +
+                        " bytes; the file has " +
+                        std::to_string(left - std::min<uint64_t>(chunk.size(), left)) + " of them");
 }
 
 Mat4d localMatrix(const tinygltf::Node& node) {
@@ -223,13 +240,14 @@ void GltfScene::load(Content content) {
   bool loaded = false;
   if (is_binary) {
     requireSmallScene(jsonPart(file), path_);
+    requireWholeBinaryPart(file, path_);
     loaded = loader.LoadBinaryFromFile(model_.get(), &error, &warning, path_);
   } else {
     const std::string text = readTextFile(path_, std::numeric_limits<unsigned>::max());
     requireSmallScene(text, path_);
-    loaded = loader.LoadASCIIFromString(
-        model_.get(), &error, &warning, text.data(), static_cast<unsigned>(text.size()),
-        std::filesystem::path(path_).parent_path().string());
+    loaded = loader.LoadASCIIFromString(model_.get(), &error, &warning, text.data(),
+                                        static_cast<unsigned>(text.size()),
+                                        std::filesystem::path(path_).parent_path().string());
   }
   files.requireAllowed();
   if (!loaded) failLoading(path_, error);

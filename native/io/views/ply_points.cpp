@@ -87,13 +87,13 @@ PointSet readPlyPoints(const std::string& path) {
       points.colours[i] /= fullScale(vertices->properties[*colour[i % 3]].type);
     }
   }
+  for (float& value : points.colours) value = srgbToLinear(value);
   try {
     requireFinite(points.positions.data(), points.positions.size(), 3, "position of vertex");
     requireFinite(points.colours.data(), points.colours.size(), 3, "colour of vertex");
   } catch (const Error& error) {
     fail(ErrorCode::kFormat, path + ": " + error.what());
   }
-  for (float& value : points.colours) value = srgbToLinear(value);
   return points;
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -294,6 +295,22 @@ TEST_F(GltfSplats, FallBackColoursAreLinear) {
         EXPECT_NEAR(code / 65535.0, std::clamp(expected, 0.0, 1.0), 0.5 / 65535.0 + 1e-7);
       }
     }
+  }
+}
+
+TEST_F(GltfSplats, RefusesABinaryPartThatIsCutShort) {
+  GlbBuilder mesh;
+  mesh.addFloats({0, 0, 0, 1, 0, 0, 0, 1, 0}, 3);
+  std::string bytes = mesh.glb(
+      "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
+      "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}]");
+  // The head tells the size that the file has, so that the binary part alone is wrong.
+  for (const size_t missing : {6, 36, 40}) {
+    std::string cut = bytes.substr(0, bytes.size() - missing);
+    const auto size = static_cast<uint32_t>(cut.size());
+    std::memcpy(&cut[8], &size, sizeof size);
+    expectError(ErrorCode::kFormat, {"a.glb", "its binary part says that it has"},
+                [&] { readMeshFile(store("a.glb", cut)); });
   }
 }
 
