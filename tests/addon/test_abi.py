@@ -84,7 +84,8 @@ def ctype_of(text, enums):
     plain = {'void': None, 'constchar*': c_char_p, 'constchar**': POINTER(c_char_p), 'uint32_t': c_uint32,
              'uint64_t': c_uint64, 'constfloat*': POINTER(c_float), 'float*': POINTER(c_float),
              'constdouble*': POINTER(c_double), 'double*': POINTER(c_double), 'double': c_double, 'float': c_float,
-             'uint32_t*': POINTER(c_uint32), 'constuint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'uint8_t*': POINTER(c_uint8),
+             'uint32_t*': POINTER(c_uint32), 'constuint32_t*': POINTER(c_uint32),
+             'uint64_t*': POINTER(c_uint64), 'uint8_t*': POINTER(c_uint8),
              'constuint8_t*': POINTER(c_uint8), 'constuint64_t*': POINTER(c_uint64)}
     if text in plain:
         return plain[text]

@@ -14,8 +14,8 @@ def _is_mesh(obj):
 
 
 def _target(context, obj):
-    """The mesh that an object's splats shall follow: the active one, the one that is selected, or the one that they were
-    made from. Errors: StippleError where that is none or several."""
+    """The mesh that an object's splats shall follow: the active one, the one that is selected, or the one that they
+    were made from. Errors: StippleError where that is none or several."""
     active = context.view_layer.objects.active
     if _is_mesh(active) and active.select_get():
         return active

@@ -60,7 +60,8 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
         sync.write(data, splats, masks.key(data))
         if bound.is_bound(active.data):
             bound.hold(active, None)
-            self.report({'WARNING'}, f"'{active.name}' follows no mesh now; bind it again where all of it shall follow.")
+            self.report({'WARNING'}, f"'{active.name}' follows no mesh now; bind it again where all of it shall "
+                                     'follow.')
         active.data = data
         for obj in self._objects[1:]:
             bpy.data.objects.remove(obj)

@@ -9,7 +9,8 @@ import bpy
 
 from . import source_state
 from ..scene import geometry
-from ..scene.source import bound, decoded, erased, exporting, frame_budgets, masks, source_settings, sources, splat_data, sync
+from ..scene.source import (bound, decoded, erased, exporting, frame_budgets, masks, source_settings, sources,
+                            splat_data, sync)
 from ..scene.view import viewed
 from .text import draw_anchors
 

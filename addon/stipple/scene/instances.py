@@ -32,9 +32,9 @@ def gather_owned(depsgraph, mode, warn=lambda message: None):
 
 def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
     """The same with a key before each, which stays while it is the same instance: matrices() has it at other times. And
-    with a ChangingSplats behind those that a frame changes beside their matrix, None behind others. wait: called with (name of an object, job)
-    where a source has to be read, to wait for the job; then what is not decoded yet is a LaterCloud, for
-    decode_later()."""
+    with a ChangingSplats behind those that a frame changes beside their matrix, None behind others. wait: called with
+    (name of an object, job) where a source has to be read, to wait for the job; then what is not decoded yet is a
+    LaterCloud, for decode_later()."""
     clouds, found, changing = {}, [], {}
     share, splats = limits.share(depsgraph, mode), shown.SplatObjects(depsgraph)
     for entry in depsgraph.object_instances:
@@ -54,7 +54,8 @@ def gather_keyed(depsgraph, mode, warn=lambda message: None, wait=None):
             original = obj.original
             owner = entry.parent.original if entry.is_instance else original
             found.append((_key_of(entry, owner, original), owner, original,
-                          (clouds[key], matrix, shown.holds_out(entry, depsgraph)), changing.get(original.data.name_full)))
+                          (clouds[key], matrix, shown.holds_out(entry, depsgraph)),
+                          changing.get(original.data.name_full)))
     return found
 
 

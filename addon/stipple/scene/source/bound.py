@@ -23,13 +23,13 @@ from ...binding.surface_binding import SurfaceBinding
 CONSTRAINT = 'Splat Binding'
 REACHES = (('SURFACE', "Surface", "Each splat follows the nearest triangle: for splats that were made from the mesh or "
                                   "lie on it"),
-           ('AROUND', "Around", "Each splat follows the triangles around it, smoothly: for scans and fits near a mesh or "
-                                "inside a cage"))
+           ('AROUND', "Around", "Each splat follows the triangles around it, smoothly: for scans and fits near a mesh "
+                                "or inside a cage"))
 _KEPT = 8  # bindings that are kept
 # Of modifiers: what renders evaluate and what the viewport does.
 _MODES = (('show_render', 'show_viewport'), ('render_levels', 'levels'))
 
-_rests = OrderedDict()  # by (key of a binding, of renders): (vertices [V,3], triangles [T,3]) in the space of the splats
+_rests = OrderedDict()  # by (key of a binding, of renders): (vertices [V,3], triangles [T,3]), in the splats' space
 _held = OrderedDict()   # by (key of a binding, key of a cloud): (Cloud, SurfaceBinding)
 _lock = threading.Lock()
 
@@ -85,7 +85,7 @@ def _rendered_shape(obj, depsgraph):
     """The shape that a render gives an object, where its modifiers say that it is another one; else None. Subdivision
     has more levels in renders as soon as it is added."""
     changed = [(modifier, seen, getattr(modifier, seen)) for modifier in obj.modifiers for rendered, seen in _MODES
-               if getattr(modifier, rendered, None) != getattr(modifier, seen, None)]
+               if hasattr(modifier, rendered) and getattr(modifier, rendered) != getattr(modifier, seen)]
     if not changed or depsgraph.mode != 'VIEWPORT':
         return None
     try:
@@ -145,7 +145,8 @@ def carrier(data, depsgraph=None):
     if shape.topology not in (stipple.bind_topology, stipple.bind_topology_render):
         raise StippleError(f"The faces of '{obj.name}' are not those that '{data.name}' was bound to "
                            f"({len(shape.vertices):,} vertices now, {_count_of(stipple.bind_topology)} then); its "
-                           'modifiers must make the same faces in every frame. Choose Unbind, and bind the splats again.',
+                           'modifiers must make the same faces in every frame. Choose Unbind, and bind the splats '
+                           'again.',
                            Status.ERROR_INVALID_ARGUMENT)
     as_rendered = shape.topology != stipple.bind_topology
     return Carrier(f'{stipple.bind_key}:render' if as_rendered else stipple.bind_key, stipple.bind_reach,

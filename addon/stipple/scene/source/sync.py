@@ -15,7 +15,8 @@ from bpy.app.handlers import persistent
 from ...binding.errors import CancelledError, StippleError
 from .. import grades, handlers, limits, meshes
 from ..sequence import sequences
-from . import bound, decode_progress, decoded, erased, masks, selections, source_paths, source_settings, sources, splat_data
+from . import (bound, decode_progress, decoded, erased, masks, selections, source_paths, source_settings, sources,
+               splat_data)
 
 WRITTEN_KEY = 'stipple_written'
 FINGERPRINT_KEY = 'stipple_fingerprint'

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves while the shutter is open: cameras, splat objects, and splats that move or follow meshes, at sub-frames, as
-Cycles has them."""
+"""What moves while the shutter is open: cameras, splat objects, and splats that move or follow meshes, at sub-frames,
+as Cycles has them."""
 
 import math
 from dataclasses import dataclass
