@@ -38,8 +38,9 @@ MemoryViewSource& writable(StippleViews& views) {
   return *views.memory;
 }
 
-std::vector<float> copied(const float* values, size_t count) {
-  return values ? std::vector<float>(values, values + count) : std::vector<float>();
+template <class T>
+std::vector<T> copied(const T* values, size_t count) {
+  return values ? std::vector<T>(values, values + count) : std::vector<T>();
 }
 
 ViewPicture pictureFrom(const StippleViewImage& given, const Camera& camera) {
@@ -175,7 +176,7 @@ StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoi
       require(given.positions, "points->positions");
       require(given.colours, "points->colours");
     }
-    constexpr uint64_t kBytesPerPoint = 11 * sizeof(float);
+    constexpr uint64_t kBytesPerPoint = 11 * sizeof(float) + sizeof(double);
     views->context->requireMemory(
         given.count > UINT64_MAX / kBytesPerPoint ? UINT64_MAX : given.count * kBytesPerPoint,
         "the points of views");
@@ -185,6 +186,7 @@ StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoi
     made.colours = copied(given.colours, count * 3);
     made.normals = copied(given.normals, count * 3);
     made.weights = copied(given.weights, count);
+    made.times = copied(given.times, count);
     made.opacities.assign(count, 1.0f);
     source.setPoints(std::move(made));
   });

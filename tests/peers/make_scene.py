@@ -97,12 +97,17 @@ def write_cameras(folder, width, height):
          'cy': height / 2, 'ply_file_path': 'points.ply', 'frames': frames}, indent=1))
 
 
-def write_points(path, positions, display):
-    rows = np.empty(len(positions), [('xyz', '<f4', 3), ('rgb', 'u1', 3)])
+def write_points(path, positions, display, times=None):
+    """times: seconds of the images in which the points were found."""
+    rows = np.empty(len(positions), [('xyz', '<f4', 3), ('rgb', 'u1', 3), *([('time', '<f4')] if times is not None
+                                                                            else [])])
     rows['xyz'], rows['rgb'] = positions, np.clip(np.rint(display * 255), 0, 255)
+    if times is not None:
+        rows['time'] = times
     header = '\n'.join(['ply', 'format binary_little_endian 1.0', f'element vertex {len(rows)}', 'property float x',
                         'property float y', 'property float z', 'property uchar red', 'property uchar green',
-                        'property uchar blue', 'end_header', ''])
+                        'property uchar blue', *(['property float time'] if times is not None else []), 'end_header',
+                        ''])
     path.write_bytes(header.encode() + rows.tobytes())
 
 

@@ -45,11 +45,13 @@ class Views(Handle):
         self._check(self.library.stipple_views_add(self.pointer, byref(camera), byref(picture),
                                                    None if name is None else name.encode()))
 
-    def set_points(self, positions, colours, normals=None, weights=None):
-        """positions [N,3] metres, colours [N,3] scene linear, normals [N,3], weights [N]."""
+    def set_points(self, positions, colours, normals=None, weights=None, times=None):
+        """positions [N,3] metres, colours [N,3] scene linear, normals [N,3], weights [N], times [N] seconds."""
         count = len(positions)
         kept = _shaped('Point', {'positions': (positions, (count, 3)), 'colours': (colours, (count, 3)),
                                  'normals': (normals, (count, 3)), 'weights': (weights, (count,))})
+        if times is not None:
+            kept |= _shaped('Point', {'times': (times, (count,))}, np.float64)
         points = StippleViewPoints(count=count, **{key: pointer_to(array) for key, array in kept.items()})
         self._check(self.library.stipple_views_set_points(self.pointer, byref(points)))
 
@@ -94,13 +96,13 @@ class Views(Handle):
         return positions, colours
 
 
-def _shaped(what, arrays):
+def _shaped(what, arrays, dtype=np.float32):
     """{name: (array or None, shape)} to contiguous arrays, or one clear error."""
     kept = {}
     for name, (array, shape) in arrays.items():
         if array is None:
             continue
-        kept[name] = contiguous(array)
+        kept[name] = contiguous(array, dtype)
         if kept[name].shape != shape:
             raise invalid(f'{what} array {name} has shape {kept[name].shape}; allowed is {shape}.')
     return kept

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -160,6 +161,15 @@ void checkCameras(const ViewSource& views, std::vector<std::string>& warnings) {
                      " none of the scene's points: " + listed(blind));
 }
 
+void requireLength(const PointSet& points, const char* what, const char* array, size_t held,
+                   size_t needed) {
+  if (held == needed) return;
+  fail(ErrorCode::kInvalidArgument, std::string(what) + ": " + array + " holds " +
+                                        std::to_string(held) + " values; " +
+                                        std::to_string(needed) + " are needed for " +
+                                        std::to_string(points.size()) + " points");
+}
+
 }  // namespace
 
 void validateView(const Camera& camera, const ViewPicture& picture, const std::string& name) {
@@ -194,15 +204,17 @@ void validatePoints(const PointSet& points, const char* what) {
         Array{"opacities", points.opacities, 1, false}, Array{"normals", points.normals, 3, true},
         Array{"areas", points.areas, 1, true}, Array{"weights", points.weights, 1, true}}) {
     if (array.may_be_empty && array.values.empty()) continue;
-    if (array.values.size() != count * array.channels) {
-      fail(ErrorCode::kInvalidArgument, std::string(what) + ": " + array.name + " holds " +
-                                            std::to_string(array.values.size()) + " values; " +
-                                            std::to_string(count * array.channels) +
-                                            " are needed for " + std::to_string(count) + " points");
-    }
+    requireLength(points, what, array.name, array.values.size(), count * array.channels);
     const std::string name = std::string(what) + ": " + array.name + " of point";
     requireFinite(array.values.data(), array.values.size(), array.channels, name.c_str());
   }
+  if (points.times.empty()) return;
+  requireLength(points, what, "times", points.times.size(), count);
+  const auto bad = std::find_if(points.times.begin(), points.times.end(),
+                                [](double time) { return !std::isfinite(time); });
+  if (bad == points.times.end()) return;
+  const std::string index = std::to_string(bad - points.times.begin());
+  requireFinite(*bad, (std::string(what) + ": time of point " + index).c_str());
 }
 
 std::vector<std::string> checkViews(const ViewSource& views, const ViewCheckOptions& options,

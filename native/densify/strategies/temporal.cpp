@@ -22,8 +22,8 @@ ControlAssembly temporalControl(const TemporalOptions& options) {
   ControlAssembly assembly;
   assembly.schedule = options.schedule;
   addPart(assembly, makeScreenPull(options.pull));
-  addPart(assembly, makeLifespanThreshold(options.threshold));
-  addPart(assembly, makeOffsetWarp(options.stretch));
+  if (options.threshold) addPart(assembly, makeLifespanThreshold(*options.threshold));
+  if (options.stretch) addPart(assembly, makeOffsetWarp(*options.stretch));
   addPart(assembly, makeCloneOrSplit(options.children));
   addPart(assembly, makeFaintRemoval(options.removal));
   addPart(assembly, makeOpacityReset(options.reset));
@@ -35,6 +35,9 @@ ControlAssembly temporalControl(StrategySettings& settings) {
   TemporalOptions options;
   options.pull.copy_threshold = options.pull.split_threshold =
       settings.number("threshold", options.pull.split_threshold, 1e-9, 1e9);
+  if (!settings.flag("weighted", true)) options.pull.least_opacity.reset();
+  if (!settings.flag("by_lifespan", true)) options.threshold.reset();
+  if (!settings.flag("stretched", true)) options.stretch.reset();
   return temporalControl(options);
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "densify/control_part.h"
 #include "densify/parts/clone_or_split.h"
 #include "densify/parts/faint_removal.h"
@@ -17,8 +19,9 @@ struct TemporalOptions {
 
   EventSchedule schedule;
   ScreenPullOptions pull;
-  LifespanThresholdOptions threshold;
-  TimeStretch stretch = kPublishedStretch;
+  /// Absent: one threshold for all.
+  std::optional<LifespanThresholdOptions> threshold = LifespanThresholdOptions();
+  std::optional<TimeStretch> stretch = kPublishedStretch;  ///< absent: time is as it is
   CloneOrSplitOptions children;
   FaintRemovalOptions removal;
   OpacityResetOptions reset;

@@ -54,6 +54,7 @@ PointSet readPlyPoints(const std::string& path) {
     size_t property;
     std::vector<float>* values;
     size_t channel;
+    size_t channels;
   };
   std::vector<Column> columns;
   PointSet points;
@@ -61,17 +62,23 @@ PointSet readPlyPoints(const std::string& path) {
     const char* name = i == 0 ? "x" : i == 1 ? "y" : "z";
     const std::optional<size_t> property = find(*vertices, name);
     if (!property) fail(ErrorCode::kFormat, path + " has no vertex property '" + name + "'");
-    columns.push_back({*property, &points.positions, i});
+    columns.push_back({*property, &points.positions, i, 3});
   }
   const std::optional<size_t> colour[3] = {find(*vertices, "red"), find(*vertices, "green"),
                                            find(*vertices, "blue")};
   const bool has_colour = colour[0] && colour[1] && colour[2];
-  for (size_t i = 0; has_colour && i < 3; ++i) columns.push_back({*colour[i], &points.colours, i});
+  for (size_t i = 0; has_colour && i < 3; ++i) {
+    columns.push_back({*colour[i], &points.colours, i, 3});
+  }
+  std::vector<float> times;
+  const std::optional<size_t> time = find(*vertices, "time");
+  if (time) columns.push_back({*time, &times, 0, 1});
 
   const size_t count = static_cast<size_t>(vertices->count);
   points.positions.resize(count * 3);
   points.colours.assign(count * 3, kGrey);
   points.opacities.assign(count, 1.0f);
+  if (time) times.resize(count);
   const PlyRowLayout layout = rows.layout(*vertices);
   std::vector<char> block(std::min(count, kBlockRows) * layout.stride);
   for (size_t begin = 0; begin < count; begin += kBlockRows) {
@@ -79,7 +86,8 @@ PointSet readPlyPoints(const std::string& path) {
     rows.read(*vertices, layout, read, block.data());
     for (const Column& column : columns) {
       extractPlyColumn(block.data(), layout.stride, read, layout.columns[column.property],
-                       column.values->data() + begin * 3 + column.channel, 3);
+                       column.values->data() + begin * column.channels + column.channel,
+                       column.channels);
     }
   }
   if (has_colour) {
@@ -91,9 +99,11 @@ PointSet readPlyPoints(const std::string& path) {
   try {
     requireFinite(points.positions.data(), points.positions.size(), 3, "position of vertex");
     requireFinite(points.colours.data(), points.colours.size(), 3, "colour of vertex");
+    requireFinite(times.data(), times.size(), 1, "time of vertex");
   } catch (const Error& error) {
     fail(ErrorCode::kFormat, path + ": " + error.what());
   }
+  points.times.assign(times.begin(), times.end());
   return points;
 }
 

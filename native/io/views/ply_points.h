@@ -7,7 +7,7 @@
 namespace stipple {
 
 /// Reads the vertices of a PLY file as points: x y z, and red green blue where they are there (8 or
-/// 16 bits or float, display values; grey without). Opacities are 1, normals are left out.
+/// 16 bits or float, display values; grey without), and time where it is there (seconds). Opacities are 1, normals are left out.
 /// Errors: kIo, kFormat with the property or the vertex.
 PointSet readPlyPoints(const std::string& path);
 

@@ -91,14 +91,18 @@ std::vector<double> MovingParameterisation::rates(double position_rate, double e
   return rates;
 }
 
-std::vector<std::vector<float>> MovingParameterisation::initialExtras(size_t count,
-                                                                      uint64_t seed) const {
+std::vector<std::vector<float>> MovingParameterisation::initialExtras(
+    size_t count, std::span<const double> times, uint64_t seed) const {
   std::vector<std::vector<float>> extras;
   for (const size_t length : extraLengths()) extras.emplace_back(count * length, 0.0f);
   std::fill(extras[kLifespans].begin(), extras[kLifespans].end(), kStartLifespan);
   const uint32_t last = clip_.frame_count - 1;
   const uint32_t moments = (last + kFramesBetweenMoments - 1) / kFramesBetweenMoments + 1;
   for (size_t i = 0; i < count; ++i) {
+    if (!times.empty()) {
+      extras[kCentres][i] = static_cast<float>(clip_.partOf(times[i]));
+      continue;
+    }
     const double place = unitDouble(keyedBits(seed, RandomUse::kStartMoment, i)) * moments;
     const uint32_t frame = std::min(static_cast<uint32_t>(place) * kFramesBetweenMoments, last);
     extras[kCentres][i] = static_cast<float>(static_cast<double>(frame) / clip_.frame_count);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "data/views/view_source.h"
@@ -37,9 +38,11 @@ class MovingParameterisation final : public Parameterisation {
   /// Learning rates of the extras. In: position_rate: of this iteration, metres; extent: of the
   /// cameras, metres.
   static std::vector<double> rates(double position_rate, double extent);
-  /// The extras of splats that begin to move: they stand still, and their moments are drawn among
-  /// every 20th frame and the last one.
-  std::vector<std::vector<float>> initialExtras(size_t count, uint64_t seed) const;
+  /// The extras of splats that begin to move: they stand still, and have their moments when they
+  /// were seen. In: times [N] seconds; empty: nothing is known, and moments are drawn among every
+  /// 20th frame and the last one.
+  std::vector<std::vector<float>> initialExtras(size_t count, std::span<const double> times,
+                                                uint64_t seed) const;
   /// The temporal scale of each splat that fades it at the present time, in stretched time. Out:
   /// lifespans [N].
   void lifespansInUse(const RawSplats& raw, std::vector<float>& lifespans) const;

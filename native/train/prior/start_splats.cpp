@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "base/parallel.h"
@@ -75,6 +76,7 @@ StartPoints fromPoints(const ViewSource& views, const StartOptions& options) {
     start.positions.insert(start.positions.end(), &points.positions[i * 3],
                            &points.positions[i * 3] + 3);
     start.colours.insert(start.colours.end(), colour, colour + 3);
+    if (!points.times.empty()) start.times.push_back(points.times[i]);
   }
   return start;
 }
@@ -118,6 +120,7 @@ StartPoints fromDepth(const ViewSource& views, std::span<const size_t> training,
       start.add(unproject(views.camera(view), pixel % picture.width + 0.5,
                           pixel / picture.width + 0.5, static_cast<double>(picture.depth[pixel])),
                 colour);
+      start.times.push_back(views.time(view));
     }
   }
   return start;
@@ -210,8 +213,8 @@ SplatCloud splatsAt(const StartPoints& points, const ViewSource& views,
 
 }  // namespace
 
-SplatCloud startSplats(const ViewSource& views, std::span<const size_t> training,
-                       const StartOptions& options, Progress* progress) {
+StartSplats startSplats(const ViewSource& views, std::span<const size_t> training,
+                        const StartOptions& options, Progress* progress) {
   StartPoints points;
   if (views.points().size() > 0) {
     points = fromPoints(views, options);
@@ -225,7 +228,7 @@ SplatCloud startSplats(const ViewSource& views, std::span<const size_t> training
       if (points.size() < wanted / kLeastSwept) points = fromVolume(views, training, options);
     }
   }
-  return splatsAt(points, views, training, options);
+  return {splatsAt(points, views, training, options), std::move(points.times)};
 }
 
 }  // namespace stipple

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
@@ -24,14 +25,20 @@ struct StartOptions {
   uint64_t seed = 0;
 };
 
+struct StartSplats {
+  SplatCloud splats;
+  std::vector<double> times;  ///< [N] seconds at which each was seen; empty: nothing is known
+};
+
 /// The splats that a fit begins with: round, as large as the distance to their neighbours, faint.
 /// They stand at the points of the views; without points, on the surfaces that depth pictures show;
 /// without depth, where pictures agree (swept_points.h); where they tell nothing, anywhere in the
-/// volume that the cameras share.
+/// volume that the cameras share. Points know when they were seen where their source says it,
+/// and depth pictures do.
 /// In: training: the views that may be looked at, at least one. Same result for any number of
 /// threads. Cost: O(N log N); loads at most 64 pictures. Errors: those of ViewSource::load.
 /// Source: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section 5.
-SplatCloud startSplats(const ViewSource& views, std::span<const size_t> training,
-                       const StartOptions& options, Progress* progress = nullptr);
+StartSplats startSplats(const ViewSource& views, std::span<const size_t> training,
+                        const StartOptions& options, Progress* progress = nullptr);
 
 }  // namespace stipple

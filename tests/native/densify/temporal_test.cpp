@@ -223,6 +223,21 @@ TEST(Temporal, HasTheScheduleAndRatesOfTheReleasedProgram) {
   EXPECT_EQ(rates.higher_colour, 1.25e-4);
 }
 
+TEST(Temporal, CanLeaveOutEachOfItsThreeParts) {
+  // One view in ten shows it: of 2e-4, a pull of 3e-4 as a plain mean is 0.15, 1.5 where it counts.
+  std::vector<Shown> views(10, {Seen({0.0f}), {0.04f}, {0.2f}});
+  views[3] = {Seen({3e-4f}), {0.8f}, {0.2f}};
+  const auto scoreOf = [&](const char* strategy) {
+    return static_cast<double>(scoresOf(*makeStrategy(strategy), views, 1)[0]);
+  };
+  const double share = 0.75 + 0.25 * std::pow(0.2, 0.8);  // the threshold of such a lifespan
+  EXPECT_NEAR(scoreOf("temporal"), 1.5 / share, 1e-5);
+  EXPECT_NEAR(scoreOf("temporal(by_lifespan=0)"), 1.5, 1e-5);
+  EXPECT_NEAR(scoreOf("temporal(weighted=0)"), 0.15 / share, 1e-5);
+  EXPECT_NEAR(scoreOf("temporal(weighted=0,by_lifespan=0,stretched=0)"), 0.15, 1e-5);
+  EXPECT_EQ(stretchOf("temporal(stretched=0)").frames, 0);
+}
+
 TEST(Temporal, CopiesSmallSplatsSplitsLargeOnesAndRemovesTheFaintAlone) {
   const auto strategy = makeStrategy("temporal");
   // Beyond 0.01 of the extent of 1 a splat is large; however large, it stays.

@@ -38,5 +38,17 @@ TEST_F(PlyPoints, RefuseColoursWhoseLightIsNotFinite) {
   }
 }
 
+TEST_F(PlyPoints, KnowWhenTheyWereSeen) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+      "property float z\nproperty double time\nend_header\n";
+  const PointSet points = readPlyPoints(store("timed.ply", header + "1 2 3 0.25\n4 5 6 -2\n"));
+  EXPECT_EQ(points.times, (std::vector<double>{0.25, -2}));
+  EXPECT_EQ(points.positions, (std::vector<float>{1, 2, 3, 4, 5, 6}));
+  EXPECT_TRUE(readPlyPoints(file("0.5")).times.empty());
+  expectError(ErrorCode::kFormat, {"timed.ply", "time of vertex 1"},
+              [&] { readPlyPoints(store("timed.ply", header + "1 2 3 0.25\n4 5 6 nan\n")); });
+}
+
 }  // namespace
 }  // namespace stipple

@@ -87,7 +87,7 @@ TEST(ClipOfViews, HasAFrameForEveryTimeThatDiffers) {
 
 TEST(MovingParameterisation, DrawsMomentsAmongEvery20thFrameAndTheLast) {
   const MovingParameterisation moving(clipOf(50), nullptr, 0);
-  const auto extras = moving.initialExtras(4000, 3);
+  const auto extras = moving.initialExtras(4000, {}, 3);
   ASSERT_EQ(extras.size(), MovingParameterisation::extraLengths().size());
   std::map<float, size_t> counts;
   for (const float moment : extras.back()) ++counts[moment];
@@ -96,15 +96,22 @@ TEST(MovingParameterisation, DrawsMomentsAmongEvery20thFrameAndTheLast) {
     // Binomial of 4000 and a quarter: five standard deviations are 137.
     EXPECT_NEAR(static_cast<double>(counts.at(frame / 50)), 1000, 137) << frame;
   }
-  EXPECT_EQ(extras, moving.initialExtras(4000, 3));
-  EXPECT_NE(extras, moving.initialExtras(4000, 4));
+  EXPECT_EQ(extras, moving.initialExtras(4000, {}, 3));
+  EXPECT_NE(extras, moving.initialExtras(4000, {}, 4));
+}
+
+TEST(MovingParameterisation, TakesMomentsFromPointsThatSayThem) {
+  const MovingParameterisation moving(clipOf(50), nullptr, 0);
+  const double rate = clipOf(50).frames_per_second;
+  const auto extras = moving.initialExtras(4, std::vector<double>{0, 10 / rate, -1, 1e12}, 3);
+  EXPECT_EQ(extras.back(), (std::vector<float>{0, 0.2f, 0, 0.98f}));
 }
 
 TEST(MovingParameterisation, BeginsWithSplatsThatStandStillAndOnlyFade) {
   const MovingParameterisation moving(clipOf(50), nullptr, 0);
   RawSplats raw = rawSplats(ballOfSplats(20, 1));
   raw.extra_lengths = MovingParameterisation::extraLengths();
-  raw.extras = moving.initialExtras(20, 3);
+  raw.extras = moving.initialExtras(20, {}, 3);
   const MotionCloud cloud = moving.cloudOf(raw);
   validate(cloud, "moving");
   for (const double time : {1.0, 3.3, 5.9}) {

@@ -33,7 +33,7 @@ std::shared_ptr<MemoryViewSource> emptyViews(const std::vector<Camera>& cameras,
 }
 
 SplatCloud startOf(const MemoryViewSource& views, const StartOptions& options = {}) {
-  return startSplats(views, allViews(views), options);
+  return startSplats(views, allViews(views), options).splats;
 }
 
 TEST(StartSplats, StandAtThePointsAsLargeAsTheirNeighboursAreFar) {
@@ -111,6 +111,26 @@ TEST(StartSplats, FewerThanThePointsAreDrawnByWeight) {
   EXPECT_EQ(startOf(*views, options).size(), 100u);
   options.count = 0;
   EXPECT_EQ(startOf(*views, options).size(), 100u);
+}
+
+TEST(StartSplats, KnowWhenTheirPointsWereSeen) {
+  const auto views = emptyViews(camerasAround(2, 16));
+  PointSet points = pointsOf(ballOfSplats(400, 3), 0, 1);
+  views->setPoints(points);
+  EXPECT_TRUE(startSplats(*views, allViews(*views), {}).times.empty());
+  std::map<float, double> time_of;
+  for (size_t i = 0; i < 400; ++i) {
+    points.times.push_back(0.01 * static_cast<double>(i));
+    time_of[points.positions[i * 3]] = points.times[i];
+  }
+  views->setPoints(points);
+  StartOptions options;
+  options.count = 100;
+  const StartSplats start = startSplats(*views, allViews(*views), options);
+  ASSERT_EQ(start.times.size(), 100u);
+  for (size_t i = 0; i < 100; ++i) {
+    EXPECT_EQ(start.times[i], time_of.at(start.splats.positions[i * 3]));
+  }
 }
 
 TEST(StartSplats, WithoutPointsTheyStandOnWhatDepthShows) {
