@@ -88,14 +88,15 @@ struct CloudGradient {
 };
 
 /// How raw numbers and extra parameters become splats, where that is not exp, logistic and identity
-/// (raw_splats.h).
+/// (raw_splats.h). Harmonics are the same numbers raw and stored in every case: neither function
+/// may touch them, and clouds and derivatives may come without them.
 class Parameterisation {
  public:
   virtual ~Parameterisation() = default;
   /// Out: cloud, of as many splats, where the usual activation has already written.
   virtual void activate(const RawSplats& raw, SplatCloud& cloud) const = 0;
   /// In: derivatives by the stored values of the cloud, which it may change. Out: by_raw, where the
-  /// usual derivatives stand already and those of extras are 0.
+  /// usual derivatives stand already; it writes all those of its extras.
   virtual void adjoint(const RawSplats& raw, const SplatCloud& cloud, const CloudGradient& by_cloud,
                        RawSplats& by_raw) const = 0;
 };

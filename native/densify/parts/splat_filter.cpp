@@ -32,7 +32,6 @@ void FilteredParameterisation::adjoint(const RawSplats& raw, const SplatCloud&,
     before_.sh_degree = raw.sh_degree;
     before_.positions = raw.positions;
     before_.rotations = raw.rotations;
-    before_.sh = raw.sh;
     how_->activate(raw, before_);
   }
   filter_.adjoint(before_, by_cloud);

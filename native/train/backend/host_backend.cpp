@@ -202,13 +202,13 @@ class HostBackend final : public RenderBackend {
 
   RawSplats gradients() const override {
     requireGradients("there are no derivatives; call backward first");
-    if (how_) return by_raw_;
-    RawSplats raw = zerosLike(held_.splats);
+    RawSplats raw = how_ ? by_raw_ : zerosLike(held_.splats);
+    raw.sh = by_.sh;
+    if (how_) return raw;
     raw.positions = by_.positions;
     raw.rotations = by_.rotations;
     raw.log_scales = by_.scales;
     raw.logits = by_.opacities;
-    raw.sh = by_.sh;
     return raw;
   }
 
@@ -231,23 +231,21 @@ class HostBackend final : public RenderBackend {
 
  private:
   /// Positions, rotations and harmonics are the same numbers raw and stored: while splats are
-  /// drawn, the cloud has the arrays. With a parameterisation it has arrays of its own.
+  /// drawn, the cloud has the arrays. With a parameterisation it has positions and rotations of its
+  /// own.
   class Lent {
    public:
-    explicit Lent(HostBackend& backend) : backend_(backend) {
-      if (!backend_.how_) exchange();
-    }
-    ~Lent() {
-      if (!backend_.how_) exchange();
-    }
+    explicit Lent(HostBackend& backend) : backend_(backend) { exchange(); }
+    ~Lent() { exchange(); }
     Lent(const Lent&) = delete;
     Lent& operator=(const Lent&) = delete;
 
    private:
     void exchange() {
+      backend_.cloud_.sh.swap(backend_.held_.splats.sh);
+      if (backend_.how_) return;
       backend_.cloud_.positions.swap(backend_.held_.splats.positions);
       backend_.cloud_.rotations.swap(backend_.held_.splats.rotations);
-      backend_.cloud_.sh.swap(backend_.held_.splats.sh);
     }
     HostBackend& backend_;
   };
@@ -286,7 +284,7 @@ class HostBackend final : public RenderBackend {
   void activate() {
     if (is_activated_) return;
     if (how_) {
-      activateAll(held_.splats, *how_, cloud_);
+      activateWith(held_.splats, *how_, cloud_);
     } else {
       activateShapes(held_.splats, cloud_);
     }
@@ -295,7 +293,7 @@ class HostBackend final : public RenderBackend {
 
   /// Derivatives by an array of the raw splats, of the last backward pass.
   std::span<const float> lastGradient(RawArray array) const {
-    if (how_) return arrayOf(by_raw_, array);
+    if (how_ && array != RawArray::kSh) return arrayOf(by_raw_, array);
     const std::vector<float>* const arrays[] = {&by_.positions, &by_.rotations, &by_.scales,
                                                 &by_.opacities, &by_.sh};
     return *arrays[static_cast<size_t>(array)];

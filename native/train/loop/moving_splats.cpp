@@ -126,7 +126,6 @@ void MovingParameterisation::rest(const RawSplats& raw) const {
   rest_.sh_degree = raw.sh_degree;
   rest_.positions = raw.positions;
   rest_.rotations = raw.rotations;
-  rest_.sh = raw.sh;
   how_->activate(raw, rest_);
 }
 
@@ -174,10 +173,7 @@ MotionCloud MovingParameterisation::cloudOf(const RawSplats& raw) const {
 
 void MovingParameterisation::activate(const RawSplats& raw, SplatCloud& cloud) const {
   rest(raw);
-  if (how_) {
-    cloud.scales = rest_.scales;
-    cloud.sh = rest_.sh;
-  }
+  if (how_) cloud.scales = rest_.scales;
   const MotionKernel kernel = chosenMotionKernel();
   const MotionColumns<const float> columns = columnsOf(raw);
   const MomentColumns<float> moments = {cloud.positions.data(), cloud.rotations.data(),
@@ -202,6 +198,7 @@ void MovingParameterisation::adjoint(const RawSplats& raw, const SplatCloud&,
   by.phases = extras[kPhases].data();
   by.spins = extras[kSpins].data();
   by.lifespans = extras[kLifespans].data();
+  std::fill(extras[kCentres].begin(), extras[kCentres].end(), 0.0f);  // they are not learned
   const MotionKernel kernel = chosenMotionKernel();
   const MotionColumns<const float> columns = columnsOf(raw);
   const MomentColumns<const float> by_moments = {

@@ -48,11 +48,10 @@ void activateShapes(const RawSplats& raw, SplatCloud& cloud) {
                  [&](size_t i) { return activatedOpacity(raw.logits[i]); });
 }
 
-void activateAll(const RawSplats& raw, const Parameterisation& how, SplatCloud& cloud) {
+void activateWith(const RawSplats& raw, const Parameterisation& how, SplatCloud& cloud) {
   activateShapes(raw, cloud);
   cloud.positions = raw.positions;
   cloud.rotations = raw.rotations;
-  cloud.sh = raw.sh;
   how.activate(raw, cloud);
 }
 
@@ -68,10 +67,8 @@ void throughActivations(const RawSplats& raw, const SplatCloud& cloud, const Par
   by_raw.resize(raw.size());
   std::copy(by_cloud.positions.begin(), by_cloud.positions.end(), by_raw.positions.begin());
   std::copy(by_cloud.rotations.begin(), by_cloud.rotations.end(), by_raw.rotations.begin());
-  std::copy(by_cloud.sh.begin(), by_cloud.sh.end(), by_raw.sh.begin());
   scalesThrough(cloud, by_cloud.scales.data(), by_raw.log_scales.data());
   opacitiesThrough(cloud, by_cloud.opacities.data(), by_raw.logits.data());
-  for (std::vector<float>& extra : by_raw.extras) std::fill(extra.begin(), extra.end(), 0.0f);
   how.adjoint(raw, cloud, spansOf(by_cloud), by_raw);
 }
 

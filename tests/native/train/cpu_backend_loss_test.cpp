@@ -160,7 +160,7 @@ class Moved final : public Parameterisation {
   void adjoint(const RawSplats&, const SplatCloud&, const CloudGradient& by_cloud,
                RawSplats& by_raw) const override {
     for (size_t i = 0; i < by_cloud.positions.size(); ++i) {
-      by_raw.extras[0][i] += 2 * by_cloud.positions[i];
+      by_raw.extras[0][i] = 2 * by_cloud.positions[i];
     }
   }
 };

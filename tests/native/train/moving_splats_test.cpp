@@ -103,7 +103,7 @@ TEST(MovingParameterisation, DrawsMomentsAmongEvery20thFrameAndTheLast) {
 TEST(MovingParameterisation, TakesMomentsFromPointsThatSayThem) {
   const MovingParameterisation moving(clipOf(50), nullptr, 0);
   const double rate = clipOf(50).frames_per_second;
-  const auto extras = moving.initialExtras(4, std::vector<double>{0, 10 / rate, -1, 1e12}, 3);
+  const auto extras = moving.initialExtras(4, std::vector<double>{1, 1 + 10 / rate, -1, 1e12}, 3);
   EXPECT_EQ(extras.back(), (std::vector<float>{0, 0.2f, 0, 0.98f}));
 }
 
