@@ -74,13 +74,14 @@ class Judge:
 
     def __call__(self, result, frame_rate):
         model = Model.load(self._context, result)
+        count = model.info().max_anchors
         options = self._renderer.options(output_colour=OutputColour.COMPOSITED, background=(0, 0, 0))
         values = {key: [] for key in ('psnr', 'ssim', 'masked_psnr', 'masked_ssim')}
         changes, truths = [], []
         for frames, masks in self._cameras.values():
             before = None
             for (frame, camera, truth), mask in zip(frames, masks):
-                cloud = model.decode(DecodeSettings(1, time=frame / frame_rate))
+                cloud = model.decode(DecodeSettings(count, time=frame / frame_rate))
                 task = self._renderer.start([(cloud, np.eye(4))], camera, options, with_depth=False)
                 task.job.wait()
                 drawn = np.clip(task.colour[..., :3], 0, 1)
@@ -96,7 +97,7 @@ class Judge:
                 before = drawn, truth
         return {**{key: statistics.mean(found) for key, found in values.items()},
                 'flicker': statistics.mean(changes) / statistics.mean(truths),
-                'splats': model.decode(DecodeSettings(1)).info().count}
+                'splats': count}
 
 
 def measure(stipple, judge, given, scene, arm, strategy, seed):
