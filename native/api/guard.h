@@ -117,6 +117,13 @@ class StructArray {
   size_t step_ = 0;
 };
 
+/// Refuses buffers that are too small. In: what is counted, "floats".
+inline void requireCapacity(uint64_t needed, uint64_t capacity, const char* what) {
+  if (capacity >= needed) return;
+  fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " " + what + "; " +
+                                       std::to_string(needed) + " are needed");
+}
+
 /// Refuses enum values outside 0..last.
 template <typename Enum>
 Enum enumValue(uint32_t value, uint32_t last, const char* name) {

@@ -61,10 +61,7 @@ StippleStatus stipple_image_read(const StippleImage* image, float* pixels, uint6
   return guarded([&] {
     const Image& picture = *require(image, "image").image;
     require(pixels, "pixels");
-    if (capacity < picture.pixels.size()) {
-      fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " floats; " +
-                                           std::to_string(picture.pixels.size()) + " are needed");
-    }
+    requireCapacity(picture.pixels.size(), capacity, "floats");
     std::memcpy(pixels, picture.pixels.data(), picture.pixels.size() * sizeof(float));
   });
 }

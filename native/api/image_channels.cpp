@@ -58,10 +58,7 @@ StippleStatus stipple_image_channels_read(const StippleImageChannels* channels, 
   return guarded([&] {
     const ImageChannel& channel = channelOf(channels, index);
     require(values, "values");
-    if (capacity < channel.values.size()) {
-      fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " floats; " +
-                                           std::to_string(channel.values.size()) + " are needed");
-    }
+    requireCapacity(channel.values.size(), capacity, "floats");
     std::memcpy(values, channel.values.data(), channel.values.size() * sizeof(float));
   });
 }

@@ -84,10 +84,7 @@ StippleStatus stipple_rig_search_rays(const StippleRigSearch* search, uint64_t c
     const std::vector<SceneRay>& asked = require(search, "search").rig.rays();
     require(count, "count") = asked.size();
     if (!rays || asked.empty()) return;
-    if (capacity < asked.size()) {
-      fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " rays; " +
-                                           std::to_string(asked.size()) + " are needed");
-    }
+    requireCapacity(asked.size(), capacity, "rays");
     std::memcpy(rays, asked.data(), asked.size() * sizeof(SceneRay));
   });
 }

@@ -107,10 +107,7 @@ StippleStatus stipple_cloud_quantity(const StippleCloud* cloud, uint32_t quantit
     const bool is_known = cloud->seen && !is_axis && cloud->seen->of(wanted).size() == splats;
     *count = is_axis ? splats * 3 : is_known ? splats : 0;
     if (!values || *count == 0) return;
-    if (capacity < *count) {
-      fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " floats; " +
-                                           std::to_string(*count) + " are needed");
-    }
+    requireCapacity(*count, capacity, "floats");
     std::vector<float> axes;
     if (is_axis) {
       withThreads(cloud->context->thread_count, [&] { axes = splitAxes(*cloud->cloud); });

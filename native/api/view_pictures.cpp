@@ -56,12 +56,6 @@ ViewPicture pictureFrom(const StippleViewImage& given, const Camera& camera) {
   return picture;
 }
 
-void requireCapacity(uint64_t needed, uint64_t capacity, const char* what) {
-  if (capacity >= needed) return;
-  fail(ErrorCode::kBufferTooSmall, "capacity is " + std::to_string(capacity) + " " + what + "; " +
-                                       std::to_string(needed) + " are needed");
-}
-
 /// What is known of the views of a data set; each must be readable within the memory limit.
 void noteDataset(const Dataset& dataset, StippleViews& views) {
   for (size_t i = 0; i < dataset.count(); ++i) {

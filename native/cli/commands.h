@@ -14,6 +14,7 @@ void addDecode(CLI::App& app, const Context& context);
 void addRender(CLI::App& app, const Context& context);
 void addVoxelize(CLI::App& app, const Context& context);
 void addCarry(CLI::App& app, const Context& context);
+void addBind(CLI::App& app, const Context& context);
 void addMesh(CLI::App& app, const Context& context);
 void addFit(CLI::App& app, const Context& context);
 void addDensify(CLI::App& app, const Context& context);

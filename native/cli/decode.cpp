@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/formats.h"
 #include "cli/hierarchy.h"
+#include "cli/motion/shapes.h"
 #include "cli/report.h"
 
 namespace stipple::cli {
@@ -16,7 +17,7 @@ namespace {
 constexpr int64_t kMaxRefineSteps = 1'000'000;
 
 struct Arguments {
-  std::string in, out, order = "systematic";
+  std::string in, out, posed, order = "systematic";
   std::optional<int64_t> anchors;  // the model's own where there are none
   std::optional<double> ratio;
   int64_t refine = 0;
@@ -112,6 +113,25 @@ Cloud refined(const Cloud& cloud, const Model& model, const Arguments& arguments
   return make<Cloud>(stipple_job_cloud, job.get());
 }
 
+/// The splats as the posed mesh carries them that their asset brings at rest.
+Cloud carried(const Context& context, const Cloud& cloud, const Arguments& arguments) {
+  auto info = sized<StippleRestInfo>();
+  check(stipple_asset_rest_info(context.get(), arguments.in.c_str(), &info));
+  if (info.vertex_count == 0) {
+    throw Failure(arguments.in +
+                  " brings no mesh that its splats follow; 'stipple bind' gives it one");
+  }
+  Shape rest;
+  rest.positions.resize(3 * info.vertex_count);
+  rest.triangles.resize(3 * info.triangle_count);
+  check(stipple_asset_read_rest(context.get(), arguments.in.c_str(), info.vertex_count,
+                                rest.positions.data(), info.triangle_count,
+                                rest.triangles.data()));
+  const Shape posed = shapeOf(context, arguments.posed);
+  requireOneMesh(rest, arguments.in, posed, arguments.posed);
+  return carriedBy(posed, cloud, bindingOf(cloud, rest, info.reach));
+}
+
 void decode(const Context& context, const Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   StippleDecodeOptions options;
@@ -130,6 +150,10 @@ void decode(const Context& context, const Arguments& arguments) {
     throw Failure("'" + arguments.out + "' is not a splat file; " + splatExtensions(true) +
                   " or .stipple.safetensors is expected");
   }
+  if (!arguments.posed.empty() && fileKind(arguments.in) != FileKind::kModel) {
+    throw Failure("--posed is for a model that 'stipple bind' has made; '" + arguments.in +
+                  "' is none");
+  }
   const Model model = modelFrom(context, arguments);
   if (out_kind == FileKind::kModel) {
     check(stipple_model_save(model.get(), arguments.out.c_str()));
@@ -140,6 +164,7 @@ void decode(const Context& context, const Arguments& arguments) {
   finish(job);
   auto cloud = make<Cloud>(stipple_job_cloud, job.get());
   if (arguments.refine != 0) cloud = refined(cloud, model, arguments);
+  if (!arguments.posed.empty()) cloud = carried(context, cloud, arguments);
   check(stipple_cloud_save(cloud.get(), arguments.out.c_str(), nullptr));
   auto info = sized<StippleCloudInfo>();
   check(stipple_cloud_info(cloud.get(), &info));
@@ -190,6 +215,9 @@ void addDecode(CLI::App& app, const Context& context) {
       ->capture_default_str();
   command->add_option("--time", arguments->time, "Seconds, for models of splats that move")
       ->capture_default_str();
+  command->add_option("--posed", arguments->posed,
+                      "Mesh (.glb, .gltf): the splats as it carries them, where the model brings "
+                      "the same mesh at rest ('stipple bind')");
   command->callback([arguments, &context] { decode(context, *arguments); });
 }
 

@@ -6,8 +6,9 @@ import pytest
 
 from stipple.binding.cloud import SplatArrays
 from stipple.binding.errors import StippleError
+from stipple.binding.model import DecodeSettings, Model
 from stipple.binding.structs import BindingReach, Status
-from stipple.binding.surface_binding import SurfaceBinding
+from stipple.binding.surface_binding import SurfaceBinding, asset_rest, bind_asset
 
 REST = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -93,3 +94,24 @@ def test_a_small_limit_refuses_before_anything_is_made(library):
     with pytest.raises(StippleError) as caught:
         bound(cloud, rest=np.tile(REST, (1000, 1)))
     assert caught.value.status == Status.ERROR_MEMORY_LIMIT
+
+
+def test_an_asset_brings_the_mesh_that_its_splats_follow(context, root, tmp_path):
+    asset, out = root / 'tests' / 'data' / 'assets' / 'surface_1.0.stipple.safetensors', tmp_path / 'bound.safetensors'
+    assert asset_rest(context, asset) is None
+    bind_asset(context, asset, REST, TRIANGLES, BindingReach.AROUND, out)
+    rest, triangles, reach = asset_rest(context, out)
+    assert rest.tolist() == REST.tolist() and triangles.tolist() == TRIANGLES.tolist()
+    assert reach == BindingReach.AROUND
+    # The model beside it is the same.
+    before, after = (Model.load(context, path).decode(DecodeSettings(50)).read() for path in (asset, out))
+    assert before.positions.tolist() == after.positions.tolist()
+    with pytest.raises(StippleError, match='name vertex 5'):
+        bind_asset(context, asset, REST, TRIANGLES + 2, BindingReach.SURFACE, out)
+    # A file whose faces were changed without its topology.
+    damaged = bytearray(out.read_bytes())
+    where = damaged.find(np.ascontiguousarray(TRIANGLES, '<u4').tobytes())
+    damaged[where] ^= 1
+    out.write_bytes(damaged)
+    with pytest.raises(StippleError, match='the file is damaged'):
+        asset_rest(context, out)

@@ -512,3 +512,34 @@ class side_heights:
 
     def std(self):
         return np.sqrt(self._shares @ np.square(self._heights - self.mean()))
+
+
+def test_a_file_brings_the_mesh_at_rest(stipple, tmp_path):
+    """Bound in any frame, the splats follow from the shape that their file says they fit."""
+    from stipple.binding.structs import BindingReach
+    from stipple.binding.surface_binding import bind_asset
+    mesh = animated_square()
+    splats = scenes.make_splats(mesh, anchors=COUNT)
+    source = stipple.scene.source.source_paths.file_of(splats.data)
+    before = positions(stipple, splats)
+    vertices, triangles = np.empty(12, np.float32), np.empty(6, np.int32)
+    mesh.data.vertices.foreach_get('co', vertices)
+    mesh.data.calc_loop_triangles()
+    mesh.data.loop_triangles.foreach_get('vertices', triangles)
+    native = stipple.scene.source.sources.context()
+    brought = tmp_path / 'brought.stipple.safetensors'
+    bind_asset(native, source, vertices.reshape(-1, 3), triangles.reshape(-1, 3), BindingReach.AROUND, brought)
+    assert bpy.ops.stipple.splats_import(filepath=str(brought), up_axis='Z') == {'FINISHED'}
+    found = bpy.context.object
+    bpy.context.scene.frame_set(11)
+    mesh.hide_set(False)
+    mesh.select_set(True)
+    bpy.context.view_layer.objects.active = mesh
+    splats.select_set(False)
+    assert bpy.ops.stipple.bind_to_mesh() == {'FINISHED'}
+    assert found.data.stipple.bind_reach == 'AROUND'
+    rest = positions(stipple, found)
+    bpy.context.scene.frame_set(1)
+    # Lifted by 1 m at frame 11, where it was bound; at frame 1 where the file's own shape has it.
+    np.testing.assert_allclose(rest[:, 2].mean() - positions(stipple, found)[:, 2].mean(), 1, atol=1e-5)
+    np.testing.assert_allclose(np.sort(positions(stipple, found)[:, 2]).mean(), np.sort(before[:, 2]).mean(), atol=1e-4)

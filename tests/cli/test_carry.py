@@ -57,3 +57,27 @@ def test_another_mesh_is_refused_and_nothing_written(cube, tmp_path):
     assert 'must be shapes of one mesh' in error('carry', cloud, rest, tmp_path / 'posed.glb', tmp_path / 'out.ply')
     assert 'missing.glb' in error('carry', cloud, rest, tmp_path / 'missing.glb', tmp_path / 'out.ply')
     assert not (tmp_path / 'out.ply').exists()
+
+
+def test_a_model_brings_the_mesh_that_its_splats_follow_at_any_budget(cube, tmp_path):
+    _, rest = cube
+    model, bound = tmp_path / 'cube.stipple.safetensors', tmp_path / 'bound.stipple.safetensors'
+    run('decode', rest, model)
+    assert 'brings no mesh' in error('decode', model, tmp_path / 'out.ply', '--posed', rest)
+    seen = figures('bind', model, rest, bound)
+    assert (seen['vertices'], seen['triangles'], seen['follows']) == (8, 12, 'surface')
+    write_cube(tmp_path / 'posed.glb', 2 * CORNERS + np.float32([1, 0, 0]))
+    for budget in (50, 900):
+        run('decode', bound, tmp_path / 'before.ply', '--anchors', budget)
+        run('decode', bound, tmp_path / 'after.ply', '--anchors', budget, '--posed', tmp_path / 'posed.glb')
+        before, after = splats(tmp_path / 'before.ply')[0], splats(tmp_path / 'after.ply')[0]
+        assert len(before) == budget
+        np.testing.assert_allclose(after, 2 * before + np.float32([1, 0, 0]), atol=2e-6)
+    # Another mesh, and what is no model.
+    write_cube_glb(tmp_path / 'posed.glb')
+    data = (tmp_path / 'posed.glb').read_bytes()
+    (tmp_path / 'posed.glb').write_bytes(data.replace(struct.pack('<3H', 0, 2, 1), struct.pack('<3H', 0, 1, 2), 1))
+    assert 'must be shapes of one mesh' in error('decode', bound, tmp_path / 'x.ply', '--posed', tmp_path / 'posed.glb')
+    assert 'is not a model' in error('bind', cube[0], rest, bound)
+    assert 'is none' in error('decode', rest, tmp_path / 'x.ply', '--posed', rest)
+    assert not (tmp_path / 'x.ply').exists()

@@ -15,6 +15,7 @@
 #include "io/assets/hierarchy_asset.h"
 #include "io/assets/latent_asset.h"
 #include "io/assets/motion_asset.h"
+#include "io/assets/rest_mesh.h"
 #include "io/assets/surface_asset.h"
 #include "io/glb_builder.h"
 #include "io/image_channels.h"
@@ -370,6 +371,9 @@ std::vector<std::string> motionSeeds(const fs::path& folder) {
     asset.frame_count = 9;
     writeMotionAsset(asset, (folder / "seed").string());
     made.push_back(load(folder / "seed"));
+    writeRestMesh((folder / "seed").string(), {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2}, 7, true},
+                  (folder / "seed").string());
+    made.push_back(load(folder / "seed"));
   }
   return made;
 }
@@ -386,7 +390,11 @@ std::vector<std::string> latentSeeds(const fs::path& folder) {
 
 void readMotion(const fs::path& path) {
   const MotionAsset asset = readMotionAsset(path.string());
-  keepsPromises([&] { writeMotionAsset(asset, (path.parent_path() / "again").string()); });
+  const std::string again = (path.parent_path() / "again").string();
+  if (const auto rest = readRestMesh(path.string())) {
+    keepsPromises([&] { writeRestMesh(path.string(), *rest, again); });
+  }
+  keepsPromises([&] { writeMotionAsset(asset, again); });
 }
 
 void readLatent(const fs::path& path) {

@@ -74,7 +74,7 @@ class Judge:
 
     def __call__(self, result, frame_rate):
         model = Model.load(self._context, result)
-        count = model.info().max_anchors
+        count = model.settings().maximum_budget
         options = self._renderer.options(output_colour=OutputColour.COMPOSITED, background=(0, 0, 0))
         values = {key: [] for key in ('psnr', 'ssim', 'masked_psnr', 'masked_ssim')}
         changes, truths = [], []
@@ -96,7 +96,7 @@ class Judge:
                     truths.append(np.abs(truth - before[1]).mean())
                 before = drawn, truth
         return {**{key: statistics.mean(found) for key, found in values.items()},
-                'flicker': statistics.mean(changes) / statistics.mean(truths),
+                'flicker': float(statistics.mean(changes) / statistics.mean(truths)),
                 'splats': count}
 
 

@@ -210,6 +210,10 @@ FUNCTIONS = {
     'stipple_binding_free': (None, [_handle]),
     'stipple_binding_info': (_status, [_handle, _to(s.StippleBindingInfo)]),
     'stipple_cloud_carry': (_status, [_handle, _handle, _floats, c_uint64, _out_handle]),
+    'stipple_asset_bind': (_status, [_handle, c_char_p, _floats, c_uint64, POINTER(c_uint32), c_uint64, c_uint32,
+                                     c_char_p]),
+    'stipple_asset_rest_info': (_status, [_handle, c_char_p, _to(s.StippleRestInfo)]),
+    'stipple_asset_read_rest': (_status, [_handle, c_char_p, c_uint64, _floats, c_uint64, POINTER(c_uint32)]),
     # differentiable rendering
     'stipple_renderer_backward_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleCamera),
                                                   _to(s.StippleRenderOptions), _to(s.StippleBackwardInput),

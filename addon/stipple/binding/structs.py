@@ -370,6 +370,11 @@ class StippleBindingInfo(_Sized):
                 ('vertex_count', c_uint64), ('triangle_count', c_uint64), ('topology', c_uint64)]
 
 
+class StippleRestInfo(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reach', c_uint32), ('vertex_count', c_uint64),
+                ('triangle_count', c_uint64), ('topology', c_uint64)]
+
+
 class StippleBackwardInput(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('colour_gradient', _floats), ('residual', _floats),
                 ('residual_weights', _floats), ('edge_weights', _floats), ('errors', _floats),

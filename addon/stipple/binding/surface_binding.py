@@ -6,10 +6,10 @@ from ctypes import byref
 import numpy as np
 
 from .cloud import Cloud
-from .errors import invalid
-from .handle import Handle, contiguous, new_handle, pointer_to
+from .errors import check, invalid
+from .handle import Handle, contiguous, new_handle, path_bytes, pointer_to
 from .job import Job
-from .structs import BindingReach, StippleBindingInfo
+from .structs import BindingReach, StippleBindingInfo, StippleRestInfo
 
 
 class SurfaceBinding(Handle):
@@ -37,6 +37,28 @@ class SurfaceBinding(Handle):
         deformed = _places(deformed)
         return Cloud(self.library, new_handle(self.library, 'stipple_cloud_carry', cloud.pointer, self.pointer,
                                               pointer_to(deformed), len(deformed)))
+
+
+def bind_asset(context, path, rest, triangles, reach, out):
+    """Writes an asset file once more with a mesh at rest that its splats follow: rest [V,3] in their frame, triangles
+    [T,3]."""
+    rest, triangles = _places(rest), contiguous(triangles, np.uint32).reshape(-1, 3)
+    check(context.library,
+          context.library.stipple_asset_bind(context.pointer, path_bytes(path), pointer_to(rest), len(rest),
+                                             pointer_to(triangles), len(triangles), int(reach), path_bytes(out)))
+
+
+def asset_rest(context, path):
+    """(rest [V,3], triangles [T,3], BindingReach) of the mesh that an asset file brings, None where it brings none."""
+    library, info = context.library, StippleRestInfo()
+    check(library, library.stipple_asset_rest_info(context.pointer, path_bytes(path), byref(info)))
+    if info.vertex_count == 0:
+        return None
+    rest = np.empty((info.vertex_count, 3), np.float32)
+    triangles = np.empty((info.triangle_count, 3), np.uint32)
+    check(library, library.stipple_asset_read_rest(context.pointer, path_bytes(path), len(rest), pointer_to(rest),
+                                                   len(triangles), pointer_to(triangles)))
+    return rest, triangles, BindingReach(info.reach)
 
 
 def _places(values):

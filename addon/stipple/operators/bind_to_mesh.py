@@ -68,7 +68,8 @@ class STIPPLE_OT_bind_to_mesh(bpy.types.Operator):
         edits.give_source(obj)
         matrix = np.linalg.inv(placement.matrix_of(obj)) @ placement.matrix_of(mesh.evaluated_get(depsgraph))
         with sync.paused():
-            bound.bind(data, mesh, self.reach, matrix, depsgraph)
+            if bound.bind(data, mesh, self.reach, matrix, depsgraph, bound.brought_rest(data)):
+                self.report({'INFO'}, f"'{obj.name}' is bound to the mesh at rest that its file brings")
             for user in _users(data):
                 bound.hold(user, mesh)
                 if self.parent and user.parent != mesh:

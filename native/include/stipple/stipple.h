@@ -1682,6 +1682,29 @@ StippleStatus stipple_binding_info(const StippleBinding* binding, StippleBinding
 StippleStatus stipple_cloud_carry(const StippleCloud* cloud, const StippleBinding* binding, const float* deformed,
                                   uint64_t vertex_count, StippleCloud** carried);
 
+/* The mesh at rest that an asset file of any kind brings for its splats to follow. All 0: it brings none. */
+typedef struct StippleRestInfo {
+  uint32_t struct_size;
+  uint32_t reach;          /* StippleBindingReach */
+  uint64_t vertex_count;
+  uint64_t triangle_count;
+  uint64_t topology;       /* as of StippleBindingInfo */
+} StippleRestInfo;
+
+/* Writes an asset file once more, to out_utf8, with a mesh at rest in the place of an earlier one; both may be the same
+ * file. In: positions [vertex_count,3] in the frame of the splats, triangles [triangle_count,3]; reach,
+ * StippleBindingReach. Everything else in the file stays as it is. Errors: IO, FORMAT, INVALID_ARGUMENT for a mesh
+ * without faces, indices out of range and places that are not finite; UNSUPPORTED for checkpoints. */
+StippleStatus stipple_asset_bind(StippleContext* context, const char* path_utf8, const float* positions,
+                                 uint64_t vertex_count, const uint32_t* triangles, uint64_t triangle_count,
+                                 uint32_t reach, const char* out_utf8);
+/* Errors: IO, FORMAT. */
+StippleStatus stipple_asset_rest_info(StippleContext* context, const char* path_utf8, StippleRestInfo* info);
+/* Reads that mesh. Either array may be NULL; positions has room for vertex_capacity * 3 numbers, triangles for
+ * triangle_capacity * 3. Nothing is written where the file has none. Errors: IO, FORMAT, BUFFER_TOO_SMALL. */
+StippleStatus stipple_asset_read_rest(StippleContext* context, const char* path_utf8, uint64_t vertex_capacity,
+                                      float* positions, uint64_t triangle_capacity, uint32_t* triangles);
+
 /* ---- differentiable rendering ------------------------------------------------------------------- */
 
 /* The derivative of a scalar loss by the image, and what statistics need. Each array is an image of the camera's

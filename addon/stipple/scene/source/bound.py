@@ -17,7 +17,8 @@ from ... import version
 from ...binding.errors import StippleError
 from ...binding.job import Job
 from ...binding.structs import BindingReach, Status
-from ...binding.surface_binding import SurfaceBinding
+from ...binding.surface_binding import SurfaceBinding, asset_rest
+from . import source_paths, sources
 
 # On objects: it has no influence, but Blender evaluates its target for it, hidden meshes too.
 CONSTRAINT = 'Splat Binding'
@@ -43,14 +44,19 @@ def follows(data):
     return is_bound(data) and data.stipple.bind_follow
 
 
-def bind(data, obj, reach, matrix, depsgraph):
+def bind(data, obj, reach, matrix, depsgraph, brought=None):
     """Binds a datablock to a mesh object in its present shape. matrix: [4,4], from the space of the mesh object to that
-    of the splats. Errors: StippleError for an object without a triangle."""
+    of the splats. brought: as of brought_rest(), which is taken in place of the present shape and of reach where it has
+    the same faces; returns whether it has. Errors: StippleError for an object without a
+    triangle."""
     shape = _shape_of(obj, depsgraph, with_triangles=True)
+    is_brought = brought is not None and np.array_equal(brought[1], shape.triangles)
+    if is_brought:
+        shape.vertices, reach = _placed(brought[0], np.linalg.inv(matrix)), brought[2]
     if len(shape.triangles) == 0:
         raise StippleError(f"'{obj.name}' has no faces; at least one is needed for splats to follow.",
                            Status.ERROR_INVALID_ARGUMENT)
-    rendered = _rendered_shape(obj, depsgraph)
+    rendered = None if is_brought else _rendered_shape(obj, depsgraph)
     unbind(data)
     stipple = data.stipple
     stipple.bind_object, stipple.bind_reach = obj, reach
@@ -61,6 +67,17 @@ def bind(data, obj, reach, matrix, depsgraph):
         stipple.bind_topology_render = rendered.topology
     stipple.bind_follow = True
     stipple.bind_key = _key_of(stipple, shape)
+    return is_brought
+
+
+def brought_rest(data):
+    """(vertices [V,3] in the space of the splats, triangles [T,3], a name of REACHES) of the mesh that the file of a
+    datablock's splats brings, else None. Errors: StippleError."""
+    path = source_paths.file_of(data)
+    if not path.endswith('.safetensors'):
+        return None
+    found = asset_rest(sources.context(), path)
+    return None if found is None else (found[0], found[1], found[2].name)
 
 
 def unbind(data):
