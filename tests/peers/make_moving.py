@@ -6,8 +6,9 @@
         [--height 180]
 
 transforms.json with times (24 frames are a second), cam00/0000.png..., points.ply with times: places that rays through
-random pixels meet at frames 0, 20, 40 and the last one, as reconstructions of those frames would have them. Two
+random pixels meet at every fourth frame and the last one, as reconstructions of those frames would have them. Two
 cameras in the middle are held out; moving/ has masks of their pixels in which a render without what moves differs.
+Images that are there are kept, so that a run goes on where it ended.
 """
 
 import argparse
@@ -26,8 +27,8 @@ from make_scene import write_points  # noqa: E402
 from moving_scenes import FRAMES, SCENES  # noqa: E402
 
 FRAME_RATE = 24
-FRAMES_BETWEEN_POINTS = 20
-POINTS_PER_MOMENT = 5000
+FRAMES_BETWEEN_POINTS = 4
+POINTS_PER_MOMENT = 2000
 ANGLE = math.radians(55)
 HELD_OUT = 5, 10
 LEAST_CHANGE = 3  # of 255, in one channel
@@ -109,7 +110,8 @@ def main():
         for camera in cameras:
             scene.camera = camera
             path = given.folder / camera.name / f'{frame:04}.png'
-            render(path)
+            if not path.exists():
+                render(path)
             shots.append((path, camera.matrix_world.copy()))
             frames.append({'file_path': f'{camera.name}/{frame:04}.png', 'time': frame / FRAME_RATE,
                            'transform_matrix': [list(row) for row in camera.matrix_world]})

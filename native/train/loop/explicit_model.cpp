@@ -40,14 +40,14 @@ void requireOptions(const ExplicitModelOptions& options) {
 class ExplicitModel final : public FitModel, private Regulariser {
  public:
   ExplicitModel(const BackendFactory& backends, const SplatCloud& start,
-                std::span<const double> start_times, std::unique_ptr<Strategy> strategy,
+                const StartMoments& moments, std::unique_ptr<Strategy> strategy,
                 const ExplicitModelOptions& options, bool begins)
       : strategy_(std::move(strategy)), options_(options), backend_(backends.makeRenderBackend()) {
     backend_->upload(start);
     if (begins) prepare();
     step_options_.extra_rates = beginControl(*backend_, *strategy_);
     strategy_->adjustRates(rates_);
-    if (options.clip) beginMotion(*options.clip, start_times);
+    if (options.clip) beginMotion(*options.clip, moments);
   }
 
   const char* name() const override { return motion_ ? "motion" : "explicit"; }
@@ -158,7 +158,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
   }
 
   /// Gives the splats the numbers of their motion, behind what the strategy trains beside them.
-  void beginMotion(MotionClip clip, std::span<const double> start_times) {
+  void beginMotion(MotionClip clip, const StartMoments& moments) {
     TimeStretch stretch;
     strategy_->adjustStretch(stretch);
     clip.window_frames = stretch.frames;
@@ -170,7 +170,7 @@ class ExplicitModel final : public FitModel, private Regulariser {
     for (const size_t length : MovingParameterisation::extraLengths()) {
       state.splats.extra_lengths.push_back(length);
     }
-    for (auto& values : motion_->initialExtras(state.splats.size(), start_times, options_.seed)) {
+    for (auto& values : motion_->initialExtras(state.splats.size(), moments, options_.seed)) {
       state.splats.extras.push_back(std::move(values));
     }
     state.first_moments = state.second_moments = zerosLike(state.splats);
@@ -276,17 +276,19 @@ std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, cons
   start.sh_degree = options.sh_degree;
   start.antialias = options.antialias;
   start.seed = options.seed;
+  start.with_lives = options.clip.has_value();
   const StartSplats begin = startSplats(views, training, start, progress);
-  return std::make_unique<ExplicitModel>(backends, begin.splats, begin.times, std::move(strategy),
-                                         options, true);
+  return std::make_unique<ExplicitModel>(backends, begin.splats,
+                                         StartMoments{begin.times, begin.lives},
+                                         std::move(strategy), options, true);
 }
 
 std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,
                                             std::unique_ptr<Strategy> strategy,
                                             const ExplicitModelOptions& options) {
   requireOptions(options);
-  return std::make_unique<ExplicitModel>(backends, start, std::span<const double>{},
-                                         std::move(strategy), options, false);
+  return std::make_unique<ExplicitModel>(backends, start, StartMoments(), std::move(strategy),
+                                         options, false);
 }
 
 std::optional<MotionCloud> motionResult(const FitModel& model) {

@@ -91,16 +91,36 @@ std::vector<double> MovingParameterisation::rates(double position_rate, double e
   return rates;
 }
 
+/// Raw, of a splat that stays as it is for `life` seconds on one side (-1, 1) of its moment: at
+/// their end half of it is left.
+float MovingParameterisation::startLifespan(double life, float centre, double side) const {
+  if (life < 0) return kStartLifespan;
+  const double unit = lifespanUnit(clip_.frame_count);
+  const double whole = std::log(static_cast<double>(kLargestLifespan) / unit);
+  // Never less than a frame: nothing is known of what is between two.
+  const double part = std::max(life * clip_.frames_per_second, 1.0) / clip_.frame_count;
+  if (part >= 1) return static_cast<float>(whole);
+  const double from = static_cast<double>(centre);
+  const double offset = stretchedOffset(clip_.window(), from + side * part, from);
+  const double scale = std::abs(offset) / std::sqrt(std::log(2.0));
+  return static_cast<float>(std::min(std::log(scale / unit), whole));
+}
+
 std::vector<std::vector<float>> MovingParameterisation::initialExtras(
-    size_t count, std::span<const double> times, uint64_t seed) const {
+    size_t count, const StartMoments& known, uint64_t seed) const {
   std::vector<std::vector<float>> extras;
   for (const size_t length : extraLengths()) extras.emplace_back(count * length, 0.0f);
   std::fill(extras[kLifespans].begin(), extras[kLifespans].end(), kStartLifespan);
   const uint32_t last = clip_.frame_count - 1;
   const uint32_t moments = (last + kFramesBetweenMoments - 1) / kFramesBetweenMoments + 1;
   for (size_t i = 0; i < count; ++i) {
-    if (!times.empty()) {
-      extras[kCentres][i] = static_cast<float>(clip_.partOf(times[i]));
+    if (!known.times.empty()) {
+      const auto centre = static_cast<float>(clip_.partOf(known.times[i]));
+      extras[kCentres][i] = centre;
+      for (size_t side = 0; side < 2 && !known.lives.empty(); ++side) {
+        const double life = static_cast<double>(known.lives[i * 2 + side]);
+        extras[kLifespans][i * 2 + side] = startLifespan(life, centre, side == 0 ? -1 : 1);
+      }
       continue;
     }
     const double place = unitDouble(keyedBits(seed, RandomUse::kStartMoment, i)) * moments;

@@ -17,6 +17,12 @@ namespace stipple {
 /// shorter than a nanosecond or longer than 10^12 s.
 MotionClip clipOfViews(const ViewSource& views);
 
+/// What is known of the splats that a fit begins with.
+struct StartMoments {
+  std::span<const double> times = {};  ///< [N] seconds at which they were seen; empty: unknown
+  std::span<const float> lives = {};   ///< [N,2] as of pointLives(); empty: unknown
+};
+
 /// How a fit of splats that move gets from raw numbers to splats at one time. Raw splats have the
 /// motion as extras (RawSplats::extras): the eight waves [N,3], phases [N,4], spins [N,4], the
 /// logarithms of both temporal scales over lifespanUnit() [N,2], and the moments [N], which are not
@@ -39,9 +45,9 @@ class MovingParameterisation final : public Parameterisation {
   /// cameras, metres.
   static std::vector<double> rates(double position_rate, double extent);
   /// The extras of splats that begin to move: they stand still, and have their moments when they
-  /// were seen. In: times [N] seconds; empty: nothing is known, and moments are drawn among every
-  /// 20th frame and the last one.
-  std::vector<std::vector<float>> initialExtras(size_t count, std::span<const double> times,
+  /// were seen, and live as long as they stay there. Where nothing is known of when, moments are
+  /// drawn among every 20th frame and the last one.
+  std::vector<std::vector<float>> initialExtras(size_t count, const StartMoments& known,
                                                 uint64_t seed) const;
   /// The temporal scale of each splat that fades it at the present time, in stretched time. Out:
   /// lifespans [N].
@@ -54,6 +60,7 @@ class MovingParameterisation final : public Parameterisation {
                RawSplats& by_raw) const override;
 
  private:
+  float startLifespan(double life, float centre, double side) const;
   void rest(const RawSplats& raw) const;
   MotionColumns<const float> columnsOf(const RawSplats& raw) const;
 

@@ -10,6 +10,7 @@
 #include "base/random.h"
 #include "decode/tree/merge_neighbours.h"
 #include "math/colour.h"
+#include "train/prior/point_lives.h"
 #include "train/prior/shared_volume.h"
 #include "train/prior/start_points.h"
 #include "train/prior/swept_points.h"
@@ -228,7 +229,11 @@ StartSplats startSplats(const ViewSource& views, std::span<const size_t> trainin
       if (points.size() < wanted / kLeastSwept) points = fromVolume(views, training, options);
     }
   }
-  return {splatsAt(points, views, training, options), std::move(points.times)};
+  StartSplats start;
+  start.splats = splatsAt(points, views, training, options);
+  if (options.with_lives) start.lives = pointLives(views, training, points, progress);
+  start.times = std::move(points.times);
+  return start;
 }
 
 }  // namespace stipple

@@ -20,6 +20,7 @@ struct StartOptions {
   /// points: which of them is drawn by their weights.
   uint64_t count = 0;
   uint64_t max_count = 0;  ///< hard cap; 0: none
+  bool with_lives = false;  ///< find how long points stay where they are
   int sh_degree = 3;
   Antialias antialias = Antialias::kClassic;
   uint64_t seed = 0;
@@ -28,6 +29,7 @@ struct StartOptions {
 struct StartSplats {
   SplatCloud splats;
   std::vector<double> times;  ///< [N] seconds at which each was seen; empty: nothing is known
+  std::vector<float> lives;   ///< [N,2] pointLives(), where they were asked for
 };
 
 /// The splats that a fit begins with: round, as large as the distance to their neighbours, faint.

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -16,6 +17,7 @@
 #include "train/fit_scene.h"
 #include "train/loop/explicit_model.h"
 #include "train/loop/trainer.h"
+#include "train/prior/point_lives.h"
 #include "train/reference_backend.h"
 
 namespace stipple {
@@ -103,8 +105,30 @@ TEST(MovingParameterisation, DrawsMomentsAmongEvery20thFrameAndTheLast) {
 TEST(MovingParameterisation, TakesMomentsFromPointsThatSayThem) {
   const MovingParameterisation moving(clipOf(50), nullptr, 0);
   const double rate = clipOf(50).frames_per_second;
-  const auto extras = moving.initialExtras(4, std::vector<double>{1, 1 + 10 / rate, -1, 1e12}, 3);
+  const std::vector<double> times = {1, 1 + 10 / rate, -1, 1e12};
+  const auto extras = moving.initialExtras(4, {times, {}}, 3);
   EXPECT_EQ(extras.back(), (std::vector<float>{0, 0.2f, 0, 0.98f}));
+}
+
+TEST(MovingParameterisation, TakesLifespansFromPointsThatSayThem) {
+  MotionClip clip = clipOf(50);
+  clip.window_frames = 0;
+  const MovingParameterisation moving(clip, nullptr, 0);
+  const double rate = clip.frames_per_second;
+  const std::vector<double> times = {1 + 25 / rate, 1 + 25 / rate};
+  const auto life = static_cast<float>(10 / rate);
+  const std::vector<float> lives = {life, kWholeLife, kUnknownLife, 0};
+  RawSplats raw = zerosLike(RawSplats());
+  raw.resize(2);
+  raw.extra_lengths = MovingParameterisation::extraLengths();
+  raw.extras = moving.initialExtras(2, {times, lives}, 3);
+  const MotionCloud cloud = moving.cloudOf(raw);
+  // Half of the opacity is left ten frames before its moment: exp(-(0.2 / S)^2) = 1/2.
+  EXPECT_NEAR(cloud.lifespans[0], 0.2 / std::sqrt(std::log(2.0)), 1e-6);
+  EXPECT_NEAR(cloud.lifespans[1], kLargestLifespan, 1e-6);
+  EXPECT_NEAR(cloud.lifespans[2], std::exp(1.0) * lifespanUnit(50), 1e-6);
+  // No less than a frame.
+  EXPECT_NEAR(cloud.lifespans[3], 0.02 / std::sqrt(std::log(2.0)), 1e-6);
 }
 
 TEST(MovingParameterisation, BeginsWithSplatsThatStandStillAndOnlyFade) {
