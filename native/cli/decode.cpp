@@ -125,8 +125,7 @@ Cloud carried(const Context& context, const Cloud& cloud, const Arguments& argum
   rest.positions.resize(3 * info.vertex_count);
   rest.triangles.resize(3 * info.triangle_count);
   check(stipple_asset_read_rest(context.get(), arguments.in.c_str(), info.vertex_count,
-                                rest.positions.data(), info.triangle_count,
-                                rest.triangles.data()));
+                                rest.positions.data(), info.triangle_count, rest.triangles.data()));
   const Shape posed = shapeOf(context, arguments.posed);
   requireOneMesh(rest, arguments.in, posed, arguments.posed);
   return carriedBy(posed, cloud, bindingOf(cloud, rest, info.reach));

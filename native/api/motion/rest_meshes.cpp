@@ -35,8 +35,8 @@ RestMesh restFrom(const float* positions, uint64_t vertex_count, const uint32_t*
   rest.positions.assign(positions, positions + numbers);
   rest.triangles.assign(triangles, triangles + corners);
   rest.topology = topologyOf(vertex_count, rest.triangles);
-  rest.around = enumValue<BindingReach>(reach, STIPPLE_BIND_AROUND, "reach") ==
-                BindingReach::kAround;
+  rest.around =
+      enumValue<BindingReach>(reach, STIPPLE_BIND_AROUND, "reach") == BindingReach::kAround;
   return rest;
 }
 
@@ -45,8 +45,9 @@ std::optional<RestMesh> requireRest(const char* path_utf8) {
   const std::string path = &require(path_utf8, "path_utf8");
   std::optional<RestMesh> rest = readRestMesh(path);
   if (rest && rest->topology != topologyOf(rest->positions.size() / 3, rest->triangles)) {
-    fail(ErrorCode::kFormat, path + ": the faces of its mesh at rest are not those that its "
-                                    "topology was made of; the file is damaged");
+    fail(ErrorCode::kFormat, path +
+                                 ": the faces of its mesh at rest are not those that its "
+                                 "topology was made of; the file is damaged");
   }
   return rest;
 }

@@ -85,7 +85,8 @@ void motionStep(benchmark::State& state, const SplatCase& c) {
   StepOfFit moving(c, true), still(c, false);
   moving.take();
   still.take();
-  compare(state, "still", [&] { moving.take(); }, [&] { still.take(); });
+  compare(
+      state, "still", [&] { moving.take(); }, [&] { still.take(); });
 }
 
 const bool registered = [] {

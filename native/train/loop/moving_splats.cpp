@@ -106,8 +106,9 @@ float MovingParameterisation::startLifespan(double life, float centre, double si
   return static_cast<float>(std::min(std::log(scale / unit), whole));
 }
 
-std::vector<std::vector<float>> MovingParameterisation::initialExtras(
-    size_t count, const StartMoments& known, uint64_t seed) const {
+std::vector<std::vector<float>> MovingParameterisation::initialExtras(size_t count,
+                                                                      const StartMoments& known,
+                                                                      uint64_t seed) const {
   std::vector<std::vector<float>> extras;
   for (const size_t length : extraLengths()) extras.emplace_back(count * length, 0.0f);
   std::fill(extras[kLifespans].begin(), extras[kLifespans].end(), kStartLifespan);
