@@ -14,7 +14,9 @@ struct PointSet {
   std::vector<float> opacities;  ///< [N] 0..1
   std::vector<float> areas;      ///< [N] m^2 of surface that the sample stands for
   std::vector<float> weights;    ///< [N] >= 0, share of the anchors that it attracts (sum is free)
-  std::vector<double> times;     ///< [N] seconds at which they were seen; empty: nothing is known
+  /// [N] seconds at which they were seen, NaN for one that is there at all times; empty: nothing is
+  /// known of when.
+  std::vector<double> times;
 
   size_t size() const { return opacities.size(); }
 };

@@ -211,7 +211,7 @@ void validatePoints(const PointSet& points, const char* what) {
   if (points.times.empty()) return;
   requireLength(points, what, "times", points.times.size(), count);
   const auto bad = std::find_if(points.times.begin(), points.times.end(),
-                                [](double time) { return !std::isfinite(time); });
+                                [](double time) { return std::isinf(time); });
   if (bad == points.times.end()) return;
   const std::string index = std::to_string(bad - points.times.begin());
   requireFinite(*bad, (std::string(what) + ": time of point " + index).c_str());

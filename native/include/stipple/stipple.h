@@ -767,7 +767,8 @@ typedef struct StippleViewPoints {
   const float* colours;    /* [N,3] scene linear */
   const float* normals;    /* [N,3] unit. NULL: unknown */
   const float* weights;    /* [N] >= 0, what a point counts. NULL: alike */
-  const double* times;     /* [N] seconds at which the points were there, where things move. NULL: unknown */
+  const double* times;     /* [N] seconds at which the points were there, where things move; NaN: at all times, and
+                              then those with a time move on. NULL: unknown */
 } StippleViewPoints;
 
 typedef struct StippleViewsInfo {

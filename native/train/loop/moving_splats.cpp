@@ -4,6 +4,7 @@
 #include "train/loop/moving_splats.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "base/error.h"
@@ -115,18 +116,17 @@ std::vector<std::vector<float>> MovingParameterisation::initialExtras(size_t cou
   const uint32_t last = clip_.frame_count - 1;
   const uint32_t moments = (last + kFramesBetweenMoments - 1) / kFramesBetweenMoments + 1;
   for (size_t i = 0; i < count; ++i) {
-    if (!known.times.empty()) {
-      const auto centre = static_cast<float>(clip_.partOf(known.times[i]));
-      extras[kCentres][i] = centre;
-      for (size_t side = 0; side < 2 && !known.lives.empty(); ++side) {
-        const double life = static_cast<double>(known.lives[i * 2 + side]);
-        extras[kLifespans][i * 2 + side] = startLifespan(life, centre, side == 0 ? -1 : 1);
-      }
-      continue;
-    }
     const double place = unitDouble(keyedBits(seed, RandomUse::kStartMoment, i)) * moments;
     const uint32_t frame = std::min(static_cast<uint32_t>(place) * kFramesBetweenMoments, last);
-    extras[kCentres][i] = static_cast<float>(static_cast<double>(frame) / clip_.frame_count);
+    float& centre = extras[kCentres][i];
+    centre = static_cast<float>(static_cast<double>(frame) / clip_.frame_count);
+    if (!known.times.empty() && !std::isnan(known.times[i])) {
+      centre = static_cast<float>(clip_.partOf(known.times[i]));
+    }
+    for (size_t side = 0; side < 2 && !known.lives.empty(); ++side) {
+      const auto life = static_cast<double>(known.lives[i * 2 + side]);
+      extras[kLifespans][i * 2 + side] = startLifespan(life, centre, side == 0 ? -1 : 1);
+    }
   }
   return extras;
 }

@@ -19,7 +19,7 @@ MotionClip clipOfViews(const ViewSource& views);
 
 /// What is known of the splats that a fit begins with.
 struct StartMoments {
-  std::span<const double> times = {};  ///< [N] seconds at which they were seen; empty: unknown
+  std::span<const double> times = {};  ///< [N] as of PointSet
   std::span<const float> lives = {};   ///< [N,2] as of pointLives(); empty: unknown
 };
 
@@ -45,8 +45,8 @@ class MovingParameterisation final : public Parameterisation {
   /// cameras, metres.
   static std::vector<double> rates(double position_rate, double extent);
   /// The extras of splats that begin to move: they stand still, and have their moments when they
-  /// were seen, and live as long as they stay there. Where nothing is known of when, moments are
-  /// drawn among every 20th frame and the last one.
+  /// were seen, and live as long as they stay there. Where nothing is known of when, and where they
+  /// are there at all times, moments are drawn among every 20th frame and the last one.
   std::vector<std::vector<float>> initialExtras(size_t count, const StartMoments& known,
                                                 uint64_t seed) const;
   /// The temporal scale of each splat that fades it at the present time, in stretched time. Out:

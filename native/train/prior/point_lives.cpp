@@ -124,19 +124,44 @@ void liveOf(const std::vector<std::vector<std::vector<Answer>>>& answers,
   }
 }
 
+void keepDistinct(std::vector<double>& times) {
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+}
+
+/// Which of the times is nearest.
+size_t nearest(const std::vector<double>& times, double at) {
+  const auto after = std::lower_bound(times.begin(), times.end(), at);
+  const auto next = static_cast<size_t>(after - times.begin());
+  const bool is_before =
+      next == times.size() || (next > 0 && at - times[next - 1] < times[next] - at);
+  return next - (is_before ? 1 : 0);
+}
+
+/// Half-way to the moments before and after.
+void liveUntilNext(const std::vector<double>& moments, double at, float* life) {
+  const auto own = std::lower_bound(moments.begin(), moments.end(), at);
+  life[0] = own == moments.begin() ? kWholeLife : static_cast<float>((at - *(own - 1)) / 2);
+  life[1] = own + 1 == moments.end() ? kWholeLife : static_cast<float>((*(own + 1) - at) / 2);
+}
+
 }  // namespace
 
 std::vector<float> pointLives(const ViewSource& views, std::span<const size_t> training,
                               const StartPoints& points, Progress* progress) {
   if (points.times.empty()) return {};
   const std::vector<Still> cameras = spread(stillCameras(views, training), kMostCameras);
+  std::vector<double> moments;
+  for (const double time : points.times) {
+    if (!std::isnan(time)) moments.push_back(time);
+  }
+  const bool tells_what_moves = moments.size() < points.times.size();
+  keepDistinct(moments);
   std::vector<double> times;
   for (const Still& still : cameras) {
     for (const size_t view : still) times.push_back(views.time(view));
   }
-  std::sort(times.begin(), times.end());
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  if (times.size() < 2) return {};
+  keepDistinct(times);
   times = spread(times, kMostTimes);
 
   std::vector<std::vector<std::vector<Answer>>> answers(cameras.size());
@@ -162,10 +187,11 @@ std::vector<float> pointLives(const ViewSource& views, std::span<const size_t> t
   parallelFor(points.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const double at = points.times[i];
-      const auto after = std::lower_bound(times.begin(), times.end(), at);
-      size_t own = static_cast<size_t>(after - times.begin());
-      if (own == times.size() || (own > 0 && at - times[own - 1] < times[own] - at)) --own;
-      liveOf(answers, times, i, own, at, &lives[i * 2]);
+      float* life = &lives[i * 2];
+      if (std::isnan(at)) life[0] = life[1] = kWholeLife;
+      if (std::isnan(at)) continue;
+      if (!times.empty()) liveOf(answers, times, i, nearest(times, at), at, life);
+      if (life[0] < 0 && tells_what_moves) liveUntilNext(moments, at, life);
     }
   });
   return lives;

@@ -15,9 +15,12 @@ constexpr float kWholeLife = 1e30f;
 /// Of a point of which nothing is known.
 constexpr float kUnknownLife = -1;
 
-/// How long points stay where they are seen, as cameras that stand still tell it: seconds before
-/// and after the time of each, [N,2], kWholeLife or kUnknownLife; empty where points have no times
-/// or no camera stands still.
+/// How long points stay where they are seen: seconds before and after the time of each, [N,2],
+/// kWholeLife or kUnknownLife; empty where points have no times.
+///
+/// Points that are there at all times live for the whole clip. Of others, cameras that stand still
+/// tell it. Where none can, those that move on, as others are there at all times, live until
+/// half-way to the next time at which any was seen.
 ///
 /// A camera that shows the colour of a point at its place, at its own time, is asked at other times
 /// whether it still does. The life ends where most of these cameras do not. What covers a point for

@@ -11,7 +11,7 @@ namespace stipple {
 struct StartPoints {
   std::vector<float> positions;  ///< [N,3]
   std::vector<float> colours;    ///< [N,3]
-  std::vector<double> times;     ///< [N] seconds at which they were seen; empty: nothing is known
+  std::vector<double> times;     ///< [N] as of PointSet
 
   size_t size() const { return positions.size() / 3; }
   void add(const Vec3d& position, const float* colour) {

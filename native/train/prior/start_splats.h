@@ -28,7 +28,7 @@ struct StartOptions {
 
 struct StartSplats {
   SplatCloud splats;
-  std::vector<double> times;  ///< [N] seconds at which each was seen; empty: nothing is known
+  std::vector<double> times;  ///< [N] as of PointSet
   std::vector<float> lives;   ///< [N,2] pointLives(), where they were asked for
 };
 

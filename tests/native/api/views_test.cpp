@@ -156,12 +156,12 @@ TEST_F(ViewsTest, KeepsPoints) {
   EXPECT_EQ(read_colours, colours);
   EXPECT_EQ(stipple_views_read_points(views_, 1, read_positions.data(), nullptr),
             STIPPLE_ERROR_BUFFER_TOO_SMALL);
-  std::vector<double> times = {0.5, NAN};
+  std::vector<double> times = {0.5, INFINITY};
   points.times = times.data();
   EXPECT_EQ(stipple_views_set_points(views_, &points), STIPPLE_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(stipple_last_error_message(),
-               "points: time of point 1 is nan; it must be a finite number");
-  times[1] = 0;
+               "points: time of point 1 is inf; it must be a finite number");
+  times[1] = NAN;  // at all times
   STIPPLE_EXPECT_OK(stipple_views_set_points(views_, &points));
   points.count = UINT64_MAX;
   EXPECT_NE(stipple_views_set_points(views_, &points), STIPPLE_OK);

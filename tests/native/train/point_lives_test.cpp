@@ -105,8 +105,17 @@ TEST(PointLives, AreUnknownWhereNoCameraShowsThePointAtItsTime) {
   EXPECT_EQ(lives, (std::vector<float>(4, kUnknownLife)));
 }
 
+TEST(PointLives, OfWhatMovesOnEndHalfWayToTheNextTime) {
+  const double always = std::nan("");
+  std::vector<Block> blocks(4, kBlocks[0]);
+  const auto lives = livesOf(viewsOf(kBlocks, 0.02), blocks, {always, 2, 4, 8});
+  EXPECT_EQ(lives,
+            (std::vector<float>{kWholeLife, kWholeLife, kWholeLife, 1, 1, 2, 2, kWholeLife}));
+}
+
 TEST(PointLives, AreNotAskedOfCamerasThatMove) {
-  EXPECT_TRUE(livesOf(viewsOf(kBlocks, 0.02), kBlocks, {5, 4, 1}).empty());
+  EXPECT_EQ(livesOf(viewsOf(kBlocks, 0.02), kBlocks, {5, 4, 1}),
+            (std::vector<float>(6, kUnknownLife)));
   EXPECT_TRUE(livesOf(viewsOf(kBlocks), kBlocks, {}).empty()) << "points without times";
 }
 
