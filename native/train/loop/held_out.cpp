@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <string>
 
@@ -68,10 +69,20 @@ FitViews splitViews(const ViewSource& views, uint64_t every) {
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return names[a] < names[b]; });
-  FitViews split;
-  const bool holds_out = every > 1 && order.size() >= every;
+  // Views without a camera's name are of a camera each.
+  std::map<std::string, size_t> cameras;
+  std::vector<size_t> camera_of(order.size());
+  size_t camera_count = 0;
   for (size_t i = 0; i < order.size(); ++i) {
-    (holds_out && i % every == 0 ? split.held_out : split.training).push_back(order[i]);
+    const std::string camera = views.cameraName(order[i]);
+    const bool is_new = camera.empty() || cameras.emplace(camera, camera_count).second;
+    camera_of[i] = is_new ? camera_count++ : cameras.at(camera);
+  }
+  FitViews split;
+  const bool holds_out = every > 1 && camera_count >= every;
+  for (size_t i = 0; i < order.size(); ++i) {
+    const bool is_held_out = holds_out && camera_of[i] % every == 0;
+    (is_held_out ? split.held_out : split.training).push_back(order[i]);
   }
   return split;
 }

@@ -21,8 +21,10 @@ struct FitViews {
   std::vector<size_t> held_out;  ///< the same
 };
 
-/// Every `every`-th view by name is held out, the first one too, as published results do it.
-/// In: every: 0: none. Where there are fewer than `every` views, none is held out.
+/// Every `every`-th view by name is held out, the first one too, as published results do it. Where
+/// cameras took several views (ViewSource::cameraName), every `every`-th camera is, with all its
+/// views: who learns from a camera at other times has seen most of what it is judged by.
+/// In: every: 0: none. Where there are fewer than `every` views or cameras, none is held out.
 FitViews splitViews(const ViewSource& views, uint64_t every);
 
 /// 1.1 times the largest distance of a camera from the mean of all, metres: the unit of published
