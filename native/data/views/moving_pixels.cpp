@@ -83,8 +83,8 @@ StillCameras::StillCameras(const ViewSource& views) : camera_of_(views.count()) 
 
 std::vector<size_t> StillCameras::around(size_t view) const {
   const std::vector<size_t>& camera = cameras_[camera_of_[view]];
-  const auto at = static_cast<size_t>(std::find(camera.begin(), camera.end(), view) -
-                                      camera.begin());
+  const auto at =
+      static_cast<size_t>(std::find(camera.begin(), camera.end(), view) - camera.begin());
   if (at == camera.size()) return {};
   const size_t count = std::min(camera.size(), kMovingFrames);
   const size_t before = std::min(at, kMovingFrames / 2);

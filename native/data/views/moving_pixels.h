@@ -11,12 +11,12 @@ namespace stipple {
 
 /// Frames that tell what moves, and how far their colours differ there.
 constexpr size_t kMovingFrames = 5;
-/// Of display values: 13 of 255. The noise of a camera and of JPEG, averaged over nine pixels, stays
-/// below it; a thing of little contrast to what is behind it does, too.
+/// Of display values: 13 of 255. The noise of a camera and of JPEG, averaged over nine pixels,
+/// stays below it; a thing of little contrast to what is behind it does, too.
 constexpr float kMovingDifference = 0.05f;
 
-/// The pixels of a camera that stands still in which something moves: there the values of one of the
-/// colours, each averaged over the pixel and its eight neighbours, spread by more than
+/// The pixels of a camera that stands still in which something moves: there the values of one of
+/// the colours, each averaged over the pixel and its eight neighbours, spread by more than
 /// kMovingDifference over the pictures. In: pictures: [H,W,3] each, display values.
 /// Returns: [H,W], true where something moves; all false of fewer than two pictures.
 std::vector<bool> movingPixels(std::span<const std::vector<float>> pictures, uint32_t width,

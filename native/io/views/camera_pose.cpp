@@ -1,5 +1,6 @@
 #include "io/views/camera_pose.h"
 
+#include <Eigen/LU>
 #include <Eigen/SVD>
 
 namespace stipple {

@@ -254,10 +254,10 @@ void holdOut(const std::string& dataset, const std::string& names,
   }
   for (const std::string& name : wanted) {
     if (known.count(name) != 0) continue;
-    fail(ErrorCode::kInvalidArgument, dataset + ": '" + name.substr(0, 80) +
-                                          "' is to be held out; " +
-                                          (known.empty() ? "no camera of several images is there"
-                                                         : "cameras are called " + *known.begin() + " to " + *known.rbegin()));
+    fail(ErrorCode::kInvalidArgument,
+         dataset + ": '" + name.substr(0, 80) + "' is to be held out; " +
+             (known.empty() ? "no camera of several images is there"
+                            : "cameras are called " + *known.begin() + " to " + *known.rbegin()));
   }
   if (wanted.size() == known.size()) {
     fail(ErrorCode::kInvalidArgument,
@@ -291,6 +291,8 @@ SeriesSize arrangeSeries(const std::string& dataset, const SeriesOptions& option
   }
   size.frame_count = times.size();
   size.camera_count = cameras.size();
+  size.time_begin = times.empty() ? 0 : *times.begin();
+  size.time_end = times.empty() ? 0 : *times.rbegin();
   return size;
 }
 

@@ -31,11 +31,13 @@ struct SeriesOptions {
 
 constexpr double kDefaultFrameRate = 30;
 
-/// What there was before anything was left out.
+/// How many images there were before any was left out, and what is left.
 struct SeriesSize {
   uint64_t image_count = 0;
   uint64_t frame_count = 0;   ///< times that differ, of those that are used
   uint64_t camera_count = 0;  ///< of those that are used: cameras with a name
+  double time_begin = 0;      ///< seconds, of those that are used
+  double time_end = 0;
 };
 
 /// Gives views their times, names their cameras, and leaves out what is not asked for.
