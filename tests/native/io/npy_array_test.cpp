@@ -52,22 +52,21 @@ TEST_F(NpyArrayTest, ReadsOneNumberAndNone) {
 }
 
 TEST_F(NpyArrayTest, AcceptsOtherOrdersOfKeysAndQuotes) {
-  const NpyArray array = read(npyFile(
-      "{\"shape\": (6,), 'descr': '<f8', \"fortran_order\": False}", doubles(kSix)));
+  const NpyArray array =
+      read(npyFile("{\"shape\": (6,), 'descr': '<f8', \"fortran_order\": False}", doubles(kSix)));
   EXPECT_EQ(array.values, kSix);
 }
 
 TEST_F(NpyArrayTest, RefusesOtherTypesByName) {
   for (const char* type : {">f8", "<i8", "|O", "<c16", "<f2"}) {
-    const std::string message =
-        refusal(npyFile(npyHeader(type, false, "(6,)"), doubles(kSix)));
+    const std::string message = refusal(npyFile(npyHeader(type, false, "(6,)"), doubles(kSix)));
     EXPECT_NE(message.find("a.npy holds numbers of the type '" + std::string(type) +
                            "'; <f8 and <f4 are read"),
               std::string::npos)
         << message;
   }
-  const std::string records = refusal(npyFile(
-      "{'descr': [('x', '<f8')], 'fortran_order': False, 'shape': (6,), }", doubles(kSix)));
+  const std::string records = refusal(
+      npyFile("{'descr': [('x', '<f8')], 'fortran_order': False, 'shape': (6,), }", doubles(kSix)));
   EXPECT_NE(records.find("holds records"), std::string::npos) << records;
 }
 
@@ -84,8 +83,8 @@ TEST_F(NpyArrayTest, RefusesShapesThatAreNotOfTheFilesSize) {
 
 TEST_F(NpyArrayTest, RefusesDamagedHeadersInOneSentence) {
   for (const char* header :
-       {"", "{", "{}", "{'descr': '<f8'}", "{'descr' '<f8'}", "{'descr': '<f8",
-        "{'descr': <f8, }", "{'descr': '<f8', 'fortran_order': 0, 'shape': (6,), }",
+       {"", "{", "{}", "{'descr': '<f8'}", "{'descr' '<f8'}", "{'descr': '<f8", "{'descr': <f8, }",
+        "{'descr': '<f8', 'fortran_order': 0, 'shape': (6,), }",
         "{'descr': '<f8', 'fortran_order': False, 'shape': (6, }",
         "{'descr': '<f8', 'fortran_order': False, 'shape': (-6,), }",
         "{'descr': '<f8', 'fortran_order': False, 'shape': 6, }",

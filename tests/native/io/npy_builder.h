@@ -8,7 +8,8 @@
 
 namespace stipple {
 
-/// A .npy file with this dictionary as its header, padded to 64 bytes as NumPy does, and these bytes.
+/// A .npy file with this dictionary as its header, padded to 64 bytes as NumPy does, and these
+/// bytes.
 inline std::string npyFile(const std::string& header, const std::string& values,
                            unsigned version = 1) {
   ByteText file;

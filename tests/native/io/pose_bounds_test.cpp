@@ -37,7 +37,8 @@ TEST_F(PoseBoundsTest, TurnsDownRightBackwardsIntoRightDownForward) {
   EXPECT_EQ(camera.cx, 676);
   EXPECT_EQ(camera.cy, 507);
   EXPECT_TRUE(views[1].image_path.empty());
-  // At (1, 0, 4), looking along -z with y up: what is at (2, 3, 0) is 1 to the right, 3 above, 4 ahead.
+  // At (1, 0, 4), looking along -z with y up: what is at (2, 3, 0) is 1 to the right, 3 above, 4
+  // ahead.
   const Vec4d seen = camera.world_to_camera * Vec4d(2, 3, 0, 1);
   EXPECT_NEAR(seen.x(), 1, 1e-12);
   EXPECT_NEAR(seen.y(), -3, 1e-12);

@@ -334,8 +334,7 @@ TEST_F(SeriesTest, CountsFramesOfGivenTimesInTheirOrder) {
   for (const char* time : {"0.9", "0.1", "0.5"}) {
     const std::string name = std::string("v") + time + ".png";
     storeGrey(name, 0.5f);
-    frames += (frames.empty() ? "" : ",") +
-              frame(name, "\"time\": " + std::string(time) + ", ");
+    frames += (frames.empty() ? "" : ",") + frame(name, "\"time\": " + std::string(time) + ", ");
   }
   storeTransforms("\"fl_x\": 3, \"w\": 4, \"h\": 2, ", frames);
   SeriesOptions series;
