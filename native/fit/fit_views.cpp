@@ -1,5 +1,6 @@
 #include "fit/fit_views.h"
 
+#include <algorithm>
 #include <set>
 #include <span>
 
@@ -38,13 +39,17 @@ FitViews splitAsTold(const ViewSource& views, uint64_t holdout) {
 
 std::string heldOutCameras(const ViewSource& views, const FitViews& split) {
   const std::set<std::string> held_out = camerasOf(views, split.held_out);
-  const size_t learned_from = camerasOf(views, split.training).size();
+  const std::set<std::string> learned_from = camerasOf(views, split.training);
   if (held_out.empty()) {
-    if (learned_from == 0) return {};
-    return (learned_from == 1
+    if (learned_from.empty()) return {};
+    return (learned_from.size() == 1
                 ? "the only camera is not held out"
-                : "none of the " + std::to_string(learned_from) + " cameras is held out") +
+                : "none of the " + std::to_string(learned_from.size()) + " cameras is held out") +
            std::string("; figures are of views that are learned from");
+  }
+  if (std::any_of(held_out.begin(), held_out.end(),
+                  [&](const std::string& name) { return learned_from.count(name) != 0; })) {
+    return "the data set holds out images of cameras that are learned from at other times";
   }
   std::string names;
   size_t named = 0;
@@ -54,7 +59,7 @@ std::string heldOutCameras(const ViewSource& views, const FitViews& split) {
   if (named > kNamesInSentence) {
     names += " and " + std::to_string(named - kNamesInSentence) + " more";
   }
-  return std::to_string(learned_from) + " cameras are learned from and " +
+  return std::to_string(learned_from.size()) + " cameras are learned from and " +
          std::to_string(held_out.size()) + " held out: " + names + " (" +
          std::to_string(split.held_out.size()) + " of " + std::to_string(views.count()) +
          " images)";

@@ -18,7 +18,7 @@ struct DatasetOptions {
   /// a third more with alpha; the others are read
   /// again when they are wanted.
   uint64_t cache_bytes = uint64_t{1} << 30;
-  SeriesOptions series;  ///< of scenes that move
+  SeriesOptions series = {};  ///< of scenes that move
 };
 
 /// Photographs with their cameras: COLMAP, nerfstudio's transforms.json, NeRF-synthetic or LLFF's

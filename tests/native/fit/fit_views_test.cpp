@@ -42,5 +42,14 @@ TEST(FitViews, HoldOutTheCamerasThatTheDataSetNames) {
             "3 cameras are learned from and 1 held out: cam2 (3 of 12 images)");
 }
 
+TEST(FitViews, TellWhereTheDataSetDividesTheImagesOfACamera) {
+  const SeriesViews views(2, 3);
+  FitViews split;
+  split.held_out = {0};
+  split.training = {1, 2, 3, 4, 5};
+  EXPECT_EQ(heldOutCameras(views, split),
+            "the data set holds out images of cameras that are learned from at other times");
+}
+
 }  // namespace
 }  // namespace stipple
