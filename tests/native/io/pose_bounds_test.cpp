@@ -53,7 +53,7 @@ TEST_F(PoseBoundsTest, ReadsFloatsAndFortransOrder) {
   const auto views = read(npyFile(npyHeader("<f4", true, "(1, 17)"), floats(columns)));
   ASSERT_EQ(views.size(), 1u);
   EXPECT_EQ(views[0].camera.fx, 25);
-  EXPECT_EQ(readCameraFile(folder()).size(), 1u);
+  EXPECT_EQ(readCameraFile(folder_.string()).size(), 1u);
   EXPECT_EQ(readCameraFile(path("poses_bounds.npy")).size(), 1u);
 }
 

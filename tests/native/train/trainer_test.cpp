@@ -189,6 +189,51 @@ TEST(Trainer, ChoosesTheSameStateWhateverHeldOutCamerasShow) {
   EXPECT_GT(std::abs(psnr[0] - psnr[1]), 1);
 }
 
+/// Counts the images that are loaded, and those that are in memory at once.
+class CountedSeries final : public testing::SeriesViews {
+ public:
+  CountedSeries() : SeriesViews(6, 20) { test_camera = 0; }
+  std::shared_ptr<const PackedPicture> packed(size_t view) const override {
+    ++loads;
+    most_alive = std::max(most_alive.load(), ++*alive_);
+    return {new PackedPicture(load(view)), [alive = alive_](const PackedPicture* picture) {
+              --*alive;
+              delete picture;
+            }};
+  }
+  mutable std::atomic<int> loads{0};
+  mutable std::atomic<int> most_alive{0};
+
+ private:
+  std::shared_ptr<std::atomic<int>> alive_ = std::make_shared<std::atomic<int>>(0);
+};
+
+TEST(Trainer, KeepsNoMoreImagesOfASeriesThanItIsAllowed) {
+  struct Seen {
+    int loads, most_alive;
+    std::vector<float> colour;
+  };
+  const auto seen = [](uint64_t kept_images) {
+    const auto views = std::make_shared<CountedSeries>();
+    TrainerOptions options = optionsOf(200);
+    options.picture_bytes = kept_images * PackedPicture(views->load(1)).bytes();
+    auto model = std::make_unique<ColourModel>();
+    const ColourModel& fitted = *model;
+    Trainer trainer(*cpuBackends(), views, splitByRole(*views), std::move(model), options);
+    Listener listener;
+    trainer.run(listener);
+    return Seen{views->loads, views->most_alive, fitted.colour()};
+  };
+  const Seen few = seen(5), all = seen(120);
+  // Besides five that are kept: one at work and one that is loaded ahead.
+  EXPECT_LE(few.most_alive, 7);
+  EXPECT_GE(few.loads, 190);
+  // Each image once.
+  EXPECT_LE(all.loads, 120);
+  EXPECT_GE(all.most_alive, 100);
+  EXPECT_EQ(few.colour, all.colour);
+}
+
 TEST(Trainer, MeasuresMovingPixelsOfSeriesApart) {
   const auto views = std::make_shared<SpoiltSeries>(false);
   Trainer trainer(*cpuBackends(), views, splitByRole(*views), std::make_unique<ColourModel>(),
