@@ -532,10 +532,6 @@ void readNpy(const fs::path& path) {
   });
 }
 
-std::vector<std::string> poseBoundsSeeds(const fs::path&) {
-  return {poseBoundsFile(2, 1014, 1352, 730), poseBoundsFile(1, 20, 30, 25)};
-}
-
 std::vector<Reader> makeReaders() {
   std::vector<Reader> all;
   addSplatReaders(all);
@@ -566,7 +562,8 @@ std::vector<Reader> makeReaders() {
   all.push_back({"npy", nullptr, storeAs("input.npy"),
                  [](const fs::path& folder) { readNpy(folder / "input.npy"); }, npySeeds});
   all.push_back({"pose-bounds", nullptr, storeAs("poses_bounds.npy"),
-                 [](const fs::path& folder) { readCameras(folder); }, poseBoundsSeeds});
+                 [](const fs::path& folder) { readCameras(folder); },
+                 [](const fs::path&) { return std::vector{poseBoundsFile(2, 20, 30, 25)}; }});
   all.push_back({"colmap", nullptr, storePair("cameras.bin", "images.bin"),
                  [](const fs::path& folder) { readCameras(folder); }, colmapSeeds});
   all.push_back({"colmap-points", nullptr, storeAs("points3D.bin"),
