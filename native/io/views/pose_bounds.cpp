@@ -47,10 +47,6 @@ CameraView cameraOf(const double* row, const std::string& name) {
   if (!(focal > 0)) {
     refuse(" has a focal length of " + numberText(focal) + " pixels; a positive number is needed");
   }
-  if (!(row[15] > 0) || !(row[16] > row[15])) {
-    refuse(" has the depths " + numberText(row[15]) + " to " + numberText(row[16]) +
-           "; the nearest must be above 0, and the farthest above that");
-  }
   CameraView view;
   view.camera_model = "SIMPLE_PINHOLE";
   view.camera.width = static_cast<uint32_t>(width);
