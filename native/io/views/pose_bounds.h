@@ -14,8 +14,8 @@ constexpr const char* kPoseBoundsName = "poses_bounds.npy";
 /// depth. The columns of the former are the directions down, right and backwards, the place, and
 /// (height, width, focal length) in pixels; the axis is in the middle of the picture. Images are
 /// not named: image_path stays empty. Errors: those of readNpyArray(); kFormat for another shape,
-/// and, with the camera's number, for numbers that are not finite, for what is no rotation, for
-/// sizes and focal lengths that no camera has, and for depths that are not 0 < nearest < farthest.
+/// and, with the camera's number, for numbers that are not finite, for what is no rotation, and for
+/// sizes and focal lengths that no camera has. The depths are not used.
 std::vector<CameraView> readPoseBounds(const std::string& path);
 
 }  // namespace stipple
