@@ -28,27 +28,37 @@ float meanAround(const std::vector<float>& picture, uint32_t width, uint32_t hei
 
 }  // namespace
 
-std::vector<bool> movingPixels(std::span<const std::vector<float>> pictures, uint32_t width,
-                               uint32_t height) {
-  // Tasks write bytes of their own, which bits are not.
-  std::vector<uint8_t> moves(size_t{width} * height, 0);
-  parallelFor(height, kRowsPerTask, [&](size_t begin, size_t end) {
+MovingPixels::MovingPixels(uint32_t width, uint32_t height)
+    : width_(width),
+      height_(height),
+      least_(size_t{width} * height * 3),
+      most_(size_t{width} * height * 3) {}
+
+void MovingPixels::add(const std::vector<float>& picture) {
+  parallelFor(height_, kRowsPerTask, [&](size_t begin, size_t end) {
     for (size_t y = begin; y < end; ++y) {
-      for (uint32_t x = 0; x < width; ++x) {
-        for (size_t colour = 0; colour < 3 && pictures.size() > 1; ++colour) {
-          float least = 0, most = 0;
-          for (size_t p = 0; p < pictures.size(); ++p) {
-            const float mean =
-                meanAround(pictures[p], width, height, x, static_cast<uint32_t>(y), colour);
-            least = p == 0 ? mean : std::min(least, mean);
-            most = p == 0 ? mean : std::max(most, mean);
-          }
-          if (most - least > kMovingDifference) moves[y * width + x] = 1;
+      for (uint32_t x = 0; x < width_; ++x) {
+        for (size_t colour = 0; colour < 3; ++colour) {
+          const float mean =
+              meanAround(picture, width_, height_, x, static_cast<uint32_t>(y), colour);
+          const size_t at = (y * width_ + x) * 3 + colour;
+          least_[at] = count_ == 0 ? mean : std::min(least_[at], mean);
+          most_[at] = count_ == 0 ? mean : std::max(most_[at], mean);
         }
       }
     }
   });
-  return std::vector<bool>(moves.begin(), moves.end());
+  ++count_;
+}
+
+std::vector<bool> MovingPixels::found() const {
+  std::vector<bool> moves(size_t{width_} * height_);
+  for (size_t i = 0; i < moves.size(); ++i) {
+    for (size_t at = i * 3; at < i * 3 + 3; ++at) {
+      if (most_[at] - least_[at] > kMovingDifference) moves[i] = true;
+    }
+  }
+  return moves;
 }
 
 StillCameras::StillCameras(const ViewSource& views) : camera_of_(views.count()) {

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "data/views/view_source.h"
@@ -17,10 +16,22 @@ constexpr float kMovingDifference = 0.05f;
 
 /// The pixels of a camera that stands still in which something moves: there the values of one of
 /// the colours, each averaged over the pixel and its eight neighbours, spread by more than
-/// kMovingDifference over the pictures. In: pictures: [H,W,3] each, display values.
-/// Returns: [H,W], true where something moves; all false of fewer than two pictures.
-std::vector<bool> movingPixels(std::span<const std::vector<float>> pictures, uint32_t width,
-                               uint32_t height);
+/// kMovingDifference over its pictures. Memory: 6 floats a pixel, however many pictures there are.
+class MovingPixels {
+ public:
+  MovingPixels(uint32_t width, uint32_t height);
+
+  /// In: picture [H,W,3], display values.
+  void add(const std::vector<float>& picture);
+
+  /// [H,W], true where something moves; all false of fewer than two pictures.
+  std::vector<bool> found() const;
+
+ private:
+  uint32_t width_, height_;
+  size_t count_ = 0;
+  std::vector<float> least_, most_;  ///< [H,W,3] of the means around each pixel
+};
 
 /// Which views were taken by the same camera from the same place.
 class StillCameras {

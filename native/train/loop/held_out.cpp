@@ -134,14 +134,14 @@ const std::vector<bool>& ViewMeasure::movingOf(PictureStore& pictures, size_t vi
                                                const double background[3]) {
   const auto known = moving_.find(view);
   if (known != moving_.end()) return known->second;
-  std::vector<std::vector<float>> frames;
+  MovingPixels moving(target_.width, target_.height);
   TargetPicture frame;
   for (const size_t other : still_cameras_->around(view)) {
     pictures.load(other, background, frame);
     showAll(frame.colour, pictures.views().colourSpace());
-    frames.push_back(frame.colour);
+    moving.add(frame.colour);
   }
-  return moving_[view] = movingPixels(frames, target_.width, target_.height);
+  return moving_[view] = moving.found();
 }
 
 /// Of the view that seen_ and target_ are of.

@@ -19,6 +19,12 @@ std::vector<float> grey(float value) {
   return std::vector<float>(size_t{kWidth} * kHeight * 3, value);
 }
 
+std::vector<bool> movingPixels(const std::vector<std::vector<float>>& pictures) {
+  MovingPixels moving(kWidth, kHeight);
+  for (const std::vector<float>& picture : pictures) moving.add(picture);
+  return moving.found();
+}
+
 void paint(std::vector<float>& picture, uint32_t x, uint32_t y, size_t colour, float value) {
   picture[(size_t{y} * kWidth + x) * 3 + colour] = value;
 }
@@ -28,7 +34,7 @@ TEST(MovingPixels, AreThoseWhoseNeighbourhoodChangesInAnyColour) {
   // One pixel of one colour in the fourth of five: a ninth of 0.9 is 0.1, twice the limit.
   paint(pictures[3], 5, 4, 1, 1.0f);
   paint(pictures[1], 5, 4, 1, 0.1f);
-  const std::vector<bool> moves = movingPixels(pictures, kWidth, kHeight);
+  const std::vector<bool> moves = movingPixels(pictures);
   for (uint32_t y = 0; y < kHeight; ++y) {
     for (uint32_t x = 0; x < kWidth; ++x) {
       const bool is_near = x >= 4 && x <= 6 && y >= 3 && y <= 5;
@@ -46,20 +52,20 @@ TEST(MovingPixels, AreNotThoseThatFlickerByNoise) {
       value += static_cast<float>((unitDouble(mixBits(++key)) - 0.5) * 8 / 255);
     }
   }
-  const std::vector<bool> moves = movingPixels(pictures, kWidth, kHeight);
+  const std::vector<bool> moves = movingPixels(pictures);
   EXPECT_EQ(std::count(moves.begin(), moves.end(), true), 0);
 }
 
 TEST(MovingPixels, AreNoneOfOnePictureAndTheSameForAnyThreads) {
   const std::vector<std::vector<float>> one(1, grey(0.5f));
-  const std::vector<bool> none = movingPixels(one, kWidth, kHeight);
+  const std::vector<bool> none = movingPixels(one);
   EXPECT_EQ(none, std::vector<bool>(size_t{kWidth} * kHeight, false));
-  EXPECT_EQ(movingPixels({}, kWidth, kHeight), none);
+  EXPECT_EQ(movingPixels({}), none);
   std::vector<std::vector<float>> pictures(2, grey(0.2f));
   for (size_t i = 0; i < pictures[1].size(); i += 7) pictures[1][i] = 0.9f;
   std::vector<bool> by_one, by_many;
-  withThreads(1, [&] { by_one = movingPixels(pictures, kWidth, kHeight); });
-  withThreads(4, [&] { by_many = movingPixels(pictures, kWidth, kHeight); });
+  withThreads(1, [&] { by_one = movingPixels(pictures); });
+  withThreads(4, [&] { by_many = movingPixels(pictures); });
   EXPECT_EQ(by_one, by_many);
 }
 
