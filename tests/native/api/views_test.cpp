@@ -268,7 +268,9 @@ TEST_F(DatasetFolder, OpensSeriesOfFramesAndTellsTheirTimes) {
     StippleViews* views = nullptr;
     EXPECT_EQ(stipple_views_open(context_, folder_.c_str(), &given, &views), STIPPLE_OK)
         << stipple_last_error_message();
-    if (views) EXPECT_EQ(stipple_views_info(views, &info), STIPPLE_OK);
+    if (views != nullptr) {
+      EXPECT_EQ(stipple_views_info(views, &info), STIPPLE_OK);
+    }
     stipple_views_free(views);
     return info;
   };
