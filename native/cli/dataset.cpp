@@ -101,7 +101,7 @@ void printSeries(const Views& views) {
                   info.time_end);
     text += ", of " + std::string(times);
   }
-  if (info.camera_count > 0) {
+  if (info.camera_count > 0 && info.frame_count > 1) {
     text += ", by " + std::to_string(info.camera_count) +
             (info.camera_count == 1 ? " camera" : " cameras") + " of several images";
   }

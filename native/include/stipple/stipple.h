@@ -1864,8 +1864,7 @@ typedef struct StippleFitOptions {
                                   options */
   uint64_t seed;
   double ssim_share;           /* 0..1 of the loss beside L1, default 0.2 */
-  uint64_t image_bytes;        /* images kept in memory, default 1 GiB, of motion 768 MiB; others are loaded when
-                                  wanted */
+  uint64_t image_bytes;        /* kept images, default 1 GiB, of motion 768 MiB; others are loaded when wanted */
   uint64_t measure_interval;   /* iterations between measurements; 0, the default: a twentieth of the fit, at
                                   least 100 */
   const char* checkpoint_path_utf8; /* NULL, the default: none are written */

@@ -260,6 +260,7 @@ TEST_F(SeriesTest, TakesTimesByTheirNamesAndFramesByTheRate) {
   EXPECT_EQ(timesOf("\"time\": 0, \"timestep_index\": 3, ", "\"time\": 7, \"timestamp\": 8, ", 10),
             (std::vector<double>{0, 7}));
   EXPECT_THROW(timesOf("\"timestamp\": \"now\", ", "", 0), Error);
+  EXPECT_THROW(timesOf("\"time\": 1e999, ", "", 0), Error);
   EXPECT_THROW(timesOf("\"timestep_index\": 0.5, ", "", 0), Error);
   EXPECT_THROW(timesOf("\"timestep_index\": -1, ", "", 0), Error);
   EXPECT_THROW(timesOf("\"timestep_index\": 1e12, ", "", 0), Error);
