@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "base/parallel.h"
+#include "data/views/view_check.h"
 #include "data/views/view_colour.h"
 #include "data/views/view_resample.h"
 #include "io/image_file.h"
@@ -262,6 +263,19 @@ ViewPicture Dataset::load(size_t view) const {
   const auto packed = std::make_shared<const PackedPicture>(read(view));
   cache_.offer(view, packed);
   return packed->unpacked();
+}
+
+std::shared_ptr<const PackedPicture> Dataset::packed(size_t view) const {
+  if (view >= views_.size() || cache_.find(view)) return ViewSource::packed(view);
+  ViewPicture picture = read(view);
+  validateView(cameras_[view], picture, name(view));
+  // Whoever loads it wants the depths, too.
+  const bool has_depth = !picture.depth.empty();
+  if (has_depth) cache_.offer(view, std::make_shared<const PackedPicture>(picture));
+  picture.depth.clear();
+  auto made = std::make_shared<const PackedPicture>(picture);
+  if (!has_depth) cache_.offer(view, made);
+  return made;
 }
 
 ViewPicture Dataset::read(size_t view) const {

@@ -50,6 +50,8 @@ class Dataset final : public ViewSource {
   /// their path; kInvalidArgument for a pixel that is not finite. Two threads that want one picture
   /// may both read it.
   ViewPicture load(size_t view) const override;
+  /// The same as of any source, packed once.
+  std::shared_ptr<const PackedPicture> packed(size_t view) const override;
   /// Of COLMAP's points3D, or of the file that `ply_file_path` of transforms.json names.
   const PointSet& points() const override { return points_; }
   /// Images that the cameras' file names and that are not there.
