@@ -17,8 +17,8 @@ constexpr char kHistory[] = "history.";
 constexpr char kBest[] = "best.";
 constexpr uint64_t kRecordLength = 9;
 constexpr uint64_t kMeasureLength = 9;
-/// Of checkpoints from before there was moving_psnr, and before that training_psnr: their best state
-/// was chosen by the views that psnr is of.
+/// Of checkpoints from before there was moving_psnr, and before that training_psnr: their best
+/// state was chosen by the views that psnr is of.
 constexpr uint64_t kLeastMeasureLength = 7;
 
 constexpr float FitRecord::*kRecordNumbers[kRecordLength] = {&FitRecord::loss,
@@ -71,11 +71,10 @@ void addFitState(TensorTable& table, uint64_t iteration, const FitHistory& histo
   }
   std::vector<double> measures;
   for (const FitMeasure& m : history.measures) {
-    measures.insert(
-        measures.end(),
-        {static_cast<double>(m.iteration), static_cast<double>(m.budget),
-         static_cast<double>(m.splat_count), m.psnr, m.foreground_psnr, m.ssim, m.density_entropy,
-         m.training_psnr, m.moving_psnr});
+    measures.insert(measures.end(),
+                    {static_cast<double>(m.iteration), static_cast<double>(m.budget),
+                     static_cast<double>(m.splat_count), m.psnr, m.foreground_psnr, m.ssim,
+                     m.density_entropy, m.training_psnr, m.moving_psnr});
   }
   table[kIteration] = whole(iteration);
   table[kBestIteration] = whole(history.best_iteration);
