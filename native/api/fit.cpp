@@ -41,6 +41,7 @@ StippleFitFigures figuresTo(const FitStatus& status) {
   out.estimated_bytes = figures.estimated_bytes.value_or(0);
   out.note_count = status.note_count;
   out.preview_iteration = status.preview_iteration;
+  out.best_moving_psnr = figures.best_moving_psnr.value_or(unknown);
   std::snprintf(out.stage, sizeof(out.stage), "%s", status.stage.c_str());
   return out;
 }

@@ -24,6 +24,7 @@
 #include "io/assets/weights_folder.h"
 #include "io/assets/weights_place.h"
 #include "io/views/camera_file.h"
+#include "io/views/series.h"
 #include "measure/picture_accuracy.h"
 #include "model/splat_model.h"
 #include "motion/surface_binding.h"
@@ -94,6 +95,7 @@ struct StippleViews {
   std::shared_ptr<const stipple::ViewSource> source;  ///< null: cameras alone
   std::shared_ptr<stipple::MemoryViewSource> memory;  ///< the source, where it can grow
   std::deque<stipple::api::ViewNote> notes;           ///< one for each view
+  stipple::SeriesSize series;                         ///< of a data set
 };
 
 struct StippleRenderer {

@@ -21,7 +21,25 @@ StippleViewsOpenOptions openDefaults() {
   options.struct_size = sizeof(options);
   options.downscale = DatasetOptions().downscale;
   options.cache_bytes = DatasetOptions().cache_bytes;
+  const SeriesOptions series;
+  options.frame_rate = series.frame_rate;
+  options.first_frame = series.first_frame;
+  options.last_frame = series.last_frame;
+  options.frame_step = series.frame_step;
+  options.max_images = series.max_images;
   return options;
+}
+
+SeriesOptions seriesFrom(const StippleViewsOpenOptions& given) {
+  SeriesOptions series;
+  series.with_frames = given.with_frames != 0;
+  series.frame_rate = given.frame_rate;
+  series.first_frame = given.first_frame;
+  series.last_frame = given.last_frame;
+  series.frame_step = given.frame_step;
+  series.max_images = given.max_images;
+  if (given.held_out_cameras_utf8) series.held_out_cameras = given.held_out_cameras_utf8;
+  return series;
 }
 
 /// The views to change; a copy, which shares the pictures, where a job holds a share of them.
@@ -103,12 +121,14 @@ StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
     const ContextState& state = *context->state;
     DatasetOptions asked;
     asked.downscale = given.downscale;
+    asked.series = seriesFrom(given);
     asked.cache_bytes = std::min(given.cache_bytes, state.memory_limit_bytes / 4);
     std::shared_ptr<const Dataset> dataset;
     withThreads(state.thread_count, [&] { dataset = openDataset(path, asked); });
     auto made = std::make_unique<StippleViews>();
     made->context = context->state;
     noteDataset(*dataset, *made);
+    made->series = dataset->series();
     made->source = std::move(dataset);
     *views = made.release();
   });
@@ -191,6 +211,11 @@ StippleStatus stipple_views_info(const StippleViews* views, StippleViewsInfo* in
     const StippleViews& given = require(views, "views");
     StippleViewsInfo out = {};
     out.view_count = given.notes.size();
+    out.found_count = given.series.image_count;
+    out.camera_count = given.series.camera_count;
+    out.frame_count = given.series.frame_count;
+    out.time_begin = given.series.time_begin;
+    out.time_end = given.series.time_end;
     if (given.source) {
       out.colour_space = static_cast<uint32_t>(given.source->colourSpace());
       out.point_count = given.source->points().size();

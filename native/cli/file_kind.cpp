@@ -44,7 +44,7 @@ FileKind fileKind(const std::string& path) {
   }
   if (hasSplatExtension(path)) return FileKind::kSplats;
   if (hasModelExtension(path)) return FileKind::kModel;
-  if (extension == ".json" || isColmapFile(path)) return FileKind::kViews;
+  if (extension == ".json" || extension == ".npy" || isColmapFile(path)) return FileKind::kViews;
   if (extension == ".vdb") return FileKind::kVolume;
   for (const char* image : {".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}) {
     if (extension == image) return FileKind::kImage;

@@ -30,6 +30,7 @@ constexpr auto kPollInterval = std::chrono::milliseconds(50);
 
 struct Arguments {
   FitFlags flags;
+  SeriesFlags series;
   std::string dataset, out, report;
   std::optional<int64_t> budget;
   int64_t downscale = 1;
@@ -254,6 +255,10 @@ void printFigures(const Job& job) {
   report.add("iterations", figures.iteration);
   report.add("best_iteration", figures.best_iteration);
   report.add(figures.measured_on_training ? "training_psnr" : "held_out_psnr", figures.best_psnr);
+  if (std::isfinite(figures.best_moving_psnr)) {
+    report.add(figures.measured_on_training ? "training_moving_psnr" : "held_out_moving_psnr",
+               figures.best_moving_psnr);
+  }
   report.add("gaussians", figures.splat_count);
   report.add("seconds", figures.seconds);
   report.print(false);
@@ -264,7 +269,12 @@ void fit(const Context& context, const Arguments& arguments) {
   const StippleFitOptions options = arguments.flags.options(checkpoint);
   requirePlaces(arguments, checkpoint, options.resume != 0);
   const uint64_t budget = arguments.budget ? counted(*arguments.budget, "--budget") : 0;
-  const Views views = openViews(context, arguments.dataset, arguments.downscale);
+  if (arguments.series.holdsOut() && options.holdout == 0) {
+    throw Failure("--held-out-cameras and --holdout 0 say both what is held out");
+  }
+  const Views views = openViews(context, arguments.dataset, arguments.downscale, &arguments.series,
+                                options.model == STIPPLE_FIT_MOTION);
+  printSeries(views);
   // From here on there is something to keep, also where a terminal or the other end of a pipe is
   // gone.
   const SignalHold hold;
@@ -294,11 +304,13 @@ void addFit(CLI::App& app, const Context& context) {
   CLI::App* command = app.add_subcommand("fit", "Fits splats to images with cameras.");
   command
       ->add_option("dataset", to.dataset,
-                   "A COLMAP folder, or transforms.json or its folder, with the images.")
+                   "A COLMAP folder, transforms.json or its folder, or a folder with "
+                   "poses_bounds.npy, with the images.")
       ->required();
   command->add_option("out", to.out, "Splats (.ply and others), or a model (.stipple.safetensors).")
       ->required();
   to.flags.addTo(*command);
+  to.series.addTo(*command);
   // While the command line is read: newer releases of CLI11 ask for missing arguments before they call back.
   command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts.")
       ->trigger_on_parse();

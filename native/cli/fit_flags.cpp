@@ -63,9 +63,13 @@ std::string helpOf(const StippleFitOptionInfo& info) {
     preset += "; of a field " + of_fields;
   }
   const std::string of_moving = presetText(info, STIPPLE_FIT_MOTION);
-  if (!of_moving.empty() && of_moving != of_splats) preset += "; of motion " + of_moving;
+  const bool is_alone = preset.empty();
+  if (!is_alone && !of_moving.empty() && of_moving != of_splats) {
+    preset += "; of motion " + of_moving;
+  }
   std::string help = info.help_utf8;
   if (!preset.empty()) help += " Default: " + preset + ".";
+  if (is_alone && !of_moving.empty()) help += " Of motion the default is " + of_moving + ".";
   const bool has_end = info.maximum < std::numeric_limits<uint32_t>::max();
   if (has_end && info.kind <= STIPPLE_FIT_OPTION_NUMBER) {
     char range[80];

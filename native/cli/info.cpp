@@ -140,6 +140,12 @@ Report describeDataset(const Views& views) {
     report.add("test", splits[STIPPLE_VIEW_SPLIT_TEST]);
     report.add("validation", splits[STIPPLE_VIEW_SPLIT_VALIDATION]);
   }
+  if (info.camera_count > 0) report.add("cameras", info.camera_count);
+  if (info.frame_count > 1) {
+    report.add("frames", info.frame_count);
+    report.add("time_begin", info.time_begin);
+    report.add("time_end", info.time_end);
+  }
   report.add("points", info.point_count);
   report.add("colour_space", info.colour_space == STIPPLE_COLOUR_DISPLAY ? "srgb_rec709_display"
                                                                          : "lin_rec709_display");
@@ -149,7 +155,10 @@ Report describeDataset(const Views& views) {
 /// Cameras with pictures are a data set; where pictures are missing, the cameras and why.
 Report describeViews(const Context& context, const std::string& path) {
   StippleViews* opened = nullptr;
-  const StippleStatus status = stipple_views_open(context.get(), path.c_str(), nullptr, &opened);
+  StippleViewsOpenOptions options;
+  stipple_views_open_options_init(&options);
+  options.with_frames = 1;
+  const StippleStatus status = stipple_views_open(context.get(), path.c_str(), &options, &opened);
   if (status == STIPPLE_OK) return describeDataset(Views(opened));
   const std::string reason = stipple_last_error_message();
   StippleViews* loaded = nullptr;

@@ -19,6 +19,9 @@ struct FitMeasure {
   /// dB, the same as psnr over a few of the views that are learned from, by which the best state is
   /// chosen; NaN: not known, of a checkpoint whose best was chosen otherwise.
   double training_psnr = std::numeric_limits<double>::quiet_NaN();
+  /// dB, the same as psnr of the pixels in which something moves (data/views/moving_pixels.h), mean
+  /// over the views that have any; NaN where none has, as where no camera stands still.
+  double moving_psnr = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// What one iteration was like.

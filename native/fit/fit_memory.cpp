@@ -16,6 +16,8 @@ constexpr uint64_t kKeptFloats = 5;
 /// At work: one image being loaded and one waiting, with depth and normals (9 floats), the target
 /// (5), what is drawn (4), its derivative (4), what drawing keeps (16) and the loss (4).
 constexpr uint64_t kWorkingFloats = 2 * 9 + 5 + 4 + 4 + 16 + 4;
+/// Telling which pixels of a series move: another image, and the least and most of each colour.
+constexpr uint64_t kMovingFloats = 5 + 6;
 /// Numbers of a splat beside its harmonics.
 constexpr uint64_t kRowFloats = 11;
 /// Density control: parameters, two moments, derivatives twice and what is drawn, with a quarter of
@@ -31,15 +33,16 @@ uint64_t bytesOfSplat(const FitOptions& options) {
 }  // namespace
 
 uint64_t pictureMemoryBound(const ViewSource& views, uint64_t picture_bytes) {
-  uint64_t all_pixels = 0, largest = 0;
+  uint64_t all_pixels = 0, largest = 0, working = kWorkingFloats;
   for (size_t v = 0; v < views.count(); ++v) {
     const Camera& camera = views.camera(v);
     const uint64_t pixels = uint64_t{camera.width} * camera.height;
     all_pixels += pixels;
     largest = std::max(largest, pixels);
+    if (!views.cameraName(v).empty()) working = kWorkingFloats + kMovingFloats;
   }
   const uint64_t kept = std::min(picture_bytes, all_pixels * kKeptFloats * kFloatBytes);
-  return kept + largest * kWorkingFloats * kFloatBytes;
+  return kept + largest * working * kFloatBytes;
 }
 
 uint64_t fitMemoryBound(const FitOptions& options, const ViewSource& views) {

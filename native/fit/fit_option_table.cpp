@@ -187,6 +187,9 @@ const FitOption kTable[] = {
      .help = "Images up to this size stay in memory; others are read again whenever they are "
              "wanted.",
      .stored_of = kOfNoModel,
+     // Moving splats take 1.6 times the memory of others, and a series has more images than either
+     // limit: 150,000 of them beside 24 cameras' images stay below 2 GiB so.
+     .presets = {{}, {}, {"768MiB", "768MiB", "768MiB"}},
      .aliases = {{"image_memory", kMebibyte}, {"picture_bytes"}, {"picture_memory", kMebibyte}}},
     {.name = "max_bytes",
      .kind = FitOptionKind::kBytes,

@@ -123,6 +123,8 @@ std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
     requireSameSettings(checkpoint->settings_json, settings, options_.checkpoint_path);
   }
   for (const std::string& text : views_->notes()) note(text);
+  const std::string held_out = heldOutCameras(*views_, split_);
+  if (!held_out.empty()) note(held_out);
   for (const std::string& warning : checkViews(*views_, {}, &progress)) note(warning);
   auto trainer = std::make_unique<Trainer>(
       *backends_, views_, split_, makeModel(*backends_, *views_, split_, options_, &progress),

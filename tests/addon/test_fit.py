@@ -158,7 +158,7 @@ def test_defaults_and_presets_are_those_of_the_table(context):
         if option.kind == FitOptionKind.CHOICE:
             return option.choices[value]
         if option.kind == FitOptionKind.BYTES and value:
-            return f'{value >> 30}GiB'
+            return f'{value >> 30}GiB' if value % 2**30 == 0 else f'{value >> 20}MiB'
         if option.kind == FitOptionKind.TEXT:
             return (value or b'').decode()
         return f'{value:g}' if option.kind == FitOptionKind.NUMBER else str(value)

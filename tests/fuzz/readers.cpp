@@ -17,11 +17,13 @@
 #include "io/assets/motion_asset.h"
 #include "io/assets/rest_mesh.h"
 #include "io/assets/surface_asset.h"
+#include "io/bytes/npy_array.h"
 #include "io/glb_builder.h"
 #include "io/image_channels.h"
 #include "io/image_file.h"
 #include "io/ksplat_builder.h"
 #include "io/mesh_file.h"
+#include "io/npy_builder.h"
 #include "io/random_cloud.h"
 #include "io/sog_scene.h"
 #include "io/splats/sog_levels.h"
@@ -515,13 +517,27 @@ std::vector<std::string> transformsSeeds(const fs::path&) {
       "{\"fl_x\":500,\"fl_y\":510,\"cx\":300.5,\"cy\":250,\"w\":640,\"h\":480,\"k1\":0.0,"
       "\"camera_model\":\"OPENCV\"," +
           frames,
-      "{\"camera_angle_x\":1.2,\"time\":0.25," + frames,
+      "{\"camera_angle_x\":1.2,\"time\":0.25,\"timestamp\":2,\"timestep_index\":7," + frames,
       "{\"fl_x\":50,\"w\":64,\"h\":48,\"camera_model\":\"OPENCV\",\"k1\":-0.1,\"k3\":0.01,\"k5\":0."
       "1,\"p2\":"
       "0.001,\"ply_file_path\":\"p.ply\",\"test_filenames\":[\"b\"]," +
           frames,
       "{\"fl_x\":50,\"w\":64,\"h\":48,\"is_fisheye\":true,\"k1\":0.1,\"k4\":0.2," + frames,
       "{\"camera_model\":\"ORTHOGRAPHIC\",\"ortho_scale\":3,\"w\":8,\"h\":8," + frames};
+}
+
+std::vector<std::string> npySeeds(const fs::path&) {
+  return {npyFile(npyHeader("<f8", false, "(2, 3)"), doubles({1, 2, 3, 4, 5, 6})),
+          npyFile(npyHeader("<f4", true, "(2, 2)"), floats({1, 2, 3, 4}), 2)};
+}
+
+void readNpy(const fs::path& path) {
+  const NpyArray array = readNpyArray(path.string());
+  keepsPromises([&] {
+    uint64_t count = 1;
+    for (const uint64_t side : array.shape) count *= side;
+    if (count != array.values.size()) fail(ErrorCode::kInternal, "its shape is of other numbers");
+  });
 }
 
 std::vector<Reader> makeReaders() {
@@ -551,6 +567,11 @@ std::vector<Reader> makeReaders() {
   all.push_back({"transforms", nullptr, storeAs("transforms.json"),
                  [](const fs::path& folder) { readCameras(folder / "transforms.json"); },
                  transformsSeeds, JsonPlace::kWholeFile});
+  all.push_back({"npy", nullptr, storeAs("input.npy"),
+                 [](const fs::path& folder) { readNpy(folder / "input.npy"); }, npySeeds});
+  all.push_back({"pose-bounds", nullptr, storeAs("poses_bounds.npy"),
+                 [](const fs::path& folder) { readCameras(folder); },
+                 [](const fs::path&) { return std::vector{poseBoundsFile(2, 20, 30, 25)}; }});
   all.push_back({"colmap", nullptr, storePair("cameras.bin", "images.bin"),
                  [](const fs::path& folder) { readCameras(folder); }, colmapSeeds});
   all.push_back({"colmap-points", nullptr, storeAs("points3D.bin"),

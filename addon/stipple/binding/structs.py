@@ -183,7 +183,10 @@ class StippleCamera(_Sized):
 
 
 class StippleViewsOpenOptions(_Sized):
-    _fields_ = [('struct_size', c_uint32), ('downscale', c_uint32), ('cache_bytes', c_uint64)]
+    _fields_ = [('struct_size', c_uint32), ('downscale', c_uint32), ('cache_bytes', c_uint64),
+                ('with_frames', c_uint32), ('reserved', c_uint32), ('frame_rate', c_double), ('first_frame', c_uint64),
+                ('last_frame', c_uint64), ('frame_step', c_uint64), ('max_images', c_uint64),
+                ('held_out_cameras_utf8', c_char_p)]
 
 
 class StippleViewImage(_Sized):
@@ -198,7 +201,9 @@ class StippleViewPoints(_Sized):
 
 class StippleViewsInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('colour_space', c_uint32), ('view_count', c_uint64),
-                ('point_count', c_uint64), ('has_images', c_uint32), ('reserved', c_uint32)]
+                ('point_count', c_uint64), ('has_images', c_uint32), ('reserved', c_uint32),
+                ('found_count', c_uint64), ('camera_count', c_uint64), ('frame_count', c_uint64),
+                ('time_begin', c_double), ('time_end', c_double)]
 
 
 class StippleViewInfo(_Sized):
@@ -439,7 +444,7 @@ class StippleFitFigures(_Sized):
                 ('iterations', c_uint64), ('splat_count', c_uint64), ('best_iteration', c_uint64), ('loss', c_double),
                 ('psnr', c_double), ('best_psnr', c_double), ('seconds', c_double), ('seconds_left', c_double),
                 ('estimated_seconds', c_double), ('estimated_bytes', c_uint64), ('note_count', c_uint64),
-                ('preview_iteration', c_uint64), ('stage', c_char * 64)]
+                ('preview_iteration', c_uint64), ('stage', c_char * 64), ('best_moving_psnr', c_double)]
 
 
 class StippleStrategyInfo(_Sized):

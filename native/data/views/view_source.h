@@ -48,6 +48,8 @@ class ViewSource {
   virtual ViewRole role(size_t) const { return ViewRole::kNone; }
   /// When the picture was taken, seconds; 0 where nothing moves.
   virtual double time(size_t) const { return 0; }
+  /// Of the camera that took it, where the same camera took others at other times; else empty.
+  virtual std::string cameraName(size_t) const { return {}; }
 
   /// May be called by several threads at once. Errors: kIo, kFormat (names the picture), and
   /// kInvalidArgument for numbers that are not finite.

@@ -778,6 +778,11 @@ typedef struct StippleViewsInfo {
   uint64_t point_count;
   uint32_t has_images;    /* 0: there are cameras alone (stipple_views_load) */
   uint32_t reserved;
+  uint64_t found_count;   /* images that were there before frames and images were chosen */
+  uint64_t camera_count;  /* cameras of several images at different times; 0: none */
+  uint64_t frame_count;   /* times that differ */
+  double time_begin;      /* seconds */
+  double time_end;
 } StippleViewsInfo;
 
 /* What a data set says a view is for. */
@@ -817,16 +822,30 @@ typedef struct StippleViewsOpenOptions {
   uint32_t downscale;    /* 1..64, default 1: pixels of the file along each side of a pixel, averaged by area */
   uint64_t cache_bytes;  /* decoded images that stay in memory, default 1 GiB; at most a quarter of the context's
                             limit. Other images are read again when they are wanted */
+  uint32_t with_frames;  /* 1: numbered frames that lie in the folder of a camera's image are views, too; 0, the
+                            default: listed images alone (of poses_bounds.npy each camera's first frame) */
+  uint32_t reserved;
+  double frame_rate;     /* frames per second: image n was taken at n / frame_rate seconds, where the file of cameras
+                            says no time. 0, the default: 30 of frames that lie beside listed images, and else
+                            numbers in names say nothing */
+  uint64_t first_frame;  /* default 0; by number, or where files say times, counted from 0 in their order. A later
+                            first frame that is there takes its place */
+  uint64_t last_frame;   /* default UINT64_MAX */
+  uint64_t frame_step;   /* at least 1, the default: every so many-th frame from the first */
+  uint64_t max_images;   /* spread evenly over frames and cameras; 0, the default: all */
+  const char* held_out_cameras_utf8; /* names with commas between: their views are for testing, all others for
+                            training. NULL, the default: as the data set says */
 } StippleViewsOpenOptions;
 void stipple_views_open_options_init(StippleViewsOpenOptions* options);
 
-/* Opens a photo data set: a COLMAP model with its images, transforms.json of nerfstudio, or a NeRF-synthetic
- * folder (path_utf8 as in stipple_views_load); options may be NULL. Lens distortion is taken out of images as they
+/* Opens a photo data set: a COLMAP model with its images, transforms.json of nerfstudio, a NeRF-synthetic folder, or
+ * poses_bounds.npy beside a folder of images for each camera (path_utf8 as in stipple_views_load); options may be NULL. Lens distortion is taken out of images as they
  * are read: cameras are pinholes. The colour space is that of the first image: display of 8 and 16 bits, scene
  * linear of float. Masks give the weights. docs/formats.md, Data sets.
  * Errors: IO where images are missing, with the first of them; FORMAT; UNSUPPORTED for camera models that are not
- * known; MEMORY_LIMIT where the largest image cannot be read within it. No image is decoded.
- * Cost: one header is read per file where the cameras say no size. */
+ * known, and for videos; INVALID_ARGUMENT for options out of range, frames of which none is there, and names of no
+ * camera; MEMORY_LIMIT where the largest image cannot be read within it. No image is decoded.
+ * Cost: one header is read per file where the cameras say no size, and of each numbered frame. */
 StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
                                  const StippleViewsOpenOptions* options, StippleViews** views);
 /* Makes a set that has no views yet. In: colour_space, a StippleColourSpace: that of the splats to be. */
@@ -1870,7 +1889,7 @@ typedef struct StippleFitOptions {
                                   options */
   uint64_t seed;
   double ssim_share;           /* 0..1 of the loss beside L1, default 0.2 */
-  uint64_t image_bytes;        /* images kept in memory, default 1 GiB; others are loaded when wanted */
+  uint64_t image_bytes;        /* kept images, default 1 GiB, of motion 768 MiB; others are loaded when wanted */
   uint64_t measure_interval;   /* iterations between measurements; 0, the default: a twentieth of the fit, at
                                   least 100 */
   const char* checkpoint_path_utf8; /* NULL, the default: none are written */
@@ -1944,6 +1963,8 @@ typedef struct StippleFitFigures {
   uint64_t note_count;         /* of stipple_fit_note */
   uint64_t preview_iteration;  /* of the newest preview; 0: none yet */
   char stage[64];
+  double best_moving_psnr;     /* as best_psnr, of the pixels in which something moves: where the colours of a camera
+                                  that stands still differ over five frames. NaN: no such camera is measured */
 } StippleFitFigures;
 
 /* Fits splats to views, as a job. It reads the images of views as they are at the start.

@@ -51,7 +51,8 @@ Json row(const FitMeasure& measure) {
           {"foreground_psnr", number(measure.foreground_psnr)},
           {"ssim", number(measure.ssim)},
           {"density_entropy", number(measure.density_entropy)},
-          {"training_psnr", number(measure.training_psnr)}};
+          {"training_psnr", number(measure.training_psnr)},
+          {"moving_psnr", number(measure.moving_psnr)}};
 }
 
 Json rows(const std::vector<FitMeasure>& measures) {

@@ -3,7 +3,6 @@
 #include "io/views/camera_file.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -15,7 +14,9 @@
 #include "io/bytes/input_file.h"
 #include "io/bytes/json_text.h"
 #include "io/bytes/limits.h"
+#include "io/views/camera_pose.h"
 #include "io/views/colmap_cameras.h"
+#include "io/views/pose_bounds.h"
 
 namespace stipple {
 
@@ -24,9 +25,11 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-// A thousand frames take about a megabyte.
-// How far a stored rotation may be from orthonormal: three decimal digits in the file.
-constexpr double kRotationTolerance = 5e-3;
+/// Names of when a frame was taken, in seconds, and as its number.
+constexpr const char* kSecondsKeys[] = {"time", "timestamp"};
+constexpr const char* kFrameKey = "timestep_index";
+// Of a frame's number, as of those in file names.
+constexpr double kLargestFrame = 999'999'999;
 
 /// One frame and the file around it, and how both are called in messages.
 class FrameReader {
@@ -46,7 +49,7 @@ class FrameReader {
     view.image_path = text("file_path").value_or("");
     view.mask_path = text("mask_path").value_or("");
     view.depth_path = text("depth_file_path").value_or("");
-    view.time = number("time").value_or(0.0);
+    readTime(view);
     readModel(view);
     readIntrinsics(view.camera);
     readPose(view.camera);
@@ -90,6 +93,22 @@ class FrameReader {
                "; a whole number from 1 to 65536 is needed");
     }
     return static_cast<uint32_t>(*value);
+  }
+
+  void readTime(CameraView& view) const {
+    for (const char* key : kSecondsKeys) {
+      const std::optional<double> seconds = number(key);
+      if (!seconds || view.has_time) continue;
+      view.time = *seconds;
+      view.has_time = true;
+    }
+    const std::optional<double> frame = number(kFrameKey);
+    if (!frame) return;
+    if (*frame < 0 || *frame > kLargestFrame || *frame != std::floor(*frame)) {
+      failHere(std::string("has ") + kFrameKey + " = " + std::to_string(*frame) +
+               "; a whole number from 0 to 999999999 is needed");
+    }
+    view.frame = static_cast<uint64_t>(*frame);
   }
 
   static std::optional<CameraModel> wideModel(const std::string& name) {
@@ -239,24 +258,15 @@ class FrameReader {
       }
     }
     Mat3d rotation = matrix.topLeftCorner<3, 3>();
-    // Cameras under a scaled parent carry its scale, which means nothing for a camera.
-    for (int axis = 0; axis < 3; ++axis) rotation.col(axis).normalize();
-    const double error =
-        (rotation.transpose() * rotation - Mat3d::Identity()).cwiseAbs().maxCoeff();
-    if (!(error < kRotationTolerance) || !(rotation.determinant() > 0)) {
+    double error = 0;
+    if (!takeNearestRotation(rotation, error)) {
       failHere("has a 'transform_matrix' that is not a rotation and a translation (it differs by " +
                std::to_string(error) + " from orthonormal; at most 0.005 is allowed)");
     }
-    // The nearest rotation: what rounding in the file has taken away.
-    const Eigen::JacobiSVD<Mat3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    rotation = svd.matrixU() * svd.matrixV().transpose();
     // OpenGL looks along −z with y up, OpenCV along +z with y down.
     rotation.col(1) = -rotation.col(1);
     rotation.col(2) = -rotation.col(2);
-    const Vec3d centre = matrix.topRightCorner<3, 1>();
-    camera.world_to_camera = Mat4d::Identity();
-    camera.world_to_camera.topLeftCorner<3, 3>() = rotation.transpose();
-    camera.world_to_camera.topRightCorner<3, 1>() = -(rotation.transpose() * centre);
+    placeCamera(rotation, matrix.topRightCorner<3, 1>(), camera);
   }
 
   const std::string& path_;
@@ -325,8 +335,8 @@ void requireUsable(const std::vector<CameraView>& views, const std::string& path
     } catch (const Error& error) {
       const std::string& image = views[i].image_path;
       fail(ErrorCode::kFormat, path + ": view " + std::to_string(i) +
-                                   (image.empty() ? "" : " ('" + image.substr(0, 80) + "')") + ": " +
-                                   error.what());
+                                   (image.empty() ? "" : " ('" + image.substr(0, 80) + "')") +
+                                   ": " + error.what());
     }
   }
 }
@@ -353,10 +363,16 @@ CameraFiles findCameraFiles(const std::string& path) {
   if (const std::optional<std::string> model = findColmapModel(path)) {
     files.colmap = *model;
   } else if (is_folder) {
-    fail(ErrorCode::kFormat, path +
-                                 " holds no cameras: transforms.json, transforms_train.json, or "
-                                 "images.bin or images.txt of COLMAP (there or in sparse/0) is "
-                                 "needed");
+    const fs::path bounds = fs::path(path) / kPoseBoundsName;
+    if (!fs::exists(bounds, ignored)) {
+      fail(ErrorCode::kFormat,
+           path +
+               " holds no cameras: transforms.json, transforms_train.json, images.bin or "
+               "images.txt of COLMAP (there or in sparse/0), or poses_bounds.npy is needed");
+    }
+    files.pose_bounds = bounds.string();
+  } else if (fs::path(path).filename() == kPoseBoundsName) {
+    files.pose_bounds = path;
   } else {
     files.transforms.push_back(path);
   }
@@ -367,6 +383,7 @@ std::vector<CameraView> readCameraFile(const std::string& path, Distorted distor
   const CameraFiles files = findCameraFiles(path);
   std::vector<CameraView> views;
   if (!files.colmap.empty()) views = readColmapCameras(files.colmap, distorted);
+  if (!files.pose_bounds.empty()) views = readPoseBounds(files.pose_bounds);
   for (const std::string& file : files.transforms) {
     const std::vector<CameraView> more = readTransforms(file, distorted);
     views.insert(views.end(), more.begin(), more.end());

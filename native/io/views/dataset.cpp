@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/number_text.h"
 #include "base/parallel.h"
+#include "data/views/view_check.h"
 #include "data/views/view_colour.h"
 #include "data/views/view_resample.h"
 #include "io/image_file.h"
@@ -21,6 +22,8 @@ namespace {
 
 constexpr uint32_t kMaxDownscale = 64;
 constexpr size_t kPixelsPerTask = 65536;
+// Between two looks at whether the caller has had enough.
+constexpr size_t kHeadersAtOnce = 64;
 // Integer depths of nerfstudio are millimetres.
 constexpr float kMetresPerDepthUnit = 1e-3f;
 
@@ -30,6 +33,30 @@ void takeSizeOfPicture(DatasetView& view) {
   if (camera.width != 0) return;
   const ImageHeader header = readImageHeader(view.image_path);
   camera = resized(camera, header.width, header.height);
+}
+
+/// Frames of a folder are not listed one by one: a fit would find another size hours later.
+void requireSizesOfFrames(const std::vector<DatasetView>& views, Progress* progress) {
+  std::vector<ImageHeader> headers(views.size());
+  for (size_t begin = 0; begin < views.size(); begin += kHeadersAtOnce) {
+    const size_t end = std::min(begin + kHeadersAtOnce, views.size());
+    advance(progress, static_cast<double>(begin) / static_cast<double>(views.size()),
+            "Opening images");
+    parallelFor(end - begin, 1, [&](size_t from, size_t to) {
+      for (size_t i = begin + from; i < begin + to; ++i) {
+        if (views[i].is_of_folder) headers[i] = readImageHeader(views[i].image_path);
+      }
+    });
+    for (size_t i = begin; i < end; ++i) {
+      const Camera& camera = views[i].view.camera;
+      const bool is_same = headers[i].width == camera.width && headers[i].height == camera.height;
+      if (!views[i].is_of_folder || is_same) continue;
+      fail(ErrorCode::kFormat, views[i].image_path + " is " +
+                                   sizeText(headers[i].width, headers[i].height) +
+                                   " pixels; other images of its camera are " +
+                                   sizeText(camera.width, camera.height) + " pixels");
+    }
+  }
 }
 
 uint32_t reduced(uint32_t side, uint32_t downscale) {
@@ -193,6 +220,7 @@ ViewPicture separated(Image image, std::vector<float> weights) {
 PointSet readPoints(const std::string& path) {
   const CameraFiles files = findCameraFiles(path);
   if (!files.colmap.empty()) return readColmapPoints(files.colmap);
+  if (files.transforms.empty()) return {};
   const std::string& transforms = files.transforms.front();
   const std::string name = readPointsPath(transforms);
   if (name.empty()) return {};
@@ -208,7 +236,8 @@ Dataset::Dataset(const std::string& path, const DatasetOptions& options, Progres
                                           "; 1 to " + std::to_string(kMaxDownscale) +
                                           " is allowed");
   }
-  DatasetFiles files = findDatasetFiles(path);
+  DatasetFiles files = findDatasetFiles(path, options.series.with_frames);
+  series_ = arrangeSeries(path, options.series, files);
   views_ = std::move(files.views);
   notes_ = std::move(files.notes);
   for (size_t i = 0; i < views_.size(); ++i) {
@@ -216,6 +245,7 @@ Dataset::Dataset(const std::string& path, const DatasetOptions& options, Progres
             "Opening images");
     takeSizeOfPicture(views_[i]);
   }
+  requireSizesOfFrames(views_, progress);
   cameras_ = givenCameras(views_, options.downscale);
   const ImageHeader first = readImageHeader(views_.front().image_path);
   colour_space_ = first.transfer == Transfer::kSrgb ? ColourSpace::kDisplay : ColourSpace::kLinear;
@@ -233,6 +263,19 @@ ViewPicture Dataset::load(size_t view) const {
   const auto packed = std::make_shared<const PackedPicture>(read(view));
   cache_.offer(view, packed);
   return packed->unpacked();
+}
+
+std::shared_ptr<const PackedPicture> Dataset::packed(size_t view) const {
+  if (view >= views_.size() || cache_.find(view)) return ViewSource::packed(view);
+  ViewPicture picture = read(view);
+  validateView(cameras_[view], picture, name(view));
+  // Whoever loads it wants the depths, too.
+  const bool has_depth = !picture.depth.empty();
+  if (has_depth) cache_.offer(view, std::make_shared<const PackedPicture>(picture));
+  picture.depth.clear();
+  auto made = std::make_shared<const PackedPicture>(picture);
+  if (!has_depth) cache_.offer(view, made);
+  return made;
 }
 
 ViewPicture Dataset::read(size_t view) const {

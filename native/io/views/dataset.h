@@ -8,6 +8,7 @@
 #include "data/views/packed_picture.h"
 #include "data/views/view_source.h"
 #include "io/views/dataset_files.h"
+#include "io/views/series.h"
 
 namespace stipple {
 
@@ -17,9 +18,11 @@ struct DatasetOptions {
   /// a third more with alpha; the others are read
   /// again when they are wanted.
   uint64_t cache_bytes = uint64_t{1} << 30;
+  SeriesOptions series = {};  ///< of scenes that move
 };
 
-/// Photographs with their cameras: COLMAP, nerfstudio's transforms.json or NeRF-synthetic.
+/// Photographs with their cameras: COLMAP, nerfstudio's transforms.json, NeRF-synthetic or LLFF's
+/// poses_bounds.npy; also several frames of each camera (series.h).
 ///
 /// Pictures come as pinhole cameras see them: distortion is taken out at full size, then they are
 /// made smaller by the mean over the area of each pixel. Both interpolate the values in which the
@@ -31,8 +34,9 @@ struct DatasetOptions {
 /// nothing, the weight is 0; means count each pixel by its weight.
 class Dataset final : public ViewSource {
  public:
-  /// Errors: those of findDatasetViews(); kInvalidArgument for options out of range; kFormat for
-  /// sizes that cannot be; kUnsupported for lenses whose distortion cannot be taken out.
+  /// Errors: those of findDatasetFiles() and arrangeSeries(); kInvalidArgument for options out of
+  /// range; kFormat for sizes that cannot be, and for numbered frames of a camera that are not all
+  /// of one size; kUnsupported for lenses whose distortion cannot be taken out.
   Dataset(const std::string& path, const DatasetOptions& options, Progress* progress = nullptr);
 
   size_t count() const override { return views_.size(); }
@@ -41,10 +45,13 @@ class Dataset final : public ViewSource {
   ColourSpace colourSpace() const override { return colour_space_; }
   ViewRole role(size_t view) const override { return views_[view].view.role; }
   double time(size_t view) const override { return views_[view].view.time; }
+  std::string cameraName(size_t view) const override { return views_[view].camera_name; }
   /// Errors: kFormat for files that are truncated or of another size than their camera says, with
   /// their path; kInvalidArgument for a pixel that is not finite. Two threads that want one picture
   /// may both read it.
   ViewPicture load(size_t view) const override;
+  /// The same as of any source, packed once.
+  std::shared_ptr<const PackedPicture> packed(size_t view) const override;
   /// Of COLMAP's points3D, or of the file that `ply_file_path` of transforms.json names.
   const PointSet& points() const override { return points_; }
   /// Images that the cameras' file names and that are not there.
@@ -52,6 +59,7 @@ class Dataset final : public ViewSource {
 
   /// The view as its files say it: with the lens, and the size of the picture's file.
   const DatasetView& source(size_t view) const { return views_[view]; }
+  const SeriesSize& series() const { return series_; }
   uint64_t cachedBytes() const { return cache_.bytes(); }
 
  private:
@@ -59,6 +67,7 @@ class Dataset final : public ViewSource {
 
   std::vector<DatasetView> views_;
   std::vector<std::string> notes_;
+  SeriesSize series_;
   std::vector<Camera> cameras_;
   ColourSpace colour_space_ = ColourSpace::kDisplay;
   PointSet points_;

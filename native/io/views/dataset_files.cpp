@@ -1,9 +1,16 @@
 #include "io/views/dataset_files.h"
 
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
+#include "data/views/view_resample.h"
+#include "io/image_file.h"
+#include "io/views/numbered_frames.h"
+#include "io/views/pose_bounds_files.h"
 
 namespace stipple {
 
@@ -114,13 +121,66 @@ fs::path colmapPictures(const std::string& model, const std::vector<CameraView>&
            " and the folders around them");
 }
 
-DatasetFiles colmapFiles(const std::string& path, const std::string& model) {
+/// The frames that lie beside listed images. Cameras that move list more than one image of a
+/// folder, and have no others.
+class FrameFolders {
+ public:
+  /// In: around: the folder that names of images start from.
+  FrameFolders(fs::path around, const std::vector<CameraView>& listed, bool is_wanted)
+      : around_(std::move(around)), is_wanted_(is_wanted) {
+    if (!is_wanted) return;
+    for (const CameraView& camera : listed) ++counts_[folderOf(camera)];
+  }
+
+  /// Adds all frames of a listed image's camera. In: camera and masks as those of the image.
+  /// Returns: false where there is none beside it.
+  bool add(const CameraView& camera, const MaskFolder& masks,
+           const std::function<fs::path(const std::string&)>& mask_name,
+           std::vector<DatasetView>& views) const {
+    const fs::path name = fs::path(camera.image_path).filename();
+    if (!is_wanted_ || camera.has_time || camera.frame || !frameNumber(name)) return false;
+    if (!camera.mask_path.empty() || !camera.depth_path.empty()) return false;
+    if (counts_.at(folderOf(camera)) != 1) return false;
+    const std::vector<NumberedFrame> frames = numberedFrames(folderOf(camera), name);
+    if (frames.size() < 2) return false;
+    CameraView sized = camera;
+    if (camera.camera.width == 0) {
+      const ImageHeader header =
+          readImageHeader((folderOf(camera) / frames.front().file_name).string());
+      sized.camera = resized(camera.camera, header.width, header.height);
+    }
+    for (const NumberedFrame& frame : frames) {
+      DatasetView view{sized, {}, {}, {}};
+      view.view.image_path = (fs::path(camera.image_path).parent_path() / frame.file_name).string();
+      view.view.frame = frame.number;
+      view.image_path = (around_ / view.view.image_path).string();
+      view.mask_path = masks.of(mask_name(view.view.image_path));
+      view.is_of_folder = true;
+      views.push_back(std::move(view));
+    }
+    return true;
+  }
+
+ private:
+  fs::path folderOf(const CameraView& camera) const {
+    return (around_ / camera.image_path).lexically_normal().parent_path();
+  }
+
+  fs::path around_;
+  bool is_wanted_;
+  std::map<fs::path, size_t> counts_;  ///< listed images of each folder
+};
+
+DatasetFiles colmapFiles(const std::string& path, const std::string& model, bool with_frames) {
   const std::vector<CameraView> cameras = readCameraFile(path, Distorted::kKeep);
   const fs::path folder = colmapPictures(model, cameras);
   const MaskFolder masks(folder.parent_path() / "masks");
+  const FrameFolders frames(folder, cameras, with_frames);
+  const auto as_it_is = [](const std::string& name) { return fs::path(name); };
   DatasetFiles files;
   Missing missing;
   for (const CameraView& camera : cameras) {
+    if (frames.add(camera, masks, as_it_is, files.views)) continue;
     const fs::path image = folder / camera.image_path;
     if (isFile(image)) {
       files.views.push_back({camera, image.string(), masks.of(camera.image_path), {}});
@@ -139,16 +199,20 @@ fs::path nameBelowImages(const std::string& image_path) {
   return name.lexically_relative("images");
 }
 
-void addTransforms(const std::string& path, std::vector<DatasetView>& views, Missing& missing) {
+void addTransforms(const std::string& path, bool with_frames, std::vector<DatasetView>& views,
+                   Missing& missing) {
   const fs::path folder = fs::path(path).parent_path();
   const MaskFolder masks(folder / "masks");
+  const std::vector<CameraView> cameras = readCameraFile(path, Distorted::kKeep);
+  const FrameFolders frames(folder, cameras, with_frames);
   size_t frame = 0;
-  for (const CameraView& camera : readCameraFile(path, Distorted::kKeep)) {
+  for (const CameraView& camera : cameras) {
     if (camera.image_path.empty()) {
       fail(ErrorCode::kFormat,
            path + ": frame " + std::to_string(frame) + " has no 'file_path'; it has no image");
     }
     ++frame;
+    if (frames.add(camera, masks, nameBelowImages, views)) continue;
     DatasetView view{camera, {}, {}, {}};
     const auto image = pictureFile(folder / camera.image_path);
     if (!image) {
@@ -170,12 +234,15 @@ void addTransforms(const std::string& path, std::vector<DatasetView>& views, Mis
 
 }  // namespace
 
-DatasetFiles findDatasetFiles(const std::string& path) {
+DatasetFiles findDatasetFiles(const std::string& path, bool with_frames) {
   const CameraFiles cameras = findCameraFiles(path);
-  if (!cameras.colmap.empty()) return colmapFiles(path, cameras.colmap);
+  if (!cameras.colmap.empty()) return colmapFiles(path, cameras.colmap, with_frames);
+  if (!cameras.pose_bounds.empty()) return findPoseBoundsFiles(cameras.pose_bounds, with_frames);
   DatasetFiles files;
   Missing missing;
-  for (const std::string& file : cameras.transforms) addTransforms(file, files.views, missing);
+  for (const std::string& file : cameras.transforms) {
+    addTransforms(file, with_frames, files.views, missing);
+  }
   missing.settle(path, files);
   return files;
 }

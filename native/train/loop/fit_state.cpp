@@ -16,9 +16,10 @@ constexpr char kMeasures[] = "history.measures";
 constexpr char kHistory[] = "history.";
 constexpr char kBest[] = "best.";
 constexpr uint64_t kRecordLength = 9;
-constexpr uint64_t kMeasureLength = 8;
-/// Of checkpoints whose best state was chosen by the views that psnr is of.
-constexpr uint64_t kShorterMeasureLength = 7;
+constexpr uint64_t kMeasureLength = 9;
+/// Of checkpoints from before there was moving_psnr, and before that training_psnr: their best
+/// state was chosen by the views that psnr is of.
+constexpr uint64_t kLeastMeasureLength = 7;
 
 constexpr float FitRecord::*kRecordNumbers[kRecordLength] = {&FitRecord::loss,
                                                              &FitRecord::l1,
@@ -70,11 +71,10 @@ void addFitState(TensorTable& table, uint64_t iteration, const FitHistory& histo
   }
   std::vector<double> measures;
   for (const FitMeasure& m : history.measures) {
-    measures.insert(
-        measures.end(),
-        {static_cast<double>(m.iteration), static_cast<double>(m.budget),
-         static_cast<double>(m.splat_count), m.psnr, m.foreground_psnr, m.ssim, m.density_entropy,
-         m.training_psnr});
+    measures.insert(measures.end(),
+                    {static_cast<double>(m.iteration), static_cast<double>(m.budget),
+                     static_cast<double>(m.splat_count), m.psnr, m.foreground_psnr, m.ssim,
+                     m.density_entropy, m.training_psnr, m.moving_psnr});
   }
   table[kIteration] = whole(iteration);
   table[kBestIteration] = whole(history.best_iteration);
@@ -103,8 +103,9 @@ uint64_t takeFitState(const TensorTable& table, FitHistory& history) {
   const uint64_t measure_count =
       found == table.end() || found->second.shape.empty() ? 0 : found->second.shape[0];
   const bool is_shorter = found != table.end() && found->second.shape.size() == 2 &&
-                          found->second.shape[1] == kShorterMeasureLength;
-  const uint64_t length = is_shorter ? kShorterMeasureLength : kMeasureLength;
+                          found->second.shape[1] >= kLeastMeasureLength &&
+                          found->second.shape[1] < kMeasureLength;
+  const uint64_t length = is_shorter ? found->second.shape[1] : kMeasureLength;
   const auto& measures = valuesOf<double>(table, kMeasures, length, measure_count);
   history.measures.assign(measure_count, {});
   for (size_t i = 0; i < measure_count; ++i) {
@@ -116,7 +117,8 @@ uint64_t takeFitState(const TensorTable& table, FitHistory& history) {
                            row[4],
                            row[5],
                            row[6]};
-    if (!is_shorter) history.measures[i].training_psnr = row[7];
+    if (length > 7) history.measures[i].training_psnr = row[7];
+    if (length > 8) history.measures[i].moving_psnr = row[8];
   }
   return iteration;
 }

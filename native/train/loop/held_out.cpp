@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <string>
 
@@ -49,6 +50,13 @@ double psnrOf(const std::vector<float>& a, const std::vector<float>& b,
   return std::min(kMostPsnr, -10.0 * std::log10(squares / total));
 }
 
+/// What is to be seen of colours of the compositing space.
+void showAll(std::vector<float>& colours, ColourSpace space) {
+  parallelFor(colours.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) colours[i] = shown(colours[i], space);
+  });
+}
+
 /// Mean distance of the points from a place, metres; 0 without points.
 double meanDistance(const PointSet& points, const Vec3d& place) {
   double sum = 0;
@@ -68,10 +76,20 @@ FitViews splitViews(const ViewSource& views, uint64_t every) {
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return names[a] < names[b]; });
-  FitViews split;
-  const bool holds_out = every > 1 && order.size() >= every;
+  // Views without a camera's name are of a camera each.
+  std::map<std::string, size_t> cameras;
+  std::vector<size_t> camera_of(order.size());
+  size_t camera_count = 0;
   for (size_t i = 0; i < order.size(); ++i) {
-    (holds_out && i % every == 0 ? split.held_out : split.training).push_back(order[i]);
+    const std::string camera = views.cameraName(order[i]);
+    const bool is_new = camera.empty() || cameras.emplace(camera, camera_count).second;
+    camera_of[i] = is_new ? camera_count++ : cameras.at(camera);
+  }
+  FitViews split;
+  const bool holds_out = every > 1 && camera_count >= every;
+  for (size_t i = 0; i < order.size(); ++i) {
+    const bool is_held_out = holds_out && camera_of[i] % every == 0;
+    (is_held_out ? split.held_out : split.training).push_back(order[i]);
   }
   return split;
 }
@@ -112,10 +130,36 @@ double ViewMeasure::meanPsnr(SplatsOverTime& splats, PictureStore& pictures,
          static_cast<double>(chosen.size());
 }
 
+const std::vector<bool>& ViewMeasure::movingOf(PictureStore& pictures, size_t view,
+                                               const double background[3]) {
+  const auto known = moving_.find(view);
+  if (known != moving_.end()) return known->second;
+  MovingPixels moving(target_.width, target_.height);
+  TargetPicture frame;
+  for (const size_t other : still_cameras_->around(view)) {
+    pictures.load(other, background, frame);
+    showAll(frame.colour, pictures.views().colourSpace());
+    moving.add(frame.colour);
+  }
+  return moving_[view] = moving.found();
+}
+
+/// Of the view that seen_ and target_ are of.
+double ViewMeasure::psnrOfMoving(const std::vector<bool>& moves) {
+  std::vector<float> weights(moves.size());
+  for (size_t i = 0; i < moves.size(); ++i) {
+    const float weight = target_.weights.empty() ? 1.0f : target_.weights[i];
+    weights[i] = moves[i] ? weight : 0.0f;
+  }
+  return psnrOf(seen_, target_.colour, weights);
+}
+
 FitMeasure ViewMeasure::sumOver(SplatsOverTime& splats, PictureStore& pictures,
                                 std::span<const size_t> chosen, const double background[3],
                                 bool with_ssim) {
   FitMeasure sum;
+  double moving_sum = 0;
+  size_t moving_count = 0;
   RenderOptions options;
   options.with_depth = false;
   options.with_background = true;
@@ -150,7 +194,14 @@ FitMeasure ViewMeasure::sumOver(SplatsOverTime& splats, PictureStore& pictures,
                               {target_.colour.data(), PixelLayout::kRgb},
                               target_.weights.empty() ? nullptr : target_.weights.data(), {})
                     .ssim;
+    if (!still_cameras_ || !still_cameras_->hasAny()) continue;
+    const std::vector<bool>& moves = movingOf(pictures, chosen[k], background);
+    if (std::find(moves.begin(), moves.end(), true) == moves.end()) continue;
+    moving_sum += psnrOfMoving(moves);
+    ++moving_count;
   }
+  sum.moving_psnr = moving_count > 0 ? moving_sum / static_cast<double>(moving_count)
+                                     : std::numeric_limits<double>::quiet_NaN();
   return sum;
 }
 

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "data/clouds/splat_cloud.h"
 #include "data/fit_history.h"
+#include "data/views/moving_pixels.h"
 #include "data/views/view_source.h"
 #include "train/backend/backend_factory.h"
 #include "train/loop/picture_store.h"
@@ -21,8 +24,10 @@ struct FitViews {
   std::vector<size_t> held_out;  ///< the same
 };
 
-/// Every `every`-th view by name is held out, the first one too, as published results do it.
-/// In: every: 0: none. Where there are fewer than `every` views, none is held out.
+/// Every `every`-th view by name is held out, the first one too, as published results do it. Where
+/// cameras took several views (ViewSource::cameraName), every `every`-th camera is, with all its
+/// views: who learns from a camera at other times has seen most of what it is judged by.
+/// In: every: 0: none. Where there are fewer than `every` views or cameras, none is held out.
 FitViews splitViews(const ViewSource& views, uint64_t every);
 
 /// 1.1 times the largest distance of a camera from the mean of all, metres: the unit of published
@@ -34,6 +39,11 @@ double extentOfCameras(const ViewSource& views, std::span<const size_t> chosen);
 class ViewMeasure {
  public:
   explicit ViewMeasure(const BackendFactory& backends) : images_(backends.makeImageRenderer()) {}
+
+  /// From now on measures also tell the pixels apart in which something moves, of views of these:
+  /// other frames of a measured view's camera are looked at for that, once. Every store that is
+  /// measured with must be of them.
+  void tellMoving(const ViewSource& views) { still_cameras_.emplace(views); }
 
   /// Mean PSNR and SSIM over views. Colours are held to 0..1 and compared in display space; SSIM as
   /// image_loss.h has it. Views with alpha stand over `background`. Pixels that a mask leaves out
@@ -52,7 +62,13 @@ class ViewMeasure {
   FitMeasure sumOver(SplatsOverTime& splats, PictureStore& pictures, std::span<const size_t> chosen,
                      const double background[3], bool with_ssim);
 
+  const std::vector<bool>& movingOf(PictureStore& pictures, size_t view,
+                                    const double background[3]);
+  double psnrOfMoving(const std::vector<bool>& moves);
+
   std::unique_ptr<ImageRenderer> images_;
+  std::optional<StillCameras> still_cameras_;
+  std::map<size_t, std::vector<bool>> moving_;  ///< [H,W] by view
   RenderResult drawn_;
   ImageLoss loss_;
   TargetPicture target_;

@@ -61,7 +61,7 @@ MotionClip clipOfViews(const ViewSource& views) {
     fail(
         ErrorCode::kInvalidArgument,
         "all views have the same time; splats that move need views of 2 times or more ('time' of a "
-        "frame in transforms.json)");
+        "frame in transforms.json, or numbered images in a folder of each camera)");
   }
   MotionClip clip;
   clip.begin = times.front();

@@ -111,6 +111,7 @@ Trainer::Trainer(const BackendFactory& backends, std::shared_ptr<const ViewSourc
     fail(ErrorCode::kInvalidArgument, "there are no views to learn from; at least one is needed");
   }
   extent_ = extentOfCameras(pictures_.views(), split_.training);
+  measure_.tellMoving(pictures_.views());
   double background[3];
   backgroundOf(0, background);
   evaluator_ = std::make_unique<FitViewEvaluator>(backends, splatsOf(0), pictures_, split_.training,
@@ -251,7 +252,9 @@ void Trainer::report(FitObserver& observer, const Pace& pace) const {
   }
   for (const FitMeasure& measure : history_.measures) {
     figures.psnr = measure.psnr;
-    if (measure.iteration == history_.best_iteration) figures.best_psnr = measure.psnr;
+    if (measure.iteration != history_.best_iteration) continue;
+    figures.best_psnr = measure.psnr;
+    if (std::isfinite(measure.moving_psnr)) figures.best_moving_psnr = measure.moving_psnr;
   }
   figures.best_iteration = history_.best_iteration;
   figures.seconds = pace.begun.seconds();

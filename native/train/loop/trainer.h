@@ -53,6 +53,8 @@ struct FitFigures {
   double loss = 0;                  ///< mean of the last 50 iterations
   std::optional<double> psnr;       ///< dB, as measured last
   std::optional<double> best_psnr;  ///< of the result if the fit ended now
+  /// The same of the pixels in which something moves, where cameras that stand still tell them.
+  std::optional<double> best_moving_psnr;
   uint64_t best_iteration = 0;
   double seconds = 0;       ///< since run() began
   double seconds_left = 0;  ///< at the pace of the last iterations

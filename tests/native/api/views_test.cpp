@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -249,6 +250,52 @@ TEST_F(DatasetFolder, ObeysItsOptionsAndTheMemoryLimit) {
   EXPECT_EQ(stipple_views_open(context, folder_.c_str(), nullptr, &views),
             STIPPLE_ERROR_MEMORY_LIMIT);
   stipple_context_free(context);
+}
+
+TEST_F(DatasetFolder, OpensSeriesOfFramesAndTellsTheirTimes) {
+  std::string frames;
+  for (const char* camera : {"cam0", "cam1"}) {
+    std::filesystem::create_directories(folder_ / camera);
+    for (const char* frame : {"7", "8", "9"}) {
+      std::filesystem::copy_file(folder_ / "a.png",
+                                 folder_ / camera / (std::string(frame) + ".png"));
+    }
+    frames += (frames.empty() ? "" : ",") + std::string("{\"file_path\": \"") + camera +
+              "/7.png\", \"transform_matrix\": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}";
+  }
+  std::ofstream(folder_ / "transforms.json")
+      << "{\"camera_angle_x\": 1, \"frames\": [" << frames << "]}";
+  StippleViewsOpenOptions options;
+  stipple_views_open_options_init(&options);
+  EXPECT_EQ(options.with_frames, 0u);
+  EXPECT_EQ(options.last_frame, UINT64_MAX);
+  EXPECT_EQ(options.frame_step, 1u);
+  const auto infoOf = [&](const StippleViewsOpenOptions& given) {
+    auto info = sized<StippleViewsInfo>();
+    StippleViews* views = nullptr;
+    EXPECT_EQ(stipple_views_open(context_, folder_.c_str(), &given, &views), STIPPLE_OK)
+        << stipple_last_error_message();
+    if (views != nullptr) {
+      EXPECT_EQ(stipple_views_info(views, &info), STIPPLE_OK);
+    }
+    stipple_views_free(views);
+    return info;
+  };
+  EXPECT_EQ(infoOf(options).view_count, 2u);
+  options.with_frames = 1;
+  options.frame_rate = 10;
+  options.frame_step = 2;
+  options.held_out_cameras_utf8 = "cam1";
+  const StippleViewsInfo info = infoOf(options);
+  EXPECT_EQ(info.view_count, 4u);
+  EXPECT_EQ(info.found_count, 6u);
+  EXPECT_EQ(info.camera_count, 2u);
+  EXPECT_EQ(info.frame_count, 2u);
+  EXPECT_EQ(info.time_begin, 0.7);
+  EXPECT_EQ(info.time_end, 0.9);
+  // Who was compiled before there were frames asks for none, whatever lies behind his options.
+  options.struct_size = offsetof(StippleViewsOpenOptions, with_frames);
+  EXPECT_EQ(infoOf(options).view_count, 2u);
 }
 
 TEST_F(DatasetFolder, CamerasAloneHaveNoPictures) {

@@ -353,6 +353,13 @@ TEST_F(DatasetTest, GivesTheSameToManyThreadsAndWithoutACache) {
     EXPECT_EQ(seen[i].colour, alone.colour);
     EXPECT_EQ(seen[i].alpha, alone.alpha);
     EXPECT_EQ(seen[i].weights, alone.weights);
+    // Packed at once, or anew from what was unpacked: the numbers are the same.
+    for (const Dataset* set : {kept.get(), read_again.get()}) {
+      const ViewPicture packed = set->packed(i % 8)->unpacked();
+      EXPECT_EQ(packed.colour, alone.colour);
+      EXPECT_EQ(packed.alpha, alone.alpha);
+      EXPECT_EQ(packed.weights, alone.weights);
+    }
   }
   EXPECT_EQ(read_again->cachedBytes(), 0u);
 }
