@@ -56,12 +56,95 @@ def test_a_clip_plays_on_the_timeline(stipple, clip):
                                atol=1e-6)
 
 
-def test_all_splats_are_shown_at_any_budget(stipple, clip):
-    """They have no budget: whatever an animation or a script says, all of them come."""
-    count = len(shown(stipple, clip))
-    clip.data.stipple.ratio = 0.1
-    assert len(shown(stipple, clip)) == count
+def rows_of(cloud):
+    """What of splats does not change with time, row by row: it tells nodes apart."""
+    return np.concatenate([cloud.scales, cloud.sh.reshape(len(cloud.scales), -1)], axis=1)
+
+
+def shown_rows(stipple, obj):
+    return rows_of(stipple.scene.source.splat_data.read(obj.data))
+
+
+@pytest.fixture
+def crowd(stipple, tmp_path):
+    """The object of 200 splats that move each in its own way."""
+    path = tmp_path / 'crowd.stipple.safetensors'
+    write_crowd(path, 200)
+    assert bpy.ops.stipple.splats_import(filepath=str(path), up_axis='Z') == {'FINISHED'}
+    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 24, 1.0
+    return bpy.context.object
+
+
+def write_crowd(path, count):
+    """The numbers of the asset, as many times, with places, colours and paths drawn anew."""
+    data = ASSET.read_bytes()
+    size = struct.unpack('<Q', data[:8])[0]
+    header, tensors = json.loads(data[8:8 + size]), b''
+    dice = np.random.default_rng(5)
+    for name, tensor in header.items():
+        if name in ('__metadata__', 'future.labels'):
+            continue
+        width = tensor['shape'][1] if len(tensor['shape']) > 1 else 1
+        low, high = next((bounds for begin, bounds in {
+            'motion.positions': (-1, 1), 'motion.scales': (0.02, 0.06), 'motion.opacities': (0.5, 1),
+            'motion.lifespans': (0.5, 1.1), 'motion.centres': (0.2, 0.8)}.items() if name == begin), (-0.2, 0.2))
+        values = dice.uniform(low, high, (count, width)).astype('<f4')
+        if name == 'motion.rotations':
+            values += 1
+        tensor['shape'] = [count] + tensor['shape'][1:]
+        tensor['data_offsets'] = [len(tensors), len(tensors) + values.nbytes]
+        tensors += values.tobytes()
+    del header['future.labels']
+    text = json.dumps(header).encode()
+    text += b' ' * (-len(text) % 8)
+    path.write_bytes(struct.pack('<Q', len(text)) + text + tensors)
+
+
+def test_the_budget_is_a_slider_that_plays(stipple, crowd):
+    """Fewer splats, as many at every frame, the same ones, and where they are at its time."""
+    scene, stored = bpy.context.scene, crowd.data.stipple
+    settings = model(stipple, crowd).settings()
+    assert (settings.minimum_budget, settings.maximum_budget) == (1, 200)
+    assert len(shown(stipple, crowd)) == 200
+    stored.ratio = 0.25
+    scene.frame_set(1)
+    first, places = shown_rows(stipple, crowd), shown(stipple, crowd)
+    assert len(first) == 50
+    for frame in (2, 5, 9):
+        scene.frame_set(frame)
+        np.testing.assert_array_equal(shown_rows(stipple, crowd), first)
+        wanted = model(stipple, crowd).decode(stipple.binding.model.DecodeSettings(
+            50, time=settings.time_begin + (frame - 1) / 24))
+        np.testing.assert_allclose(shown(stipple, crowd), wanted.positions())
+    assert np.abs(shown(stipple, crowd) - places).max() > 1e-3
     assert not stipple.scene.source.sync.problems
+
+
+def test_budgets_of_moving_splats_are_keyframed(stipple, crowd):
+    scene, stored = bpy.context.scene, crowd.data.stipple
+    for frame, ratio in ((1, 0.1), (11, 1.0)):
+        stored.ratio = ratio
+        stored.keyframe_insert('ratio', frame=frame)
+    counts = []
+    for frame in (1, 4, 8, 11):
+        scene.frame_set(frame)
+        counts.append(len(shown(stipple, crowd)))
+    assert counts[0] == 20 and counts[-1] == 200
+    assert sorted(set(counts)) == counts
+
+
+def test_renders_have_their_own_budget_of_moving_splats(stipple, crowd, tmp_path):
+    scene, stored = bpy.context.scene, crowd.data.stipple
+    scenes.camera((0, 0, 10), width=48, height=48, type='ORTHO', ortho_scale=3.0)
+    scene.render.engine, scene.render.film_transparent = 'STIPPLE', True
+    stored.ratio = 0.05
+    scene.frame_set(5)
+    stored.ratio_render = 1.0
+    whole = scenes.render_pixels(tmp_path, 'whole')
+    stored.ratio_render = 0.05
+    few = scenes.render_pixels(tmp_path, 'few')
+    assert np.abs(whole - few).max() > 0.05
+    assert len(shown(stipple, crowd)) == 10
 
 
 def test_images_and_files_are_of_their_frame(stipple, clip, tmp_path):

@@ -45,11 +45,11 @@ TEST(MotionSplats, GivesItsSplatsAtEveryTime) {
   EXPECT_EQ(model->decode(at(3.375)).positions, model->decode(at(1e6)).positions);
 }
 
-TEST(MotionSplats, TellsItsClipAndHasOneBudget) {
+TEST(MotionSplats, TellsItsClipAndHasEveryBudget) {
   const auto model = makeMotionSplats(test::movingCloud(kCount));
   const ModelSettings settings = model->settings();
   EXPECT_EQ(settings.budget_unit, BudgetUnit::kSplats);
-  EXPECT_EQ(settings.minimum_budget, kCount);
+  EXPECT_EQ(settings.minimum_budget, 1u);
   EXPECT_EQ(settings.maximum_budget, kCount);
   EXPECT_EQ(settings.default_budget, kCount);
   EXPECT_FALSE(settings.has_order || settings.has_seed || settings.takes_mask);
@@ -59,16 +59,67 @@ TEST(MotionSplats, TellsItsClipAndHasOneBudget) {
   EXPECT_EQ(model->density(), nullptr);
   EXPECT_EQ(model->info().leaf_count, kCount);
   EXPECT_EQ(model->info().sh_degree, 1);
-  ModelRequest half = at(2);
-  half.budget = kCount / 2;
+  for (const uint64_t budget : {uint64_t{1}, kCount / 2, kCount - 1}) {
+    ModelRequest request = at(2.5);
+    request.budget = budget;
+    EXPECT_EQ(model->decode(request).size(), budget);
+  }
+  ModelRequest more = at(2);
+  more.budget = kCount + 1;
   try {
-    model->decode(half);
-    FAIL() << "a budget of half the splats is accepted";
+    model->decode(more);
+    FAIL() << "a budget of more than the splats is accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    EXPECT_NE(std::string(error.what()).find("20 splats; 40 to 40 is allowed"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("41 splats; 1 to 40 is allowed"), std::string::npos)
         << error.what();
   }
+}
+
+TEST_F(MotionSplatsFile, KeepsItsTreeOnceThereIsOne) {
+  const MotionCloud moving = test::movingCloud(kCount);
+  const auto model = makeMotionSplats(moving);
+  model->save(path("without"));
+  EXPECT_TRUE(readMotionAsset(path("without")).parents.empty());
+  ModelRequest half = at(2.6);
+  half.budget = kCount / 2;
+  const SplatCloud wanted = model->decode(half);
+  model->save(path("with"));
+  const MotionAsset seen = readMotionAsset(path("with"));
+  EXPECT_EQ(seen.parents.size(), 2 * kCount - 1);
+  EXPECT_EQ(seen.nodes.waves[0].size(), 3 * (kCount - 1));
+  EXPECT_EQ(loadModel(path("with"))->decode(half).positions, wanted.positions);
+  // Whoever opens the file without a tree gets the same.
+  EXPECT_EQ(loadModel(path("without"))->decode(half).positions, wanted.positions);
+  loadModel(path("with"))->save(path("again"));
+  EXPECT_EQ(load(path("again")), load(path("with")));
+}
+
+TEST_F(MotionSplatsFile, RefusesTreesThatDoNotFit) {
+  MovingTree tree = buildMovingTree(test::movingCloud(5), {}, {});
+  makeMotionSplats(test::movingCloud(5), {}, std::make_shared<const MovingTree>(tree))
+      ->save(path("a"));
+  const MotionAsset good = readMotionAsset(path("a"));
+  // What the file may hold, and no tree has.
+  const auto refused = [&](const auto& spoil, std::initializer_list<const char*> words) {
+    MotionAsset asset = good;
+    spoil(asset);
+    writeMotionAsset(asset, path("bad"));
+    expectError(ErrorCode::kFormat, words, [&] { loadModel(path("bad")); });
+  };
+  refused([](MotionAsset& asset) { asset.parents[3] = 7; }, {"parent 7"});
+  refused([](MotionAsset& asset) { asset.errors[2] = 1e9f; }, {"error 2"});
+  refused([](MotionAsset& asset) { asset.nodes.lifespans[1] = 3; }, {"inner nodes", "lifespans"});
+  // What is not even written.
+  const auto unwritten = [&](const auto& spoil, std::initializer_list<const char*> words) {
+    MotionAsset asset = good;
+    spoil(asset);
+    expectError(ErrorCode::kInvalidArgument, words,
+                [&] { writeMotionAsset(asset, path("never")); });
+  };
+  unwritten([](MotionAsset& asset) { asset.nodes.spins.pop_back(); }, {"tree.nodes.spins", "4"});
+  unwritten([](MotionAsset& asset) { asset.errors.clear(); }, {"tree.errors", "0 rows; 4"});
+  unwritten([](MotionAsset& asset) { asset.parents.pop_back(); }, {"tree.parents", "8 rows; 9"});
 }
 
 TEST(MotionSplats, RefusesWhatDoesNotMove) {
