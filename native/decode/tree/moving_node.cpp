@@ -20,6 +20,7 @@ constexpr double kNoTurn = kNoRotation * kNoRotation;
 /// stay in the range of float32.
 constexpr double kFarthestPath = 1e17;
 constexpr double kLargestShape = 1e34;
+constexpr double kWidestFootprint = 1e30;
 
 using Quaternion = std::array<double, 4>;
 
@@ -70,6 +71,8 @@ double timeOfOffset(const TimeWindow& window, double offset, double centre) {
 MovingScale movingScale(const MergeScale& space, const MotionClip& clip, size_t times) {
   MovingScale scale;
   scale.space = space;
+  // Through a low-pass so wide everything looks alike; areas stay in the range of float32.
+  scale.space.footprint = std::min(space.footprint, kWidestFootprint);
   scale.window = clip.window();
   const double frames = clip.frame_count;
   scale.times = std::min<size_t>({times, clip.frame_count, kMostMergeTimes});
