@@ -45,8 +45,9 @@ class FitSession final : public FitObserver {
   static uint64_t memoryBound(const ViewSource& views, const FitOptions& options);
 
   /// The whole work; at the end, splats that move get the tree of their budgets, unless that would
-  /// take more memory than is allowed, or is cancelled. Errors: of views that nothing can be learned from, of a checkpoint that cannot
-  /// be read or is of another fit, and those of Trainer::run().
+  /// take more memory than is allowed, or is cancelled. Errors: of views that nothing can be
+  /// learned from, of a checkpoint that cannot be read or is of another fit, and those of
+  /// Trainer::run().
   void run(Progress& progress);
 
   FitStatus status() const;

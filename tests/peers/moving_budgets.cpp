@@ -102,8 +102,8 @@ class Judge {
 
  private:
   double timeOf(size_t i, size_t count) const {
-    return clip_.begin + (clip_.end() - clip_.begin) * static_cast<double>(i) /
-                             static_cast<double>(count - 1);
+    return clip_.begin +
+           (clip_.end() - clip_.begin) * static_cast<double>(i) / static_cast<double>(count - 1);
   }
 
   /// Mean absolute second difference of consecutive frames in the middle of the clip.
@@ -143,11 +143,10 @@ std::vector<uint32_t> byContribution(const MotionCloud& moving) {
         splatVisibility(*cpuBackends(), cloud, viewsForVisibility(*cpuBackends(), cloud, rig));
     for (size_t k = 0; k < cloud.size(); ++k) {
       const auto* s = &cloud.scales[3 * k];
-      const double area = std::sqrt(static_cast<double>(s[0] * s[0] * s[1] * s[1] +
-                                                        s[0] * s[0] * s[2] * s[2] +
-                                                        s[1] * s[1] * s[2] * s[2]));
-      contributions[k] += static_cast<double>(seen[k]) * area *
-                          static_cast<double>(cloud.opacities[k]);
+      const double area = std::sqrt(static_cast<double>(
+          s[0] * s[0] * s[1] * s[1] + s[0] * s[0] * s[2] * s[2] + s[1] * s[1] * s[2] * s[2]));
+      contributions[k] +=
+          static_cast<double>(seen[k]) * area * static_cast<double>(cloud.opacities[k]);
     }
   }
   std::vector<uint32_t> rows(moving.size());

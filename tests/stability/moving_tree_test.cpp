@@ -27,7 +27,8 @@ void fill(std::vector<float>& column, float value) {
 
 std::vector<Hard> hardClouds() {
   std::vector<Hard> cases;
-  const auto add = [&](const char* name, size_t count, const std::function<void(MotionCloud&)>& set) {
+  const auto add = [&](const char* name, size_t count,
+                       const std::function<void(MotionCloud&)>& set) {
     cases.push_back({name, test::movingCloud(count)});
     set(cases.back().moving);
   };
@@ -114,8 +115,7 @@ TEST(MovingTreeStability, EveryCutIsSplatsAtEveryTime) {
     for (const size_t times : {size_t{3}, kMergeTimes}) {
       MovingTreeOptions options;
       options.times = times;
-      const auto tree =
-          std::make_shared<const MovingTree>(buildMovingTree(moving, {}, options));
+      const auto tree = std::make_shared<const MovingTree>(buildMovingTree(moving, {}, options));
       for (const float error : tree->errors) ASSERT_TRUE(std::isfinite(error));
       if (tree->nodes.size() > 0) {
         ASSERT_NO_THROW(validate(tree->nodes, "nodes"));

@@ -121,8 +121,11 @@ BENCHMARK_CAPTURE(build, 200k, size_t{200000})
     ->UseManualTime()
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);
-BENCHMARK(cut)->Name("motion.cut.200k")->UseManualTime()->Iterations(20)->Unit(
-    benchmark::kMillisecond);
+BENCHMARK(cut)
+    ->Name("motion.cut.200k")
+    ->UseManualTime()
+    ->Iterations(20)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Vectors of doubles for merges, without fused operations. Included inside the namespace of a Highway
-// target.
+// Vectors of doubles for merges, without fused operations. Included inside the namespace of a
+// Highway target.
 
 namespace hn = hwy::HWY_NAMESPACE;
 

@@ -13,7 +13,8 @@ namespace stipple {
 /// Leaves in Morton order: neighbours in space are neighbours in memory. Returns: [N] rows.
 std::vector<uint32_t> spatialOrder(const std::vector<float>& positions, const CloudExtent& extent);
 
-/// A visibility as merges count it: splats that no view sees may show in others, and count a little.
+/// A visibility as merges count it: splats that no view sees may show in others, and count a
+/// little.
 double countedVisibility(float visibility);
 
 /// As many splats of the same kind.

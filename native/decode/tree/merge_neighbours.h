@@ -8,8 +8,8 @@
 namespace stipple {
 
 /// Nearest neighbours of places. Where very many share one place, some of them are its neighbours,
-/// evenly, and one of them knows places beyond. Ties and the order within a row are those of the search; the same
-/// for any number of threads.
+/// evenly, and one of them knows places beyond. Ties and the order within a row are those of the
+/// search; the same for any number of threads.
 /// In: places [count,width]; neighbour_count k >= 1; width >= 1.
 /// Returns: [count,k] indices, never the place itself; rows of fewer than k places end with
 /// kNoPlace. Cost: O(count log count).

@@ -92,7 +92,8 @@ constexpr double kLeastExponent = -40;
 constexpr size_t kPlaneEntries[3][3] = {{0, 1, 3}, {0, 2, 5}, {3, 4, 5}};
 constexpr size_t kPlaneAxes[3][2] = {{0, 1}, {0, 2}, {1, 2}};
 
-/// Fills the area and the plane sizes of a node without inflation, which follow from its covariance.
+/// Fills the area and the plane sizes of a node without inflation, which follow from its
+/// covariance.
 void measureNode(MergeNode& node, const MergeScale& scale);
 
 MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,

@@ -84,8 +84,8 @@ void measurePlanes(MergeValues<T>& node, T footprint) {
   }
 }
 
-/// The moments of a mixture, and the sum of what both cover. Both nodes count alike: exchanging them
-/// changes no bit.
+/// The moments of a mixture, and the sum of what both cover. Both nodes count alike: exchanging
+/// them changes no bit.
 template <class T>
 void mixMoments(const MergeValues<T>& a, const MergeValues<T>& b, MergeValues<T>& node) {
   node.weight = a.weight + b.weight;

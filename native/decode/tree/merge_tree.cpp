@@ -107,16 +107,17 @@ MergeTree buildMergeTree(const SplatCloud& leaves, std::span<const float> visibi
 uint64_t mergeTreeMemoryBound(uint64_t leaf_count, int sh_degree) {
   // Inner nodes and their copy while they are numbered: 11 numbers and the harmonics.
   const uint64_t row = 4 * (11 + 3 * shCoefficientCount(sh_degree));
-  return leaf_count * (2 * row + sizeof(MergeNode) + mergeBytesPerNode(3) + 64) + (uint64_t{1} << 20);
+  return leaf_count * (2 * row + sizeof(MergeNode) + mergeBytesPerNode(3) + 64) +
+         (uint64_t{1} << 20);
 }
 
 void validateTree(const MergeTree& tree, const SplatCloud& leaves, const char* what) {
   const std::string name(what);
   validateShape(tree, leaves.size(), what);
   if (tree.nodes.size() != leaves.size() - 1) {
-    fail(ErrorCode::kInvalidArgument,
-         name + " has " + std::to_string(tree.nodes.size()) + " inner nodes; a tree over " +
-             std::to_string(leaves.size()) + " splats has one fewer");
+    fail(ErrorCode::kInvalidArgument, name + " has " + std::to_string(tree.nodes.size()) +
+                                          " inner nodes; a tree over " +
+                                          std::to_string(leaves.size()) + " splats has one fewer");
   }
   if (tree.nodes.sh_degree != leaves.sh_degree) {
     fail(ErrorCode::kInvalidArgument,

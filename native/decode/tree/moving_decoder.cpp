@@ -57,16 +57,24 @@ struct PieceColumns {
       return place;
     };
     MotionColumns<const float> columns;
-    columns.positions = taken([](const auto& c) -> auto& { return c.splats.positions; }, 3);
-    columns.rotations = taken([](const auto& c) -> auto& { return c.splats.rotations; }, 4);
-    columns.opacities = taken([](const auto& c) -> auto& { return c.splats.opacities; }, 1);
+    columns.positions = taken(
+        [](const auto& c) -> auto& { return c.splats.positions; }, 3);
+    columns.rotations = taken(
+        [](const auto& c) -> auto& { return c.splats.rotations; }, 4);
+    columns.opacities = taken(
+        [](const auto& c) -> auto& { return c.splats.opacities; }, 1);
     for (size_t wave = 0; wave < kMotionWaves; ++wave) {
-      columns.waves[wave] = taken([wave](const auto& c) -> auto& { return c.waves[wave]; }, 3);
+      columns.waves[wave] = taken(
+          [wave](const auto& c) -> auto& { return c.waves[wave]; }, 3);
     }
-    columns.phases = taken([](const auto& c) -> auto& { return c.phases; }, 4);
-    columns.spins = taken([](const auto& c) -> auto& { return c.spins; }, 4);
-    columns.lifespans = taken([](const auto& c) -> auto& { return c.lifespans; }, 2);
-    columns.centres = taken([](const auto& c) -> auto& { return c.centres; }, 1);
+    columns.phases = taken(
+        [](const auto& c) -> auto& { return c.phases; }, 4);
+    columns.spins = taken(
+        [](const auto& c) -> auto& { return c.spins; }, 4);
+    columns.lifespans = taken(
+        [](const auto& c) -> auto& { return c.lifespans; }, 2);
+    columns.centres = taken(
+        [](const auto& c) -> auto& { return c.centres; }, 1);
     return columns;
   }
 };
@@ -118,9 +126,11 @@ SplatCloud MovingDecoder::decode(const DecodeRequest& request) const {
       const NodeRows rows(tree->nodes, leaves_, {ids.data() + begin, count});
       kernel.moments(piece.take(rows), window, time, 0, count,
                      {&out.positions[3 * begin], &out.rotations[4 * begin], &out.opacities[begin]});
-      rows.take([](const auto& c) -> auto& { return c.splats.scales; }, 3, &out.scales[3 * begin]);
-      rows.take([](const auto& c) -> auto& { return c.splats.sh; }, sh_stride,
-                &out.sh[sh_stride * begin]);
+      rows.take(
+          [](const auto& c) -> auto& { return c.splats.scales; }, 3, &out.scales[3 * begin]);
+      rows.take(
+          [](const auto& c) -> auto& { return c.splats.sh; }, sh_stride,
+          &out.sh[sh_stride * begin]);
     }
   });
   return out;
@@ -128,9 +138,11 @@ SplatCloud MovingDecoder::decode(const DecodeRequest& request) const {
 
 uint64_t MovingDecoder::memoryBound(uint64_t budget, uint32_t) const {
   constexpr uint64_t kOthers = 3 + 4 + 3 + 1;
-  // Pieces of several threads, and what allocators round up.
+  // What allocators round up, and pieces of several threads.
+  constexpr uint64_t kRounding = uint64_t{64} << 10;
   constexpr uint64_t kPieces = uint64_t{16} << 20;
-  const uint64_t splats = budget * (kOthers + leaves_.splats.shStride()) * sizeof(float);
+  const uint64_t splats =
+      budget * (kOthers + leaves_.splats.shStride()) * sizeof(float) + kRounding;
   if (budget >= leaves_.size()) return splats;
   const uint64_t cut = splats + budget * sizeof(uint32_t) + kPieces;
   return tree() ? cut : cut + movingTreeMemoryBound(leaves_.size(), leaves_.splats.sh_degree);

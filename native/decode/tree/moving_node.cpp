@@ -80,7 +80,8 @@ MovingScale movingScale(const MergeScale& space, const MotionClip& clip, size_t 
   const auto count = static_cast<double>(scale.times);
   for (size_t i = 0; i < scale.stride; ++i) {
     const auto part = static_cast<double>(std::min(i, scale.times - 1));
-    // A frame is the middle of its own part of the clip, which begins half a frame before the first.
+    // A frame is the middle of its own part of the clip, which begins half a frame before the
+    // first.
     scale.parts[i] = std::max((part + 0.5) / count - 0.5 / frames, 0.0);
     scale.weights[i] = i < scale.times ? 1 / count : 0;
   }

@@ -127,8 +127,8 @@ struct TimeRows {
   alignas(64) double opacity[kMostMergeTimes];
 };
 
-/// Moments of the mixture at every time. The covariance that is drawn is the mean of what is seen of
-/// it, in the frame that turns with the node.
+/// Moments of the mixture at every time. The covariance that is drawn is the mean of what is seen
+/// of it, in the frame that turns with the node.
 template <class T>
 void mixTimes(const MovingScale& scale, const MovingNode& a, const float* a_samples,
               const MovingNode& b, const float* b_samples, MovingNode& node, TimeRows& rows) {
@@ -140,8 +140,7 @@ void mixTimes(const MovingScale& scale, const MovingNode& a, const float* a_samp
     loadTimes(a_samples, scale.stride, first, va);
     loadTimes(b_samples, scale.stride, first, vb);
     mixMoments(va, vb, mixed);
-    const T offset =
-        offsetOf(scale.window, loadLanes<T>(scale.parts.data() + first), node.centre);
+    const T offset = offsetOf(scale.window, loadLanes<T>(scale.parts.data() + first), node.centre);
     storeLanes(offset, rows.offset + first);
     for (size_t k = 0; k < 3; ++k) storeLanes(mixed.mean[k], rows.mean[k] + first);
     storeLanes(mixed.depth, rows.depth + first);
@@ -229,8 +228,8 @@ std::array<double, 2> fittedRates(const MovingScale& scale, const TimeRows& rows
   return rates;
 }
 
-/// Fills areas, the inflation and the opacities that a row can have, nearest to those that the depth
-/// asks for. Out: areas [stride].
+/// Fills areas, the inflation and the opacities that a row can have, nearest to those that the
+/// depth asks for. Out: areas [stride].
 template <class T>
 void drawTimes(const MovingScale& scale, const std::array<double, 2>& before, MovingNode& node,
                TimeRows& rows, double* areas) {
@@ -305,8 +304,8 @@ double mergeOverTime(const MovingScale& scale, const MovingNode& a, const float*
     for (size_t k = 0; k < 6; ++k) vm.covariance[k] = loadLanes<T>(rows.covariance[k] + first);
     vm.opacity = loadLanes<T>(rows.opacity + first);
     measurePlanes(vm, footprint);
-    errors.add(first, loadLanes<T>(scale.weights.data() + first) *
-                          errorOfMerge(va, vb, vm, footprint));
+    errors.add(first,
+               loadLanes<T>(scale.weights.data() + first) * errorOfMerge(va, vb, vm, footprint));
     if (!samples) continue;
     for (size_t k = 0; k < 3; ++k) put(MovingField::kMean + k, first, vm.mean[k]);
     put(MovingField::kOpacity, first, vm.opacity);

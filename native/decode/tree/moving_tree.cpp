@@ -270,15 +270,15 @@ void validateTree(const MovingTree& tree, const MotionCloud& leaves, const char*
   const std::string name(what);
   validateShape(tree, leaves.size(), what);
   if (tree.nodes.size() != leaves.size() - 1) {
-    fail(ErrorCode::kInvalidArgument,
-         name + " has " + std::to_string(tree.nodes.size()) + " inner nodes; a tree over " +
-             std::to_string(leaves.size()) + " splats has one fewer");
+    fail(ErrorCode::kInvalidArgument, name + " has " + std::to_string(tree.nodes.size()) +
+                                          " inner nodes; a tree over " +
+                                          std::to_string(leaves.size()) + " splats has one fewer");
   }
   if (tree.nodes.splats.sh_degree != leaves.splats.sh_degree) {
-    fail(ErrorCode::kInvalidArgument,
-         name + " has inner nodes of harmonic degree " +
-             std::to_string(tree.nodes.splats.sh_degree) + "; that of the splats, " +
-             std::to_string(leaves.splats.sh_degree) + ", is needed");
+    fail(ErrorCode::kInvalidArgument, name + " has inner nodes of harmonic degree " +
+                                          std::to_string(tree.nodes.splats.sh_degree) +
+                                          "; that of the splats, " +
+                                          std::to_string(leaves.splats.sh_degree) + ", is needed");
   }
 }
 

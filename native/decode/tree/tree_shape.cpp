@@ -25,8 +25,7 @@ void requireLeafCount(size_t leaf_count, const char* what) {
 void requireVisibility(std::span<const float> visibility, size_t leaf_count) {
   if (!visibility.empty() && visibility.size() != leaf_count) {
     fail(ErrorCode::kInvalidArgument, "visibility has " + std::to_string(visibility.size()) +
-                                          " values; " + std::to_string(leaf_count) +
-                                          " are needed");
+                                          " values; " + std::to_string(leaf_count) + " are needed");
   }
   for (const float value : visibility) {
     if (!(value >= 0.0f && value <= 1.0f)) {
@@ -103,10 +102,10 @@ void validateShape(const TreeShape& shape, size_t leaf_count, const char* what) 
   const std::string name(what);
   if (leaf_count == 0 || shape.parents.size() != 2 * leaf_count - 1 ||
       shape.errors.size() != leaf_count - 1) {
-    fail(ErrorCode::kInvalidArgument,
-         name + " has " + std::to_string(shape.parents.size()) + " parents and " +
-             std::to_string(shape.errors.size()) + " errors; a tree over " +
-             std::to_string(leaf_count) + " splats has 2N-1 and N-1");
+    fail(ErrorCode::kInvalidArgument, name + " has " + std::to_string(shape.parents.size()) +
+                                          " parents and " + std::to_string(shape.errors.size()) +
+                                          " errors; a tree over " + std::to_string(leaf_count) +
+                                          " splats has 2N-1 and N-1");
   }
   std::vector<uint8_t> children(leaf_count - 1, 0);
   for (size_t id = 0; id < shape.parents.size(); ++id) {

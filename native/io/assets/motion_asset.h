@@ -31,11 +31,11 @@ struct MotionAsset : MotionTensors {
   uint32_t frame_count = 1;
   double window_frames = 0;  ///< of stretched time; 0: it is not stretched
   double window_share = 0.7;
-  MotionTensors nodes;                ///< [N-1] inner nodes in the order in which they are split
-  std::vector<uint32_t> parents;      ///< [2N-1] as of HierarchyAsset; none: there is no tree
-  std::vector<float> errors;          ///< [N-1]
-  std::string settings_json = "{}";   ///< free for the caller (how the splats were made)
-  AssetExtras extras;                 ///< of the file that it was read from
+  MotionTensors nodes;               ///< [N-1] inner nodes in the order in which they are split
+  std::vector<uint32_t> parents;     ///< [2N-1] as of HierarchyAsset; none: there is no tree
+  std::vector<float> errors;         ///< [N-1]
+  std::string settings_json = "{}";  ///< free for the caller (how the splats were made)
+  AssetExtras extras;                ///< of the file that it was read from
 };
 
 /// `.stipple.safetensors`, version 1, kind "motion". The settings of the file also have the time

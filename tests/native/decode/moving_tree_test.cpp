@@ -181,8 +181,8 @@ TEST(MovingTree, EqualSplatsBecomeOneThatMovesLikeThem) {
     // 1 - (1 - o)^2 and the depth of a sum differ by parts of o.
     EXPECT_NEAR(one.opacities[0], 2 * both.opacities[0], 0.02f * both.opacities[0]) << time;
   }
-  EXPECT_EQ(tree->nodes.splats.sh, std::vector<float>(moving.splats.sh.begin(),
-                                                      moving.splats.sh.begin() + 12));
+  EXPECT_EQ(tree->nodes.splats.sh,
+            std::vector<float>(moving.splats.sh.begin(), moving.splats.sh.begin() + 12));
 }
 
 TEST(MovingTree, APathAboutAnotherMomentStaysWhereItIs) {
