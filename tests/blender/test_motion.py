@@ -75,29 +75,44 @@ def crowd(stipple, tmp_path):
     return bpy.context.object
 
 
-def write_crowd(path, count):
-    """The numbers of the asset, as many times, with places, colours and paths drawn anew."""
+# Ranges of the numbers of a crowd; others are between -0.2 and 0.2.
+RANGES = {'positions': (-1, 1), 'rotations': (0.8, 1.2), 'scales': (0.02, 0.06), 'opacities': (0.5, 1),
+          'lifespans': (0.5, 1.1), 'centres': (0.2, 0.8)}
+
+
+def write_crowd(path, count, with_tree=False):
+    """The asset with other splats, as many as are asked for, that move each in its own way.
+
+    With a tree: its nodes are more of the same, and their order is drawn; cuts of it show nothing that is like all."""
     data = ASSET.read_bytes()
     size = struct.unpack('<Q', data[:8])[0]
-    header, tensors = json.loads(data[8:8 + size]), b''
-    dice = np.random.default_rng(5)
-    for name, tensor in header.items():
-        if name in ('__metadata__', 'future.labels'):
-            continue
-        width = tensor['shape'][1] if len(tensor['shape']) > 1 else 1
-        low, high = next((bounds for begin, bounds in {
-            'motion.positions': (-1, 1), 'motion.scales': (0.02, 0.06), 'motion.opacities': (0.5, 1),
-            'motion.lifespans': (0.5, 1.1), 'motion.centres': (0.2, 0.8)}.items() if name == begin), (-0.2, 0.2))
-        values = dice.uniform(low, high, (count, width)).astype('<f4')
-        if name == 'motion.rotations':
-            values += 1
-        tensor['shape'] = [count] + tensor['shape'][1:]
-        tensor['data_offsets'] = [len(tensors), len(tensors) + values.nbytes]
-        tensors += values.tobytes()
-    del header['future.labels']
+    old, tensors, dice = json.loads(data[8:8 + size]), [], np.random.default_rng(5)
+    header = {'__metadata__': old['__metadata__']}
+
+    def add(name, dtype, values):
+        begin = sum(len(part) for part in tensors)
+        tensors.append(values.tobytes())
+        header[name] = {'dtype': dtype, 'shape': list(values.shape), 'data_offsets': [begin, begin + values.nbytes]}
+
+    for stem, rows in (('motion', count), ('tree.nodes', count - 1))[:2 if with_tree else 1]:
+        for name, tensor in old.items():
+            if name.startswith('motion.'):
+                low, high = RANGES.get(name.split('.')[1], (-0.2, 0.2))
+                values = dice.uniform(low, high, [rows] + tensor['shape'][1:])
+                add(name.replace('motion', stem, 1), 'F32', values.astype('<f4'))
+    if with_tree:
+        free, parents = [0, 0], [2**32 - 1]
+        for node, drawn in enumerate(dice.integers(0, 2**62, 2 * count - 2), 1):
+            place = int(drawn % len(free))
+            free[place], free[-1] = free[-1], free[place]
+            parents.append(free.pop())
+            if node < count - 1:
+                free += [node, node]
+        add('tree.parents', 'U32', np.array(parents, '<u4'))
+        add('tree.errors', 'F32', np.ones(count - 1, '<f4'))
     text = json.dumps(header).encode()
     text += b' ' * (-len(text) % 8)
-    path.write_bytes(struct.pack('<Q', len(text)) + text + tensors)
+    path.write_bytes(struct.pack('<Q', len(text)) + text + b''.join(tensors))
 
 
 def test_the_budget_is_a_slider_that_plays(stipple, crowd):
