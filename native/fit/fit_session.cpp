@@ -12,6 +12,7 @@
 #include "io/reports/fit_report.h"
 #include "model/field_splats.h"
 #include "model/motion_splats.h"
+#include "model/moving_budgets.h"
 #include "train/loop/explicit_model.h"
 #include "train/loop/field_model.h"
 #include "train/loop/moving_splats.h"
@@ -155,8 +156,8 @@ void FitSession::run(Progress& progress) {
 void FitSession::mergeMoving(Progress& progress) {
   const std::optional<MotionCloud> moving = motionResult(trainer_->model());
   if (!moving || moving->size() == 0) return;
-  const uint64_t needed =
-      memoryBound() + movingTreeMemoryBound(moving->size(), moving->splats.sh_degree);
+  const MovingTreeSource trees = movingTreesByViews(backends_);
+  const uint64_t needed = memoryBound() + trees.memoryBoundOf(*moving);
   if (options_.max_bytes > 0 && needed > options_.max_bytes) {
     note("The splats have no tree of budgets, since fit and tree would take " +
          std::to_string(needed) + " bytes; it is built when fewer splats are first asked for.");
@@ -165,7 +166,7 @@ void FitSession::mergeMoving(Progress& progress) {
   // The fit itself is done, whatever becomes of this.
   progress.enterPart(1, 1);
   try {
-    tree_ = std::make_shared<const MovingTree>(buildMovingTree(*moving, {}, {}, &progress));
+    tree_ = std::make_shared<const MovingTree>(trees.treeOf(*moving, &progress));
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCancelled) throw;
   }
@@ -219,7 +220,9 @@ std::shared_ptr<const SplatModel> FitSession::model() const {
     learned = fieldResult(model);
     moving = motionResult(model);
   }
-  if (moving) return makeMotionSplats(std::move(*moving), {settings_json_, {}}, tree_);
+  if (moving)
+    return makeMotionSplats(std::move(*moving), {settings_json_, {}}, tree_,
+                            movingTreesByViews(backends_));
   if (!learned) {
     fail(ErrorCode::kUnsupported, std::string("the ") + model.name() +
                                       " model has no field; its splats can be made a hierarchy");

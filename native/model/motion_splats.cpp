@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "data/position_bounds.h"
 #include "io/assets/motion_asset.h"
+#include "model/moving_budgets.h"
 
 namespace stipple {
 
@@ -35,8 +36,9 @@ MotionCloud restore(MotionTensors& tensors, const MotionClip& clip) {
 
 class MotionSplats final : public SplatModel {
  public:
-  MotionSplats(MotionCloud moving, ModelNotes notes, std::shared_ptr<const MovingTree> tree)
-      : decoder_(std::move(moving), std::move(tree)), notes_(std::move(notes)) {}
+  MotionSplats(MotionCloud moving, ModelNotes notes, std::shared_ptr<const MovingTree> tree,
+               MovingTreeSource trees)
+      : decoder_(std::move(moving), std::move(tree), std::move(trees)), notes_(std::move(notes)) {}
 
   const char* kind() const override { return kAssetMotion; }
 
@@ -87,16 +89,18 @@ class MotionSplats final : public SplatModel {
 }  // namespace
 
 std::shared_ptr<const SplatModel> makeMotionSplats(MotionCloud moving, ModelNotes notes,
-                                                   std::shared_ptr<const MovingTree> tree) {
+                                                   std::shared_ptr<const MovingTree> tree,
+                                                   MovingTreeSource trees) {
   validate(moving, "moving splats");
   if (moving.size() == 0) {
     fail(ErrorCode::kInvalidArgument, "there are 0 moving splats; at least 1 is needed");
   }
   if (tree) validate(tree->nodes, "inner nodes of moving splats");
-  return std::make_shared<const MotionSplats>(std::move(moving), std::move(notes), std::move(tree));
+  return std::make_shared<const MotionSplats>(std::move(moving), std::move(notes), std::move(tree),
+                                              std::move(trees));
 }
 
-std::shared_ptr<const SplatModel> readMotionSplats(const std::string& path, const ReadingAid&) {
+std::shared_ptr<const SplatModel> readMotionSplats(const std::string& path, const ReadingAid& aid) {
   MotionAsset asset = readMotionAsset(path);
   ModelNotes notes = {std::move(asset.settings_json), std::move(asset.extras)};
   const MotionClip clip = {asset.begin, asset.frames_per_second, asset.frame_count,
@@ -109,7 +113,8 @@ std::shared_ptr<const SplatModel> readMotionSplats(const std::string& path, cons
     tree->errors = std::move(asset.errors);
   }
   try {
-    return makeMotionSplats(restore(asset, clip), std::move(notes), std::move(tree));
+    return makeMotionSplats(restore(asset, clip), std::move(notes), std::move(tree),
+                            movingTreesByViews(aid.backends));
   } catch (const Error& error) {
     fail(ErrorCode::kFormat, path + ": " + error.what());
   }

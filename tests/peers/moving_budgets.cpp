@@ -1,7 +1,8 @@
 // Cuts of the tree of moving splats against all of them, over the times of their clip: beside the
 // same number of splats that contribute most, and a tree of its own for every time.
 //   moving_budgets ASSET [TIMES]
-// TIMES: at which merges are judged (default: as everywhere).
+// TIMES: at which merges are judged, of splats that all count as seen (default: as everywhere, with
+// what views see of them, and so have the trees of each time).
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,12 +14,11 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
 #include "base/stopwatch.h"
 #include "decode/tree/hierarchy_decoder.h"
 #include "decode/tree/moving_decoder.h"
 #include "io/assets/motion_asset.h"
-#include "math/covariance.h"
+#include "model/moving_budgets.h"
 #include "splat/render/render.h"
 #include "train/loop/view_rig.h"
 #include "train/loop/visibility.h"
@@ -182,7 +182,9 @@ void compare(const char* path, size_t times) {
   MovingTreeOptions options;
   if (times > 0) options.times = times;
   Stopwatch watch;
-  auto tree = std::make_shared<const MovingTree>(buildMovingTree(moving, {}, options));
+  auto tree = std::make_shared<const MovingTree>(
+      times > 0 ? buildMovingTree(moving, {}, options)
+                : movingTreesByViews(cpuBackends()).treeOf(moving, nullptr));
   const double seconds = watch.seconds();
   const SplatCloud still = splatsAt(moving, moving.clip.begin);
   watch = Stopwatch();
@@ -206,7 +208,11 @@ void compare(const char* path, size_t times) {
     judge.print("a tree for each time", budget, [&](double at) {
       const auto leaves = std::make_shared<const SplatCloud>(splatsAt(moving, at));
       const HierarchyDecoder each(
-          leaves, std::make_shared<const MergeTree>(buildMergeTree(*leaves, {}, {})));
+          leaves, std::make_shared<const MergeTree>(buildMergeTree(
+                      *leaves,
+                      splatVisibility(*cpuBackends(), *leaves,
+                                      viewsForVisibility(*cpuBackends(), *leaves, {})),
+                      {})));
       return each.decode(request);
     });
   }

@@ -81,8 +81,18 @@ struct PieceColumns {
 
 }  // namespace
 
-MovingDecoder::MovingDecoder(MotionCloud leaves, std::shared_ptr<const MovingTree> tree)
-    : leaves_(std::move(leaves)), tree_(std::move(tree)) {
+MovingTree MovingTreeSource::treeOf(const MotionCloud& moving, Progress* progress) const {
+  return build ? build(moving, progress) : buildMovingTree(moving, {}, {}, progress);
+}
+
+uint64_t MovingTreeSource::memoryBoundOf(const MotionCloud& moving) const {
+  return memory_bound ? memory_bound(moving)
+                      : movingTreeMemoryBound(moving.size(), moving.splats.sh_degree);
+}
+
+MovingDecoder::MovingDecoder(MotionCloud leaves, std::shared_ptr<const MovingTree> tree,
+                             MovingTreeSource trees)
+    : leaves_(std::move(leaves)), trees_(std::move(trees)), tree_(std::move(tree)) {
   if (tree_) validateTree(*tree_, leaves_, "tree of moving splats");
 }
 
@@ -95,7 +105,7 @@ std::shared_ptr<const MovingTree> MovingDecoder::builtTree(Progress* progress) c
   if (auto known = tree()) return known;
   std::lock_guard<std::mutex> lock(building_);
   if (auto known = tree()) return known;
-  auto made = std::make_shared<const MovingTree>(buildMovingTree(leaves_, {}, {}, progress));
+  auto made = std::make_shared<const MovingTree>(trees_.treeOf(leaves_, progress));
   std::lock_guard<std::mutex> told(mutex_);
   tree_ = made;
   return made;
@@ -145,7 +155,7 @@ uint64_t MovingDecoder::memoryBound(uint64_t budget, uint32_t) const {
       budget * (kOthers + leaves_.splats.shStride()) * sizeof(float) + kRounding;
   if (budget >= leaves_.size()) return splats;
   const uint64_t cut = splats + budget * sizeof(uint32_t) + kPieces;
-  return tree() ? cut : cut + movingTreeMemoryBound(leaves_.size(), leaves_.splats.sh_degree);
+  return tree() ? cut : cut + trees_.memoryBoundOf(leaves_);
 }
 
 }  // namespace stipple

@@ -11,6 +11,7 @@
 #include "io/scratch_folder.h"
 #include "model/model_kinds.h"
 #include "moving_cloud.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 namespace {
@@ -93,6 +94,50 @@ TEST_F(MotionSplatsFile, KeepsItsTreeOnceThereIsOne) {
   EXPECT_EQ(loadModel(path("without"))->decode(half).positions, wanted.positions);
   loadModel(path("with"))->save(path("again"));
   EXPECT_EQ(load(path("again")), load(path("with")));
+}
+
+TEST_F(MotionSplatsFile, LooksAtItsSplatsWhereTheReaderHasWhatDraws) {
+  // A shell of opaque splats around as many that nobody sees, all on one path.
+  constexpr size_t kEach = 600;
+  MotionCloud moving = test::movingCloud(2 * kEach);
+  for (size_t i = 0; i < 2 * kEach; ++i) {
+    const double turn = 2.4 * static_cast<double>(i % kEach);
+    const double z = (2.0 * static_cast<double>(i % kEach) + 1) / kEach - 1;
+    const double radius = i < kEach ? 1 : 0.5, ring = radius * std::sqrt(1 - z * z);
+    moving.splats.positions[3 * i] = static_cast<float>(ring * std::cos(turn));
+    moving.splats.positions[3 * i + 1] = static_cast<float>(ring * std::sin(turn));
+    moving.splats.positions[3 * i + 2] = static_cast<float>(radius * z);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      moving.splats.scales[3 * i + axis] = i < kEach ? 0.1f : 0.05f;
+      for (auto& wave : moving.waves) wave[3 * i + axis] = 0.1f;
+    }
+    moving.splats.opacities[i] = 0.99f;
+    moving.centres[i] = 0.5f;
+    moving.lifespans[2 * i] = moving.lifespans[2 * i + 1] = 1.1f;
+  }
+  makeMotionSplats(moving)->save(path("a"));
+  const auto hiddenIn = [&](const SplatModel& model) {
+    ModelRequest half = at(2.5);
+    half.budget = kEach;
+    const SplatCloud cut = model.decode(half), all = splatsAt(moving, 2.5);
+    double centre[3] = {};
+    for (size_t i = 0; i < all.positions.size(); ++i) {
+      centre[i % 3] += static_cast<double>(all.positions[i]) / static_cast<double>(all.size());
+    }
+    size_t hidden = 0;
+    for (size_t i = 0; i < cut.size(); ++i) {
+      double squared = 0;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        squared += std::pow(static_cast<double>(cut.positions[3 * i + axis]) - centre[axis], 2);
+      }
+      hidden += squared < 0.7 * 0.7 ? 1 : 0;
+    }
+    return hidden;
+  };
+  const size_t blind = hiddenIn(*loadModel(path("a")));
+  const size_t looked = hiddenIn(*loadModel(path("a"), {"", nullptr, cpuBackends()}));
+  EXPECT_GT(blind, kEach / 4);
+  EXPECT_LT(looked, blind / 4);
 }
 
 TEST_F(MotionSplatsFile, RefusesTreesThatDoNotFit) {
