@@ -12,6 +12,7 @@
 #include "io/reports/fit_report.h"
 #include "model/field_splats.h"
 #include "model/motion_splats.h"
+#include "model/moving_budgets.h"
 #include "train/loop/explicit_model.h"
 #include "train/loop/field_model.h"
 #include "train/loop/moving_splats.h"
@@ -146,11 +147,32 @@ void FitSession::run(Progress& progress) {
   };
   try {
     trainer_->run(*this, &progress);
+    mergeMoving(progress);
   } catch (...) {
     ends();
     throw;
   }
   ends();
+}
+
+void FitSession::mergeMoving(Progress& progress) {
+  const std::optional<MotionCloud> moving = motionResult(trainer_->model());
+  if (!moving || moving->size() == 0) return;
+  const MovingTreeSource trees = movingTreesByViews(backends_);
+  const uint64_t needed = memoryBound() + trees.memoryBoundOf(*moving);
+  if (options_.max_bytes > 0 && needed > options_.max_bytes) {
+    note("The splats have no tree of budgets, since fit and tree would take " +
+         std::to_string(needed) + " bytes; it is built when fewer splats are first asked for.");
+    return;
+  }
+  // The fit itself is done, whatever becomes of this.
+  progress.enterPart(1, 1);
+  try {
+    tree_ = std::make_shared<const MovingTree>(trees.treeOf(*moving, &progress));
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kCancelled) throw;
+  }
+  progress.enterPart(0, 1);
 }
 
 FitStatus FitSession::status() const {
@@ -200,7 +222,9 @@ std::shared_ptr<const SplatModel> FitSession::model() const {
     learned = fieldResult(model);
     moving = motionResult(model);
   }
-  if (moving) return makeMotionSplats(std::move(*moving), {settings_json_, {}});
+  if (moving)
+    return makeMotionSplats(std::move(*moving), {settings_json_, {}}, tree_,
+                            movingTreesByViews(backends_));
   if (!learned) {
     fail(ErrorCode::kUnsupported, std::string("the ") + model.name() +
                                       " model has no field; its splats can be made a hierarchy");

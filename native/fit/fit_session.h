@@ -11,6 +11,7 @@
 #include "data/clouds/seen_cloud.h"
 #include "data/fit_history.h"
 #include "data/views/view_source.h"
+#include "decode/tree/moving_tree.h"
 #include "fit/fit_options.h"
 #include "model/splat_model.h"
 #include "train/backend/backend_factory.h"
@@ -43,8 +44,10 @@ class FitSession final : public FitObserver {
   /// The same of a session that is not made. Errors: as the constructor.
   static uint64_t memoryBound(const ViewSource& views, const FitOptions& options);
 
-  /// The whole work. Errors: of views that nothing can be learned from, of a checkpoint that cannot
-  /// be read or is of another fit, and those of Trainer::run().
+  /// The whole work; at the end, splats that move get the tree of their budgets, unless that would
+  /// take more memory than is allowed, or is cancelled. Errors: of views that nothing can be
+  /// learned from, of a checkpoint that cannot be read or is of another fit, and those of
+  /// Trainer::run().
   void run(Progress& progress);
 
   FitStatus status() const;
@@ -75,6 +78,8 @@ class FitSession final : public FitObserver {
 
  private:
   std::unique_ptr<Trainer> prepared(Progress& progress);
+  /// The tree of a finished fit of splats that move, so that their model has every budget at once.
+  void mergeMoving(Progress& progress);
   Trainer& ended() const;
 
   std::shared_ptr<const BackendFactory> backends_;
@@ -83,6 +88,7 @@ class FitSession final : public FitObserver {
   FitViews split_;
   std::string settings_json_;
   std::unique_ptr<Trainer> trainer_;
+  std::shared_ptr<const MovingTree> tree_;  ///< null: none was made
 
   mutable std::mutex decode_mutex_;  ///< models decode and are handed over one at a time
   mutable std::mutex mutex_;         ///< of what follows

@@ -5,42 +5,46 @@
 #include "base/error.h"
 #include "data/position_bounds.h"
 #include "io/assets/motion_asset.h"
+#include "model/moving_budgets.h"
 
 namespace stipple {
 
 namespace {
 
-static_assert(MotionAsset::kWaves == kMotionWaves);
+static_assert(MotionTensors::kWaves == kMotionWaves);
 
-/// All splats at the time of the request.
-class MotionDecoder final : public Decoder {
- public:
-  explicit MotionDecoder(MotionCloud moving) : moving_(std::move(moving)) {}
+void store(const MotionCloud& moving, MotionTensors& tensors) {
+  tensors.splats = moving.splats;
+  tensors.waves = moving.waves;
+  tensors.phases = moving.phases;
+  tensors.spins = moving.spins;
+  tensors.lifespans = moving.lifespans;
+  tensors.centres = moving.centres;
+}
 
-  SplatCloud decode(const DecodeRequest& request) const override {
-    return splatsAt(moving_, request.time);
-  }
-  uint64_t memoryBound(uint64_t budget, uint32_t) const override {
-    constexpr uint64_t kOthers = 3 + 4 + 3 + 1;
-    return budget * (kOthers + moving_.splats.shStride()) * sizeof(float);
-  }
-
-  const MotionCloud& moving() const { return moving_; }
-
- private:
-  MotionCloud moving_;
-};
+MotionCloud restore(MotionTensors& tensors, const MotionClip& clip) {
+  MotionCloud moving;
+  moving.splats = std::move(tensors.splats);
+  moving.waves = std::move(tensors.waves);
+  moving.phases = std::move(tensors.phases);
+  moving.spins = std::move(tensors.spins);
+  moving.lifespans = std::move(tensors.lifespans);
+  moving.centres = std::move(tensors.centres);
+  moving.clip = clip;
+  return moving;
+}
 
 class MotionSplats final : public SplatModel {
  public:
-  MotionSplats(MotionCloud moving, ModelNotes notes)
-      : decoder_(std::move(moving)), notes_(std::move(notes)) {}
+  MotionSplats(MotionCloud moving, ModelNotes notes, std::shared_ptr<const MovingTree> tree,
+               MovingTreeSource trees)
+      : decoder_(std::move(moving), std::move(tree), std::move(trees)), notes_(std::move(notes)) {}
 
   const char* kind() const override { return kAssetMotion; }
 
   /// Bounds are those at the begin of the clip.
   ModelInfo info() const override {
-    const MotionCloud& moving = decoder_.moving();
+    const MotionCloud& moving = decoder_.leaves();
     ModelInfo info;
     info.leaf_count = moving.size();
     info.sh_degree = moving.splats.sh_degree;
@@ -50,14 +54,14 @@ class MotionSplats final : public SplatModel {
   }
 
   void save(const std::string& path) const override {
-    const MotionCloud& moving = decoder_.moving();
+    const MotionCloud& moving = decoder_.leaves();
     MotionAsset asset;
-    asset.splats = moving.splats;
-    asset.waves = moving.waves;
-    asset.phases = moving.phases;
-    asset.spins = moving.spins;
-    asset.lifespans = moving.lifespans;
-    asset.centres = moving.centres;
+    store(moving, asset);
+    if (const auto tree = decoder_.tree()) {
+      store(tree->nodes, asset.nodes);
+      asset.parents = tree->parents;
+      asset.errors = tree->errors;
+    }
     asset.begin = moving.clip.begin;
     asset.frames_per_second = moving.clip.frames_per_second;
     asset.frame_count = moving.clip.frame_count;
@@ -72,40 +76,45 @@ class MotionSplats final : public SplatModel {
   const Decoder& decoder() const override { return decoder_; }
 
   void limit(ModelSettings& settings) const override {
-    const MotionCloud& moving = decoder_.moving();
-    settings.minimum_budget = settings.maximum_budget = settings.default_budget = moving.size();
+    const MotionCloud& moving = decoder_.leaves();
+    settings.maximum_budget = settings.default_budget = moving.size();
     settings.time = TimeRange{moving.clip.begin, moving.clip.end()};
   }
 
  private:
-  MotionDecoder decoder_;
+  MovingDecoder decoder_;
   ModelNotes notes_;
 };
 
 }  // namespace
 
-std::shared_ptr<const SplatModel> makeMotionSplats(MotionCloud moving, ModelNotes notes) {
+std::shared_ptr<const SplatModel> makeMotionSplats(MotionCloud moving, ModelNotes notes,
+                                                   std::shared_ptr<const MovingTree> tree,
+                                                   MovingTreeSource trees) {
   validate(moving, "moving splats");
   if (moving.size() == 0) {
     fail(ErrorCode::kInvalidArgument, "there are 0 moving splats; at least 1 is needed");
   }
-  return std::make_shared<const MotionSplats>(std::move(moving), std::move(notes));
+  if (tree) validate(tree->nodes, "inner nodes of moving splats");
+  return std::make_shared<const MotionSplats>(std::move(moving), std::move(notes), std::move(tree),
+                                              std::move(trees));
 }
 
-std::shared_ptr<const SplatModel> readMotionSplats(const std::string& path, const ReadingAid&) {
+std::shared_ptr<const SplatModel> readMotionSplats(const std::string& path, const ReadingAid& aid) {
   MotionAsset asset = readMotionAsset(path);
   ModelNotes notes = {std::move(asset.settings_json), std::move(asset.extras)};
-  MotionCloud moving;
-  moving.splats = std::move(asset.splats);
-  moving.waves = std::move(asset.waves);
-  moving.phases = std::move(asset.phases);
-  moving.spins = std::move(asset.spins);
-  moving.lifespans = std::move(asset.lifespans);
-  moving.centres = std::move(asset.centres);
-  moving.clip = {asset.begin, asset.frames_per_second, asset.frame_count, asset.window_frames,
-                 asset.window_share};
+  const MotionClip clip = {asset.begin, asset.frames_per_second, asset.frame_count,
+                           asset.window_frames, asset.window_share};
+  std::shared_ptr<MovingTree> tree;
+  if (!asset.parents.empty()) {
+    tree = std::make_shared<MovingTree>();
+    tree->nodes = restore(asset.nodes, clip);
+    tree->parents = std::move(asset.parents);
+    tree->errors = std::move(asset.errors);
+  }
   try {
-    return makeMotionSplats(std::move(moving), std::move(notes));
+    return makeMotionSplats(restore(asset, clip), std::move(notes), std::move(tree),
+                            movingTreesByViews(aid.backends));
   } catch (const Error& error) {
     fail(ErrorCode::kFormat, path + ": " + error.what());
   }

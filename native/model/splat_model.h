@@ -17,6 +17,8 @@
 
 namespace stipple {
 
+class BackendFactory;
+
 /// What an asset file holds beside the model, for saving it again.
 struct ModelNotes {
   std::string settings_json = "{}";
@@ -29,6 +31,8 @@ struct ReadingAid {
   /// nobody has said where it is.
   std::string weights_folder;
   Progress* progress = nullptr;  ///< of reading; files of weights are hashed once
+  /// What a model may look at its splats with later; null: it does without.
+  std::shared_ptr<const BackendFactory> backends = nullptr;
 };
 
 /// What a model is, beside its settings. 0 where it does not apply.

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import scenes
+from test_motion import write_crowd
 from test_splat_data import make_arrays
 
 
@@ -96,6 +97,22 @@ def test_splats_on_a_mesh(stipple):
         report(f'200,000 splats on a mesh, {reach.lower()}, a frame', best_of(20, next_frame), 0.04)
         assert bpy.ops.stipple.unbind() == {'FINISHED'}
     print(f'a frame of the mesh alone: {plain[0] * 1e3:.1f} ms')
+
+
+def test_moving_splats_at_a_budget(stipple, tmp_path):
+    """200,000 of 300,000 splats that move, a frame: those of its time, with their attributes."""
+    path = tmp_path / 'crowd.stipple.safetensors'
+    write_crowd(path, 300_000, with_tree=True)
+    assert bpy.ops.stipple.splats_import(filepath=str(path), up_axis='Z') == {'FINISHED'}
+    scene, stored = bpy.context.scene, bpy.context.object.data.stipple
+    stored.ratio, stored.frame_speed = 200 / 300, 0.05
+    sources = stipple.scene.source.sources
+    model = sources.model(stipple.scene.source.source_paths.file_of(bpy.context.object.data))
+    frames = iter(range(2, 1000))
+    report('200,000 moving splats, a frame', best_of(20, lambda: scene.frame_set(next(frames))), 0.04)
+    begin = model.settings().time_begin
+    report('the same decoded by the binding', best_of(20, lambda: model.decode(
+        stipple.binding.model.DecodeSettings(200_000, time=begin + 0.002 * next(frames)))), 0.04)
 
 
 def test_slider_and_surface(stipple, tmp_path):

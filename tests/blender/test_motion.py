@@ -56,12 +56,110 @@ def test_a_clip_plays_on_the_timeline(stipple, clip):
                                atol=1e-6)
 
 
-def test_all_splats_are_shown_at_any_budget(stipple, clip):
-    """They have no budget: whatever an animation or a script says, all of them come."""
-    count = len(shown(stipple, clip))
-    clip.data.stipple.ratio = 0.1
-    assert len(shown(stipple, clip)) == count
+def rows_of(cloud):
+    """What of splats does not change with time, row by row: it tells nodes apart."""
+    return np.concatenate([cloud.scales, cloud.sh.reshape(len(cloud.scales), -1)], axis=1)
+
+
+def shown_rows(stipple, obj):
+    return rows_of(stipple.scene.source.splat_data.read(obj.data))
+
+
+@pytest.fixture
+def crowd(stipple, tmp_path):
+    """The object of 200 splats that move each in its own way."""
+    path = tmp_path / 'crowd.stipple.safetensors'
+    write_crowd(path, 200)
+    assert bpy.ops.stipple.splats_import(filepath=str(path), up_axis='Z') == {'FINISHED'}
+    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 24, 1.0
+    return bpy.context.object
+
+
+# Ranges of the numbers of a crowd; others are between -0.2 and 0.2.
+RANGES = {'positions': (-1, 1), 'rotations': (0.8, 1.2), 'scales': (0.02, 0.06), 'opacities': (0.5, 1),
+          'lifespans': (0.5, 1.1), 'centres': (0.2, 0.8)}
+
+
+def write_crowd(path, count, with_tree=False):
+    """The asset with other splats, as many as are asked for, that move each in its own way.
+
+    With a tree: its nodes are more of the same, and their order is drawn; cuts of it show nothing that is like all."""
+    data = ASSET.read_bytes()
+    size = struct.unpack('<Q', data[:8])[0]
+    old, tensors, dice = json.loads(data[8:8 + size]), [], np.random.default_rng(5)
+    header = {'__metadata__': old['__metadata__']}
+
+    def add(name, dtype, values):
+        begin = sum(len(part) for part in tensors)
+        tensors.append(values.tobytes())
+        header[name] = {'dtype': dtype, 'shape': list(values.shape), 'data_offsets': [begin, begin + values.nbytes]}
+
+    for stem, rows in (('motion', count), ('tree.nodes', count - 1))[:2 if with_tree else 1]:
+        for name, tensor in old.items():
+            if name.startswith('motion.'):
+                low, high = RANGES.get(name.split('.')[1], (-0.2, 0.2))
+                values = dice.uniform(low, high, [rows] + tensor['shape'][1:])
+                add(name.replace('motion', stem, 1), 'F32', values.astype('<f4'))
+    if with_tree:
+        free, parents = [0, 0], [2**32 - 1]
+        for node, drawn in enumerate(dice.integers(0, 2**62, 2 * count - 2), 1):
+            place = int(drawn % len(free))
+            free[place], free[-1] = free[-1], free[place]
+            parents.append(free.pop())
+            if node < count - 1:
+                free += [node, node]
+        add('tree.parents', 'U32', np.array(parents, '<u4'))
+        add('tree.errors', 'F32', np.ones(count - 1, '<f4'))
+    text = json.dumps(header).encode()
+    text += b' ' * (-len(text) % 8)
+    path.write_bytes(struct.pack('<Q', len(text)) + text + b''.join(tensors))
+
+
+def test_the_budget_is_a_slider_that_plays(stipple, crowd):
+    """Fewer splats, as many at every frame, the same ones, and where they are at its time."""
+    scene, stored = bpy.context.scene, crowd.data.stipple
+    settings = model(stipple, crowd).settings()
+    assert (settings.minimum_budget, settings.maximum_budget) == (1, 200)
+    assert len(shown(stipple, crowd)) == 200
+    stored.ratio = 0.25
+    scene.frame_set(1)
+    first, places = shown_rows(stipple, crowd), shown(stipple, crowd)
+    assert len(first) == 50
+    for frame in (2, 5, 9):
+        scene.frame_set(frame)
+        np.testing.assert_array_equal(shown_rows(stipple, crowd), first)
+        wanted = model(stipple, crowd).decode(stipple.binding.model.DecodeSettings(
+            50, time=settings.time_begin + (frame - 1) / 24))
+        np.testing.assert_allclose(shown(stipple, crowd), wanted.positions())
+    assert np.abs(shown(stipple, crowd) - places).max() > 1e-3
     assert not stipple.scene.source.sync.problems
+
+
+def test_budgets_of_moving_splats_are_keyframed(stipple, crowd):
+    scene, stored = bpy.context.scene, crowd.data.stipple
+    for frame, ratio in ((1, 0.1), (11, 1.0)):
+        stored.ratio = ratio
+        stored.keyframe_insert('ratio', frame=frame)
+    counts = []
+    for frame in (1, 4, 8, 11):
+        scene.frame_set(frame)
+        counts.append(len(shown(stipple, crowd)))
+    assert counts[0] == 20 and counts[-1] == 200
+    assert sorted(set(counts)) == counts
+
+
+def test_renders_have_their_own_budget_of_moving_splats(stipple, crowd, tmp_path):
+    scene, stored = bpy.context.scene, crowd.data.stipple
+    scenes.camera((0, 0, 10), width=48, height=48, type='ORTHO', ortho_scale=3.0)
+    scene.render.engine, scene.render.film_transparent = 'STIPPLE', True
+    stored.ratio = 0.05
+    scene.frame_set(5)
+    stored.ratio_render = 1.0
+    whole = scenes.render_pixels(tmp_path, 'whole')
+    stored.ratio_render = 0.05
+    few = scenes.render_pixels(tmp_path, 'few')
+    assert np.abs(whole - few).max() > 0.05
+    assert len(shown(stipple, crowd)) == 10
 
 
 def test_images_and_files_are_of_their_frame(stipple, clip, tmp_path):

@@ -50,15 +50,57 @@ def test_a_fit_of_moving_splats_is_a_model_with_times(model):
     assert (info['time_begin'], info['time_end']) == (0, 1)
 
 
-def test_it_decodes_at_any_time_and_always_whole(model, tmp_path):
-    count = json.loads(run('info', model, '--json').stdout)['count']
+def splats_of(path):
+    return json.loads(run('info', path, '--json').stdout)['count']
+
+
+def test_it_decodes_at_any_time(model, tmp_path):
+    count = splats_of(model)
     for name, seconds in (('begin', 0), ('again', -7), ('middle', 0.27), ('end', 1)):
         run('decode', model, tmp_path / f'{name}.ply', '--time', seconds)
-        assert json.loads(run('info', tmp_path / f'{name}.ply', '--json').stdout)['count'] == count
+        assert splats_of(tmp_path / f'{name}.ply') == count
     files = {name: (tmp_path / f'{name}.ply').read_bytes() for name in ('begin', 'again', 'middle', 'end')}
     assert files['begin'] == files['again']
     assert len(set(files.values())) == 3
-    assert f'{count} to {count} is allowed' in error('decode', model, tmp_path / 'few.ply', '--anchors', count - 1)
+    assert f'1 to {count} is allowed' in error('decode', model, tmp_path / 'many.ply', '--anchors', count + 1)
+
+
+def test_it_decodes_at_any_budget_with_the_tree_of_its_fit(model, tmp_path):
+    count = splats_of(model)
+    assert b'tree.parents' in model.read_bytes()
+    for name, budget, seconds in (('few', ('--anchors', 7), 0.27), ('half', ('--ratio', 0.5), 0.27),
+                                  ('later', ('--ratio', 0.5), 0.8)):
+        run('decode', model, tmp_path / f'{name}.ply', *budget, '--time', seconds)
+    assert splats_of(tmp_path / 'few.ply') == 7
+    assert splats_of(tmp_path / 'half.ply') == splats_of(tmp_path / 'later.ply') == round(count / 2)
+    assert (tmp_path / 'half.ply').read_bytes() != (tmp_path / 'later.ply').read_bytes()
+
+
+def without_tree(path, out):
+    """The asset as versions before trees wrote it."""
+    data = path.read_bytes()
+    size = int.from_bytes(data[:8], 'little')
+    header, kept, tensors = json.loads(data[8:8 + size]), {}, b''
+    for name, tensor in header.items():
+        if name.startswith('tree.'):
+            continue
+        kept[name] = tensor
+        if name != '__metadata__':
+            first, last = tensor['data_offsets']
+            tensor['data_offsets'] = [len(tensors), len(tensors) + last - first]
+            tensors += data[8 + size + first:8 + size + last]
+    text = json.dumps(kept).encode()
+    text += b' ' * (-len(text) % 8)
+    out.write_bytes(len(text).to_bytes(8, 'little') + text + tensors)
+
+
+def test_an_asset_without_a_tree_decodes_to_the_same(model, tmp_path):
+    old = tmp_path / 'old.stipple.safetensors'
+    without_tree(model, old)
+    assert b'tree.' not in old.read_bytes()
+    for name, path in (('with', model), ('without', old)):
+        run('decode', path, tmp_path / f'{name}.ply', '--ratio', 0.25, '--time', 0.4)
+    assert (tmp_path / 'with.ply').read_bytes() == (tmp_path / 'without.ply').read_bytes()
 
 
 def test_an_image_is_of_its_time(moving, model, tmp_path):

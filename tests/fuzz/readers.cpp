@@ -360,17 +360,26 @@ std::vector<std::string> hierarchySeeds(const fs::path& folder) {
   return made;
 }
 
+void fillMoving(MotionTensors& tensors, size_t count, int degree) {
+  tensors.splats = randomCloud(count, degree, 1);
+  for (auto& wave : tensors.waves) wave.assign(3 * count, 0.25f);
+  tensors.phases.assign(4 * count, 0.5f);
+  tensors.spins.assign(4 * count, 0.1f);
+  tensors.lifespans.assign(2 * count, 0.75f);
+  tensors.centres.assign(count, 0.5f);
+}
+
 std::vector<std::string> motionSeeds(const fs::path& folder) {
   std::vector<std::string> made;
   for (const int degree : {0, 2}) {
     MotionAsset asset;
-    asset.splats = randomCloud(3, degree, 1);
-    for (auto& wave : asset.waves) wave.assign(9, 0.25f);
-    asset.phases.assign(12, 0.5f);
-    asset.spins.assign(12, 0.1f);
-    asset.lifespans.assign(6, 0.75f);
-    asset.centres.assign(3, 0.5f);
+    fillMoving(asset, 3, degree);
     asset.frame_count = 9;
+    if (degree == 2) {
+      fillMoving(asset.nodes, 2, degree);
+      asset.parents = {UINT32_MAX, 0, 0, 1, 1};
+      asset.errors = {0.5f, 0.25f};
+    }
     writeMotionAsset(asset, (folder / "seed").string());
     made.push_back(load(folder / "seed"));
     writeRestMesh((folder / "seed").string(), {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2}, 7, true},

@@ -36,28 +36,7 @@ HierarchyDecoder::HierarchyDecoder(std::shared_ptr<const SplatCloud> leaves,
 }
 
 std::vector<uint32_t> HierarchyDecoder::cut(uint64_t budget) const {
-  const size_t leaf_count = leaves_->size();
-  if (budget < 1 || budget > leaf_count) {
-    fail(ErrorCode::kInvalidArgument, "the budget is " + std::to_string(budget) + " splats; 1 to " +
-                                          std::to_string(leaf_count) +
-                                          " is allowed, as many as the cloud has");
-  }
-  // The first budget - 1 inner nodes are split: a node shows whose parent is and which itself is
-  // not.
-  const uint32_t split_count = static_cast<uint32_t>(budget - 1);
-  const uint32_t* parents = tree_->parents.data();
-  std::vector<uint32_t> ids(budget);
-  size_t filled = 0;
-  if (split_count == 0) {
-    ids[filled++] = 0;
-    return ids;
-  }
-  const uint32_t id_count = static_cast<uint32_t>(tree_->parents.size());
-  for (uint32_t id = split_count; id < id_count && filled < budget; ++id) {
-    ids[filled] = id;
-    filled += parents[id] < split_count ? 1 : 0;
-  }
-  return ids;
+  return cutOfShape(*tree_, budget);
 }
 
 SplatCloud HierarchyDecoder::decode(const DecodeRequest& request) const {

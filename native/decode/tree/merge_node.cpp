@@ -41,26 +41,7 @@ OpacityTable makeOpacityTable() {
   return table;
 }
 
-using std::max;
-using std::min;
-using std::sqrt;
-
-double pick(bool condition, double yes, double no) {
-  return condition ? yes : no;
-}
-double wholePart(double value) {
-  return std::floor(value);
-}
-double powerOfTwo(double n) {
-  return std::bit_cast<double>(static_cast<uint64_t>(static_cast<int64_t>(n) + 1023) << 52);
-}
-double rootGuess(double x) {
-  return std::bit_cast<double>(kRootGuess - (std::bit_cast<uint64_t>(x) >> 1));
-}
-void opacityEnds(double piece, double* ends) {
-  std::copy_n(&opacityTable().ends[2 * static_cast<size_t>(piece)], 4, ends);
-}
-
+#include "decode/tree/merge_numbers-inl.h"
 #include "decode/tree/merge_steps-inl.h"
 
 }  // namespace
@@ -100,6 +81,11 @@ double opacityOfDepth(double depth) {
   return opacityByTable(depth);
 }
 
+void measureNode(MergeNode& node, const MergeScale& scale) {
+  measureArea<double>(node, scale.footprint);
+  measurePlanes<double>(node, scale.footprint);
+}
+
 MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,
                    const MergeScale& scale) {
   MergeNode node;
@@ -115,8 +101,7 @@ MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,
     node.colour[axis] =
         std::max(0.0, 0.5 + static_cast<double>(kShC0) * static_cast<double>(sh[axis]));
   }
-  measureArea<double>(node, scale.footprint);
-  measurePlanes<double>(node, scale.footprint);
+  measureNode(node, scale);
   node.leaf_area = node.area;
   node.opacity = std::min(static_cast<double>(cloud.opacities[index]), kMergeMaxOpacity);
   node.depth = opticalDepth(node.opacity) * node.area;

@@ -82,12 +82,19 @@ constexpr double kFullInflationVisibility = 0.2;
 constexpr double kSmallestDeterminant = 1e-60;
 /// Less half of a number's bits: the bits of about 1 / sqrt of it (within 3.5 %).
 constexpr uint64_t kRootGuess = 0x5fe6eb50c7b537a9;
+/// Bits of a double's digits, and those of 1.
+constexpr uint64_t kMantissaBits = 0x000fffffffffffff;
+constexpr uint64_t kBitsOfOne = 0x3ff0000000000000;
 /// Below this an exponential is far below the errors of moments: 0.
 constexpr double kLeastExponent = -40;
 
 /// Entries of the covariance that a coordinate plane keeps, and its axes.
 constexpr size_t kPlaneEntries[3][3] = {{0, 1, 3}, {0, 2, 5}, {3, 4, 5}};
 constexpr size_t kPlaneAxes[3][2] = {{0, 1}, {0, 2}, {1, 2}};
+
+/// Fills the area and the plane sizes of a node without inflation, which follow from its
+/// covariance.
+void measureNode(MergeNode& node, const MergeScale& scale);
 
 MergeNode leafNode(const SplatCloud& cloud, size_t index, double visibility,
                    const MergeScale& scale);

@@ -8,7 +8,6 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "decode/tree/merge_cost.h"
 #include "decode/tree/merge_neighbours.h"
 
 // Based on: Murtagh, A Survey of Recent Advances in Hierarchical Clustering Algorithms, Computer
@@ -36,8 +35,7 @@ struct Entry {
 /// A merged node lives on in the slot of its first child.
 class MergeRounds {
  public:
-  MergeRounds(std::vector<MergeNode> nodes, const MergeScale& scale)
-      : scale_(scale), nodes_(std::move(nodes)), count_(nodes_.size()) {
+  explicit MergeRounds(MergingNodes& nodes) : nodes_(nodes), count_(nodes.size()) {
     ids_.resize(count_);
     active_.resize(count_);
     for (size_t i = 0; i < count_; ++i) ids_[i] = active_[i] = static_cast<uint32_t>(i);
@@ -52,8 +50,7 @@ class MergeRounds {
     merges_.reserve(count_ == 0 ? 0 : count_ - 1);
   }
 
-  template <typename OnMerge>
-  std::vector<Merge> run(const OnMerge& on_merge, Progress* progress) {
+  std::vector<Merge> run(Progress* progress) {
     searchNeighbours();
     size_t searched_at = active_.size();
     while (active_.size() > 1) {
@@ -72,7 +69,7 @@ class MergeRounds {
         searched_at = active_.size();
         continue;
       }
-      mergePairs(on_merge);
+      mergePairs();
       updateLists();
       // Long chains of ever cheaper partners have one pair each; taking costs within an eighth of
       // an octave for equal breaks them.
@@ -82,19 +79,12 @@ class MergeRounds {
   }
 
  private:
-  /// Nodes lie all over the memory; the costs of a list wait for them less where they are asked for
-  /// as soon as they are known.
-  static void fetchAhead(const MergeNode& node) {
-    const char* bytes = reinterpret_cast<const char*>(&node);
-    for (size_t line = 0; line < sizeof(MergeNode); line += 64) __builtin_prefetch(bytes + line);
-  }
-
   /// Costs of a node with the others of entries[0..count).
   void fillCosts(uint32_t slot, Entry* entries, size_t count) const {
     uint32_t others[2 * kListCapacity] = {};
     float costs[2 * kListCapacity];
     for (size_t k = 0; k < count; ++k) others[k] = entries[k].slot;
-    kernel_.costs(nodes_.data(), slot, others, count, scale_, costs);
+    nodes_.costs(slot, others, count, costs);
     for (size_t k = 0; k < count; ++k) entries[k].cost = costs[k];
   }
 
@@ -116,13 +106,11 @@ class MergeRounds {
 
   void searchNeighbours() {
     const size_t count = active_.size();
-    std::vector<double> places(count * 3);
-    for (size_t i = 0; i < count; ++i) {
-      const MergeNode& node = nodes_[active_[i]];
-      std::copy(node.mean.begin(), node.mean.end(), places.begin() + static_cast<long>(i * 3));
-      sizes_[active_[i]] = 0;
-    }
-    const std::vector<uint32_t> rows = nearestNeighbours(places, kNeighbourCount);
+    const size_t width = nodes_.placeWidth();
+    std::vector<double> places(count * width);
+    nodes_.places(active_, places.data());
+    for (const uint32_t slot : active_) sizes_[slot] = 0;
+    const std::vector<uint32_t> rows = nearestNeighbours(places, kNeighbourCount, width);
     const auto append = [&](uint32_t slot, uint32_t other) {
       if (sizes_[slot] == kListCapacity) return;
       entries_[slot * kListCapacity + sizes_[slot]++] = {0.0f, other};
@@ -218,8 +206,7 @@ class MergeRounds {
     }
   }
 
-  template <typename OnMerge>
-  void mergePairs(const OnMerge& on_merge) {
+  void mergePairs() {
     ++round_;
     const size_t first_merge = merges_.size();
     merges_.resize(first_merge + pairs_.size());
@@ -227,12 +214,10 @@ class MergeRounds {
       for (size_t i = begin; i < end; ++i) {
         const auto [a, b] = pairs_[i];
         const uint32_t id = static_cast<uint32_t>(count_ + first_merge + i);
-        const MergeNode merged = mergedNode(nodes_[a], nodes_[b], scale_);
+        const float made = nodes_.merge(a, b, {id, ids_[a], ids_[b]});
         // Never below that of the children, so that a cut refines from the top.
-        const float error = std::max({best_[a].cost, errors_[a], errors_[b]});
+        const float error = std::max({best_[a].cost, made, errors_[a], errors_[b]});
         merges_[first_merge + i] = {ids_[a], ids_[b], error};
-        on_merge(id, merges_[first_merge + i], nodes_[a], nodes_[b], merged);
-        nodes_[a] = merged;
         ids_[a] = id;
         errors_[a] = error;
         alias_[b] = a;
@@ -297,16 +282,16 @@ class MergeRounds {
   /// What is around a node: itself and the partners of those whose lists are its own. Who is near
   /// to both children counts twice.
   void lookAround(uint32_t slot, std::initializer_list<uint32_t> sources) {
-    Surrounding surrounding;
-    surrounding.add(nodes_[slot]);
+    uint32_t others[2 * kListCapacity];
+    size_t count = 0;
     for (const uint32_t source : sources) {
       const Entry* list = &entries_[source * kListCapacity];
       for (size_t k = 0; k < sizes_[source]; ++k) {
         const uint32_t other = alias_[list[k].slot];
-        if (other != slot) surrounding.add(nodes_[other]);
+        if (other != slot) others[count++] = other;
       }
     }
-    nodes_[slot].around = surrounding.mean();
+    nodes_.lookAround(slot, {others, count});
   }
 
   /// The list of a merged node: the partners of both children, the cheapest kept.
@@ -324,7 +309,7 @@ class MergeRounds {
         for (size_t j = 0; j < count; ++j) known |= candidates[j].slot == slot;
         if (known) continue;
         candidates[count++] = {0.0f, slot};
-        fetchAhead(nodes_[slot]);
+        nodes_.fetchAhead(slot);
       }
     }
     fillCosts(a, candidates, count);
@@ -361,8 +346,7 @@ class MergeRounds {
     uint32_t second;
   };
 
-  MergeScale scale_;
-  std::vector<MergeNode> nodes_;  ///< [slots]
+  MergingNodes& nodes_;
   size_t count_;
   std::vector<uint32_t> ids_;      ///< [slots] of the node that lives there
   std::vector<uint32_t> active_;   ///< slots in use, ascending
@@ -379,17 +363,12 @@ class MergeRounds {
   uint32_t round_ = 0;
   bool coarse_ = false;
   bool was_coarse_ = false;
-  MergeCostKernel kernel_ = chosenMergeCostKernel();
 };
 
 }  // namespace
 
-std::vector<Merge> mergeInRounds(
-    std::vector<MergeNode> nodes, const MergeScale& scale,
-    const std::function<void(uint32_t id, const Merge& merge, const MergeNode& first,
-                             const MergeNode& second, const MergeNode& merged)>& on_merge,
-    Progress* progress) {
-  return MergeRounds(std::move(nodes), scale).run(on_merge, progress);
+std::vector<Merge> mergeInRounds(MergingNodes& nodes, Progress* progress) {
+  return MergeRounds(nodes).run(progress);
 }
 
 }  // namespace stipple

@@ -84,10 +84,10 @@ void measurePlanes(MergeValues<T>& node, T footprint) {
   }
 }
 
-/// mergedNode. Both nodes count alike: exchanging them changes no bit.
+/// The moments of a mixture, and the sum of what both cover. Both nodes count alike: exchanging
+/// them changes no bit.
 template <class T>
-void mergeMoments(const MergeValues<T>& a, const MergeValues<T>& b, T footprint,
-                  MergeValues<T>& node) {
+void mixMoments(const MergeValues<T>& a, const MergeValues<T>& b, MergeValues<T>& node) {
   node.weight = a.weight + b.weight;
   const auto has_weight = node.weight > T(0.0);
   const T inverse_weight = T(1.0) / pick(has_weight, node.weight, T(1.0));
@@ -106,7 +106,6 @@ void mergeMoments(const MergeValues<T>& a, const MergeValues<T>& b, T footprint,
     node.covariance[i] = share_a * a.covariance[i] + share_b * b.covariance[i] +
                          spread * (apart[row] * apart[column]);
   }
-  measureArea(node, footprint);
   node.leaf_area = share_a * a.leaf_area + share_b * b.leaf_area;
   node.visibility = share_a * a.visibility + share_b * b.visibility;
   node.contrast = share_a * a.contrast + share_b * b.contrast;
@@ -115,11 +114,25 @@ void mergeMoments(const MergeValues<T>& a, const MergeValues<T>& b, T footprint,
   const T seen_a = pick(node.visibility > a.visibility, a.visibility * inverse_seen, T(1.0));
   const T seen_b = pick(node.visibility > b.visibility, b.visibility * inverse_seen, T(1.0));
   node.depth = seen_a * a.depth + seen_b * b.depth;
+}
+
+/// How much larger than its moments a node with its area and its depth is drawn.
+template <class T>
+T inflationOf(const MergeValues<T>& node) {
   // 0 where all leaves lie in one place, near 1 where the area is that between them.
   const T spacing = max(T(1.0) - node.leaf_area / node.area, T(0.0));
   const T open = min(node.visibility * T(1 / kFullInflationVisibility), T(1.0));
   const T surplus = max(node.depth / (T(kLargestDepth) * node.area), T(1.0));
-  node.inflation = T(1.0) + open * (min(T(1.0) + spacing * spacing, surplus) - T(1.0));
+  return T(1.0) + open * (min(T(1.0) + spacing * spacing, surplus) - T(1.0));
+}
+
+/// mergedNode.
+template <class T>
+void mergeMoments(const MergeValues<T>& a, const MergeValues<T>& b, T footprint,
+                  MergeValues<T>& node) {
+  mixMoments(a, b, node);
+  measureArea(node, footprint);
+  node.inflation = inflationOf(node);
   node.opacity = opacityByTable(node.depth / (node.area * node.inflation));
   measurePlanes(node, footprint);
 }

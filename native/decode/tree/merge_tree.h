@@ -1,27 +1,17 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
-#include <vector>
 
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
+#include "decode/tree/tree_shape.h"
 
 namespace stipple {
 
-/// A binary tree over the splats of a cloud. Each inner node is what its leaves were merged into.
-/// Inner nodes are numbered in the order in which growing budgets split them: node 0 is the root,
-/// errors fall, a parent comes before its children. Ids: inner nodes 0..N-2, then the N leaves.
-struct MergeTree {
-  static constexpr uint32_t kNoParent = std::numeric_limits<uint32_t>::max();
-
-  SplatCloud nodes;               ///< [N-1] inner nodes
-  std::vector<uint32_t> parents;  ///< [2N-1] by id; kNoParent for the root
-  std::vector<float> errors;      ///< [N-1] of each inner node, never rising
-
-  size_t leafCount() const { return parents.empty() ? 0 : parents.size() / 2 + 1; }
+/// A tree over the splats of a cloud. Each inner node is what its leaves were merged into.
+struct MergeTree : TreeShape {
+  SplatCloud nodes;  ///< [N-1] inner nodes
 };
 
 struct MergeTreeOptions {
@@ -30,9 +20,6 @@ struct MergeTreeOptions {
   /// 0: 1/1400 of the cloud's extent, half a pixel of a picture of 800.
   double footprint = 0;
 };
-
-/// Most leaves of a tree: ids are 32 bit.
-constexpr size_t kMaxTreeLeaves = (size_t{1} << 31) - 1;
 
 /// Builds the tree bottom-up: neighbours that are each other's cheapest partner merge, round by
 /// round.

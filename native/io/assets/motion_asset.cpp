@@ -16,12 +16,15 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr char kStem[] = "motion.";
+constexpr char kSplats[] = "motion.";
+constexpr char kNodes[] = "tree.nodes.";
+constexpr char kParents[] = "tree.parents";
+constexpr char kErrors[] = "tree.errors";
 constexpr char kClip[] = "clip";
 constexpr uint64_t kMostFrames = uint64_t{1} << 24;
 
-std::string waveName(size_t wave) {
-  return (wave % 2 == 0 ? "motion.cosines." : "motion.sines.") + std::to_string(wave / 2 + 1);
+std::string waveName(const std::string& stem, size_t wave) {
+  return stem + (wave % 2 == 0 ? "cosines." : "sines.") + std::to_string(wave / 2 + 1);
 }
 
 double lastSecond(const MotionAsset& asset) {
@@ -44,15 +47,14 @@ void validateClip(const MotionAsset& asset, const std::string& name, ErrorCode c
                  "needed");
 }
 
-/// Sizes that agree and splats that are splats, for an asset from either side.
-void validateAsset(const MotionAsset& asset, const std::string& name, ErrorCode code) {
+/// Sizes that agree and splats that are splats.
+void validateTensors(const MotionTensors& tensors, const std::string& stem, size_t count,
+                     const std::string& name, ErrorCode code) {
   try {
-    validate(asset.splats, (name + ": motion").c_str());
+    validate(tensors.splats, (name + ": " + stem.substr(0, stem.size() - 1)).c_str());
   } catch (const Error& error) {
     fail(code, error.what());
   }
-  const size_t count = asset.splats.size();
-  if (count == 0) fail(code, name + " has 0 splats; at least 1 is needed");
   const auto requireColumn = [&](const std::string& what, const std::vector<float>& values,
                                  size_t width) {
     if (values.size() != count * width) {
@@ -65,14 +67,53 @@ void validateAsset(const MotionAsset& asset, const std::string& name, ErrorCode 
                      "; every value must be a finite number");
     }
   };
-  for (size_t wave = 0; wave < MotionAsset::kWaves; ++wave) {
-    requireColumn(waveName(wave), asset.waves[wave], 3);
+  requireColumn(stem + "opacities", tensors.splats.opacities, 1);
+  for (size_t wave = 0; wave < MotionTensors::kWaves; ++wave) {
+    requireColumn(waveName(stem, wave), tensors.waves[wave], 3);
   }
-  requireColumn("motion.phases", asset.phases, 4);
-  requireColumn("motion.spins", asset.spins, 4);
-  requireColumn("motion.lifespans", asset.lifespans, 2);
-  requireColumn("motion.centres", asset.centres, 1);
+  requireColumn(stem + "phases", tensors.phases, 4);
+  requireColumn(stem + "spins", tensors.spins, 4);
+  requireColumn(stem + "lifespans", tensors.lifespans, 2);
+  requireColumn(stem + "centres", tensors.centres, 1);
+}
+
+void validateAsset(const MotionAsset& asset, const std::string& name, ErrorCode code) {
+  const size_t count = asset.splats.size();
+  validateTensors(asset, kSplats, count, name, code);
+  if (count == 0) fail(code, name + " has 0 splats; at least 1 is needed");
   validateClip(asset, name, code);
+  if (asset.parents.empty()) return;
+  validateTensors(asset.nodes, kNodes, count - 1, name, code);
+  const auto requireRows = [&](const char* what, size_t seen, size_t needed) {
+    if (seen == needed) return;
+    fail(code, name + ": " + what + " has " + std::to_string(seen) + " rows; " +
+                   std::to_string(needed) + " are needed for " + std::to_string(count) + " splats");
+  };
+  requireRows(kErrors, asset.errors.size(), count - 1);
+  requireRows(kParents, asset.parents.size(), 2 * count - 1);
+}
+
+void addTensors(SafeTensorsWriter& file, const std::string& stem, const MotionTensors& tensors) {
+  addCloudTensors(file, stem, tensors.splats);
+  for (size_t wave = 0; wave < MotionTensors::kWaves; ++wave) {
+    file.add(waveName(stem, wave), tensors.waves[wave], 3);
+  }
+  file.add(stem + "phases", tensors.phases, 4);
+  file.add(stem + "spins", tensors.spins, 4);
+  file.add(stem + "lifespans", tensors.lifespans, 2);
+  file.add(stem + "centres", tensors.centres, 1);
+}
+
+void readTensors(const SafeTensorsReader& file, const std::string& stem, const SplatCloud& flags,
+                 MotionTensors& tensors) {
+  tensors.splats = readCloudTensors(file, stem, flags);
+  for (size_t wave = 0; wave < MotionTensors::kWaves; ++wave) {
+    tensors.waves[wave] = file.readFloats(waveName(stem, wave), 3);
+  }
+  tensors.phases = file.readFloats(stem + "phases", 4);
+  tensors.spins = file.readFloats(stem + "spins", 4);
+  tensors.lifespans = file.readFloats(stem + "lifespans", 2);
+  tensors.centres = file.readFloats(stem + "centres", 1);
 }
 
 void readClip(const SafeTensorsReader& file, MotionAsset& asset) {
@@ -113,14 +154,12 @@ void writeMotionAsset(const MotionAsset& asset, const std::string& path) {
                               .dump());
   file.setMetadata("settings",
                    settingsWithTime(asset.settings_json, {asset.begin, lastSecond(asset)}));
-  addCloudTensors(file, kStem, asset.splats);
-  for (size_t wave = 0; wave < MotionAsset::kWaves; ++wave) {
-    file.add(waveName(wave), asset.waves[wave], 3);
+  addTensors(file, kSplats, asset);
+  if (!asset.parents.empty()) {
+    addTensors(file, kNodes, asset.nodes);
+    file.add(kParents, asset.parents, 1);
+    file.add(kErrors, asset.errors, 1);
   }
-  file.add("motion.phases", asset.phases, 4);
-  file.add("motion.spins", asset.spins, 4);
-  file.add("motion.lifespans", asset.lifespans, 2);
-  file.add("motion.centres", asset.centres, 1);
   addAssetExtras(file, asset.extras);
   file.write(path);
 }
@@ -129,14 +168,16 @@ MotionAsset readMotionAsset(const std::string& path) {
   const SafeTensorsReader file(path);
   requireAssetKind(file, kAssetMotion);
   MotionAsset asset;
-  asset.splats = readCloudTensors(file, kStem, readCloudFlags(file));
-  for (size_t wave = 0; wave < MotionAsset::kWaves; ++wave) {
-    asset.waves[wave] = file.readFloats(waveName(wave), 3);
+  const SplatCloud flags = readCloudFlags(file);
+  readTensors(file, kSplats, flags, asset);
+  if (file.tensors().contains(kParents)) {
+    readTensors(file, kNodes, flags, asset.nodes);
+    asset.parents = file.readUint32s(kParents, 1);
+    asset.errors = file.readFloats(kErrors, 1);
+    if (asset.parents.empty()) {
+      fail(ErrorCode::kFormat, path + ": " + kParents + " has 0 rows; at least 1 is needed");
+    }
   }
-  asset.phases = file.readFloats("motion.phases", 4);
-  asset.spins = file.readFloats("motion.spins", 4);
-  asset.lifespans = file.readFloats("motion.lifespans", 2);
-  asset.centres = file.readFloats("motion.centres", 1);
   readClip(file, asset);
   asset.settings_json = requireText(file, "settings");
   asset.extras = readAssetExtras(file);

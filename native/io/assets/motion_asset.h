@@ -10,9 +10,9 @@
 
 namespace stipple {
 
-/// The stored parts of splats that move (motion/motion_cloud.h says what they mean): io knows
+/// The stored numbers of splats that move (motion/motion_cloud.h says what they mean): io knows
 /// arrays, not algorithms.
-struct MotionAsset {
+struct MotionTensors {
   /// Cosines of the first harmonic, sines of the first, cosines of the second and so on.
   static constexpr size_t kWaves = 8;
 
@@ -22,11 +22,18 @@ struct MotionAsset {
   std::vector<float> spins;                        ///< [N,4]
   std::vector<float> lifespans;                    ///< [N,2] above 0
   std::vector<float> centres;                      ///< [N] 0..1, parts of the clip
-  double begin = 0;                                ///< seconds of the first frame
+};
+
+/// The splats, their clip, and where they have one the tree of their merges.
+struct MotionAsset : MotionTensors {
+  double begin = 0;  ///< seconds of the first frame
   double frames_per_second = 24;
   uint32_t frame_count = 1;
   double window_frames = 0;  ///< of stretched time; 0: it is not stretched
   double window_share = 0.7;
+  MotionTensors nodes;               ///< [N-1] inner nodes in the order in which they are split
+  std::vector<uint32_t> parents;     ///< [2N-1] as of HierarchyAsset; none: there is no tree
+  std::vector<float> errors;         ///< [N-1]
   std::string settings_json = "{}";  ///< free for the caller (how the splats were made)
   AssetExtras extras;                ///< of the file that it was read from
 };

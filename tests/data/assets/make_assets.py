@@ -122,22 +122,30 @@ def latent():
            'settings': '{"seed": 42}', 'provenance': 'written by hand'}, tensors)
 
 
-def motion():
-    count, degree = 3, 1
+def moving(stem, count, degree, first):
     rotations = numpy.zeros((count, 4), '<f4')
     rotations[:, 1] = 1
-    tensors = {'motion.positions': f32(numbers(count, 3, 1)), 'motion.rotations': f32(rotations),
-               'motion.scales': f32(numbers(count, 3, 8)), 'motion.opacities': f32(numbers(count, 1, 20)[:, 0]),
-               'motion.sh': f32(numbers(count, 3 * (degree + 1)**2, 14)), 'motion.phases': f32(numbers(count, 4, 3)),
-               'motion.spins': f32(numbers(count, 4, 4)), 'motion.lifespans': f32(numbers(count, 2, 5)),
-               'motion.centres': f32(numbers(count, 1, 6)[:, 0]),
-               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+    tensors = {f'{stem}.positions': f32(numbers(count, 3, first)), f'{stem}.rotations': f32(rotations),
+               f'{stem}.scales': f32(numbers(count, 3, first + 7)),
+               f'{stem}.opacities': f32(numbers(count, 1, 20)[:, 0]),
+               f'{stem}.sh': f32(numbers(count, 3 * (degree + 1)**2, first + 13)),
+               f'{stem}.phases': f32(numbers(count, 4, first + 2)), f'{stem}.spins': f32(numbers(count, 4, first + 3)),
+               f'{stem}.lifespans': f32(numbers(count, 2, 5)), f'{stem}.centres': f32(numbers(count, 1, 6)[:, 0])}
+    if stem == 'motion':
+        tensors['future.labels'] = 'I16', numpy.array([[1, -2], [300, 4]], '<i2')
     for harmonic in range(1, 5):
-        tensors[f'motion.cosines.{harmonic}'] = f32(numbers(count, 3, 30 + harmonic))
-        tensors[f'motion.sines.{harmonic}'] = f32(numbers(count, 3, 40 + harmonic))
-    write('motion_1.0.stipple.safetensors',
+        tensors[f'{stem}.cosines.{harmonic}'] = f32(numbers(count, 3, first + 29 + harmonic))
+        tensors[f'{stem}.sines.{harmonic}'] = f32(numbers(count, 3, first + 39 + harmonic))
+    return tensors
+
+
+def motion(name, *more):
+    tensors = {}
+    for part in more:
+        tensors.update(part)
+    write(f'{name}_1.0.stipple.safetensors',
           {'stipple_version': '1.0', 'kind': 'motion', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
-           'frame': 'RUB', 'sh_degree': str(degree),
+           'frame': 'RUB', 'sh_degree': '1',
            'clip': '{"begin": 0.5, "frames": 9, "frames_per_second": 4, "window_frames": 50, "window_share": 0.75}',
            'settings': '{"seed": 42, "time": {"begin": 0.5, "end": 2.5}}', 'provenance': 'written by hand'}, tensors)
 
@@ -148,4 +156,7 @@ if __name__ == '__main__':
     field()
     whole_field()
     latent()
-    motion()
+    motion('motion', moving('motion', 3, 1, 1))
+    motion('motion_tree', moving('motion', 3, 1, 1), moving('tree.nodes', 2, 1, 101),
+           {'tree.parents': ('U32', numpy.array([2**32 - 1, 0, 0, 1, 1], '<u4')),
+            'tree.errors': f32(numpy.array([0.75, 0.5], '<f4'))})

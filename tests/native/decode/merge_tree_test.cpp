@@ -412,6 +412,26 @@ TEST(MergeTree, HiddenSplatsMergeFirstAndChangeNothing) {
   EXPECT_GT(near, 170u) << kept << " unchanged";
 }
 
+TEST(MergeTree, ManySplatsOfOnePlaceAreNotAChain) {
+  constexpr size_t kCount = 4000;
+  SplatCloud cloud = randomCloud(kCount, 9);
+  const auto repeat = [&](std::vector<float>& column) {
+    const size_t width = column.size() / kCount;
+    // A few of other places, so that the others must find them.
+    for (size_t i = width; i < column.size() - 20 * width; ++i) column[i] = column[i - width];
+  };
+  repeat(cloud.positions);
+  repeat(cloud.rotations);
+  repeat(cloud.scales);
+  repeat(cloud.opacities);
+  repeat(cloud.sh);
+  const MergeTree tree = buildMergeTree(cloud, {}, {});
+  std::vector<size_t> depths(tree.parents.size(), 0);
+  for (size_t id = 1; id < depths.size(); ++id) depths[id] = depths[tree.parents[id]] + 1;
+  // Twelve rounds would do; ties that are shuffled leave some over in each.
+  EXPECT_LT(*std::ranges::max_element(depths), 100u);
+}
+
 TEST(MergeTree, LongChainsOfEverCheaperPartnersEnd) {
   // On a line, each next gap a little smaller: only the last two splats are each other's nearest.
   constexpr size_t kCount = 20000;

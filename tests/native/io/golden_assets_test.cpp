@@ -168,16 +168,21 @@ TEST_F(GoldenAssets, ReadsALatentOfVersion1AndKeepsAllOfIt) {
   expectLatent(readLatentAsset(path("again")));
 }
 
-void expectMotion(const MotionAsset& asset) {
-  expectSplats(asset.splats, 3, 1);
+void expectMovingSplats(const MotionTensors& tensors, size_t rows, int first) {
+  expectSplats(tensors.splats, rows, first);
   for (size_t harmonic = 1; harmonic <= 4; ++harmonic) {
-    EXPECT_EQ(asset.waves[2 * harmonic - 2], numbers(3, 3, 30 + static_cast<int>(harmonic)));
-    EXPECT_EQ(asset.waves[2 * harmonic - 1], numbers(3, 3, 40 + static_cast<int>(harmonic)));
+    const int at = first + 29 + static_cast<int>(harmonic);
+    EXPECT_EQ(tensors.waves[2 * harmonic - 2], numbers(rows, 3, at));
+    EXPECT_EQ(tensors.waves[2 * harmonic - 1], numbers(rows, 3, at + 10));
   }
-  EXPECT_EQ(asset.phases, numbers(3, 4, 3));
-  EXPECT_EQ(asset.spins, numbers(3, 4, 4));
-  EXPECT_EQ(asset.lifespans, numbers(3, 2, 5));
-  EXPECT_EQ(asset.centres, numbers(3, 1, 6));
+  EXPECT_EQ(tensors.phases, numbers(rows, 4, first + 2));
+  EXPECT_EQ(tensors.spins, numbers(rows, 4, first + 3));
+  EXPECT_EQ(tensors.lifespans, numbers(rows, 2, 5));
+  EXPECT_EQ(tensors.centres, numbers(rows, 1, 6));
+}
+
+void expectMotion(const MotionAsset& asset) {
+  expectMovingSplats(asset, 3, 1);
   EXPECT_EQ(asset.begin, 0.5);
   EXPECT_EQ(asset.frame_count, 9u);
   EXPECT_EQ(asset.frames_per_second, 4);
@@ -190,8 +195,21 @@ void expectMotion(const MotionAsset& asset) {
 TEST_F(GoldenAssets, ReadsMovingSplatsOfVersion1AndKeepsAllOfThem) {
   const MotionAsset asset = readMotionAsset(golden("motion_1.0"));
   expectMotion(asset);
+  EXPECT_TRUE(asset.parents.empty());
   writeMotionAsset(asset, path("again"));
   expectMotion(readMotionAsset(path("again")));
+}
+
+TEST_F(GoldenAssets, ReadsMovingSplatsWithATreeAndKeepsAllOfThem) {
+  MotionAsset asset = readMotionAsset(golden("motion_tree_1.0"));
+  for (int time = 0; time < 2; ++time) {
+    expectMotion(asset);
+    expectMovingSplats(asset.nodes, 2, 101);
+    EXPECT_EQ(asset.parents, (std::vector<uint32_t>{UINT32_MAX, 0, 0, 1, 1}));
+    EXPECT_EQ(asset.errors, (std::vector<float>{0.75f, 0.5f}));
+    writeMotionAsset(asset, path("again"));
+    asset = readMotionAsset(path("again"));
+  }
 }
 
 TEST_F(GoldenAssets, ReadsAFieldThatSaysHowItsAnchorsAreDrawn) {

@@ -11,8 +11,10 @@
 #include "io/scratch_folder.h"
 #include "model/field_splats.h"
 #include "model/hierarchy_splats.h"
+#include "model/motion_splats.h"
 #include "model/splat_model.h"
 #include "model/surface_splats.h"
+#include "moving_cloud.h"
 #include "small_latent.h"
 #include "train/allocation_count.h"
 
@@ -144,6 +146,20 @@ TEST(DecodeMemory, OfHierarchiesIsBoundTightly) {
                   useOf(*model, budget, 1));
     }
   }
+}
+
+TEST(DecodeMemory, OfMovingSplatsIsWithinTheBoundWithAndWithoutTheirTree) {
+  constexpr uint64_t kCount = 20000;
+  const Model model = makeMotionSplats(test::movingCloud(kCount));
+  expectTight("all", useOf(*model, kCount, 1));
+  // The first smaller budget builds the tree. Its bound is of the most times that it may be asked
+  // for, twice as many as it has by default.
+  const Use building = useOf(*model, kCount / 2, 1);
+  EXPECT_GE(building.bound, building.peak);
+  EXPECT_LE(building.bound, 3 * building.peak);
+  const Use cutting = useOf(*model, kCount / 2, 1);
+  EXPECT_GE(cutting.bound, cutting.peak);
+  EXPECT_LT(cutting.bound, building.bound / 2);
 }
 
 TEST(DecodeMemory, OfFieldsIsBoundTightly) {

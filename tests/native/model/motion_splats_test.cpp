@@ -11,6 +11,7 @@
 #include "io/scratch_folder.h"
 #include "model/model_kinds.h"
 #include "moving_cloud.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 namespace {
@@ -45,11 +46,11 @@ TEST(MotionSplats, GivesItsSplatsAtEveryTime) {
   EXPECT_EQ(model->decode(at(3.375)).positions, model->decode(at(1e6)).positions);
 }
 
-TEST(MotionSplats, TellsItsClipAndHasOneBudget) {
+TEST(MotionSplats, TellsItsClipAndHasEveryBudget) {
   const auto model = makeMotionSplats(test::movingCloud(kCount));
   const ModelSettings settings = model->settings();
   EXPECT_EQ(settings.budget_unit, BudgetUnit::kSplats);
-  EXPECT_EQ(settings.minimum_budget, kCount);
+  EXPECT_EQ(settings.minimum_budget, 1u);
   EXPECT_EQ(settings.maximum_budget, kCount);
   EXPECT_EQ(settings.default_budget, kCount);
   EXPECT_FALSE(settings.has_order || settings.has_seed || settings.takes_mask);
@@ -59,16 +60,116 @@ TEST(MotionSplats, TellsItsClipAndHasOneBudget) {
   EXPECT_EQ(model->density(), nullptr);
   EXPECT_EQ(model->info().leaf_count, kCount);
   EXPECT_EQ(model->info().sh_degree, 1);
-  ModelRequest half = at(2);
-  half.budget = kCount / 2;
+  for (const uint64_t budget : {uint64_t{1}, kCount / 2, kCount - 1}) {
+    ModelRequest request = at(2.5);
+    request.budget = budget;
+    EXPECT_EQ(model->decode(request).size(), budget);
+  }
+  ModelRequest more = at(2);
+  more.budget = kCount + 1;
   try {
-    model->decode(half);
-    FAIL() << "a budget of half the splats is accepted";
+    model->decode(more);
+    FAIL() << "a budget of more than the splats is accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
-    EXPECT_NE(std::string(error.what()).find("20 splats; 40 to 40 is allowed"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("41 splats; 1 to 40 is allowed"), std::string::npos)
         << error.what();
   }
+}
+
+TEST_F(MotionSplatsFile, KeepsItsTreeOnceThereIsOne) {
+  const MotionCloud moving = test::movingCloud(kCount);
+  const auto model = makeMotionSplats(moving);
+  model->save(path("without"));
+  EXPECT_TRUE(readMotionAsset(path("without")).parents.empty());
+  ModelRequest half = at(2.6);
+  half.budget = kCount / 2;
+  const SplatCloud wanted = model->decode(half);
+  model->save(path("with"));
+  const MotionAsset seen = readMotionAsset(path("with"));
+  EXPECT_EQ(seen.parents.size(), 2 * kCount - 1);
+  EXPECT_EQ(seen.nodes.waves[0].size(), 3 * (kCount - 1));
+  EXPECT_EQ(loadModel(path("with"))->decode(half).positions, wanted.positions);
+  // Whoever opens the file without a tree gets the same.
+  EXPECT_EQ(loadModel(path("without"))->decode(half).positions, wanted.positions);
+  loadModel(path("with"))->save(path("again"));
+  EXPECT_EQ(load(path("again")), load(path("with")));
+}
+
+TEST_F(MotionSplatsFile, LooksAtItsSplatsWhereTheReaderHasWhatDraws) {
+  // A shell of opaque splats filled with as many that nobody sees, all on one path.
+  constexpr size_t kEach = 600;
+  MotionCloud moving = test::movingCloud(2 * kEach);
+  for (size_t i = 0; i < 2 * kEach; ++i) {
+    const double turn = 2.4 * static_cast<double>(i % kEach);
+    const double z = (2.0 * static_cast<double>(i % kEach) + 1) / kEach - 1;
+    // Without room in the middle, which would be looked at from inside.
+    const double depth = std::cbrt(0.001 * static_cast<double>(1 + i * 389 % 997));
+    const double radius = i < kEach ? 1 : 0.8 * depth, ring = radius * std::sqrt(1 - z * z);
+    moving.splats.positions[3 * i] = static_cast<float>(ring * std::cos(turn));
+    moving.splats.positions[3 * i + 1] = static_cast<float>(ring * std::sin(turn));
+    moving.splats.positions[3 * i + 2] = static_cast<float>(radius * z);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      moving.splats.scales[3 * i + axis] = i < kEach ? 0.1f : 0.08f;
+      for (auto& wave : moving.waves) wave[3 * i + axis] = 0.1f;
+      moving.splats.rotations[4 * i + axis + 1] = 0;
+    }
+    moving.splats.opacities[i] = 0.99f;
+    std::fill_n(&moving.phases[4 * i], 4, 0.0f);
+    std::fill_n(&moving.spins[4 * i], 4, 0.0f);
+    moving.centres[i] = 0.5f;
+    moving.lifespans[2 * i] = moving.lifespans[2 * i + 1] = 1.1f;
+  }
+  makeMotionSplats(moving)->save(path("a"));
+  const auto hiddenIn = [&](const SplatModel& model) {
+    ModelRequest half = at(2.5);
+    half.budget = kEach;
+    const SplatCloud cut = model.decode(half), all = splatsAt(moving, 2.5);
+    double centre[3] = {};
+    for (size_t i = 0; i < all.positions.size(); ++i) {
+      centre[i % 3] += static_cast<double>(all.positions[i]) / static_cast<double>(all.size());
+    }
+    size_t hidden = 0;
+    for (size_t i = 0; i < cut.size(); ++i) {
+      double squared = 0;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        squared += std::pow(static_cast<double>(cut.positions[3 * i + axis]) - centre[axis], 2);
+      }
+      hidden += squared < 0.9 * 0.9 ? 1 : 0;
+    }
+    return hidden;
+  };
+  const size_t blind = hiddenIn(*loadModel(path("a")));
+  const size_t looked = hiddenIn(*loadModel(path("a"), {"", nullptr, cpuBackends()}));
+  EXPECT_GT(blind, kEach / 5);
+  EXPECT_LT(looked, blind / 2);
+}
+
+TEST_F(MotionSplatsFile, RefusesTreesThatDoNotFit) {
+  MovingTree tree = buildMovingTree(test::movingCloud(5), {}, {});
+  makeMotionSplats(test::movingCloud(5), {}, std::make_shared<const MovingTree>(tree))
+      ->save(path("a"));
+  const MotionAsset good = readMotionAsset(path("a"));
+  // What the file may hold, and no tree has.
+  const auto refused = [&](const auto& spoil, std::initializer_list<const char*> words) {
+    MotionAsset asset = good;
+    spoil(asset);
+    writeMotionAsset(asset, path("bad"));
+    expectError(ErrorCode::kFormat, words, [&] { loadModel(path("bad")); });
+  };
+  refused([](MotionAsset& asset) { asset.parents[3] = 7; }, {"parent 7"});
+  refused([](MotionAsset& asset) { asset.errors[2] = 1e9f; }, {"error 2"});
+  refused([](MotionAsset& asset) { asset.nodes.lifespans[1] = 3; }, {"inner nodes", "lifespans"});
+  // What is not even written.
+  const auto unwritten = [&](const auto& spoil, std::initializer_list<const char*> words) {
+    MotionAsset asset = good;
+    spoil(asset);
+    expectError(ErrorCode::kInvalidArgument, words,
+                [&] { writeMotionAsset(asset, path("never")); });
+  };
+  unwritten([](MotionAsset& asset) { asset.nodes.spins.pop_back(); }, {"tree.nodes.spins", "4"});
+  unwritten([](MotionAsset& asset) { asset.errors.clear(); }, {"tree.errors", "0 rows; 4"});
+  unwritten([](MotionAsset& asset) { asset.parents.pop_back(); }, {"tree.parents", "8 rows; 9"});
 }
 
 TEST(MotionSplats, RefusesWhatDoesNotMove) {
