@@ -1,5 +1,6 @@
 #include "model/motion_splats.h"
 
+#include <string>
 #include <utility>
 
 #include "base/error.h"
@@ -66,6 +67,23 @@ class MotionSplats final : public SplatModel {
     asset.settings_json = notes_.settings_json;
     asset.extras = notes_.extras;
     writeMotionAsset(asset, path);
+  }
+
+  std::shared_ptr<const SplatModel> keep(std::span<const uint8_t> mask) const override {
+    const MotionCloud& moving = decoder_.moving();
+    MotionCloud left = kept(moving, mask);
+    if (left.size() == 0) {
+      fail(ErrorCode::kInvalidArgument, "mask leaves out all " + std::to_string(moving.size()) +
+                                            " splats; at least one must stay");
+    }
+    return makeMotionSplats(std::move(left));
+  }
+
+  uint64_t keepMemoryBound() const override {
+    const MotionCloud& moving = decoder_.moving();
+    constexpr uint64_t kOfMotion = 3 * kMotionWaves + 4 + 4 + 2 + 1;
+    constexpr uint64_t kOthers = 3 + 4 + 3 + 1;
+    return moving.size() * (kOfMotion + kOthers + moving.splats.shStride()) * sizeof(float);
   }
 
  protected:

@@ -70,6 +70,8 @@ class FitObserver {
   virtual void note(const std::string&) {}
   virtual bool wantsPreview() { return false; }
   virtual bool wantsContributions() { return false; }  ///< with previews
+  /// Seconds that previews of splats that move show; empty: the begin of their clip.
+  virtual std::optional<double> previewTime() { return std::nullopt; }
   /// The splats as they are now, where they were wanted, and what density control sees of them.
   virtual void preview(SplatCloud, SplatQuantities) {}
   /// To be kept for restore(). Errors become notes: the fit goes on.

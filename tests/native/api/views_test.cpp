@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -74,6 +75,45 @@ TEST_F(ViewsTest, GivesBackThePictureThatWasAdded) {
   EXPECT_EQ(depths, (std::vector<float>{2.5f, 0.0f}));
   EXPECT_EQ(masks, (std::vector<float>{0.0f, 1.0f}));
   EXPECT_EQ(normals, std::vector<float>(6, 0.0f));
+}
+
+TEST_F(ViewsTest, KnowsWhenAViewWasTakenAndWhatItIsFor) {
+  StippleViewImage given = picture(rgba_);
+  given.time = 0.125;
+  given.split = STIPPLE_VIEW_SPLIT_TEST;
+  STIPPLE_ASSERT_OK(stipple_views_add(views_, &camera_, &given, nullptr));
+  // A caller that was built before there were times: whatever lies behind his struct is not read.
+  given.struct_size = offsetof(StippleViewImage, time);
+  STIPPLE_ASSERT_OK(stipple_views_add(views_, &camera_, &given, nullptr));
+  auto view = sized<StippleViewInfo>();
+  STIPPLE_ASSERT_OK(stipple_views_view_info(views_, 0, &view));
+  EXPECT_EQ(view.time, 0.125);
+  EXPECT_EQ(view.split, uint32_t{STIPPLE_VIEW_SPLIT_TEST});
+  STIPPLE_ASSERT_OK(stipple_views_view_info(views_, 1, &view));
+  EXPECT_EQ(view.time, 0);
+  EXPECT_EQ(view.split, uint32_t{STIPPLE_VIEW_SPLIT_NONE});
+  StippleViewInfo shorter = {};
+  shorter.struct_size = offsetof(StippleViewInfo, time);
+  shorter.time = 7;
+  STIPPLE_ASSERT_OK(stipple_views_view_info(views_, 0, &shorter));
+  EXPECT_EQ(shorter.time, 7);
+
+  given.struct_size = offsetof(StippleViewImage, normals);
+  EXPECT_EQ(stipple_views_add(views_, &camera_, &given, nullptr), STIPPLE_ERROR_INVALID_ARGUMENT);
+  given.struct_size = sizeof(given);
+  given.split = 4;
+  EXPECT_EQ(stipple_views_add(views_, &camera_, &given, nullptr), STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(stipple_last_error_message(), "image->split is 4; 0 to 3 is allowed");
+  given.split = 0;
+  for (const double time :
+       {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    given.time = time;
+    EXPECT_EQ(stipple_views_add(views_, &camera_, &given, "late"), STIPPLE_ERROR_INVALID_ARGUMENT);
+    EXPECT_NE(std::string(stipple_last_error_message()).find("late: time"), std::string::npos);
+  }
+  uint64_t count = 0;
+  STIPPLE_ASSERT_OK(stipple_views_count(views_, &count));
+  EXPECT_EQ(count, 2u);
 }
 
 TEST_F(ViewsTest, BringsLinearPicturesIntoTheViewsColourSpace) {
