@@ -84,8 +84,9 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
             sync.write_decoded(obj.data, result.splats)
         else:
             # As they are at the present frame of the scene.
-            now = sources.decode_settings(stipple, scene=context.scene)
-            sync.write_decoded(obj.data, sources.model(result.path).decode(now).read())
+            now = sources.model(result.path).decode(sources.decode_settings(stipple, scene=context.scene)).read()
+            now.seen = result.splats.seen
+            sync.write_decoded(obj.data, now)
         report = fit_reports.keep(obj.data, obj.name, result.report)
         if bpy.app.background:
             fit_proposal.accept(context, obj, hide_source=False)

@@ -184,6 +184,8 @@ class FitTask(view_task.ViewTask):
                 self.job.wait()  # says why
             is_model = settings.model != 'EXPLICIT'
             made = self.job.model() if is_model else self.job.result()
+            # Rows of a field are drawn anew; of all others they stay.
+            seen = {} if settings.model == 'FIELD' else (self.job.result() if is_model else made).seen()
             report = self.job.draw_report(fit_reports.SCALE)
             if settings.report:
                 self.job.save_report(setting_paths.absolute(settings, 'report'))
@@ -192,10 +194,9 @@ class FitTask(view_task.ViewTask):
         is_whole = state.figures.iteration == state.figures.iterations
         yield 'keep', 0.0, 'Keeping the result'
         if is_model:
-            self._keep(made, sources.first_settings(made.settings()), report)  # seed 0: the fit's own draws
+            self._keep(made, sources.first_settings(made.settings()), report, seen)  # seed 0: the fit's own draws
             self._forget(checkpoint if is_whole else None)
             return
-        seen = made.seen()
         made = cloud_edit.merge([(made, np.eye(4))], self._frame)  # the same splats, with the label of their frame
         job = Model.from_cloud_start(self._native, made, seed=settings.seed)
         yield from self._until_done(job, 'keep')
