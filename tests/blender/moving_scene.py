@@ -27,9 +27,26 @@ def build(folder):
         ball.location, ball.rotation_euler = (x, 0.0, 0.0), (0.0, angle, 0.0)
         ball.keyframe_insert('location', frame=frame)
         ball.keyframe_insert('rotation_euler', frame=frame)
+    straighten(ball)
     scene.frame_set(FIRST)
     scenes.select(ball, box)
     return ball, box
+
+
+def fcurves(owner):
+    """The curves of an animated datablock, in any version."""
+    action = owner.animation_data.action
+    if bpy.app.version < (5, 0, 0):
+        return list(action.fcurves)
+    return [curve for layer in action.layers for strip in layer.strips for bag in strip.channelbags
+            for curve in bag.fcurves]
+
+
+def straighten(owner):
+    """An animated datablock changes evenly."""
+    for curve in fcurves(owner):
+        for point in curve.keyframe_points:
+            point.interpolation = 'LINEAR'
 
 
 def settings(**values):
