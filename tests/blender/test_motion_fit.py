@@ -150,7 +150,7 @@ def test_views_are_taken_at_their_times_by_cameras_that_move(stipple, tmp_path, 
     assert len(places) == 7 and np.all(np.diff(places) >= 0) and places[-1] > places[0]
 
 
-def test_stopping_halfway_leaves_the_scene_as_it_was(stipple, tmp_path, fitting):
+def test_stopping_halfway_leaves_the_scene_as_it_was(stipple, tmp_path, fitting, monkeypatch):
     """While surfaces are looked at, while views are rendered, and after an error in the middle."""
     ball, box = moving_scene.build(tmp_path)
     scene = bpy.context.scene
@@ -178,16 +178,20 @@ def test_stopping_halfway_leaves_the_scene_as_it_was(stipple, tmp_path, fitting)
     chosen.views_from = 'CAMERAS'
     scenes.refuses(bpy.ops.stipple.splats_fit, 'no perspective or orthographic camera')
     camera.data.type = 'PERSP'
-    mat = scenes.principled(ball.data.materials[0])
-    mat.inputs['Base Color'].links and ball.data.materials[0].node_tree.links.remove(mat.inputs['Base Color'].links[0])
-    mat.inputs['Metallic'].default_value = 0.0
-    chosen.engine = 'CYCLES'
-    chosen.samples = 1
-    light = scenes.link(bpy.data.objects.new('Light', bpy.data.lights.new('Light', 'POINT')))
-    light.data.energy = float('inf')
+    # Cycles fails in the middle and leaves no passes.
+    chosen.engine, chosen.samples, chosen.views_from = 'CYCLES', 1, 'RIG'
+    functions, drawn = module(stipple, '.cycles_functions'), []
+    draw = functions.render
+
+    def fail_later(engine, *given):
+        drawn.append(scene.frame_current)
+        return draw(engine, *given) if len(drawn) < 7 else {}
+
+    monkeypatch.setattr(functions, 'render', fail_later)
     before = state()
-    text = scenes.refuses(bpy.ops.stipple.splats_fit, 'not finite')
-    assert text.count('Error') == 1 and state() == before
+    text = scenes.refuses(bpy.ops.stipple.splats_fit, "no image for view 'view_0006 at frame")
+    assert text.count('Error') == 1 and len(drawn) == 7 and state() == before
+    assert sorted(drawn) == drawn and drawn[-1] > drawn[0]
 
 
 def test_bad_ranges_and_budgets_are_one_sentence(stipple, tmp_path, fitting):

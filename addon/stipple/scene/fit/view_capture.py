@@ -175,11 +175,13 @@ class Capture:
         scene.camera = camera_object
         self._passes.clear()
         with bpy.context.temp_override(scene=scene, view_layer=self._layer):
-            if self._path is None:
-                bpy.ops.render.render(scene=scene.name)
-            else:
-                bpy.ops.render.render(write_still=True, scene=scene.name)
-                self._read_file()
+            try:
+                bpy.ops.render.render(write_still=self._path is not None, scene=scene.name)
+            except RuntimeError as error:
+                said = '; '.join(line.removeprefix('Error: ') for line in str(error).strip().splitlines())
+                raise StippleError(f"View '{name}' could not be rendered: {said}", Status.ERROR_IO) from None
+        if self._path is not None:
+            self._read_file()
         if 'Combined' not in self._passes:
             raise StippleError(f"Blender rendered no image for view '{name}'; its messages are in the console.",
                                Status.ERROR_IO)
