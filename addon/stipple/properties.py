@@ -183,7 +183,7 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
     image_count: IntProperty(name="Images", description="Number of images that are rendered at most, spread evenly "
                              "over frames and cameras: each frame is seen by about as many cameras", default=240, min=2,
                              soft_max=2000, max=1000000, options=set())
-    held_out_cameras: IntProperty(name="Held-Out Cameras", description="Number of cameras whose images the fit is "
+    held_out_cameras: IntProperty(name="Held Out", description="Number of cameras whose images the fit is "
                                   "measured on and never learns from. With 0 it is measured on every eighth image",
                                   default=0, min=0, soft_max=10, max=10000, options=set())
     view_size: IntProperty(name="Resolution", description="Pixels of the longer side of a view", default=256, min=16,

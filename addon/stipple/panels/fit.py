@@ -153,6 +153,7 @@ def _draw_times(layout, context, settings):
         return
     seconds = view_pace.expected(view_task.capture_settings(settings), plan.image_count)
     draw_text(layout, context, str(plan) + ('' if seconds is None else f', about {duration(seconds)}'))
+    layout.separator()
 
 
 def _draw_switch(layout, settings, name):

@@ -51,7 +51,7 @@ def plan(settings, scene, camera_count):
     times = frames(settings, scene)
     held = settings.held_out_cameras
     if held >= camera_count:
-        raise invalid(f'All {camera_count} cameras are held out, and none is left to learn from; Held-Out Cameras must '
+        raise invalid(f'All {camera_count} cameras are held out, and none is left to learn from; Held Out must '
                       f'be smaller than {camera_count}.')
     if settings.image_count < len(times):
         raise invalid(f'Images is {settings.image_count:,}, and there are {len(times):,} times from frame '
