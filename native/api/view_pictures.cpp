@@ -176,12 +176,13 @@ StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera
 StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoints* points) {
   return guarded([&] {
     MemoryViewSource& source = writable(require(views, "views"));
-    const StippleViewPoints given = complete(points, "points");
+    const StippleViewPoints given =
+        completeUpTo(points, offsetof(StippleViewPoints, times), "points");
     if (given.count > 0) {
       require(given.positions, "points->positions");
       require(given.colours, "points->colours");
     }
-    constexpr uint64_t kBytesPerPoint = 11 * sizeof(float);
+    constexpr uint64_t kBytesPerPoint = 11 * sizeof(float) + sizeof(double);
     views->context->requireMemory(
         given.count > UINT64_MAX / kBytesPerPoint ? UINT64_MAX : given.count * kBytesPerPoint,
         "the points of views");
@@ -192,6 +193,7 @@ StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoi
     made.normals = copied(given.normals, count * 3);
     made.weights = copied(given.weights, count);
     made.opacities.assign(count, 1.0f);
+    if (given.times) made.times.assign(given.times, given.times + count);
     source.setPoints(std::move(made));
   });
 }

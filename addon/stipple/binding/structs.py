@@ -194,7 +194,7 @@ class StippleViewImage(_Sized):
 
 class StippleViewPoints(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('count', c_uint64), ('positions', _floats),
-                ('colours', _floats), ('normals', _floats), ('weights', _floats)]
+                ('colours', _floats), ('normals', _floats), ('weights', _floats), ('times', POINTER(c_double))]
 
 
 class StippleViewsInfo(_Sized):

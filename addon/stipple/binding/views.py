@@ -48,11 +48,16 @@ class Views(Handle):
         self._check(self.library.stipple_views_add(self.pointer, byref(camera), byref(picture),
                                                    None if name is None else name.encode()))
 
-    def set_points(self, positions, colours, normals=None, weights=None):
-        """positions [N,3] metres, colours [N,3] scene linear, normals [N,3], weights [N]."""
+    def set_points(self, positions, colours, normals=None, weights=None, times=None):
+        """positions [N,3] metres, colours [N,3] scene linear, normals [N,3], weights [N], times [N] seconds when a surface
+        was there, NaN for at all times."""
         count = len(positions)
         kept = _shaped('Point', {'positions': (positions, (count, 3)), 'colours': (colours, (count, 3)),
                                  'normals': (normals, (count, 3)), 'weights': (weights, (count,))})
+        if times is not None:
+            kept['times'] = contiguous(times, np.float64)
+            if kept['times'].shape != (count,):
+                raise invalid(f"Point array times has shape {kept['times'].shape}; allowed is {(count,)}.")
         points = StippleViewPoints(count=count, **{key: pointer_to(array) for key, array in kept.items()})
         self._check(self.library.stipple_views_set_points(self.pointer, byref(points)))
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -202,6 +203,16 @@ void validatePoints(const PointSet& points, const char* what) {
     }
     const std::string name = std::string(what) + ": " + array.name + " of point";
     requireFinite(array.values.data(), array.values.size(), array.channels, name.c_str());
+  }
+  if (!points.times.empty() && points.times.size() != count) {
+    fail(ErrorCode::kInvalidArgument, std::string(what) + ": times holds " +
+                                          std::to_string(points.times.size()) + " values; " +
+                                          std::to_string(count) + " are needed");
+  }
+  for (size_t i = 0; i < points.times.size(); ++i) {
+    if (std::isnan(points.times[i])) continue;  // at all times
+    requireFinite(points.times[i],
+                  (std::string(what) + ": time of point " + std::to_string(i)).c_str());
   }
 }
 

@@ -778,6 +778,8 @@ typedef struct StippleViewPoints {
   const float* colours;    /* [N,3] scene linear */
   const float* normals;    /* [N,3] unit. NULL: unknown */
   const float* weights;    /* [N] >= 0, what a point counts. NULL: alike */
+  const double* times;     /* [N] when a surface was there, seconds; splats that move begin with it as their moment.
+                              NULL: at all times. NaN: likewise, of one point */
 } StippleViewPoints;
 
 typedef struct StippleViewsInfo {

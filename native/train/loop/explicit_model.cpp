@@ -170,7 +170,8 @@ class ExplicitModel final : public FitModel, private Regulariser {
     for (const size_t length : MovingParameterisation::extraLengths()) {
       state.splats.extra_lengths.push_back(length);
     }
-    for (auto& values : motion_->initialExtras(state.splats.size(), options_.seed)) {
+    for (auto& values : motion_->initialExtras(state.splats.size(), options_.seed,
+                                              options_.start_times)) {
       state.splats.extras.push_back(std::move(values));
     }
     state.first_moments = state.second_moments = zerosLike(state.splats);
@@ -276,8 +277,10 @@ std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, cons
   start.sh_degree = options.sh_degree;
   start.antialias = options.antialias;
   start.seed = options.seed;
+  ExplicitModelOptions begun = options;
+  if (options.clip) begun.start_times = startTimes(views, start);
   return std::make_unique<ExplicitModel>(backends, startSplats(views, training, start, progress),
-                                         std::move(strategy), options, true);
+                                         std::move(strategy), begun, true);
 }
 
 std::unique_ptr<FitModel> makeExplicitModel(const BackendFactory& backends, const SplatCloud& start,

@@ -29,6 +29,7 @@ struct ExplicitModelOptions {
   /// Splats move over this clip: each view is drawn as they are at its time, and their motion is
   /// trained with them. Its window is what the strategy says (TimeStretch).
   std::optional<MotionClip> clip = {};
+  std::vector<double> start_times = {};  ///< of the splats of the start (startTimes())
 };
 
 /// Bytes that a fit takes for each splat at its largest, about: parameters, two moments and

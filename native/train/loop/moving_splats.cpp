@@ -4,6 +4,7 @@
 #include "train/loop/moving_splats.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "base/error.h"
@@ -49,6 +50,35 @@ void fillInParallel(size_t count, float* out, const Map& map) {
   });
 }
 
+/// Raw temporal scale with which a splat keeps kVisibleShare of its opacity at another time than
+/// its moment.
+float lifespanUpTo(const MotionClip& clip, double moment, double other) {
+  const double offset = std::abs(stretchedOffset(clip.window(), other, moment));
+  const double scale = std::max(offset / std::sqrt(-std::log(kVisibleShare)), kSmallestLifespan);
+  return static_cast<float>(std::log(scale / lifespanUnit(clip.frame_count)));
+}
+
+/// Splats whose surface was at their place at one time have that as their moment, and are hardly
+/// visible any more when others were looked at next. In: times [N] seconds, NaN for any time: such
+/// a splat stays as it is. Changes: moments [N], raw temporal scales [N,2].
+void beginAtTimes(const MotionClip& clip, std::span<const double> times,
+                  std::vector<float>& moments, std::vector<float>& lifespans) {
+  std::vector<double> known;
+  for (const double time : times) {
+    if (!std::isnan(time)) known.push_back(clip.partOf(time));
+  }
+  std::sort(known.begin(), known.end());
+  known.erase(std::unique(known.begin(), known.end()), known.end());
+  for (size_t i = 0; i < times.size(); ++i) {
+    if (std::isnan(times[i])) continue;
+    const double moment = clip.partOf(times[i]);
+    const auto at = std::lower_bound(known.begin(), known.end(), moment);
+    moments[i] = static_cast<float>(moment);
+    if (at != known.begin()) lifespans[2 * i] = lifespanUpTo(clip, moment, *(at - 1));
+    if (at + 1 != known.end()) lifespans[2 * i + 1] = lifespanUpTo(clip, moment, *(at + 1));
+  }
+}
+
 }  // namespace
 
 MotionClip clipOfViews(const ViewSource& views) {
@@ -91,8 +121,8 @@ std::vector<double> MovingParameterisation::rates(double position_rate, double e
   return rates;
 }
 
-std::vector<std::vector<float>> MovingParameterisation::initialExtras(size_t count,
-                                                                      uint64_t seed) const {
+std::vector<std::vector<float>> MovingParameterisation::initialExtras(
+    size_t count, uint64_t seed, std::span<const double> times) const {
   std::vector<std::vector<float>> extras;
   for (const size_t length : extraLengths()) extras.emplace_back(count * length, 0.0f);
   std::fill(extras[kLifespans].begin(), extras[kLifespans].end(), kStartLifespan);
@@ -103,6 +133,7 @@ std::vector<std::vector<float>> MovingParameterisation::initialExtras(size_t cou
     const uint32_t frame = std::min(static_cast<uint32_t>(place) * kFramesBetweenMoments, last);
     extras[kCentres][i] = static_cast<float>(static_cast<double>(frame) / clip_.frame_count);
   }
+  if (!times.empty()) beginAtTimes(clip_, times, extras[kCentres], extras[kLifespans]);
   return extras;
 }
 

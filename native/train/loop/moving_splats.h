@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "data/views/view_source.h"
@@ -38,8 +39,11 @@ class MovingParameterisation final : public Parameterisation {
   /// cameras, metres.
   static std::vector<double> rates(double position_rate, double extent);
   /// The extras of splats that begin to move: they stand still, and their moments are drawn among
-  /// every 20th frame and the last one.
-  std::vector<std::vector<float>> initialExtras(size_t count, uint64_t seed) const;
+  /// every 20th frame and the last one. In: times: empty, or [count] seconds at which a splat's
+  /// surface was where it stands, NaN for any: that time is its moment, and it fades to
+  /// kVisibleShare until the nearest other of these times on either side.
+  std::vector<std::vector<float>> initialExtras(size_t count, uint64_t seed,
+                                                std::span<const double> times = {}) const;
   /// The temporal scale of each splat that fades it at the present time, in stretched time. Out:
   /// lifespans [N].
   void lifespansInUse(const RawSplats& raw, std::vector<float>& lifespans) const;

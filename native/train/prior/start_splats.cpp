@@ -61,12 +61,17 @@ std::vector<size_t> choosePoints(const PointSet& points, size_t count, uint64_t 
   return chosen;
 }
 
+/// Those that splats stand at.
+std::vector<size_t> chosenPoints(const PointSet& points, const StartOptions& options) {
+  const uint64_t wanted = options.count > 0 ? options.count : points.size();
+  return choosePoints(points, capped(wanted, options.max_count), options.seed);
+}
+
 StartPoints fromPoints(const ViewSource& views, const StartOptions& options) {
   const PointSet& points = views.points();
-  const uint64_t wanted = options.count > 0 ? options.count : points.size();
   const bool is_display = views.colourSpace() == ColourSpace::kDisplay;
   StartPoints start;
-  for (const size_t i : choosePoints(points, capped(wanted, options.max_count), options.seed)) {
+  for (const size_t i : chosenPoints(points, options)) {
     float colour[3];
     for (size_t c = 0; c < 3; ++c) {
       const float linear = points.colours[i * 3 + c];
@@ -226,6 +231,14 @@ SplatCloud startSplats(const ViewSource& views, std::span<const size_t> training
     }
   }
   return splatsAt(points, views, training, options);
+}
+
+std::vector<double> startTimes(const ViewSource& views, const StartOptions& options) {
+  std::vector<double> times;
+  const PointSet& points = views.points();
+  if (points.times.empty()) return times;
+  for (const size_t i : chosenPoints(points, options)) times.push_back(points.times[i]);
+  return times;
 }
 
 }  // namespace stipple

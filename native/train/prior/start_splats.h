@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
@@ -33,5 +34,9 @@ struct StartOptions {
 /// Source: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section 5.
 SplatCloud startSplats(const ViewSource& views, std::span<const size_t> training,
                        const StartOptions& options, Progress* progress = nullptr);
+
+/// When the surface at each of these splats was there: [N] seconds, NaN at all times (PointSet);
+/// empty where no point says so, or where they do not stand at points.
+std::vector<double> startTimes(const ViewSource& views, const StartOptions& options);
 
 }  // namespace stipple

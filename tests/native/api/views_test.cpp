@@ -196,6 +196,18 @@ TEST_F(ViewsTest, KeepsPoints) {
   EXPECT_EQ(read_colours, colours);
   EXPECT_EQ(stipple_views_read_points(views_, 1, read_positions.data(), nullptr),
             STIPPLE_ERROR_BUFFER_TOO_SMALL);
+  // A caller that was built before points had times.
+  points.struct_size = offsetof(StippleViewPoints, times);
+  points.times = reinterpret_cast<const double*>(1);
+  STIPPLE_ASSERT_OK(stipple_views_set_points(views_, &points));
+  points.struct_size = sizeof(points);
+  const std::vector<double> times = {0.5, std::numeric_limits<double>::quiet_NaN()};
+  points.times = times.data();
+  STIPPLE_ASSERT_OK(stipple_views_set_points(views_, &points));
+  const std::vector<double> endless = {std::numeric_limits<double>::infinity(), 0};
+  points.times = endless.data();
+  EXPECT_EQ(stipple_views_set_points(views_, &points), STIPPLE_ERROR_INVALID_ARGUMENT);
+  points.times = nullptr;
   points.count = UINT64_MAX;
   EXPECT_NE(stipple_views_set_points(views_, &points), STIPPLE_OK);
 }

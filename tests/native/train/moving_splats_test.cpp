@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
@@ -98,6 +99,40 @@ TEST(MovingParameterisation, DrawsMomentsAmongEvery20thFrameAndTheLast) {
   }
   EXPECT_EQ(extras, moving.initialExtras(4000, 3));
   EXPECT_NE(extras, moving.initialExtras(4000, 4));
+}
+
+TEST(MovingParameterisation, BeginsAtTheTimesOfSurfacesAndFadesUntilTheNextOnes) {
+  const MotionClip clip = clipOf(50);
+  const MovingParameterisation moving(clip, nullptr, 0);
+  const double never = std::numeric_limits<double>::quiet_NaN();
+  const double middle = clip.begin + 20 / clip.frames_per_second;
+  const double late = clip.begin + 32 / clip.frames_per_second;
+  const std::vector<double> times = {middle, never, clip.begin, late, middle};
+  RawSplats raw = rawSplats(ballOfSplats(5, 1));
+  raw.extra_lengths = MovingParameterisation::extraLengths();
+  raw.extras = moving.initialExtras(5, 3, times);
+  const auto plain = moving.initialExtras(5, 3);
+  EXPECT_EQ(raw.extras.back()[1], plain.back()[1]);
+  const MotionCloud cloud = moving.cloudOf(raw);
+  validate(cloud, "moving");
+  const auto share = [&](size_t splat, double seconds) {
+    const double whole = static_cast<double>(cloud.splats.opacities[splat]);
+    return static_cast<double>(splatsAt(cloud, seconds).opacities[splat]) / whole;
+  };
+  // In single precision.
+  constexpr double kRounding = 1e-5;
+  for (const size_t splat : {0, 4}) {
+    EXPECT_NEAR(share(splat, middle), 1, kRounding);
+    EXPECT_NEAR(share(splat, clip.begin), kVisibleShare, kRounding);
+    EXPECT_NEAR(share(splat, late), kVisibleShare, kRounding);
+  }
+  EXPECT_NEAR(share(2, clip.begin), 1, kRounding);
+  EXPECT_NEAR(share(2, middle), kVisibleShare, kRounding);
+  EXPECT_NEAR(share(3, late), 1, kRounding);
+  EXPECT_NEAR(share(3, middle), kVisibleShare, kRounding);
+  // Nothing was looked at after the last: there it lives as any other.
+  EXPECT_EQ(raw.extras[MovingParameterisation::extraLengths().size() - 2][2 * 3 + 1],
+            plain[MovingParameterisation::extraLengths().size() - 2][2 * 3 + 1]);
 }
 
 TEST(MovingParameterisation, BeginsWithSplatsThatStandStillAndOnlyFade) {

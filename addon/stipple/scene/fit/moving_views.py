@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 from mathutils import Vector
+from mathutils.kdtree import KDTree
 
 from ...binding.errors import StippleError, invalid
 from ...binding.model import DecodeSettings, Model
@@ -18,6 +19,11 @@ _LOOKED_AT = 9
 _CAST_AT = 3
 # Points that tell whether something moves.
 _TELLING_POINTS = 512
+
+
+# A point has neighbours in another set on the same surface nearer than this many times the distance within a set: of
+# points by chance one in 1,000 has none, and these are spread more evenly.
+_NEAR = 3.0
 
 
 class Frames:
@@ -55,6 +61,7 @@ class Surfaces:
         self._frames = frames
         self.looked_at = view_times.evenly(times, _LOOKED_AT)
         self.clouds = []    # SplatArrays of points at every second of these times
+        self.frames = []    # [N] of each point: when a surface was there, NaN for at all times that were looked at
         self.bounds = None  # view_rigs.Bounds over all of them
         self.moves = False  # what is known so far
 
@@ -82,14 +89,42 @@ class Surfaces:
             # Of other seeds at other times: what stands still gets points at all of them, and none twice.
             count = max(1, point_count // len(pointed))
             self.clouds.append(model.decode(DecodeSettings(count, 1, seed=seed + i)).read())
+            self.frames.append(np.full(len(self.clouds[-1].positions), frame))
         if self.bounds is None or not told:
             raise problem or invalid('No selected object has faces at any frame of the range; at least one is needed.')
         self.moves = len(told) < len(pointed) or any(not np.array_equal(told[0], other) for other in told[1:])
+        if len(told) == len(pointed):
+            for times, still in zip(self.frames, _still([cloud.positions for cloud in self.clouds])):
+                times[still] = np.nan
 
     def _widen(self, bounds):
         known = self.bounds or bounds
         self.bounds = view_rigs.Bounds(Vector(np.minimum(known.lowest, bounds.lowest)),
                                        Vector(np.maximum(known.highest, bounds.highest)))
+
+
+def _still(clouds):
+    """For each of several sets of points [N,3] of surfaces: which of them have a neighbour in all other sets."""
+    trees = [_tree(points) for points in clouds]
+    # Points of one set are evenly spread: a surface without any nearer than this is no longer there.
+    near = [_NEAR * np.median([tree.find_n(point, 2)[-1][2] for point in points[::max(1, len(points) // 200)]])
+            for points, tree in zip(clouds, trees)]
+    found = []
+    for points in clouds:
+        still = np.ones(len(points), bool)
+        for tree, reach in zip(trees, near):
+            distances = np.array([tree.find(point)[2] for point in points])
+            still &= distances <= reach
+        found.append(still)
+    return found
+
+
+def _tree(points):
+    tree = KDTree(len(points))
+    for i, point in enumerate(points):
+        tree.insert(point, i)
+    tree.balance()
+    return tree
 
 
 class Caster:

@@ -160,7 +160,9 @@ class ViewTask:
             self._notes.append(f'No surface moves between the frames {looked_at}, where they were looked at; the model '
                                'Splats, in Advanced, would do.')
         views.set_points(np.concatenate([cloud.positions for cloud in surfaces.clouds]),
-                         np.concatenate([_linear_colours(cloud) for cloud in surfaces.clouds]))
+                         np.concatenate([_linear_colours(cloud) for cloud in surfaces.clouds]),
+                         times=view_times.seconds_at(self._context.scene, np.concatenate(surfaces.frames),
+                                                     self.plan.frames[0]))
 
     def _meshes(self):
         seen = meshes.source_objects(self._objects)
