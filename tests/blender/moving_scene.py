@@ -80,21 +80,21 @@ class Judge:
         with self._capture.Capture(bpy.context, self._meshes, chosen) as capture:
             return before_black(capture.camera(self.camera).linear[::-1])
 
-    def shown(self, obj, frame, name='shown'):
-        """The same of splats, by F12 in the engine Stipple."""
+    def shown(self, obj, frame, engine='STIPPLE'):
+        """The same of splats, by F12."""
         scene = bpy.context.scene
         scene.frame_set(int(frame), subframe=frame % 1)
         hidden = [(mesh, mesh.hide_render) for mesh in bpy.data.objects if mesh.type not in {'CAMERA', 'LIGHT'}]
-        engine, film = scene.render.engine, scene.render.film_transparent
+        before = scene.render.engine, scene.render.film_transparent
         try:
             for mesh, _ in hidden:
                 mesh.hide_render = mesh != obj
-            scene.render.engine, scene.render.film_transparent = 'STIPPLE', True
+            scene.render.engine, scene.render.film_transparent = engine, True
             scene.camera = self.camera
             scenes.write_exact_pictures()
-            return before_black(scenes.render_pixels(self._folder, name))
+            return before_black(scenes.render_pixels(self._folder, 'shown'))
         finally:
-            scene.render.engine, scene.render.film_transparent = engine, film
+            scene.render.engine, scene.render.film_transparent = before
             for mesh, was_hidden in hidden:
                 mesh.hide_render = was_hidden
 
