@@ -181,7 +181,7 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                               "between two frames are seen, too", default=1.0, min=0.01, soft_min=0.1, soft_max=10.0,
                               max=1000.0, step=25, precision=2, options=set())
     image_count: IntProperty(name="Images", description="Number of images that are rendered at most, spread evenly "
-                             "over frames and cameras: each frame is seen by about as many cameras", default=240, min=2,
+                             "over frames and cameras: each frame is seen by about as many cameras", default=300, min=2,
                              soft_max=2000, max=1000000, options=set())
     held_out_cameras: IntProperty(name="Held Out", description="Number of cameras whose images the fit is "
                                   "measured on and never learns from. With 0 it is measured on every eighth image",

@@ -43,6 +43,11 @@ def test_pictures_and_points_come_back(context):
     with_space.set_points(positions, colours)
     np.testing.assert_array_equal(with_space.points()[0], positions)
     np.testing.assert_array_equal(with_space.points()[1], colours)
+    with_space.set_points(positions, colours, times=[0.0, 1.5, np.nan, 2.0, 0.0])
+    with pytest.raises(StippleError, match=r'Point array times has shape \(4,\); allowed is \(5,\)'):
+        with_space.set_points(positions, colours, times=np.zeros(4))
+    with pytest.raises(StippleError, match='time of point 2'):
+        with_space.set_points(positions, colours, times=[0.0, 1.5, np.inf, 2.0, 0.0])
     info = with_space.info()
     assert (info.view_count, info.point_count, info.has_images) == (2, 5, 1)
 

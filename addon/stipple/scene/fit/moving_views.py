@@ -13,8 +13,8 @@ from .. import meshes
 from ..source import sync
 from . import view_rigs, view_times
 
-# Times at which surfaces are looked at, at most: their bounds at all, points of them at every second.
-_LOOKED_AT = 9
+# Times at which surfaces are looked at, at most: their bounds at all of the first number, points of them at the second.
+_LOOKED_AT, _POINTED_AT = 9, 5
 # Times at which cameras look for free places, at most: each takes an evaluation of the scene for every round of rays.
 _CAST_AT = 3
 # Points that tell whether something moves.
@@ -60,7 +60,8 @@ class Surfaces:
     def __init__(self, frames, times):
         self._frames = frames
         self.looked_at = view_times.evenly(times, _LOOKED_AT)
-        self.clouds = []    # SplatArrays of points at every second of these times
+        self.pointed_at = view_times.evenly(self.looked_at, _POINTED_AT)
+        self.clouds = []    # SplatArrays of points at these times
         self.frames = []    # [N] of each point: when a surface was there, NaN for at all times that were looked at
         self.bounds = None  # view_rigs.Bounds over all of them
         self.moves = False  # what is known so far
@@ -69,7 +70,7 @@ class Surfaces:
         """Fills it. wait(job): a generator of how far it is, (_, share, stage). Yields (share, stage). Errors:
         StippleError, also where there is no surface at any of the times."""
         told, problem = [], None
-        pointed = self.looked_at[::2]
+        pointed = self.pointed_at
         for i, frame in enumerate(self.looked_at):
             depsgraph = self._frames.set(frame)
             try:

@@ -156,7 +156,7 @@ class ViewTask:
             yield 'points', share, stage
             self._check_cancelled()
         if not surfaces.moves:
-            looked_at = ', '.join(f'{frame:g}' for frame in surfaces.looked_at[::2])
+            looked_at = ', '.join(f'{frame:g}' for frame in surfaces.pointed_at)
             self._notes.append(f'No surface moves between the frames {looked_at}, where they were looked at; the model '
                                'Splats, in Advanced, would do.')
         views.set_points(np.concatenate([cloud.positions for cloud in surfaces.clouds]),
