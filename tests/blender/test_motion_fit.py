@@ -3,6 +3,7 @@
 does."""
 
 import importlib
+import json
 import math
 
 import bpy
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import moving_scene
+import photo_set
 import scenes
 from moving_scene import FIRST, LAST, fitted, settings
 
@@ -314,3 +316,24 @@ def test_the_preview_shows_the_present_frame(stipple, tmp_path, fitting):
     red = {frame: splats.positions[(splats.opacities > 0.5) & (splats.sh[:, 0, 1] < -1)]
            for frame, splats in seen.items()}
     assert red[FIRST][:, 0].mean() < -0.2 and red[LAST][:, 0].mean() > 0.2
+
+
+def test_photographs_with_times_make_a_clip(stipple, tmp_path, fitting):
+    """It begins at the scene's start, at the first time of the data set."""
+    ball, box = moving_scene.build(tmp_path)
+    capture = module(stipple, '.scene.fit.view_capture')
+    photo_set.write(module(stipple, '.scene.fit.view_rigs'), capture, ball, tmp_path / 'photos', 8,
+                    capture.CaptureSettings('WORKBENCH', 24))
+    settings(views_from='DATASET', dataset=str(tmp_path / 'photos'), max_splats=200)
+    scenes.refuses(bpy.ops.stipple.splats_fit, 'all views have the same time')
+    path = next((tmp_path / 'photos').glob('transforms*.json'))
+    told = json.loads(path.read_text())
+    for i, frame in enumerate(told['frames']):
+        frame['time'] = 2.0 + i / 8
+    path.write_text(json.dumps(told))
+    bpy.context.scene.frame_set(FIRST + 6)
+    clip = fitted()
+    stored = clip.data.stipple
+    known = stipple.scene.source.source_settings.of(stored)
+    assert (stored.frame_start, known.time_begin, known.time_end) == (FIRST, 2.0, 2.875)
+    assert stipple.scene.source.sources.seconds(stored) == pytest.approx(2.25)
