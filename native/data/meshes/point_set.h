@@ -14,7 +14,8 @@ struct PointSet {
   std::vector<float> opacities;  ///< [N] 0..1
   std::vector<float> areas;      ///< [N] m^2 of surface that the sample stands for
   std::vector<float> weights;    ///< [N] >= 0, share of the anchors that it attracts (sum is free)
-  /// [N] seconds when the surface was there, NaN for one that is there at all times; empty: all are.
+  /// [N] seconds when the surface was there, NaN for one that is there at all times; empty: all
+  /// are.
   std::vector<double> times;
 
   size_t size() const { return opacities.size(); }

@@ -17,8 +17,8 @@ class MemoryViewSource final : public ViewSource {
 
   /// Errors: kInvalidArgument, as validateView(); nothing is added then. In: name, empty for
   /// "view" and its number; time, seconds, finite; role, what the view is for.
-  void add(const Camera& camera, const ViewPicture& picture, std::string name = {},
-           double time = 0, ViewRole role = ViewRole::kNone);
+  void add(const Camera& camera, const ViewPicture& picture, std::string name = {}, double time = 0,
+           ViewRole role = ViewRole::kNone);
   /// In: positions and colours [N,3] and opacities [N], the other arrays of N or empty.
   /// Errors: kInvalidArgument for array sizes that disagree and values that are not finite.
   void setPoints(PointSet points);

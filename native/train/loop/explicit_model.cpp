@@ -170,8 +170,8 @@ class ExplicitModel final : public FitModel, private Regulariser {
     for (const size_t length : MovingParameterisation::extraLengths()) {
       state.splats.extra_lengths.push_back(length);
     }
-    for (auto& values : motion_->initialExtras(state.splats.size(), options_.seed,
-                                              options_.start_times)) {
+    for (auto& values :
+         motion_->initialExtras(state.splats.size(), options_.seed, options_.start_times)) {
       state.splats.extras.push_back(std::move(values));
     }
     state.first_moments = state.second_moments = zerosLike(state.splats);

@@ -82,9 +82,10 @@ class FitObserver {
 enum class FitEnd { kWhole, kStopped };
 
 /// Trains a model on views: chooses views, keeps their pictures, measures on held-out ones, keeps
-/// the state that shows a fixed few of those that it learns from best, saves and goes on. The same for every kind of model.
-/// Determinism: the same views, options and model give the same bits, for any number of threads,
-/// any limit of memory and wherever the fit was stopped and restored in between.
+/// the state that shows a fixed few of those that it learns from best, saves and goes on. The same
+/// for every kind of model. Determinism: the same views, options and model give the same bits, for
+/// any number of threads, any limit of memory and wherever the fit was stopped and restored in
+/// between.
 class Trainer {
  public:
   /// In: backends: for what draws between steps, for this call; split: disjoint, of `views`;
