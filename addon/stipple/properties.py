@@ -170,8 +170,22 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                              ('AROUND', "Around", "The cameras are on a sphere around everything and look in"),
                              ('INSIDE', "Inside", "The cameras are between the walls of a room and look everywhere")),
                       options=set())
-    view_count: IntProperty(name="Count", description="Number of views that are rendered", default=60, min=1,
-                            soft_max=500, max=10000, options=set())
+    view_count: IntProperty(name="Count", description="Number of views that are rendered; of Moving Splats, the number "
+                            "of cameras", default=60, min=1, soft_max=500, max=10000, options=set())
+    # Of splats that move: which frames, and which images of all cameras at all of them.
+    scene_range: BoolProperty(name="Scene Range", description="The fit takes the frames from the scene's start to its "
+                              "end", default=True, options=set())
+    range_start: IntProperty(name="Start", description="First frame of the splats' clip", default=1, options=set())
+    range_end: IntProperty(name="End", description="Last frame of the splats' clip", default=250, options=set())
+    frame_step: FloatProperty(name="Step", description="Frames from one time that is seen to the next; below 1, times "
+                              "between two frames are seen, too", default=1.0, min=0.01, soft_min=0.1, soft_max=10.0,
+                              max=1000.0, step=25, precision=2, options=set())
+    image_count: IntProperty(name="Images", description="Number of images that are rendered at most, spread evenly "
+                             "over frames and cameras: each frame is seen by about as many cameras", default=300, min=2,
+                             soft_max=2000, max=1000000, options=set())
+    held_out_cameras: IntProperty(name="Held Out", description="Number of cameras whose images the fit is "
+                                  "measured on and never learns from. With 0 it is measured on every eighth image",
+                                  default=0, min=0, soft_max=10, max=10000, options=set())
     view_size: IntProperty(name="Resolution", description="Pixels of the longer side of a view", default=256, min=16,
                            soft_max=1024, max=8192, options=set())
     engine: EnumProperty(name="Engine", description="Engine that renders the views",
@@ -208,10 +222,13 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                                                                           "view, as those of shiny objects do. Each "
                                                                           "splat then has more numbers", default=False,
                                  options=set())
-    model: EnumProperty(name="Model", description="What the fit learns: splats, or a density of anchors",
+    model: EnumProperty(name="Model", description="What the fit learns: splats, a density of anchors, or splats that "
+                                                  "move",
                         items=(('EXPLICIT', "Splats", "The fit learns splats, each with numbers of its own"),
                                ('FIELD', "Density Field", "The fit learns a density of anchors, which decodes at any "
-                                                          "budget")),
+                                                          "budget"),
+                               ('MOTION', "Moving Splats", "The fit learns splats that move, from views at several "
+                                                           "frames, which then play on the timeline")),
                         options=set())
     strategy: EnumProperty(name="Strategy", description="How splats are added and removed while they are fitted",
                            items=strategies.strategy_items, default=strategies.BY_QUALITY_NUMBER, options=set())

@@ -182,3 +182,19 @@ def has_nodes(owner):
 def copy_of_evaluated_matrix(matrix):
     """Depsgraph iterators reuse their memory: values have to be taken at once."""
     return np.array(matrix, np.float64)
+
+
+def animation_curves(owner, path):
+    """The curves and drivers that animate a property of a datablock itself."""
+    animation = owner.animation_data
+    if animation is None:
+        return []
+    found, action = list(animation.drivers), animation.action
+    if action is not None and VERSION < (4, 4, 0):
+        found += action.fcurves
+    elif action is not None and animation.action_slot is not None:
+        for layer in action.layers:
+            for strip in layer.strips:
+                bag = strip.channelbag(animation.action_slot)
+                found += [] if bag is None else bag.fcurves
+    return [curve for curve in found if curve.data_path == path]

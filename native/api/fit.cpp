@@ -112,6 +112,10 @@ StippleStatus stipple_fit_watch_contributions(StippleJob* job, uint32_t watched)
       [&] { sessionOf(job).watchContributions(enumValue<uint32_t>(watched, 1, "watched") == 1); });
 }
 
+StippleStatus stipple_fit_watch_time(StippleJob* job, double seconds) {
+  return guarded([&] { sessionOf(job).watchTime(seconds); });
+}
+
 StippleStatus stipple_fit_cloud(const StippleJob* job, uint64_t budget, StippleCloud** cloud) {
   return guarded([&] {
     require(cloud, "cloud");

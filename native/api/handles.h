@@ -53,6 +53,7 @@ struct ViewNote {
   uint32_t source_width = 0;
   uint32_t source_height = 0;
   bool is_distorted = false;
+  double time = 0;  ///< seconds
 };
 
 }  // namespace stipple::api

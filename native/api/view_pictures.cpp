@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstddef>
 
 #include "api/camera.h"
 #include "api/guard.h"
@@ -89,6 +90,7 @@ void noteDataset(const Dataset& dataset, StippleViews& views) {
     note.source_width = seen_by.width;
     note.source_height = seen_by.height;
     note.is_distorted = source.view.lens.isDistorted();
+    note.time = dataset.time(i);
     views.notes.push_back(std::move(note));
   }
 }
@@ -153,8 +155,10 @@ StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera
   return guarded([&] {
     require(views, "views");
     const Camera seen_by = cameraFrom(camera);
-    const StippleViewImage given = complete(image, "image");
+    const StippleViewImage given = completeUpTo(image, offsetof(StippleViewImage, time), "image");
     const Transfer transfer = enumValue<Transfer>(given.transfer, 1, "image->transfer");
+    const auto split =
+        enumValue<StippleViewSplit>(given.split, STIPPLE_VIEW_SPLIT_VALIDATION, "image->split");
     MemoryViewSource& source = writable(*views);
     const std::string name = name_utf8 ? name_utf8 : "view " + std::to_string(views->notes.size());
     // Before the arrays are made: an absurd size is refused as such.
@@ -172,9 +176,11 @@ StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera
     ViewNote note;
     note.name = name;
     note.camera_model = modelName(seen_by);
+    note.split = split;
+    note.time = given.time;
     views->notes.push_back(std::move(note));
     try {
-      source.add(seen_by, std::move(made), name);
+      source.add(seen_by, std::move(made), name, given.time, static_cast<ViewRole>(split));
     } catch (...) {
       views->notes.pop_back();
       throw;
@@ -185,7 +191,8 @@ StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera
 StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoints* points) {
   return guarded([&] {
     MemoryViewSource& source = writable(require(views, "views"));
-    const StippleViewPoints given = complete(points, "points");
+    const StippleViewPoints given =
+        completeUpTo(points, offsetof(StippleViewPoints, times), "points");
     if (given.count > 0) {
       require(given.positions, "points->positions");
       require(given.colours, "points->colours");
@@ -202,6 +209,7 @@ StippleStatus stipple_views_set_points(StippleViews* views, const StippleViewPoi
     made.weights = copied(given.weights, count);
     made.times = copied(given.times, count);
     made.opacities.assign(count, 1.0f);
+    if (given.times) made.times.assign(given.times, given.times + count);
     source.setPoints(std::move(made));
   });
 }
@@ -238,6 +246,7 @@ StippleStatus stipple_views_view_info(const StippleViews* views, uint64_t index,
     out.name = note.name.c_str();
     out.image_path = note.image_path.c_str();
     out.camera_model = note.camera_model;
+    out.time = note.time;
     deliver(info, out, "info");
   });
 }

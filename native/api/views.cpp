@@ -63,6 +63,7 @@ void noteCameras(StippleViews& views) {
     note.camera_model = modelName(view.camera);
     note.source_width = view.camera.width;
     note.source_height = view.camera.height;
+    note.time = view.time;
     views.notes.push_back(std::move(note));
   }
 }

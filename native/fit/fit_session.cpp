@@ -262,6 +262,17 @@ bool FitSession::wantsPreview() {
   return preview_is_wanted_.exchange(false);
 }
 
+void FitSession::watchTime(double seconds) {
+  requireFinite(seconds, "the time of previews");
+  std::lock_guard<std::mutex> lock(mutex_);
+  preview_time_ = seconds;
+}
+
+std::optional<double> FitSession::previewTime() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return preview_time_;
+}
+
 void FitSession::preview(SplatCloud cloud, SplatQuantities seen) {
   SeenCloud shared(std::move(cloud), std::move(seen));
   std::lock_guard<std::mutex> lock(mutex_);

@@ -5,6 +5,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "base/progress.h"
@@ -56,6 +57,9 @@ class FitSession final : public FitObserver {
   /// The newest preview, and a request for another.
   SeenCloud takePreview();
   void watchContributions(bool wanted) { contributions_are_wanted_ = wanted; }
+  /// The time that previews show of splats that move, seconds; before, that of the clip's begin.
+  /// Errors: kInvalidArgument for a number that is not finite.
+  void watchTime(double seconds);
 
   /// The result at a budget. May be called by several threads. This and what follows, errors:
   /// kInvalidArgument where the fit has not ended, or ended before its first step.
@@ -73,6 +77,7 @@ class FitSession final : public FitObserver {
   void note(const std::string& text) override;
   bool wantsPreview() override;
   bool wantsContributions() override { return contributions_are_wanted_; }
+  std::optional<double> previewTime() override;
   void preview(SplatCloud cloud, SplatQuantities seen) override;
   void save(const TensorTable& table) override;
 
@@ -100,6 +105,7 @@ class FitSession final : public FitObserver {
   uint64_t preview_iteration_ = 0;
   std::atomic<bool> preview_is_wanted_{false};
   std::atomic<bool> contributions_are_wanted_{false};
+  std::optional<double> preview_time_;  ///< seconds; empty: nobody has said
 };
 
 }  // namespace stipple

@@ -36,7 +36,7 @@ std::span<const ModelKind> modelKinds() {
       ModelKind{"motion",
                 "moving splats",
                 4,
-                {.budget_unit = BudgetUnit::kSplats},
+                {.budget_unit = BudgetUnit::kSplats, .takes_mask = true},
                 readMotionSplats},
   };
   return kinds;

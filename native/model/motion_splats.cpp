@@ -1,5 +1,6 @@
 #include "model/motion_splats.h"
 
+#include <string>
 #include <utility>
 
 #include "base/error.h"
@@ -38,7 +39,9 @@ class MotionSplats final : public SplatModel {
  public:
   MotionSplats(MotionCloud moving, ModelNotes notes, std::shared_ptr<const MovingTree> tree,
                MovingTreeSource trees)
-      : decoder_(std::move(moving), std::move(tree), std::move(trees)), notes_(std::move(notes)) {}
+      : decoder_(std::move(moving), std::move(tree), trees),
+        notes_(std::move(notes)),
+        trees_(std::move(trees)) {}
 
   const char* kind() const override { return kAssetMotion; }
 
@@ -72,6 +75,23 @@ class MotionSplats final : public SplatModel {
     writeMotionAsset(asset, path);
   }
 
+  std::shared_ptr<const SplatModel> keep(std::span<const uint8_t> mask) const override {
+    const MotionCloud& moving = decoder_.leaves();
+    MotionCloud left = kept(moving, mask);
+    if (left.size() == 0) {
+      fail(ErrorCode::kInvalidArgument, "mask leaves out all " + std::to_string(moving.size()) +
+                                            " splats; at least one must stay");
+    }
+    return makeMotionSplats(std::move(left), {}, nullptr, trees_);
+  }
+
+  uint64_t keepMemoryBound() const override {
+    const MotionCloud& moving = decoder_.leaves();
+    constexpr uint64_t kOfMotion = 3 * kMotionWaves + 4 + 4 + 2 + 1;
+    constexpr uint64_t kOthers = 3 + 4 + 3 + 1;
+    return moving.size() * (kOfMotion + kOthers + moving.splats.shStride()) * sizeof(float);
+  }
+
  protected:
   const Decoder& decoder() const override { return decoder_; }
 
@@ -84,6 +104,7 @@ class MotionSplats final : public SplatModel {
  private:
   MovingDecoder decoder_;
   ModelNotes notes_;
+  MovingTreeSource trees_;  ///< for what keep() leaves
 };
 
 }  // namespace

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
 
 #include "base/error.h"
 #include "base/number_text.h"
 #include "base/parallel.h"
+#include "data/clouds/cloud_selection.h"
 
 namespace stipple {
 
@@ -48,6 +50,18 @@ void requireClip(const MotionClip& clip, const char* what) {
            " s, with a window of " + numberText(clip.window_frames) + " frames and a share of " +
            numberText(clip.window_share) +
            "; it needs a frame, a rate above 0, a window of 0 or more and a share between 0 and 1");
+}
+
+/// Rows of a column whose mask is not 0. In: width, numbers in a row.
+std::vector<float> keptRows(const std::vector<float>& column, size_t width,
+                            std::span<const uint8_t> mask) {
+  std::vector<float> rows;
+  for (size_t i = 0; i < mask.size(); ++i) {
+    if (!mask[i]) continue;
+    const auto first = column.begin() + static_cast<std::ptrdiff_t>(i * width);
+    rows.insert(rows.end(), first, first + static_cast<std::ptrdiff_t>(width));
+  }
+  return rows;
 }
 
 }  // namespace
@@ -94,6 +108,20 @@ void momentsAt(const MotionCloud& moving, double seconds, const MomentColumns<fl
   parallelFor(moving.size(), kGrain, [&](size_t begin, size_t end) {
     kernel.moments(columns, window, time, begin, end, moments);
   });
+}
+
+MotionCloud kept(const MotionCloud& moving, std::span<const uint8_t> mask) {
+  MotionCloud result;
+  result.splats = kept(moving.splats, mask);
+  for (size_t wave = 0; wave < kMotionWaves; ++wave) {
+    result.waves[wave] = keptRows(moving.waves[wave], 3, mask);
+  }
+  result.phases = keptRows(moving.phases, 4, mask);
+  result.spins = keptRows(moving.spins, 4, mask);
+  result.lifespans = keptRows(moving.lifespans, 2, mask);
+  result.centres = keptRows(moving.centres, 1, mask);
+  result.clip = moving.clip;
+  return result;
 }
 
 SplatCloud splatsAt(const MotionCloud& moving, double seconds) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "data/clouds/splat_cloud.h"
@@ -46,6 +48,10 @@ void validate(const MotionCloud& moving, const char* what);
 /// What moves, at a time, into columns [N]; every other column of the cloud is its own at all
 /// times. Threads and determinism: parallel; same result for any number of threads.
 void momentsAt(const MotionCloud& moving, double seconds, const MomentColumns<float>& moments);
+
+/// The splats whose mask is not 0, bit for bit and in their order, in the same clip. In: mask [N].
+/// Errors: kInvalidArgument for a mask of another length.
+MotionCloud kept(const MotionCloud& moving, std::span<const uint8_t> mask);
 
 /// The cloud at a time.
 SplatCloud splatsAt(const MotionCloud& moving, double seconds);

@@ -43,8 +43,24 @@ def test_pictures_and_points_come_back(context):
     with_space.set_points(positions, colours)
     np.testing.assert_array_equal(with_space.points()[0], positions)
     np.testing.assert_array_equal(with_space.points()[1], colours)
+    with_space.set_points(positions, colours, times=[0.0, 1.5, np.nan, 2.0, 0.0])
+    with pytest.raises(StippleError, match=r'Point array times has shape \(4,\); allowed is \(5,\)'):
+        with_space.set_points(positions, colours, times=np.zeros(4))
+    with pytest.raises(StippleError, match='time of point 2'):
+        with_space.set_points(positions, colours, times=[0.0, 1.5, np.inf, 2.0, 0.0])
     info = with_space.info()
     assert (info.view_count, info.point_count, info.has_images) == (2, 5, 1)
+
+
+def test_views_have_times_and_say_what_they_are_for(context):
+    views = Views.create(context)
+    rgba = np.zeros((1, 2, 4), np.float32)
+    views.add(camera(2, 1), rgba, time=1.25, split=ViewSplit.TEST)
+    views.add(camera(2, 1), rgba)
+    assert [(info.time, info.split) for info in map(views.view_info, (0, 1))] == [(1.25, ViewSplit.TEST),
+                                                                                  (0.0, ViewSplit.NONE)]
+    with pytest.raises(StippleError, match='time'):
+        views.add(camera(2, 1), rgba, time=float('nan'))
 
 
 def test_a_data_set_is_read_from_its_folder(context, tmp_path):

@@ -33,9 +33,7 @@ def test_numbers_stay_within_the_range_of_the_library(options):
 def test_words_and_switches_are_those_of_the_library(options):
     for name in ('model', 'shell'):
         option, shown = options[name]
-        # Blender's own views have one time: splats that move are fitted by the tool.
-        choices = [choice for choice in option.choices if choice != 'motion']
-        assert [item.identifier.lower() for item in shown.enum_items] == choices
+        assert [item.identifier.lower() for item in shown.enum_items] == list(option.choices)
         assert shown.default.lower() == option.default
     assert options['seed'][1].default == int(options['seed'][0].default)
     assert options['density_gradient'][1].default == bool(int(options['density_gradient'][0].default))

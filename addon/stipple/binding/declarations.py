@@ -245,6 +245,7 @@ FUNCTIONS = {
     'stipple_fit_note': (_status, [_handle, c_uint64, POINTER(c_char_p)]),
     'stipple_fit_preview': (_status, [_handle, _out_handle]),
     'stipple_fit_watch_contributions': (_status, [_handle, c_uint32]),
+    'stipple_fit_watch_time': (_status, [_handle, c_double]),
     'stipple_fit_cloud': (_status, [_handle, c_uint64, _out_handle]),
     'stipple_fit_model': (_status, [_handle, _out_handle]),
     'stipple_fit_places_check': (_status, [_path, _path]),

@@ -119,12 +119,17 @@ class Fit(Job):
         """Whether previews tell what each splat contributes: a few views are drawn for each."""
         self._check(self.library.stipple_fit_watch_contributions(self.pointer, int(watched)))
 
+    def watch_time(self, seconds):
+        """The time that previews of splats that move show."""
+        self._check(self.library.stipple_fit_watch_time(self.pointer, seconds))
+
     def result(self, budget=0):
         """The best splats, at a budget where the model has budgets; 0: the largest."""
         return Cloud(self.library, new_handle(self.library, 'stipple_fit_cloud', self.pointer, budget))
 
     def model(self):
-        """A field as a model for any budget; of explicit splats Model.from_cloud_start(result()) makes one."""
+        """A field as a model for any budget, splats that move as one for any time; of explicit splats that stand still
+        Model.from_cloud_start(result()) makes one."""
         return Model(self.library, new_handle(self.library, 'stipple_fit_model', self.pointer))
 
     def save_report(self, path):

@@ -191,7 +191,8 @@ class StippleViewsOpenOptions(_Sized):
 
 class StippleViewImage(_Sized):
     _fields_ = [('struct_size', c_uint32), ('transfer', c_uint32), ('rgba', _floats), ('weights', _floats),
-                ('depth', _floats), ('normals', _floats)]
+                ('depth', _floats), ('normals', _floats), ('time', c_double), ('split', c_uint32),
+                ('reserved', c_uint32)]
 
 
 class StippleViewPoints(_Sized):
@@ -209,7 +210,7 @@ class StippleViewsInfo(_Sized):
 class StippleViewInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('split', c_uint32), ('source_width', c_uint32),
                 ('source_height', c_uint32), ('is_distorted', c_uint32), ('reserved', c_uint32), ('name', c_char_p),
-                ('image_path', c_char_p), ('camera_model', c_char_p)]
+                ('image_path', c_char_p), ('camera_model', c_char_p), ('time', c_double)]
 
 
 class StippleViewBuffers(_Sized):

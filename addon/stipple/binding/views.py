@@ -8,7 +8,7 @@ import numpy as np
 from .errors import check, invalid
 from .handle import Handle, contiguous, new_handle, path_bytes, pointer_to
 from .structs import (ColourSpace, StippleCamera, StippleViewBuffers, StippleViewInfo, StippleViewImage,
-                      StippleViewPoints, StippleViewsInfo, StippleViewsOpenOptions, Transfer)
+                      StippleViewPoints, StippleViewsInfo, StippleViewsOpenOptions, Transfer, ViewSplit)
 
 
 class Views(Handle):
@@ -35,18 +35,22 @@ class Views(Handle):
         return cls(context.library,
                    new_handle(context.library, 'stipple_views_create', context.pointer, int(colour_space)))
 
-    def add(self, camera, rgba, transfer=Transfer.LINEAR, weights=None, depth=None, normals=None, name=None):
-        """rgba [H,W,4] premultiplied, weights [H,W], depth [H,W] planar metres, normals [H,W,3]; row 0 = top."""
+    def add(self, camera, rgba, transfer=Transfer.LINEAR, weights=None, depth=None, normals=None, name=None, time=0.0,
+            split=ViewSplit.NONE):
+        """rgba [H,W,4] premultiplied, weights [H,W], depth [H,W] planar metres, normals [H,W,3]; row 0 = top. time:
+        when it was taken, seconds; split: what the view is for."""
         size = (camera.height, camera.width)
         arrays = {'rgba': (rgba, (*size, 4)), 'weights': (weights, size), 'depth': (depth, size),
                   'normals': (normals, (*size, 3))}
         kept = _shaped('View', arrays)
-        picture = StippleViewImage(transfer=int(transfer), **{key: pointer_to(array) for key, array in kept.items()})
+        picture = StippleViewImage(transfer=int(transfer), time=time, split=int(split),
+                                   **{key: pointer_to(array) for key, array in kept.items()})
         self._check(self.library.stipple_views_add(self.pointer, byref(camera), byref(picture),
                                                    None if name is None else name.encode()))
 
     def set_points(self, positions, colours, normals=None, weights=None, times=None):
-        """positions [N,3] metres, colours [N,3] scene linear, normals [N,3], weights [N], times [N] seconds."""
+        """positions [N,3] metres, colours [N,3] scene linear, normals [N,3], weights [N], times [N] seconds when a surface
+        was there, NaN for at all times."""
         count = len(positions)
         kept = _shaped('Point', {'positions': (positions, (count, 3)), 'colours': (colours, (count, 3)),
                                  'normals': (normals, (count, 3)), 'weights': (weights, (count,))})

@@ -29,6 +29,7 @@ class STIPPLE_OT_apply_transform(JobOperator, bpy.types.Operator):
     def start(self, context):
         objects = edits.selected_splats(context)
         for obj in objects:
+            edits.refuse_moving(obj)
             if obj.data.users > 1:
                 raise invalid(f"The splats of '{obj.name}' have {obj.data.users} users; make them single-user first.")
         wanted = [(target, placement.matrix_of(obj), source_settings.of(obj.data.stipple).counts_splats,

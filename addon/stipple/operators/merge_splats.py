@@ -38,6 +38,7 @@ class STIPPLE_OT_merge_splats(JobOperator, bpy.types.Operator):
         self._objects = [active] + others
         for obj in self._objects:
             edits.refuse_sequence(obj)
+            edits.refuse_moving(obj)
         inverse = np.linalg.inv(placement.matrix_of(active))
         depsgraph = context.evaluated_depsgraph_get()
         clouds = [exporting.cloud_at(obj.evaluated_get(depsgraph), self.budget) for obj in self._objects]

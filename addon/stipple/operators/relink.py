@@ -85,7 +85,7 @@ class STIPPLE_OT_relink(JobOperator, bpy.types.Operator, ImportHelper):
         kept = {name: getattr(stipple, name) for name in names}
         try:
             with sync.paused():
-                if known.counts_anchors:
+                if known.counts_anchors or known.has_time or found.has_time:
                     source_settings.note_model(stipple, found)
                 stipple.source = source_paths.stored(self._path)
                 stipple.source_stamp = sources.stamp(self._path)

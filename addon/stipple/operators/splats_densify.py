@@ -35,6 +35,7 @@ class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
     def start(self, context):
         self._object = context.object
         edits.refuse_sequence(self._object)
+        edits.refuse_moving(self._object)
         settings = context.scene.stipple.fit
         strategy = self.strategy or strategies.text_of(settings)
         strategies.require(strategy)

@@ -77,7 +77,16 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
             sources.attach_asset(obj.data, result.path, result.settings)
             stipple.ratio = stipple.ratio_render = 1.0
             stipple.seed = result.decoding.seed
-        sync.write_decoded(obj.data, result.splats)
+            if result.clip_start is not None:
+                stipple.frame_start, stipple.frame_offset, stipple.frame_speed = result.clip_start, 0, 1.0
+                stipple.time_mode = 'HOLD'
+        if result.clip_start is None:
+            sync.write_decoded(obj.data, result.splats)
+        else:
+            # As they are at the present frame of the scene.
+            now = sources.model(result.path).decode(sources.decode_settings(stipple, scene=context.scene)).read()
+            now.seen = result.splats.seen
+            sync.write_decoded(obj.data, now)
         report = fit_reports.keep(obj.data, obj.name, result.report)
         if bpy.app.background:
             fit_proposal.accept(context, obj, hide_source=False)

@@ -3,8 +3,9 @@
 
 import bpy
 
+from ..binding.errors import StippleError
 from ..operators import show_report
-from ..scene.fit import fit_proposal, fitting, strategies
+from ..scene.fit import fit_proposal, fitting, strategies, view_pace, view_task
 from ..scene.source import splat_data
 from .text import draw_text
 
@@ -25,7 +26,7 @@ class STIPPLE_PT_fit(_FitPanel, bpy.types.Panel):
         settings, state = context.scene.stipple.fit, fitting.state
         column = layout.column()
         column.enabled = not state.is_running
-        _draw_views(column, settings)
+        _draw_views(column, context, settings)
         column.separator()
         column.prop(settings, 'max_splats')
         column.prop(settings, 'quality')
@@ -111,7 +112,7 @@ def _draw_strategy(layout, context, settings):
         _draw_problem(layout, context, problem)
 
 
-def _draw_views(layout, settings):
+def _draw_views(layout, context, settings):
     layout.prop(settings, 'views_from')
     if settings.views_from == 'DATASET':
         layout.prop(settings, 'dataset')
@@ -125,12 +126,34 @@ def _draw_views(layout, settings):
         return
     if settings.views_from == 'RIG':
         layout.prop(settings, 'rig')
-        layout.prop(settings, 'view_count')
+        layout.prop(settings, 'view_count', text="Cameras" if settings.model == 'MOTION' else "Count")
+    if settings.model == 'MOTION':
+        _draw_times(layout, context, settings)
     layout.prop(settings, 'view_size')
     layout.prop(settings, 'engine')
     if settings.engine != 'WORKBENCH':
         layout.prop(settings, 'samples')
     _draw_switch(layout, settings, 'transparent')
+
+
+def _draw_times(layout, context, settings):
+    """Of splats that move: which frames, and how many images that makes."""
+    _draw_switch(layout, settings, 'scene_range')
+    if not settings.scene_range:
+        column = layout.column(align=True)
+        column.prop(settings, 'range_start')
+        column.prop(settings, 'range_end')
+    layout.prop(settings, 'frame_step')
+    layout.prop(settings, 'image_count')
+    layout.prop(settings, 'held_out_cameras')
+    try:
+        plan = fitting.plan_of(context, settings)
+    except StippleError as error:
+        _draw_problem(layout, context, str(error))
+        return
+    seconds = view_pace.expected(view_task.capture_settings(settings), plan.image_count)
+    draw_text(layout, context, str(plan) + ('' if seconds is None else f', about {duration(seconds)}'))
+    layout.separator()
 
 
 def _draw_switch(layout, settings, name):

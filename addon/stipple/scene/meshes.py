@@ -40,12 +40,13 @@ def source_objects(objects):
             or obj.instance_type != 'NONE']
 
 
-def native_mesh(context, objects, depsgraph, color_from, notes=None):
+def native_mesh(context, objects, depsgraph, color_from, notes=None, may_be_empty=False):
     """All triangles of the objects and of what they instance, with colours, as one native mesh.
 
     Where a material's texture, UV map or colour attribute is missing, its viewport colour takes the place; notes gets
-    the sentences that say so. Errors: StippleError that names the object: no faces, NaN vertices, no colour attribute
-    where color_from asks for it.
+    the sentences that say so. may_be_empty: objects may have no faces, and where none has any, there is no mesh: None.
+    Errors: StippleError that names the object: no faces, NaN vertices, no colour attribute where color_from asks for
+    it.
     """
     mesh = Mesh.create(context)
     materials = _Materials(mesh, [] if notes is None else notes)
@@ -67,9 +68,9 @@ def native_mesh(context, objects, depsgraph, color_from, notes=None):
         except StippleError as error:
             raise StippleError(f"Object '{name}': {error}", error.status) from None
     for obj in objects:
-        if obj not in seen:
+        if obj not in seen and not may_be_empty:
             raise invalid(f"Object '{obj.name}' has no faces; at least one is needed to make splats.")
-    return mesh
+    return mesh if seen else None
 
 
 @contextlib.contextmanager

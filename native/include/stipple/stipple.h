@@ -748,6 +748,14 @@ StippleStatus stipple_rig_search_camera(const StippleRigSearch* search, uint64_t
 
 /* Splats are fitted to views: photographs from files, or renders that are handed in. */
 
+/* What a data set says a view is for. */
+typedef enum StippleViewSplit {
+  STIPPLE_VIEW_SPLIT_NONE = 0, /* nothing is said */
+  STIPPLE_VIEW_SPLIT_TRAIN = 1,
+  STIPPLE_VIEW_SPLIT_TEST = 2,
+  STIPPLE_VIEW_SPLIT_VALIDATION = 3
+} StippleViewSplit;
+
 /* The image of a view. Its arrays are read during the call. Row 0 is the top; the size is that of the camera. */
 typedef struct StippleViewImage {
   uint32_t struct_size;
@@ -756,6 +764,9 @@ typedef struct StippleViewImage {
   const float* weights;  /* [H,W] >= 0, what a pixel counts (a mask). NULL: 1 */
   const float* depth;    /* [H,W] planar z, metres; 0, and 1e10 and more: unknown. NULL: unknown */
   const float* normals;  /* [H,W,3] unit, world; 0: unknown. NULL: unknown */
+  double time;           /* when it was taken, seconds, finite; 0, and where the struct ends early: nothing moves */
+  uint32_t split;        /* StippleViewSplit, what the view is for; 0: the fit's holdout says it */
+  uint32_t reserved;
 } StippleViewImage;
 
 /* Where surfaces are known to be, in the world of the cameras. */
@@ -785,14 +796,6 @@ typedef struct StippleViewsInfo {
   double time_end;
 } StippleViewsInfo;
 
-/* What a data set says a view is for. */
-typedef enum StippleViewSplit {
-  STIPPLE_VIEW_SPLIT_NONE = 0, /* nothing is said */
-  STIPPLE_VIEW_SPLIT_TRAIN = 1,
-  STIPPLE_VIEW_SPLIT_TEST = 2,
-  STIPPLE_VIEW_SPLIT_VALIDATION = 3
-} StippleViewSplit;
-
 /* The texts live as long as the handle. */
 typedef struct StippleViewInfo {
   uint32_t struct_size;
@@ -804,6 +807,7 @@ typedef struct StippleViewInfo {
   const char* name;
   const char* image_path;     /* the file of the image; empty where there is none */
   const char* camera_model;   /* as its source calls it: "OPENCV" */
+  double time;                /* when the image was taken, seconds; 0 where nothing is said */
 } StippleViewInfo;
 
 /* Any pointer may be NULL. capacity: pixels that each given buffer has room for. */
@@ -852,8 +856,8 @@ StippleStatus stipple_views_open(StippleContext* context, const char* path_utf8,
 StippleStatus stipple_views_create(StippleContext* context, uint32_t colour_space, StippleViews** views);
 /* Adds a view, and copies its image (0..1 as 16 bits). name_utf8 may be NULL: the view is then called "view" and
  * its number. Jobs under way do not see what is added.
- * Errors: INVALID_ARGUMENT, by name and pixel, for values that are not finite or out of range, and for views that
- * were not made by stipple_views_create; MEMORY_LIMIT. */
+ * Errors: INVALID_ARGUMENT, by name and pixel, for values that are not finite or out of range, a time that is not
+ * finite, and for views that were not made by stipple_views_create; MEMORY_LIMIT. */
 StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera,
                                 const StippleViewImage* image, const char* name_utf8);
 /* Sets the points, in the place of earlier ones. Errors: as of stipple_views_add. */
@@ -1519,7 +1523,7 @@ StippleStatus stipple_cloud_keep(const StippleCloud* cloud, const uint8_t* mask,
 StippleStatus stipple_cloud_thin(const StippleCloud* cloud, uint64_t count, uint64_t seed,
                                  StippleCloud** thinned);
 /* Gives the hierarchy of a cloud without the splats whose mask is 0: no budget shows any of them, and its largest
- * budget is what is left, bit for bit. mask [mask_count], mask_count = leaf_count of the model.
+ * budget is what is left, bit for bit. Of splats that move, gives those that are left, at all times. mask [mask_count], mask_count = leaf_count of the model.
  * Errors: UNSUPPORTED for a model whose settings have no takes_mask; INVALID_ARGUMENT for a mask that keeps
  * nothing.
  * Cost: O(N). */
@@ -1994,6 +1998,10 @@ StippleStatus stipple_fit_preview(StippleJob* job, StippleCloud** cloud);
 /* Sets whether previews tell what each splat contributes (stipple_cloud_quantity): 1, or 0, as at the begin of a
  * fit. With 1 the fit draws 8 views for every preview; its steps are the same either way. */
 StippleStatus stipple_fit_watch_contributions(StippleJob* job, uint32_t watched);
+/* Sets the time that previews of splats that move show, seconds; at the begin of a fit that of its clip. The next
+ * preview that is asked for has it. Splats that stand still have no time. Steps are the same whatever is shown.
+ * Errors: INVALID_ARGUMENT for a time that is not finite. */
+StippleStatus stipple_fit_watch_time(StippleJob* job, double seconds);
 /* Gives the result of a job that has ended, however it ended: the state that did best on views it learned from,
  * decoded at a budget (anchors of a field; 0: the largest; explicit splats have one size; splats that move are
  * as they are when their clip begins). INVALID_ARGUMENT

@@ -5,6 +5,7 @@
 #include <exception>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "base/error.h"
 #include "base/random.h"
@@ -299,7 +300,9 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
     if (interval_is_over || time_is_over) save(observer, pace);
     if (observer.wantsPreview()) {
       const size_t views = observer.wantsContributions() ? kPreviewedViews : 0;
-      observer.preview(model_->splats(0), look(views));
+      const std::optional<double> time = observer.previewTime();
+      SplatCloud shown = time ? model_->splatsAt(0, *time) : model_->splats(0);
+      observer.preview(std::move(shown), look(views));
     }
     report(observer, pace);
     if (progress && !progress->cancelled()) {

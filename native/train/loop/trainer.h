@@ -72,6 +72,8 @@ class FitObserver {
   virtual void note(const std::string&) {}
   virtual bool wantsPreview() { return false; }
   virtual bool wantsContributions() { return false; }  ///< with previews
+  /// Seconds that previews of splats that move show; empty: the begin of their clip.
+  virtual std::optional<double> previewTime() { return std::nullopt; }
   /// The splats as they are now, where they were wanted, and what density control sees of them.
   virtual void preview(SplatCloud, SplatQuantities) {}
   /// To be kept for restore(). Errors become notes: the fit goes on.
@@ -82,9 +84,10 @@ class FitObserver {
 enum class FitEnd { kWhole, kStopped };
 
 /// Trains a model on views: chooses views, keeps their pictures, measures on held-out ones, keeps
-/// the state that shows a fixed few of those that it learns from best, saves and goes on. The same for every kind of model.
-/// Determinism: the same views, options and model give the same bits, for any number of threads,
-/// any limit of memory and wherever the fit was stopped and restored in between.
+/// the state that shows a fixed few of those that it learns from best, saves and goes on. The same
+/// for every kind of model. Determinism: the same views, options and model give the same bits, for
+/// any number of threads, any limit of memory and wherever the fit was stopped and restored in
+/// between.
 class Trainer {
  public:
   /// In: backends: for what draws between steps, for this call; split: disjoint, of `views`;

@@ -186,6 +186,54 @@ TEST_F(FitTest, PreviewsTellContributionsWhereTheyAreWatched) {
   stipple_job_free(job);
 }
 
+TEST_F(FitTest, PreviewsOfSplatsThatMoveShowTheTimeThatIsWatched) {
+  options_.model = STIPPLE_FIT_MOTION;
+  options_.iterations = 1000000;
+  StippleJob* job = nullptr;
+  expectRefused(stipple_fit_start(context_, views_, &options_, &job),
+                STIPPLE_ERROR_INVALID_ARGUMENT, "all views have the same time");
+  StippleViews* moving = nullptr;
+  STIPPLE_ASSERT_OK(stipple_views_create(context_, STIPPLE_COLOUR_DISPLAY, &moving));
+  addViews(moving, 1.0f, 0.25);
+  STIPPLE_ASSERT_OK(stipple_fit_start(context_, moving, &options_, &job));
+  expectRefused(stipple_fit_watch_time(job, std::nan("")), STIPPLE_ERROR_INVALID_ARGUMENT,
+                "the time of previews");
+  /// Opacities [3], made after it was called.
+  const auto opacities = [&] {
+    const uint64_t before = figuresOf(job).preview_iteration;
+    std::vector<float> found;
+    for (int i = 0; i < 20000; ++i) {
+      StippleCloud* cloud = nullptr;
+      STIPPLE_EXPECT_OK(stipple_fit_preview(job, &cloud));
+      // The one that was under way may be of the time before.
+      if (cloud && figuresOf(job).preview_iteration > before + 3) {
+        const std::vector<float> all = taken(cloud);
+        found.assign(all.begin() + 10 * 3, all.begin() + 11 * 3);
+        return found;
+      }
+      stipple_cloud_free(cloud);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return found;
+  };
+  const auto apart = [](const std::vector<float>& a, const std::vector<float>& b) {
+    float most = 0;
+    for (size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i]));
+    return most;
+  };
+  const std::vector<float> at_begin = opacities(), again = opacities();
+  STIPPLE_ASSERT_OK(stipple_fit_watch_time(job, 11 * 0.25));
+  const std::vector<float> at_end = opacities();
+  ASSERT_EQ(at_end.size(), 3u);
+  ASSERT_EQ(at_begin.size(), 3u);
+  // Splats keep 44 % of their opacity from one end of the clip to the other; steps change it by
+  // thousandths.
+  EXPECT_LT(4 * apart(at_begin, again), apart(at_begin, at_end));
+  STIPPLE_ASSERT_OK(stipple_job_cancel(job));
+  stipple_job_free(job);
+  stipple_views_free(moving);
+}
+
 TEST_F(FitTest, ResumesBitForBit) {
   options_.iterations = 40;
   StippleJob* whole = start();

@@ -49,8 +49,9 @@ class FitViewsTest : public ApiTest {
     return cloud;
   }
 
-  /// In: brightness, a factor of all colours; 0 makes black pictures.
-  void addViews(StippleViews* views, float brightness) {
+  /// In: brightness, a factor of all colours; 0 makes black pictures; seconds from one view to the
+  /// next.
+  void addViews(StippleViews* views, float brightness, double seconds = 0) {
     StippleCloud* cloud = scene();
     StippleRenderOptions render_options;
     stipple_render_options_init(&render_options);
@@ -69,6 +70,7 @@ class FitViewsTest : public ApiTest {
       auto picture = sized<StippleViewImage>();
       picture.transfer = STIPPLE_TRANSFER_SRGB;
       picture.rgba = rgba.data();
+      picture.time = v * seconds;
       const std::string name = std::to_string(100 + v);
       STIPPLE_ASSERT_OK(stipple_views_add(views, &camera, &picture, name.c_str()));
     }

@@ -77,6 +77,45 @@ TEST_F(ViewsTest, GivesBackThePictureThatWasAdded) {
   EXPECT_EQ(normals, std::vector<float>(6, 0.0f));
 }
 
+TEST_F(ViewsTest, KnowsWhenAViewWasTakenAndWhatItIsFor) {
+  StippleViewImage given = picture(rgba_);
+  given.time = 0.125;
+  given.split = STIPPLE_VIEW_SPLIT_TEST;
+  STIPPLE_ASSERT_OK(stipple_views_add(views_, &camera_, &given, nullptr));
+  // A caller that was built before there were times: whatever lies behind his struct is not read.
+  given.struct_size = offsetof(StippleViewImage, time);
+  STIPPLE_ASSERT_OK(stipple_views_add(views_, &camera_, &given, nullptr));
+  auto view = sized<StippleViewInfo>();
+  STIPPLE_ASSERT_OK(stipple_views_view_info(views_, 0, &view));
+  EXPECT_EQ(view.time, 0.125);
+  EXPECT_EQ(view.split, uint32_t{STIPPLE_VIEW_SPLIT_TEST});
+  STIPPLE_ASSERT_OK(stipple_views_view_info(views_, 1, &view));
+  EXPECT_EQ(view.time, 0);
+  EXPECT_EQ(view.split, uint32_t{STIPPLE_VIEW_SPLIT_NONE});
+  StippleViewInfo shorter = {};
+  shorter.struct_size = offsetof(StippleViewInfo, time);
+  shorter.time = 7;
+  STIPPLE_ASSERT_OK(stipple_views_view_info(views_, 0, &shorter));
+  EXPECT_EQ(shorter.time, 7);
+
+  given.struct_size = offsetof(StippleViewImage, normals);
+  EXPECT_EQ(stipple_views_add(views_, &camera_, &given, nullptr), STIPPLE_ERROR_INVALID_ARGUMENT);
+  given.struct_size = sizeof(given);
+  given.split = 4;
+  EXPECT_EQ(stipple_views_add(views_, &camera_, &given, nullptr), STIPPLE_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(stipple_last_error_message(), "image->split is 4; 0 to 3 is allowed");
+  given.split = 0;
+  for (const double time :
+       {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    given.time = time;
+    EXPECT_EQ(stipple_views_add(views_, &camera_, &given, "late"), STIPPLE_ERROR_INVALID_ARGUMENT);
+    EXPECT_NE(std::string(stipple_last_error_message()).find("late: time"), std::string::npos);
+  }
+  uint64_t count = 0;
+  STIPPLE_ASSERT_OK(stipple_views_count(views_, &count));
+  EXPECT_EQ(count, 2u);
+}
+
 TEST_F(ViewsTest, BringsLinearPicturesIntoTheViewsColourSpace) {
   const StippleViewImage given = picture(rgba_, STIPPLE_TRANSFER_LINEAR);
   STIPPLE_ASSERT_OK(stipple_views_add(views_, &camera_, &given, nullptr));
@@ -157,13 +196,18 @@ TEST_F(ViewsTest, KeepsPoints) {
   EXPECT_EQ(read_colours, colours);
   EXPECT_EQ(stipple_views_read_points(views_, 1, read_positions.data(), nullptr),
             STIPPLE_ERROR_BUFFER_TOO_SMALL);
-  std::vector<double> times = {0.5, INFINITY};
+  // A caller that was built before points had times.
+  points.struct_size = offsetof(StippleViewPoints, times);
+  points.times = reinterpret_cast<const double*>(1);
+  STIPPLE_ASSERT_OK(stipple_views_set_points(views_, &points));
+  points.struct_size = sizeof(points);
+  const std::vector<double> times = {0.5, std::numeric_limits<double>::quiet_NaN()};
   points.times = times.data();
+  STIPPLE_ASSERT_OK(stipple_views_set_points(views_, &points));
+  const std::vector<double> endless = {std::numeric_limits<double>::infinity(), 0};
+  points.times = endless.data();
   EXPECT_EQ(stipple_views_set_points(views_, &points), STIPPLE_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(stipple_last_error_message(),
-               "points: time of point 1 is inf; it must be a finite number");
-  times[1] = NAN;  // at all times
-  STIPPLE_EXPECT_OK(stipple_views_set_points(views_, &points));
+  points.times = nullptr;
   points.count = UINT64_MAX;
   EXPECT_NE(stipple_views_set_points(views_, &points), STIPPLE_OK);
 }

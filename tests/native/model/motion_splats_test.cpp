@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
+#include "data/clouds/cloud_selection.h"
 #include "io/assets/motion_asset.h"
 #include "io/scratch_folder.h"
 #include "model/model_kinds.h"
@@ -53,7 +55,8 @@ TEST(MotionSplats, TellsItsClipAndHasEveryBudget) {
   EXPECT_EQ(settings.minimum_budget, 1u);
   EXPECT_EQ(settings.maximum_budget, kCount);
   EXPECT_EQ(settings.default_budget, kCount);
-  EXPECT_FALSE(settings.has_order || settings.has_seed || settings.takes_mask);
+  EXPECT_FALSE(settings.has_order || settings.has_seed);
+  EXPECT_TRUE(settings.takes_mask);
   ASSERT_TRUE(settings.time);
   EXPECT_EQ(settings.time->begin, 2);
   EXPECT_EQ(settings.time->end, 2 + 11 / 8.0);
@@ -170,6 +173,30 @@ TEST_F(MotionSplatsFile, RefusesTreesThatDoNotFit) {
   unwritten([](MotionAsset& asset) { asset.nodes.spins.pop_back(); }, {"tree.nodes.spins", "4"});
   unwritten([](MotionAsset& asset) { asset.errors.clear(); }, {"tree.errors", "0 rows; 4"});
   unwritten([](MotionAsset& asset) { asset.parents.pop_back(); }, {"tree.parents", "8 rows; 9"});
+}
+
+TEST(MotionSplats, LeavesSplatsOutAtAllTimes) {
+  const auto model = makeMotionSplats(test::movingCloud(kCount));
+  std::vector<uint8_t> mask(kCount, 0);
+  for (size_t i = 1; i < kCount; i += 3) mask[i] = 1;
+  const auto left = model->keep(mask);
+  EXPECT_EQ(left->settings().maximum_budget, 13u);
+  EXPECT_EQ(left->settings().time->end, model->settings().time->end);
+  for (const double time : {2.0, 2.9}) {
+    ModelRequest request = at(time);
+    request.budget = 13;
+    const SplatCloud seen = left->decode(request);
+    const SplatCloud wanted = kept(model->decode(at(time)), mask);
+    EXPECT_EQ(seen.positions, wanted.positions);
+    EXPECT_EQ(seen.rotations, wanted.rotations);
+    EXPECT_EQ(seen.scales, wanted.scales);
+    EXPECT_EQ(seen.opacities, wanted.opacities);
+    EXPECT_EQ(seen.sh, wanted.sh);
+    EXPECT_EQ(seen.frame, wanted.frame);
+    EXPECT_EQ(seen.antialias, wanted.antialias);
+  }
+  EXPECT_THROW(model->keep(std::vector<uint8_t>(kCount, 0)), Error);
+  EXPECT_THROW(model->keep(std::vector<uint8_t>(kCount + 1, 1)), Error);
 }
 
 TEST(MotionSplats, RefusesWhatDoesNotMove) {

@@ -39,7 +39,10 @@ class STIPPLE_OT_fill_erased(JobOperator, bpy.types.Operator):
         return self.run_in_window(context)
 
     def start(self, context):
-        self._grounds = selecting.grounds(context, edits.selected_splats(context))
+        objects = edits.selected_splats(context)
+        for obj in objects:
+            edits.refuse_moving(obj)
+        self._grounds = selecting.grounds(context, objects)
         settings = regions.FillSettings(self.radius, self.ring_width, self.patch_size, self.seed)
         native, count = sources.context(), len(self._grounds)
         paths = [source_paths.place_for(ground.obj.name) for ground in self._grounds]

@@ -28,26 +28,39 @@ class STIPPLE_OT_separate_selected(JobOperator, bpy.types.Operator):
         for target in self._targets:
             target.check_erase()
         native = sources.context()
-        wanted = [(target.selected_cloud(), source_settings.of(target.obj.data.stipple).counts_splats,
-                   source_paths.place_for(target.obj.name)) for target in self._targets]
+        wanted = [(target.selected_cloud(), self._moving(target),
+                   source_settings.of(target.obj.data.stipple).counts_splats, source_paths.place_for(target.obj.name))
+                  for target in self._targets]
 
         def work(task):
             made = []
-            for i, (cloud, has_budget, path) in enumerate(wanted):
+            for i, (cloud, moving, has_budget, path) in enumerate(wanted):
                 task.advance(i / len(wanted), 'Separating splats')
-                tree = None
-                if has_budget:
+                tree = settings = None
+                if moving is not None:
+                    part = moving()
+                    tree, settings = sources.save_model(part, path), part.settings()
+                elif has_budget:
                     job = task.run(Model.from_cloud_start(native, cloud), (i + 0.1) / len(wanted),
                                    (i + 1) / len(wanted))
                     tree = sources.save_model(Model.of_job(job), path)
-                made.append((cloud, tree))
+                made.append((cloud, tree, settings))
             return made
         return Task(work)
 
+    @staticmethod
+    def _moving(target):
+        """A function that makes the model of what is selected, of splats that move; None of others."""
+        data = target.obj.data
+        if not source_settings.of(data.stipple).has_time:
+            return None
+        whole = sources.model(source_paths.file_of(data))
+        return lambda: whole.masked(target.selected)
+
     def finish(self, context, job):
         count = 0
-        for target, (cloud, tree) in zip(self._targets, job.result):
-            new = self._new_object(context, target.obj, cloud, tree)
+        for target, (cloud, tree, settings) in zip(self._targets, job.result):
+            new = self._new_object(context, target.obj, cloud, tree, settings)
             target.erase()
             target.obj.select_set(False)
             new.select_set(True)
@@ -58,14 +71,14 @@ class STIPPLE_OT_separate_selected(JobOperator, bpy.types.Operator):
         self.report({'INFO'}, f'{count:,} splats separated into {len(self._targets)} new objects')
 
     @staticmethod
-    def _new_object(context, old, cloud, tree):
+    def _new_object(context, old, cloud, tree, settings):
         path = sources.save_cloud(cloud, old.name) if tree is None else tree
         # The old one's place, settings and grade.
         new, data = old.copy(), old.data.copy()
         new.data = data
         for collection in old.users_collection or (context.collection,):
             collection.objects.link(new)
-        edits.attach(data, path, cloud.info().count, tree is not None)
+        edits.attach(data, path, cloud.info().count, tree is not None, settings=settings)
         edits.show(data, cloud)
         return new
 

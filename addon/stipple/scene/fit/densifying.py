@@ -34,8 +34,8 @@ class DensifyTask(ViewTask):
             raise invalid('There is no mesh to take views of; select one, show one, or choose a data set.')
         return iter(())
 
-    def _add_view(self, views, seen, name):
-        views.add(self._placed(seen.camera), seen.linear, name=name)
+    def _add_view(self, views, seen, shot):
+        views.add(self._placed(seen.camera), seen.linear, name=shot.name)
 
     def _placed(self, camera):
         """The same image, seen from the object's own space: its splats keep their numbers."""

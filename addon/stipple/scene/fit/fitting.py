@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A fit from the scene's settings to splats: views, surface points, the native fit, the tree that makes a slider."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,11 +15,10 @@ from ...binding.fit import Fit, check_places, fit_options
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import FitModel, FitQuality, FitShell, JobState
 from .. import meshes
-from . import fit_proposal, fit_reports, strategies
+from . import fit_proposal, fit_reports, strategies, view_task, view_times
 from ..sequence import frames
 from ..source import setting_paths, source_paths, sources
 from ..view import photo_cameras
-from .view_task import ViewTask
 
 # What a native stage is called.
 _STAGES = {'Splats': 'Fitting splats', 'Density': 'Learning where surfaces are', 'Attributes': 'Learning attributes',
@@ -55,6 +55,7 @@ class Result:
     decoding: object    # DecodeSettings of these splats
     settings: object    # StippleModelSettings of the asset
     report: object      # image of the fit's curves, [H,W,4]
+    clip_start: object = None  # frame of the scene at which splats that move begin; None: they stand still
 
 
 _CHECKPOINT_SUFFIX = '.safetensors'
@@ -90,16 +91,20 @@ def _check_places(native, settings):
     check_places(native.library, report, None if resumes else _checkpoint_path(settings))
 
 
-class FitTask(ViewTask):
+class FitTask(view_task.ViewTask):
     """cancel() while it fits ends with the best so far."""
 
     def __init__(self, context, objects, settings, path):
-        if settings.model == 'EXPLICIT':
+        if settings.model != 'FIELD':
             strategies.require(strategies.text_of(settings))
         _require_checkpoint(settings)
         super().__init__(context, objects, settings)
         _check_places(self._native, settings)
+        self.plan = plan_of(context, settings)
         self._path = path
+        self._clip_start, self._clip_begin = None, 0.0
+        if settings.model == 'MOTION':
+            self._clip_start = context.scene.frame_start if self.plan is None else math.floor(self.plan.frames[0])
         self._frame = self._frame_of_views()
         state.__init__(name=self._name(), stage='Preparing', is_running=True,
                        source_names=fit_proposal.visible_names(meshes.source_objects(objects)),
@@ -123,6 +128,10 @@ class FitTask(ViewTask):
         """The splats as they are now (SplatArrays), or None. with_contributions: the next one tells them."""
         if self.job is not None:
             self.job.watch_contributions(with_contributions)
+            if self._clip_start is not None:
+                scene = self._context.scene
+                now = scene.frame_current + scene.frame_subframe
+                self.job.watch_time(self._clip_begin + view_times.seconds_at(scene, now, self._clip_start))
         cloud = None if self.job is None else self.job.preview()
         return None if cloud is None else cloud.read()
 
@@ -141,10 +150,12 @@ class FitTask(ViewTask):
     def _use(self, views):
         settings = self._settings
         chosen = {'density_gradient': int(settings.density_gradient), 'seed': settings.seed}
-        if settings.model == 'EXPLICIT':
-            chosen.update(max_splats=settings.max_splats, strategy=strategies.text_of(settings))
-        else:
+        if settings.model == 'FIELD':
             chosen['shell'] = FitShell[settings.shell]
+        else:
+            chosen.update(max_splats=settings.max_splats, strategy=strategies.text_of(settings))
+        if self._clip_start is not None:
+            self._clip_begin = min((views.view_info(i).time for i in range(len(views))), default=0.0)
         if not settings.view_dependent:
             chosen['sh_degree'] = 0
         checkpoint = _checkpoint_path(settings)
@@ -168,11 +179,13 @@ class FitTask(ViewTask):
                     begun = state.figures.iteration - 1  # of a fit that goes on
                 left = None if begun is None else _seconds_left(state.figures, begun)
                 yield 'use', fraction, _STAGES.get(stage, stage or 'Starting the fit'), left
-            state.notes = tuple(self.job.notes())
+            state.notes = (*self._notes, *self.job.notes())
             if not state.figures.iteration:
                 self.job.wait()  # says why
-            is_field = settings.model == 'FIELD'
-            made = self.job.model() if is_field else self.job.result()
+            is_model = settings.model != 'EXPLICIT'
+            made = self.job.model() if is_model else self.job.result()
+            # Rows of a field are drawn anew; of all others they stay.
+            seen = {} if settings.model == 'FIELD' else (self.job.result() if is_model else made).seen()
             report = self.job.draw_report(fit_reports.SCALE)
             if settings.report:
                 self.job.save_report(setting_paths.absolute(settings, 'report'))
@@ -180,11 +193,10 @@ class FitTask(ViewTask):
             self.job = None
         is_whole = state.figures.iteration == state.figures.iterations
         yield 'keep', 0.0, 'Keeping the result'
-        if is_field:
-            self._keep(made, sources.first_settings(made.settings()), report)  # seed 0: the fit's own draws
+        if is_model:
+            self._keep(made, sources.first_settings(made.settings()), report, seen)  # seed 0: the fit's own draws
             self._forget(checkpoint if is_whole else None)
             return
-        seen = made.seen()
         made = cloud_edit.merge([(made, np.eye(4))], self._frame)  # the same splats, with the label of their frame
         job = Model.from_cloud_start(self._native, made, seed=settings.seed)
         yield from self._until_done(job, 'keep')
@@ -201,8 +213,8 @@ class FitTask(ViewTask):
         """seen: of the splats at these settings."""
         path = sources.save_model(model, self._path or source_paths.place_for(state.name), bool(self._path))
         sources.remember_model(path, model)
-        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, model.settings(),
-                             report)
+        self.result = Result(state.name, model.decode(decoding).read(), path, decoding, model.settings(), report,
+                             self._clip_start)
         self.result.splats.seen = seen or {}
         state.kept_count = self.result.splats.count
 
@@ -211,6 +223,15 @@ def _seconds_left(figures, begun):
     """Of the steps: at the pace of the last ones, or of all with their measurements where that is slower."""
     rest = figures.iterations - figures.iteration
     return max(figures.seconds_left, figures.seconds * rest / (figures.iteration - begun))
+
+
+def plan_of(context, settings):
+    """The view_times.Plan of a fit's views, None for views at one time and for photographs, which have times of their
+    own. Errors: StippleError that says what to change."""
+    if settings.model != 'MOTION' or settings.views_from == 'DATASET':
+        return None
+    count = settings.view_count if settings.views_from == 'RIG' else len(view_task.scene_cameras(context.scene))
+    return view_times.plan(settings, context.scene, count)
 
 
 def seen_objects(context):

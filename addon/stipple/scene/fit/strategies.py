@@ -10,7 +10,7 @@ from ...binding.fit import fit_options
 from ...binding.structs import FitModel, FitQuality
 from ..source import sources
 
-ADAPTIVE = 'adaptive'
+ADAPTIVE, TEMPORAL = 'adaptive', 'temporal'
 # As the preset of the quality has it; the number is that of the item in files.
 BY_QUALITY, BY_QUALITY_NUMBER = 'by_quality', 1
 _ADAPTIVE_ALONE = (native.StrategyEntry(ADAPTIVE, "Adaptive", "", FitModel.EXPLICIT),)
@@ -66,7 +66,9 @@ def chosen(settings):
     library = _library()
     if library is None:
         return ADAPTIVE
-    return fit_options(library, FitModel.EXPLICIT, FitQuality[settings.quality]).strategy_utf8.decode()
+    model = FitModel.MOTION if settings.model == 'MOTION' else FitModel.EXPLICIT
+    strategy = fit_options(library, model, FitQuality[settings.quality]).strategy_utf8
+    return TEMPORAL if strategy is None else strategy.decode()
 
 
 def summary(settings):

@@ -136,11 +136,15 @@ class Capture:
                  use_motion_blur=False, use_multiview=False, use_persistent_data=True)
         kept.set(self._layer, use_pass_z=True, use_pass_normal=True)
         kept.set(scene, camera=scene.camera)
+        for marker in scene.timeline_markers:
+            kept.set(marker, camera=None)  # it would take the place of the view's camera
         for layer in scene.view_layers:
             kept.set(layer, use=layer == self._layer)
         self._layer.update()  # else its list may hold what has been removed
         for obj in list(self._layer.objects):
             if not obj.hide_render and obj.type not in {'LIGHT', 'CAMERA', 'LIGHT_PROBE'} and not self._is_seen(obj):
+                for curve in version.animation_curves(obj, 'hide_render'):
+                    kept.set(curve, mute=True)
                 kept.set(obj, hide_render=True)
         self._camera = bpy.data.objects.new('Stipple View', bpy.data.cameras.new('Stipple View'))
         stack.callback(_remove_camera, self._camera.name)
@@ -171,11 +175,13 @@ class Capture:
         scene.camera = camera_object
         self._passes.clear()
         with bpy.context.temp_override(scene=scene, view_layer=self._layer):
-            if self._path is None:
-                bpy.ops.render.render(scene=scene.name)
-            else:
-                bpy.ops.render.render(write_still=True, scene=scene.name)
-                self._read_file()
+            try:
+                bpy.ops.render.render(write_still=self._path is not None, scene=scene.name)
+            except RuntimeError as error:
+                said = '; '.join(line.removeprefix('Error: ') for line in str(error).strip().splitlines())
+                raise StippleError(f"View '{name}' could not be rendered: {said}", Status.ERROR_IO) from None
+        if self._path is not None:
+            self._read_file()
         if 'Combined' not in self._passes:
             raise StippleError(f"Blender rendered no image for view '{name}'; its messages are in the console.",
                                Status.ERROR_IO)

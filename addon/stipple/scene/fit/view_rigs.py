@@ -56,14 +56,14 @@ def bounds_of(objects, depsgraph):
     return Bounds(Vector(lowest), Vector(highest))
 
 
-def poses(rig, scene, depsgraph, bounds, count, seed=0, angle=0.0):
+def poses(rig, scene, depsgraph, bounds, count, seed=0, angle=0.0, cast=None):
     """Poses that see all of the bounds. rig: a key of RIGS; AUTO: inside where the scene's camera stands between walls,
-    else around. angle: field of view, radians; 0: as the rig has it. Errors: StippleError where no place is left for a
-    camera."""
+    else around. angle: field of view, radians; 0: as the rig has it. cast: what rays meet, as RigSearch.cameras() asks
+    for it; None: in the scene of the depsgraph. Errors: StippleError where no place is left for a camera."""
     viewer = None if scene.camera is None else scene.camera.matrix_world.translation
     search = RigSearch.create(sources.context().library, bounds.lowest, bounds.highest, count, RIGS[rig], seed, angle,
                               viewer)
-    return [_pose(camera) for camera in search.cameras(_Caster(scene, depsgraph))]
+    return [_pose(camera) for camera in search.cameras(cast or Caster(scene, depsgraph, Numbers()))]
 
 
 def _pose(camera):
@@ -72,12 +72,29 @@ def _pose(camera):
                 camera.far_plane)
 
 
-class _Caster:
-    """Casts rays into a scene. Objects are numbered as they are met."""
+class Numbers:
+    """Numbers objects as they are met, with the sides of their boxes then."""
 
-    def __init__(self, scene, depsgraph):
-        self._scene, self._depsgraph = scene, depsgraph
+    def __init__(self):
         self._numbers, self._sizes = {}, []
+
+    def of(self, obj):
+        name = obj.name_full
+        if name not in self._numbers:
+            self._numbers[name] = len(self._sizes)
+            corners = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
+            self._sizes.append(np.ptp(corners, axis=0))
+        return self._numbers[name]
+
+    def sizes(self):
+        return np.array(self._sizes).reshape(-1, 3)
+
+
+class Caster:
+    """Casts rays into a scene."""
+
+    def __init__(self, scene, depsgraph, numbers):
+        self._scene, self._depsgraph, self._numbers = scene, depsgraph, numbers
 
     def __call__(self, rays):
         distances, normals = np.full(len(rays), np.inf), np.zeros((len(rays), 3))
@@ -87,12 +104,5 @@ class _Caster:
             hit, location, normal, _, obj, _ = self._scene.ray_cast(self._depsgraph, ray[:3], ray[3:6], **limit)
             if hit:
                 distances[i] = np.linalg.norm(np.array(location) - ray[:3])
-                normals[i], objects[i] = normal, self._number(obj)
-        return distances, normals, objects, np.array(self._sizes).reshape(-1, 3)
-
-    def _number(self, obj):
-        if obj not in self._numbers:
-            self._numbers[obj] = len(self._sizes)
-            corners = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
-            self._sizes.append(np.ptp(corners, axis=0))
-        return self._numbers[obj]
+                normals[i], objects[i] = normal, self._numbers.of(obj)
+        return distances, normals, objects, self._numbers.sizes()

@@ -1,23 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Work on views of the scene, or on photographs: the views first, then what is done with them."""
 
+import contextlib
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...binding.errors import CancelledError, StippleError, invalid
 from ...binding.model import DecodeSettings, Model
-from ...binding.structs import ColourSpace, JobState
+from ...binding.structs import ColourSpace, JobState, ViewSplit
 from ...binding.views import Views
 from ...pace import Pace
 from .. import meshes
-from . import view_capture, view_rigs
+from . import moving_views, view_capture, view_pace, view_rigs, view_times
 from ..source import setting_paths, sources
 from ..view import facts
 
 # Surface samples that a fit of meshes starts from and learns its density on.
 POINT_COUNT = 20_000
 _POLL_SECONDS = 0.02
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A view to be taken."""
+
+    name: str
+    seen_by: object        # view_rigs.Pose, or a camera object
+    frame: object = None   # of the scene; None for as it is
+    seconds: float = 0.0   # when that is
+    split: ViewSplit = ViewSplit.NONE
 
 
 class ViewTask:
@@ -29,6 +42,7 @@ class ViewTask:
 
     parts = {'points': 0.05, 'views': 0.30, 'use': 0.62, 'keep': 0.03}  # of the work, and their usual shares
     colour_space = ColourSpace.DISPLAY  # of the splats that the views are for
+    plan = None                         # view_times.Plan of views at several times; None: the scene as it is
 
     def __init__(self, context, objects, settings):
         self.result = None
@@ -39,6 +53,7 @@ class ViewTask:
         self._cancelled, self._error = False, None
         self.pace = Pace(self.parts)
         self._stage = 'Preparing'
+        self._notes = []  # sentences on the views
         self._steps = self._work()
 
     def poll(self):
@@ -94,9 +109,9 @@ class ViewTask:
     def _ended(self, error):
         pass
 
-    def _add_view(self, views, seen, name):
+    def _add_view(self, views, seen, shot):
         # No fit looks at normals, and 100 views of 800 x 800 would keep 0.4 GiB of them.
-        views.add(seen.camera, seen.linear, depth=seen.depth, name=name)
+        views.add(seen.camera, seen.linear, depth=seen.depth, name=shot.name, time=shot.seconds, split=shot.split)
 
     def _work(self):
         settings = self._settings
@@ -107,17 +122,22 @@ class ViewTask:
             views = Views.open(self._native, setting_paths.absolute(settings, 'dataset'), settings.downscale)
         else:
             views = Views.create(self._native, self.colour_space)
-            yield from self._add_points(views)
-            yield from self._add_views(views)
+            with contextlib.nullcontext() if self.plan is None else moving_views.Frames(self._context) as frames:
+                if frames is None:
+                    yield from self._add_points(views)
+                    shots = self._shots()
+                else:
+                    surfaces = moving_views.Surfaces(frames, self.plan.frames)
+                    yield from self._add_moving_points(views, surfaces)
+                    shots = self._moving_shots(frames, surfaces.bounds)
+                yield from self._add_views(views, shots, frames)
         self._check_cancelled()
         self.holds_scene = False
         yield from self._use(views)
 
     def _add_points(self, views):
         """Samples of the meshes' surfaces: where splats can be."""
-        seen = meshes.source_objects(self._objects)
-        if not seen:
-            raise invalid('There is no mesh to fit splats to; select one, or show one.')
+        seen = self._meshes()
         yield 'points', 0.0, 'Reading the meshes'
         depsgraph = self._context.evaluated_depsgraph_get()
         mesh = meshes.native_mesh(self._native, seen, depsgraph, 'MATERIAL')
@@ -126,31 +146,76 @@ class ViewTask:
         cloud = Model.of_job(job).decode(DecodeSettings(POINT_COUNT, 1, seed=self._settings.seed)).read()
         views.set_points(cloud.positions, _linear_colours(cloud))
 
-    def _add_views(self, views):
-        settings = self._settings
-        capturing = view_capture.CaptureSettings(settings.engine, settings.view_size, settings.samples,
-                                                 settings.transparent)
-        shots = self._shots()
+    def _add_moving_points(self, views, surfaces):
+        """The same of several times."""
+        seen = self._meshes()
+        yield 'points', 0.0, 'Reading the meshes'
+        looking = surfaces.look(self._native, seen, self._settings.seed, POINT_COUNT,
+                                lambda job: self._until_done(job, 'points'))
+        for share, stage in looking:
+            yield 'points', share, stage
+            self._check_cancelled()
+        if not surfaces.moves:
+            looked_at = ', '.join(f'{frame:g}' for frame in surfaces.pointed_at)
+            self._notes.append(f'No surface moves between the frames {looked_at}, where they were looked at; the model '
+                               'Splats, in Advanced, would do.')
+        views.set_points(np.concatenate([cloud.positions for cloud in surfaces.clouds]),
+                         np.concatenate([_linear_colours(cloud) for cloud in surfaces.clouds]),
+                         times=view_times.seconds_at(self._context.scene, np.concatenate(surfaces.frames),
+                                                     self.plan.frames[0]))
+
+    def _meshes(self):
+        seen = meshes.source_objects(self._objects)
+        if not seen:
+            raise invalid('There is no mesh to fit splats to; select one, or show one.')
+        return seen
+
+    def _add_views(self, views, shots, frames):
+        """frames: moving_views.Frames, None where no shot has a frame."""
+        capturing = capture_settings(self._settings)
+        shown = None
         with view_capture.Capture(self._context, self._objects, capturing) as capture:
-            for i, (name, shot) in enumerate(shots):
+            for i, shot in enumerate(shots):
                 yield 'views', i / len(shots), f'Rendering view {i + 1} of {len(shots)}'
                 self._check_cancelled()
-                is_pose = isinstance(shot, view_rigs.Pose)
-                seen = capture.pose(name, shot) if is_pose else capture.camera(shot)
-                self._add_view(views, seen, name)
+                began = time.perf_counter()
+                if shot.frame != shown:
+                    frames.set(shot.frame)
+                    shown = shot.frame
+                is_pose = isinstance(shot.seen_by, view_rigs.Pose)
+                seen = capture.pose(shot.name, shot.seen_by) if is_pose else capture.camera(shot.seen_by)
+                self._add_view(views, seen, shot)
+                view_pace.note(capturing, time.perf_counter() - began)
 
     def _shots(self):
-        """[(name, pose or camera object)]."""
-        settings, scene = self._settings, self._context.scene
+        """[Shot] of the scene as it is."""
+        settings = self._settings
         if settings.views_from == 'CAMERAS':
-            cameras = view_capture.scene_cameras(scene)
-            if not cameras:
-                raise invalid('The scene has no perspective or orthographic camera; add cameras, or choose a rig.')
-            return [(camera.name, camera) for camera in cameras]
+            return [Shot(camera.name, camera) for camera in scene_cameras(self._context.scene)]
         depsgraph = self._context.evaluated_depsgraph_get()
         bounds = view_rigs.bounds_of(self._objects, depsgraph)
-        poses = view_rigs.poses(settings.rig, scene, depsgraph, bounds, settings.view_count, settings.seed)
-        return [(f'view_{i:04d}', pose) for i, pose in enumerate(poses)]
+        poses = view_rigs.poses(settings.rig, self._context.scene, depsgraph, bounds, settings.view_count,
+                                settings.seed)
+        return [Shot(f'view_{i:04d}', pose) for i, pose in enumerate(poses)]
+
+    def _moving_shots(self, frames, bounds):
+        """[Shot] of the plan."""
+        settings, scene, plan = self._settings, self._context.scene, self.plan
+        if settings.views_from == 'CAMERAS':
+            cameras = scene_cameras(scene)
+            names = [camera.name for camera in cameras]
+        else:
+            cast = moving_views.Caster(scene, frames, plan.frames)
+            cameras = view_rigs.poses(settings.rig, scene, frames.set(plan.frames[0]), bounds, plan.camera_count,
+                                      settings.seed, cast=cast)
+            names = [f'view_{i:04d}' for i in range(len(cameras))]
+        shots = []
+        for when, camera in plan.images():
+            frame, is_held = plan.frames[when], camera in plan.held_out
+            split = ViewSplit.NONE if not plan.held_out else ViewSplit.TEST if is_held else ViewSplit.TRAIN
+            name = f"{names[camera]}{', held out,' if is_held else ''} at frame {frame:08.2f}"
+            shots.append(Shot(name, cameras[camera], frame, view_times.seconds_at(scene, frame, plan.frames[0]), split))
+        return shots
 
     def _until_done(self, job, part):
         while True:
@@ -165,6 +230,19 @@ class ViewTask:
     def _check_cancelled(self):
         if self._cancelled:
             raise CancelledError()
+
+
+def capture_settings(settings):
+    """The view_capture.CaptureSettings of a fit's settings."""
+    return view_capture.CaptureSettings(settings.engine, settings.view_size, settings.samples, settings.transparent)
+
+
+def scene_cameras(scene):
+    """view_capture.scene_cameras(). Errors: StippleError for none."""
+    cameras = view_capture.scene_cameras(scene)
+    if not cameras:
+        raise invalid('The scene has no perspective or orthographic camera; add cameras, or choose a rig.')
+    return cameras
 
 
 def _linear_colours(splats):

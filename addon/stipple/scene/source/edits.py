@@ -99,13 +99,15 @@ def write(edited):
     return outcome
 
 
-def attach(data, path, count, is_tree, mask=None):
+def attach(data, path, count, is_tree, mask=None, settings=None):
     """Notes a file of splats, or a tree of so many, as the source of a datablock. mask: [count] what stays of it, None
-    for all."""
+    for all. settings: StippleModelSettings of what is a tree and moves."""
     with sync.paused():
         masks.clear(data)
         if is_tree:
             sources.attach_tree(data, path, count)
+            if settings is not None:
+                source_settings.note_model(data.stipple, source_settings.of_model(settings))
         else:
             sources.attach_cloud(data, path)
         if mask is not None:
@@ -137,6 +139,13 @@ def refuse_sequence(obj):
     if obj.data.stipple.is_sequence:
         raise invalid(f"'{obj.name}' is a series of files, and this changes the splats of one; choose Use as New "
                       'Source first, which keeps the present frame alone.')
+
+
+def refuse_moving(obj):
+    """Refuses what would leave one moment of splats that move."""
+    if source_settings.of(obj.data.stipple).has_time and not obj.data.stipple.edited:
+        raise invalid(f"'{obj.name}' is a clip of splats that move, and this changes the splats of one moment; choose Use "
+                      'as New Source first, which keeps the moment that is shown.')
 
 
 def check_editable(obj, is_edited=sync.is_edited):

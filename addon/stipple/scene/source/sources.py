@@ -235,12 +235,13 @@ def source_key(data):
 
 
 def whole_cloud(data):
-    """All splats of a datablock's source, masked ones too; the last one is kept."""
-    path = source_paths.file_of(data)
-    key = _file_key(path)
+    """All splats of a datablock's source, masked ones too, and those that move where they are now; the last one is
+    kept."""
+    path, settings = source_paths.file_of(data), _whole_settings(data)
+    key = (*_file_key(path), settings)
     if key not in _whole:
         ahead = _whole_ahead.pop(key, None)
-        cloud = _whole_reader(data, path)() if ahead is None else ahead.result()
+        cloud = _whole_reader(path, settings)() if ahead is None else ahead.result()
         _whole.clear()
         _whole[key] = cloud
     return _whole[key]
@@ -249,24 +250,33 @@ def whole_cloud(data):
 def read_whole_ahead(data):
     """Begins to read what whole_cloud() gives, in a thread of its own. Returns whether that is at hand. Errors:
     StippleError."""
-    path = source_paths.file_of(data)
-    key = _file_key(path)
+    path, settings = source_paths.file_of(data), _whole_settings(data)
+    key = (*_file_key(path), settings)
     if key in _whole:
         return True
     if key not in _whole_ahead:
         _whole_ahead.clear()  # one at a time is kept
-        _whole_ahead[key] = Ahead(_whole_reader(data, path))
+        _whole_ahead[key] = Ahead(_whole_reader(path, settings))
     if _whole_ahead[key].is_running():
         return False
     whole_cloud(data)
     return True
 
 
-def _whole_reader(data, path):
+def _whole_settings(data):
+    """DecodeSettings of all splats of a model, None of a file of splats."""
+    stipple = data.stipple
+    known = source_settings.of(stipple)
+    if not known.counts_splats:
+        return None
+    return DecodeSettings(stipple.source_count, time=seconds(stipple) if known.has_time else 0.0)
+
+
+def _whole_reader(path, settings):
     """A function that reads all splats of a source and never touches Blender."""
-    if source_settings.of(data.stipple).counts_splats:
-        tree, settings = model(path), DecodeSettings(data.stipple.source_count)
-        return lambda: tree.decode(settings)
+    if settings is not None:
+        source = model(path)
+        return lambda: source.decode(settings)
     native = context()
     return lambda: Cloud.load(native, path)
 
@@ -291,7 +301,7 @@ def decode_settings(stipple, mode='VIEWPORT', scene=None):
     tells the time, None for the present one. What the source does not have is as it is in new settings."""
     known = source_settings.of(stipple)
     if known.counts_splats:
-        budget = max(_tree_budget(stipple, mode), known.least_budget)
+        budget = max(_tree_budget(stipple, mode), min(known.least_budget, visible_count(stipple)))
     else:
         budget = (mode == 'RENDER' and stipple.anchors_render) or stipple.anchors
     return DecodeSettings(budget, gaussians_per_anchor(stipple),
@@ -428,7 +438,9 @@ def _save(write, path, suffix, overwrite):
 def first_settings(settings):
     """How an asset is shown at first. In: settings, StippleModelSettings."""
     known = source_settings.of_model(settings)
-    budget = min(known.default_budget, FIRST_COUNT) if known.counts_splats else known.default_budget
+    budget = known.default_budget
+    if known.counts_splats:
+        budget = max(min(budget, FIRST_COUNT), known.least_budget)
     return DecodeSettings(budget, known.default_gaussians)
 
 
