@@ -50,8 +50,9 @@ class FitViewsTest : public ApiTest {
   }
 
   /// In: brightness, a factor of all colours; 0 makes black pictures; seconds from one view to the
-  /// next.
-  void addViews(StippleViews* views, float brightness, double seconds = 0) {
+  /// next; teaches: else nothing can be learned from them: the first looks away, and no pixel of
+  /// the others counts.
+  void addViews(StippleViews* views, float brightness, double seconds = 0, bool teaches = true) {
     StippleCloud* cloud = scene();
     StippleRenderOptions render_options;
     stipple_render_options_init(&render_options);
@@ -71,6 +72,11 @@ class FitViewsTest : public ApiTest {
       picture.transfer = STIPPLE_TRANSFER_SRGB;
       picture.rgba = rgba.data();
       picture.time = v * seconds;
+      const std::vector<float> nothing(rgba.size() / 4, 0.0f);
+      if (!teaches && v > 0) picture.weights = nothing.data();
+      for (int i = 0; i < 12 && !teaches && v == 0; ++i) {
+        if (i / 4 != 1) camera.world_to_camera[i] *= -1;
+      }
       const std::string name = std::to_string(100 + v);
       STIPPLE_ASSERT_OK(stipple_views_add(views, &camera, &picture, name.c_str()));
     }
