@@ -4,6 +4,7 @@
 import json
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import bpy
@@ -13,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import moving_scene  # noqa: E402
 from fit_steps import module, press  # noqa: E402
 
+LATEST = 4.0  # seconds until a preview is shown, at every 1.5 seconds
 facts = {}
 _shown = {}
 
@@ -95,9 +97,10 @@ def previewed(frame, name):
             return False
         if _shown.get('frame') != frame:
             bpy.context.scene.frame_set(frame)
-            _shown.update(frame=frame, made_at=figures.preview_iteration)
+            _shown.update(frame=frame, made_at=figures.preview_iteration, changed_at=time.monotonic())
             return False
-        if figures.preview_iteration < _shown['made_at'] + 200:
+        is_shown = time.monotonic() > _shown['changed_at'] + LATEST
+        if figures.preview_iteration < _shown['made_at'] + 200 or not is_shown:
             return False
         return name
     return step
