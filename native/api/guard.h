@@ -69,7 +69,8 @@ T complete(const T* given, const char* name) {
   return *given;
 }
 
-/// A struct of the caller whose first `needed` bytes must be there; the rest is 0 where it ends early.
+/// A struct of the caller whose first `needed` bytes must be there; the rest is 0 where it ends
+/// early.
 template <typename T>
 T completeUpTo(const T* given, size_t needed, const char* name) {
   const size_t size = require(given, name).struct_size;
@@ -116,6 +117,16 @@ class StructArray {
   std::string name_;
   size_t step_ = 0;
 };
+
+/// Refuses counts of rows of three numbers that no array can hold. Returns: how many numbers.
+inline size_t requireTriples(uint64_t rows, const char* name) {
+  constexpr uint64_t kMost = UINT32_MAX;
+  if (rows > kMost) {
+    fail(ErrorCode::kInvalidArgument, std::string(name) + " is " + std::to_string(rows) +
+                                          "; at most " + std::to_string(kMost) + " are allowed");
+  }
+  return 3 * static_cast<size_t>(rows);
+}
 
 /// Refuses buffers that are too small. In: what is counted, "floats".
 inline void requireCapacity(uint64_t needed, uint64_t capacity, const char* what) {

@@ -32,9 +32,8 @@ def prepare_ball(quality):
     settings.quality = quality
 
 
-def build(window):
-    """A ball; the sidebar shows the panel, in a tab that every Blender opens first."""
-    prepare_ball('BALANCED')
+def show_panel(window):
+    """The sidebar with the panel, in a tab that every Blender opens first, beside the scene from its front."""
     window.space.show_region_ui = True
     for panel in reversed(module('.panels.fit').classes):
         bpy.utils.unregister_class(panel)
@@ -44,6 +43,12 @@ def build(window):
     with window.context():
         bpy.ops.view3d.view_axis(type='FRONT')
     window.region_data.view_distance = 6
+
+
+def build(window):
+    """A ball."""
+    prepare_ball('BALANCED')
+    show_panel(window)
 
 
 def panel(_window):

@@ -12,7 +12,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import moving_scene  # noqa: E402
-from fit_steps import module, press  # noqa: E402
+from fit_steps import module, press, show_panel  # noqa: E402
 
 LATEST = 4.0  # seconds until a preview is shown, at every 1.5 seconds
 facts = {}
@@ -41,16 +41,8 @@ def build(window):
     moving_scene.build(Path(tempfile.mkdtemp(prefix='stipple-steps-')))
     # Runs longer than the test waits.
     moving_scene.settings(view_count=8, image_count=96, max_splats=4000, quality='FINE_DETAIL')
-    window.space.show_region_ui = True
     window.space.shading.color_type = 'TEXTURE'
-    for panel in reversed(module('.panels.fit').classes):
-        bpy.utils.unregister_class(panel)
-    for panel in module('.panels.fit').classes:
-        panel.bl_category = 'Item'
-        bpy.utils.register_class(panel)
-    with window.context():
-        bpy.ops.view3d.view_axis(type='FRONT')
-    window.region_data.view_distance = 6
+    show_panel(window)
     bpy.context.scene.frame_set(9)
 
 

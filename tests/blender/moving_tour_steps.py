@@ -15,7 +15,7 @@ sys.path.insert(0, str(HERE))
 import photo_set  # noqa: E402
 import scenes  # noqa: E402
 import tour_steps  # noqa: E402
-from fit_tour_steps import few_tabs, fit, folder, open_tab, over_grey, state  # noqa: E402
+from fit_tour_steps import accept, ended, few_tabs, fit, folder, open_tab, over_grey, start, state  # noqa: E402
 
 FIRST, LAST = 1, 24
 FRAMES = (1, 9, 17, 24)
@@ -57,25 +57,13 @@ def panel(window):
     return 'moving_start'
 
 
-def start(window):
-    with window.context():
-        assert bpy.ops.stipple.splats_fit('INVOKE_DEFAULT') == {'RUNNING_MODAL'}
-
-
 def running(_window):
     assert state().is_running, state().problem
     figures = state().figures
     return 'moving_panel' if figures is not None and figures.iteration > 0.6 * figures.iterations else False
 
 
-def ended(_window):
-    assert not state().problem, state().problem
-    return False if state().is_running else None
-
-
-def accept(window):
-    with window.context():
-        assert bpy.ops.stipple.fit_accept() == {'FINISHED'}
+def figures(_window):
     print('MOVING', state().figures.best_psnr, state().figures.seconds, state().kept_count, flush=True)
 
 
@@ -108,4 +96,4 @@ def strip(_window):
     photo_set.save(np.concatenate(rows[::-1], axis=0), folder() / 'moving_frames.png')
 
 
-steps = [build, open_tab, panel, start, running, ended, accept, clip, strip]
+steps = [build, open_tab, panel, start, running, ended, accept, figures, clip, strip]

@@ -32,26 +32,10 @@ std::vector<Hard> hardClouds() {
     cases.push_back({name, test::movingCloud(count)});
     set(cases.back().moving);
   };
-  const auto alike = [](MotionCloud& m) {
-    const auto repeat = [&](std::vector<float>& column) {
-      const size_t width = column.size() / m.size();
-      for (size_t i = width; i < column.size(); ++i) column[i] = column[i - width];
-    };
-    repeat(m.splats.positions);
-    repeat(m.splats.rotations);
-    repeat(m.splats.scales);
-    repeat(m.splats.opacities);
-    repeat(m.splats.sh);
-    for (auto& wave : m.waves) repeat(wave);
-    repeat(m.phases);
-    repeat(m.spins);
-    repeat(m.lifespans);
-    repeat(m.centres);
-  };
   add("one splat", 1, [](MotionCloud&) {});
-  add("two identical splats", 2, alike);
+  add("two identical splats", 2, test::makeAlike);
   // A million of them take the same path as these, a few rounds more.
-  add("many equal splats", 20000, alike);
+  add("many equal splats", 20000, test::makeAlike);
   add("lives that do not overlap", 200, [](MotionCloud& m) {
     m.clip.frame_count = 300;
     fill(m.lifespans, 0.01f);

@@ -15,20 +15,10 @@ using namespace stipple::api;
 
 namespace {
 
-/// Refuses counts whose numbers no array can hold.
-size_t requireRows(uint64_t rows, const char* name) {
-  constexpr uint64_t kMost = UINT32_MAX;
-  if (rows > kMost) {
-    fail(ErrorCode::kInvalidArgument, std::string(name) + " is " + std::to_string(rows) +
-                                          "; at most " + std::to_string(kMost) + " are allowed");
-  }
-  return 3 * static_cast<size_t>(rows);
-}
-
 RestMesh restFrom(const float* positions, uint64_t vertex_count, const uint32_t* triangles,
                   uint64_t triangle_count, uint32_t reach) {
-  const size_t numbers = requireRows(vertex_count, "vertex_count");
-  const size_t corners = requireRows(triangle_count, "triangle_count");
+  const size_t numbers = requireTriples(vertex_count, "vertex_count");
+  const size_t corners = requireTriples(triangle_count, "triangle_count");
   if (numbers > 0) require(positions, "positions");
   if (corners > 0) require(triangles, "triangles");
   RestMesh rest;

@@ -15,18 +15,8 @@ using namespace stipple::api;
 
 namespace {
 
-/// Refuses counts whose numbers no array can hold.
-size_t lengthOf(uint64_t rows, const char* name) {
-  constexpr uint64_t kMost = UINT32_MAX;
-  if (rows > kMost) {
-    fail(ErrorCode::kInvalidArgument, std::string(name) + " is " + std::to_string(rows) +
-                                          "; at most " + std::to_string(kMost) + " are allowed");
-  }
-  return 3 * static_cast<size_t>(rows);
-}
-
 std::vector<float> placesFrom(const float* values, uint64_t vertex_count, const char* name) {
-  const size_t length = lengthOf(vertex_count, "vertex_count");
+  const size_t length = requireTriples(vertex_count, "vertex_count");
   const float* begin = length == 0 ? values : &require(values, name);
   return {begin, begin + length};
 }
@@ -40,7 +30,7 @@ StippleStatus stipple_cloud_bind_start(const StippleCloud* cloud, const float* r
                                        uint64_t triangle_count, uint32_t reach, StippleJob** job) {
   return guarded([&] {
     const std::shared_ptr<const SplatCloud> splats = require(cloud, "cloud").cloud;
-    const size_t corners = lengthOf(triangle_count, "triangle_count");
+    const size_t corners = requireTriples(triangle_count, "triangle_count");
     const auto followed = enumValue<BindingReach>(reach, STIPPLE_BIND_AROUND, "reach");
     require(job, "job");
     cloud->context->requireMemory(
@@ -89,7 +79,7 @@ StippleStatus stipple_cloud_carry(const StippleCloud* cloud, const StippleBindin
   return guarded([&] {
     const SplatCloud& splats = *require(cloud, "cloud").cloud;
     const SurfaceBinding& bound = *require(binding, "binding").binding;
-    const size_t length = lengthOf(vertex_count, "vertex_count");
+    const size_t length = requireTriples(vertex_count, "vertex_count");
     if (length > 0) require(deformed, "deformed");
     require(carried, "carried");
     const Context& context = cloud->context;

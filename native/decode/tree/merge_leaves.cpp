@@ -1,7 +1,10 @@
 #include "decode/tree/merge_leaves.h"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "decode/tree/tree_shape.h"
 #include "math/morton.h"
@@ -70,6 +73,26 @@ void HarmonicRows::mix(const MergeIds& ids, double share_first) {
 const float* HarmonicRows::row(uint32_t id) const {
   return id < order_.size() ? &leaves_.sh[order_[id] * stride_]
                             : &merged_.sh[(id - order_.size()) * stride_];
+}
+
+void requireFootprint(double footprint) {
+  if (std::isfinite(footprint) && footprint >= 0) return;
+  fail(ErrorCode::kInvalidArgument,
+       "footprint is " + std::to_string(footprint) + " m; 0 (automatic) or more is allowed");
+}
+
+void requireNodesLike(const SplatCloud& nodes, const SplatCloud& leaves, const char* what) {
+  const std::string name(what);
+  if (nodes.size() != leaves.size() - 1) {
+    fail(ErrorCode::kInvalidArgument, name + " has " + std::to_string(nodes.size()) +
+                                          " inner nodes; a tree over " +
+                                          std::to_string(leaves.size()) + " splats has one fewer");
+  }
+  if (nodes.sh_degree != leaves.sh_degree) {
+    fail(ErrorCode::kInvalidArgument,
+         name + " has inner nodes of harmonic degree " + std::to_string(nodes.sh_degree) +
+             "; that of the splats, " + std::to_string(leaves.sh_degree) + ", is needed");
+  }
 }
 
 }  // namespace stipple

@@ -23,6 +23,13 @@ SplatCloud emptyLike(const SplatCloud& cloud, size_t count);
 /// Rows of a cloud in another order.
 void gatherRows(SplatCloud& cloud, const std::vector<uint32_t>& from);
 
+/// Refuses footprints that no tree is built for. Errors: kInvalidArgument.
+void requireFootprint(double footprint);
+
+/// Refuses inner nodes that are not one fewer than the leaves, or of another harmonic degree.
+/// `what` names their tree. Errors: kInvalidArgument.
+void requireNodesLike(const SplatCloud& nodes, const SplatCloud& leaves, const char* what);
+
 /// Harmonics of merged splats: the mean of both children's by their weights.
 class HarmonicRows {
  public:

@@ -1,10 +1,7 @@
 #include "decode/tree/merge_tree.h"
 
 #include <algorithm>
-#include <cmath>
-#include <string>
 
-#include "base/error.h"
 #include "base/parallel.h"
 #include "data/clouds/cloud_extent.h"
 #include "decode/tree/merge_cost.h"
@@ -22,10 +19,7 @@ void validateInput(const SplatCloud& leaves, std::span<const float> visibility,
   validate(leaves, "cloud");
   requireLeafCount(leaves.size(), "cloud");
   requireVisibility(visibility, leaves.size());
-  if (!std::isfinite(options.footprint) || options.footprint < 0) {
-    fail(ErrorCode::kInvalidArgument, "footprint is " + std::to_string(options.footprint) +
-                                          " m; 0 (automatic) or more is allowed");
-  }
+  requireFootprint(options.footprint);
 }
 
 /// Splats that stand.
@@ -112,18 +106,8 @@ uint64_t mergeTreeMemoryBound(uint64_t leaf_count, int sh_degree) {
 }
 
 void validateTree(const MergeTree& tree, const SplatCloud& leaves, const char* what) {
-  const std::string name(what);
   validateShape(tree, leaves.size(), what);
-  if (tree.nodes.size() != leaves.size() - 1) {
-    fail(ErrorCode::kInvalidArgument, name + " has " + std::to_string(tree.nodes.size()) +
-                                          " inner nodes; a tree over " +
-                                          std::to_string(leaves.size()) + " splats has one fewer");
-  }
-  if (tree.nodes.sh_degree != leaves.sh_degree) {
-    fail(ErrorCode::kInvalidArgument,
-         name + " has inner nodes of harmonic degree " + std::to_string(tree.nodes.sh_degree) +
-             "; that of the splats, " + std::to_string(leaves.sh_degree) + ", is needed");
-  }
+  requireNodesLike(tree.nodes, leaves, what);
 }
 
 }  // namespace stipple

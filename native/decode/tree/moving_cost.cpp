@@ -20,25 +20,14 @@ namespace HWY_NAMESPACE {
 #include "decode/tree/merge_steps-inl.h"
 #include "decode/tree/moving_steps-inl.h"
 
-HWY_FLATTEN double mergeOfLanes(const MovingNodeRows& rows, uint32_t a, uint32_t b,
-                                const double* means, MovingNode& node, float* samples) {
-  return mergeOverTime<CostLanes>(*rows.scale, rows.nodes[a], rows.samplesOf(a), rows.nodes[b],
-                                  rows.samplesOf(b), means, node, samples);
+HWY_FLATTEN void costsOfLanes(const MovingNodeRows& rows, uint32_t slot, const uint32_t* others,
+                              size_t count, float* costs) {
+  costsOverTime<CostLanes>(rows, slot, others, count, costs);
 }
 
-void costsOfLanes(const MovingNodeRows& rows, uint32_t slot, const uint32_t* others, size_t count,
-                  float* costs) {
-  constexpr double kLargest = std::numeric_limits<float>::max();
-  MovingNode node;
-  for (size_t i = 0; i < count; ++i) {
-    const double error = mergeOfLanes(rows, slot, others[i], nullptr, node, nullptr);
-    costs[i] = static_cast<float>(std::min(error, kLargest));
-  }
-}
-
-void mergeRowsOfLanes(const MovingNodeRows& rows, uint32_t a, uint32_t b, const double* means,
-                      MovingMerge& merged) {
-  merged.error = mergeOfLanes(rows, a, b, means, merged.node, merged.samples.data());
+HWY_FLATTEN void mergeRowsOfLanes(const MovingNodeRows& rows, uint32_t a, uint32_t b,
+                                  const double* means, MovingMerge& merged) {
+  mergeRowsOverTime<CostLanes>(rows, a, b, means, merged);
 }
 
 /// Highway's own one-lane target is not the plain kernel, which has the name "scalar".

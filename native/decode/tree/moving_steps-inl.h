@@ -316,3 +316,25 @@ double mergeOverTime(const MovingScale& scale, const MovingNode& a, const float*
   }
   return errors.total();
 }
+
+/// MovingMergeKernel::costs.
+template <class T>
+void costsOverTime(const MovingNodeRows& rows, uint32_t slot, const uint32_t* others, size_t count,
+                   float* costs) {
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  MovingNode node;
+  for (size_t i = 0; i < count; ++i) {
+    const double error =
+        mergeOverTime<T>(*rows.scale, rows.nodes[slot], rows.samplesOf(slot), rows.nodes[others[i]],
+                         rows.samplesOf(others[i]), nullptr, node, nullptr);
+    costs[i] = static_cast<float>(std::min(error, kLargest));
+  }
+}
+
+/// MovingMergeKernel::merge.
+template <class T>
+void mergeRowsOverTime(const MovingNodeRows& rows, uint32_t a, uint32_t b, const double* means,
+                       MovingMerge& merged) {
+  merged.error = mergeOverTime<T>(*rows.scale, rows.nodes[a], rows.samplesOf(a), rows.nodes[b],
+                                  rows.samplesOf(b), means, merged.node, merged.samples.data());
+}

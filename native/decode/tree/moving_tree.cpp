@@ -33,10 +33,7 @@ void validateInput(const MotionCloud& leaves, std::span<const float> visibility,
   validate(leaves, "moving splats");
   requireLeafCount(leaves.size(), "the moving cloud");
   requireVisibility(visibility, leaves.size());
-  if (!std::isfinite(options.footprint) || options.footprint < 0) {
-    fail(ErrorCode::kInvalidArgument, "footprint is " + std::to_string(options.footprint) +
-                                          " m; 0 (automatic) or more is allowed");
-  }
+  requireFootprint(options.footprint);
   if (options.times < 1 || options.times > kMostMergeTimes) {
     fail(ErrorCode::kInvalidArgument, "times is " + std::to_string(options.times) + "; 1 to " +
                                           std::to_string(kMostMergeTimes) + " is allowed");
@@ -267,19 +264,8 @@ uint64_t movingTreeMemoryBound(uint64_t leaf_count, int sh_degree) {
 }
 
 void validateTree(const MovingTree& tree, const MotionCloud& leaves, const char* what) {
-  const std::string name(what);
   validateShape(tree, leaves.size(), what);
-  if (tree.nodes.size() != leaves.size() - 1) {
-    fail(ErrorCode::kInvalidArgument, name + " has " + std::to_string(tree.nodes.size()) +
-                                          " inner nodes; a tree over " +
-                                          std::to_string(leaves.size()) + " splats has one fewer");
-  }
-  if (tree.nodes.splats.sh_degree != leaves.splats.sh_degree) {
-    fail(ErrorCode::kInvalidArgument, name + " has inner nodes of harmonic degree " +
-                                          std::to_string(tree.nodes.splats.sh_degree) +
-                                          "; that of the splats, " +
-                                          std::to_string(leaves.splats.sh_degree) + ", is needed");
-  }
+  requireNodesLike(tree.nodes.splats, leaves.splats, what);
 }
 
 }  // namespace stipple

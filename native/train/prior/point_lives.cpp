@@ -15,7 +15,8 @@ constexpr size_t kMostCameras = 5;
 constexpr size_t kMostTimes = 48;
 /// Largest difference of a channel of one colour, of two images.
 constexpr float kLikeness = 0.12f;
-/// Of all times at which cameras say something: seen in so many, a point is always there.
+/// A point is always there that is seen at so large a share of the times at which cameras say
+/// something.
 constexpr double kSteadyShare = 0.7;
 constexpr float kOpaque = 0.5f;
 constexpr size_t kGrain = 1 << 12;

@@ -155,18 +155,7 @@ TEST(MovingTree, EqualSplatsBecomeOneThatMovesLikeThem) {
   MotionCloud moving = test::movingCloud(2);
   // As faint that opacities add up; a life that is long beside a part of the clip.
   for (size_t i = 0; i < 2; ++i) moving.splats.opacities[i] = 0.01f;
-  const auto copyRow = [](std::vector<float>& column) {
-    std::copy_n(column.begin(), column.size() / 2, column.begin() + column.size() / 2);
-  };
-  copyRow(moving.splats.positions);
-  copyRow(moving.splats.rotations);
-  copyRow(moving.splats.scales);
-  copyRow(moving.splats.sh);
-  for (auto& wave : moving.waves) copyRow(wave);
-  copyRow(moving.phases);
-  copyRow(moving.spins);
-  copyRow(moving.lifespans);
-  copyRow(moving.centres);
+  test::makeAlike(moving);
   const auto tree = treeOf(moving);
   EXPECT_LT(tree->errors[0], 1e-6);
   const MovingDecoder decoder(moving, tree);

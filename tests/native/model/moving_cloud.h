@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "base/random.h"
 #include "motion/motion_cloud.h"
 
@@ -44,6 +46,24 @@ inline MotionCloud movingCloud(size_t count) {
   moving.clip.frames_per_second = 8;
   moving.clip.frame_count = 12;
   return moving;
+}
+
+/// Gives all splats the numbers of the first.
+inline void makeAlike(MotionCloud& moving) {
+  const auto repeat = [&](std::vector<float>& column) {
+    const size_t width = column.size() / moving.size();
+    for (size_t i = width; i < column.size(); ++i) column[i] = column[i - width];
+  };
+  repeat(moving.splats.positions);
+  repeat(moving.splats.rotations);
+  repeat(moving.splats.scales);
+  repeat(moving.splats.opacities);
+  repeat(moving.splats.sh);
+  for (auto& wave : moving.waves) repeat(wave);
+  repeat(moving.phases);
+  repeat(moving.spins);
+  repeat(moving.lifespans);
+  repeat(moving.centres);
 }
 
 }  // namespace stipple::test
