@@ -179,9 +179,12 @@ TEST_F(SurfaceApi, ComesFromMeshesByTheirDepth) {
   EXPECT_NEAR(depth_[24 * 64 + 32], 2.5f, 1e-6);
   EXPECT_NEAR(depth_[24 * 64 + 32 + 11], 2.5f, 1e-6);
   EXPECT_EQ(depth_[24 * 64 + 32 + 12], 1e10f);
+  mesh = cube(context_);
+  instance.mesh = mesh;
   instance.matrix[0] = std::nan("");
   EXPECT_EQ(stipple_mesh_depth_start(context_, &instance, 1, &camera_, depth_.data(), &job),
             STIPPLE_ERROR_INVALID_ARGUMENT);
+  stipple_mesh_free(mesh);
 }
 
 }  // namespace

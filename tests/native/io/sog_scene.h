@@ -104,7 +104,7 @@ struct ZipBytes {
 
   static std::string number(uint64_t value, size_t width) {
     std::string text;
-    for (size_t b = 0; b < width; ++b) text.push_back(static_cast<char>(value >> (8 * b)));
+    for (size_t b = 0; b < width; ++b, value >>= 8) text.push_back(static_cast<char>(value));
     return text;
   }
 
