@@ -57,6 +57,12 @@ MemoryViewSource& writable(StippleViews& views) {
   return *views.memory;
 }
 
+std::vector<bool> movingFrom(const uint8_t* moving, size_t count) {
+  std::vector<bool> moves(moving ? count : 0);
+  for (size_t i = 0; i < moves.size(); ++i) moves[i] = moving[i] != 0;
+  return moves;
+}
+
 template <class T>
 std::vector<T> copied(const T* values, size_t count) {
   return values ? std::vector<T>(values, values + count) : std::vector<T>();
@@ -73,6 +79,16 @@ ViewPicture pictureFrom(const StippleViewImage& given, const Camera& camera) {
   forgetEmptyDepth(picture);
   picture.normals = copied(given.normals, pixels * 3);
   return picture;
+}
+
+/// In: pixels, of the image.
+ViewFacts factsFrom(const StippleViewImage& given, const std::string& name, size_t pixels) {
+  return {.name = name,
+          .time = given.time,
+          .role = static_cast<ViewRole>(enumValue<StippleViewSplit>(
+              given.split, STIPPLE_VIEW_SPLIT_VALIDATION, "image->split")),
+          .camera_name = given.camera_utf8 ? given.camera_utf8 : "",
+          .moving = movingFrom(given.moving, pixels)};
 }
 
 /// What is known of the views of a data set; each must be readable within the memory limit.
@@ -157,8 +173,6 @@ StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera
     const Camera seen_by = cameraFrom(camera);
     const StippleViewImage given = completeUpTo(image, offsetof(StippleViewImage, time), "image");
     const Transfer transfer = enumValue<Transfer>(given.transfer, 1, "image->transfer");
-    const auto split =
-        enumValue<StippleViewSplit>(given.split, STIPPLE_VIEW_SPLIT_VALIDATION, "image->split");
     MemoryViewSource& source = writable(*views);
     const std::string name = name_utf8 ? name_utf8 : "view " + std::to_string(views->notes.size());
     // Before the arrays are made: an absurd size is refused as such.
@@ -169,18 +183,19 @@ StippleStatus stipple_views_add(StippleViews* views, const StippleCamera* camera
       fail(error.code(), name + ": " + error.what());
     }
     constexpr uint64_t kBytesPerPixel = 9 * sizeof(float);
-    views->context->requireMemory(uint64_t{seen_by.width} * seen_by.height * kBytesPerPixel,
-                                  "the image of a view");
+    const uint64_t pixels = uint64_t{seen_by.width} * seen_by.height;
+    views->context->requireMemory(pixels * kBytesPerPixel, "the image of a view");
+    const ViewFacts facts = factsFrom(given, name, pixels);
     ViewPicture made = pictureFrom(given, seen_by);
     convertColours(made, transfer, source.colourSpace());
     ViewNote note;
     note.name = name;
     note.camera_model = modelName(seen_by);
-    note.split = split;
-    note.time = given.time;
+    note.split = static_cast<StippleViewSplit>(facts.role);
+    note.time = facts.time;
     views->notes.push_back(std::move(note));
     try {
-      source.add(seen_by, std::move(made), name, given.time, static_cast<ViewRole>(split));
+      source.add(seen_by, made, facts);
     } catch (...) {
       views->notes.pop_back();
       throw;

@@ -276,6 +276,20 @@ def test_objects_that_come_and_go_are_fitted(stipple, tmp_path, fitting):
     assert stipple.scene.source.splat_data.count(moving.data) > 20
 
 
+@pytest.mark.parametrize('engine,held_out,is_told', [('CYCLES', 0, True), ('WORKBENCH', 2, True),
+                                                     ('WORKBENCH', 0, False)])
+def test_what_moves_is_measured_apart(stipple, tmp_path, fitting, engine, held_out, is_told):
+    """By Cycles' own pass, or by how the images of a whole camera differ."""
+    moving_scene.build(tmp_path)
+    settings(engine=engine, samples=1, view_size=32, image_count=96 if held_out else 24, max_splats=300,
+             held_out_cameras=held_out)
+    fitted()
+    figures = fitting.state.figures
+    assert math.isnan(figures.best_moving_psnr) != is_told
+    if is_told:  # the ball is harder than the box that stands, and than what is empty
+        assert 5 < figures.best_moving_psnr < figures.best_psnr
+
+
 def test_a_stopped_fit_goes_on_from_its_checkpoint(stipple, tmp_path, fitting):
     ball, box = moving_scene.build(tmp_path)
     chosen = settings(view_size=24, image_count=48, max_splats=300)

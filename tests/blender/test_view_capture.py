@@ -237,6 +237,40 @@ def test_scene_cameras_keep_their_proportions(capture):
     assert (view.camera.width, view.camera.height) == (60, 30)
 
 
+@pytest.mark.parametrize('engine', ENGINES)
+def test_what_moves_is_told_apart_whatever_the_camera_does(rigs, capture, engine):
+    """Where a ball is that passes a standing one, exactly."""
+    still, passing = scenes.sphere('Still'), scenes.sphere('Passing')
+    still.location.x, passing.location.x = -1.5, 1.5
+    camera = scenes.camera(location=(0.0, 0.0, 9.0), width=48, height=48)
+    camera.data.type = 'PERSP'
+    for frame in (1, 21):
+        for owner, step in ((passing, 0.5), (camera, 2.0)):
+            owner.location.y = (frame - 11) * step / 10
+            owner.keyframe_insert('location', frame=frame)
+        camera.data.lens = 50 + frame
+        camera.data.keyframe_insert('lens', frame=frame)
+    bpy.context.scene.frame_set(11)
+    lenses = set(bpy.data.cameras)
+    settings = capture.CaptureSettings(engine=engine, size=48, samples=16)
+    with capture.Capture(bpy.context, [still, passing], settings) as views:
+        before = views.camera(camera)
+        seen = views.camera(camera, with_moving=True)
+        after = views.camera(camera)
+        assert set(bpy.data.cameras) - lenses == {views._camera.data}
+    assert before.moving is None and after.moving is None
+    np.testing.assert_array_equal(list(seen.camera.world_to_camera), list(before.camera.world_to_camera))
+    assert seen.camera.fx == before.camera.fx
+    np.testing.assert_allclose(seen.linear, before.linear, atol=1e-6)
+    with capture.Capture(bpy.context, [passing], settings) as views:
+        alone = views.camera(camera).linear[..., 3]
+    if engine == 'WORKBENCH' or engine == 'EEVEE' and bpy.app.version < (4, 2, 0):  # they have no such pass
+        assert seen.moving is None
+        return
+    assert seen.moving[alone > 0.99].all() and alone[alone > 0.99].size > 50
+    assert not seen.moving[alone == 0].any()
+
+
 def test_messages(capture, stipple):
     error = stipple.binding.errors.StippleError
     with pytest.raises(error, match="Engine is 'LUX'; allowed are CYCLES, EEVEE, WORKBENCH"):

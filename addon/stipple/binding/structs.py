@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Structs of stipple.h, field by field, and its enumerations; tests/addon compares them with the header."""
 
-from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint32, c_uint64, c_void_p,
-                    sizeof)
+from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_int64, c_uint8, c_uint32, c_uint64,
+                    c_void_p, sizeof)
 
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BindingReach, BlendSpace, BudgetUnit, CameraModel,
                     ColourSpace, ENUMS, Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality,
@@ -192,7 +192,7 @@ class StippleViewsOpenOptions(_Sized):
 class StippleViewImage(_Sized):
     _fields_ = [('struct_size', c_uint32), ('transfer', c_uint32), ('rgba', _floats), ('weights', _floats),
                 ('depth', _floats), ('normals', _floats), ('time', c_double), ('split', c_uint32),
-                ('reserved', c_uint32)]
+                ('reserved', c_uint32), ('camera_utf8', c_char_p), ('moving', POINTER(c_uint8))]
 
 
 class StippleViewPoints(_Sized):

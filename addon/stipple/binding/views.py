@@ -36,14 +36,16 @@ class Views(Handle):
                    new_handle(context.library, 'stipple_views_create', context.pointer, int(colour_space)))
 
     def add(self, camera, rgba, transfer=Transfer.LINEAR, weights=None, depth=None, normals=None, name=None, time=0.0,
-            split=ViewSplit.NONE):
+            split=ViewSplit.NONE, camera_name=None, moving=None):
         """rgba [H,W,4] premultiplied, weights [H,W], depth [H,W] planar metres, normals [H,W,3]; row 0 = top. time:
-        when it was taken, seconds; split: what the view is for."""
+        when it was taken, seconds; split: what the view is for; camera_name: of the camera, where it has taken others at
+        other times; moving [H,W]: not 0 where something moves."""
         size = (camera.height, camera.width)
         arrays = {'rgba': (rgba, (*size, 4)), 'weights': (weights, size), 'depth': (depth, size),
                   'normals': (normals, (*size, 3))}
-        kept = _shaped('View', arrays)
+        kept = _shaped('View', arrays) | _shaped('View', {'moving': (moving, size)}, np.uint8)
         picture = StippleViewImage(transfer=int(transfer), time=time, split=int(split),
+                                   camera_utf8=None if camera_name is None else camera_name.encode(),
                                    **{key: pointer_to(array) for key, array in kept.items()})
         self._check(self.library.stipple_views_add(self.pointer, byref(camera), byref(picture),
                                                    None if name is None else name.encode()))

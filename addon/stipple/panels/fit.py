@@ -185,6 +185,7 @@ def _draw_running(layout, settings, state):
         if figures.psnr == figures.psnr:
             best = '' if figures.psnr >= figures.best_psnr else f', best {figures.best_psnr:.1f}'
             rows.append((_measured(figures), f'{figures.psnr:.1f} dB{best}'))
+        rows += _moving_rows(figures)
         if figures.estimated_bytes:
             rows.append(("Estimate", f'{duration(figures.estimated_seconds)}, {size(figures.estimated_bytes)}'))
     _draw_rows(layout, rows)
@@ -202,8 +203,14 @@ def _draw_result(layout, state):
     rows = [("Splats", f'{state.kept_count:,}'), ("Steps", f'{figures.iteration:,}'),
             ("Fitted In", duration(figures.seconds))]
     if figures.best_psnr == figures.best_psnr:
-        rows.insert(0, (_measured(figures), f'{figures.best_psnr:.1f} dB'))
+        rows[:0] = [(_measured(figures), f'{figures.best_psnr:.1f} dB'), *_moving_rows(figures)]
     _draw_rows(layout, rows)
+
+
+def _moving_rows(figures):
+    """Of the best state: the pixels in which something moves."""
+    known = figures.best_moving_psnr == figures.best_moving_psnr
+    return [("What Moves", f'{figures.best_moving_psnr:.1f} dB')] if known else []
 
 
 def _measured(figures):

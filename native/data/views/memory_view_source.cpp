@@ -7,14 +7,13 @@
 
 namespace stipple {
 
-void MemoryViewSource::add(const Camera& camera, const ViewPicture& picture, std::string name,
-                           double time, ViewRole role) {
-  if (name.empty()) name = "view " + std::to_string(views_.size());
-  validateView(camera, picture, name);
-  requireFinite(time, (name + ": time").c_str());
+void MemoryViewSource::add(const Camera& camera, const ViewPicture& picture, ViewFacts facts) {
+  if (facts.name.empty()) facts.name = "view " + std::to_string(views_.size());
+  validateView(camera, picture, facts.name);
+  requireFinite(facts.time, (facts.name + ": time").c_str());
   auto packed = std::make_shared<const PackedPicture>(picture);
   views_.push_back(
-      std::make_shared<const View>(View{camera, std::move(packed), std::move(name), time, role}));
+      std::make_shared<const View>(View{camera, std::move(packed), std::move(facts)}));
 }
 
 void MemoryViewSource::setPoints(PointSet points) {

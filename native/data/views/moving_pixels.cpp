@@ -85,7 +85,6 @@ StillCameras::StillCameras(const ViewSource& views) : camera_of_(views.count()) 
                  other.cy == first.cy;
     }
     if (!is_still) camera.clear();
-    has_any_ = has_any_ || is_still;
     std::stable_sort(camera.begin(), camera.end(),
                      [&](size_t a, size_t b) { return views.time(a) < views.time(b); });
   }

@@ -44,13 +44,9 @@ class StillCameras {
   /// Ascending times.
   std::vector<size_t> around(size_t view) const;
 
-  /// False where every camera moves, or took one picture.
-  bool hasAny() const { return has_any_; }
-
  private:
   std::vector<std::vector<size_t>> cameras_;  ///< views by time; of one that moves, none
   std::vector<size_t> camera_of_;             ///< by view
-  bool has_any_ = false;
 };
 
 }  // namespace stipple

@@ -51,6 +51,10 @@ class ViewSource {
   /// Of the camera that took it, where the same camera took others at other times; else empty.
   virtual std::string cameraName(size_t) const { return {}; }
 
+  /// [H,W], true where something moves in the picture, by whoever made it; empty where that is
+  /// unknown.
+  virtual std::vector<bool> moving(size_t) const { return {}; }
+
   /// May be called by several threads at once. Errors: kIo, kFormat (names the picture), and
   /// kInvalidArgument for numbers that are not finite.
   virtual ViewPicture load(size_t view) const = 0;

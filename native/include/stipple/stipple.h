@@ -767,6 +767,9 @@ typedef struct StippleViewImage {
   double time;           /* when it was taken, seconds, finite; 0, and where the struct ends early: nothing moves */
   uint32_t split;        /* StippleViewSplit, what the view is for; 0: the fit's holdout says it */
   uint32_t reserved;
+  const char* camera_utf8; /* whose image it is, where the same camera has others of other times. NULL: unknown */
+  const uint8_t* moving; /* [H,W] not 0 where something moves: where a fit measures moving pixels. NULL: told by how
+                            the images of its camera differ, where it stands still */
 } StippleViewImage;
 
 /* Where surfaces are known to be, in the world of the cameras. */

@@ -134,9 +134,13 @@ const std::vector<bool>& ViewMeasure::movingOf(PictureStore& pictures, size_t vi
                                                const double background[3]) {
   const auto known = moving_.find(view);
   if (known != moving_.end()) return known->second;
+  std::vector<bool> told = pictures.views().moving(view);
+  if (!told.empty()) return moving_[view] = std::move(told);
+  const std::vector<size_t> frames = still_cameras_->around(view);
+  if (frames.empty()) return moving_[view];
   MovingPixels moving(target_.width, target_.height);
   TargetPicture frame;
-  for (const size_t other : still_cameras_->around(view)) {
+  for (const size_t other : frames) {
     pictures.load(other, background, frame);
     showAll(frame.colour, pictures.views().colourSpace());
     moving.add(frame.colour);
@@ -194,7 +198,7 @@ FitMeasure ViewMeasure::sumOver(SplatsOverTime& splats, PictureStore& pictures,
                               {target_.colour.data(), PixelLayout::kRgb},
                               target_.weights.empty() ? nullptr : target_.weights.data(), {})
                     .ssim;
-    if (!still_cameras_ || !still_cameras_->hasAny()) continue;
+    if (!still_cameras_) continue;
     const std::vector<bool>& moves = movingOf(pictures, chosen[k], background);
     if (std::find(moves.begin(), moves.end(), true) == moves.end()) continue;
     moving_sum += psnrOfMoving(moves);

@@ -41,8 +41,8 @@ class ViewMeasure {
   explicit ViewMeasure(const BackendFactory& backends) : images_(backends.makeImageRenderer()) {}
 
   /// From now on measures also tell the pixels apart in which something moves, of views of these:
-  /// other frames of a measured view's camera are looked at for that, once. Every store that is
-  /// measured with must be of them.
+  /// by what the views say (ViewSource::moving), else other frames of a measured view's camera are
+  /// looked at for that, once. Every store that is measured with must be of them.
   void tellMoving(const ViewSource& views) { still_cameras_.emplace(views); }
 
   /// Mean PSNR and SSIM over views. Colours are held to 0..1 and compared in display space; SSIM as
@@ -62,6 +62,7 @@ class ViewMeasure {
   FitMeasure sumOver(SplatsOverTime& splats, PictureStore& pictures, std::span<const size_t> chosen,
                      const double background[3], bool with_ssim);
 
+  /// [H,W]; empty where nothing is known.
   const std::vector<bool>& movingOf(PictureStore& pictures, size_t view,
                                     const double background[3]);
   double psnrOfMoving(const std::vector<bool>& moves);

@@ -3,9 +3,11 @@
 #include <stipple/stipple.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "fixtures.h"
@@ -118,6 +120,46 @@ class FitViewsTest : public ApiTest {
 
   std::filesystem::path folder_;
   StippleViews* views_ = nullptr;
+};
+
+/// A fit of them.
+class FitTest : public FitViewsTest {
+ protected:
+  void SetUp() override {
+    FitViewsTest::SetUp();
+    stipple_fit_options_init(&options_);
+    options_.iterations = 60;
+    options_.max_splats = 200;
+    options_.sh_degree = 0;
+    options_.measure_interval = 10;
+  }
+
+  StippleJob* start() {
+    StippleJob* job = nullptr;
+    STIPPLE_EXPECT_OK(stipple_fit_start(context_, views_, &options_, &job));
+    return job;
+  }
+
+  static StippleFitFigures figuresOf(const StippleJob* job) {
+    auto figures = sized<StippleFitFigures>();
+    STIPPLE_EXPECT_OK(stipple_fit_figures(job, &figures));
+    return figures;
+  }
+
+  /// Every number of the result.
+  static std::vector<float> result(const StippleJob* job) {
+    StippleCloud* cloud = nullptr;
+    STIPPLE_EXPECT_OK(stipple_fit_cloud(job, 0, &cloud));
+    return taken(cloud);
+  }
+
+  static void waitForIteration(const StippleJob* job, uint64_t iteration) {
+    for (int i = 0; i < 20000 && figuresOf(job).iteration < iteration; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+
+  StippleFitOptions options_;
 };
 
 }  // namespace stipple::test

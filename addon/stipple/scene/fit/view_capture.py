@@ -33,6 +33,10 @@ if version.VERSION >= (5, 0, 0):
     _MULTI_LAYER = {'media_type': 'MULTI_LAYER_IMAGE', **_MULTI_LAYER}
 # Blender's engines mark emptiness by a depth of 65504 and more, or by the far end of the camera.
 _FARTHEST, _SHARE_OF_END = 6e4, 0.999
+# Pixels that a thing moves by from one frame to the next; rounding moves what stands still by less.
+_LEAST_MOTION = 0.01
+# A change of a camera that shows nowhere.
+_ANOTHER_CAMERA = 1.0001
 # Depth and normals of pixels that something covers in part are mixtures: not used.
 _WHOLE = 0.99
 
@@ -46,6 +50,7 @@ class Captured:
     linear: np.ndarray    # [H,W,4] scene linear Rec.709, premultiplied
     depth: np.ndarray     # [H,W] planar z, metres; 0 where unknown
     normals: np.ndarray   # [H,W,3] world, unit; 0 where unknown; None where the engine has none
+    moving: np.ndarray    # [H,W] bool, what is elsewhere a frame before or after; None where that is not known
 
 
 @dataclass(frozen=True)
@@ -85,8 +90,9 @@ class Capture:
     def __exit__(self, *_):
         self._left.close()
 
-    def pose(self, name, pose):
-        """A view from a pose of view_rigs: a square image."""
+    def pose(self, name, pose, with_moving=False):
+        """A view from a pose of view_rigs: a square image. with_moving: also what moves in it, if the engine can tell;
+        the scene is evaluated at the frames around, too."""
         camera, render = self._camera.data, self._scene.render
         camera.type, camera.sensor_fit = 'PERSP', 'HORIZONTAL'
         camera.shift_x = camera.shift_y = 0.0
@@ -95,9 +101,9 @@ class Capture:
         self._camera.matrix_world = pose.matrix
         render.resolution_x = render.resolution_y = self._settings.size
         render.pixel_aspect_x = render.pixel_aspect_y = 1.0
-        return self._render(name, self._camera)
+        return self._render(name, self._camera, with_moving)
 
-    def camera(self, camera_object):
+    def camera(self, camera_object, with_moving=False):
         """The view of one of the scene's cameras, in the scene's proportions. Errors: panoramic cameras, which no fit
         can learn from."""
         if camera_object.data.type == 'PANO':
@@ -107,7 +113,8 @@ class Capture:
         share = self._settings.size / max(width, height)
         render.resolution_x = max(1, round(width * share))
         render.resolution_y = max(1, round(height * share))
-        return self._render(camera_object.name, camera_object)
+        with self._still(camera_object) if with_moving else contextlib.nullcontext(camera_object) as seen_by:
+            return self._render(camera_object.name, seen_by, with_moving)
 
     def _prepare(self, stack):
         scene, render, settings = self._scene, self._scene.render, self._settings
@@ -134,7 +141,7 @@ class Capture:
                  pixel_aspect_x=render.pixel_aspect_x, pixel_aspect_y=render.pixel_aspect_y, use_border=False,
                  film_transparent=settings.transparent, use_compositing=False, use_sequencer=False,
                  use_motion_blur=False, use_multiview=False, use_persistent_data=True)
-        kept.set(self._layer, use_pass_z=True, use_pass_normal=True)
+        kept.set(self._layer, use_pass_z=True, use_pass_normal=True, use_pass_vector=False)
         kept.set(scene, camera=scene.camera)
         for marker in scene.timeline_markers:
             kept.set(marker, camera=None)  # it would take the place of the view's camera
@@ -149,6 +156,18 @@ class Capture:
         self._camera = bpy.data.objects.new('Stipple View', bpy.data.cameras.new('Stipple View'))
         stack.callback(_remove_camera, self._camera.name)
         scene.collection.objects.link(self._camera)
+
+    @contextlib.contextmanager
+    def _still(self, camera_object):
+        """A camera that stays where this one is now: what moves by it alone does not move."""
+        mine, lens = self._camera.data, camera_object.data.copy()
+        try:
+            lens.animation_data_clear()
+            self._camera.data, self._camera.matrix_world = lens, camera_object.matrix_world
+            yield self._camera
+        finally:
+            self._camera.data = mine
+            bpy.data.cameras.remove(lens)
 
     def _is_seen(self, obj):
         return obj in self._objects and not splat_data.is_splat_object(obj)
@@ -170,9 +189,13 @@ class Capture:
         bpy.utils.register_class(STIPPLE_RE_capture)
         stack.callback(bpy.utils.unregister_class, STIPPLE_RE_capture)
 
-    def _render(self, name, camera_object):
+    def _render(self, name, camera_object, with_moving):
         scene = self._scene
         scene.camera = camera_object
+        if self._layer.use_pass_vector != with_moving:  # where it is as it was, Cycles keeps what it has of the scene
+            self._layer.use_pass_vector = with_moving
+        if with_moving:  # Cycles that kept a camera from a render without the pass takes it for one that moves
+            camera_object.data.clip_end *= _ANOTHER_CAMERA
         self._passes.clear()
         with bpy.context.temp_override(scene=scene, view_layer=self._layer):
             try:
@@ -213,13 +236,17 @@ class Capture:
             length = np.linalg.norm(self._passes['Normal'], axis=2, keepdims=True)
             known = is_known[..., None] & (length > 0.5)
             normals = np.where(known, self._passes['Normal'] / np.maximum(length, 1e-9), 0).astype(np.float32)
-        return Captured(name, camera, linear, np.where(is_known, depth, 0).astype(np.float32), normals)
+        moving = None
+        if 'Vector' in self._passes:
+            moving = np.abs(self._passes['Vector']).max(axis=2) > _LEAST_MOTION
+        return Captured(name, camera, linear, np.where(is_known, depth, 0).astype(np.float32), normals, moving)
 
 
 def layers_of(channels):
     """{pass: [H,W,n]} of the passes that an ImageChannels has whole, whatever its view layer is called."""
     names, found = channels.names(), {}
-    for name, letters in (('Combined', 'RGBA'), ('Depth', 'Z'), ('Normal', 'XYZ')):
+    for name, letters in (('Combined', 'RGBA'), ('Depth', 'Z'), ('Normal', 'XYZ'),
+                          ('Vector', 'XYZW')):
         places = [next((i for i, full in enumerate(names) if full.endswith(f'{name}.{letter}')), None)
                   for letter in letters]
         if None not in places:

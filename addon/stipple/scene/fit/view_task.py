@@ -31,6 +31,7 @@ class Shot:
     frame: object = None   # of the scene; None for as it is
     seconds: float = 0.0   # when that is
     split: ViewSplit = ViewSplit.NONE
+    camera: object = None  # its name, where whole cameras are held out
 
 
 class ViewTask:
@@ -111,7 +112,8 @@ class ViewTask:
 
     def _add_view(self, views, seen, shot):
         # No fit looks at normals, and 100 views of 800 x 800 would keep 0.4 GiB of them.
-        views.add(seen.camera, seen.linear, depth=seen.depth, name=shot.name, time=shot.seconds, split=shot.split)
+        views.add(seen.camera, seen.linear, depth=seen.depth, name=shot.name, time=shot.seconds, split=shot.split,
+                  camera_name=shot.camera, moving=seen.moving)
 
     def _work(self):
         settings = self._settings
@@ -183,7 +185,10 @@ class ViewTask:
                     frames.set(shot.frame)
                     shown = shot.frame
                 is_pose = isinstance(shot.seen_by, view_rigs.Pose)
-                seen = capture.pose(shot.name, shot.seen_by) if is_pose else capture.camera(shot.seen_by)
+                # What moves is told apart where the fit is measured.
+                with_moving = shot.frame is not None and shot.split == ViewSplit.TEST
+                seen = (capture.pose(shot.name, shot.seen_by, with_moving) if is_pose else
+                        capture.camera(shot.seen_by, with_moving))
                 self._add_view(views, seen, shot)
                 view_pace.note(capturing, time.perf_counter() - began)
 
@@ -209,12 +214,14 @@ class ViewTask:
             cameras = view_rigs.poses(settings.rig, scene, frames.set(plan.frames[0]), bounds, plan.camera_count,
                                       settings.seed, cast=cast)
             names = [f'view_{i:04d}' for i in range(len(cameras))]
-        shots = []
-        for when, camera in plan.images():
-            frame, is_held = plan.frames[when], camera in plan.held_out
-            split = ViewSplit.NONE if not plan.held_out else ViewSplit.TEST if is_held else ViewSplit.TRAIN
-            name = f"{names[camera]}{', held out,' if is_held else ''} at frame {frame:08.2f}"
-            shots.append(Shot(name, cameras[camera], frame, view_times.seconds_at(scene, frame, plan.frames[0]), split))
+        shots, held_out = [], plan.held_out_images()
+        for i, (when, camera) in enumerate(plan.images()):
+            frame, is_held = plan.frames[when], i in held_out
+            is_named = is_held and plan.held_out
+            name = f"{names[camera]}{', held out,' if is_named else ''} at frame {frame:08.2f}"
+            shots.append(Shot(name, cameras[camera], frame, view_times.seconds_at(scene, frame, plan.frames[0]),
+                              ViewSplit.TEST if is_held else ViewSplit.TRAIN,
+                              names[camera] if plan.held_out else None))
         return shots
 
     def _until_done(self, job, part):

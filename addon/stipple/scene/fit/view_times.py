@@ -15,6 +15,8 @@ from ...binding.errors import invalid
 # More times than any clip that a fit can learn from; a range that has more was mistyped.
 _MOST_TIMES = 100_000
 _GOLDEN = (math.sqrt(5) - 1) / 2
+# Without cameras that are held out, every one of so many images is, as published results do it.
+_HELD_OUT_EVERY = 8
 _ROUNDING = 1e-6  # of a step, that the end of a range may be missed by
 
 
@@ -25,11 +27,20 @@ class Plan:
     frames: tuple        # of the times, ascending; between two whole ones too
     camera_count: int
     image_count: int     # at most those of all cameras at all times
-    held_out: frozenset  # indices of the cameras that are measured on alone
+    held_out: frozenset  # indices of the cameras that the fit is measured on alone
 
     def images(self):
         """((index of a time, index of a camera), ...) by time."""
         return spread(len(self.frames), self.camera_count, self.image_count)
+
+    def held_out_images(self):
+        """Places in images() of those that the fit is measured on: all of the cameras that are held out; where none is,
+        every eighth by camera and time, if there are so many."""
+        images = self.images()
+        if self.held_out:
+            return frozenset(i for i, (_, camera) in enumerate(images) if camera in self.held_out)
+        by_camera = sorted(range(len(images)), key=lambda i: images[i][::-1])
+        return frozenset(by_camera[::_HELD_OUT_EVERY] if len(images) >= _HELD_OUT_EVERY else ())
 
     @property
     def whole_count(self):
