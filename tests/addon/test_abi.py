@@ -141,6 +141,7 @@ def test_field_kinds_match(header):
     kinds = {'uint32_t': c_uint32, 'uint64_t': c_uint64, 'int64_t': ctypes.c_int64, 'double': c_double,
              'float': c_float, 'char': ctypes.c_char,
              'const float*': POINTER(c_float), 'float*': POINTER(c_float), 'const uint32_t*': POINTER(c_uint32),
+             'const uint8_t*': POINTER(c_uint8),
              'uint32_t*': POINTER(c_uint32), 'uint64_t*': POINTER(c_uint64), 'const uint64_t*': POINTER(c_uint64),
              'const StippleCloud*': c_void_p, 'const StippleCloud* const*': POINTER(c_void_p),
              'const StippleGrade*': POINTER(structs.StippleGrade),
