@@ -29,6 +29,8 @@ COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: texture
 
 BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats"),
                 ('COUNT', "Count", "The budget is a number of splats"))
+CROP_TIMES = (('SHOWN', "Shown Frame", "Splats that move are where they are at the frame that is shown"),
+              ('CLIP', "Whole Clip", "Splats that move are inside if they are at any frame of their clip while they show"))
 SIDES = (('INSIDE', "Inside", "Keep what is inside"), ('OUTSIDE', "Outside", "Keep what is outside"))
 
 

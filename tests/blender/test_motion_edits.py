@@ -11,6 +11,8 @@ from mathutils import Vector
 import scenes
 from test_motion import ASSET, clip, model, shown  # noqa: F401
 
+EDGE = 3.3  # of x, metres: a single splat of the clip is ever behind it
+
 
 def at(stipple, obj, frame):
     bpy.context.scene.frame_set(frame)
@@ -54,6 +56,40 @@ def test_a_crop_holds_at_all_times(stipple, clip, box):  # noqa: F811
     assert set(twice) < set(inside)
     assert bpy.ops.stipple.clear_mask() == {'FINISHED'}
     assert len(rows(stipple, clip, 4)) == total
+
+
+@pytest.mark.parametrize('operator', ['crop_by_box', 'crop_by_mesh'])
+def test_a_crop_over_the_clip_takes_what_ever_enters(stipple, clip, operator):  # noqa: F811
+    """Whatever passes the box at a frame of the clip at which it shows, and nothing else."""
+    known = stipple.scene.source.source_settings.of(clip.data.stipple)
+    last = 1 + round((known.time_end - known.time_begin) * bpy.context.scene.render.fps)
+    frames = [at(stipple, clip, frame) for frame in range(1, last + 1)]
+    if operator == 'crop_by_box':
+        cutter = scenes.link(bpy.data.objects.new('Box', None))
+    else:
+        bpy.ops.mesh.primitive_cube_add(size=2.0)
+        cutter = bpy.context.object
+    crop = getattr(bpy.ops.stipple, operator)
+    scenes.select(clip, cutter)
+    cutter.location, cutter.scale = (100.0 + EDGE, 0.0, 0.0), (100.0, 100.0, 100.0)
+    inside = [(seen.positions[:, 0] > EDGE) & (seen.opacities >= 1 / 255) for seen in frames]
+    ever = np.any(inside, axis=0)
+    assert not inside[1].any() and 0 < ever.sum() < len(ever)
+    bpy.context.scene.frame_set(2)
+    with pytest.raises(RuntimeError, match='No splat'):
+        crop(keep='INSIDE')
+    assert crop(keep='INSIDE', times='CLIP') == {'FINISHED'}
+    np.testing.assert_array_equal(rows(stipple, clip, 3), np.flatnonzero(ever))
+    assert bpy.ops.stipple.clear_mask() == {'FINISHED'}
+    assert crop(keep='OUTSIDE', times='CLIP') == {'FINISHED'}
+    np.testing.assert_array_equal(rows(stipple, clip, 3), np.flatnonzero(~ever))
+    assert bpy.ops.stipple.clear_mask() == {'FINISHED'}
+    # What passes a place where nobody sees it is not there.
+    unseen = next(seen for seen in frames if seen.opacities[0] < 1e-4)
+    cutter.location, cutter.scale = unseen.positions[0], (0.01, 0.01, 0.01)
+    with pytest.raises(RuntimeError, match='No splat'):
+        crop(keep='INSIDE', times='CLIP')
+    assert len(rows(stipple, clip, 3)) == len(ever)
 
 
 def test_a_mask_stays_in_the_file_and_in_what_is_written(stipple, clip, box, tmp_path):  # noqa: F811

@@ -202,6 +202,13 @@ class Cloud(Handle):
         self._check(self.library.stipple_cloud_read(self.pointer, byref(buffers)))
         return values
 
+    def opacities(self):
+        """[N] as a new array."""
+        values = np.empty(self.info().count, np.float32)
+        buffers = StippleCloudBuffers(capacity=len(values), opacities=pointer_to(values))
+        self._check(self.library.stipple_cloud_read(self.pointer, byref(buffers)))
+        return values
+
     def pack_into(self, geometry):
         """Fills rows [N,12] of a float texture that a graphics card draws the splats from."""
         self._check(self.library.stipple_cloud_pack(self.pointer, pointer_to(geometry), len(geometry)))

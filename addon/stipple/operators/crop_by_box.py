@@ -6,11 +6,10 @@ import numpy as np
 
 from ..binding import cloud_edit
 from ..binding.errors import invalid
-from ..binding.structs import Side
-from ..jobs import JobOperator
-from ..properties import SIDES
+from ..jobs import JobOperator, Task
+from ..properties import CROP_TIMES, SIDES
 from ..scene import shapes
-from ..scene.source import edits, placement
+from ..scene.source import clip_clouds, edits, placement
 
 
 class STIPPLE_OT_crop_by_box(JobOperator, bpy.types.Operator):
@@ -22,23 +21,30 @@ class STIPPLE_OT_crop_by_box(JobOperator, bpy.types.Operator):
 
     keep: bpy.props.EnumProperty(name="Keep", description="Which side of the boxes' surfaces stays", items=SIDES)
 
+    times: bpy.props.EnumProperty(name="Time", description="When splats that move are looked at", items=CROP_TIMES)
+
     @classmethod
     def poll(cls, context):
         return context.mode == 'OBJECT' and bool(edits.selected_splats(context))
+
+    def invoke(self, context, _event):
+        return self.run_in_window(context) if self.times == 'CLIP' else self.execute(context)
 
     def start(self, context):
         boxes = [shapes.box_matrix(obj) for obj in shapes.cutters(context)]
         if not boxes:
             raise invalid('No box is selected; select an empty or any other object along with the splats.')
-        self._edited = []
+        wanted, keep = [], self.keep
         for target in edits.targets(edits.selected_splats(context)):
-            to_world = placement.matrix_of(target.obj)
-            inside = sum(cloud_edit.select_box(target.cloud, np.linalg.inv(box) @ to_world) for box in boxes) > 0
-            self._edited.append((target, np.uint8(inside == (Side[self.keep] == Side.INSIDE))))
-        return None
+            places = [np.linalg.inv(box) @ placement.matrix_of(target.obj) for box in boxes]
+            wanted.append((target, clip_clouds.readers(target, self.times == 'CLIP'), places))
 
-    def finish(self, _context, _job):
-        self.report({'INFO'}, str(edits.write(self._edited)))
+        def inside(cloud, places, _start, _end):
+            return np.any([cloud_edit.select_box(cloud, place) for place in places], axis=0)
+        return Task(lambda task: clip_clouds.crop(task, wanted, keep, inside))
+
+    def finish(self, _context, job):
+        self.report({'INFO'}, str(edits.write(job.result)))
 
 
 classes = (STIPPLE_OT_crop_by_box,)

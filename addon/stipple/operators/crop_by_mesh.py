@@ -4,11 +4,10 @@
 import bpy
 
 from ..binding import cloud_edit
-from ..binding.structs import Side
 from ..jobs import JobOperator, Task
-from ..properties import SIDES
+from ..properties import CROP_TIMES, SIDES
 from ..scene import shapes
-from ..scene.source import edits, placement, sources
+from ..scene.source import clip_clouds, edits, placement, sources
 
 
 class STIPPLE_OT_crop_by_mesh(JobOperator, bpy.types.Operator):
@@ -20,6 +19,8 @@ class STIPPLE_OT_crop_by_mesh(JobOperator, bpy.types.Operator):
 
     keep: bpy.props.EnumProperty(name="Keep", description="Which side of the meshes' surfaces stays", items=SIDES)
 
+    times: bpy.props.EnumProperty(name="Time", description="When splats that move are looked at", items=CROP_TIMES)
+
     @classmethod
     def poll(cls, context):
         return context.mode == 'OBJECT' and bool(edits.selected_splats(context))
@@ -29,17 +30,17 @@ class STIPPLE_OT_crop_by_mesh(JobOperator, bpy.types.Operator):
 
     def start(self, context):
         mesh = shapes.bare_mesh(sources.context(), shapes.cutters(context), context.evaluated_depsgraph_get())
-        side = Side[self.keep]
-        wanted = [(target, placement.matrix_of(target.obj)) for target in
-                  edits.targets(edits.selected_splats(context))]
+        wanted, keep = [], self.keep
+        for target in edits.targets(edits.selected_splats(context)):
+            readers = clip_clouds.readers(target, self.times == 'CLIP')
+            wanted.append((target, readers, placement.matrix_of(target.obj)))
 
         def work(task):
-            masks = []
-            for i, (target, to_world) in enumerate(wanted):
-                selection = cloud_edit.select_mesh_start(target.cloud, to_world, mesh, side)
-                task.run(selection.job, i / len(wanted), (i + 1) / len(wanted))
-                masks.append((target, selection.mask))
-            return masks
+            def inside(cloud, to_world, start, end):
+                selection = cloud_edit.select_mesh_start(cloud, to_world, mesh)
+                task.run(selection.job, start, end)
+                return selection.mask
+            return clip_clouds.crop(task, wanted, keep, inside)
         return Task(work)
 
     def finish(self, _context, job):
