@@ -276,6 +276,42 @@ def test_objects_that_come_and_go_are_fitted(stipple, tmp_path, fitting):
     assert stipple.scene.source.splat_data.count(moving.data) > 20
 
 
+def test_undo_takes_a_fit_back_and_redo_brings_a_clip_that_plays(stipple, tmp_path, fitting):
+    moving_scene.build(tmp_path)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
+    settings(view_size=32, max_splats=300, image_count=48)
+    bpy.ops.ed.undo_push(message='before')
+    name = fitted().name
+    bpy.ops.ed.undo_push(message='Fit Splats')
+    seen = [positions(stipple, bpy.data.objects[name], frame) for frame in (FIRST, LAST)]
+    bpy.ops.ed.undo()
+    assert name not in bpy.data.objects and bpy.context.scene.frame_current == FIRST
+    bpy.ops.ed.redo()
+    again = [positions(stipple, bpy.data.objects[name], frame) for frame in (FIRST, LAST)]
+    np.testing.assert_array_equal(again, seen)
+    assert not np.allclose(seen[0], seen[1]) and not stipple.scene.source.sync.problems
+
+
+def test_motion_blur_of_a_fitted_clip(stipple, tmp_path, fitting):
+    """The mean of sharp images, however the clip came about."""
+    ball, box = moving_scene.build(tmp_path)
+    judge = moving_scene.Judge(stipple, tmp_path, ball, box)
+    settings(quality='BALANCED', image_count=288)
+    moving, scene = fitted(), bpy.context.scene
+    scene.render.motion_blur_shutter, scene.stipple.blur_samples = 8.0, 128
+    moving.cycles.motion_steps = 3
+    sharp = judge.shown(moving, 14)
+    scene.render.use_motion_blur = True
+    blurred = judge.shown(moving, 14)
+    scene.render.use_motion_blur = False
+    mean = np.average([judge.shown(moving, frame) for frame in np.linspace(10, 18, 17)], axis=0,
+                      weights=[0.5, *[1.0] * 15, 0.5])
+    # Display colours are averaged here, light is there; and the splats' shapes are straight between nine of them.
+    assert np.abs(sharp - mean).mean() > 0.01
+    # Measured: 0.31.
+    assert np.abs(blurred - mean).mean() < 0.5 * np.abs(sharp - mean).mean()
+
+
 @pytest.mark.parametrize('engine,held_out,is_told', [('CYCLES', 0, True), ('WORKBENCH', 2, True),
                                                      ('WORKBENCH', 0, False)])
 def test_what_moves_is_measured_apart(stipple, tmp_path, fitting, engine, held_out, is_told):
