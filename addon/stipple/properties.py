@@ -182,12 +182,25 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
     frame_step: FloatProperty(name="Step", description="Frames from one time that is seen to the next; below 1, times "
                               "between two frames are seen, too", default=1.0, min=0.01, soft_min=0.1, soft_max=10.0,
                               max=1000.0, step=25, precision=2, options=set())
-    image_count: IntProperty(name="Images", description="Number of images that are rendered at most, spread evenly "
-                             "over frames and cameras: each frame is seen by about as many cameras", default=300, min=2,
-                             soft_max=2000, max=1000000, options=set())
+    image_count: IntProperty(name="Images", description="Number of images that are rendered, or used of photographs, at "
+                             "most, spread evenly over frames and cameras: each frame is seen by about as many cameras",
+                             default=300, min=2, soft_max=2000, max=1000000, options=set())
     held_out_cameras: IntProperty(name="Held Out", description="Number of cameras whose images the fit is "
                                   "measured on and never learns from. With 0 it is measured on every eighth image",
                                   default=0, min=0, soft_max=10, max=10000, options=set())
+    # The same of photographs.
+    series_whole: BoolProperty(name="All Frames", description="The fit takes every frame that the data set has",
+                               default=True, options=set())
+    series_first: IntProperty(name="First", description="First frame that is used, by the number in the names of the "
+                              "images, or counted from 0 where the data set says times", default=0, min=0, options=set())
+    series_last: IntProperty(name="Last", description="Last frame that is used", default=299, min=0, options=set())
+    series_step: IntProperty(name="Step", description="The fit uses every so many-th frame", default=1, min=1,
+                             soft_max=30, max=100000, options=set())
+    series_rate: FloatProperty(name="Frame Rate", description="Numbered images of a camera are so many per second. With 0 "
+                               "the data set says it, or 30 are", default=0.0, min=0.0, soft_max=120.0, max=1e6,
+                               precision=2, options=set())
+    held_out_names: StringProperty(name="Held Out", description="Names of cameras, with commas between, that the fit is "
+                                   "measured on and never learns from. Without any, the data set says it", options=set())
     view_size: IntProperty(name="Resolution", description="Pixels of the longer side of a view", default=256, min=16,
                            soft_max=1024, max=8192, options=set())
     engine: EnumProperty(name="Engine", description="Engine that renders the views",

@@ -387,3 +387,31 @@ def test_photographs_with_times_make_a_clip(stipple, tmp_path, fitting):
     known = stipple.scene.source.source_settings.of(stored)
     assert (stored.frame_start, known.time_begin, known.time_end) == (FIRST, 2.0, 2.875)
     assert stipple.scene.source.sources.seconds(stored) == pytest.approx(2.25)
+
+
+def test_photographs_in_numbered_frames_make_a_clip(stipple, tmp_path, fitting):
+    """A folder for each camera: the frames that are asked for, at the rate that is asked for, by the cameras that are
+    not held out."""
+    ball, _ = moving_scene.build(tmp_path)
+    capture = module(stipple, '.scene.fit.view_capture')
+    photo_set.write(module(stipple, '.scene.fit.view_rigs'), capture, ball, tmp_path / 'photos', 6,
+                    capture.CaptureSettings('WORKBENCH', 24), range(FIRST, FIRST + 10))
+    chosen = settings(views_from='DATASET', dataset=str(tmp_path / 'photos'), max_splats=200, series_rate=8.0,
+                      held_out_names='cam01, cam04')
+    clip = fitted()
+    known = stipple.scene.source.source_settings.of(clip.data.stipple)
+    assert (known.time_begin, known.time_end) == (0.0, 9 / 8)
+    assert fitting.state.notes == ('4 cameras are learned from and 2 held out: cam01, cam04 (20 of 60 images)',)
+    assert not math.isnan(fitting.state.figures.best_moving_psnr)
+    chosen.series_whole, chosen.series_first, chosen.series_last, chosen.series_step = False, 2, 8, 3
+    chosen.image_count = 9
+    clip = fitted()
+    known = stipple.scene.source.source_settings.of(clip.data.stipple)
+    assert (known.time_begin, known.time_end) == (2 / 8, 1.0)
+    assert fitting.state.notes[0] == '9 of 60 images are used, of 3 times; Images, in Advanced, allows more.'
+    chosen.series_last = 1
+    scenes.refuses(bpy.ops.stipple.splats_fit, 'Last is frame 1, before First, frame 2')
+    chosen.series_first, chosen.series_last = 40, 50
+    scenes.refuses(bpy.ops.stipple.splats_fit, 'frames 40 to 50 are asked for; there are frames 0 to 9')
+    chosen.series_whole, chosen.held_out_names = True, 'left'
+    scenes.refuses(bpy.ops.stipple.splats_fit, "'left' is to be held out; cameras are called cam00 to cam05")

@@ -99,7 +99,7 @@ def test_a_fit_holds_out_whole_cameras_and_measures_what_moves(videos, tmp_path)
 
 def test_a_camera_is_held_out_by_name(videos, tmp_path):
     out = tmp_path / 'm.stipple.safetensors'
-    result = run('fit', videos, out, *FEW, '--held-out-cameras', 'cam00')
+    result = run('fit', videos, out, *FEW, '--held-out-cameras', ' cam00 ')
     assert '4 cameras are learned from and 1 held out: cam00 (6 of 30 images)' in result.stderr
     assert error('fit', videos, out, *FEW, '--held-out-cameras', 'left').endswith(
         "'left' is to be held out; cameras are called cam00 to cam04")

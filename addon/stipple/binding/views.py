@@ -21,11 +21,14 @@ class Views(Handle):
                    new_handle(context.library, 'stipple_views_load', context.pointer, path_bytes(path)))
 
     @classmethod
-    def open(cls, context, path, downscale=1):
-        """A photo data set with its images."""
+    def open(cls, context, path, **options_given):
+        """A photo data set with its images; options_given: fields of StippleViewsOpenOptions, such as downscale=2."""
         options = StippleViewsOpenOptions()
         context.library.stipple_views_open_options_init(byref(options))
-        options.downscale = downscale
+        for name, value in options_given.items():
+            if name not in dict(StippleViewsOpenOptions._fields_):
+                raise TypeError(f"Views.open() has no option '{name}'")
+            setattr(options, name, value)
         return cls(context.library, new_handle(context.library, 'stipple_views_open', context.pointer,
                                                path_bytes(path), byref(options)))
 

@@ -118,6 +118,8 @@ def _draw_views(layout, context, settings):
         layout.prop(settings, 'dataset')
         layout.prop(settings, 'up_axis')
         layout.prop(settings, 'downscale')
+        if settings.model == 'MOTION':
+            _draw_series(layout, settings)
         row = layout.row()
         row.enabled = bool(settings.dataset)
         row.operator_context = 'EXEC_DEFAULT'  # the folder is chosen
@@ -154,6 +156,17 @@ def _draw_times(layout, context, settings):
     seconds = view_pace.expected(view_task.capture_settings(settings), plan.image_count)
     draw_text(layout, context, str(plan) + ('' if seconds is None else f', about {duration(seconds)}'))
     layout.separator()
+
+
+def _draw_series(layout, settings):
+    """Of photographs of things that move: which frames are used."""
+    _draw_switch(layout, settings, 'series_whole')
+    if not settings.series_whole:
+        column = layout.column(align=True)
+        column.prop(settings, 'series_first')
+        column.prop(settings, 'series_last')
+    for name in ('series_step', 'series_rate', 'image_count', 'held_out_names'):
+        layout.prop(settings, name)
 
 
 def _draw_switch(layout, settings, name):

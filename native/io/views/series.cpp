@@ -240,6 +240,12 @@ void chooseImages(uint64_t most, std::vector<DatasetView>& views) {
   keep(evenChoice(places, most), views);
 }
 
+std::string withoutSpacesAround(const std::string& name) {
+  const size_t first = name.find_first_not_of(' ');
+  if (first == std::string::npos) return {};
+  return name.substr(first, name.find_last_not_of(' ') + 1 - first);
+}
+
 void holdOut(const std::string& dataset, const std::string& names,
              std::vector<DatasetView>& views) {
   if (names.empty()) return;
@@ -249,7 +255,7 @@ void holdOut(const std::string& dataset, const std::string& names,
   }
   for (size_t begin = 0; begin <= names.size();) {
     const size_t end = std::min(names.find(',', begin), names.size());
-    wanted.insert(names.substr(begin, end - begin));
+    wanted.insert(withoutSpacesAround(names.substr(begin, end - begin)));
     begin = end + 1;
   }
   for (const std::string& name : wanted) {

@@ -13,7 +13,7 @@ from ...binding.structs import ColourSpace, JobState, ViewSplit
 from ...binding.views import Views
 from ...pace import Pace
 from .. import meshes
-from . import moving_views, view_capture, view_pace, view_rigs, view_times
+from . import moving_views, series, view_capture, view_pace, view_rigs, view_times
 from ..source import setting_paths, sources
 from ..view import facts
 
@@ -121,7 +121,7 @@ class ViewTask:
             yield 'points', 0.0, 'Reading the data set'
             if not settings.dataset:
                 raise invalid('No data set is chosen; a folder with COLMAP cameras or a transforms.json is needed.')
-            views = Views.open(self._native, setting_paths.absolute(settings, 'dataset'), settings.downscale)
+            views = self._open_dataset()
         else:
             views = Views.create(self._native, self.colour_space)
             with contextlib.nullcontext() if self.plan is None else moving_views.Frames(self._context) as frames:
@@ -136,6 +136,16 @@ class ViewTask:
         self._check_cancelled()
         self.holds_scene = False
         yield from self._use(views)
+
+    def _open_dataset(self):
+        settings = self._settings
+        # Who fits keeps the images.
+        views = Views.open(self._native, setting_paths.absolute(settings, 'dataset'), downscale=settings.downscale,
+                           cache_bytes=0, **series.options_of(settings))
+        note = series.used(views.info())
+        if note:
+            self._notes.append(note)
+        return views
 
     def _add_points(self, views):
         """Samples of the meshes' surfaces: where splats can be."""
