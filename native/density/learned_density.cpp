@@ -23,6 +23,8 @@ constexpr size_t kGrain = 2048;
 const float kEvenLog = static_cast<float>(-std::log(8.0));
 /// Logits stay within this of each other's size: beyond it exp() of their differences is 0 anyway.
 constexpr float kLargestLogit = 60.0f;
+/// Share of what is kept that must lie in active cells of a level, before it goes down to it.
+constexpr double kSettledShare = 0.98;
 constexpr float kNothing = -std::numeric_limits<float>::infinity();
 
 using Eight = std::array<double, 8>;
@@ -87,6 +89,14 @@ class RowCursor {
   const std::vector<uint64_t>& cells_;
   size_t at_ = 0;
 };
+
+/// Sums of g over the anchors of each child become sums of g minus the mean of the others' in the
+/// cell: n / (n - 1) (g - mean of all n). In: counts, of anchors, in all at least two.
+void subtractMeanOfOthers(const Eight& counts, Eight& sums) {
+  const double count = std::accumulate(counts.begin(), counts.end(), 0.0);
+  const double mean = std::accumulate(sums.begin(), sums.end(), 0.0) / count;
+  for (size_t k = 0; k < 8; ++k) sums[k] = count / (count - 1) * (sums[k] - mean * counts[k]);
+}
 
 /// The points inside the root with weight.
 void keepInside(std::span<const float> positions, std::span<const float> weights,
@@ -166,12 +176,14 @@ LearnedDensity LearnedDensity::fromPoints(std::span<const float> positions,
     density.levels_[l] = std::move(level);
     children = std::move(parents);
   }
+  density.settled_level_ = 0;
   density.refreshAll();
   return density;
 }
 
-LearnedDensity::LearnedDensity(const RootCube& root, std::vector<LearnedLevel> levels)
-    : root_(root), levels_(std::move(levels)) {
+LearnedDensity::LearnedDensity(const RootCube& root, std::vector<LearnedLevel> levels,
+                               int settled_level)
+    : root_(root), levels_(std::move(levels)), settled_level_(settled_level) {
   requireLeafLevel(static_cast<int>(std::min<size_t>(levels_.size(), 100)));
   if (levels_[0].cells != std::vector<uint64_t>{0}) {
     fail(ErrorCode::kFormat, "level 0 of the density lists " +
@@ -199,6 +211,12 @@ LearnedDensity::LearnedDensity(const RootCube& root, std::vector<LearnedLevel> l
                                    " out of order or without its parent; ascending cells below "
                                    "those of the level above are needed");
     }
+  }
+  const bool is_there = settled_level >= 0 && static_cast<size_t>(settled_level) <= levels_.size();
+  if (!is_there ||
+      (settled_level > 0 && levels_[static_cast<size_t>(settled_level) - 1].cells.empty())) {
+    fail(ErrorCode::kFormat, "the density is settled down to level " +
+                                 std::to_string(settled_level) + ", which has no cells above it");
   }
   refreshAll();
 }
@@ -316,7 +334,9 @@ void LearnedDensity::addStructuralGradient(double weight, DensityGradient& gradi
 }
 
 DensityGradient LearnedDensity::logDensityGradient(const AnchorSet& anchors,
-                                                   std::span<const double> g) const {
+                                                   std::span<const double> g,
+                                                   const ScoreOptions& options) const {
+  const size_t least = std::max<size_t>(options.least_anchors, options.against_others ? 2 : 1);
   DensityGradient gradient;
   gradient.levels.resize(levels_.size());
   // Levels apart: each walks the anchors, which are in Morton order, as runs of equal cells.
@@ -327,10 +347,14 @@ DensityGradient LearnedDensity::logDensityGradient(const AnchorSet& anchors,
       DensityGradient::Level& out = gradient.levels[l];
       for (size_t i = 0; i < anchors.size();) {
         const uint64_t cell = anchors.leaves[i] >> (below + 3);
-        Eight sums{};
+        Eight sums{}, counts{};
+        const size_t first = i;
         for (; i < anchors.size() && anchors.leaves[i] >> (below + 3) == cell; ++i) {
           sums[(anchors.leaves[i] >> below) & 7] += g[i];
+          counts[(anchors.leaves[i] >> below) & 7] += 1;
         }
+        if (i - first < least) continue;
+        if (options.against_others) subtractMeanOfOthers(counts, sums);
         const size_t row = cursor.find(cell);
         if (row == levels_[l].cells.size()) continue;
         const Eight by_logit = logitGradient(static_cast<int>(l), row, sums);
@@ -408,15 +432,43 @@ std::vector<std::vector<uint32_t>> LearnedDensity::activate(const DrawCounts& dr
     has_new = true;
   }
   if (has_new) settleAll();
+  while (activeShareBelow() >= kSettledShare) {
+    ++settled_level_;
+    settleAll();
+  }
   return inserted;
 }
 
-/// Which children lead down to the deepest active cells, whose children are leaves. A matter of
-/// which cells are active, not of logits: it changes with activate() alone.
+/// Share of what is kept whose children at the settled level are active cells.
+double LearnedDensity::activeShareBelow() const {
+  const auto depth = static_cast<size_t>(settled_level_);
+  if (depth == levels_.size() || levels_[depth].cells.empty()) return 0;
+  std::vector<double> shares{1.0};
+  double total = 0;
+  for (size_t l = 0; l < depth; ++l) {
+    const std::vector<uint64_t>& children = levels_[l + 1].cells;
+    std::vector<double> below(children.size());
+    RowCursor parents(levels_[l].cells);
+    total = 0;
+    for (size_t i = 0; i < children.size(); ++i) {
+      const size_t row = parents.find(children[i] >> 3);
+      below[i] = shares[row] * std::exp(static_cast<double>(settled_[l][row * 8 + (children[i] & 7)]));
+      total += below[i];
+    }
+    shares = std::move(below);
+  }
+  return total;
+}
+
+/// Which children lead down to active cells right above the settled level, whose children are
+/// leaves. A matter of which cells are active, not of logits: it changes with activate() alone.
 void LearnedDensity::findLiving() {
-  size_t depth = levels_.size();
-  while (levels_[depth - 1].cells.empty()) --depth;
-  settled_level_ = static_cast<int>(depth);
+  auto depth = static_cast<size_t>(settled_level_);
+  if (depth == 0) {
+    depth = levels_.size();
+    while (levels_[depth - 1].cells.empty()) --depth;
+    settled_level_ = static_cast<int>(depth);
+  }
   living_.assign(levels_.size(), {});
   living_[depth - 1].assign(levels_[depth - 1].cells.size(), 0xff);
   for (size_t l = depth - 1; l-- > 0;) {

@@ -35,6 +35,16 @@ struct DensityGradient {
   std::vector<Level> levels;
 };
 
+/// How a gradient is estimated from the anchors of a draw.
+struct ScoreOptions {
+  /// In each cell the mean of the other anchors of the cell is taken from an anchor's g. Over
+  /// independent draws the mean of the gradient stays what it is; what falls away is how many
+  /// anchors chance has put into a child. A cell with one anchor tells nothing then.
+  bool against_others = false;
+  /// Cells with fewer anchors get no gradient.
+  size_t least_anchors = 1;
+};
+
 /// Density over an octree whose choices are learned. An active cell stores eight logits:
 /// q(k | cell) = (1 - eps) softmax(logits)_k + eps / 8; below an inactive cell the choices are
 /// even.
@@ -53,9 +63,10 @@ class LearnedDensity final : public DensityModel {
                                    const RootCube& root, int leaf_level,
                                    int known_level = kMaxLeafLevel);
 
-  /// From stored levels. Errors: kFormat for arrays that do not fit together, cells that are not in
-  /// order or whose parent is inactive, numbers that are not finite.
-  LearnedDensity(const RootCube& root, std::vector<LearnedLevel> levels);
+  /// From stored levels. In: settled_level, as settledLevel() was; 0: the deepest with active cells.
+  /// Errors: kFormat for arrays that do not fit together, cells that are not in order or whose
+  /// parent is inactive, numbers that are not finite, a settled level without active cells.
+  LearnedDensity(const RootCube& root, std::vector<LearnedLevel> levels, int settled_level = 0);
 
   int leafLevel() const override { return static_cast<int>(levels_.size()); }
   void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
@@ -78,7 +89,8 @@ class LearnedDensity final : public DensityModel {
   /// Derivatives of sum_j g_j log q(x_j) for anchors of this density, through the even share.
   /// In: g [anchors]. Cost: O(anchors * levels). Source: DeG (arXiv 2605.16355), score-function
   /// gradient of the density; log-softmax of each level on the path of an anchor.
-  DensityGradient logDensityGradient(const AnchorSet& anchors, std::span<const double> g) const;
+  DensityGradient logDensityGradient(const AnchorSet& anchors, std::span<const double> g,
+                                     const ScoreOptions& options = {}) const;
 
   /// -sum q log q over the leaves, nats. Cost: O(active cells).
   double entropy() const;
@@ -92,8 +104,10 @@ class LearnedDensity final : public DensityModel {
   std::vector<std::vector<uint32_t>> activate(const DrawCounts& draws, uint64_t least_draws);
 
   /// As an octree with what sampling needs, for decoding: without the even share, without choices
-  /// below kUniformShare, and without cells that nothing was learned below. Its leaf level is that
-  /// of the deepest active cells.
+  /// below kUniformShare, and without cells that nothing was learned below. Its leaf level is
+  /// settledLevel(): that of the deepest active cells at the start, and one more as often as
+  /// activate() finds nearly all of what is kept in active cells there. A few active cells below the
+  /// others do not change what is kept.
   OctreeDensity frozen() const;
 
   /// What frozen() keeps of the choices in some of its cells, up to date after every change: log
@@ -106,6 +120,7 @@ class LearnedDensity final : public DensityModel {
   void refresh(int level, size_t row);
   void refreshAll();
   void findLiving();
+  double activeShareBelow() const;
   void settle(int level, size_t row);
   void settleAll();
   std::array<double, 8> logitGradient(int level, size_t row,

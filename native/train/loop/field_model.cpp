@@ -36,16 +36,19 @@ constexpr uint64_t kMostStructureSteps = 20;
 struct FieldStart {
   double opacity;
   double attributes_end;  ///< share of the iterations, from which on the density learns, too
+  /// Share after which it is held: the attributes learn what the anchors stand for that will be
+  /// drawn.
+  double density_end;
   double network_rate;
   double logit_rate;
   /// Share of the steps that draw the anchors that decoding will draw. They learn what they stand
   /// for themselves, no mean over draws; the others keep other seeds good, and see all places.
   double own_draws;
 };
-constexpr FieldStart kFromSurfaces = {0.3, 0.3, 8e-3, 1e-2, 0.75};
+constexpr FieldStart kFromSurfaces = {0.3, 0.3, 0.6, 8e-3, 1e-2, 0.75};
 /// A thin fog in all of the cube, whose density moves at once: opaque, or learned faster, it clears
 /// everywhere before any place can show that it is worth something.
-constexpr FieldStart kFromNothing = {0.03, 0.0, 2e-3, 5e-2, 0.5};
+constexpr FieldStart kFromNothing = {0.03, 0.0, 1.0, 2e-3, 5e-2, 0.5};
 
 constexpr double kGridRate = 2.5e-2;
 constexpr double kStructureRate = 2e-2;
@@ -61,6 +64,8 @@ constexpr double kReach = 2;
 
 /// Pull of the prior on the density beside the loss, whose mean size per anchor is 1.
 constexpr double kPriorShare = 0.02;
+/// Anchors are compared with others of their cell; where there are few, chance decides.
+constexpr ScoreOptions kScore = {true, 4};
 constexpr uint64_t kDrawWindow = 100;
 constexpr uint64_t kLeastDraws = 8;
 /// Levels that start active where nothing is known of surfaces.
@@ -149,7 +154,8 @@ class FieldModel final : public FitModel {
                                                static_cast<uint64_t>(kStructureEnd * iterations))) {
       return structureStep();
     }
-    return renderedStep(moment, view, done >= start_.attributes_end, progress);
+    const bool joint = done >= start_.attributes_end && done < start_.density_end;
+    return renderedStep(moment, view, joint, progress);
   }
 
   SplatCloud splats(uint64_t budget) override {
@@ -210,9 +216,10 @@ class FieldModel final : public FitModel {
     report.stage = joint ? "Joint" : "Attributes";
     const bool learns_density = joint && options_.density_gradient;
     AnchorSet anchors;
+    bool is_own = false;
     {
       const TimedBlock watch(report.seconds.field);
-      anchors = drawAnchors(moment, learns_density);
+      anchors = drawAnchors(moment, learns_density, is_own);
       FieldDecoder(state_.field).forward(anchors, tape_, cloud_);
     }
     report.splat_count = cloud_.size();
@@ -250,7 +257,7 @@ class FieldModel final : public FitModel {
     }
     if (learns_density) {
       const TimedBlock watch(report.seconds.edit);
-      growDensity(anchors, moment);
+      growDensity(anchors, is_own, moment);
     }
     return report;
   }
@@ -259,7 +266,8 @@ class FieldModel final : public FitModel {
 
   /// Without what the even share adds, as decoding draws: its anchors stand in empty space, large,
   /// as they have no neighbours, and in the way of views. Only a density that learns draws them.
-  AnchorSet drawAnchors(const FitMoment& moment, bool learns_density) const {
+  /// Out: is_own, whether these are anchors that decoding will draw.
+  AnchorSet drawAnchors(const FitMoment& moment, bool learns_density, bool& is_own) const {
     const double u =
         unitDouble(keyedBits(options_.seed, RandomUse::kAnchorBudget, moment.iteration));
     uint64_t most = options_.most_anchors;
@@ -272,9 +280,9 @@ class FieldModel final : public FitModel {
     AnchorSamplingOptions sampling;
     sampling.count = std::min(most, static_cast<uint64_t>(std::llround(drawn)));
     const uint64_t bits = keyedBits(options_.seed, RandomUse::kAnchorSeed, moment.iteration);
-    const bool own = unitDouble(mixBits(bits)) < start_.own_draws;
-    if (!own) sampling.seed = bits;
-    return own || !learns_density ? drawSettled(state_.density, sampling, draws())
+    is_own = unitDouble(mixBits(bits)) < start_.own_draws;
+    if (!is_own) sampling.seed = bits;
+    return is_own || !learns_density ? drawSettled(state_.density, sampling, draws())
                                   : drawLearned(state_.density, sampling, draws());
   }
 
@@ -298,7 +306,7 @@ class FieldModel final : public FitModel {
     for (const double value : g) size += std::abs(value);
     const double scale = size > 0 ? 1 / size : 0;
     for (double& value : g) value *= scale;
-    by_logits_ = state_.density.logDensityGradient(anchors, g);
+    by_logits_ = state_.density.logDensityGradient(anchors, g, kScore);
     state_.density.addStructuralGradient(kPriorShare, by_logits_);
   }
 
@@ -369,8 +377,9 @@ class FieldModel final : public FitModel {
     frozen_.reset();
   }
 
-  void growDensity(const AnchorSet& anchors, const FitMoment& moment) {
-    state_.density.countDraws(anchors, state_.draws);
+  /// The fit's own draws are the same anchors again and again, whose cells count for no more.
+  void growDensity(const AnchorSet& anchors, bool is_own, const FitMoment& moment) {
+    if (!is_own) state_.density.countDraws(anchors, state_.draws);
     if (moment.iteration % kDrawWindow != 0) return;
     insertMoments(state_, state_.density.activate(state_.draws, kLeastDraws));
     state_.draws.clear();

@@ -134,7 +134,8 @@ TensorTable tensorsOf(const FieldState& state) {
     put(table, "adam.first." + name, moments.first, length);
     put(table, "adam.second." + name, moments.second, length);
   });
-  put(table, "field.steps", std::vector<uint64_t>{state.density_steps, state.field_steps});
+  put(table, "field.steps", std::vector<uint64_t>{state.density_steps, state.field_steps,
+                            static_cast<uint64_t>(state.density.settledLevel())});
   std::vector<uint64_t> draws;
   for (const auto& [cell, count] : state.draws) {
     draws.insert(draws.end(), {static_cast<uint64_t>(cell.first), cell.second, count});
@@ -159,8 +160,12 @@ FieldState stateOf(const TensorTable& table, const FieldState& like) {
     logits[l].first = floatsOf(table, numbered("adam.first.octree.level", l, "logits"), count);
     logits[l].second = floatsOf(table, numbered("adam.second.octree.level", l, "logits"), count);
   }
-  FieldState state = startState(
-      LearnedDensity({{root[0], root[1], root[2]}, root[3]}, std::move(levels)), *like.field);
+  const std::vector<uint64_t> steps = valuesOf<uint64_t>(table, "field.steps");
+  // Without the third: of a version that settled on the deepest level.
+  const uint64_t settled = steps.size() > 2 ? std::min<uint64_t>(steps[2], kMaxLeafLevel + 1) : 0;
+  FieldState state = startState(LearnedDensity({{root[0], root[1], root[2]}, root[3]},
+                                               std::move(levels), static_cast<int>(settled)),
+                                *like.field);
   state.field->root = state.density.root();
   state.logits = std::move(logits);
   forEachFieldArray(
@@ -169,12 +174,11 @@ FieldState stateOf(const TensorTable& table, const FieldState& like) {
         moments.first = floatsOf(table, "adam.first." + name, values.size());
         moments.second = floatsOf(table, "adam.second." + name, values.size());
       });
-  const std::vector<uint64_t> steps = valuesOf<uint64_t>(table, "field.steps");
   const std::vector<uint64_t> draws = valuesOf<uint64_t>(table, "octree.draws");
-  if (steps.size() != 2 || draws.size() % 3 != 0) {
+  if (steps.size() < 2 || steps.size() > 3 || draws.size() % 3 != 0) {
     fail(ErrorCode::kFormat, "the state of the fit has " + std::to_string(steps.size()) +
                                  " counts of steps and " + std::to_string(draws.size()) +
-                                 " numbers of draws; 2 and whole triples are needed");
+                                 " numbers of draws; 3 and whole triples are needed");
   }
   state.density_steps = steps[0];
   state.field_steps = steps[1];

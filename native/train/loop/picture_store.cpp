@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "base/error.h"
 #include "base/parallel.h"
 
 namespace stipple {
@@ -27,7 +28,12 @@ void PictureStore::prefetch(size_t view) {
         awaited_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
       return;
     }
-    awaited_ = {};  // nobody came for it
+    try {
+      keep(awaited_view_, awaited_.get());  // nobody came for it yet
+    } catch (const Error&) {
+      // Who loads it will hear of it.
+    }
+    if (kept_[view]) return;
   }
   awaited_view_ = view;
   awaited_ = std::async(std::launch::async, [this, view] { return views_->packed(view); });
@@ -41,12 +47,15 @@ std::shared_ptr<const PackedPicture> PictureStore::fetch(size_t view) {
   } else {
     made = views_->packed(view);
   }
-  // What is kept stays: orders are random, so that no other choice would serve more often.
-  if (bytes_ + made->bytes() <= byte_limit_) {
-    bytes_ += made->bytes();
-    kept_[view] = made;
-  }
+  keep(view, made);
   return made;
+}
+
+void PictureStore::keep(size_t view, const std::shared_ptr<const PackedPicture>& made) {
+  // What is kept stays: orders are random, so that no other choice would serve more often.
+  if (kept_[view] || bytes_ + made->bytes() > byte_limit_) return;
+  bytes_ += made->bytes();
+  kept_[view] = made;
 }
 
 void PictureStore::load(size_t view, const double background[3], TargetPicture& target) {

@@ -41,6 +41,8 @@ class PictureStore {
 
  private:
   std::shared_ptr<const PackedPicture> fetch(size_t view);
+  /// Where there is room.
+  void keep(size_t view, const std::shared_ptr<const PackedPicture>& made);
 
   std::shared_ptr<const ViewSource> views_;
   uint64_t byte_limit_;

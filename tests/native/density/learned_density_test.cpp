@@ -177,6 +177,54 @@ TEST(LearnedDensity, LogGradientIsThatOfDifferences) {
   EXPECT_GT(largest, 0.5);
 }
 
+/// All pairs of anchors that independent draws can give, each by its probability.
+TEST(LearnedDensity, ComparingAnchorsWithTheOthersOfTheirCellKeepsTheMeanGradient) {
+  LearnedDensity density(kRoot, 1, 1);
+  const std::vector<float> logits = {0.5f, -1.0f, 2.0f, 0.0f, 1.0f, -0.5f, 0.25f, -2.0f};
+  density.setLogits(0, std::vector<uint32_t>{0}, logits);
+  const double g[8] = {0.3, -2.0, 0.7, 5.0, -0.1, 0.0, 1.5, -0.4};
+  std::vector<double> plain(8), compared(8);
+  for (uint64_t a = 0; a < 8; ++a) {
+    for (uint64_t b = 0; b < 8; ++b) {
+      AnchorSet anchors;
+      anchors.leaves = {std::min(a, b), std::max(a, b)};
+      anchors.log_q.resize(2);
+      const std::vector<double> given = {g[anchors.leaves[0]], g[anchors.leaves[1]]};
+      const double share = std::exp(logDensity(density.levels(), a)) *
+                           std::exp(logDensity(density.levels(), b));
+      const auto by_plain = density.logDensityGradient(anchors, given).levels[0].values;
+      const auto by_compared =
+          density.logDensityGradient(anchors, given, {true, 2}).levels[0].values;
+      for (size_t k = 0; k < 8; ++k) {
+        plain[k] += share * by_plain[k];
+        compared[k] += share * by_compared[k];
+      }
+    }
+  }
+  // The probabilities of the density are float32.
+  for (size_t k = 0; k < 8; ++k) EXPECT_NEAR(compared[k], plain[k], 1e-6) << k;
+}
+
+TEST(LearnedDensity, AnchorsThatAreWorthTheSameMoveNothingWhenTheyAreCompared) {
+  const LearnedDensity density = wavyDensity(5000, 6);
+  const AnchorSet anchors = sampled(density, 3000);
+  const std::vector<double> alike(anchors.size(), 0.7);
+  const DensityGradient gradient = density.logDensityGradient(anchors, alike, {true, 4});
+  size_t cells = 0;
+  for (size_t l = 0; l < gradient.levels.size(); ++l) {
+    for (const double value : gradient.levels[l].values) EXPECT_NEAR(value, 0, 1e-9);
+    cells += gradient.levels[l].rows.size();
+    // Cells of the leaves' level hold fewer anchors than can be compared.
+    EXPECT_LT(gradient.levels[l].rows.size(), anchors.size() / 4 + 1);
+  }
+  EXPECT_GT(cells, 50u);
+  double moved = 0;
+  for (const auto& level : density.logDensityGradient(anchors, alike).levels) {
+    for (const double value : level.values) moved = std::max(moved, std::abs(value));
+  }
+  EXPECT_GT(moved, 0.1);  // by chance alone
+}
+
 TEST(LearnedDensity, GradientsHaveTheSameBitsForAnyNumberOfThreads) {
   const LearnedDensity density = wavyDensity(5000, 6);
   const AnchorSet anchors = sampled(density, 3000);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/error.h"
 #include "base/random.h"
 #include "density/learned_density.h"
 #include "math/morton.h"
@@ -76,13 +77,35 @@ LearnedDensity shallowDensity() {
   return density;
 }
 
+TEST(LearnedDraws, AFewActiveCellsBelowTheOthersChangeNothingThatIsKept) {
+  LearnedDensity density = shallowDensity();
+  const AnchorSet before = drawSettled(density, asked(500, 3), {true, true, 9});
+  density.activate({{{3, 0}, 100}, {{3, 1}, 100}}, 8);
+  density.activate({{{4, 8}, 100}}, 8);
+  density.activate({{{5, 65}, 100}}, 8);
+  EXPECT_EQ(density.settledLevel(), 3);
+  EXPECT_EQ(density.frozen().leafLevel(), 3);
+  EXPECT_EQ(places(drawSettled(density, asked(500, 3), {true, true, 9})), places(before));
+  // As a state that is stored.
+  const LearnedDensity stored(kUnit, density.levels(), density.settledLevel());
+  EXPECT_EQ(places(drawSettled(stored, asked(500, 3), {true, true, 9})), places(before));
+  EXPECT_EQ(LearnedDensity(kUnit, density.levels()).settledLevel(), 6);
+  for (const int level : {-1, 7}) {
+    EXPECT_THROW(LearnedDensity(kUnit, density.levels(), level), Error) << level;
+  }
+}
+
 TEST(LearnedDraws, SettledOnesAreThoseOfTheFrozenDensity) {
   for (const bool deep : {false, true}) {
     LearnedDensity density = shallowDensity();
-    if (deep) {  // cells below become active, with even choices, but for one whose children lead on
-      density.activate({{{3, 0}, 100}, {{3, 1}, 100}}, 8);
-      density.activate({{{4, 8}, 100}}, 8);
-      density.activate({{{5, 65}, 100}}, 8);
+    if (deep) {  // all cells below become active, level by level, with even choices
+      for (int level = 3; level < 6; ++level) {
+        LearnedDensity::DrawCounts draws;
+        for (uint64_t cell = 0; cell < uint64_t{1} << (3 * level); ++cell) {
+          draws[{level, cell}] = 100;
+        }
+        density.activate(draws, 8);
+      }
     }
     const AnchorSet frozen = drawLearned(density.frozen(), asked(500, 3), {true, true, 9});
     const AnchorSet settled = drawSettled(density, asked(500, 3), {true, true, 9});

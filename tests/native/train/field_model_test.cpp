@@ -203,7 +203,8 @@ TEST(FieldModel, GoesThroughItsStages) {
   EXPECT_STREQ(reports[0].stage, "Density");
   EXPECT_EQ(reports[0].splat_count, 0u);
   EXPECT_STREQ(reports[2].stage, "Attributes");
-  EXPECT_STREQ(reports[199].stage, "Joint");
+  EXPECT_STREQ(reports[100].stage, "Joint");
+  EXPECT_STREQ(reports[199].stage, "Attributes");  // of the density that is drawn from in the end
   uint64_t least = UINT64_MAX, most = 0;
   for (size_t i = 2; i < reports.size(); ++i) {
     EXPECT_GT(reports[i].seconds.render, 0);
@@ -233,8 +234,8 @@ TEST(FieldModel, TheDensityMovesOnlyWhereItsGradientIsOn) {
   const auto on = entropyAfter(true);
   EXPECT_EQ(off.first, off.second);
   EXPECT_EQ(on.first, off.first);
-  // By 0.011 nats in these 70 steps, on every instruction set.
-  EXPECT_GT(std::abs(on.second - on.first), 0.007);
+  // By 0.0037 nats in the 30 steps until it is held.
+  EXPECT_GT(std::abs(on.second - on.first), 0.002);
 }
 
 /// Half of the prior stands where nothing is: views show that it does not help.
