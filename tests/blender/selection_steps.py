@@ -209,7 +209,9 @@ def zoom_back(window):
     window.region_data.view_distance = facts['distances']['before']
 
 
-def note_theme(_window):
+def note_theme(window):
+    region = window.region
+    facts['view'] = [region.x, region.y, region.width, region.height]
     facts['theme'] = list(bpy.context.preferences.themes[0].view_3d.vertex_select)
 
 
