@@ -41,12 +41,14 @@ using Weights = Handle<StippleWeights, stipple_weights_free>;
 using Binding = Handle<StippleBinding, stipple_binding_free>;
 using Job = Handle<StippleJob, stipple_job_free>;
 
-/// Calls f(..., &pointer), checks, and takes the handle.
+/// Calls f(..., &pointer), takes the handle, and checks, so that a signal that came meanwhile frees it.
 template <typename Result, typename Function, typename... Arguments>
 Result make(Function function, Arguments... arguments) {
   typename Result::pointer made = nullptr;
-  check(function(arguments..., &made));
-  return Result(made);
+  const StippleStatus status = function(arguments..., &made);
+  Result result(made);
+  check(status);
+  return result;
 }
 
 /// A struct of the header with its size set.
