@@ -8,9 +8,10 @@ FOLDER holds a folder of make_moving.py for each scene, and moving.jsonl: a line
 a run goes on.
 
 What is compared: the same code with all three parts off, with one more at a time, and once more with all off and a
-threshold that makes it grow as many splats as all three do. The cameras that judge are those that the data set holds
-out: no fit learns from them, and its best state is chosen by others. Masked values are of the pixels in which something
-moves (moving/). Flicker is the mean change from one frame to the next that the truth does not have, over the truth's.
+threshold that makes it grow as many splats as all three do, unless it has as many anyway. The cameras that judge are
+those that the data set holds out: no fit learns from them, and its best state is chosen by others. Masked values are of
+the pixels in which something moves (moving/). Flicker is the mean change from one frame to the next that the truth does
+not have, over the truth's.
 """
 
 import argparse
@@ -181,9 +182,11 @@ def main():
                     setting = {'scene': scene, 'seed': seed, 'iterations': given.iterations, 'most': given.most}
                     if results.find(arm=arm, **setting):
                         continue
-                    whole = results.find(arm='all three', **setting)
+                    whole, plain = (results.find(arm=other, **setting) for other in ('all three', 'off'))
                     if ARMS[arm]:
                         row = measure(given.stipple, judge, given, scene, arm, ARMS[arm], seed)
+                    elif whole and plain and abs(math.log(plain[0]['splats'] / whole[0]['splats'])) <= LIKENESS:
+                        row = {**plain[0], 'arm': arm}
                     elif whole:
                         row = as_many(given.stipple, judge, given, scene, seed, whole[0]['splats'])
                     else:
