@@ -58,7 +58,8 @@ const FitOption kTable[] = {
     {.name = "start_splats",
      .kind = FitOptionKind::kCount,
      .member = member<&FitOptions::start_splats>(),
-     .help = "The fit begins with this number of splats; 0: as many as points are known.",
+     .help = "The fit begins with this number of splats: at known points, and where images agree "
+             "if those are too few; 0: all points, and 30,000 or more in photographs.",
      .models = kOfSplats,
      .stored_of = kOfSplats,
      .not_above = &FitOptions::max_splats,

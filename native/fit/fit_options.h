@@ -30,7 +30,7 @@ struct FitOptions {
   std::string strategy;  ///< empty: "adaptive"; of a field as density_gradient says
   uint64_t iterations = 0;
   uint64_t max_splats = 0;
-  uint64_t start_splats = 0;  ///< 0: as many as points are known
+  uint64_t start_splats = 0;  ///< 0: as StartOptions::count
   uint64_t least_anchors = 0;
   uint64_t most_anchors = 0;
   uint32_t gaussians_per_anchor = 0;

@@ -17,7 +17,7 @@
 
 // Based on: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023 (sizes
 // from three neighbours, opacity 0.1). Differs: depth, the pictures and the cameras' volume serve
-// where there are no points.
+// where there are no points, and beside them where there are few.
 
 namespace stipple {
 
@@ -95,11 +95,9 @@ std::vector<uint32_t> seenPixels(const ViewPicture& picture) {
 }
 
 /// One pixel of each of as many runs as are wanted.
-StartPoints fromDepth(const ViewSource& views, std::span<const size_t> training,
+StartPoints fromDepth(const ViewSource& views, std::span<const size_t> training, uint64_t wanted,
                       const StartOptions& options, Progress* progress) {
   const size_t picture_count = std::min(training.size(), kDepthPictures);
-  const uint64_t wanted =
-      capped(options.count > 0 ? options.count : kStartSplatsOfDepth, options.max_count);
   StartPoints start;
   for (size_t p = 0; p < picture_count; ++p) {
     advance(progress, static_cast<double>(p) / static_cast<double>(picture_count),
@@ -127,7 +125,7 @@ StartPoints fromDepth(const ViewSource& views, std::span<const size_t> training,
   return start;
 }
 
-StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training,
+StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training, uint64_t wanted,
                        const StartOptions& options) {
   std::vector<Camera> cameras;
   const size_t camera_count = std::min(training.size(), kVolumeCameras);
@@ -135,8 +133,6 @@ StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training
     cameras.push_back(views.camera(training[i * training.size() / camera_count]));
   }
   const SharedVolume ball = sharedVolume(cameras);
-  const uint64_t wanted =
-      capped(options.count > 0 ? options.count : kStartSplatsOfPictures, options.max_count);
   constexpr float kGrey[3] = {0.5f, 0.5f, 0.5f};
   /// A ball fills 0.52 of its cube; most of it is seen.
   constexpr uint64_t kTriesPerPoint = 16;
@@ -156,6 +152,53 @@ StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training
     if (seen >= ball.least_views || i >= wanted * kTriesPerPoint / 2) start.add(point, kGrey);
   }
   return start;
+}
+
+/// What a start has of pictures alone, unless somebody says how many.
+uint64_t splatsOfPictures(const ViewSource& views, std::span<const size_t> training) {
+  uint64_t pixels = 0;
+  for (const size_t view : sweptViews(training)) {
+    const Camera small = sweptCamera(views.camera(view));
+    pixels += uint64_t{small.width} * small.height;
+  }
+  return std::clamp<uint64_t>(pixels / kPixelsOfASplat, 1, kStartSplatsOfPictures);
+}
+
+bool haveDepth(const ViewSource& views, std::span<const size_t> training) {
+  return !views.load(training[0]).depth.empty();
+}
+
+/// Reconstructions find places where pictures are rich in detail, and walls and skies stay open.
+void addBesidePoints(const ViewSource& views, std::span<const size_t> training,
+                     const StartOptions& options, StartPoints& points, Progress* progress) {
+  // Samples of meshes come with depth, and tell of everything that is there. Where things move,
+  // pictures of different times tell of no depth.
+  if (options.count == 0 && options.with_lives) return;
+  const uint64_t most = options.count > 0 ? options.count : splatsOfPictures(views, training);
+  const uint64_t wanted = capped(most, options.max_count);
+  if (wanted <= points.size()) return;
+  const uint64_t missing = wanted - points.size();
+  if (haveDepth(views, training)) {
+    if (options.count > 0) {
+      points.append(fromDepth(views, training, missing, options, progress));
+    }
+  } else {
+    points.append(sweptPoints(views, training, missing, options.seed, progress));
+  }
+}
+
+StartPoints withoutPoints(const ViewSource& views, std::span<const size_t> training,
+                          const StartOptions& options, Progress* progress) {
+  const auto wanted = [&](uint64_t otherwise) {
+    return capped(options.count > 0 ? options.count : otherwise, options.max_count);
+  };
+  StartPoints points = fromDepth(views, training, wanted(kStartSplatsOfDepth), options, progress);
+  if (points.size() > 0) return points;
+  const uint64_t count = wanted(splatsOfPictures(views, training));
+  points = sweptPoints(views, training, count, options.seed, progress);
+  // Silhouettes that contradict each other leave nothing standing.
+  if (points.size() >= count / kLeastSwept) return points;
+  return fromVolume(views, training, count, options);
 }
 
 /// Metres, from the nearest neighbours.
@@ -219,15 +262,9 @@ StartSplats startSplats(const ViewSource& views, std::span<const size_t> trainin
   StartPoints points;
   if (views.points().size() > 0) {
     points = fromPoints(views, options);
+    addBesidePoints(views, training, options, points, progress);
   } else {
-    points = fromDepth(views, training, options, progress);
-    if (points.size() == 0) {
-      const uint64_t wanted =
-          capped(options.count > 0 ? options.count : kStartSplatsOfPictures, options.max_count);
-      points = sweptPoints(views, training, wanted, options.seed, progress);
-      // Silhouettes that contradict each other leave nothing standing.
-      if (points.size() < wanted / kLeastSwept) points = fromVolume(views, training, options);
-    }
+    points = withoutPoints(views, training, options, progress);
   }
   StartSplats start;
   start.splats = splatsAt(points, views, training, options);

@@ -13,11 +13,16 @@ namespace stipple {
 
 /// Where there is no prior, or none says how many.
 constexpr uint64_t kStartSplatsOfDepth = 50000;
+/// So many, or one for so many pixels where that is fewer: pixels of the pictures that are looked
+/// at, at the size at which they are compared (swept_points.h).
 constexpr uint64_t kStartSplatsOfPictures = 30000;
+constexpr uint64_t kPixelsOfASplat = 16;
 
 struct StartOptions {
-  /// Splats; 0: as many as the prior has points, or the constants above. No more than the prior has
-  /// points: which of them is drawn by their weights.
+  /// Splats; 0: all points of the prior and, of views without depth in which nothing moves, at
+  /// least as many as pictures alone would give; or the constants above. If there are more points,
+  /// it is drawn by their weights which are taken; if fewer, what is missing is looked for in the
+  /// pictures.
   uint64_t count = 0;
   uint64_t max_count = 0;  ///< hard cap; 0: none
   bool with_lives = false;  ///< find how long points stay where they are
@@ -33,10 +38,12 @@ struct StartSplats {
 };
 
 /// The splats that a fit begins with: round, as large as the distance to their neighbours, faint.
-/// They stand at the points of the views; without points, on the surfaces that depth pictures show;
-/// without depth, where pictures agree (swept_points.h); where they tell nothing, anywhere in the
-/// volume that the cameras share. Points know when they were seen where their source says it,
-/// and depth pictures do.
+/// They stand at the points of the views, and where there are fewer than wanted, at places that the
+/// pictures tell of as if there were none: on the surfaces that depth pictures show; without depth,
+/// where pictures agree (swept_points.h). Without points, where pictures tell nothing, they stand
+/// anywhere in the volume that the cameras share. Points know when they were seen where their
+/// source says it, and depth pictures do.
+///
 /// In: training: the views that may be looked at, at least one. Same result for any number of
 /// threads. Cost: O(N log N); loads at most 64 pictures. Errors: those of ViewSource::load.
 /// Source: Kerbl, Kopanas, Leimkuehler, Drettakis, 3D Gaussian Splatting, SIGGRAPH 2023, section 5.

@@ -90,11 +90,8 @@ std::vector<float> reduced(const std::vector<float>& values, const ViewPicture& 
 }
 
 Look lookOf(const Camera& camera, const ViewPicture& picture) {
-  const double shrink = std::min(1.0, kMostSide / std::max(camera.width, camera.height));
   Look look;
-  look.camera =
-      resized(camera, std::max(1u, static_cast<uint32_t>(std::lround(camera.width * shrink))),
-              std::max(1u, static_cast<uint32_t>(std::lround(camera.height * shrink))));
+  look.camera = sweptCamera(camera);
   look.has_alpha = !picture.alpha.empty();
   const std::vector<float> colour = reduced(picture.colour, picture, look.camera, 3);
   const std::vector<float> alpha = reduced(picture.alpha, picture, look.camera, 1);
@@ -300,13 +297,25 @@ Found findPlace(const std::vector<Look>& looks, const Look& look, const SharedVo
 
 }  // namespace
 
+std::vector<size_t> sweptViews(std::span<const size_t> training) {
+  std::vector<size_t> views(std::min(training.size(), kPictures));
+  for (size_t p = 0; p < views.size(); ++p) views[p] = training[p * training.size() / views.size()];
+  return views;
+}
+
+Camera sweptCamera(const Camera& camera) {
+  const double shrink = std::min(1.0, kMostSide / std::max(camera.width, camera.height));
+  return resized(camera, std::max(1u, static_cast<uint32_t>(std::lround(camera.width * shrink))),
+                 std::max(1u, static_cast<uint32_t>(std::lround(camera.height * shrink))));
+}
+
 StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> training, uint64_t count,
                         uint64_t seed, Progress* progress) {
   std::vector<Look> looks;
-  const size_t picture_count = std::min(training.size(), kPictures);
-  for (size_t p = 0; p < picture_count; ++p) {
-    advance(progress, static_cast<double>(p) / static_cast<double>(picture_count), kStage);
-    const size_t view = training[p * training.size() / picture_count];
+  const std::vector<size_t> compared = sweptViews(training);
+  for (size_t p = 0; p < compared.size(); ++p) {
+    advance(progress, static_cast<double>(p) / static_cast<double>(compared.size()), kStage);
+    const size_t view = compared[p];
     Look look = lookOf(views.camera(view), views.load(view));
     // A picture of nothing is a mistake more often than a proof that there is nothing.
     if (!look.pixels.empty()) looks.push_back(std::move(look));

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "base/progress.h"
 #include "data/views/view_source.h"
@@ -21,5 +22,11 @@ namespace stipple {
 /// Matching, CVPR 1996; Laurentini, The Visual Hull Concept, PAMI 1994.
 StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> training, uint64_t count,
                         uint64_t seed, Progress* progress = nullptr);
+
+/// The views whose pictures are compared.
+std::vector<size_t> sweptViews(std::span<const size_t> training);
+
+/// The camera at the size at which its picture is compared.
+Camera sweptCamera(const Camera& camera);
 
 }  // namespace stipple

@@ -122,14 +122,15 @@ TEST_F(StrategiesTest, AMemoryCapLowersTheCountUntilTheFitIsBelowIt) {
   options_.max_bytes = 2 * free_bound;
   EXPECT_EQ(bound(), free_bound);
 
-  // Few enough that the fit feels it: it wants more than 20 splats without.
+  // Few enough that the fit feels it: it begins with more, and half of the memory may be images.
   options_.max_splats = 25;
-  const uint64_t most = bound();
-  options_.max_bytes = 0;
-  options_.max_splats = 20;
-  const uint64_t least = bound();
+  const uint64_t limit = bound();
+  options_.image_bytes = limit / 2;
+  const uint64_t with_25 = bound();
+  options_.max_splats = 26;
+  const uint64_t most = 25 + (limit - with_25) / (bound() - with_25);
   options_.max_splats = 1000;
-  options_.max_bytes = (most + least) / 2;
+  options_.max_bytes = limit;
   options_.strategy_utf8 = "adaptive(threshold=1e-9)";
   options_.iterations = 1200;
   StippleJob* job = nullptr;
@@ -137,8 +138,9 @@ TEST_F(StrategiesTest, AMemoryCapLowersTheCountUntilTheFitIsBelowIt) {
   STIPPLE_ASSERT_OK(stipple_job_wait(job));
   auto figures = sized<StippleFitFigures>();
   STIPPLE_ASSERT_OK(stipple_fit_figures(job, &figures));
-  EXPECT_GE(figures.splat_count, 15u);
-  EXPECT_LE(figures.splat_count, 22u);
+  EXPECT_LT(most, 100u);
+  EXPECT_GE(figures.splat_count, most * 3 / 4);
+  EXPECT_LE(figures.splat_count, most);
   stipple_job_free(job);
 }
 

@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "math/colour.h"
 #include "train/fit_scene.h"
+#include "train/sphere_views.h"
 #include "train/toy_views.h"
 
 namespace stipple {
@@ -48,7 +49,9 @@ TEST(StartSplats, StandAtThePointsAsLargeAsTheirNeighboursAreFar) {
     points.opacities.push_back(1);
   }
   views->setPoints(points);
-  const SplatCloud cloud = startOf(*views);
+  StartOptions options;
+  options.count = 8;
+  const SplatCloud cloud = startOf(*views, options);
   ASSERT_EQ(cloud.size(), 8u);
   EXPECT_EQ(cloud.sh_degree, 3);
   for (size_t i = 0; i < 8; ++i) {
@@ -71,13 +74,16 @@ TEST(StartSplats, PointsAtOnePlaceAndAPointAloneHaveASize) {
   points.colours.assign(30, 0.5f);
   points.opacities.assign(10, 1.0f);
   views->setPoints(points);
+  StartOptions options;
+  options.count = 10;
   // sqrt(1e-7).
-  for (const float scale : startOf(*views).scales) EXPECT_NEAR(scale, 3.162e-4f, 1e-6f);
+  for (const float scale : startOf(*views, options).scales) EXPECT_NEAR(scale, 3.162e-4f, 1e-6f);
   points.positions.resize(3);
   points.colours.resize(3);
   points.opacities.resize(1);
   views->setPoints(points);
-  const SplatCloud one = startOf(*views);
+  options.count = 1;
+  const SplatCloud one = startOf(*views, options);
   ASSERT_EQ(one.size(), 1u);
   EXPECT_GT(one.scales[0], 0.02f);  // a hundredth of the distance of the nearest camera
   EXPECT_LT(one.scales[0], 0.05f);
@@ -133,6 +139,69 @@ TEST(StartSplats, KnowWhenTheirPointsWereSeen) {
   }
 }
 
+/// A sphere before a pattern, and points of a reconstruction that knows its upper half alone.
+std::shared_ptr<MemoryViewSource> halfKnownSphere() {
+  auto views = sphereViews(camerasAround(24, 64), Behind::kPattern);
+  PointSet points;
+  for (size_t i = 0; i < 300; ++i) {
+    const double z = (static_cast<double>(i) + 0.5) / 300;
+    const double turn = 2.399963 * static_cast<double>(i);  // the golden angle
+    const double r = std::sqrt(1 - z * z);
+    for (const double at : {r * std::cos(turn), r * std::sin(turn), z}) {
+      points.positions.push_back(static_cast<float>(at));
+    }
+    points.opacities.push_back(1);
+  }
+  points.colours.assign(900, 0.5f);
+  views->setPoints(points);
+  return views;
+}
+
+TEST(StartSplats, WherePointsAreFewPicturesTellTheRest) {
+  const auto views = halfKnownSphere();
+  StartOptions options;
+  options.count = 3000;
+  const SplatCloud cloud = startOf(*views, options);
+  ASSERT_EQ(cloud.size(), 3000u);
+  const std::vector<float>& known = views->points().positions;
+  EXPECT_TRUE(std::equal(known.begin(), known.end(), cloud.positions.begin()));
+  // The sphere covers 0.32 of the pictures and the half that is unknown about half of that: 0.16 of
+  // the 2,700 others, less those whose depth is off.
+  size_t below = 0, behind = 0;
+  for (size_t i = 300; i < cloud.size(); ++i) {
+    const Vec3d place = Eigen::Map<const Vec3f>(&cloud.positions[i * 3]).cast<double>();
+    below += std::abs(place.norm() - 1) < 0.1 && place.z() < 0;
+    behind += place.norm() > 5;
+  }
+  EXPECT_GT(below, 270u);
+  EXPECT_GT(behind, 1200u);
+  // Unless somebody says how many: one for 16 pixels of 24 pictures.
+  options.count = 0;
+  EXPECT_EQ(startOf(*views, options).size(), 24u * 64 * 64 / 16);
+  options.max_count = 500;
+  EXPECT_EQ(startOf(*views, options).size(), 500u);
+  options.count = 300;
+  EXPECT_EQ(startOf(*views, options).size(), 300u);
+}
+
+TEST(StartSplats, BesidePointsOfThingsThatMoveNothingIsLookedForUnlessAskedFor) {
+  const auto views = halfKnownSphere();
+  PointSet points = views->points();
+  points.times.assign(300, 0.5);
+  views->setPoints(points);
+  StartOptions options;
+  options.with_lives = true;
+  const std::vector<size_t> all = allViews(*views);
+  EXPECT_EQ(startSplats(*views, all, options).splats.size(), 300u);
+  options.count = 400;
+  const StartSplats more = startSplats(*views, all, options);
+  ASSERT_EQ(more.splats.size(), 400u);
+  ASSERT_EQ(more.times.size(), 400u);
+  EXPECT_EQ(more.lives.size(), 800u);
+  EXPECT_EQ(more.times[299], 0.5);
+  EXPECT_TRUE(std::isnan(more.times[300]));
+}
+
 TEST(StartSplats, WithoutPointsTheyStandOnWhatDepthShows) {
   // A wall at z = 5 before a camera at the origin, half of it transparent.
   Camera camera;
@@ -167,6 +236,15 @@ TEST(StartSplats, WithoutPointsTheyStandOnWhatDepthShows) {
   // As many as there are pixels, once each.
   options.count = 100000;
   EXPECT_EQ(startOf(*views, options).size(), 500u);
+  // Beside points, which tell of all that is there, only if asked for.
+  PointSet point;
+  point.positions = {0, 0, 5};
+  point.colours = {0.5f, 0.5f, 0.5f};
+  point.opacities = {1};
+  views->setPoints(point);
+  EXPECT_EQ(startOf(*views).size(), 1u);
+  options.count = 100;
+  EXPECT_EQ(startOf(*views, options).size(), 100u);
 }
 
 TEST(StartSplats, WherePicturesTellNothingTheyFillWhatTheCamerasShare) {
