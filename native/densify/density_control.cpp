@@ -127,6 +127,11 @@ class DensityControl final : public Strategy {
     return part ? part->afterStep(at(given), store) : std::optional<SplatEdit>{};
   }
 
+  bool lowersOpacitiesAt(const FitMoment& given) const override {
+    const ControlPart* part = owner(ControlRole::kOpacity);
+    return part && part->lowersAt(at(given));
+  }
+
   bool wantsSweep(const FitMoment& given) const override {
     return std::any_of(parts_.begin(), parts_.end(),
                        [&](const auto& part) { return part->wantsSweep(at(given)); });

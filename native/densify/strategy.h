@@ -236,6 +236,9 @@ class Strategy : public FitHooks<FitMoment> {
   /// What this iteration's backward pass shall gather for observe().
   virtual StatisticRequest requests(const FitMoment&) const { return {}; }
 
+  /// Whether the edit of this iteration lowers opacities, for them to come back.
+  virtual bool lowersOpacitiesAt(const FitMoment&) const { return false; }
+
   /// Which splats there shall be. The strategy's own arrays per splat follow its answer at once;
   /// whoever called applies it.
   virtual std::optional<SplatEdit> edit(const FitMoment&, const SplatStore&) { return {}; }

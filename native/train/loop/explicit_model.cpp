@@ -120,6 +120,9 @@ class ExplicitModel final : public FitModel, private Regulariser {
     return motion_->cloudOf(backend_->state().splats);
   }
   std::vector<uint64_t> budgets() const override { return {backend_->splatCount()}; }
+  bool lowersOpacitiesAt(const FitMoment& moment) const override {
+    return strategy_->lowersOpacitiesAt(moment);
+  }
   SplatQuantities seen() const override { return strategy_->seen(backend_->splatCount()); }
 
   TensorTable state() const override {

@@ -60,6 +60,10 @@ class FitModel {
   virtual StepReport step(const FitMoment& moment, const StepView& view, ViewEvaluator* views,
                           Progress* progress) = 0;
 
+  /// Whether the step of this moment ends with opacities lowered for what comes after: then the
+  /// splats look like fog for some steps.
+  virtual bool lowersOpacitiesAt(const FitMoment&) const { return false; }
+
   /// The splats at a budget (of a field: its anchors); 0: all that there are, or the largest budget
   /// that was trained. A model of one size gives that, whatever is asked. Of splats that move: as
   /// they are when their clip begins.

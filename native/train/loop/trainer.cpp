@@ -128,8 +128,24 @@ uint64_t Trainer::measureInterval() const {
   return std::max(kLeastMeasureInterval, options_.iterations / kMeasuresPerFit);
 }
 
+FitMoment Trainer::momentOf(uint64_t iteration) const {
+  FitMoment moment;
+  moment.iteration = iteration;
+  moment.iterations = options_.iterations;
+  moment.extent = extent_;
+  moment.seed = options_.seed;
+  moment.max_splats = options_.max_splats;
+  moment.view_count = split_.training.size();
+  return moment;
+}
+
+/// Where the step before lowered opacities, splats look like fog: they are measured before it.
 bool Trainer::measureIsDue() const {
-  return iteration_ % measureInterval() == 0 || iteration_ == options_.iterations;
+  if (iteration_ == options_.iterations) return true;
+  const uint64_t interval = measureInterval();
+  const auto lowers = [this](uint64_t at) { return model_->lowersOpacitiesAt(momentOf(at)); };
+  if (iteration_ % interval == 0) return !lowers(iteration_);
+  return (iteration_ + 1) % interval == 0 && lowers(iteration_ + 1);
 }
 
 void Trainer::backgroundOf(uint64_t iteration, double background[3]) const {
@@ -142,13 +158,7 @@ void Trainer::backgroundOf(uint64_t iteration, double background[3]) const {
 
 void Trainer::step(Pace& pace) {
   const Stopwatch watch;
-  FitMoment moment;
-  moment.iteration = iteration_ + 1;
-  moment.iterations = options_.iterations;
-  moment.extent = extent_;
-  moment.seed = options_.seed;
-  moment.max_splats = options_.max_splats;
-  moment.view_count = split_.training.size();
+  FitMoment moment = momentOf(iteration_ + 1);
   StepView view;
   view.index = order_.at(iteration_);
   const size_t source_view = split_.training[view.index];

@@ -123,6 +123,7 @@ class Trainer {
   struct Pace;
 
   void step(Pace& pace);
+  FitMoment momentOf(uint64_t iteration) const;
   bool measureIsDue() const;
   void measure();
   FitMeasure measureOf(uint64_t budget, std::span<const size_t> views);

@@ -154,16 +154,6 @@ StartPoints fromVolume(const ViewSource& views, std::span<const size_t> training
   return start;
 }
 
-/// What a start has of pictures alone, unless somebody says how many.
-uint64_t splatsOfPictures(const ViewSource& views, std::span<const size_t> training) {
-  uint64_t pixels = 0;
-  for (const size_t view : sweptViews(training)) {
-    const Camera small = sweptCamera(views.camera(view));
-    pixels += uint64_t{small.width} * small.height;
-  }
-  return std::clamp<uint64_t>(pixels / kPixelsOfASplat, 1, kStartSplatsOfPictures);
-}
-
 bool haveDepth(const ViewSource& views, std::span<const size_t> training) {
   return !views.load(training[0]).depth.empty();
 }
@@ -174,7 +164,7 @@ void addBesidePoints(const ViewSource& views, std::span<const size_t> training,
   // Samples of meshes come with depth, and tell of everything that is there. Where things move,
   // pictures of different times tell of no depth.
   if (options.count == 0 && options.with_lives) return;
-  const uint64_t most = options.count > 0 ? options.count : splatsOfPictures(views, training);
+  const uint64_t most = options.count > 0 ? options.count : placesOfPictures(views, training);
   const uint64_t wanted = capped(most, options.max_count);
   if (wanted <= points.size()) return;
   const uint64_t missing = wanted - points.size();
@@ -194,7 +184,7 @@ StartPoints withoutPoints(const ViewSource& views, std::span<const size_t> train
   };
   StartPoints points = fromDepth(views, training, wanted(kStartSplatsOfDepth), options, progress);
   if (points.size() > 0) return points;
-  const uint64_t count = wanted(splatsOfPictures(views, training));
+  const uint64_t count = wanted(placesOfPictures(views, training));
   points = sweptPoints(views, training, count, options.seed, progress);
   // Silhouettes that contradict each other leave nothing standing.
   if (points.size() >= count / kLeastSwept) return points;

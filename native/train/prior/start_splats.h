@@ -13,18 +13,14 @@ namespace stipple {
 
 /// Where there is no prior, or none says how many.
 constexpr uint64_t kStartSplatsOfDepth = 50000;
-/// So many, or one for so many pixels where that is fewer: pixels of the pictures that are looked
-/// at, at the size at which they are compared (swept_points.h).
-constexpr uint64_t kStartSplatsOfPictures = 30000;
-constexpr uint64_t kPixelsOfASplat = 16;
 
 struct StartOptions {
   /// Splats; 0: all points of the prior and, of views without depth in which nothing moves, at
-  /// least as many as pictures alone would give; or the constants above. If there are more points,
-  /// it is drawn by their weights which are taken; if fewer, what is missing is looked for in the
-  /// pictures.
+  /// least as many as pictures alone would give; or the constant above, or placesOfPictures()
+  /// (swept_points.h). If there are more points, it is drawn by their weights which are taken; if
+  /// fewer, what is missing is looked for in the pictures.
   uint64_t count = 0;
-  uint64_t max_count = 0;  ///< hard cap; 0: none
+  uint64_t max_count = 0;   ///< hard cap; 0: none
   bool with_lives = false;  ///< find how long points stay where they are
   int sh_degree = 3;
   Antialias antialias = Antialias::kClassic;

@@ -24,6 +24,8 @@ namespace stipple {
 namespace {
 
 constexpr size_t kPictures = 64;
+constexpr uint64_t kMostPlaces = 30000;
+constexpr uint64_t kPixelsOfAPlace = 16;
 constexpr double kMostSide = 256;  ///< pixels of a picture that is compared
 constexpr size_t kNeighbours = 6;
 constexpr size_t kDepths = 48;
@@ -89,9 +91,21 @@ std::vector<float> reduced(const std::vector<float>& values, const ViewPicture& 
   return areaAverage(image, camera.width, camera.height).pixels;
 }
 
+std::vector<size_t> comparedViews(std::span<const size_t> training) {
+  std::vector<size_t> views(std::min(training.size(), kPictures));
+  for (size_t p = 0; p < views.size(); ++p) views[p] = training[p * training.size() / views.size()];
+  return views;
+}
+
+Camera comparedCamera(const Camera& camera) {
+  const double shrink = std::min(1.0, kMostSide / std::max(camera.width, camera.height));
+  return resized(camera, std::max(1u, static_cast<uint32_t>(std::lround(camera.width * shrink))),
+                 std::max(1u, static_cast<uint32_t>(std::lround(camera.height * shrink))));
+}
+
 Look lookOf(const Camera& camera, const ViewPicture& picture) {
   Look look;
-  look.camera = sweptCamera(camera);
+  look.camera = comparedCamera(camera);
   look.has_alpha = !picture.alpha.empty();
   const std::vector<float> colour = reduced(picture.colour, picture, look.camera, 3);
   const std::vector<float> alpha = reduced(picture.alpha, picture, look.camera, 1);
@@ -297,22 +311,19 @@ Found findPlace(const std::vector<Look>& looks, const Look& look, const SharedVo
 
 }  // namespace
 
-std::vector<size_t> sweptViews(std::span<const size_t> training) {
-  std::vector<size_t> views(std::min(training.size(), kPictures));
-  for (size_t p = 0; p < views.size(); ++p) views[p] = training[p * training.size() / views.size()];
-  return views;
-}
-
-Camera sweptCamera(const Camera& camera) {
-  const double shrink = std::min(1.0, kMostSide / std::max(camera.width, camera.height));
-  return resized(camera, std::max(1u, static_cast<uint32_t>(std::lround(camera.width * shrink))),
-                 std::max(1u, static_cast<uint32_t>(std::lround(camera.height * shrink))));
+uint64_t placesOfPictures(const ViewSource& views, std::span<const size_t> training) {
+  uint64_t pixels = 0;
+  for (const size_t view : comparedViews(training)) {
+    const Camera small = comparedCamera(views.camera(view));
+    pixels += uint64_t{small.width} * small.height;
+  }
+  return std::clamp<uint64_t>(pixels / kPixelsOfAPlace, 1, kMostPlaces);
 }
 
 StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> training, uint64_t count,
                         uint64_t seed, Progress* progress) {
   std::vector<Look> looks;
-  const std::vector<size_t> compared = sweptViews(training);
+  const std::vector<size_t> compared = comparedViews(training);
   for (size_t p = 0; p < compared.size(); ++p) {
     advance(progress, static_cast<double>(p) / static_cast<double>(compared.size()), kStage);
     const size_t view = compared[p];

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "base/progress.h"
 #include "data/views/view_source.h"
@@ -23,10 +22,8 @@ namespace stipple {
 StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> training, uint64_t count,
                         uint64_t seed, Progress* progress = nullptr);
 
-/// The views whose pictures are compared.
-std::vector<size_t> sweptViews(std::span<const size_t> training);
-
-/// The camera at the size at which its picture is compared.
-Camera sweptCamera(const Camera& camera);
+/// How many places are worth looking for: 30,000, or one for 16 pixels where that is fewer, of the
+/// pictures that are compared, at the size at which they are.
+uint64_t placesOfPictures(const ViewSource& views, std::span<const size_t> training);
 
 }  // namespace stipple

@@ -147,6 +147,18 @@ TEST(Adaptive, TheStrongestPullsWinWhereThereIsNoRoom) {
   EXPECT_FALSE(edit->keep);
 }
 
+TEST(Adaptive, TellsBeforehandWhenItLowersOpacities) {
+  const auto strategy = makeStrategy("adaptive");
+  const RawSplats splats = splatsOf({{0.005f, 0.9f}});
+  for (const uint64_t iteration : {600u, 2999u, 3000u, 3001u, 3100u, 12000u, 15000u, 18000u}) {
+    const auto edit = editAt(*strategy, at(iteration), splats);
+    const bool lowers = edit && !edit->writes.empty();
+    EXPECT_EQ(strategy->lowersOpacitiesAt(at(iteration)), lowers) << iteration;
+  }
+  EXPECT_TRUE(strategy->lowersOpacitiesAt(at(3000)));
+  EXPECT_FALSE(makeStrategy("mcmc")->lowersOpacitiesAt(at(3000)));
+}
+
 TEST(Adaptive, WhatIsRemovedMakesRoom) {
   const std::vector<Kind> kinds = {{0.005f, 0.001f}, {0.005f, 0.001f}, {0.05f, 0.5f}};
   const auto edit = firstEdit(kinds, {1, 1, 1}, 2);

@@ -9,8 +9,9 @@
 namespace stipple::testing {
 
 struct ColourModelOptions {
-  uint64_t spoils_from = UINT64_MAX;  ///< iteration from which steps lead away from the target
-  uint64_t fails_at = UINT64_MAX;     ///< iteration whose step throws
+  uint64_t spoils_from = UINT64_MAX;   ///< iteration from which steps lead away from the target
+  uint64_t fails_at = UINT64_MAX;      ///< iteration whose step throws
+  uint64_t lowers_every = UINT64_MAX;  ///< iterations, after which opacities are said to be lowered
 };
 
 /// A model of four numbers, a colour and a sum of gradients, that fits the mean colour of views by
@@ -44,6 +45,10 @@ class ColourModel final : public FitModel {
     report.splat_count = 1;
     report.stage = "Colour";
     return report;
+  }
+
+  bool lowersOpacitiesAt(const FitMoment& moment) const override {
+    return moment.iteration % options_.lowers_every == 0;
   }
 
   SplatCloud splats(uint64_t) override {

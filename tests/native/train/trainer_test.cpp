@@ -134,6 +134,19 @@ TEST(Trainer, FitsTheViewsAndMeasuresHeldOutOnes) {
   EXPECT_STREQ(fit.listener.all.back().stage, "Colour");
 }
 
+TEST(Trainer, MeasuresBeforeOpacitiesAreLoweredAndNotRightAfter) {
+  ColourModelOptions lowers;
+  lowers.lowers_every = 10;
+  Fit fit(colourViews(16, 0.2f, 0.6f, 0.8f), optionsOf(30), lowers);
+  fit.run();
+  std::vector<uint64_t> measured;
+  for (const FitMeasure& measure : fit.trainer->history().measures) {
+    measured.push_back(measure.iteration);
+  }
+  // At each fifth iteration; the last is measured whatever it ends with.
+  EXPECT_EQ(measured, (std::vector<uint64_t>{5, 9, 15, 19, 25, 29, 30}));
+}
+
 TEST(Trainer, TellsNoMovingPixelsApartWhereNoCameraTookSeveralViews) {
   Fit still(colourViews(16, 0.2f, 0.6f, 0.8f), optionsOf(10));
   still.run();
