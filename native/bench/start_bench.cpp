@@ -57,7 +57,7 @@ void sweep(benchmark::State& state) {
     withThreads(2, [&] {
       plain = std::min(plain, secondsOf([&] { benchmark::DoNotOptimize(plainTaps(picture)); }));
       const double seconds = secondsOf(
-          [&] { benchmark::DoNotOptimize(sweptPoints(*views, training, kPoints, 0).size()); });
+          [&] { benchmark::DoNotOptimize(sweptPoints(*views, training, {kPoints}).size()); });
       ours = std::min(ours, seconds);
       state.SetIterationTime(seconds);
     });

@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <unordered_map>
 #include <utility>
 
 #include "base/random.h"
 #include "decode/field/contraction.h"
 #include "math/vec.h"
 #include "train/prior/shared_volume.h"
+#include "train/prior/swept_points.h"
 #include "train/prior/visual_hull.h"
 
 namespace stipple {
@@ -22,6 +24,11 @@ constexpr double kOutliers = 0.01;
 /// Points that reach this much farther than all but the outliers are no outliers.
 constexpr double kCompact = 1.3;
 constexpr double kMargin = 0.1;
+/// Pixels of one colour, of all: a backdrop. Skies of photographs are not as plain.
+constexpr double kBlankShare = 0.1;
+/// Most pixels' depth is not certain; where hardly any is, they tell nothing of the scene.
+constexpr uint64_t kTriesOfAPlace = 3;
+constexpr double kLeastCertain = 0.01;
 /// Cameras that are asked whether they see a point.
 constexpr size_t kWitnesses = 100;
 /// Pictures that are asked what they show beyond the root, every so many-th pixel, and the share of
@@ -94,6 +101,44 @@ void addDepth(const ViewSource& views, std::span<const size_t> training,
                            static_cast<double>(picture.depth[i])),
                1.0f);
     }
+  }
+}
+
+/// Whether pictures are of something before a backdrop of one colour, as renders without alpha are.
+bool haveBlankBackdrop(const ViewSource& views, std::span<const size_t> training) {
+  std::unordered_map<uint32_t, size_t> counts;
+  size_t asked = 0, most = 0;
+  const size_t looks = std::min(training.size(), kLooks);
+  for (size_t v = 0; v < looks; ++v) {
+    const ViewPicture picture = views.load(training[v * training.size() / looks]);
+    for (size_t i = 0; i + 2 < picture.colour.size(); i += 3 * kPixelStep) {
+      uint32_t key = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        const float value = std::clamp(picture.colour[i + c], 0.0f, 1.0f);
+        key = key << 8 | static_cast<uint32_t>(std::lround(value * 255));
+      }
+      most = std::max(most, ++counts[key]);
+      ++asked;
+    }
+  }
+  return static_cast<double>(most) > kBlankShare * static_cast<double>(asked);
+}
+
+/// Places whose depth opaque pictures tell for certain, as a reconstruction would. Before a blank
+/// backdrop there are none: what is plain on both sides of an outline would get no density, and the
+/// fog does better. Alpha tells more, and its hull has no wrong depths.
+void addWherePicturesAgree(const ViewSource& views, std::span<const size_t> training,
+                           const ScenePriorOptions& options, ScenePrior& prior,
+                           Progress* progress) {
+  if (!views.load(training[0]).alpha.empty() || haveBlankBackdrop(views, training)) return;
+  SweepOptions sweep;
+  sweep.count = kTriesOfAPlace * placesOfPictures(views, training);
+  sweep.seed = options.seed;
+  sweep.only_certain = true;
+  const StartPoints found = sweptPoints(views, training, sweep, progress);
+  if (static_cast<double>(found.size()) < kLeastCertain * static_cast<double>(sweep.count)) return;
+  for (size_t i = 0; i < found.size(); ++i) {
+    addPoint(prior, Eigen::Map<const Vec3f>(&found.positions[i * 3]).cast<double>(), 1.0f);
   }
 }
 
@@ -261,6 +306,7 @@ ScenePrior scenePrior(const ViewSource& views, std::span<const size_t> training,
   ScenePrior prior;
   addPoints(views.points(), prior);
   addDepth(views, training, options, prior, progress);
+  if (prior.weights.empty()) addWherePicturesAgree(views, training, options, prior, progress);
   dropUnseen(views, training, prior);
   if (!prior.weights.empty()) {
     prior.root = cubeOfPoints(prior.positions);

@@ -40,7 +40,9 @@ struct ScenePriorOptions {
 /// Points of the source, and places that the views' depth shows. The root cube holds the points
 /// that at least two cameras see, without the farthest 1 % on either side of each axis where those
 /// reach far out, and a tenth more. Without points or depth: points of the visual hull, where
-/// pictures have alpha; else none, and the root is around the ball that the cameras have in common.
+/// pictures have alpha; places that other pictures tell of for certain (swept_points.h), unless
+/// they have a blank backdrop; else none, and the root is around the ball that the cameras have in
+/// common.
 /// With a shell the root is contracted: its inner half is what it would be. Auto has one where
 /// points are known and pictures have no alpha. It begins right behind the walls where depth ends
 /// inside the root in all but a twentieth of the pixels; else it reaches far out.

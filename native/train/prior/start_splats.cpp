@@ -173,7 +173,7 @@ void addBesidePoints(const ViewSource& views, std::span<const size_t> training,
       points.append(fromDepth(views, training, missing, options, progress));
     }
   } else {
-    points.append(sweptPoints(views, training, missing, options.seed, progress));
+    points.append(sweptPoints(views, training, {missing, options.seed}, progress));
   }
 }
 
@@ -185,7 +185,7 @@ StartPoints withoutPoints(const ViewSource& views, std::span<const size_t> train
   StartPoints points = fromDepth(views, training, wanted(kStartSplatsOfDepth), options, progress);
   if (points.size() > 0) return points;
   const uint64_t count = wanted(placesOfPictures(views, training));
-  points = sweptPoints(views, training, count, options.seed, progress);
+  points = sweptPoints(views, training, {count, options.seed}, progress);
   // Silhouettes that contradict each other leave nothing standing.
   if (points.size() >= count / kLeastSwept) return points;
   return fromVolume(views, training, count, options);

@@ -48,6 +48,10 @@ constexpr const char* kStage = "Looking for surfaces";
 constexpr double kSpread = 1.5;
 constexpr std::array<std::array<float, 2>, 9> kTaps = {
     {{0, 0}, {-1, -1}, {0, -1}, {1, -1}, {-1, 0}, {1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
+/// A certain depth: its difference beside the least one of depths that are more than so many steps
+/// away.
+constexpr double kRivalShare = 0.5;
+constexpr double kApart = 3;
 /// Of a place that no neighbour sees: worse than any that matches.
 constexpr double kUnseenCost = 0.5;
 
@@ -270,10 +274,19 @@ struct Found {
   float colour[3] = {0, 0, 0};
 };
 
+/// In: tries of a ray, by rising cost.
+bool isToldApart(std::span<const std::pair<double, double>> tries,
+                 const std::pair<double, double>& best) {
+  const auto rival = std::find_if(tries.begin(), tries.end(), [&](const auto& each) {
+    return std::abs(each.second - best.second) * kDepths > kApart;
+  });
+  return rival == tries.end() || best.first < kRivalShare * rival->first - kNoise;
+}
+
 /// In: chance, of which 2 + kDepths numbers are used.
 template <typename Chance>
 Found findPlace(const std::vector<Look>& looks, const Look& look, const SharedVolume& volume,
-                uint32_t pixel, const Chance& chance) {
+                uint32_t pixel, bool must_be_certain, const Chance& chance) {
   const Sweep sweep(looks, look, pixel);
   const DepthRange range = rangeOf(look, volume);
   const double pull = look.has_alpha || look.neighbours.empty() ? 0 : kFarPull;
@@ -288,6 +301,7 @@ Found findPlace(const std::vector<Look>& looks, const Look& look, const SharedVo
   };
   const auto first = std::find_if(tries.begin(), tries.end(), stands);
   if (first == tries.end()) return {};
+  if (must_be_certain && !isToldApart(tries, *first)) return {};
   double t = first->second;
   double best = sweep.cost(range.at(t));
   double step = 0.5 / kDepths;
@@ -320,8 +334,9 @@ uint64_t placesOfPictures(const ViewSource& views, std::span<const size_t> train
   return std::clamp<uint64_t>(pixels / kPixelsOfAPlace, 1, kMostPlaces);
 }
 
-StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> training, uint64_t count,
-                        uint64_t seed, Progress* progress) {
+StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> training,
+                        const SweepOptions& options, Progress* progress) {
+  const uint64_t count = options.count;
   std::vector<Look> looks;
   const std::vector<size_t> compared = comparedViews(training);
   for (size_t p = 0; p < compared.size(); ++p) {
@@ -346,7 +361,8 @@ StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> trainin
       for (size_t k = begin; k < end; ++k) {
         const uint64_t i = first + k;
         const auto chance = [&](uint64_t what) {
-          return unitDouble(keyedBits(seed, RandomUse::kStartPoint, i * (2 + kDepths) + what));
+          return unitDouble(
+              keyedBits(options.seed, RandomUse::kStartPoint, i * (2 + kDepths) + what));
         };
         // Views in turn, each one's pixels in as many runs as it has turns.
         const Look& look = looks[i % looks.size()];
@@ -355,7 +371,7 @@ StartPoints sweptPoints(const ViewSource& views, std::span<const size_t> trainin
             (static_cast<double>(i / looks.size()) + chance(1)) / static_cast<double>(turns);
         const size_t at = static_cast<size_t>(along * static_cast<double>(look.pixels.size()));
         found[k] = findPlace(looks, look, volume, look.pixels[std::min(at, look.pixels.size() - 1)],
-                             chance);
+                             options.only_certain, chance);
       }
     });
     for (const Found& each : found) {

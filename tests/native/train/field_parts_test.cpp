@@ -18,6 +18,7 @@
 #include "train/optimiser/sparse_adam.h"
 #include "train/prior/scene_prior.h"
 #include "train/prior/visual_hull.h"
+#include "train/sphere_views.h"
 #include "train/toy_views.h"
 
 namespace stipple {
@@ -358,6 +359,28 @@ std::shared_ptr<MemoryViewSource> withoutAlpha(const MemoryViewSource& views) {
   return opaque;
 }
 
+TEST(ScenePrior, WithoutPointsOrAlphaTakesWhereThePicturesOfCamerasAgree) {
+  const auto views =
+      testing::sphereViews(testing::camerasAround(24, 64), testing::Behind::kPattern);
+  ScenePriorOptions options;
+  options.shell = ShellChoice::kOff;
+  const ScenePrior prior = scenePrior(*views, all(*views), options);
+  ASSERT_GT(prior.weights.size(), 500u);
+  size_t right = 0;
+  for (size_t i = 0; i < prior.weights.size(); ++i) {
+    const double distance = Eigen::Map<const Vec3f>(&prior.positions[i * 3]).cast<double>().norm();
+    right += std::abs(distance - 1) < 0.1 || distance > 5;
+  }
+  EXPECT_GT(right, prior.weights.size() * 9 / 10);
+  options.shell = ShellChoice::kAuto;
+  EXPECT_TRUE(scenePrior(*views, all(*views), options).contracted);
+  // Before a backdrop of one colour little more than outlines would be certain.
+  const auto before_blank =
+      testing::sphereViews(testing::camerasAround(24, 64), testing::Behind::kBlank);
+  EXPECT_TRUE(scenePrior(*before_blank, all(*before_blank), options).weights.empty());
+}
+
+/// Before black.
 TEST(ScenePrior, WithoutPointsOrAlphaTakesWhatTheCamerasShare) {
   const auto views = withoutAlpha(*toyViews(toyBall(100), 12, 16, false));
   const ScenePrior prior = scenePrior(*views, all(*views), {});

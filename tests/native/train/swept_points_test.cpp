@@ -16,7 +16,7 @@ namespace {
 using namespace stipple::testing;
 
 StartPoints sweep(const MemoryViewSource& views, uint64_t count, uint64_t seed = 0) {
-  return sweptPoints(views, allViews(views), count, seed);
+  return sweptPoints(views, allViews(views), {count, seed});
 }
 
 Vec3d placeAt(const StartPoints& points, size_t i) {
@@ -55,6 +55,24 @@ TEST(SweptPoints, WithoutAlphaWhatIsBehindIsFarther) {
   EXPECT_GT(near, 0.22);
   EXPECT_GT(far, 0.45);
   EXPECT_GT(near + far, 0.8);
+}
+
+TEST(SweptPoints, CertainOnesAreFewerAndInTheRightPlace) {
+  const auto views = sphereViews(camerasAround(24, 64), Behind::kPattern);
+  SweepOptions options;
+  options.count = 2000;
+  options.only_certain = true;
+  const StartPoints points = sweptPoints(*views, allViews(*views), options);
+  EXPECT_GT(points.size(), 200u);
+  EXPECT_LT(points.size(), 1600u);
+  const auto is_right = [](const Vec3d& p) { return std::abs(p.norm() - 1) < 0.1 || p.norm() > 5; };
+  EXPECT_GT(shareOf(points, is_right), 0.93);
+  EXPECT_LT(shareOf(sweep(*views, 2000), is_right), shareOf(points, is_right));
+  // A blank wall tells no depth, but where the ball hides all but the farthest ones. Of all pixels
+  // 0.32 show the ball.
+  const auto blank = sphereViews(camerasAround(24, 64), Behind::kBlank);
+  const StartPoints before = sweptPoints(*blank, allViews(*blank), options);
+  EXPECT_GT(shareOf(before, [](const Vec3d& p) { return p.norm() < 1.5; }), 0.7);
 }
 
 TEST(SweptPoints, ABlankBackdropHidesNothing) {
@@ -142,7 +160,7 @@ TEST(SweptPoints, CanBeCancelled) {
   const auto views = sphereViews(camerasAround(4, 16), Behind::kNothing);
   Progress progress;
   progress.cancel();
-  EXPECT_THROW(sweptPoints(*views, allViews(*views), 10, 0, &progress), Error);
+  EXPECT_THROW(sweptPoints(*views, allViews(*views), {10}, &progress), Error);
 }
 
 }  // namespace
