@@ -28,6 +28,8 @@ SurfaceModelOptions modelOptions(const StippleModelFromMeshOptions& given) {
                                             "; 0 (automatic) or 1000 to 67108864 is allowed");
     }
     options.sampling.count = given.sample_count;
+  } else {
+    options.sampling.detail_count = options.sampling.count;
   }
   if (!(given.detail_weight >= 0) || !std::isfinite(given.detail_weight)) {
     fail(ErrorCode::kInvalidArgument, "options->detail_weight is " +

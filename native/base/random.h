@@ -45,6 +45,8 @@ enum class RandomUse : uint32_t {
   kAnchorBudget = 32,
   kAnchorSeed = 33,
   kPriorSample = 34,
+  kSeeThrough = 35,
+  kSurfacePart = 36,
   kColourNoise = 40,
   kTokenNoise = 41,
   kCameraNoise = 42,

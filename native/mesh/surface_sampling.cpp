@@ -13,8 +13,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "mesh/surface_colour.h"
 #include "mesh/surface_detail.h"
-#include "mesh/texture_lookup.h"
 
 namespace stipple {
 
@@ -24,7 +24,7 @@ constexpr size_t kTriangleGrain = 8192;
 constexpr size_t kSampleGrain = 4096;
 constexpr double kPlastic1 = 0.7548776662466927;  ///< 1/g, g^3 = g + 1
 constexpr double kPlastic2 = 0.5698402909980532;  ///< 1/g^2
-constexpr uint64_t kMaxTapCount = 8;
+constexpr double kMostParts = 4;                  ///< of a sample where there is detail
 constexpr double kDetailGain = 4.0;  ///< at detail weight 1, full detail attracts 1 + 4 times more
 
 using Vec = std::array<double, 3>;
@@ -62,7 +62,9 @@ std::vector<double> runningAreas(const TriMesh& mesh) {
   return running;
 }
 
-using Barycentric = std::array<double, 3>;
+uint64_t keyOf(uint64_t seed, size_t triangle) {
+  return keyedBits(~seed, RandomUse::kSurfaceSample, static_cast<uint64_t>(triangle));
+}
 
 Barycentric foldedPoint(double x, double y) {
   if (x + y > 1) {
@@ -92,98 +94,6 @@ Vec unitNormal(const TriMesh& mesh, size_t triangle, const Barycentric& at) {
   return {face[0] / face_length, face[1] / face_length, face[2] / face_length};
 }
 
-/// Colours of places on triangles.
-class SurfaceColour {
- public:
-  SurfaceColour(const TriMesh& mesh, double sample_area) : mesh_(mesh), sample_area_(sample_area) {
-    for (const Image& image : mesh.textures) textures_.emplace_back(image);
-  }
-
-  /// Scene linear colour and opacity of the sample `index` at a place of a triangle.
-  std::array<float, 4> at(size_t triangle, const Barycentric& place, double triangle_area,
-                          uint64_t random) const {
-    const size_t index = mesh_.triangle_materials.empty() ? 0 : mesh_.triangle_materials[triangle];
-    const Material& material = mesh_.materials[index];
-    std::array<float, 4> colour = {material.base_colour[0], material.base_colour[1],
-                                   material.base_colour[2], material.base_colour[3]};
-    if (material.colour == MaterialColour::kTexture) {
-      colour = textured(textures_[material.texture], triangle, place, triangle_area, random);
-    } else if (material.colour == MaterialColour::kCorner) {
-      colour = interpolated(triangle, place);
-    }
-    colour[3] = std::clamp(colour[3], 0.0f, 1.0f);
-    return colour;
-  }
-
- private:
-  std::array<float, 4> interpolated(size_t triangle, const Barycentric& place) const {
-    std::array<float, 4> colour = {0, 0, 0, 0};
-    for (size_t corner = 0; corner < 3; ++corner) {
-      for (size_t c = 0; c < 4; ++c) {
-        colour[c] += static_cast<float>(place[corner]) *
-                     mesh_.corner_colours[triangle * 12 + corner * 4 + c];
-      }
-    }
-    return colour;
-  }
-
-  std::array<float, 4> lookUp(const TextureLookup& texture, size_t triangle,
-                              const Barycentric& place) const {
-    const float* uv = &mesh_.corner_uvs[triangle * 6];
-    float u = 0, v = 0;
-    for (size_t corner = 0; corner < 3; ++corner) {
-      u += static_cast<float>(place[corner]) * uv[corner * 2];
-      v += static_cast<float>(place[corner]) * uv[corner * 2 + 1];
-    }
-    return texture.at(u, v);
-  }
-
-  /// Mean over the piece of the triangle that the sample stands for: one tap per two texels, at
-  /// most eight, so that a fine texture does not alias into speckles.
-  std::array<float, 4> textured(const TextureLookup& texture, size_t triangle,
-                                const Barycentric& place, double triangle_area,
-                                uint64_t random) const {
-    const float* uv = &mesh_.corner_uvs[triangle * 6];
-    const double du[2] = {static_cast<double>(uv[2] - uv[0]), static_cast<double>(uv[4] - uv[0])};
-    const double dv[2] = {static_cast<double>(uv[3] - uv[1]), static_cast<double>(uv[5] - uv[1])};
-    const double share = std::min(1.0, sample_area_ / triangle_area);
-    const double texels =
-        0.5 * std::abs(du[0] * dv[1] - du[1] * dv[0]) * texture.width() * texture.height() * share;
-    const auto taps = static_cast<uint64_t>(
-        std::clamp(std::ceil(texels / 2), 1.0, static_cast<double>(kMaxTapCount)));
-    if (taps == 1) return lookUp(texture, triangle, place);
-    // Side of the sample's square where the triangle is the lower half of the unit square.
-    const double side = std::sqrt(0.5 * share);
-    const double start[2] = {unitDouble(mixBits(random)), unitDouble(mixBits(~random))};
-    std::array<double, 4> sum = {0, 0, 0, 0};
-    for (uint64_t tap = 0; tap < taps; ++tap) {
-      double x = start[0] + kPlastic1 * static_cast<double>(tap);
-      double y = start[1] + kPlastic2 * static_cast<double>(tap);
-      x = place[1] + (x - std::floor(x) - 0.5) * side;
-      y = place[2] + (y - std::floor(y) - 0.5) * side;
-      Barycentric at = {std::max(0.0, 1 - x - y), std::max(0.0, x), std::max(0.0, y)};
-      const double total = at[0] + at[1] + at[2];
-      for (double& weight : at) weight /= total;
-      const std::array<float, 4> colour = lookUp(texture, triangle, at);
-      // Colour weighted by alpha: transparent texels do not bleed theirs.
-      for (size_t c = 0; c < 3; ++c) sum[c] += static_cast<double>(colour[c] * colour[3]);
-      sum[3] += static_cast<double>(colour[3]);
-    }
-    if (sum[3] <= 0) {
-      std::array<float, 4> colour = lookUp(texture, triangle, place);
-      colour[3] = 0;
-      return colour;
-    }
-    return {static_cast<float>(sum[0] / sum[3]), static_cast<float>(sum[1] / sum[3]),
-            static_cast<float>(sum[2] / sum[3]),
-            static_cast<float>(sum[3] / static_cast<double>(taps))};
-  }
-
-  const TriMesh& mesh_;
-  double sample_area_;
-  std::vector<TextureLookup> textures_;
-};
-
 void requireOptions(const SurfaceSamplingOptions& options) {
   constexpr uint64_t kMaxSampleCount = uint64_t{1} << 28;
   if (options.count == 0 || options.count > kMaxSampleCount) {
@@ -196,29 +106,64 @@ void requireOptions(const SurfaceSamplingOptions& options) {
   }
 }
 
-}  // namespace
+/// Where a sample lies: the weights of the second and the third corner of its triangle.
+struct Place {
+  uint32_t triangle = 0;
+  double x = 0, y = 0;
+};
 
-PointSet sampleSurface(const TriMesh& mesh, const SurfaceSamplingOptions& options,
-                       Progress* progress) {
-  requireOptions(options);
-  validate(mesh);
-  advance(progress, 0.0, "Sampling the surface");
-  const std::vector<double> running = runningAreas(mesh);
-  const double area = running.back();
-  const size_t count = options.count;
-  const double stratum = area / static_cast<double>(count);
-  const SurfaceColour colour_of(mesh, stratum);
+/// Makes samples of places.
+class Sampler {
+ public:
+  Sampler(const TriMesh& mesh, const std::vector<double>& running)
+      : mesh_(mesh), running_(running), colour_(mesh) {}
 
+  double areaOf(size_t triangle) const {
+    return running_[triangle] - (triangle == 0 ? 0.0 : running_[triangle - 1]);
+  }
+
+  /// area: square metres that the sample stands for.
+  void put(const Place& place, double area, uint64_t random, PointSet& samples, size_t i) const {
+    const size_t triangle = place.triangle;
+    const Barycentric at = {1 - place.x - place.y, place.x, place.y};
+    const Vec corners[3] = {vertexOf(mesh_, triangle, 0), vertexOf(mesh_, triangle, 1),
+                            vertexOf(mesh_, triangle, 2)};
+    const Vec normal = unitNormal(mesh_, triangle, at);
+    const std::array<float, 4> colour =
+        colour_.at(triangle, at, area / areaOf(triangle), mixBits(random));
+    for (size_t axis = 0; axis < 3; ++axis) {
+      samples.positions[i * 3 + axis] = static_cast<float>(
+          at[0] * corners[0][axis] + at[1] * corners[1][axis] + at[2] * corners[2][axis]);
+      samples.normals[i * 3 + axis] = static_cast<float>(normal[axis]);
+      samples.colours[i * 3 + axis] = colour[axis];
+    }
+    samples.opacities[i] = colour[3];
+    samples.areas[i] = static_cast<float>(area);
+  }
+
+ private:
+  const TriMesh& mesh_;
+  const std::vector<double>& running_;
+  SurfaceColour colour_;
+};
+
+PointSet emptySamples(size_t count) {
   PointSet samples;
   samples.positions.resize(count * 3);
   samples.normals.resize(count * 3);
   samples.colours.resize(count * 3);
   samples.opacities.resize(count);
-  samples.areas.assign(count, static_cast<float>(stratum));
-  samples.weights.assign(count, static_cast<float>(stratum));
+  samples.areas.resize(count);
+  return samples;
+}
 
+/// One place for every equal share of the area.
+std::vector<Place> evenPlaces(const std::vector<double>& running, size_t count, uint64_t seed,
+                              Progress* progress) {
+  const double stratum = running.back() / static_cast<double>(count);
+  std::vector<Place> places(count);
   const auto heightOf = [&](size_t i) {
-    const double jitter = unitDouble(keyedBits(options.seed, RandomUse::kSurfaceSample, i));
+    const double jitter = unitDouble(keyedBits(seed, RandomUse::kSurfaceSample, i));
     return (static_cast<double>(i) + jitter) * stratum;
   };
   parallelFor(count, kSampleGrain, [&](size_t begin, size_t end) {
@@ -239,38 +184,112 @@ PointSet sampleSurface(const TriMesh& mesh, const SurfaceSamplingOptions& option
         while (first < i && heightOf(first) < low) ++first;
         fresh = false;
       }
-      const double low = triangle == 0 ? 0.0 : running[triangle - 1];
-      const uint64_t random =
-          keyedBits(~options.seed, RandomUse::kSurfaceSample, static_cast<uint64_t>(triangle));
+      const uint64_t random = keyOf(seed, triangle);
       const auto ordinal = static_cast<double>(i - std::min(first, i));
-      double x = unitDouble(random) + kPlastic1 * ordinal;
-      double y = unitDouble(mixBits(random)) + kPlastic2 * ordinal;
-      const Barycentric place = foldedPoint(x - std::floor(x), y - std::floor(y));
-      const Vec corners[3] = {vertexOf(mesh, triangle, 0), vertexOf(mesh, triangle, 1),
-                              vertexOf(mesh, triangle, 2)};
-      const Vec normal = unitNormal(mesh, triangle, place);
-      const std::array<float, 4> colour =
-          colour_of.at(triangle, place, running[triangle] - low, mixBits(random + i));
-      for (size_t axis = 0; axis < 3; ++axis) {
-        samples.positions[i * 3 + axis] =
-            static_cast<float>(place[0] * corners[0][axis] + place[1] * corners[1][axis] +
-                               place[2] * corners[2][axis]);
-        samples.normals[i * 3 + axis] = static_cast<float>(normal[axis]);
-        samples.colours[i * 3 + axis] = colour[axis];
-      }
-      samples.opacities[i] = colour[3];
+      const double x = unitDouble(random) + kPlastic1 * ordinal;
+      const double y = unitDouble(mixBits(random)) + kPlastic2 * ordinal;
+      const Barycentric at = foldedPoint(x - std::floor(x), y - std::floor(y));
+      places[i] = {static_cast<uint32_t>(triangle), at[1], at[2]};
     }
   });
-  advance(progress, 0.6, "Sampling the surface");
-  if (options.detail_weight > 0) {
-    const std::vector<float> detail = surfaceDetail(samples, nullptr);
-    const double gain = kDetailGain * options.detail_weight;
-    parallelFor(count, kSampleGrain, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        samples.weights[i] =
-            static_cast<float>(stratum * (1.0 + gain * static_cast<double>(detail[i])));
+  return places;
+}
+
+/// A place of a share of a triangle's area around another, which stays on the triangle.
+Place nearPlace(const Place& middle, double share, double u, double v) {
+  if (share >= 1) {
+    const Barycentric at = foldedPoint(u, v);
+    return {middle.triangle, at[1], at[2]};
+  }
+  // Where the triangle is the lower half of the unit square.
+  const double side = std::sqrt(0.5 * share);
+  double x = std::abs(middle.x + (u - 0.5) * side);
+  double y = std::abs(middle.y + (v - 0.5) * side);
+  const double over = x + y - 1;
+  if (over > 0) {
+    x = std::max(0.0, x - over);
+    y = std::max(0.0, y - over);
+  }
+  return {middle.triangle, x, std::min(y, 1 - x)};
+}
+
+/// From which number on the parts of each sample stand, and how many there are in all: more of them
+/// where there is detail.
+std::vector<size_t> partsOf(const std::vector<float>& detail, uint64_t further) {
+  double sum = 0;
+  for (const float value : detail) sum += static_cast<double>(value);
+  const double gain =
+      sum > 0 ? std::min<double>(kMostParts - 1, static_cast<double>(further) / sum) : 0.0;
+  std::vector<size_t> begins(detail.size() + 1, 0);
+  double running = 0;
+  for (size_t i = 0; i < detail.size(); ++i) {
+    running += gain * static_cast<double>(detail[i]);
+    begins[i + 1] = i + 1 + static_cast<size_t>(running);
+  }
+  return begins;
+}
+
+/// The samples with parts in the place of each, and the detail of every part.
+PointSet split(const Sampler& sampler, const std::vector<Place>& places, const PointSet& even,
+               const std::vector<size_t>& begins, uint64_t seed, std::vector<float>& detail) {
+  PointSet samples = emptySamples(begins.back());
+  std::vector<float> of_parts(samples.size());
+  parallelFor(places.size(), kSampleGrain, [&](size_t first, size_t last) {
+    for (size_t i = first; i < last; ++i) {
+      const size_t count = begins[i + 1] - begins[i];
+      const auto area = static_cast<double>(even.areas[i]) / static_cast<double>(count);
+      const uint64_t random = keyedBits(seed, RandomUse::kSurfacePart, i);
+      const double start[2] = {unitDouble(random), unitDouble(mixBits(random))};
+      const double share = static_cast<double>(even.areas[i]) / sampler.areaOf(places[i].triangle);
+      for (size_t part = 0; part < count; ++part) {
+        const double x = start[0] + kPlastic1 * static_cast<double>(part);
+        const double y = start[1] + kPlastic2 * static_cast<double>(part);
+        const Place place = count == 1
+                                ? places[i]
+                                : nearPlace(places[i], share, x - std::floor(x), y - std::floor(y));
+        sampler.put(place, area, random + part, samples, begins[i] + part);
+        of_parts[begins[i] + part] = detail[i];
       }
-    });
+    }
+  });
+  detail = std::move(of_parts);
+  return samples;
+}
+
+}  // namespace
+
+PointSet sampleSurface(const TriMesh& mesh, const SurfaceSamplingOptions& options,
+                       Progress* progress) {
+  requireOptions(options);
+  validate(mesh);
+  advance(progress, 0.0, "Sampling the surface");
+  const std::vector<double> running = runningAreas(mesh);
+  const size_t count = options.count;
+  const double stratum = running.back() / static_cast<double>(count);
+  const Sampler sampler(mesh, running);
+  const std::vector<Place> places = evenPlaces(running, count, options.seed, progress);
+  PointSet samples = emptySamples(count);
+  parallelFor(count, kSampleGrain, [&](size_t begin, size_t end) {
+    if (progress) progress->throwIfCancelled();
+    for (size_t i = begin; i < end; ++i) {
+      sampler.put(places[i], stratum, keyOf(options.seed, places[i].triangle) + i, samples, i);
+    }
+  });
+  advance(progress, 0.5, "Sampling the surface");
+  std::vector<float> detail(count, 0.0f);
+  if (options.detail_weight > 0) {
+    detail = surfaceDetail(samples, nullptr);
+    if (options.detail_count > 0) {
+      advance(progress, 0.8, "Sampling the surface");
+      samples = split(sampler, places, samples, partsOf(detail, options.detail_count), options.seed,
+                      detail);
+    }
+  }
+  const double gain = kDetailGain * options.detail_weight;
+  samples.weights.resize(samples.size());
+  for (size_t i = 0; i < samples.size(); ++i) {
+    samples.weights[i] = static_cast<float>(static_cast<double>(samples.areas[i]) *
+                                            (1.0 + gain * static_cast<double>(detail[i])));
   }
   advance(progress, 1.0, "Sampling the surface");
   return samples;

@@ -21,11 +21,11 @@ constexpr float kPatchScale = 2.15f;
 /// the size that a flat patch of its width would get keeps its flat splat from sticking out.
 constexpr double kCurvedTrim = 1.1;
 constexpr float kMaxAspect = 5.0f;
-/// Thickness over the smaller width: thin, yet several voxels can resolve it and it is seen
-/// edge-on.
-constexpr float kThickness = 0.1f;
+/// Thickness over the smaller width. Splats of a silhouette are seen edge-on, many behind each
+/// other: thicker ones make a rim around it.
+constexpr float kThickness = 0.03f;
 constexpr float kMaxThickness = 0.35f;
-constexpr float kHeightScale = 1.5f;  ///< thickness over the standard deviation of heights
+constexpr float kHeightScale = 1.0f;  ///< thickness over the standard deviation of heights
 /// Mean normal length of a patch from which on its splat may grow, and may grow fully: a flat splat
 /// on a curved patch sticks out at the silhouette.
 constexpr double kNoGrowth = 0.943;
@@ -38,6 +38,7 @@ struct Moments {
   double normal[3] = {0, 0, 0};
   double second[6] = {0, 0, 0, 0, 0, 0};  ///< xx, xy, xz, yy, yz, zz about the site
   double turns[6] = {0, 0, 0, 0, 0, 0};   ///< the same of the normals
+  double widening = 0;  ///< of normal · place: how far the normals spread with the places
   double colour[3] = {0, 0, 0};
   double opacity = 0;
 };
@@ -67,6 +68,7 @@ Moments patchMoments(const SurfaceIndex& index, const SurfacePatches& patches, c
     const double n[3] = {static_cast<double>(index.normals[i * 3]),
                          static_cast<double>(index.normals[i * 3 + 1]),
                          static_cast<double>(index.normals[i * 3 + 2])};
+    m.widening += area * (n[0] * d[0] + n[1] * d[1] + n[2] * d[2]);
     m.turns[0] += area * n[0] * n[0];
     m.turns[1] += area * n[0] * n[1];
     m.turns[2] += area * n[0] * n[2];
@@ -80,6 +82,9 @@ Moments patchMoments(const SurfaceIndex& index, const SurfacePatches& patches, c
     for (double& value : m.mean) value /= m.area;
     for (double& value : m.second) value /= m.area;
     for (double& value : m.turns) value /= m.area;
+    m.widening =
+        (m.widening - m.normal[0] * m.mean[0] - m.normal[1] * m.mean[1] - m.normal[2] * m.mean[2]) /
+        m.area;
     for (double& value : m.colour) value /= m.opacity + 1e-4 * m.area;
     m.opacity /= m.area;
   }
@@ -190,6 +195,7 @@ SplatShapes fitShapes(const SurfaceIndex& index, const SurfaceSites& sites,
   shapes.areas.resize(count);
   shapes.colours.resize(count * 3);
   shapes.opacities.resize(count);
+  shapes.curvatures.assign(count, 0.0f);
   shapes.growths.assign(count, 1.0f);
   shapes.borders.assign(count * 10, std::numeric_limits<float>::infinity());
   parallelFor(count, kGrain, [&](size_t first, size_t last) {
@@ -227,6 +233,9 @@ SplatShapes fitShapes(const SurfaceIndex& index, const SurfaceSites& sites,
         covariance[k] = m.second[k] - m.mean[rows[k]] * m.mean[columns[k]];
       }
       const TangentFrame frame(normal);
+      const double across =
+          quadratic(covariance, frame.u, frame.u) + quadratic(covariance, frame.v, frame.v);
+      shapes.curvatures[i] = static_cast<float>(m.widening / (across + 2 * grain));
       const double scale = static_cast<double>(kPatchScale * kPatchScale);
       const double uu = scale * (quadratic(covariance, frame.u, frame.u) + grain);
       const double uv = scale * quadratic(covariance, frame.u, frame.v);

@@ -13,14 +13,15 @@ namespace stipple {
 
 /// Flat Gaussians on the surface, one per site, in the unit cube.
 struct SplatShapes {
-  std::vector<float> centres;    ///< [N,3]
-  std::vector<float> normals;    ///< [N,3] unit
-  std::vector<float> majors;     ///< [N,3] unit, at right angles to the normal
-  std::vector<float> sigmas;     ///< [N,3] along major, along normal × major, along normal
-  std::vector<float> areas;      ///< [N] of the patch
-  std::vector<float> colours;    ///< [N,3] scene linear
-  std::vector<float> opacities;  ///< [N] of the surface
-  std::vector<float> growths;    ///< [N] 0..1: how much of a wanted growth the curvature permits
+  std::vector<float> centres;     ///< [N,3]
+  std::vector<float> normals;     ///< [N,3] unit
+  std::vector<float> majors;      ///< [N,3] unit, at right angles to the normal
+  std::vector<float> sigmas;      ///< [N,3] along major, along normal × major, along normal
+  std::vector<float> areas;       ///< [N] of the patch
+  std::vector<float> colours;     ///< [N,3] scene linear
+  std::vector<float> opacities;   ///< [N] of the surface
+  std::vector<float> curvatures;  ///< [N] mean curvature; positive: the normal is on the outer side
+  std::vector<float> growths;     ///< [N] 0..1: how much of a wanted growth the curvature permits
   /// [N,2,5] up to two borders near the splat: unit direction to it in the tangent plane, distance
   /// to it along that direction (infinity: none), largest standard deviation in that direction.
   std::vector<float> borders;

@@ -30,17 +30,32 @@ struct Nodes {
   float squared_radius = 0;
 };
 
+/// Samples that stand for equal areas, in the order of the index: where there are more samples than
+/// elsewhere, not more of them.
+std::vector<uint32_t> evenSamples(const SurfaceIndex& index) {
+  const auto widest = static_cast<double>(*std::ranges::max_element(index.areas));
+  const double step = std::max(widest, index.area / static_cast<double>(kMaxNodeCount));
+  std::vector<uint32_t> chosen;
+  // Not at the ends of samples, where rounding would decide.
+  double passed = 0, next = 0.25 * step;
+  for (size_t i = 0; i < index.size(); ++i) {
+    passed += static_cast<double>(index.areas[i]);
+    if (passed < next) continue;
+    chosen.push_back(static_cast<uint32_t>(i));
+    next += step;
+  }
+  return chosen;
+}
+
 Nodes makeNodes(const SurfaceIndex& index) {
   Nodes nodes;
-  const size_t stride = (index.size() + kMaxNodeCount - 1) / kMaxNodeCount;
-  const size_t count = index.size() / stride;
+  nodes.samples = evenSamples(index);
+  const size_t count = nodes.samples.size();
   std::vector<uint64_t> codes(count);
-  nodes.samples.resize(count);
   nodes.positions.resize(count * 3);
   nodes.normals.resize(count * 3);
   for (size_t i = 0; i < count; ++i) {
-    const size_t from = i * stride;
-    nodes.samples[i] = static_cast<uint32_t>(from);
+    const size_t from = nodes.samples[i];
     codes[i] = index.codes[from];
     for (size_t axis = 0; axis < 3; ++axis) {
       nodes.positions[i * 3 + axis] = index.positions[from * 3 + axis];

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "decode/surface/silhouettes.h"
 #include "decode/surface/splat_shapes.h"
 #include "decode/surface/surface_borders.h"
 #include "decode/surface/surface_index.h"
@@ -153,6 +154,7 @@ SplatCloud SurfaceDecoder::decode(const DecodeRequest& request) const {
     findNearBorders(index_->borders, sites, shapes);
     balanceCoverage(index, sites, patches, shapes, request.progress);
   }
+  insetSplats(index, sites, shapes);
   sites.cells = std::vector<CellTable>();
   sites.around = std::vector<std::array<uint32_t, 28>>();
   SplatCloud cloud = cloudOf(index, sites, shapes);
@@ -164,7 +166,7 @@ uint64_t SurfaceDecoder::memoryBound(uint64_t anchor_count, uint32_t gaussians_p
   // The most is held while the coverage is balanced: sorting holds the sites twice but no shapes,
   // and the cloud is made when cells and patches are gone.
   constexpr uint64_t kSite = 9 * sizeof(float);
-  constexpr uint64_t kShape = 28 * sizeof(float);
+  constexpr uint64_t kShape = 29 * sizeof(float);
   constexpr uint64_t kPatch = 2 * sizeof(uint32_t);  // where its members begin, and a copy
   // Codes, runs and slots of a table, which is at least a quarter full.
   constexpr uint64_t kCell = sizeof(uint64_t) + sizeof(uint32_t) + 4 * sizeof(uint32_t);

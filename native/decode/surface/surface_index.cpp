@@ -19,6 +19,35 @@ uint64_t unitCubeCode(const float* position, int level) {
   return mortonEncode(cell[0], cell[1], cell[2]);
 }
 
+namespace {
+
+/// By the flux of places through the surface, three times the volume that it encloses (the
+/// divergence theorem), from its middle: a sheet has none of it, however it faces.
+float outwardOf(const SurfaceIndex& index) {
+  constexpr double kFlat = 0.02;  ///< of the flux if all normals pointed away from the middle
+  double middle[3] = {0, 0, 0};
+  for (size_t i = 0; i < index.size(); ++i) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      middle[axis] += static_cast<double>(index.areas[i]) *
+                      static_cast<double>(index.positions[i * 3 + axis]) / index.area;
+    }
+  }
+  double flux = 0, most = 0;
+  for (size_t i = 0; i < index.size(); ++i) {
+    double along = 0, squared = 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double d = static_cast<double>(index.positions[i * 3 + axis]) - middle[axis];
+      along += d * static_cast<double>(index.normals[i * 3 + axis]);
+      squared += d * d;
+    }
+    flux += static_cast<double>(index.areas[i]) * along;
+    most += static_cast<double>(index.areas[i]) * std::sqrt(squared);
+  }
+  return most > 0 ? static_cast<float>(std::clamp(flux / (kFlat * most), -1.0, 1.0)) : 0.0f;
+}
+
+}  // namespace
+
 SurfaceIndex makeSurfaceIndex(const PointSet& surface, const RootCube& root, int leaf_level) {
   constexpr size_t kGrain = 8192;
   constexpr double kSideCells = double{uint32_t{1} << SurfaceIndex::kCodeLevel};
@@ -82,6 +111,7 @@ SurfaceIndex makeSurfaceIndex(const PointSet& surface, const RootCube& root, int
       index.spreads[i] = static_cast<float>(weight > 0 ? area * weight_sum / weight : index.area);
     }
   });
+  index.outward = outwardOf(index);
   return index;
 }
 

@@ -25,6 +25,8 @@ struct SurfaceIndex {
   /// [S] area of surface per unit of probability: P splats stand sqrt(spread / P) apart here.
   std::vector<float> spreads;
   double area = 0;  ///< of all samples
+  /// 1 where normals point out of a body, −1 where into it, 0 for sheets that enclose nothing.
+  float outward = 0;
 
   size_t size() const { return opacities.size(); }
 };

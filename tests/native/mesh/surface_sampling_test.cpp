@@ -236,6 +236,65 @@ TEST(SurfaceSampling, GivesMoreWeightToTexturedAndCurvedPlaces) {
   EXPECT_LT(far, 1.001f);
 }
 
+/// A square of 8 m, black but for stripes of 0.05 m in a strip of 1 m along one side.
+TriMesh stripedSquare() {
+  TriMesh mesh = rectangle(8, 8);
+  addRectangleUvs(mesh);
+  mesh.materials[0].colour = MaterialColour::kTexture;
+  mesh.materials[0].texture = 0;
+  Image image{160, 8, 1, {}, Transfer::kLinear};
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 160; ++x) image.pixels.push_back(x < 20 && x % 2 == 0 ? 1.0f : 0.0f);
+  }
+  mesh.textures.push_back(image);
+  return mesh;
+}
+
+TEST(SurfaceSampling, PutsFurtherSamplesWhereThereIsDetail) {
+  SurfaceSamplingOptions options;
+  options.count = 20000;
+  options.detail_count = 5000;
+  const TriMesh mesh = stripedSquare();
+  const PointSet even = sampled(mesh, options.count, 1);
+  const PointSet set = sampleSurface(mesh, options);
+  EXPECT_GT(set.size(), 24000u);
+  EXPECT_LE(set.size(), 25000u);
+  double area = 0, striped_area = 0;
+  size_t striped = 0;
+  for (size_t i = 0; i < set.size(); ++i) {
+    const float x = set.positions[i * 3], y = set.positions[i * 3 + 1];
+    ASSERT_TRUE(x >= 0 && x <= 8.00001f && y >= 0 && y <= 8.00001f);
+    area += static_cast<double>(set.areas[i]);
+    if (x > 0.9f) continue;
+    ++striped;
+    striped_area += static_cast<double>(set.areas[i]);
+  }
+  EXPECT_NEAR(area, 64.0, 1e-3);
+  // A share of 0.9 / 8 of 20,000 samples, nearly three for each of them and most of all further
+  // ones; each stands for less, so that together they stand for the same place as before.
+  EXPECT_GT(striped, 2250u * 5 / 2);
+  EXPECT_NEAR(striped_area, 0.9 * 8, 0.15);
+  // The density asks for as much as without them.
+  const auto weightOf = [](const PointSet& samples) {
+    double sum = 0;
+    for (size_t i = 0; i < samples.size(); ++i) {
+      if (samples.positions[i * 3] < 0.9f) sum += static_cast<double>(samples.weights[i]);
+    }
+    return sum;
+  };
+  EXPECT_NEAR(weightOf(set) / weightOf(even), 1, 0.03);
+  withThreads(1, [&] { EXPECT_EQ(sampleSurface(mesh, options).positions, set.positions); });
+}
+
+TEST(SurfaceSampling, SplitsNoSampleWithoutDetail) {
+  SurfaceSamplingOptions options;
+  options.count = 3000;
+  options.detail_count = 3000;
+  EXPECT_EQ(sampleSurface(rectangle(2, 2), options).size(), 3000u);
+  options.detail_weight = 0;
+  EXPECT_EQ(sampleSurface(stripedSquare(), options).size(), 3000u);
+}
+
 TEST(SurfaceSampling, DependsOnTheSeedAndNotOnTheThreads) {
   TriMesh mesh = rectangle(2, 1);
   PointSet one, two;

@@ -29,9 +29,11 @@ constexpr float kTargetOpen = 0.0055f;  ///< transmittance wanted at every sampl
 constexpr float kSmallMass = 0.66f;
 constexpr int kCoverageRounds = 2;  ///< one more for few sites
 /// A splat ends, at this many standard deviations, one spacing over an open border: 6 % of its
-/// opacity are left there. Over a crease, where two faces' splats add up, it ends closer.
+/// opacity are left there. Over a crease, where two faces' splats add up, it ends sooner and
+/// closer.
 constexpr float kBorderSigmas = 2.35f;
 constexpr float kCreaseSigmas = 2.9f;
+constexpr float kOverCrease = 0.85f;  ///< spacings
 
 /// exp(−q/2) for q >= 0, relative error below 1e-4 up to q = 40, constant (2e-9) beyond. Without
 /// float comparisons, which would keep loops over it from being vectorised.
@@ -211,8 +213,9 @@ void findNearBorders(const SurfaceBorders& borders, const SurfaceSites& sites,
               best = cost;
               for (size_t axis = 0; axis < 3; ++axis) near[which * 5 + axis] = o[axis];
               near[which * 5 + 3] = distance;
-              near[which * 5 + 4] = (distance + sites.spacings[i]) /
-                                    (borders.open[j] ? kBorderSigmas : kCreaseSigmas);
+              near[which * 5 + 4] =
+                  borders.open[j] ? (distance + sites.spacings[i]) / kBorderSigmas
+                                  : (distance + kOverCrease * sites.spacings[i]) / kCreaseSigmas;
             }
           }
           if (!(near[which * 5 + 3] < reach)) break;
