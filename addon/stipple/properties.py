@@ -3,14 +3,14 @@
 
 import bpy
 from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty,
-                       PointerProperty, StringProperty)
+                       IntVectorProperty, PointerProperty, StringProperty)
 
 from . import version
 from .binding.errors import StippleError
 from .scene import overlays, selection_settings
 from .scene.fit import fit_proposal, fitting, strategies
 from .scene.sequence import sequences
-from .scene.source import bound, setting_paths, source_paths, source_settings, sources, sync
+from .scene.source import bound, mesh_models, setting_paths, source_paths, source_settings, sources, sync
 from .scene.view import effects, photo_cameras, quality
 
 _OVERRIDABLE = {'LIBRARY_OVERRIDABLE'}
@@ -26,6 +26,10 @@ COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: texture
                   "other node trees are baked"),
                  ('BAKED', "Baked Lighting", "Colors as lit by the scene, baked by Cycles"),
                  ('ATTRIBUTE', "Attribute", "The active color attribute"))
+
+BAKE_SIZE_TEXT = ("Side of the square image that the light of an object is baked into, in pixels; 0 for about as many "
+                  "pixels as its textures have, from 1024 to 2048. What shines is baked at the size of its textures")
+BAKE_SAMPLES_TEXT = "Rays of light for each pixel of the image: more of them take longer and leave less noise"
 
 BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats"),
                 ('COUNT', "Count", "The budget is a number of splats"))
@@ -91,9 +95,17 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
                                  min=0.0, soft_max=4.0, options=set(), override=_OVERRIDABLE)
     color_from: EnumProperty(name="Color From", description="Where colors come from. Takes effect with Update from "
                              "Source", items=COLOR_SOURCES, options=set(), override=_OVERRIDABLE)
+    bake_size: IntProperty(name="Bake Size", description=BAKE_SIZE_TEXT + ". Takes effect with Update from Source",
+                           default=0, min=0, max=4096, subtype='PIXEL', options=set(), override=_OVERRIDABLE)
+    bake_samples: IntProperty(name="Bake Samples", description=BAKE_SAMPLES_TEXT + ". Takes effect with Update from "
+                              "Source", default=32, min=1, soft_max=1024, options=set(), override=_OVERRIDABLE)
+    refine: BoolProperty(name="Refine", description=mesh_models.REFINE_TEXT + ". Takes effect with Update from Source",
+                         default=False, options=set(), override=_OVERRIDABLE)
     # What the present source was made with, to say when the settings above differ.
     source_detail_weight: FloatProperty(options={'HIDDEN'})
     source_color_from: StringProperty(options={'HIDDEN'})
+    source_refine: BoolProperty(options={'HIDDEN'})
+    source_bake: IntVectorProperty(size=2, default=(0, 32), options={'HIDDEN'})
     source_objects: CollectionProperty(type=STIPPLE_PG_source_object)
     source_fingerprint: StringProperty(options={'HIDDEN'})
     source_changed: BoolProperty(name="Source Changed",

@@ -118,4 +118,27 @@ StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const Stippl
   });
 }
 
+StippleStatus stipple_cloud_refine_to_mesh_start(const StippleCloud* cloud, const StippleMesh* mesh,
+                                                 const StippleRefineOptions* options,
+                                                 StippleJob** job) {
+  return guarded([&] {
+    require(cloud, "cloud");
+    require(mesh, "mesh");
+    require(job, "job");
+    StippleRefineOptions defaults;
+    stipple_refine_options_init(&defaults);
+    const RefineOptions settings = refineSettings(completed(options, defaults, "options"));
+    const std::shared_ptr<const SplatCloud> start = cloud->cloud;
+    const std::shared_ptr<const TriMesh> triangles = mesh->mesh;
+    const auto backends = cloud->context->backends;
+    cloud->context->requireMemory(refineToMeshMemoryBound(*backends, *start, *triangles, settings),
+                                  "refining this cloud");
+    *job = startJob(cloud->context,
+                    [start, triangles, settings, backends](Progress& progress) -> JobResult {
+                      return std::make_shared<const SplatCloud>(
+                          refineToMesh(*backends, *start, *triangles, settings, &progress));
+                    });
+  });
+}
+
 }  // extern "C"

@@ -28,21 +28,27 @@ struct Arguments {
   double time = 0.0;
 };
 
-Model modelFrom(const Context& context, const Arguments& arguments) {
+/// A model, and the mesh that it is of, where it is of one.
+struct Source {
+  Model model;
+  Mesh mesh;
+};
+
+Source sourceOf(const Context& context, const Arguments& arguments) {
   const FileKind kind = fileKind(arguments.in);
   if (kind == FileKind::kModel) {
-    return make<Model>(stipple_model_load, context.get(), arguments.in.c_str());
+    return {make<Model>(stipple_model_load, context.get(), arguments.in.c_str()), nullptr};
   }
   if (kind == FileKind::kSplats) {
     const auto cloud = make<Cloud>(stipple_cloud_load, context.get(), arguments.in.c_str());
-    return hierarchyOf(context, cloud, arguments.seed);
+    return {hierarchyOf(context, cloud, arguments.seed), nullptr};
   }
   if (kind != FileKind::kMesh) {
     throw Failure("'" + arguments.in +
                   "' is not a source of splats; a mesh, a splat file or .stipple.safetensors is "
                   "expected");
   }
-  const auto mesh = make<Mesh>(stipple_mesh_load, context.get(), arguments.in.c_str());
+  auto mesh = make<Mesh>(stipple_mesh_load, context.get(), arguments.in.c_str());
   StippleModelFromMeshOptions options;
   stipple_model_from_mesh_options_init(&options);
   options.detail_weight = arguments.detail_weight;
@@ -52,7 +58,7 @@ Model modelFrom(const Context& context, const Arguments& arguments) {
                              const_cast<const StippleMesh*>(mesh.get()),
                              const_cast<const StippleModelFromMeshOptions*>(&options));
   finish(job);
-  return make<Model>(stipple_job_model, job.get());
+  return {make<Model>(stipple_job_model, job.get()), std::move(mesh)};
 }
 
 /// Negative counts must reach the message as they were typed, not wrapped around.
@@ -93,22 +99,30 @@ uint64_t budgetOf(const Model& model, const Arguments& arguments) {
   return static_cast<uint64_t>(std::max(count, 1.0));
 }
 
-/// The splats of a budget fitted to pictures of all of them.
-Cloud refined(const Cloud& cloud, const Model& model, const Arguments& arguments) {
-  const StippleModelSettings settings = settingsOf(model);
-  if (settings.budget_unit != STIPPLE_BUDGET_SPLATS) {
-    throw Failure("--refine fits to existing splats; a mesh has none");
+/// The splats of a budget fitted to pictures of the mesh, or of all existing splats.
+Cloud refined(const Cloud& cloud, const Source& source, const Arguments& arguments) {
+  const StippleModelSettings settings = settingsOf(source.model);
+  const bool of_all = settings.budget_unit == STIPPLE_BUDGET_SPLATS;
+  if (!of_all && !source.mesh) {
+    throw Failure("--refine fits to existing splats or to a mesh file; '" + arguments.in +
+                  "' holds neither");
   }
-  const Cloud full = cutOf(model, settings.maximum_budget);
   StippleRefineOptions options;
   stipple_refine_options_init(&options);
   options.iterations =
       static_cast<uint32_t>(counted(arguments.refine, "--refine", kMaxRefineSteps));
   options.seed = arguments.seed;
-  const auto job =
-      make<Job>(stipple_cloud_refine_start, const_cast<const StippleCloud*>(cloud.get()),
-                const_cast<const StippleCloud*>(full.get()),
-                const_cast<const StippleRefineOptions*>(&options));
+  const auto* start = const_cast<const StippleCloud*>(cloud.get());
+  const auto* given = const_cast<const StippleRefineOptions*>(&options);
+  Job job;
+  if (of_all) {
+    const Cloud full = cutOf(source.model, settings.maximum_budget);
+    job = make<Job>(stipple_cloud_refine_start, start, const_cast<const StippleCloud*>(full.get()),
+                    given);
+  } else {
+    job = make<Job>(stipple_cloud_refine_to_mesh_start, start,
+                    const_cast<const StippleMesh*>(source.mesh.get()), given);
+  }
   finish(job);
   return make<Cloud>(stipple_job_cloud, job.get());
 }
@@ -153,16 +167,23 @@ void decode(const Context& context, const Arguments& arguments) {
     throw Failure("--posed is for a model that 'stipple bind' has made; '" + arguments.in +
                   "' is none");
   }
-  const Model model = modelFrom(context, arguments);
-  if (out_kind == FileKind::kModel) {
-    check(stipple_model_save(model.get(), arguments.out.c_str()));
+  const Source source = sourceOf(context, arguments);
+  // Refined splats of a mesh are explicit ones: their model is a tree of merges.
+  const bool of_refined = arguments.refine != 0 && source.mesh != nullptr;
+  if (out_kind == FileKind::kModel && !of_refined) {
+    check(stipple_model_save(source.model.get(), arguments.out.c_str()));
     return;
   }
-  options.anchor_count = budgetOf(model, arguments);
-  const auto job = make<Job>(stipple_model_decode_start, model.get(), &options);
+  options.anchor_count = budgetOf(source.model, arguments);
+  const auto job = make<Job>(stipple_model_decode_start, source.model.get(), &options);
   finish(job);
   auto cloud = make<Cloud>(stipple_job_cloud, job.get());
-  if (arguments.refine != 0) cloud = refined(cloud, model, arguments);
+  if (arguments.refine != 0) cloud = refined(cloud, source, arguments);
+  if (out_kind == FileKind::kModel) {
+    const Model tree = hierarchyOf(context, cloud, arguments.seed);
+    check(stipple_model_save(tree.get(), arguments.out.c_str()));
+    return;
+  }
   if (!arguments.posed.empty()) cloud = carried(context, cloud, arguments);
   check(stipple_cloud_save(cloud.get(), arguments.out.c_str(), nullptr));
   auto info = sized<StippleCloudInfo>();
@@ -195,9 +216,10 @@ void addDecode(CLI::App& app, const Context& context) {
       "fitted field and of generated splats a number that it has learned with");
   command->add_option("--ratio", arguments->ratio, "Budget as a share of existing splats, 0..1")
       ->excludes(anchors);
-  command->add_option("--refine", arguments->refine,
-                      "Existing splats: number of steps that fit the result to images of all of "
-                      "them");
+  command->add_option(
+      "--refine", arguments->refine,
+      "Number of steps that fit the result to images of the mesh, or of all existing "
+      "splats");
   command
       ->add_option("--gaussians-per-anchor", arguments->gaussians_per_anchor,
                    "Splats made of each anchor")

@@ -252,3 +252,108 @@ def test_changed_mesh_is_noticed_and_updated(stipple):
     assert np.abs(positions(stipple, obj)[:, 2] - 2).max() < 1e-4
     assert not obj.data.stipple.source_changed
     assert quad.hide_get()
+
+
+def chequered_cube():
+    bpy.ops.mesh.primitive_cube_add(size=2)
+    made = bpy.context.object
+    for loop, place in zip(made.data.uv_layers[0].data, [(0, 0), (1, 0), (1, 1), (0, 1)] * 6):
+        loop.uv = place
+    image = bpy.data.images.new('Chequer', 64, 64)
+    pixels = np.ones((64, 64, 4), np.float32)
+    pixels[(np.indices((64, 64)).sum(0) // 16 % 2) == 0, :3] = (0.1, 0.2, 0.5)
+    image.pixels.foreach_set(pixels.ravel())
+    material = scenes.material('chequer', (1, 1, 1), made)
+    nodes = material.node_tree.nodes
+    texture = nodes.new('ShaderNodeTexImage')
+    texture.image = image
+    shader = next(node for node in nodes if node.type == 'BSDF_PRINCIPLED')
+    material.node_tree.links.new(texture.outputs['Color'], shader.inputs['Base Color'])
+    return made
+
+
+def test_refined_splats_are_a_tree_that_still_knows_its_meshes(stipple):
+    cube = chequered_cube()
+    plain = scenes.make_splats(cube, anchors=1500, hide_source=False)
+    refined = scenes.make_splats(cube, anchors=1500, refine=True, hide_source=False)
+    settings = refined.data.stipple
+    assert stipple.scene.source.splat_data.count(refined.data) == 1500
+    assert settings.source_kind == 'TREE' and settings.source_count == 1500
+    assert [entry.object for entry in settings.source_objects] == [cube]
+    # The fit moved them: by less than the space between them, but not by nothing.
+    moved = np.abs(np.sort(positions(stipple, plain)[:, 0]) - np.sort(positions(stipple, refined)[:, 0])).mean()
+    assert 1e-4 < moved < 0.1
+    settings.ratio = 0.5
+    assert stipple.scene.source.splat_data.count(refined.data) == 750
+    # Update from Source refines again, and keeps the budget.
+    assert bpy.ops.stipple.update_from_source() == {'FINISHED'}
+    assert settings.source_kind == 'TREE' and stipple.scene.source.splat_data.count(refined.data) == 750
+
+
+def test_refining_is_switched_by_update_from_source(stipple):
+    obj = scenes.make_splats(chequered_cube(), anchors=1500)
+    settings = obj.data.stipple
+    settings.refine = True
+    assert settings.source_kind == 'MODEL'  # until it is updated
+    assert bpy.ops.stipple.update_from_source() == {'FINISHED'}
+    assert settings.source_kind == 'TREE' and settings.ratio == 1.0
+    assert stipple.scene.source.splat_data.count(obj.data) == 1500
+    settings.refine = False
+    assert bpy.ops.stipple.update_from_source() == {'FINISHED'}
+    assert settings.source_kind == 'MODEL' and settings.anchors == 1500
+    settings.anchors = 3000
+    assert stipple.scene.source.splat_data.count(obj.data) == 3000
+
+
+def glowing_quad(side=1024, lines=128):
+    """A black square of 2 m that shines in stripes of 16 mm by a texture."""
+    quad = scenes.quad()
+    image = bpy.data.images.new('Text', side, side)
+    pixels = np.zeros((side, side, 4), np.float32)
+    pixels[..., 3] = 1
+    pixels[:, np.arange(side) * lines // side % 2 == 0, :3] = 1
+    image.pixels.foreach_set(pixels.ravel())
+    material = scenes.material('glowing', (0, 0, 0), quad)
+    shader = scenes.principled(material)
+    texture = material.node_tree.nodes.new('ShaderNodeTexImage')
+    texture.image, texture.interpolation = image, 'Closest'
+    material.node_tree.links.new(texture.outputs['Color'],
+                                 shader.inputs.get('Emission Color') or shader.inputs['Emission'])
+    shader.inputs['Emission Strength'].default_value = 1.0
+    return quad
+
+
+def test_what_shines_is_baked_as_finely_as_its_texture(stipple):
+    """Light alone, baked into 64 pixels, would leave the mean of dark and bright stripes everywhere."""
+    result = scenes.make_splats(glowing_quad(), anchors=60000, color_from='BAKED', bake_size=64, bake_samples=1)
+    p, c = positions(stipple, result), scenes.colours_of(stipple, result)
+    stripe = (p[:, 0] + 1) / 2 * 128
+    middle = np.abs(stripe % 1 - 0.5) < 0.25
+    bright = np.floor(stripe) % 2 == 0
+    # The atlas has 1.4 pixels for one of the texture, and a stripe has eight of those and two splats.
+    assert np.median(c[middle & bright, 0]) > 0.9
+    assert np.median(c[middle & ~bright, 0]) < 0.1
+
+
+def test_size_and_samples_of_the_bake_are_settings(stipple, monkeypatch):
+    seen = []
+    run = stipple.scene.bake._run_cycles
+
+    def noted(obj, kind, samples):
+        side = next(node.image.size[0] for node in obj.data.materials[0].node_tree.nodes
+                    if node.type == 'TEX_IMAGE' and node.image.name.startswith('stipple_bake'))
+        seen.append((kind, side, samples))
+        run(obj, kind, samples)
+    monkeypatch.setattr(stipple.scene.bake, '_run_cycles', noted)
+    quad = glowing_quad(side=256, lines=32)
+    obj = scenes.make_splats(quad, anchors=1000, color_from='BAKED', bake_size=128, bake_samples=2)
+    # Two triangles share the one cell of the atlas; a texture of 256 needs 363 pixels where half of them are used.
+    assert seen == [('COMBINED', 128, 2), ('EMISSION', 363, 2)]
+    settings = obj.data.stipple
+    assert (settings.bake_size, settings.bake_samples) == tuple(settings.source_bake) == (128, 2)
+    settings.bake_size = 0
+    assert tuple(settings.source_bake) != (settings.bake_size, settings.bake_samples)  # the panel asks for an update
+    seen.clear()
+    assert bpy.ops.stipple.update_from_source() == {'FINISHED'}
+    assert seen[0] == ('COMBINED', 1024, 2)
+    assert tuple(settings.source_bake) == (0, 2)

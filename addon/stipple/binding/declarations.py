@@ -106,6 +106,7 @@ FUNCTIONS = {
     'stipple_model_from_cloud_options_init': (None, [_to(s.StippleModelFromCloudOptions)]),
     'stipple_model_from_cloud_start': (_status, [_handle, _handle, _to(s.StippleModelFromCloudOptions), _out_handle]),
     'stipple_refine_options_init': (None, [_to(s.StippleRefineOptions)]),
+    'stipple_cloud_refine_to_mesh_start': (_status, [_handle, _handle, _to(s.StippleRefineOptions), _out_handle]),
     'stipple_cloud_refine_start': (_status, [_handle, _handle, _to(s.StippleRefineOptions), _out_handle]),
     'stipple_model_load': (_status, [_handle, _path, _out_handle]),
     'stipple_model_load_start': (_status, [_handle, _path, _out_handle]),

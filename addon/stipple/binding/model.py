@@ -12,6 +12,7 @@ from .density import Density, check_anchor_count
 from .errors import invalid
 from .handle import Handle, contiguous, new_handle, path_bytes, pointer_to
 from .job import Job
+from .mesh import Mesh
 from .structs import (AnchorOrder, StippleDecodeOptions, StippleModelFromCloudOptions, StippleModelFromMeshOptions,
                       StippleModelInfo, StippleModelSettings, StippleRefineOptions, ViewRig)
 
@@ -48,7 +49,8 @@ def _unsigned(value, name, least):
 
 
 def refine_start(cloud, full, iterations=100, view_count=32, view_size=800, view_rig=ViewRig.AUTOMATIC, seed=0):
-    """A job that makes the reduced Cloud, fitted to images of the full one."""
+    """A job that makes the reduced Cloud, fitted to images of the full one, or of the Mesh that it was made from."""
+    function = 'stipple_cloud_refine_to_mesh_start' if isinstance(full, Mesh) else 'stipple_cloud_refine_start'
     options = StippleRefineOptions()
     cloud.library.stipple_refine_options_init(byref(options))
     options.iterations = _unsigned(iterations, 'Iterations', 0)
@@ -56,8 +58,7 @@ def refine_start(cloud, full, iterations=100, view_count=32, view_size=800, view
     options.view_size = _unsigned(view_size, 'View size', 1)
     options.view_rig = int(view_rig)
     options.seed = seed
-    return Job(cloud.library, new_handle(cloud.library, 'stipple_cloud_refine_start', cloud.pointer, full.pointer,
-                                         byref(options)))
+    return Job(cloud.library, new_handle(cloud.library, function, cloud.pointer, full.pointer, byref(options)))
 
 
 class Model(Handle):

@@ -7,13 +7,13 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from .. import version
 from ..binding.cloud import Cloud
 from ..binding.errors import invalid
-from ..binding.model import DecodeSettings, Model
+from ..binding.model import DecodeSettings
 from ..binding.structs import AnchorOrder
 from ..jobs import JobOperator
-from ..panels.text import draw_anchors
-from ..properties import COLOR_SOURCES, ORDERS
-from ..scene import meshes
-from ..scene.source import source_paths, sources, splat_data, sync
+from ..panels.text import draw_anchors, draw_color_from
+from ..properties import BAKE_SAMPLES_TEXT, BAKE_SIZE_TEXT, COLOR_SOURCES, ORDERS
+from ..scene import bake, meshes
+from ..scene.source import mesh_models, source_paths, sources, splat_data, sync
 
 
 class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
@@ -30,10 +30,14 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
                                                   "side by side on the surface", default=1, soft_min=1, soft_max=32)
     detail_weight: FloatProperty(name="Detail Weight", description="How much texture detail and curvature attract "
                                  "anchors, 0 for an even spread", default=1.0, soft_min=0.0, soft_max=4.0)
+    refine: BoolProperty(name="Refine", description=mesh_models.REFINE_TEXT, default=False)
     order: EnumProperty(name="Order", description="How anchors are drawn from the density", items=ORDERS)
     seed: IntProperty(name="Seed", description="Another seed gives another, equally good set of anchors", default=0,
                       soft_min=0)
     color_from: EnumProperty(name="Color From", description="Where the splats' colors come from", items=COLOR_SOURCES)
+    bake_size: IntProperty(name="Bake Size", description=BAKE_SIZE_TEXT, default=0, min=0, max=4096,
+                           subtype='PIXEL')
+    bake_samples: IntProperty(name="Bake Samples", description=BAKE_SAMPLES_TEXT, default=32, min=1, soft_max=1024)
     hide_source: BoolProperty(name="Hide Source", description="Hide the meshes in the viewport and in renders",
                               default=True)
     source_path: StringProperty(name="Source Path", description="File to keep the splats' source in, empty for a place "
@@ -54,13 +58,15 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
             raise invalid('No mesh is selected; select at least one object with faces.')
         native = sources.context()
         self._notes = []
-        mesh = meshes.native_mesh(native, self._objects, context.evaluated_depsgraph_get(), self.color_from, self._notes)
-        return Model.from_mesh_start(native, mesh, self.detail_weight, self.seed)
+        mesh = meshes.native_mesh(native, self._objects, context.evaluated_depsgraph_get(), self.color_from, self._notes,
+                                  baking=bake.Settings(self.bake_size, self.bake_samples))
+        return mesh_models.start(native, mesh, self._settings(), self.detail_weight, self.refine)
 
     def finish(self, context, job):
-        model = Model.of_job(job)
+        model = mesh_models.model_of(job)
         # Decoding and writing the source go on side by side; a budget that is refused is refused before the file.
-        decoding = model.decode_start(self._settings())
+        decoding = model.decode_start(DecodeSettings(model.settings().maximum_budget) if self.refine
+                                      else self._settings())
         active = context.view_layer.objects.active
         name = (active if active in self._objects else self._objects[0]).name + ' Splats'
         path = sources.save_model(model, source_paths.place_for(name, self.source_path), bool(self.source_path))
@@ -73,7 +79,9 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
             stipple.anchors, stipple.gaussians_per_anchor = self.anchors, self.gaussians_per_anchor
             stipple.order, stipple.seed = self.order, self.seed
             stipple.detail_weight, stipple.color_from = self.detail_weight, self.color_from
-            sources.attach_model(obj.data, path, self._objects, model.settings())
+            stipple.bake_size, stipple.bake_samples = self.bake_size, self.bake_samples
+            stipple.refine = self.refine
+            mesh_models.attach(obj.data, path, self._objects, model)
         sync.write_decoded(obj.data, splats)
         context.collection.objects.link(obj)
         self._select(context, obj)
@@ -86,8 +94,10 @@ class STIPPLE_OT_splats_from_mesh(JobOperator, bpy.types.Operator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         draw_anchors(layout, self, 'anchors', self.gaussians_per_anchor)
-        for name in ('gaussians_per_anchor', 'detail_weight', 'order', 'seed', 'color_from', 'hide_source',
-                     'source_path'):
+        for name in ('gaussians_per_anchor', 'refine', 'detail_weight', 'order', 'seed'):
+            layout.prop(self, name)
+        draw_color_from(layout, self)
+        for name in ('hide_source', 'source_path'):
             layout.prop(self, name)
 
     def _settings(self):

@@ -4,10 +4,10 @@
 import bpy
 
 from ..binding.errors import invalid
-from ..binding.model import Model
+from ..binding.model import DecodeSettings
 from ..jobs import JobOperator
-from ..scene import meshes
-from ..scene.source import bound, erased, source_paths, sources, splat_data, sync
+from ..scene import bake, meshes
+from ..scene.source import bound, erased, mesh_models, source_paths, source_settings, sources, splat_data, sync
 
 
 class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
@@ -28,7 +28,12 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
     def start(self, context):
         self._object = context.object
         stipple = self._object.data.stipple
+        was_refined = source_settings.of(stipple).counts_splats
+        self._changes_kind = was_refined != stipple.refine
+        made = self._made = mesh_models.made_with(stipple)
         self._settings = sources.decode_settings(stipple)
+        if self._changes_kind:
+            self._settings = DecodeSettings(made.anchors * made.gaussians_per_anchor) if stipple.refine else made
         self._settings.check()
         self._sources = [entry.object for entry in stipple.source_objects if entry.object is not None]
         if not self._sources:
@@ -37,17 +42,19 @@ class STIPPLE_OT_update_from_source(JobOperator, bpy.types.Operator):
         self._notes = []
         with meshes.shown(context, self._sources):
             mesh = meshes.native_mesh(native, self._sources, context.evaluated_depsgraph_get(), stipple.color_from,
-                                      self._notes)
-        return Model.from_mesh_start(native, mesh, stipple.detail_weight, stipple.seed)
+                                      self._notes, baking=bake.Settings(stipple.bake_size, stipple.bake_samples))
+        return mesh_models.start(native, mesh, made, stipple.detail_weight, stipple.refine)
 
     def finish(self, _context, job):
-        model, data = Model.of_job(job), self._object.data
+        model, data = mesh_models.model_of(job), self._object.data
         splats = erased.read(data).applied(model.decode(self._settings)).columns()
         # Never over the old file: undo goes back to it.
         path = sources.save_model(model, source_paths.place_for(self._object.name))
         sources.remember_model(path, model)
         with sync.paused():
-            sources.attach_model(data, path, self._sources, model.settings())
+            mesh_models.attach(data, path, self._sources, model)
+            if self._changes_kind:
+                mesh_models.show_all(data.stipple, self._made)
             bound.rebind(data)
         sync.write_decoded(data, splats)
         for note in self._notes:

@@ -12,7 +12,7 @@ from ..scene import geometry
 from ..scene.source import (bound, decoded, erased, exporting, frame_budgets, masks, source_settings, sources,
                             splat_data, sync)
 from ..scene.view import viewed
-from .text import draw_anchors
+from .text import draw_anchors, draw_color_from
 
 
 SEPARATOR = ' \u00b7 '
@@ -49,8 +49,9 @@ class STIPPLE_PT_source(_SplatPanel, bpy.types.Panel):
             return
         column = layout.column()
         column.enabled = not stipple.edited
+        column.prop(stipple, 'refine')
         column.prop(stipple, 'detail_weight')
-        column.prop(stipple, 'color_from')
+        draw_color_from(column, stipple)
         column.operator('stipple.update_from_source', icon='FILE_REFRESH')
 
 
@@ -258,7 +259,9 @@ def _draw_warnings(layout, data):
     elif stipple.source_changed:
         _draw_update(layout, "Mesh has changed")
     elif stipple.source_objects and (stipple.source_detail_weight != stipple.detail_weight
-                                     or stipple.source_color_from != stipple.color_from):
+                                     or stipple.source_color_from != stipple.color_from
+                                     or stipple.source_refine != stipple.refine
+                                     or tuple(stipple.source_bake) != (stipple.bake_size, stipple.bake_samples)):
         _draw_update(layout, "Source settings have changed")
     if bpy.ops.stipple.upgrade_to_point_cloud.poll():
         layout.operator('stipple.upgrade_to_point_cloud', icon='OUTLINER_DATA_POINTCLOUD')

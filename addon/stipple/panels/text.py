@@ -33,3 +33,11 @@ def draw_anchors(layout, owner, name, each, text="Splats"):
     split.label()
     count = getattr(owner, name) * each
     split.label(text=f"{count:,} splats" if count else "As in the viewport")
+
+
+def draw_color_from(layout, owner):
+    """Where the colours of splats of meshes come from, and how light is baked where it is."""
+    layout.prop(owner, 'color_from')
+    if owner.color_from == 'BAKED':
+        layout.prop(owner, 'bake_size')
+        layout.prop(owner, 'bake_samples')

@@ -2,11 +2,13 @@
 """Colours that only a renderer knows: baked by Cycles onto a temporary, triangulated copy.
 
 Every triangle gets its own right-angled corner of a square grid, so no UV map is needed and nothing
-bleeds from one triangle to another.
+bleeds from one triangle to another. Emission is baked apart from the light that falls on a surface: it
+is free of noise, so one sample is enough and the resolution can be that of its textures.
 """
 
 import contextlib
 import math
+from dataclasses import dataclass
 
 import bmesh
 import bpy
@@ -24,32 +26,42 @@ MAX_SIDE_PX = 4096
 MIN_SIDE_PX = 1024
 # Triangles keep this far from their cell's border, so that filtering never reaches a neighbour.
 INSET_PX = 1.5
-LIGHT_SAMPLES = 32
-# Light is smoother than colour, and costs LIGHT_SAMPLES times as much per pixel.
-LIGHT_SHRINK = 2
+# The largest side of an atlas of light that nobody asked for: light costs `samples` times as much per pixel.
+MAX_LIGHT_SIDE_PX = 2048
+LIGHT_PASSES = {'DIRECT', 'INDIRECT', 'DIFFUSE', 'GLOSSY', 'TRANSMISSION'}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """side: pixels along the atlas of an object, 0: as its textures have; samples: rays of light per pixel."""
+
+    side: int = 0
+    samples: int = 32
 
 
 class Baked:
     """A triangulated copy with its atlas; bakes each kind when it is first asked for."""
 
-    def __init__(self, obj, uvs, side_px, cell_px, kinds):
+    def __init__(self, obj, uvs, sides, samples, kinds):
         self.object = obj
         self.mesh = obj.data
         self.uvs = uvs  # [T,3,2]
-        self._side_px, self._cell_px = side_px, cell_px
+        self._sides, self._samples = sides, samples
         self._kinds = kinds  # per slot, or None to bake every slot
         self._images = {}
 
     def image(self, kind):
         """Pixels [side,side,3], row 0 = top, scene linear; kind: COMBINED, BAKE_EMIT or BAKE_DIFFUSE."""
         if kind not in self._images:
-            self._images[kind] = self._bake(kind)
+            pixels = self._bake(kind)
+            if kind == 'COMBINED' and any(colour.may_emit(material) for material in self.mesh.materials):
+                emission = self._bake('EMISSION')
+                pixels = emission + _enlarged(pixels, len(emission))
+            self._images[kind] = pixels
         return self._images[kind]
 
     def _bake(self, kind):
-        side = self._side_px
-        if kind == 'COMBINED' and self._cell_px >= 4 * LIGHT_SHRINK:
-            side //= LIGHT_SHRINK
+        side = self._sides.light if kind == 'COMBINED' else self._sides.fine
         image = bpy.data.images.new('stipple_bake', side, side, alpha=True, float_buffer=True)
         kept = list(self.mesh.materials)
         made = []
@@ -61,7 +73,7 @@ class Baked:
                     self.mesh.materials[slot] = material
                 else:
                     self.mesh.materials.append(material)
-            _run_cycles(self.object, kind)
+            _run_cycles(self.object, kind, self._samples)
             values = np.empty(side * side * 4, np.float32)
             image.pixels.foreach_get(values)
             values = values.reshape(side, side, 4)[::-1, :, :3]
@@ -110,10 +122,11 @@ def copy_of(evaluated, depsgraph):
 
 
 @contextlib.contextmanager
-def baked(mesh, name, matrix, kinds, hidden):
+def baked(mesh, name, matrix, kinds, hidden, settings):
     """A Baked of a mesh of our own, or None where it has no triangle. Everything else temporary is removed.
 
     matrix: where it stands (light and object coordinates depend on it). hidden: objects that must not shade it.
+    settings: Settings.
     """
     obj = None
     shown = [o for o in hidden if not o.hide_render]
@@ -122,7 +135,7 @@ def baked(mesh, name, matrix, kinds, hidden):
         if len(mesh.polygons) == 0:
             yield None
             return
-        side_px, cell_px, uvs = _atlas(len(mesh.polygons))
+        sides, uvs = _atlas(len(mesh.polygons), settings.side, _texture_side(mesh.materials))
         render_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
         layer = mesh.uv_layers.new(name=ATLAS, do_init=False)
         if layer is None:
@@ -137,7 +150,7 @@ def baked(mesh, name, matrix, kinds, hidden):
         bpy.context.scene.collection.objects.link(obj)
         for other in shown:
             other.hide_render = True
-        yield Baked(obj, uvs, side_px, cell_px, kinds)
+        yield Baked(obj, uvs, sides, settings.samples, kinds)
     finally:
         for other in shown:
             other.hide_render = False
@@ -153,15 +166,33 @@ def _triangulate(mesh):
     work.free()
 
 
-def _atlas(triangle_count):
-    """(side and cell in pixels, UVs [T,3,2]): two triangles per square cell."""
+@dataclass(frozen=True)
+class _Sides:
+    """Pixels along an atlas of light, and along one that takes a sample a pixel."""
+
+    light: int
+    fine: int
+
+
+def _texture_side(materials):
+    """Pixels along an atlas that holds about as many as the largest image of the materials; half of a cell is used."""
+    images = [node.image for material in materials for node in colour.nodes_of(material)
+              if node.type == 'TEX_IMAGE' and node.image is not None]
+    return max((math.ceil(math.sqrt(2 * image.size[0] * image.size[1])) for image in images), default=0)
+
+
+def _atlas(triangle_count, wanted_px, texture_px):
+    """(_Sides, UVs [T,3,2]): two triangles per square cell."""
     cells = math.ceil(math.sqrt((triangle_count + 1) // 2))
-    # Six pixels hold the insets and a few texels of colour.
-    cell_px = min(max(MIN_SIDE_PX // cells, 6), MAX_SIDE_PX // cells)
-    if cell_px < 4:
+    if MAX_SIDE_PX // cells < 4:
         raise StippleError(f'A mesh to be baked has {triangle_count:,} triangles; allowed are '
                            f'{2 * (MAX_SIDE_PX // 4) ** 2:,}.', Status.ERROR_UNSUPPORTED)
-    side_px = cells * cell_px
+
+    def cell_of(side_px):
+        # Six pixels hold the insets and a few texels of colour.
+        return min(max(side_px // cells, 6), MAX_SIDE_PX // cells)
+    cell_px = cell_of(wanted_px or max(MIN_SIDE_PX, min(texture_px, MAX_LIGHT_SIDE_PX)))
+    sides = _Sides(cells * cell_px, cells * max(cell_px, cell_of(texture_px)))
     index = np.arange(triangle_count)
     cell = index // 2
     origin = np.stack([cell % cells, cell // cells], 1) * float(cell_px)
@@ -172,7 +203,21 @@ def _atlas(triangle_count):
     first = np.array([[low, low], [high - gap, low], [low, high - gap]])
     second = np.array([[high, high], [low + gap, high], [high, low + gap]])
     corners = np.where((index % 2 == 0)[:, None, None], first, second)
-    return side_px, cell_px, ((origin[:, None, :] + corners) / side_px).astype(np.float32)
+    # The insets are of the coarser atlas; in the finer one they are wider.
+    return sides, ((origin[:, None, :] + corners) / sides.light).astype(np.float32)
+
+
+def _enlarged(pixels, side):
+    """Pixels [n,n,3] as [side,side,3], bilinear."""
+    count = len(pixels)
+    if count == side:
+        return pixels
+    at = (np.arange(side, dtype=np.float32) + 0.5) * (count / side) - 0.5
+    low = np.clip(np.floor(at).astype(np.int32), 0, count - 1)
+    high = np.minimum(low + 1, count - 1)
+    share = np.clip(at - low, 0, 1)
+    rows = pixels[low] * (1 - share[:, None, None]) + pixels[high] * share[:, None, None]
+    return rows[:, low] * (1 - share[:, None]) + rows[:, high] * share[:, None]
 
 
 def _emit_base_colour(material):
@@ -191,18 +236,18 @@ def _emit_base_colour(material):
     tree.links.new(emission.outputs[0], output.inputs['Surface'])
 
 
-def _run_cycles(obj, kind):
+def _run_cycles(obj, kind, samples):
     scene = bpy.context.scene
     render, cycles = scene.render, scene.cycles
     kept = (render.engine, cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling,
             render.bake.use_selected_to_active, render.bake.use_clear, render.bake.margin)
     render.engine = 'CYCLES'
-    cycles.samples = LIGHT_SAMPLES if kind == 'COMBINED' else 1
+    cycles.samples = samples if kind == 'COMBINED' else 1
     cycles.use_denoising = False
     cycles.use_adaptive_sampling = False
     render.bake.use_selected_to_active = False
-    options = {'type': 'COMBINED', 'pass_filter': {'DIRECT', 'INDIRECT', 'DIFFUSE', 'GLOSSY', 'TRANSMISSION', 'EMIT'}}
-    if kind == 'BAKE_EMIT':
+    options = {'type': 'COMBINED', 'pass_filter': LIGHT_PASSES}
+    if kind in {'BAKE_EMIT', 'EMISSION'}:
         options = {'type': 'EMIT'}
     elif kind == 'BAKE_DIFFUSE':
         options = {'type': 'DIFFUSE', 'pass_filter': {'COLOR'}}

@@ -73,6 +73,34 @@ def colour_socket(shader):
     return shader.inputs[name] if name else None
 
 
+def nodes_of(material):
+    """All nodes of a material, those of its groups too."""
+    trees, seen = [material.node_tree] if material is not None and version.has_nodes(material) else [], set()
+    while trees:
+        tree = trees.pop()
+        if tree is None or tree.name_full in seen:
+            continue
+        seen.add(tree.name_full)
+        for node in tree.nodes:
+            yield node
+            if node.type == 'GROUP':
+                trees.append(node.node_tree)
+
+
+def may_emit(material):
+    """Whether a material has a node that shines by itself."""
+    for node in nodes_of(material):
+        if node.type == 'EMISSION':
+            return True
+        if node.type != 'BSDF_PRINCIPLED':
+            continue
+        shown = node.inputs.get('Emission Color') or node.inputs.get('Emission')  # the latter before 4.0
+        strength = node.inputs['Emission Strength']
+        if (shown.is_linked or max(shown.default_value[:3]) > 0) and not _is_plain(strength, 0.0):
+            return True
+    return False
+
+
 def image_pixels(image, material_name, with_alpha=False):
     """(pixels [height,width,3 or 4] with row 0 = top, straight alpha; whether they are sRGB).
 

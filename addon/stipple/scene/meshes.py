@@ -40,7 +40,7 @@ def source_objects(objects):
             or obj.instance_type != 'NONE']
 
 
-def native_mesh(context, objects, depsgraph, color_from, notes=None, may_be_empty=False):
+def native_mesh(context, objects, depsgraph, color_from, notes=None, may_be_empty=False, baking=bake.Settings()):
     """All triangles of the objects and of what they instance, with colours, as one native mesh.
 
     Where a material's texture, UV map or colour attribute is missing, its viewport colour takes the place; notes gets
@@ -53,7 +53,7 @@ def native_mesh(context, objects, depsgraph, color_from, notes=None, may_be_empt
     placed, shapes = [], {}
     try:
         _collect(objects, depsgraph, color_from, placed, shapes)
-        parts = {key: _part(shape, materials, color_from, objects) for key, shape in shapes.items()}
+        parts = {key: _part(shape, materials, color_from, objects, baking) for key, shape in shapes.items()}
     finally:
         for shape in shapes.values():
             if shape.to_bake is not None:
@@ -153,10 +153,10 @@ def _shape(evaluated, matrix, color_from, depsgraph):
     return _Shape(evaluated.name, matrix, [colour.base_colour_of(m) for m in read.materials], read)
 
 
-def _part(shape, materials, color_from, objects):
+def _part(shape, materials, color_from, objects, baking):
     """The arguments of add_part for a shape, or None where it has no triangle."""
     if shape.to_bake is not None:
-        with bake.baked(shape.to_bake, shape.name, shape.matrix, shape.kinds, objects) as result:
+        with bake.baked(shape.to_bake, shape.name, shape.matrix, shape.kinds, objects, baking) as result:
             if result is None:
                 return None
             read = _read(result.mesh, shape.name, list(result.mesh.materials))

@@ -653,6 +653,11 @@ void stipple_refine_options_init(StippleRefineOptions* options);
  * Cost: one drawing of `full` per view, one drawing and one backward pass of `cloud` per iteration. */
 StippleStatus stipple_cloud_refine_start(const StippleCloud* cloud, const StippleCloud* full,
                                          const StippleRefineOptions* options, StippleJob** job);
+/* The same with images of the mesh that the cloud was made from, in its own colours, without light. Automatic views
+ * are from around, and from inside as well where the faces look at the middle of the mesh, as in a room.
+ * Errors: also INVALID_ARGUMENT for a cloud of scene linear colours. */
+StippleStatus stipple_cloud_refine_to_mesh_start(const StippleCloud* cloud, const StippleMesh* mesh,
+                                                 const StippleRefineOptions* options, StippleJob** job);
 
 /* ---- cameras ----------------------------------------------------------------------------------- */
 

@@ -1,13 +1,17 @@
 #include "train/loop/refine.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "base/error.h"
 #include "data/clouds/cloud_extent.h"
+#include "mesh/mesh_image.h"
 #include "train/loop/view_order.h"
 #include "train/optimiser/adam.h"
 
@@ -16,6 +20,7 @@ namespace stipple {
 namespace {
 
 constexpr uint32_t kMaxIterations = 1000000;
+constexpr uint32_t kRaysPerSide = 3;  ///< of a pixel, where pictures are of a mesh
 
 /// Rates at the start; they fall to kLastRate of it along a half cosine, so that the last steps
 /// settle. Positions: in units of a typical splat of the start.
@@ -33,21 +38,36 @@ constexpr double kLeastShare = 0.02;
 /// Few steps: the second moment must follow within tens of them.
 constexpr double kBeta2 = 0.99;
 
-void validateInput(const SplatCloud& start, const SplatCloud& full, const RefineOptions& options) {
+void validateStart(const SplatCloud& start, const RefineOptions& options) {
   validate(start, "cloud");
-  validate(full, "full cloud");
-  if (start.size() == 0 || full.size() == 0) {
-    fail(ErrorCode::kInvalidArgument, "refining needs splats; the clouds have " +
-                                          std::to_string(start.size()) + " and " +
-                                          std::to_string(full.size()));
-  }
-  if (start.colour_space != full.colour_space) {
-    fail(ErrorCode::kInvalidArgument, "the cloud and the full cloud have different colour spaces");
+  if (start.size() == 0) {
+    fail(ErrorCode::kInvalidArgument, "refining needs splats; the cloud has 0");
   }
   if (options.iterations > kMaxIterations) {
     fail(ErrorCode::kInvalidArgument, "iterations is " + std::to_string(options.iterations) +
                                           "; at most " + std::to_string(kMaxIterations) +
                                           " is allowed");
+  }
+}
+
+void validateInput(const SplatCloud& start, const SplatCloud& full, const RefineOptions& options) {
+  validateStart(start, options);
+  validate(full, "full cloud");
+  if (full.size() == 0) {
+    fail(ErrorCode::kInvalidArgument, "refining needs splats; the full cloud has 0");
+  }
+  if (start.colour_space != full.colour_space) {
+    fail(ErrorCode::kInvalidArgument, "the cloud and the full cloud have different colour spaces");
+  }
+}
+
+/// Display values, as the pictures of a mesh have them.
+void validateInput(const SplatCloud& start, const TriMesh& mesh, const RefineOptions& options) {
+  validateStart(start, options);
+  validate(mesh);
+  if (start.colour_space != ColourSpace::kDisplay) {
+    fail(ErrorCode::kInvalidArgument,
+         "the colours of the cloud are scene linear; those of splats of a mesh are display values");
   }
 }
 
@@ -91,20 +111,44 @@ RenderOptions renderOptions(size_t view) {
   return options;
 }
 
-void addTargets(const SplatCloud& full, const std::vector<Camera>& views, ImageRenderer& images,
+/// What a view is to show: [H,W,3] over the background of its options.
+using DrawTarget =
+    std::function<void(const Camera&, const RenderOptions&, std::span<float> pixels, Progress*)>;
+
+DrawTarget drawingOf(const SplatCloud& full, ImageRenderer& images) {
+  return
+      [&full, &images, picture = RenderResult()](const Camera& camera, const RenderOptions& options,
+                                                 std::span<float> pixels, Progress*) mutable {
+        const SplatInstance instance{&full};
+        images.render({&instance, 1}, camera, options, {}, picture);
+        for (size_t i = 0; i < pixels.size() / 3; ++i) {
+          std::copy_n(&picture.colour[i * 4], 3, &pixels[i * 3]);
+        }
+      };
+}
+
+DrawTarget drawingOf(const TriMesh& mesh, const SurfaceColour& colour) {
+  return [&mesh, &colour, picture = std::vector<float>()](
+             const Camera& camera, const RenderOptions& options, std::span<float> pixels,
+             Progress* progress) mutable {
+    picture.resize(pixels.size() / 3 * 4);
+    drawMeshImage(mesh, colour, camera, kRaysPerSide, picture, progress);
+    for (size_t i = 0; i < pixels.size() / 3; ++i) {
+      for (size_t c = 0; c < 3; ++c) {
+        pixels[i * 3 + c] = picture[i * 4 + c] +
+                            (1 - picture[i * 4 + 3]) * static_cast<float>(options.background[c]);
+      }
+    }
+  };
+}
+
+void addTargets(const DrawTarget& draw, const std::vector<Camera>& views, const char* stage,
                 RenderBackend& backend, Progress* progress) {
-  const SplatInstance instance{&full};
-  RenderResult picture;
   std::vector<float> pixels;
   for (size_t v = 0; v < views.size(); ++v) {
-    advance(progress, 0.2 * static_cast<double>(v) / static_cast<double>(views.size()),
-            "Drawing all splats");
-    images.render({&instance, 1}, views[v], renderOptions(v), {}, picture);
-    const size_t count = picture.colour.size() / 4;
-    pixels.resize(count * 3);
-    for (size_t i = 0; i < count; ++i) {
-      std::copy_n(&picture.colour[i * 4], 3, &pixels[i * 3]);
-    }
+    advance(progress, 0.2 * static_cast<double>(v) / static_cast<double>(views.size()), stage);
+    pixels.resize(size_t{views[v].width} * views[v].height * 3);
+    draw(views[v], renderOptions(v), pixels, progress);
     backend.addTarget(views[v].width, views[v].height, pixels);
   }
 }
@@ -135,16 +179,71 @@ uint64_t lossBytes(uint64_t pixel_count) {
   return threads * (uint64_t{1} << 20) + pixel_count * sizeof(double);
 }
 
-}  // namespace
+ViewRigOptions rigOf(const RefineOptions& options) {
+  ViewRigOptions rig;
+  rig.rig = options.rig;
+  rig.count = options.view_count;
+  rig.size = options.view_size;
+  rig.seed = options.seed;
+  return rig;
+}
 
-uint64_t refineMemoryBound(const BackendFactory& backends, const SplatCloud& start,
-                           const SplatCloud& full, const RefineOptions& options) {
-  validateInput(start, full, options);
+/// Whether the faces of a mesh look at its middle, as those of a room do: more flux of places goes
+/// into it than out.
+bool facesItsMiddle(const TriMesh& mesh) {
+  const auto corner = [&](size_t triangle, size_t k) {
+    const float* p = &mesh.positions[size_t{mesh.triangles[triangle * 3 + k]} * 3];
+    return Vec3d(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+  };
+  // Twice the area of a triangle, along its normal.
+  const auto normal = [&](size_t t) -> Vec3d {
+    return (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0));
+  };
+  const auto centre = [&](size_t t) -> Vec3d {
+    return (corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3;
+  };
+  Vec3d middle = Vec3d::Zero();
+  double area = 0, flux = 0;
+  for (size_t t = 0; t < mesh.triangleCount(); ++t) {
+    middle += normal(t).norm() * centre(t);
+    area += normal(t).norm();
+  }
+  middle /= area;
+  for (size_t t = 0; t < mesh.triangleCount(); ++t) flux += normal(t).dot(centre(t) - middle);
+  return flux < 0;
+}
+
+SplatCloud refineTo(const DrawTarget& draw, const char* stage, const std::vector<Camera>& views,
+                    RenderBackend& backend, const SplatCloud& start, const RefineOptions& options,
+                    Progress* progress) {
+  backend.upload(start);
+  addTargets(draw, views, stage, backend, progress);
+  ImageLossOptions loss;
+  loss.ssim_share = options.ssim_share;
+  const double size = typicalSize(start);
+  const double share =
+      std::clamp(startingError(views, loss, backend) / kErrorOfFullRates, kLeastShare, 1.0);
+  ViewOrder order(views.size(), options.seed);
+  for (uint32_t i = 0; i < options.iterations; ++i) {
+    const double done = static_cast<double>(i) / options.iterations;
+    advance(progress, 0.2 + 0.8 * done, "Refining splats");
+    const size_t view = order.at(i);
+    backend.forward(views[view], renderOptions(view));
+    backend.loss(static_cast<uint32_t>(view), loss);
+    backend.backward({});
+    backend.step(stepOptions(size, share, done));
+  }
+  SplatCloud refined = backend.download();
+  refined.frame = start.frame;
+  return refined;
+}
+
+/// Upper bound of the bytes of targets and steps, where drawing a target takes `drawing`.
+uint64_t memoryBound(const BackendFactory& backends, const SplatCloud& start, uint64_t drawing,
+                     const RefineOptions& options) {
   const uint64_t pixel_count = uint64_t{options.view_size} * options.view_size;
   const Camera camera = cameraOfSize(options.view_size);
-  const SplatInstance whole{&full};
   // The drawing of the targets is over when the steps begin, the targets stay.
-  const uint64_t drawing = backends.imageMemory({&whole, 1}, camera, renderOptions(0), {}).sum();
   const uint64_t picture = pixel_count * (4 * sizeof(float));
   const uint64_t pass = backends.passMemory(start, camera, renderOptions(0));
   // Raw splats, their zeros and both moments, the cloud that is drawn and that is handed back.
@@ -154,37 +253,48 @@ uint64_t refineMemoryBound(const BackendFactory& backends, const SplatCloud& sta
          std::max(drawing, steps) + (uint64_t{1} << 20);
 }
 
+}  // namespace
+
+uint64_t refineMemoryBound(const BackendFactory& backends, const SplatCloud& start,
+                           const SplatCloud& full, const RefineOptions& options) {
+  validateInput(start, full, options);
+  const SplatInstance whole{&full};
+  const Camera camera = cameraOfSize(options.view_size);
+  return memoryBound(backends, start,
+                     backends.imageMemory({&whole, 1}, camera, renderOptions(0), {}).sum(),
+                     options);
+}
+
+uint64_t refineToMeshMemoryBound(const BackendFactory& backends, const SplatCloud& start,
+                                 const TriMesh& mesh, const RefineOptions& options) {
+  validateInput(start, mesh, options);
+  const Camera camera = cameraOfSize(options.view_size);
+  const uint64_t picture = uint64_t{camera.width} * camera.height * (4 * sizeof(float));
+  return memoryBound(backends, start, picture + meshImageMemoryBound(mesh, camera, kRaysPerSide),
+                     options);
+}
+
 SplatCloud refineCloud(const BackendFactory& backends, const SplatCloud& start,
                        const SplatCloud& full, const RefineOptions& options, Progress* progress) {
   validateInput(start, full, options);
   if (options.iterations == 0) return start;
-  ViewRigOptions rig;
-  rig.rig = options.rig;
-  rig.count = options.view_count;
-  rig.size = options.view_size;
-  rig.seed = options.seed;
-  const std::vector<Camera> views = viewsOfCloud(backends, full, rig);
-  const std::unique_ptr<RenderBackend> backend = backends.makeRenderBackend();
-  backend->upload(start);
-  addTargets(full, views, *backends.makeImageRenderer(), *backend, progress);
-  ImageLossOptions loss;
-  loss.ssim_share = options.ssim_share;
-  const double size = typicalSize(start);
-  const double share =
-      std::clamp(startingError(views, loss, *backend) / kErrorOfFullRates, kLeastShare, 1.0);
-  ViewOrder order(views.size(), options.seed);
-  for (uint32_t i = 0; i < options.iterations; ++i) {
-    const double done = static_cast<double>(i) / options.iterations;
-    advance(progress, 0.2 + 0.8 * done, "Refining splats");
-    const size_t view = order.at(i);
-    backend->forward(views[view], renderOptions(view));
-    backend->loss(static_cast<uint32_t>(view), loss);
-    backend->backward({});
-    backend->step(stepOptions(size, share, done));
-  }
-  SplatCloud refined = backend->download();
-  refined.frame = start.frame;
-  return refined;
+  const std::vector<Camera> views = viewsOfCloud(backends, full, rigOf(options));
+  const std::unique_ptr<ImageRenderer> images = backends.makeImageRenderer();
+  return refineTo(drawingOf(full, *images), "Drawing all splats", views,
+                  *backends.makeRenderBackend(), start, options, progress);
+}
+
+SplatCloud refineToMesh(const BackendFactory& backends, const SplatCloud& start,
+                        const TriMesh& mesh, const RefineOptions& options, Progress* progress) {
+  validateInput(start, mesh, options);
+  if (options.iterations == 0) return start;
+  ViewRigOptions rig = rigOf(options);
+  // Splats of a thing are hollow, too, but nobody looks at them from inside.
+  if (rig.rig == ViewRig::kAutomatic && !facesItsMiddle(mesh)) rig.rig = ViewRig::kAround;
+  const std::vector<Camera> views = viewsOfCloud(backends, start, rig);
+  const SurfaceColour colour(mesh);
+  return refineTo(drawingOf(mesh, colour), "Drawing the mesh", views, *backends.makeRenderBackend(),
+                  start, options, progress);
 }
 
 }  // namespace stipple

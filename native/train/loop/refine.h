@@ -4,6 +4,7 @@
 
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
+#include "data/meshes/tri_mesh.h"
 #include "train/backend/backend_factory.h"
 #include "train/loop/view_rig.h"
 
@@ -30,6 +31,17 @@ struct RefineOptions {
 SplatCloud refineCloud(const BackendFactory& backends, const SplatCloud& start,
                        const SplatCloud& full, const RefineOptions& options,
                        Progress* progress = nullptr);
+
+/// The same with pictures of the mesh that the splats were made from, in its own colours, without
+/// light. An automatic rig looks from around, and from inside as well where the faces look at the
+/// middle of the mesh, as in a room. Errors: as refineCloud, and for a mesh that validate()
+/// refuses.
+SplatCloud refineToMesh(const BackendFactory& backends, const SplatCloud& start,
+                        const TriMesh& mesh, const RefineOptions& options,
+                        Progress* progress = nullptr);
+
+uint64_t refineToMeshMemoryBound(const BackendFactory& backends, const SplatCloud& start,
+                                 const TriMesh& mesh, const RefineOptions& options);
 
 /// Upper bound of the bytes that refineCloud allocates: targets, and what a step holds. Errors: as
 /// refineCloud.

@@ -465,6 +465,7 @@ def attach_model(data, path, objects, settings):
     stipple.source_stamp = stamp(path)
     stipple.source_detail_weight = stipple.detail_weight
     stipple.source_color_from = stipple.color_from
+    stipple.source_bake = (stipple.bake_size, stipple.bake_samples)
     stipple.is_sequence = False
     stipple.source_objects.clear()
     for obj in objects:
