@@ -27,8 +27,8 @@ COLOR_SOURCES = (('MATERIAL', "Material", "Base colors of the materials: texture
                  ('BAKED', "Baked Lighting", "Colors as lit by the scene, baked by Cycles"),
                  ('ATTRIBUTE', "Attribute", "The active color attribute"))
 
-BAKE_SIZE_TEXT = ("Side of the square image that the light of an object is baked into, in pixels; 0 for about as many "
-                  "pixels as its textures have, from 1024 to 2048. What shines is baked at the size of its textures")
+BAKE_SIZE_TEXT = ("Side of the square image that the light of an object is baked into, in pixels; 0 for 1024. The time "
+                  "that it takes grows with its square. What shines is baked at the size of its textures")
 BAKE_SAMPLES_TEXT = "Rays of light for each pixel of the image: more of them take longer and leave less noise"
 
 BUDGET_KINDS = (('RATIO', "Ratio", "The budget is a share of the source's splats"),

@@ -164,9 +164,8 @@ def test_other_node_trees_are_baked(stipple):
     assert bpy.context.scene.render.engine == engine
 
 
-def test_baked_lighting_holds_the_light(stipple, monkeypatch):
+def test_baked_lighting_holds_the_light(stipple):
     """Under a sun of strength pi a white square facing it is 0.8; turned away from it, black."""
-    monkeypatch.setattr(stipple.scene.bake, 'MIN_SIDE_PX', 64)  # one colour per side needs no more
     lit, away = scenes.quad('Lit', 2.0), scenes.quad('Away', 2.0, (5.0, 0.0, 0.0))
     away.data.flip_normals()
     for obj in (lit, away):
@@ -179,7 +178,8 @@ def test_baked_lighting_holds_the_light(stipple, monkeypatch):
     sun = bpy.data.lights.new('sun', 'SUN')
     sun.energy = 3.14159265
     scenes.link(bpy.data.objects.new('sun', sun))
-    result = scenes.make_splats(lit, away, anchors=2000, color_from='BAKED')
+    # One colour per side needs few pixels.
+    result = scenes.make_splats(lit, away, anchors=2000, color_from='BAKED', bake_size=64)
     p, c = positions(stipple, result), scenes.colours_of(stipple, result)
     # 32 samples of a sun half a degree wide: no noise beyond a percent.
     np.testing.assert_allclose(np.median(c[p[:, 0] < 2], axis=0), (0.8, 0.8, 0.8), atol=0.03)
@@ -347,8 +347,8 @@ def test_size_and_samples_of_the_bake_are_settings(stipple, monkeypatch):
     monkeypatch.setattr(stipple.scene.bake, '_run_cycles', noted)
     quad = glowing_quad(side=256, lines=32)
     obj = scenes.make_splats(quad, anchors=1000, color_from='BAKED', bake_size=128, bake_samples=2)
-    # Two triangles share the one cell of the atlas; a texture of 256 needs 363 pixels where half of them are used.
-    assert seen == [('COMBINED', 128, 2), ('EMISSION', 363, 2)]
+    # A texture of 256 needs 363 pixels where half of them are used. Sides are whole numbers of 16 and 128 squares.
+    assert seen == [('COMBINED', 128, 2), ('EMISSION', 352, 2)]
     settings = obj.data.stipple
     assert (settings.bake_size, settings.bake_samples) == tuple(settings.source_bake) == (128, 2)
     settings.bake_size = 0
@@ -357,3 +357,23 @@ def test_size_and_samples_of_the_bake_are_settings(stipple, monkeypatch):
     assert bpy.ops.stipple.update_from_source() == {'FINISHED'}
     assert seen[0] == ('COMBINED', 1024, 2)
     assert tuple(settings.source_bake) == (0, 2)
+
+
+def test_squares_of_the_atlas_fill_it_by_the_size_of_triangles(stipple):
+    bake = stipple.scene.bake
+    areas = np.random.default_rng(4).lognormal(0.0, 2.0, 4001).astype(np.float32)
+    sides, uvs = bake._atlas(areas, 1024, 3000)
+    assert sides.light <= 1024 < sides.fine <= 3072 and uvs.min() > 0 and uvs.max() < 1
+    units = sides.light * uvs.astype(np.float64)
+    low, high = units.min(1), units.max(1)
+    taken = np.zeros((sides.light, sides.light), np.int32)
+    for (x0, y0), (x1, y1) in zip(np.floor(low).astype(int), np.ceil(high).astype(int)):
+        taken[y0:y1, x0:x1] += 1
+    # Two triangles share a square; no third one comes near.
+    assert taken.max() == 2
+    assert (taken > 0).mean() > 0.4
+    side = (high - low).max(1)
+    large, small = np.argsort(-areas)[:40], np.argsort(areas)[:400]
+    assert side[large].min() > 4 * side[small].max()
+    with pytest.raises(Exception, match='triangles; allowed are'):
+        bake._atlas(np.ones(4_000_000, np.float32), 1024, 0)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Colours that only a renderer knows: baked by Cycles onto a temporary, triangulated copy.
 
-Every triangle gets its own right-angled corner of a square grid, so no UV map is needed and nothing
-bleeds from one triangle to another. Emission is baked apart from the light that falls on a surface: it
+Every triangle gets half of a square of its own, the larger the larger it is, so no UV map is needed and
+nothing bleeds from one triangle to another. Emission is baked apart from the light that falls on a surface: it
 is free of noise, so one sample is enough and the resolution can be that of its textures.
 """
 
@@ -22,18 +22,18 @@ from . import colour
 
 ATLAS = 'stipple_atlas'
 MAX_SIDE_PX = 4096
-# Small meshes get this many pixels along an atlas side; enough that a cube's faces stay sharp.
-MIN_SIDE_PX = 1024
+# Light that nobody asked for more of has so many pixels along an atlas side.
+LIGHT_SIDE_PX = 1024
+# Insets and a few texels of colour need so many along the smallest square; a few less must do for meshes of millions.
+SMALLEST_PX, LEAST_PX = 6, 4
 # Triangles keep this far from their cell's border, so that filtering never reaches a neighbour.
 INSET_PX = 1.5
-# The largest side of an atlas of light that nobody asked for: light costs `samples` times as much per pixel.
-MAX_LIGHT_SIDE_PX = 2048
 LIGHT_PASSES = {'DIRECT', 'INDIRECT', 'DIFFUSE', 'GLOSSY', 'TRANSMISSION'}
 
 
 @dataclass(frozen=True)
 class Settings:
-    """side: pixels along the atlas of an object, 0: as its textures have; samples: rays of light per pixel."""
+    """side: pixels along the atlas of an object, 0: LIGHT_SIDE_PX; samples: rays of light per pixel."""
 
     side: int = 0
     samples: int = 32
@@ -135,7 +135,9 @@ def baked(mesh, name, matrix, kinds, hidden, settings):
         if len(mesh.polygons) == 0:
             yield None
             return
-        sides, uvs = _atlas(len(mesh.polygons), settings.side, _texture_side(mesh.materials))
+        areas = np.empty(len(mesh.polygons), np.float32)
+        mesh.polygons.foreach_get('area', areas)
+        sides, uvs = _atlas(areas, settings.side or LIGHT_SIDE_PX, _texture_side(mesh.materials))
         render_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
         layer = mesh.uv_layers.new(name=ATLAS, do_init=False)
         if layer is None:
@@ -181,30 +183,64 @@ def _texture_side(materials):
     return max((math.ceil(math.sqrt(2 * image.size[0] * image.size[1])) for image in images), default=0)
 
 
-def _atlas(triangle_count, wanted_px, texture_px):
-    """(_Sides, UVs [T,3,2]): two triangles per square cell."""
-    cells = math.ceil(math.sqrt((triangle_count + 1) // 2))
-    if MAX_SIDE_PX // cells < 4:
-        raise StippleError(f'A mesh to be baked has {triangle_count:,} triangles; allowed are '
-                           f'{2 * (MAX_SIDE_PX // 4) ** 2:,}.', Status.ERROR_UNSUPPORTED)
+def _atlas(areas, light_px, texture_px):
+    """(_Sides, UVs [T,3,2]) of triangles with these areas: two of about one size share a square."""
+    count = len(areas)
+    pairs = (count + 1) // 2
+    units = 1 << max(0, math.floor(math.log2(max(1, light_px // SMALLEST_PX))))  # smallest squares along a side
+    while units * units < pairs:
+        units *= 2
+    if MAX_SIDE_PX // units < LEAST_PX:
+        raise StippleError(f'A mesh to be baked has {count:,} triangles; allowed are '
+                           f'{2 * (MAX_SIDE_PX // LEAST_PX) ** 2:,}.', Status.ERROR_UNSUPPORTED)
 
-    def cell_of(side_px):
-        # Six pixels hold the insets and a few texels of colour.
-        return min(max(side_px // cells, 6), MAX_SIDE_PX // cells)
-    cell_px = cell_of(wanted_px or max(MIN_SIDE_PX, min(texture_px, MAX_LIGHT_SIDE_PX)))
-    sides = _Sides(cells * cell_px, cells * max(cell_px, cell_of(texture_px)))
-    index = np.arange(triangle_count)
-    cell = index // 2
-    origin = np.stack([cell % cells, cell // cells], 1) * float(cell_px)
-    inset = min(INSET_PX, cell_px / 4.0)
-    low, high = inset, cell_px - inset
+    def unit_of(side_px):
+        return min(max(side_px // units, SMALLEST_PX), MAX_SIDE_PX // units)
+    unit_px = unit_of(light_px)
+    sides = _Sides(units * unit_px, units * max(unit_px, unit_of(texture_px)))
+    order = np.argsort(-areas, kind='stable')
+    wide = _square_sides(np.sqrt(areas[order[::2]]), units)
+    corner = _corners(wide)
+    pair = np.empty(count, np.int64)
+    pair[order] = np.arange(count) // 2
+    is_second = np.zeros(count, bool)
+    is_second[order[1::2]] = True
+    origin, cell_px = corner[pair] * float(unit_px), (wide[pair] * unit_px)[:, None].astype(float)
+    inset = min(INSET_PX, unit_px / 4.0)
+    low, high = np.full_like(cell_px, inset), cell_px - inset
     # Both halves leave the diagonal: their right angles sit in opposite corners.
     gap = inset
-    first = np.array([[low, low], [high - gap, low], [low, high - gap]])
-    second = np.array([[high, high], [low + gap, high], [high, low + gap]])
-    corners = np.where((index % 2 == 0)[:, None, None], first, second)
+    first = np.stack([np.hstack([low, low]), np.hstack([high - gap, low]), np.hstack([low, high - gap])], 1)
+    second = np.stack([np.hstack([high, high]), np.hstack([low + gap, high]), np.hstack([high, low + gap])], 1)
+    corners = np.where(is_second[:, None, None], second, first)
     # The insets are of the coarser atlas; in the finer one they are wider.
     return sides, ((origin[:, None, :] + corners) / sides.light).astype(np.float32)
+
+
+def _square_sides(lengths, units):
+    """Powers of two, about in proportion to the lengths, whose squares fill no more than units x units."""
+    wanted = np.maximum(lengths / max(float(lengths.max()), 1e-30), 1e-9)
+
+    def sides_at(scale):
+        return 1 << np.clip(np.floor(np.log2(wanted * scale)), 0, math.log2(units)).astype(np.int64)
+    low, high = 1.0, 4.0 * units
+    for _ in range(30):
+        scale = math.sqrt(low * high)
+        if np.sum(sides_at(scale) ** 2) <= units * units:
+            low = scale
+        else:
+            high = scale
+    return sides_at(low)
+
+
+def _corners(sides):
+    """Where squares of sides that are powers of two and fall lie side by side: along a Z-order curve, without gaps."""
+    codes = np.concatenate([[0], np.cumsum(sides.astype(np.int64) ** 2)[:-1]])
+    corners = np.zeros((len(sides), 2), np.int64)
+    for bit in range(16):
+        for axis in range(2):
+            corners[:, axis] |= (codes >> (2 * bit + axis) & 1) << bit
+    return corners
 
 
 def _enlarged(pixels, side):
