@@ -1,6 +1,8 @@
 // Zstandard frames by libzstd.
+#include <tbb/task_arena.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <memory>
 #include <new>
 #include <string>
@@ -12,6 +14,14 @@
 namespace stipple::media {
 
 namespace {
+
+/// Bytes that a worker takes at a time. Each knows some of those before; of a file of splats, cuts
+/// so near to each other cost less than 0.01 % of its size.
+constexpr int kJobBytes = 1 << 21;
+
+struct PackerFree {
+  void operator()(ZSTD_CCtx* packer) const { ZSTD_freeCCtx(packer); }
+};
 
 struct StreamFree {
   void operator()(ZSTD_DStream* stream) const { ZSTD_freeDStream(stream); }
@@ -49,9 +59,17 @@ void stipple_media_zstd_unpack(const char* what, const uint8_t* bytes, uint64_t 
 void stipple_media_zstd_pack(const char* what, const uint8_t* bytes, uint64_t count, int32_t level,
                              const StippleMediaSink* sink, StippleMediaStatus* status) {
   guard(what, status, [&] {
+    const std::unique_ptr<ZSTD_CCtx, PackerFree> packer(ZSTD_createCCtx());
+    if (packer == nullptr) throw std::bad_alloc();
+    ZSTD_CCtx_setParameter(packer.get(), ZSTD_c_compressionLevel, level);
+    // The frame does not depend on how many workers there are, only on whether there are any. A
+    // library that was built without them packs on this thread.
+    const int workers = tbb::this_task_arena::max_concurrency();
+    ZSTD_CCtx_setParameter(packer.get(), ZSTD_c_nbWorkers, std::max(1, workers));
+    ZSTD_CCtx_setParameter(packer.get(), ZSTD_c_jobSize, kJobBytes);
     std::vector<uint8_t> packed(ZSTD_compressBound(static_cast<size_t>(count)));
-    const size_t size =
-        ZSTD_compress(packed.data(), packed.size(), bytes, static_cast<size_t>(count), level);
+    const size_t size = ZSTD_compress2(packer.get(), packed.data(), packed.size(), bytes,
+                                       static_cast<size_t>(count));
     if (ZSTD_isError(size)) {
       fail(ErrorCode::kInternal,
            std::string(what) + " cannot be packed: " + ZSTD_getErrorName(size));
