@@ -64,6 +64,7 @@ constexpr FieldPair kFields[] = {
     pairOf<&C::density_gradient, &O::density_gradient>("density_gradient"),
     pairOf<&C::jitter, &O::jitter>("jitter"),
     pairOf<&C::shell, &O::shell>("shell"),
+    pairOf<&C::coarse_to_fine, &O::coarse_to_fine>("coarse_to_fine"),
     pairOf<&C::holdout, &O::holdout>("holdout"),
     pairOf<&C::seed, &O::seed>("seed"),
     pairOf<&C::ssim_share, &O::ssim_share>("ssim_share"),

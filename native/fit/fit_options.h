@@ -43,6 +43,7 @@ struct FitOptions {
   uint32_t holdout = 8;
   uint64_t seed = 0;
   double ssim_share = TrainerOptions().ssim_share;
+  bool coarse_to_fine = TrainerOptions().coarse_to_fine;
   uint64_t measure_interval = 0;  ///< 0: a twentieth of the fit, at least 100
   uint64_t picture_bytes = TrainerOptions().picture_bytes;
   uint64_t max_bytes = 0;       ///< 0: no limit

@@ -29,6 +29,7 @@ TrainerOptions trainerOptions(const FitOptions& options) {
   trainer.max_splats = options.model == FitKind::kField ? 0 : options.max_splats;
   trainer.picture_bytes = options.picture_bytes;
   trainer.ssim_share = options.ssim_share;
+  trainer.coarse_to_fine = options.model == FitKind::kExplicit && options.coarse_to_fine;
   trainer.measure_interval = options.measure_interval;
   if (options.checkpoint_path.empty()) return trainer;
   trainer.checkpoint_interval = options.checkpoint_interval;

@@ -418,7 +418,7 @@ class StippleFitOptions(_Sized):
                 ('holdout', c_uint32), ('resume', c_uint32), ('seed', c_uint64), ('ssim_share', c_double),
                 ('image_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
                 ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double), ('max_bytes', c_uint64),
-                ('shell', c_uint32), ('reserved', c_uint32)]
+                ('shell', c_uint32), ('coarse_to_fine', c_uint32)]
 
 
 class StippleRigSearchOptions(_Sized):

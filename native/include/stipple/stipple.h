@@ -1911,7 +1911,7 @@ typedef struct StippleFitOptions {
   uint64_t max_bytes;          /* the memory of the whole fit, about; 0, the default: no limit. It lowers
                                   max_splats and image_bytes as far as needed */
   uint32_t shell;              /* field: StippleFitShell, default auto */
-  uint32_t reserved;
+  uint32_t coarse_to_fine;     /* explicit: 1: the first steps look at large images with fewer pixels; presets set it */
 } StippleFitOptions;
 void stipple_fit_options_init(StippleFitOptions* options);
 /* Sets model, iterations, counts, degree and antialias as a user's choice of quality asks for; the others stay.

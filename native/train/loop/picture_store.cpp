@@ -11,8 +11,59 @@ namespace stipple {
 namespace {
 
 constexpr size_t kGrain = 1 << 15;
+constexpr size_t kRowGrain = 8;
+
+/// Means over blocks of `channels` values a pixel; weights: empty, or [H,W].
+std::vector<float> blockMeans(const std::vector<float>& values, size_t channels, size_t width,
+                              size_t height, size_t factor, const std::vector<float>& weights) {
+  const size_t columns = width / factor, rows = height / factor;
+  std::vector<float> means(columns * rows * channels);
+  parallelFor(rows, kRowGrain, [&](size_t begin, size_t end) {
+    for (size_t row = begin; row < end; ++row) {
+      for (size_t column = 0; column < columns; ++column) {
+        float sum[3] = {0, 0, 0}, plain[3] = {0, 0, 0}, weight = 0;
+        for (size_t y = row * factor; y < (row + 1) * factor; ++y) {
+          for (size_t x = column * factor; x < (column + 1) * factor; ++x) {
+            const size_t pixel = y * width + x;
+            const float w = weights.empty() ? 1.0f : weights[pixel];
+            weight += w;
+            for (size_t c = 0; c < channels; ++c) {
+              sum[c] += w * values[pixel * channels + c];
+              plain[c] += values[pixel * channels + c];
+            }
+          }
+        }
+        float* out = &means[(row * columns + column) * channels];
+        for (size_t c = 0; c < channels; ++c) {
+          out[c] = weight > 0 ? sum[c] / weight : plain[c] / static_cast<float>(factor * factor);
+        }
+      }
+    }
+  });
+  return means;
+}
 
 }  // namespace
+
+void reducePicture(uint32_t factor, TargetPicture& picture, Camera& camera) {
+  const auto means = [&](std::vector<float>& values, size_t channels,
+                         const std::vector<float>& weights) {
+    if (values.empty()) return;
+    values = blockMeans(values, channels, picture.width, picture.height, factor, weights);
+  };
+  means(picture.colour, 3, picture.weights);
+  means(picture.alpha, 1, picture.weights);
+  means(picture.weights, 1, {});
+  picture.width /= factor;
+  picture.height /= factor;
+  camera.width = picture.width;
+  camera.height = picture.height;
+  const auto scale = static_cast<double>(factor);
+  camera.fx /= scale;
+  camera.fy /= scale;
+  camera.cx /= scale;
+  camera.cy /= scale;
+}
 
 PictureStore::PictureStore(std::shared_ptr<const ViewSource> views, uint64_t byte_limit)
     : views_(std::move(views)), byte_limit_(byte_limit), kept_(views_->count()) {}

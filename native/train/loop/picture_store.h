@@ -8,6 +8,7 @@
 
 #include "data/views/packed_picture.h"
 #include "data/views/view_source.h"
+#include "math/camera.h"
 
 namespace stipple {
 
@@ -19,6 +20,11 @@ struct TargetPicture {
   std::vector<float> alpha;    ///< [H,W]; empty: 1 everywhere
   std::vector<float> weights;  ///< [H,W]; empty: 1 everywhere
 };
+
+/// The same view in blocks of `factor` x `factor` pixels, each with the mean of what it holds,
+/// where weights count; what is left over at the right and the bottom is cut off. camera: of the
+/// picture, becomes that of the blocks.
+void reducePicture(uint32_t factor, TargetPicture& picture, Camera& camera);
 
 /// The pictures of views, packed in memory up to a limit; what comes after it is loaded whenever it
 /// is wanted, so that sets of any size can be fitted. A picture comes out the same whether it was

@@ -31,6 +31,13 @@ constexpr uint64_t kMeasuresPerFit = 20;
 constexpr uint64_t kLeastMeasureInterval = 100;
 /// Iterations whose loss and time are averaged for the figures.
 constexpr size_t kRecentIterations = 50;
+/// Shares of a fit that look at images of a quarter and of half the width, where those have as many
+/// pixels as kLeastPixels.
+constexpr double kQuarterUntil = 0.4;
+constexpr double kHalfUntil = 0.9;
+constexpr uint64_t kLeastPixels = 30000;
+/// Of the time of a step, the share that does not depend on pixels.
+constexpr double kCostBesidePixels = 0.3;
 constexpr uint64_t kEstimateSteps = 20;
 /// The first of those steps allocate and load; the estimate leaves them out.
 constexpr uint64_t kWarmUpSteps = 5;
@@ -125,7 +132,9 @@ Trainer::~Trainer() = default;
 
 uint64_t Trainer::measureInterval() const {
   if (options_.measure_interval > 0) return options_.measure_interval;
-  return std::max(kLeastMeasureInterval, options_.iterations / kMeasuresPerFit);
+  const uint64_t interval = std::max(kLeastMeasureInterval, options_.iterations / kMeasuresPerFit);
+  // Whole images are measured, which takes long beside steps that look at fewer pixels.
+  return reduction_ > 1 ? 2 * interval : interval;
 }
 
 FitMoment Trainer::momentOf(uint64_t iteration) const {
@@ -156,6 +165,36 @@ void Trainer::backgroundOf(uint64_t iteration, double background[3]) const {
   }
 }
 
+/// Pixels along a block that one pixel of this iteration stands for.
+uint32_t Trainer::reductionAt(uint64_t iteration, uint64_t pixel_count) const {
+  if (!options_.coarse_to_fine) return 1;
+  const double done = static_cast<double>(iteration) / static_cast<double>(options_.iterations);
+  uint32_t factor = done <= kQuarterUntil ? 4 : done <= kHalfUntil ? 2 : 1;
+  while (factor > 1 && pixel_count < kLeastPixels * factor * factor) factor /= 2;
+  return factor;
+}
+
+/// Steps that are left, counted in such as the present one: those of whole images take longer.
+double Trainer::stepsLeft(uint64_t iteration) const {
+  const auto pixels = uint64_t{target_.width} * target_.height * reduction_ * reduction_;
+  const auto costAt = [&](uint64_t at) {
+    const double factor = reductionAt(at, pixels);
+    return kCostBesidePixels + (1 - kCostBesidePixels) / (factor * factor);
+  };
+  double left = 0;
+  for (uint64_t at = iteration + 1; at <= options_.iterations;) {
+    // As far as the next change.
+    uint64_t last = options_.iterations;
+    for (const double share : {kQuarterUntil, kHalfUntil}) {
+      const auto change = static_cast<uint64_t>(share * static_cast<double>(options_.iterations));
+      if (change >= at) last = std::min(last, change);
+    }
+    left += static_cast<double>(last - at + 1) * costAt(at);
+    at = last + 1;
+  }
+  return iteration > 0 ? left / costAt(iteration) : left;
+}
+
 void Trainer::step(Pace& pace) {
   const Stopwatch watch;
   FitMoment moment = momentOf(iteration_ + 1);
@@ -169,6 +208,12 @@ void Trainer::step(Pace& pace) {
   if (target_.alpha.empty()) backgroundOf(0, view.background);
   if (moment.iteration < options_.iterations) {
     pictures_.prefetch(split_.training[order_.at(moment.iteration)]);
+  }
+  Camera camera = *view.camera;
+  reduction_ = reductionAt(moment.iteration, uint64_t{target_.width} * target_.height);
+  if (reduction_ > 1) {
+    reducePicture(reduction_, target_, camera);
+    view.camera = &camera;
   }
   view.target = target_.colour.data();
   view.weights = target_.weights.empty() ? nullptr : target_.weights.data();
@@ -269,7 +314,7 @@ void Trainer::report(FitObserver& observer, const Pace& pace) const {
   }
   figures.best_iteration = history_.best_iteration;
   figures.seconds = pace.begun.seconds();
-  figures.seconds_left = pace.recent() * static_cast<double>(options_.iterations - iteration_);
+  figures.seconds_left = pace.recent() * stepsLeft(iteration_);
   figures.estimated_seconds = pace.estimated_seconds;
   figures.estimated_bytes = pace.estimated_bytes;
   observer.figures(figures);
@@ -299,8 +344,7 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
       const double mean =
           std::accumulate(pace.step_seconds.begin() + kWarmUpSteps, pace.step_seconds.end(), 0.0) /
           static_cast<double>(kEstimateSteps - kWarmUpSteps);
-      pace.estimated_seconds =
-          pace.begun.seconds() + mean * static_cast<double>(options_.iterations - iteration_);
+      pace.estimated_seconds = pace.begun.seconds() + mean * stepsLeft(iteration_);
       pace.estimated_bytes = memoryBytes();
     }
     const bool interval_is_over =

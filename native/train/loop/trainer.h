@@ -38,6 +38,7 @@ struct TrainerOptions {
   uint64_t seed = 0;
   uint64_t max_splats = 0;                     ///< hard cap of the count; 0: none
   uint64_t picture_bytes = uint64_t{1} << 30;  ///< of pictures kept in memory; others are streamed
+  bool coarse_to_fine = false;                 ///< the first steps look at images of fewer pixels
   double ssim_share = 0.2;                     ///< of the loss of views that are drawn in between
   uint64_t measure_interval = 0;     ///< iterations; 0: a twentieth of the fit, at least 100
   uint64_t checkpoint_interval = 0;  ///< iterations; 0: none
@@ -135,6 +136,8 @@ class Trainer {
   SplatQuantities look(size_t most_views);
   void backgroundOf(uint64_t iteration, double background[3]) const;
   uint64_t measureInterval() const;
+  uint32_t reductionAt(uint64_t iteration, uint64_t pixel_count) const;
+  double stepsLeft(uint64_t iteration) const;
 
   TrainerOptions options_;
   PictureStore pictures_;
@@ -147,6 +150,7 @@ class Trainer {
   ViewMeasure measure_;
   std::unique_ptr<FitViewEvaluator> evaluator_;
   TargetPicture target_;
+  uint32_t reduction_ = 1;  ///< of the target
   const char* stage_ = "";
 
   uint64_t iteration_ = 0;

@@ -57,7 +57,7 @@ TEST(FitSettings, AreWrittenAsCheckpointsHaveThem) {
       "{\"model\": \"explicit\", \"strategy\": \"adaptive(threshold=0.1)\", \"start_splats\": "
       "0, \"max_splats\": 150000, \"sh_degree\": 3, \"antialias\": 0, \"iterations\": 2000, "
       "\"background\": 2, \"holdout\": 8, \"seed\": 0, \"ssim_share\": 0.20000000000000001, "
-      "\"measure_interval\": 0, \"views\": 3, \"views_key\": \"00ff\"}");
+      "\"coarse_to_fine\": 1, \"measure_interval\": 0, \"views\": 3, \"views_key\": \"00ff\"}");
   settings.options = resolved(fieldOptions());
   EXPECT_EQ(
       settingsJson(settings),

@@ -37,6 +37,7 @@ class ColourModel final : public FitModel {
       loss += error * error;
     }
     seen_views.push_back(view.index);
+    seen_widths.push_back(view.camera->width);
     seen_backgrounds.push_back(view.background[0]);
     seen_times.push_back(view.time);
     seen_moments.push_back(moment.time);
@@ -77,6 +78,7 @@ class ColourModel final : public FitModel {
   const std::vector<float>& colour() const { return colour_; }
 
   std::vector<size_t> seen_views;
+  std::vector<uint32_t> seen_widths;  ///< of the cameras
   std::vector<double> seen_backgrounds;
   std::vector<double> seen_times;    ///< of the views
   std::vector<double> seen_moments;  ///< of the moments

@@ -368,6 +368,31 @@ TEST(Trainer, PutsTransparentViewsBeforeTheBackground) {
   EXPECT_EQ(first_backgrounds(BackgroundPolicy::kRandom, 1.0f), zeros);
 }
 
+TEST(Trainer, LooksAtFewerPixelsOfLargeImagesFirst) {
+  const auto widths = [](uint32_t width, uint32_t height, bool coarse_to_fine) {
+    auto views = std::make_shared<MemoryViewSource>(ColourSpace::kDisplay);
+    ViewPicture picture;
+    picture.width = width;
+    picture.height = height;
+    picture.colour.assign(size_t{width} * height * 3, 0.7f);
+    for (int v = 0; v < 2; ++v) views->add(testing::cameraAt(0.1 * v, width, height), picture);
+    TrainerOptions options = optionsOf(10);
+    options.measure_interval = 10;
+    options.coarse_to_fine = coarse_to_fine;
+    Fit fit(views, options);
+    fit.run();
+    // The mean of an image does not depend on how many pixels it has.
+    EXPECT_LT(fit.trainer->history().records.back().loss, fit.trainer->history().records[0].loss);
+    return fit.model->seen_widths;
+  };
+  using Widths = std::vector<uint32_t>;
+  EXPECT_EQ(widths(800, 600, true), (Widths{200, 200, 200, 200, 400, 400, 400, 400, 400, 800}));
+  EXPECT_EQ(widths(800, 600, false), Widths(10, 800));
+  // A quarter of the width would leave less than 30,000 pixels, and half of it for the last ones.
+  EXPECT_EQ(widths(400, 400, true), (Widths{200, 200, 200, 200, 200, 200, 200, 200, 200, 400}));
+  EXPECT_EQ(widths(300, 300, true), Widths(10, 300));
+}
+
 TEST(Trainer, FitsOneViewAndMeasuresItself) {
   Fit fit(colourViews(1, 0.2f, 0.6f, 0.8f), optionsOf(60));
   fit.run();
