@@ -1,5 +1,4 @@
 // Zstandard frames by libzstd.
-#include <tbb/task_arena.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "io/media/media_calls.h"
 
 namespace stipple::media {
@@ -64,7 +64,7 @@ void stipple_media_zstd_pack(const char* what, const uint8_t* bytes, uint64_t co
     ZSTD_CCtx_setParameter(packer.get(), ZSTD_c_compressionLevel, level);
     // The frame does not depend on how many workers there are, only on whether there are any. A
     // library that was built without them packs on this thread.
-    const int workers = tbb::this_task_arena::max_concurrency();
+    const auto workers = static_cast<int>(threadLimit());
     ZSTD_CCtx_setParameter(packer.get(), ZSTD_c_nbWorkers, std::max(1, workers));
     ZSTD_CCtx_setParameter(packer.get(), ZSTD_c_jobSize, kJobBytes);
     std::vector<uint8_t> packed(ZSTD_compressBound(static_cast<size_t>(count)));
