@@ -24,6 +24,7 @@ constexpr size_t kTriangleGrain = 8192;
 constexpr size_t kSampleGrain = 4096;
 constexpr double kPlastic1 = 0.7548776662466927;  ///< 1/g, g^3 = g + 1
 constexpr double kPlastic2 = 0.5698402909980532;  ///< 1/g^2
+constexpr double kGolden = 0.6180339887498949;    ///< its multiples lie evenly between integers
 constexpr double kMostParts = 4;                  ///< of a sample where there is detail
 constexpr double kDetailGain = 4.0;  ///< at detail weight 1, full detail attracts 1 + 4 times more
 
@@ -214,19 +215,26 @@ Place nearPlace(const Place& middle, double share, double u, double v) {
 }
 
 /// From which number on the parts of each sample stand, and how many there are in all: more of them
-/// where there is detail.
+/// where there is detail. A sample's parts are rounded by a number of its own, never by a running
+/// sum, so that detail that changes a little changes few samples.
 std::vector<size_t> partsOf(const std::vector<float>& detail, uint64_t further) {
   double sum = 0;
   for (const float value : detail) sum += static_cast<double>(value);
-  const double gain =
+  double gain =
       sum > 0 ? std::min<double>(kMostParts - 1, static_cast<double>(further) / sum) : 0.0;
   std::vector<size_t> begins(detail.size() + 1, 0);
-  double running = 0;
-  for (size_t i = 0; i < detail.size(); ++i) {
-    running += gain * static_cast<double>(detail[i]);
-    begins[i + 1] = i + 1 + static_cast<size_t>(running);
+  for (;;) {
+    for (size_t i = 0; i < detail.size(); ++i) {
+      const double turn = kGolden * static_cast<double>(i);
+      const double rounding = turn - std::floor(turn);
+      const double parts = gain * static_cast<double>(detail[i]) + rounding;
+      begins[i + 1] = begins[i] + 1 + static_cast<size_t>(parts);
+    }
+    const size_t over = begins.back() - detail.size();
+    if (over <= further) return begins;
+    // The rounding sums to half a part a sample but for a few; these few are taken back.
+    gain *= static_cast<double>(further) / static_cast<double>(over) * (1 - 1e-6);
   }
-  return begins;
 }
 
 /// The samples with parts in the place of each, and the detail of every part.
