@@ -30,6 +30,11 @@ ModelRequest requestFrom(const StippleDecodeOptions* options) {
                                           "; 1 to 32 is allowed");
   }
   request.gaussians_per_anchor = given.gaussians_per_anchor;
+  if (given.smooth > 1) {
+    fail(ErrorCode::kInvalidArgument,
+         "options->smooth is " + std::to_string(given.smooth) + "; 0 or 1 is allowed");
+  }
+  request.smooth = given.smooth == 1;
   requireFinite(given.time, "options->time");
   request.time = given.time;
   return request;
@@ -69,6 +74,7 @@ StippleModelSettings settingsFrom(const ModelSettings& settings) {
   out.has_order = settings.has_order;
   out.has_seed = settings.has_seed;
   out.takes_mask = settings.takes_mask;
+  out.has_smooth = settings.has_smooth ? 1 : 0;
   out.has_time = settings.time.has_value();
   const TimeRange time = settings.time.value_or(TimeRange());
   out.time_begin = time.begin;

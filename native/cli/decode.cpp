@@ -21,6 +21,7 @@ struct Arguments {
   std::optional<int64_t> anchors;  // the model's own where there are none
   std::optional<double> ratio;
   int64_t refine = 0;
+  bool smooth = false;
   int64_t gaussians_per_anchor = 1;
   uint64_t seed = 0;
   uint64_t samples = 0;
@@ -155,6 +156,7 @@ void decode(const Context& context, const Arguments& arguments) {
   options.order =
       arguments.order == "progressive" ? STIPPLE_ORDER_PROGRESSIVE : STIPPLE_ORDER_SYSTEMATIC;
   options.seed = arguments.seed;
+  options.smooth = arguments.smooth ? 1 : 0;
   options.time = arguments.time;
   // A glTF file that is there may hold a mesh; what is written over it holds splats.
   const FileKind out_kind =
@@ -224,6 +226,9 @@ void addDecode(CLI::App& app, const Context& context) {
       ->add_option("--gaussians-per-anchor", arguments->gaussians_per_anchor,
                    "Splats made of each anchor")
       ->capture_default_str();
+  command->add_flag("--smooth", arguments->smooth,
+                    "For budgets that move: between powers of two, splats on the way from the one "
+                    "to the other, up to twice as many as the budget");
   command->add_option("--order", arguments->order, "systematic, or progressive (nested budgets)")
       ->check(CLI::IsMember({"systematic", "progressive"}))
       ->capture_default_str();

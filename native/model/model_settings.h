@@ -24,6 +24,7 @@ struct ModelTraits {
   BudgetUnit budget_unit = BudgetUnit::kAnchors;
   bool has_order = false;   ///< AnchorOrder changes the splats
   bool has_seed = false;    ///< the seed changes the splats
+  bool has_smooth = false;  ///< ModelRequest::smooth changes the splats between powers of two
   bool takes_mask = false;  ///< splats of its own can be left out (SplatModel::keep)
 };
 

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "density/anchor_sampling.h"
+#include "model/budget_octaves.h"
 #include "model/model_kinds.h"
 
 namespace stipple {
@@ -47,6 +48,65 @@ ModelSettings SplatModel::settings() const {
   return settings;
 }
 
+/// Makes the steps of smooth requests, each as a request of its own.
+class SplatModel::StepMaker final : public BudgetOctaves::Maker {
+ public:
+  StepMaker(const SplatModel& model, const ModelRequest& request, const ModelSettings& allowed,
+            Progress* progress, double begin, double end)
+      : model_(model),
+        request_(request),
+        allowed_(allowed),
+        progress_(progress),
+        begin_(begin),
+        end_(end) {}
+
+  BudgetStep step(uint64_t budget) const override {
+    ModelRequest request = request_;
+    request.budget = budget;
+    return model_.step(request, allowed_, progress_, begin_, end_);
+  }
+  SplatGrowth growth(const BudgetStep& few, const BudgetStep& many) const override {
+    if (model_.density()) {
+      return growthOfAnchors(few.anchors, few.splats, many.anchors, many.splats);
+    }
+    return model_.decoder().growth(few.budget, many.budget);
+  }
+
+ private:
+  const SplatModel& model_;
+  const ModelRequest& request_;
+  const ModelSettings& allowed_;
+  Progress* progress_;
+  double begin_, end_;
+};
+
+SplatModel::SplatModel() : octaves_(std::make_unique<BudgetOctaves>()) {}
+
+SplatModel::~SplatModel() = default;
+
+BudgetStep SplatModel::step(const ModelRequest& request, const ModelSettings& allowed,
+                            Progress* progress, double begin, double end) const {
+  DecodeRequest wanted;
+  wanted.budget = request.budget;
+  wanted.gaussians_per_anchor = gaussiansOf(request, allowed);
+  wanted.time = request.time;
+  wanted.seed = request.seed;
+  wanted.progress = progress;
+  const std::shared_ptr<const DensityModel> sampled = density();
+  const double middle = sampled ? begin + kSamplingShare * (end - begin) : begin;
+  BudgetStep step;
+  step.budget = request.budget;
+  if (sampled) {
+    if (progress) progress->enterPart(begin, middle);
+    step.anchors = drawLearned(*sampled, samplingOf(request), draws(), progress);
+    wanted.anchors = &step.anchors;
+  }
+  if (progress) progress->enterPart(middle, end);
+  step.splats = decoder().decode(wanted);
+  if (progress) progress->enterPart(0, 1);
+  return step;
+}
+
 SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress, double begin,
                               double end) const {
   requireFinite(request.time, "the time");
@@ -57,27 +117,15 @@ SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress, d
              std::to_string(allowed.minimum_budget) + " to " +
              std::to_string(allowed.maximum_budget) + " is allowed for this model");
   }
-  DecodeRequest wanted;
-  wanted.budget = request.budget;
-  wanted.gaussians_per_anchor = gaussiansOf(request, allowed);
-  wanted.time = request.time;
-  wanted.seed = request.seed;
-  wanted.progress = progress;
-  const std::shared_ptr<const DensityModel> sampled = density();
-  const double middle = sampled ? begin + kSamplingShare * (end - begin) : begin;
-  AnchorSet anchors;
-  if (sampled) {
-    if (progress) progress->enterPart(begin, middle);
-    anchors = drawLearned(*sampled, samplingOf(request), draws(), progress);
-    wanted.anchors = &anchors;
+  if (!request.smooth || !allowed.has_smooth) {
+    return std::move(step(request, allowed, progress, begin, end).splats);
   }
-  if (progress) progress->enterPart(middle, end);
-  SplatCloud cloud = decoder().decode(wanted);
-  if (progress) progress->enterPart(0, 1);
-  return cloud;
+  ModelRequest nested = request;
+  nested.order = AnchorOrder::kProgressive;
+  return octaves_->splats(nested, allowed, StepMaker(*this, nested, allowed, progress, begin, end));
 }
 
-uint64_t SplatModel::memoryBound(const ModelRequest& request) const {
+uint64_t SplatModel::stepMemoryBound(const ModelRequest& request) const {
   const uint32_t gaussians = gaussiansOf(request, settings());
   const uint64_t splats = decoder().memoryBound(request.budget, gaussians);
   const std::shared_ptr<const DensityModel> sampled = density();
@@ -87,6 +135,17 @@ uint64_t SplatModel::memoryBound(const ModelRequest& request) const {
   return std::max(sampleMemoryBound(request.budget, false),
                   anchorSetBytes(request.budget) + splats) +
          sampled->answerMemoryBound();
+}
+
+uint64_t SplatModel::memoryBound(const ModelRequest& request) const {
+  const ModelSettings allowed = settings();
+  if (!request.smooth || !allowed.has_smooth) return stepMemoryBound(request);
+  // Two steps that are kept, a third of the octave before while they are made, the result, and a
+  // tree of places with what belongs together.
+  constexpr uint64_t kPairing = 64;
+  ModelRequest many = request;
+  many.budget = octaveAround(request.budget, allowed).many;
+  return 3 * stepMemoryBound(many) + kPairing * many.budget * gaussiansOf(many, allowed);
 }
 
 void SplatModel::requireMemory(const ModelRequest& request, const MemoryLimit& limit) const {

@@ -18,6 +18,8 @@
 namespace stipple {
 
 class BackendFactory;
+class BudgetOctaves;
+struct BudgetStep;
 
 /// What an asset file holds beside the model, for saving it again.
 struct ModelNotes {
@@ -52,6 +54,10 @@ struct ModelRequest {
   uint64_t seed = 0;
   uint32_t gaussians_per_anchor = 1;  ///< K; 1 stands for the model's own where it cannot make 1
   double time = 0.0;                  ///< seconds, finite; 0 where nothing moves
+  /// Between two powers of two, splats on the way from one to the other, up to twice as many as the
+  /// budget, so that a budget that moves moves and grows splats and never makes one jump. Drawn in
+  /// the progressive order; at powers of two the splats of that order. For kinds that have it.
+  bool smooth = false;
 };
 
 /// A source of splats at any budget. One sentence makes them: a density is sampled into anchors,
@@ -62,7 +68,8 @@ struct ModelRequest {
 /// this class and enter it in the table of model/model_kinds.cpp.
 class SplatModel {
  public:
-  virtual ~SplatModel() = default;
+  SplatModel();
+  virtual ~SplatModel();
 
   /// The name of its kind in the table.
   virtual const char* kind() const = 0;
@@ -98,6 +105,14 @@ class SplatModel {
   virtual LearnedDraws draws() const { return {}; }
   /// Enters the model's own ranges. In: settings of the kind, with defaults.
   virtual void limit(ModelSettings& settings) const = 0;
+
+ private:
+  class StepMaker;
+  BudgetStep step(const ModelRequest& request, const ModelSettings& allowed, Progress* progress,
+                  double begin, double end) const;
+  uint64_t stepMemoryBound(const ModelRequest& request) const;
+  /// What it remembers of smooth requests; the splats do not depend on it.
+  const std::unique_ptr<BudgetOctaves> octaves_;
 };
 
 }  // namespace stipple

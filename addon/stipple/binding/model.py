@@ -28,6 +28,7 @@ class DecodeSettings:
     order: int = AnchorOrder.SYSTEMATIC
     seed: int = 0
     time: float = 0.0  # seconds, 0 where nothing moves
+    smooth: bool = False  # a budget that moves makes no splat jump
 
     def check(self):
         """Refuses what does not fit the library's unsigned fields."""
@@ -153,4 +154,5 @@ class Model(Handle):
         options.seed = settings.seed
         options.gaussians_per_anchor = settings.gaussians_per_anchor
         options.time = settings.time
+        options.smooth = 1 if settings.smooth else 0
         return options

@@ -168,12 +168,12 @@ class StippleModelSettings(_Sized):
                 ('maximum_learned_budget', c_uint64), ('minimum_gaussians_per_anchor', c_uint32),
                 ('maximum_gaussians_per_anchor', c_uint32), ('default_gaussians_per_anchor', c_uint32),
                 ('has_order', c_uint32), ('has_seed', c_uint32), ('takes_mask', c_uint32), ('has_time', c_uint32),
-                ('reserved', c_uint32), ('time_begin', c_double), ('time_end', c_double)]
+                ('has_smooth', c_uint32), ('time_begin', c_double), ('time_end', c_double)]
 
 
 class StippleDecodeOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('order', c_uint32), ('anchor_count', c_uint64), ('seed', c_uint64),
-                ('gaussians_per_anchor', c_uint32), ('reserved', c_uint32), ('time', c_double)]
+                ('gaussians_per_anchor', c_uint32), ('smooth', c_uint32), ('time', c_double)]
 
 
 class StippleCamera(_Sized):

@@ -64,6 +64,40 @@ SplatCloud HierarchyDecoder::decode(const DecodeRequest& request) const {
   return out;
 }
 
+SplatGrowth HierarchyDecoder::growth(uint64_t few, uint64_t many) const {
+  const std::vector<uint32_t> upper = cut(few), lower = cut(many);
+  const size_t inner_count = tree_->nodes.size();
+  const auto weightOf = [&](uint32_t id) {
+    const SplatCloud& cloud = id < inner_count ? tree_->nodes : *leaves_;
+    const size_t row = id < inner_count ? id : id - inner_count;
+    const float* s = &cloud.scales[row * 3];
+    return cloud.opacities[row] * std::max({s[0] * s[1], s[1] * s[2], s[2] * s[0]});
+  };
+  // Rows of the smaller cut by node; nodes below it take that of their parent, which is numbered
+  // before them.
+  std::vector<uint32_t> rows(tree_->parents.size(), TreeShape::kNoParent);
+  for (size_t i = 0; i < upper.size(); ++i) rows[upper[i]] = static_cast<uint32_t>(i);
+  for (size_t id = 0; id < rows.size(); ++id) {
+    const uint32_t parent = tree_->parents[id];
+    if (rows[id] == TreeShape::kNoParent && parent != TreeShape::kNoParent) {
+      rows[id] = rows[parent];
+    }
+  }
+  SplatGrowth growth;
+  growth.sources.resize(lower.size());
+  growth.stays.assign(lower.size(), 0);
+  std::vector<uint32_t> best(upper.size(), TreeShape::kNoParent);
+  for (size_t i = 0; i < lower.size(); ++i) {
+    const uint32_t row = rows[lower[i]];
+    growth.sources[i] = row;
+    if (best[row] == TreeShape::kNoParent || weightOf(lower[i]) > weightOf(lower[best[row]])) {
+      best[row] = static_cast<uint32_t>(i);
+    }
+  }
+  for (const uint32_t i : best) growth.stays[i] = 1;
+  return growth;
+}
+
 uint64_t HierarchyDecoder::memoryBound(uint64_t anchor_count, uint32_t) const {
   // Splats and the ids of their nodes, and what allocators round up.
   constexpr uint64_t kRounding = uint64_t{64} << 10;

@@ -16,6 +16,9 @@ class HierarchyDecoder final : public Decoder {
   /// Errors: kInvalidArgument where the tree does not fit the cloud.
   HierarchyDecoder(std::shared_ptr<const SplatCloud> leaves, std::shared_ptr<const MergeTree> tree);
   SplatCloud decode(const DecodeRequest& request) const override;
+  /// The nodes of the larger cut lie below those of the smaller one; of these the child that shows
+  /// most stays. Cost: O(N).
+  SplatGrowth growth(uint64_t few, uint64_t many) const override;
   uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
 
   /// The cut of as many nodes when the leaves are elsewhere, or of other shapes and colours: the

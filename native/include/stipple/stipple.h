@@ -577,7 +577,7 @@ typedef struct StippleModelSettings {
   uint32_t has_seed;    /* 1: the seed changes the splats */
   uint32_t takes_mask;  /* 1: splats of its own can be left out (stipple_model_keep) */
   uint32_t has_time;    /* 1: the time changes the splats */
-  uint32_t reserved;
+  uint32_t has_smooth;  /* 1: StippleDecodeOptions.smooth changes the splats */
   double time_begin;    /* seconds, where has_time: from when to when something moves */
   double time_end;
 } StippleModelSettings;
@@ -590,7 +590,10 @@ typedef struct StippleDecodeOptions {
   uint64_t seed;                  /* of a learned field: 0, the default, gives the draws that it knows best */
   uint32_t gaussians_per_anchor;  /* K, 1..32, default 1; of a hierarchy: 1; of a field: 1, which stands for
                                      its own count, or that */
-  uint32_t reserved;
+  uint32_t smooth;                /* 1: for budgets that move. Between powers of two the splats are on their way
+                                     from the one to the other, up to twice as many as the budget, and none of
+                                     them jumps; the order is progressive. The model keeps what is around the
+                                     last budget. Default 0 */
   double time;                    /* seconds, finite, default 0; models without has_time give the same splats always */
 } StippleDecodeOptions;
 void stipple_decode_options_init(StippleDecodeOptions* options);
