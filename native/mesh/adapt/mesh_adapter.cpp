@@ -33,6 +33,7 @@ void validate(const MeshAdapterOptions& options) {
   requireRange(options.strength, "strength of the density");
   requireRange(options.adaptive_factor, "adaptive factor of the density");
   requireRange(options.smoothness, "smoothness");
+  requireRange(options.laplacian, "weight of the Laplacian penalty");
   if (!(std::isfinite(options.step_size) && options.step_size > 0 && options.step_size <= 10)) {
     fail(ErrorCode::kInvalidArgument, "step size is " + std::to_string(options.step_size) +
                                           "; more than 0 and at most 10 is allowed");
@@ -66,6 +67,7 @@ MeshAdapter::MeshAdapter(const MeshLinks& links, std::span<const Vec3d> position
 
 double MeshAdapter::step(std::span<Vec3d> gradient) {
   const double energy = addDensity(densityPhase(options_, step_), gradient);
+  if (options_.laplacian > 0) addLaplacian(gradient);
   diffusion_.solve(gradient);
   optimiser_.step(spread_, gradient);
   std::copy(spread_.begin(), spread_.end(), positions_.begin());
@@ -82,6 +84,14 @@ double MeshAdapter::addDensity(const DensityPhase& phase, std::span<Vec3d> gradi
                                         : complexity_.goals(positions_, lengths);
   addDensityGradient(links_, positions_, lengths, goals, phase.weight, gradient);
   return phase.weight * densityEnergy(lengths, goals);
+}
+
+void MeshAdapter::addLaplacian(std::span<Vec3d> gradient) const {
+  std::vector<Vec3d> once(positions_.size()), twice(positions_.size());
+  laplacian(links_, positions_, once);
+  laplacian(links_, once, twice);
+  const double factor = 2 * options_.laplacian / static_cast<double>(positions_.size());
+  for (size_t v = 0; v < twice.size(); ++v) gradient[v] += factor * twice[v];
 }
 
 uint64_t meshAdapterMemoryBound(uint64_t vertex_count, uint64_t triangle_count) {

@@ -26,7 +26,9 @@ struct MeshAdapterOptions {
   double smoothness = 10.0;      ///< >= 0, lambda of M = I + lambda L; larger: broader steps, and
                                  ///< detail that comes later
   double step_size = 0.05;       ///< > 0
-  uint32_t steps = 800;          ///< >= 1
+  double laplacian = 0.0;  ///< >= 0, weight of the mean of |L x|^2 in all steps: a penalty that
+                           ///< smooths, for comparison, since it resists density
+  uint32_t steps = 800;    ///< >= 1
 };
 
 /// Errors: kInvalidArgument with the option, its value and what is allowed.
@@ -61,6 +63,7 @@ class MeshAdapter {
 
  private:
   double addDensity(const DensityPhase& phase, std::span<Vec3d> gradient);
+  void addLaplacian(std::span<Vec3d> gradient) const;
 
   const MeshLinks& links_;
   MeshAdapterOptions options_;

@@ -146,6 +146,19 @@ TEST(MeshAdapter, MovesIslandsWithoutEachOther) {
   }
 }
 
+TEST(MeshAdapter, SmoothsUnderALaplacianPenalty) {
+  const AdaptShape shape = crowdedSphere(3);
+  MeshAdapterOptions options;
+  options.steps = 100;
+  options.density = MeshDensity::kOff;
+  double before = 0, after = 0;
+  for (const Vec3d& p : adapted(shape, options)) before += p.norm();
+  options.laplacian = 1;
+  for (const Vec3d& p : adapted(shape, options)) after += p.norm();
+  // The penalty is least where the sphere has become a point.
+  EXPECT_LT(after, 0.98 * before);
+}
+
 TEST(MeshAdapter, RefusesOptionsOutsideTheirRange) {
   const auto messageOf = [](const auto& change) {
     MeshAdapterOptions options;
