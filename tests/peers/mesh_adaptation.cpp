@@ -1,6 +1,7 @@
 // Sphere templates onto targets with density off, uniform and adaptive, and with a Laplacian
 // penalty: how far they are from the target, as a whole and where it is most curved. By hand:
-//   mesh_adaptation [--steps N] [--sides A,B] [--penalty W] TARGET.glb...
+//   mesh_adaptation [--steps N] [--sides A,B] [--modes off,adaptive] [--penalty W] [--seed S]
+//   TARGET.glb...
 // Without targets, the two procedural ones alone.
 #include <algorithm>
 #include <array>
@@ -278,7 +279,7 @@ size_t selfIntersections(const TriMesh& mesh) {
 }
 
 void compare(const std::string& name, const TriMesh& target, const std::vector<int>& sides,
-             uint32_t steps, double penalty) {
+             const std::string& modes, uint32_t steps, double penalty, uint64_t seed) {
   const std::vector<double> curvature = curvatures(target);
   const Places of_target = sampled(target, 4);
   std::vector<double> sorted;
@@ -288,7 +289,9 @@ void compare(const std::string& name, const TriMesh& target, const std::vector<i
   for (const int side : sides) {
     const TriMesh given = cubeSphere(side);
     for (const char* mode : {"off", "uniform", "adaptive", "laplacian"}) {
+      if (modes.find(mode) == std::string::npos) continue;
       RegistrationOptions options;
+      options.seed = seed;
       options.alignment = PreAlignment::kSize;
       options.adapter.steps = steps;
       options.report_count = 0;
@@ -298,7 +301,7 @@ void compare(const std::string& name, const TriMesh& target, const std::vector<i
       if (mode[0] == 'l') options.adapter.laplacian = penalty;
       const auto start = std::chrono::steady_clock::now();
       const RegisteredMesh made =
-          registerMesh(given, targetOfMesh(target, options.target_count, 0), options);
+          registerMesh(given, targetOfMesh(target, options.target_count, seed), options);
       const double seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       const Figures seen = measured(made.mesh, target, of_target, curvature, *fifth);
@@ -317,6 +320,8 @@ int main(int argc, char** argv) {
   std::vector<int> sides = {18, 41};
   uint32_t steps = 800;
   double penalty = 0.2;
+  uint64_t seed = 0;
+  std::string modes = "off,uniform,adaptive,laplacian";
   std::vector<std::string> targets;
   for (int i = 1; i < argc; ++i) {
     const std::string text = argv[i];
@@ -324,6 +329,10 @@ int main(int argc, char** argv) {
       steps = static_cast<uint32_t>(std::atoi(argv[++i]));
     } else if (text == "--penalty" && i + 1 < argc) {
       penalty = std::atof(argv[++i]);
+    } else if (text == "--modes" && i + 1 < argc) {
+      modes = argv[++i];
+    } else if (text == "--seed" && i + 1 < argc) {
+      seed = static_cast<uint64_t>(std::atoi(argv[++i]));
     } else if (text == "--sides" && i + 1 < argc) {
       sides.clear();
       for (const char* at = argv[++i]; at; at = std::strchr(at, ',')) {
@@ -337,8 +346,10 @@ int main(int argc, char** argv) {
   std::printf(
       "target | vertices | density | chamfer | salient | normals | salient | flipped | "
       "crossings | seconds\n");
-  for (const std::string& path : targets) compare(path, readMeshFile(path), sides, steps, penalty);
-  compare("ripples", shaped(ripples), sides, steps, penalty);
-  compare("warts", shaped(warts), sides, steps, penalty);
+  for (const std::string& path : targets) {
+    compare(path, readMeshFile(path), sides, modes, steps, penalty, seed);
+  }
+  compare("ripples", shaped(ripples), sides, modes, steps, penalty, seed);
+  compare("warts", shaped(warts), sides, modes, steps, penalty, seed);
   return 0;
 }

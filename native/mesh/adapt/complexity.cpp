@@ -41,10 +41,12 @@ std::vector<double> Complexity::values(std::span<const Vec3d> positions,
 }
 
 std::vector<double> Complexity::goals(std::span<const Vec3d> positions,
-                                      const VertexLengths& lengths) const {
+                                      const VertexLengths& lengths, double shortest) const {
   std::vector<double> goals = values(positions, lengths);
+  const double least = shortest * lengths.mean;
   for (size_t v = 0; v < goals.size(); ++v) {
-    goals[v] = goals[v] > 1 ? lengths.lengths[v] / goals[v] : lengths.lengths[v];
+    const double present = lengths.lengths[v];
+    goals[v] = std::min(present, std::max(present / std::max(1.0, goals[v]), least));
   }
   return goals;
 }

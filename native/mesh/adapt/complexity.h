@@ -20,9 +20,12 @@ class Complexity {
   std::vector<double> values(std::span<const Vec3d> positions, const VertexLengths& lengths) const;
 
   /// goal_i = m_i * min(1, 1 / c_i): present lengths, shorter where the shape is more complex than
-  /// on average. Constants to densityEnergy(). Threads and determinism: parallel; same result for
-  /// any number of threads. Cost: three solves of one column.
-  std::vector<double> goals(std::span<const Vec3d> positions, const VertexLengths& lengths) const;
+  /// on average, but not below `shortest` times the mean length: since the goal follows the present
+  /// length, a complex place would else collapse. Constants to densityEnergy(). Threads and
+  /// determinism: parallel; same result for any number of threads. Cost: three solves of one
+  /// column.
+  std::vector<double> goals(std::span<const Vec3d> positions, const VertexLengths& lengths,
+                            double shortest = 0) const;
 
  private:
   const MeshLinks& links_;

@@ -32,6 +32,10 @@ const MeshAdapterOptions& validated(const MeshAdapterOptions& options) {
 void validate(const MeshAdapterOptions& options) {
   requireRange(options.strength, "strength of the density");
   requireRange(options.adaptive_factor, "adaptive factor of the density");
+  if (!(options.shortest >= 0 && options.shortest <= 1)) {
+    fail(ErrorCode::kInvalidArgument, "shortest length is " + std::to_string(options.shortest) +
+                                          " of the mean; 0 to 1 is allowed");
+  }
   requireRange(options.smoothness, "smoothness");
   requireRange(options.laplacian, "weight of the Laplacian penalty");
   if (!(std::isfinite(options.step_size) && options.step_size > 0 && options.step_size <= 10)) {
@@ -81,7 +85,7 @@ double MeshAdapter::addDensity(const DensityPhase& phase, std::span<Vec3d> gradi
   const VertexLengths lengths = vertexLengths(links_, positions_);
   const std::vector<double> goals = phase.goal == MeshDensity::kUniform
                                         ? std::vector<double>(positions_.size(), lengths.mean)
-                                        : complexity_.goals(positions_, lengths);
+                                        : complexity_.goals(positions_, lengths, options_.shortest);
   addDensityGradient(links_, positions_, lengths, goals, phase.weight, gradient);
   return phase.weight * densityEnergy(lengths, goals);
 }

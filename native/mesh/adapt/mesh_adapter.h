@@ -23,12 +23,13 @@ struct MeshAdapterOptions {
   MeshDensity density = MeshDensity::kAdaptive;
   double strength = 1.5;         ///< >= 0, weight of the density energy
   double adaptive_factor = 3.0;  ///< >= 0, by which the adaptive energy weighs more than that
-  double smoothness = 10.0;      ///< >= 0, lambda of M = I + lambda L; larger: broader steps, and
-                                 ///< detail that comes later
-  double step_size = 0.05;       ///< > 0
-  double laplacian = 0.0;  ///< >= 0, weight of the mean of |L x|^2 in all steps: a penalty that
-                           ///< smooths, for comparison, since it resists density
-  uint32_t steps = 800;    ///< >= 1
+  double shortest = 0.5;  ///< 0..1, of the mean length: nothing is told to become shorter than that
+  double smoothness = 10.0;  ///< >= 0, lambda of M = I + lambda L; larger: broader steps, and
+                             ///< detail that comes later
+  double step_size = 0.05;   ///< > 0
+  double laplacian = 0.0;    ///< >= 0, weight of the mean of |L x|^2 in all steps: a penalty that
+                             ///< smooths, for comparison, since it resists density
+  uint32_t steps = 800;      ///< >= 1
 };
 
 /// Errors: kInvalidArgument with the option, its value and what is allowed.

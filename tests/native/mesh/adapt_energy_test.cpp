@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -143,6 +144,23 @@ TEST(DensityEnergy, StaysFiniteWhereFacesHaveNoArea) {
   const auto goals = complexity.goals(nowhere, none);
   EXPECT_EQ(densityEnergy(none, goals), 0);
   for (const Vec3d& g : gradientOf(links, nowhere, none, goals)) EXPECT_EQ(g, Vec3d(0, 0, 0));
+}
+
+TEST(Complexity, AsksNothingToBecomeShorterThanALeastLength) {
+  const AdaptShape shape = bumpySheet(20, 0.3);
+  const MeshLinks links(shape.positions.size(), shape.triangles);
+  const VertexLengths lengths = vertexLengths(links, shape.positions);
+  const Complexity complexity(links);
+  const auto free = complexity.goals(shape.positions, lengths);
+  const auto held = complexity.goals(shape.positions, lengths, 0.5);
+  size_t held_count = 0;
+  for (size_t v = 0; v < free.size(); ++v) {
+    // What is shorter already stays as it is.
+    const double least = std::min(0.5 * lengths.mean, lengths.lengths[v]);
+    EXPECT_EQ(held[v], std::max(free[v], least));
+    held_count += free[v] < least ? 1 : 0;
+  }
+  EXPECT_GT(held_count, 5u);
 }
 
 TEST(Complexity, DoesNotTakeBordersForDetail) {
