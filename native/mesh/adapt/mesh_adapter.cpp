@@ -1,6 +1,8 @@
 // Based on: Jung, Kim et al., Mesh Density Adaptation for Template-based Shape Reconstruction,
 // SIGGRAPH 2023 (energies, schedule); Nicolet, Jacobson, Jakob, Large Steps in Inverse Rendering of
-// Geometry, SIGGRAPH Asia 2021 (u = M x). Differs: all is in double precision.
+// Geometry, SIGGRAPH Asia 2021 (u = M x). Differs: all is in double precision; the optimiser begins
+// anew with each phase, since the moments of a strong energy that has gone would hold the next one
+// up.
 #include "mesh/adapt/mesh_adapter.h"
 
 #include <algorithm>
@@ -72,6 +74,9 @@ MeshAdapter::MeshAdapter(const MeshLinks& links, std::span<const Vec3d> position
 double MeshAdapter::step(std::span<Vec3d> gradient) {
   const double energy = addDensity(densityPhase(options_, step_), gradient);
   if (options_.laplacian > 0) addLaplacian(gradient);
+  if (step_ > 0 && densityPhase(options_, step_ - 1).goal != densityPhase(options_, step_).goal) {
+    optimiser_ = AdamUniform(links_.vertexCount(), options_.step_size);
+  }
   diffusion_.solve(gradient);
   optimiser_.step(spread_, gradient);
   std::copy(spread_.begin(), spread_.end(), positions_.begin());

@@ -100,6 +100,27 @@ TEST(MeshAdapter, HasThreePhases) {
   EXPECT_EQ(densityPhase(options, 0).goal, MeshDensity::kOff);
 }
 
+TEST(MeshAdapter, IsNotHeldUpByADensityThatHasGone) {
+  const AdaptShape shape = sphere(2);
+  const MeshLinks links(shape.positions.size(), shape.triangles);
+  MeshAdapterOptions options;
+  options.steps = 40;
+  options.density = MeshDensity::kUniform;
+  options.strength = 1000;
+  MeshAdapter adapter(links, shape.positions, options);
+  std::vector<Vec3d> gradient(shape.positions.size());
+  for (uint32_t step = 0; step < 20; ++step) {
+    std::fill(gradient.begin(), gradient.end(), Vec3d::Zero());
+    adapter.step(gradient);
+  }
+  const Vec3d before = adapter.positions()[0];
+  std::fill(gradient.begin(), gradient.end(), Vec3d(1e-6, 0, 0));
+  adapter.step(gradient);
+  // Equal gradients pass M^-1 as they are, and the first step of an optimiser is its step size,
+  // apart from the 1e-8 that it adds to a gradient of 1e-6.
+  EXPECT_NEAR(adapter.positions()[0][0], before[0] - 0.05, 1e-3);
+}
+
 TEST(MeshAdapter, GivesTheSameShapeForAnyNumberOfThreads) {
   const AdaptShape shape = crowdedSphere(4);
   MeshAdapterOptions options;
