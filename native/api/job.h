@@ -19,26 +19,28 @@ namespace stipple {
 
 class FitSession;
 class GenerateSession;
+struct RegisteredMesh;
 
 }  // namespace stipple
 
 namespace stipple::api {
 
 /// What a job leaves: nothing (it filled the caller's buffers), a model, a cloud, what density
-/// control saw with it, a volume, a mesh, a report of accuracy, what is known of weights or how splats
-/// are bound to a mesh.
-using JobResult = std::variant<std::monostate, std::shared_ptr<const SplatModel>,
-                               std::shared_ptr<const SplatCloud>, std::shared_ptr<const SparseVolume>,
-                               std::shared_ptr<const TriMesh>, std::shared_ptr<const MeasuredAccuracy>,
-                               SeenCloud, std::shared_ptr<const WeightsFolder>,
-                               std::shared_ptr<const SurfaceBinding>>;
+/// control saw with it, a volume, a mesh, a report of accuracy, what is known of weights, how
+/// splats are bound to a mesh, or a mesh that took another shape.
+using JobResult =
+    std::variant<std::monostate, std::shared_ptr<const SplatModel>,
+                 std::shared_ptr<const SplatCloud>, std::shared_ptr<const SparseVolume>,
+                 std::shared_ptr<const TriMesh>, std::shared_ptr<const MeasuredAccuracy>, SeenCloud,
+                 std::shared_ptr<const WeightsFolder>, std::shared_ptr<const SurfaceBinding>,
+                 std::shared_ptr<const RegisteredMesh>>;
 
 /// Work of a job: runs on the job's own thread within the context's thread limit. It owns shares of
 /// all that it uses, apart from the caller's buffers.
 using JobWork = std::function<JobResult(Progress&)>;
 
-/// In: fit, of a job of fitting, generation, of one that makes splats of an image: what can be asked
-/// while it runs and after any end of it.
+/// In: fit, of a job of fitting, generation, of one that makes splats of an image: what can be
+/// asked while it runs and after any end of it.
 StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit = nullptr,
                      std::shared_ptr<GenerateSession> generation = nullptr);
 

@@ -47,6 +47,7 @@ enum class RandomUse : uint32_t {
   kPriorSample = 34,
   kSeeThrough = 35,
   kSurfacePart = 36,
+  kMovingSample = 37,
   kColourNoise = 40,
   kTokenNoise = 41,
   kCameraNoise = 42,

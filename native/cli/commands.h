@@ -16,6 +16,7 @@ void addVoxelize(CLI::App& app, const Context& context);
 void addCarry(CLI::App& app, const Context& context);
 void addBind(CLI::App& app, const Context& context);
 void addMesh(CLI::App& app, const Context& context);
+void addAdapt(CLI::App& app, const Context& context);
 void addFit(CLI::App& app, const Context& context);
 void addDensify(CLI::App& app, const Context& context);
 void addGenerate(CLI::App& app, const Context& context);

@@ -44,6 +44,7 @@ int run(int argc, char** argv) {
   addRender(app, context);
   addVoxelize(app, context);
   addMesh(app, context);
+  addAdapt(app, context);
   addCarry(app, context);
   addBind(app, context);
   addFit(app, context);

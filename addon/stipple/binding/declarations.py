@@ -82,6 +82,12 @@ FUNCTIONS = {
     'stipple_mesh_read': (_status, [_handle, _to(s.StippleMeshBuffers)]),
     'stipple_mesh_topology': (_status, [_handle, _to(s.StippleMeshTopology)]),
     'stipple_mesh_save': (_status, [_handle, _path]),
+    'stipple_mesh_adapt_options_init': (None, [_to(s.StippleMeshAdaptOptions)]),
+    'stipple_mesh_adapt_start': (_status, [_handle, _to(s.StippleMeshAdaptTarget), _to(s.StippleMeshAdaptOptions),
+                                           _out_handle]),
+    'stipple_mesh_adapt_memory_bound': (_status, [_handle, _to(s.StippleMeshAdaptTarget),
+                                                  _to(s.StippleMeshAdaptOptions), POINTER(c_uint64)]),
+    'stipple_job_adapt_report': (_status, [_handle, _to(s.StippleMeshAdaptReport)]),
     # layers of another renderer
     'stipple_layers_create': (_status, [_handle, c_uint32, c_uint32, _floats, _floats, _floats, _out_handle]),
     'stipple_layers_free': (None, [_handle]),

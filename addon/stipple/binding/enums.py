@@ -183,6 +183,19 @@ class Side(IntEnum):
     OUTSIDE = 1
 
 
+class MeshDensity(IntEnum):
+    OFF = 0
+    UNIFORM = 1
+    ADAPTIVE = 2
+
+
+class MeshAlignment(IntEnum):
+    NONE = 0
+    SIZE = 1
+    RIGID = 2
+    SIMILARITY = 3
+
+
 class BindingReach(IntEnum):
     SURFACE = 0
     AROUND = 1
@@ -258,6 +271,8 @@ ENUMS = {
     'StippleEffect': (Effect, 'STIPPLE_EFFECT_'),
     'StippleEffectChoice': (EffectChoice, 'STIPPLE_EFFECT_'),
     'StippleSide': (Side, 'STIPPLE_SIDE_'),
+    'StippleMeshDensity': (MeshDensity, 'STIPPLE_MESH_DENSITY_'),
+    'StippleMeshAlignment': (MeshAlignment, 'STIPPLE_MESH_ALIGN_'),
     'StippleBindingReach': (BindingReach, 'STIPPLE_BIND_'),
     'StippleRegionKind': (RegionKind, 'STIPPLE_REGION_'),
     'StippleRegionOperation': (RegionOperation, 'STIPPLE_REGION_'),

@@ -6,8 +6,8 @@ from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_i
 
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BindingReach, BlendSpace, BudgetUnit, CameraModel,
                     ColourSpace, ENUMS, Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality,
-                    FitShell, Frame, JobState, LowPass, MaterialColour, NoiseSource, ObjectOrder, OutputColour,
-                    Precision, Projection, RegionKind, RegionOperation, RenderMethod, Sampling, Side, SplatOrder,
+                    FitShell, Frame, JobState, LowPass, MaterialColour, MeshAlignment, MeshDensity, NoiseSource,
+                    ObjectOrder, OutputColour, Precision, Projection, RegionKind, RegionOperation, RenderMethod, Sampling, Side, SplatOrder,
                     SplatQuantity, Status, Transfer, ViewRig, ViewSplit, WeightsRole, WeightsState)
 
 ABI_VERSION = 4
@@ -124,6 +124,27 @@ class StippleMeshBuffers(_Sized):
 class StippleMeshTopology(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('edge_count', c_uint64),
                 ('open_edge_count', c_uint64), ('piece_count', c_uint64), ('euler', c_int64), ('volume', c_double)]
+
+
+class StippleMeshAdaptTarget(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('mesh', c_void_p), ('cloud', c_void_p),
+                ('points', _floats), ('normals', _floats), ('point_count', c_uint64)]
+
+
+class StippleMeshAdaptOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('density', c_uint32), ('alignment', c_uint32), ('steps', c_uint32),
+                ('samples_per_point', c_uint32), ('reserved', c_uint32), ('target_count', c_uint64),
+                ('report_count', c_uint64), ('seed', c_uint64), ('strength', c_double), ('adaptive_factor', c_double),
+                ('smoothness', c_double), ('step_size', c_double), ('position_weight', c_double),
+                ('normal_weight', c_double), ('landmark_weight', c_double), ('symmetric_weight', c_double),
+                ('landmark_count', c_uint64), ('landmark_vertices', POINTER(c_uint32)), ('landmark_places', _floats)]
+
+
+class StippleMeshAdaptReport(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('is_measured', c_uint32), ('has_normals', c_uint32),
+                ('turned_normals', c_uint32), ('place_count', c_uint64), ('loose_count', c_uint64), ('loss', c_double),
+                ('distance_before', c_double), ('distance_after', c_double), ('squared_before', c_double),
+                ('squared_after', c_double), ('normals_before', c_double), ('normals_after', c_double)]
 
 
 class StippleDensityInfo(_Sized):

@@ -457,6 +457,93 @@ StippleStatus stipple_mesh_topology(const StippleMesh* mesh, StippleMeshTopology
  * Errors: UNAVAILABLE without libstipple_media.so for .glb. */
 StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8);
 
+/* ---- meshes that take another shape --------------------------------------------------------------- */
+
+/* Where vertices go while a template takes the shape of a target. */
+typedef enum StippleMeshDensity {
+  STIPPLE_MESH_DENSITY_OFF = 0,     /* wherever the target alone pulls them */
+  STIPPLE_MESH_DENSITY_UNIFORM = 1, /* even edges, through the first half of the steps */
+  STIPPLE_MESH_DENSITY_ADAPTIVE = 2 /* even edges through a quarter, then shorter ones where the shape is complex */
+} StippleMeshDensity;
+
+/* What is done to the whole template before that. */
+typedef enum StippleMeshAlignment {
+  STIPPLE_MESH_ALIGN_NONE = 0,      /* it lies over the target already */
+  STIPPLE_MESH_ALIGN_SIZE = 1,      /* it gets the target's middle and size */
+  STIPPLE_MESH_ALIGN_RIGID = 2,     /* it is turned and moved to the nearest points, or to three landmarks or more */
+  STIPPLE_MESH_ALIGN_SIMILARITY = 3 /* the same, and scaled */
+} StippleMeshAlignment;
+
+/* Exactly one of mesh, cloud and points is given. */
+typedef struct StippleMeshAdaptTarget {
+  uint32_t struct_size;
+  uint32_t reserved;
+  const StippleMesh* mesh;
+  const StippleCloud* cloud;  /* splats count by their opacity; flat ones have their shortest axis for a normal */
+  const float* points;        /* [P,3] metres */
+  const float* normals;       /* [P,3] of any length, or NULL: none are known */
+  uint64_t point_count;       /* P */
+} StippleMeshAdaptTarget;
+
+/* Weights are those of the target in the unit ball, whatever the unit of the scene is. */
+typedef struct StippleMeshAdaptOptions {
+  uint32_t struct_size;
+  uint32_t density;           /* StippleMeshDensity, default adaptive */
+  uint32_t alignment;         /* StippleMeshAlignment, default none */
+  uint32_t steps;             /* 1..1000000, default 800 */
+  uint32_t samples_per_point; /* 1..64, default 4: of the template for each point of the target */
+  uint32_t reserved;
+  uint64_t target_count;      /* points of the target at most, 1..2^24, default 20000: detail, and time */
+  uint64_t report_count;      /* samples of each side that the report is measured by, default 100000; 0: none */
+  uint64_t seed;              /* of all samples */
+  double strength;            /* of the density, >= 0, default 1.5 */
+  double adaptive_factor;     /* by which adapting is stronger than evening out, >= 0, default 3 */
+  double smoothness;          /* lambda of I + lambda L, >= 0, default 10: broader steps, later detail */
+  double step_size;           /* 0..10, default 0.05 */
+  double position_weight;     /* of the mean squared distance, >= 0, default 1 */
+  double normal_weight;       /* of the mean of 1 - cosine between normals, >= 0, default 1 */
+  double landmark_weight;     /* of the mean squared distance of landmarks, >= 0, default 1 */
+  double symmetric_weight;    /* of the mean squared distance from template to target, >= 0, default 0 */
+  uint64_t landmark_count;            /* L, default 0 */
+  const uint32_t* landmark_vertices;  /* [L] of the template */
+  const float* landmark_places;       /* [L,3] metres, where they belong */
+} StippleMeshAdaptOptions;
+void stipple_mesh_adapt_options_init(StippleMeshAdaptOptions* options);
+
+/* Distances are means of both ways, metres: from samples of each side to the nearest place of the other. */
+typedef struct StippleMeshAdaptReport {
+  uint32_t struct_size;
+  uint32_t is_measured;    /* 0: report_count was 0, and the six numbers at the end are 0 */
+  uint32_t has_normals;    /* 0: the target knows none, and their differences are 0 */
+  uint32_t turned_normals; /* 1: template and target looked opposite ways, one in and one out; the target was turned */
+  uint64_t place_count;    /* of the template: vertices, those in one place once */
+  uint64_t loose_count;    /* vertices without a triangle, which went with the alignment alone */
+  double loss;             /* of the last step, in the unit ball, without density */
+  double distance_before;
+  double distance_after;
+  double squared_before;   /* means of squared distances, square metres */
+  double squared_after;
+  double normals_before;   /* mean squared difference of unit normals, 0..4 */
+  double normals_after;
+} StippleMeshAdaptReport;
+
+/* Gives a template the shape of a target by moving its vertices, as a job (stipple_job_mesh): triangles, their order,
+ * UVs, colours and materials stay; corner normals follow. Vertices in one place move as one, whatever seam they were
+ * split for. Edges of any number of triangles and several islands are allowed. The result is the same for any number
+ * of threads; a cancelled job leaves nothing.
+ * Errors of the start: INVALID_ARGUMENT, MEMORY_LIMIT; of the job: INVALID_ARGUMENT for a template of fewer than four
+ * triangles with area, NaN, a target without points, extent or visible splats, landmarks of vertices that are missing
+ * or loose.
+ * Cost: steps times a k-d tree of target_count * samples_per_point samples and some solves.
+ * Source: Jung, Kim et al., Mesh Density Adaptation for Template-based Shape Reconstruction, SIGGRAPH 2023.
+ * docs/methods/mesh_adaptation.md. */
+StippleStatus stipple_mesh_adapt_start(const StippleMesh* given, const StippleMeshAdaptTarget* target,
+                                       const StippleMeshAdaptOptions* options, StippleJob** job);
+StippleStatus stipple_mesh_adapt_memory_bound(const StippleMesh* given, const StippleMeshAdaptTarget* target,
+                                              const StippleMeshAdaptOptions* options, uint64_t* bytes);
+/* Of a job that adapted a mesh and has ended well. Errors: INVALID_ARGUMENT. */
+StippleStatus stipple_job_adapt_report(const StippleJob* job, StippleMeshAdaptReport* report);
+
 /* ---- density and anchors ----------------------------------------------------------------------- */
 
 typedef enum StippleAnchorOrder {

@@ -2,6 +2,7 @@
 #include "api/handles.h"
 #include "api/job.h"
 #include "data/position_bounds.h"
+#include "fit/registration/registration.h"
 #include "io/mesh_file.h"
 #include "io/mesh_writer.h"
 #include "math/affine.h"
@@ -33,6 +34,16 @@ MeshPart partFrom(const StippleMeshPart& given) {
   part.triangle_materials = given.triangle_materials;
   part.object_to_world = Eigen::Map<const Mat4d>(given.matrix);
   return part;
+}
+
+/// The mesh that a job made, or whose shape it changed.
+const TriMesh& meshOf(const StippleJob& job) {
+  {
+    std::lock_guard<std::mutex> lock(job.mutex);
+    const auto* changed = std::get_if<std::shared_ptr<const RegisteredMesh>>(&job.result);
+    if (changed && job.state == STIPPLE_JOB_DONE) return (*changed)->mesh;
+  }
+  return *jobResult<std::shared_ptr<const TriMesh>>(job, "mesh");
 }
 
 }  // namespace
@@ -138,9 +149,9 @@ StippleStatus stipple_mesh_info(const StippleMesh* mesh, StippleMeshInfo* info) 
 
 StippleStatus stipple_job_mesh(const StippleJob* job, StippleMesh** mesh) {
   return guarded([&] {
-    const auto& made = jobResult<std::shared_ptr<const TriMesh>>(require(job, "job"), "mesh");
+    const TriMesh& made = meshOf(require(job, "job"));
     // Meshes can be added to, so each handle has one of its own.
-    require(mesh, "mesh") = new StippleMesh{job->context, std::make_shared<TriMesh>(*made)};
+    require(mesh, "mesh") = new StippleMesh{job->context, std::make_shared<TriMesh>(made)};
   });
 }
 

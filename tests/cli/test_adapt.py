@@ -1,0 +1,132 @@
+"""A mesh that takes the shape of another, or of splats, and keeps its triangles."""
+import json
+import struct
+
+import numpy as np
+import pytest
+from test_tool import error, figures, run
+
+
+def sphere(splits):
+    """(positions [V,3], triangles [T,3]) of a unit sphere: an octahedron, split."""
+    points = [np.float64(p) for p in ([1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1])]
+    faces = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
+    for _ in range(splits):
+        middles, finer = {}, []
+
+        def middle(a, b):
+            key = min(a, b), max(a, b)
+            if key not in middles:
+                middles[key] = len(points)
+                at = points[a] + points[b]
+                points.append(at / np.linalg.norm(at))
+            return middles[key]
+
+        for a, b, c in faces:
+            ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+            finer += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        faces = finer
+    return np.array(points), np.array(faces)
+
+
+def write_glb(path, positions, triangles):
+    """Positions are Z up, as the tool has them; the file is Y up."""
+    places = np.stack([positions[:, 0], positions[:, 2], -positions[:, 1]], axis=1).astype('<f4')
+    data = places.tobytes() + np.asarray(triangles, '<u4').tobytes()
+    head = {'asset': {'version': '2.0'}, 'scene': 0, 'scenes': [{'nodes': [0]}], 'nodes': [{'mesh': 0}],
+            'meshes': [{'primitives': [{'attributes': {'POSITION': 0}, 'indices': 1}]}],
+            'buffers': [{'byteLength': len(data)}],
+            'bufferViews': [{'buffer': 0, 'byteOffset': 0, 'byteLength': places.nbytes},
+                            {'buffer': 0, 'byteOffset': places.nbytes, 'byteLength': len(data) - places.nbytes}],
+            'accessors': [{'bufferView': 0, 'componentType': 5126, 'count': len(places), 'type': 'VEC3',
+                           'min': places.min(axis=0).tolist(), 'max': places.max(axis=0).tolist()},
+                          {'bufferView': 1, 'componentType': 5125, 'count': 3 * len(triangles), 'type': 'SCALAR'}]}
+    text = json.dumps(head).encode()
+    text += b' ' * (-len(text) % 4)
+    path.write_bytes(struct.pack('<4sII', b'glTF', 2, 28 + len(text) + len(data)) +
+                     struct.pack('<I4s', len(text), b'JSON') + text + struct.pack('<I4s', len(data), b'BIN\0') + data)
+
+
+def read_ply(path):
+    """(positions [V,3], triangles [T,3]) of a mesh that the tool wrote."""
+    head, _, body = path.read_bytes().partition(b'end_header\n')
+    vertices, faces = (int(line.split()[-1]) for line in head.splitlines() if line.startswith(b'element'))
+    positions = np.frombuffer(body, '<f4', 3 * vertices).reshape(-1, 3)
+    rows = np.frombuffer(body[positions.nbytes:], np.dtype([('count', 'u1'), ('corners', '<u4', 3)]), faces)
+    return positions, rows['corners']
+
+
+@pytest.fixture
+def shapes(tmp_path):
+    """(template, target) in files: a sphere, and an egg with half-axes of 1.2, 0.8 and 0.6."""
+    write_glb(tmp_path / 'sphere.glb', *sphere(3))
+    positions, triangles = sphere(4)
+    write_glb(tmp_path / 'egg.glb', positions * [1.2, 0.8, 0.6], triangles)
+    return tmp_path / 'sphere.glb', tmp_path / 'egg.glb'
+
+
+QUICK = ('--steps', 100, '--points', 3000)
+
+
+def test_a_sphere_becomes_an_egg_and_keeps_its_triangles(shapes, tmp_path):
+    seen = figures('adapt', *shapes, tmp_path / 'out.ply', *QUICK)
+    positions, triangles = read_ply(tmp_path / 'out.ply')
+    np.testing.assert_array_equal(triangles, sphere(3)[1])
+    assert (seen['vertices'], seen['triangles'], seen['places']) == (258, 512, 258)
+    assert seen['distance_before'] > 0.1
+    assert seen['distance_after'] < 0.02
+    assert seen['normals_after'] < 0.5 * seen['normals_before']
+    # Steps of 0.05 swing about the end.
+    np.testing.assert_allclose(np.linalg.norm(positions / [1.2, 0.8, 0.6], axis=1), 1, atol=0.1)
+    run('adapt', *shapes, tmp_path / 'out.glb', *QUICK)
+    run('adapt', tmp_path / 'out.glb', shapes[1], tmp_path / 'again.ply', '--steps', 1)
+
+
+def test_the_number_of_threads_changes_nothing(shapes, tmp_path):
+    for threads in (1, 3):
+        run('--threads', threads, 'adapt', *shapes, tmp_path / f'{threads}.ply', '--steps', 20, '--points', 2000)
+    assert (tmp_path / '1.ply').read_bytes() == (tmp_path / '3.ply').read_bytes()
+
+
+def test_splats_are_a_target(shapes, tmp_path):
+    run('decode', shapes[1], tmp_path / 'egg.ply', '--anchors', 3000)
+    seen = figures('adapt', shapes[0], tmp_path / 'egg.ply', tmp_path / 'out.ply', *QUICK)
+    positions, _ = read_ply(tmp_path / 'out.ply')
+    assert seen['distance_after'] < 0.04
+    np.testing.assert_allclose(np.linalg.norm(positions / [1.2, 0.8, 0.6], axis=1), 1, atol=0.15)
+
+
+def test_an_egg_elsewhere_is_found(shapes, tmp_path):
+    positions, triangles = sphere(4)
+    write_glb(tmp_path / 'far.glb', positions * [12, 8, 6] + [100, 0, 0], triangles)
+    seen = figures('adapt', shapes[0], tmp_path / 'far.glb', tmp_path / 'out.ply', '--align', 'size', *QUICK)
+    assert seen['distance_after'] < 0.2
+
+
+def test_a_landmark_pulls_its_vertex(shapes, tmp_path):
+    run('adapt', *shapes, tmp_path / 'out.ply', *QUICK, '--landmark', '0:0,0.8,0', '--landmark-weight', 10)
+    # The points of the target go on pulling it the other way, to where it was: 1.2 m along X.
+    np.testing.assert_allclose(read_ply(tmp_path / 'out.ply')[0][0], [0, 0.8, 0], atol=0.2)
+
+
+def test_bad_input_gets_one_sentence(shapes, tmp_path):
+    sphere_glb, egg = shapes
+    out = tmp_path / 'out.ply'
+    write_glb(tmp_path / 'one.glb', *(part[:3] for part in (sphere(0)[0][[0, 2, 4]], np.array([[0, 1, 2]]))))
+    assert 'has 1 triangles with three corners' in error('adapt', tmp_path / 'one.glb', egg, out)
+    positions, triangles = sphere(1)
+    positions[3] = np.nan
+    write_glb(tmp_path / 'nan.glb', np.nan_to_num(positions, nan=0), triangles)
+    data = (tmp_path / 'nan.glb').read_bytes()
+    (tmp_path / 'nan.glb').write_bytes(data[:-triangles.size * 4 - 4] + struct.pack('<f', np.nan) +
+                                       data[-triangles.size * 4:])
+    assert 'finite' in error('adapt', tmp_path / 'nan.glb', egg, out)
+    assert 'finite' in error('adapt', sphere_glb, tmp_path / 'nan.glb', out)
+    assert 'which has 258 vertices' in error('adapt', sphere_glb, egg, out, '--landmark', '258:0,0,0')
+    assert 'VERTEX:X,Y,Z is expected' in error('adapt', sphere_glb, egg, out, '--landmark', '3:nowhere')
+    assert '--steps' in error('adapt', sphere_glb, egg, out, '--steps', 0)
+    assert 'off, uniform, adaptive' in error('adapt', sphere_glb, egg, out, '--density', 'much')
+    assert 'strength of the density is -1' in error('adapt', sphere_glb, egg, out, '--strength', -1)
+    assert '.glb or .ply' in error('adapt', sphere_glb, egg, tmp_path / 'out.obj')
+    assert 'neither a mesh nor splats' in error('adapt', sphere_glb, tmp_path / 'a.vdb', out)
+    assert not out.exists()
