@@ -4,17 +4,16 @@
 
 #include "decode/decoder.h"
 
-#include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
+#include <nanoflann.hpp>
+#include <string>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "math/cross_product.h"
 #include "math/quaternion.h"
-#include "mesh/point_tree.h"
 
 namespace stipple {
 
@@ -26,6 +25,24 @@ constexpr uint32_t kNone = ~uint32_t{0};
 constexpr double kBirthPlace = 0.5;
 /// Of its size when it appears.
 constexpr double kBirthSize = 0.7;
+
+/// Centres of splats as nanoflann reads them.
+struct CentreRows {
+  const std::vector<float>& centres;  ///< [N,3]
+
+  size_t kdtree_get_point_count() const { return centres.size() / 3; }
+  double kdtree_get_pt(size_t row, size_t axis) const {
+    return static_cast<double>(centres[row * 3 + axis]);
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+
+using CentreTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, CentreRows, double>,
+                                        CentreRows, 3, uint32_t>;
 
 /// The anchor of the smaller set that each of the larger one is, kNone for those that it lacks.
 std::vector<uint32_t> sameAnchors(const AnchorSet& few, const AnchorSet& many) {
@@ -86,7 +103,9 @@ void putShape(const SplatCloud& few, size_t s, const SplatCloud& many, size_t i,
     const auto weakest_source = static_cast<Eigen::Index>(order[static_cast<size_t>(weakest)]);
     if (std::abs(dot) < std::abs(alike(weakest, weakest_source))) weakest = axis;
   }
-  if (start.determinant() < 0) start.col(weakest) = -start.col(weakest).eval();
+  const Vec3d first_axis = start.col(0), second_axis = start.col(1), third_axis = start.col(2);
+  if (crossProduct(first_axis, second_axis).dot(third_axis) < 0)
+    start.col(weakest) = -start.col(weakest).eval();
   // A quarter of a turn apart at most, so that the mean of the quaternions has a length.
   Vec4d first = quaternionFromRotation(start);
   const Vec4d last = quaternionFromRotation(to);
@@ -126,10 +145,8 @@ SplatGrowth growthOfAnchors(const AnchorSet& few, const SplatCloud& few_splats,
   growth.sources.resize(many_splats.size());
   growth.stays.resize(many_splats.size());
   const std::vector<uint32_t> same = sameAnchors(few, many);
-  std::vector<uint32_t> all(few_splats.size());
-  std::iota(all.begin(), all.end(), 0u);
-  const PointRows rows{few_splats.positions, all};
-  const PointTree tree(3, rows, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  const CentreRows rows{few_splats.positions};
+  const CentreTree tree(3, rows, nanoflann::KDTreeSingleIndexAdaptorParams(16));
   parallelFor(many_splats.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       const uint32_t anchor = same[i / each];
