@@ -6,6 +6,7 @@
 
 #include "decode/surface/surface_model.h"
 #include "decode/test_meshes.h"
+#include "decode/tree/hierarchy_decoder.h"
 #include "model/budget_octaves.h"
 
 namespace stipple {
@@ -79,6 +80,25 @@ TEST(SmoothBudget, EveryOldSplatStaysOnce) {
     staying[growth.sources[i]] += growth.stays[i];
   }
   EXPECT_EQ(std::count(staying.begin(), staying.end(), 1), 500);
+}
+
+TEST(SmoothBudget, NodesOfATreeGrowOutOfThoseAboveThem) {
+  const auto leaves = std::make_shared<const SplatCloud>(SurfaceMaker().step(600).splats);
+  const auto tree = std::make_shared<const MergeTree>(buildMergeTree(*leaves, {}, {}));
+  const HierarchyDecoder decoder(leaves, tree);
+  const std::vector<uint32_t> few = decoder.cut(100), many = decoder.cut(600);
+  const SplatGrowth growth = decoder.growth(100, 600);
+  std::vector<int> staying(100, 0);
+  ASSERT_EQ(growth.sources.size(), 600u);
+  for (size_t i = 0; i < many.size(); ++i) {
+    uint32_t node = many[i];
+    while (node != few[growth.sources[i]] && node != TreeShape::kNoParent) {
+      node = tree->parents[node];
+    }
+    EXPECT_EQ(node, few[growth.sources[i]]);
+    staying[growth.sources[i]] += growth.stays[i];
+  }
+  EXPECT_EQ(std::count(staying.begin(), staying.end(), 1), 100);
 }
 
 }  // namespace
