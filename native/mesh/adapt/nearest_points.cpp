@@ -40,9 +40,7 @@ uint32_t NearestPoints::nearest(const Vec3d& to) const {
                           static_cast<float>(to[2])};
   uint32_t index = 0;
   double squared = 0;
-  nanoflann::KNNResultSet<double, uint32_t> found(1);
-  found.init(&index, &squared);
-  tree_->tree.findNeighbors(found, query, nanoflann::SearchParams());
+  tree_->tree.knnSearch(query, 1, &index, &squared);
   return index;
 }
 
