@@ -157,8 +157,8 @@ SplatGrowth growthOfAnchors(const AnchorSet& few, const SplatCloud& few_splats,
       }
       double squared = 0;
       uint32_t nearest = 0;
-      tree.knnSearch(&many_splats.positions[i * 3], 1, &nearest, &squared);
-      growth.sources[i] = nearest;
+      const size_t found = tree.knnSearch(&many_splats.positions[i * 3], 1, &nearest, &squared);
+      growth.sources[i] = found == 1 ? nearest : 0;
     }
   });
   return growth;

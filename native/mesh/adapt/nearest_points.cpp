@@ -40,8 +40,7 @@ uint32_t NearestPoints::nearest(const Vec3d& to) const {
                           static_cast<float>(to[2])};
   uint32_t index = 0;
   double squared = 0;
-  tree_->tree.knnSearch(query, 1, &index, &squared);
-  return index;
+  return tree_->tree.knnSearch(query, 1, &index, &squared) == 1 ? index : 0;
 }
 
 }  // namespace stipple
