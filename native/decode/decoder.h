@@ -4,7 +4,6 @@
 
 #include "base/progress.h"
 #include "data/clouds/splat_cloud.h"
-#include "decode/growth/splat_growth.h"
 #include "density/anchor_sampling.h"
 
 namespace stipple {
@@ -24,9 +23,10 @@ class Decoder {
   virtual ~Decoder() = default;
   /// anchors → anchors * K splats, in anchor order.
   virtual SplatCloud decode(const DecodeRequest& request) const = 0;
-  /// For a decoder without anchors, which splats of a small budget those of a larger one come from.
-  /// Errors: kUnsupported for a decoder whose anchors tell it (growthOfAnchors).
-  virtual SplatGrowth growth(uint64_t few, uint64_t many) const;
+  /// For a decoder without anchors: the same for a budget that moves, up to twice as many splats,
+  /// so that none of them jumps. Errors: kUnsupported for others, whose anchors tell what grows
+  /// from what (growthOfAnchors).
+  virtual SplatCloud decodeSmooth(const DecodeRequest& request) const;
   /// Bytes that decode holds at most, the splats included, without the anchors.
   virtual uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const = 0;
 };

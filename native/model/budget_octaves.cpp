@@ -42,7 +42,8 @@ SplatCloud BudgetOctaves::splats(const ModelRequest& request, const ModelSetting
     };
     made->few = stepOf(ends.few);
     made->many = stepOf(ends.many);
-    made->growth = maker.growth(*made->few, *made->many);
+    made->growth = growthOfAnchors(made->few->anchors, made->few->splats, made->many->anchors,
+                                   made->many->splats);
     last = made;
     const std::lock_guard lock(mutex_);
     last_ = last;

@@ -14,18 +14,17 @@ namespace stipple {
 /// were made of.
 struct BudgetStep {
   uint64_t budget = 0;
-  AnchorSet anchors;  ///< empty for a model that is not sampled
+  AnchorSet anchors;
   SplatCloud splats;
 };
 
 /// What lies on both sides of the last budget that was asked for, kept, since the next one is near.
 class BudgetOctaves {
  public:
-  /// Makes the step of a budget, and says how two of them belong together.
+  /// Makes the step of a budget.
   struct Maker {
     virtual ~Maker() = default;
     virtual BudgetStep step(uint64_t budget) const = 0;
-    virtual SplatGrowth growth(const BudgetStep& few, const BudgetStep& many) const = 0;
   };
 
   /// The splats of request.budget, on their way between the powers of two around it; at those it is

@@ -65,12 +65,6 @@ class SplatModel::StepMaker final : public BudgetOctaves::Maker {
     request.budget = budget;
     return model_.step(request, allowed_, progress_, begin_, end_);
   }
-  SplatGrowth growth(const BudgetStep& few, const BudgetStep& many) const override {
-    if (model_.density()) {
-      return growthOfAnchors(few.anchors, few.splats, many.anchors, many.splats);
-    }
-    return model_.decoder().growth(few.budget, many.budget);
-  }
 
  private:
   const SplatModel& model_;
@@ -120,6 +114,13 @@ SplatCloud SplatModel::decode(const ModelRequest& request, Progress* progress, d
   if (!request.smooth || !allowed.has_smooth) {
     return std::move(step(request, allowed, progress, begin, end).splats);
   }
+  if (!density()) {
+    DecodeRequest wanted;
+    wanted.budget = request.budget;
+    wanted.gaussians_per_anchor = gaussiansOf(request, allowed);
+    wanted.progress = progress;
+    return decoder().decodeSmooth(wanted);
+  }
   ModelRequest nested = request;
   nested.order = AnchorOrder::kProgressive;
   return octaves_->splats(nested, allowed, StepMaker(*this, nested, allowed, progress, begin, end));
@@ -140,11 +141,13 @@ uint64_t SplatModel::stepMemoryBound(const ModelRequest& request) const {
 uint64_t SplatModel::memoryBound(const ModelRequest& request) const {
   const ModelSettings allowed = settings();
   if (!request.smooth || !allowed.has_smooth) return stepMemoryBound(request);
-  // Two steps that are kept, a third of the octave before while they are made, the result, and a
-  // tree of places with what belongs together.
+  // What grows from what; of anchors also two steps that are kept, a third of the octave before
+  // while they are made, and a tree of places.
   constexpr uint64_t kPairing = 64;
   ModelRequest many = request;
-  many.budget = octaveAround(request.budget, allowed).many;
+  many.budget = density() ? octaveAround(request.budget, allowed).many
+                          : std::min(2 * request.budget, allowed.maximum_budget);
+  if (!density()) return stepMemoryBound(many) + kPairing * many.budget;
   return 3 * stepMemoryBound(many) + kPairing * many.budget * gaussiansOf(many, allowed);
 }
 

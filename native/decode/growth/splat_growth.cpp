@@ -2,8 +2,6 @@
 // where the coarser one has it).
 #include "decode/growth/splat_growth.h"
 
-#include "decode/decoder.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,10 +19,8 @@ namespace {
 
 constexpr size_t kGrain = 1024;
 constexpr uint32_t kNone = ~uint32_t{0};
-/// How far from its place to its source a splat appears.
-constexpr double kBirthPlace = 0.5;
-/// Of its size when it appears.
-constexpr double kBirthSize = 0.7;
+/// How far on its way from its source a splat is when it appears.
+constexpr double kBirth = 0.5;
 
 /// Centres of splats as nanoflann reads them.
 struct CentreRows {
@@ -87,11 +83,13 @@ double lengthBetween(double from, double to, double along) {
   return std::exp(between(std::log(from), std::log(to), along));
 }
 
-/// Rotation and scales of splat i of the larger budget on its way from splat s of the smaller one.
+/// Row `o` of `out`: rotation and scales of splat i of `many` on its way from splat s of `few`.
 void putShape(const SplatCloud& few, size_t s, const SplatCloud& many, size_t i, double along,
-              SplatCloud& out) {
+              SplatCloud& out, size_t o) {
   const Mat3d from = rotationFromQuaternion<double>(&few.rotations[s * 4]);
   const Mat3d to = rotationFromQuaternion<double>(&many.rotations[i * 4]);
+  const Vec3d lengths =
+      Eigen::Map<const Vec3f>(&few.scales[s * 3]).cast<double>();  // `out` may be `few`
   const Mat3d alike = to.transpose() * from;
   const std::array<size_t, 3> order = alikeAxes(alike);
   Mat3d start;
@@ -112,19 +110,19 @@ void putShape(const SplatCloud& few, size_t s, const SplatCloud& many, size_t i,
   if (first.dot(last) < 0) first = -first;
   const Vec4d turned = (first + along * (last - first)).normalized();
   for (size_t k = 0; k < 4; ++k) {
-    out.rotations[i * 4 + k] = static_cast<float>(turned[static_cast<Eigen::Index>(k)]);
+    out.rotations[o * 4 + k] = static_cast<float>(turned[static_cast<Eigen::Index>(k)]);
   }
   for (size_t axis = 0; axis < 3; ++axis) {
-    out.scales[i * 3 + axis] =
-        static_cast<float>(lengthBetween(static_cast<double>(few.scales[s * 3 + order[axis]]),
+    out.scales[o * 3 + axis] =
+        static_cast<float>(lengthBetween(lengths[static_cast<Eigen::Index>(order[axis])],
                                          static_cast<double>(many.scales[i * 3 + axis]), along));
   }
 }
 
 void putRow(const std::vector<float>& few, size_t s, const std::vector<float>& many, size_t i,
-            size_t stride, double along, std::vector<float>& out) {
+            size_t stride, double along, std::vector<float>& out, size_t o) {
   for (size_t k = 0; k < stride; ++k) {
-    out[i * stride + k] =
+    out[o * stride + k] =
         static_cast<float>(between(static_cast<double>(few[s * stride + k]),
                                    static_cast<double>(many[i * stride + k]), along));
   }
@@ -164,8 +162,20 @@ SplatGrowth growthOfAnchors(const AnchorSet& few, const SplatCloud& few_splats,
   return growth;
 }
 
-SplatGrowth Decoder::growth(uint64_t, uint64_t) const {
-  fail(ErrorCode::kUnsupported, "budgets: these splats do not say which of them they grow from");
+void putGrown(const SplatCloud& few, size_t s, const SplatCloud& many, size_t i, bool stays,
+              double along, SplatCloud& out, size_t o) {
+  if (stays) {
+    putShape(few, s, many, i, along, out, o);
+    putRow(few.positions, s, many.positions, i, 3, along, out.positions, o);
+    putRow(few.sh, s, many.sh, i, many.shStride(), along, out.sh, o);
+    putRow(few.opacities, s, many.opacities, i, 1, along, out.opacities, o);
+    return;
+  }
+  const double place = between(kBirth, 1, along);
+  putShape(few, s, many, i, place, out, o);
+  putRow(few.positions, s, many.positions, i, 3, place, out.positions, o);
+  putRow(few.sh, s, many.sh, i, many.shStride(), place, out.sh, o);
+  out.opacities[o] = static_cast<float>(along * static_cast<double>(many.opacities[i]));
 }
 
 SplatCloud grownSplats(const SplatCloud& few, const SplatCloud& many, const SplatGrowth& growth,
@@ -177,23 +187,7 @@ SplatCloud grownSplats(const SplatCloud& few, const SplatCloud& many, const Spla
   if (along >= 1) return out;
   parallelFor(many.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
-      const size_t s = growth.sources[i];
-      if (growth.stays[i]) {
-        putShape(few, s, many, i, along, out);
-        putRow(few.positions, s, many.positions, i, 3, along, out.positions);
-        putRow(few.sh, s, many.sh, i, many.shStride(), along, out.sh);
-        putRow(few.opacities, s, many.opacities, i, 1, along, out.opacities);
-        continue;
-      }
-      putRow(few.positions, s, many.positions, i, 3, between(1 - kBirthPlace, 1, along),
-             out.positions);
-      putRow(few.sh, s, many.sh, i, many.shStride(), between(1 - kBirthPlace, 1, along), out.sh);
-      const double size = between(kBirthSize, 1, along);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        out.scales[i * 3 + axis] =
-            static_cast<float>(size * static_cast<double>(many.scales[i * 3 + axis]));
-      }
-      out.opacities[i] = static_cast<float>(along * static_cast<double>(many.opacities[i]));
+      putGrown(few, growth.sources[i], many, i, growth.stays[i], along, out, i);
     }
   });
   return out;

@@ -24,6 +24,11 @@ struct SplatGrowth {
 SplatGrowth growthOfAnchors(const AnchorSet& few, const SplatCloud& few_splats,
                             const AnchorSet& many, const SplatCloud& many_splats);
 
+/// Row `o` of `out`: splat i of `many` on its way from splat s of `few`. In: stays, along: as
+/// below; `out` of the same degree, and it may be `few` with o = s.
+void putGrown(const SplatCloud& few, size_t s, const SplatCloud& many, size_t i, bool stays,
+              double along, SplatCloud& out, size_t o);
+
 /// Splats between two budgets. In: along 0..1: 0 shows the smaller budget (splats that appear have
 /// opacity 0), 1 the larger one. Those that stay go from one shape, colour and place to the other;
 /// those that appear go from between their place and their source to their place, and grow from

@@ -1,10 +1,12 @@
 #include "decode/tree/hierarchy_decoder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "decode/growth/splat_growth.h"
 
 namespace stipple {
 
@@ -24,6 +26,13 @@ void copyRows(const std::vector<float>& inner, const std::vector<float>& leaves,
   });
 }
 
+void requireOneEach(const DecodeRequest& request) {
+  if (request.gaussians_per_anchor == 1) return;
+  fail(ErrorCode::kInvalidArgument, "gaussians_per_anchor is " +
+                                        std::to_string(request.gaussians_per_anchor) +
+                                        "; 1 is allowed for splats that exist already");
+}
+
 }  // namespace
 
 HierarchyDecoder::HierarchyDecoder(std::shared_ptr<const SplatCloud> leaves,
@@ -40,13 +49,12 @@ std::vector<uint32_t> HierarchyDecoder::cut(uint64_t budget) const {
 }
 
 SplatCloud HierarchyDecoder::decode(const DecodeRequest& request) const {
-  if (request.gaussians_per_anchor != 1) {
-    fail(ErrorCode::kInvalidArgument, "gaussians_per_anchor is " +
-                                          std::to_string(request.gaussians_per_anchor) +
-                                          "; 1 is allowed for splats that exist already");
-  }
+  requireOneEach(request);
   if (request.budget == leaves_->size()) return *leaves_;
-  const std::vector<uint32_t> ids = cut(request.budget);
+  return rowsOf(cut(request.budget));
+}
+
+SplatCloud HierarchyDecoder::rowsOf(const std::vector<uint32_t>& ids) const {
   const SplatCloud& inner = tree_->nodes;
   const SplatCloud& leaves = *leaves_;
   SplatCloud out;
@@ -64,38 +72,61 @@ SplatCloud HierarchyDecoder::decode(const DecodeRequest& request) const {
   return out;
 }
 
-SplatGrowth HierarchyDecoder::growth(uint64_t few, uint64_t many) const {
-  const std::vector<uint32_t> upper = cut(few), lower = cut(many);
+std::vector<uint32_t> HierarchyDecoder::heirs(uint32_t first, uint32_t end) const {
   const size_t inner_count = tree_->nodes.size();
-  const auto weightOf = [&](uint32_t id) {
+  const auto weightOf = [&](size_t id) {
     const SplatCloud& cloud = id < inner_count ? tree_->nodes : *leaves_;
     const size_t row = id < inner_count ? id : id - inner_count;
     const float* s = &cloud.scales[row * 3];
     return cloud.opacities[row] * std::max({s[0] * s[1], s[1] * s[2], s[2] * s[0]});
   };
-  // Rows of the smaller cut by node; nodes below it take that of their parent, which is numbered
-  // before them.
-  std::vector<uint32_t> rows(tree_->parents.size(), TreeShape::kNoParent);
-  for (size_t i = 0; i < upper.size(); ++i) rows[upper[i]] = static_cast<uint32_t>(i);
-  for (size_t id = 0; id < rows.size(); ++id) {
+  std::vector<uint32_t> heirs(end - first, TreeShape::kNoParent);
+  for (size_t id = first; id < tree_->parents.size(); ++id) {
     const uint32_t parent = tree_->parents[id];
-    if (rows[id] == TreeShape::kNoParent && parent != TreeShape::kNoParent) {
-      rows[id] = rows[parent];
+    if (parent < first || parent >= end) continue;
+    uint32_t& heir = heirs[parent - first];
+    if (heir == TreeShape::kNoParent || weightOf(id) > weightOf(heir)) {
+      heir = static_cast<uint32_t>(id);
     }
   }
-  SplatGrowth growth;
-  growth.sources.resize(lower.size());
-  growth.stays.assign(lower.size(), 0);
-  std::vector<uint32_t> best(upper.size(), TreeShape::kNoParent);
-  for (size_t i = 0; i < lower.size(); ++i) {
-    const uint32_t row = rows[lower[i]];
-    growth.sources[i] = row;
-    if (best[row] == TreeShape::kNoParent || weightOf(lower[i]) > weightOf(lower[best[row]])) {
-      best[row] = static_cast<uint32_t>(i);
-    }
+  return heirs;
+}
+
+SplatCloud HierarchyDecoder::decodeSmooth(const DecodeRequest& request) const {
+  requireOneEach(request);
+  if (request.budget == leaves_->size()) return decode(request);
+  // Node s is split by the budget s + 2, and begins to kSplitOctaves before it.
+  const double budget = static_cast<double>(request.budget);
+  const double ahead = std::min(std::ceil(budget * std::exp2(kSplitOctaves)) - 1,
+                                static_cast<double>(leaves_->size()));
+  const std::vector<uint32_t> ids = cut(std::max(static_cast<uint64_t>(ahead), request.budget));
+  const auto first = static_cast<uint32_t>(request.budget - 1);
+  const std::vector<uint32_t> heir = heirs(first, static_cast<uint32_t>(ids.size() - 1));
+  // Each from the node above it that shows at the budget.
+  const auto isWhole = [&](uint32_t id) {
+    return tree_->parents[id] == TreeShape::kNoParent || tree_->parents[id] < first;
+  };
+  std::vector<uint32_t> tops(ids);
+  for (uint32_t& id : tops) {
+    while (!isWhole(id)) id = tree_->parents[id];
   }
-  for (const uint32_t i : best) growth.stays[i] = 1;
-  return growth;
+  SplatCloud out = rowsOf(tops);
+  const size_t inner_count = tree_->nodes.size();
+  parallelFor(ids.size(), kGrain, [&](size_t begin, size_t end) {
+    std::vector<uint32_t> way;
+    for (size_t i = begin; i < end; ++i) {
+      way.clear();
+      for (uint32_t id = ids[i]; id != tops[i]; id = tree_->parents[id]) way.push_back(id);
+      for (; !way.empty(); way.pop_back()) {
+        const uint32_t id = way.back(), parent = tree_->parents[id];
+        const double along = 1 + std::log2(budget / (parent + 2.0)) / kSplitOctaves;
+        const bool is_leaf = id >= inner_count;
+        putGrown(out, i, is_leaf ? *leaves_ : tree_->nodes, is_leaf ? id - inner_count : id,
+                 heir[parent - first] == id, along, out, i);
+      }
+    }
+  });
+  return out;
 }
 
 uint64_t HierarchyDecoder::memoryBound(uint64_t anchor_count, uint32_t) const {

@@ -16,9 +16,12 @@ class HierarchyDecoder final : public Decoder {
   /// Errors: kInvalidArgument where the tree does not fit the cloud.
   HierarchyDecoder(std::shared_ptr<const SplatCloud> leaves, std::shared_ptr<const MergeTree> tree);
   SplatCloud decode(const DecodeRequest& request) const override;
-  /// The nodes of the larger cut lie below those of the smaller one; of these the child that shows
-  /// most stays. Cost: O(N).
-  SplatGrowth growth(uint64_t few, uint64_t many) const override;
+  /// The cut, and what kSplitOctaves more would split on its way: of both children the one that
+  /// shows most goes from its parent's shape to its own, and the other one appears. N of them are
+  /// the cloud itself. Cost: O(N).
+  SplatCloud decodeSmooth(const DecodeRequest& request) const override;
+  /// How much the budget grows while a node splits, in doublings.
+  static constexpr double kSplitOctaves = 0.5;
   uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override;
 
   /// The cut of as many nodes when the leaves are elsewhere, or of other shapes and colours: the
@@ -40,6 +43,11 @@ class HierarchyDecoder final : public Decoder {
   const std::shared_ptr<const MergeTree>& tree() const { return tree_; }
 
  private:
+  /// The nodes as splats, row by row.
+  SplatCloud rowsOf(const std::vector<uint32_t>& ids) const;
+  /// Of the nodes first..end-1, all of them inner ones, the child that shows most.
+  std::vector<uint32_t> heirs(uint32_t first, uint32_t end) const;
+
   std::shared_ptr<const SplatCloud> leaves_;
   std::shared_ptr<const MergeTree> tree_;
 };
