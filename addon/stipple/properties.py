@@ -18,7 +18,8 @@ _CHANGEABLE = {'ANIMATABLE'}
 
 ORDERS = (('SYSTEMATIC', "Systematic", "Anchors are spread most evenly at every budget"),
           ('PROGRESSIVE', "Progressive", "The anchors of a smaller budget are a part of those of a larger one, so a "
-                                         "moving budget adds and removes anchors; splats shift a little"))
+                                         "moving budget adds and removes anchors; splats shift a little. Smooth "
+                                         "Budget lets none of them jump"))
 TIME_MODES = (('HOLD', "Hold", "The splats stand still"),
               ('REPEAT', "Repeat", "The clip starts anew after its end"),
               ('PING_PONG', "Ping-Pong", "The clip plays forward and backward alternately"))
@@ -78,6 +79,14 @@ class STIPPLE_PG_splats(bpy.types.PropertyGroup):
     anchors_render: IntProperty(name="Render Budget", description="Anchor budget of renders, 0 for the same as in the "
                                 "viewport", default=0, soft_min=0, soft_max=10000000, options=_CHANGEABLE,
                                 override=_OVERRIDABLE)
+    detail: FloatProperty(name="Detail", description="How often the number of splats is doubled, here and in renders; "
+                          "negative numbers halve it. Keyframe this instead of the number for a change of detail that "
+                          "is even to the eye", default=0.0, min=-30.0, max=30.0, soft_min=-8.0, soft_max=8.0, step=10,
+                          precision=2, options=_CHANGEABLE, override=_OVERRIDABLE, update=sync.on_property_change)
+    smooth_budget: BoolProperty(name="Smooth Budget", description="As the number of splats changes, splats grow out of "
+                                "others and none of them jumps. Up to twice as many splats are shown, and anchors are "
+                                "in progressive order", default=False, options=_CHANGEABLE, override=_OVERRIDABLE,
+                                update=sync.on_property_change)
     gaussians_per_anchor: IntProperty(name="Splats per Anchor", description="Number of splats that each anchor becomes",
                                       default=1, soft_min=1, soft_max=32, options=_CHANGEABLE, override=_OVERRIDABLE,
                                       update=sync.on_property_change)

@@ -93,6 +93,55 @@ def test_renders_have_their_own_budget(stipple, budgeted, tmp_path):
     assert decoded == [COUNT // 2] and pixels[..., 3].max() > 0.5
 
 
+def test_detail_doubles_the_budget(stipple, budgeted):
+    settings, sources = budgeted.data.stipple, stipple.scene.source.sources
+    settings.ratio = settings.ratio_render = 0.5
+    for detail, expected in ((-1.0, 100), (-2.0, 50), (0.5, 283), (3.0, COUNT), (-30.0, 1)):
+        settings.detail = detail
+        assert count(stipple, budgeted) == expected  # 200 times 2 to the power of it, rounded, as many as there are
+        assert sources.decode_settings(settings, 'RENDER').anchors == expected
+        assert sources.decode_settings(settings, 'FULL').anchors == COUNT
+    settings.budget_by, settings.anchors, settings.detail = 'COUNT', 80, -1.0
+    assert count(stipple, budgeted) == 40
+    scenes.select(budgeted)
+    bpy.ops.stipple.scale_budget(factor=2.0)
+    assert count(stipple, budgeted) == 80 and settings.anchors == 160 and settings.detail == -1.0
+
+
+def test_a_ramp_of_detail_is_even_and_smooth(stipple, budgeted):
+    settings = budgeted.data.stipple
+    settings.ratio, settings.smooth_budget = 0.25, True
+    for frame, detail in ((1, -2.0), (41, 0.0)):
+        settings.detail = detail
+        settings.keyframe_insert('detail', frame=frame)
+    action = budgeted.data.animation_data.action
+    curves = action.fcurves if hasattr(action, 'fcurves') else action.layers[0].strips[0].channelbags[0].fcurves
+    for point in curves[0].keyframe_points:
+        point.interpolation = 'LINEAR'
+
+    def opacity(frame):
+        bpy.context.scene.frame_set(frame)
+        shown = read(stipple, budgeted)
+        return len(shown.opacities), float(np.sum(shown.opacities, dtype=np.float64))
+    counts = [opacity(frame) for frame in (1, 21, 41)]
+    for (number, _), budget in zip(counts, (25, 50, 100)):
+        assert budget < number <= int(np.ceil(budget * np.sqrt(2.0)))  # those that split on their way, too
+    # From one splat more to the next, no opacity appears at once: each takes half a doubling, 20 splats here.
+    sums = [opacity(frame)[1] for frame in range(21, 42)]
+    assert max(np.abs(np.diff(sums))) < 0.05 * max(sums)
+
+
+def test_smooth_budgets_keep_to_the_largest_number(stipple, budgeted):
+    settings, scene = budgeted.data.stipple, bpy.context.scene
+    settings.ratio, settings.smooth_budget = 0.5, True
+    assert 200 < count(stipple, budgeted) <= 283
+    scene.render.use_simplify, scene.stipple.max_splats = True, 100
+    bpy.context.view_layer.update()
+    assert count(stipple, budgeted) <= 100
+    scene.stipple.max_splats = 0
+    scene.render.use_simplify = False
+
+
 def test_keyframes_undo_and_files(stipple, budgeted, tmp_path):
     settings = budgeted.data.stipple
     for frame, ratio in ((1, 0.25), (11, 0.75)):

@@ -377,3 +377,18 @@ def test_squares_of_the_atlas_fill_it_by_the_size_of_triangles(stipple):
     assert side[large].min() > 4 * side[small].max()
     with pytest.raises(Exception, match='triangles; allowed are'):
         bake._atlas(np.ones(4_000_000, np.float32), 1024, 0)
+
+
+def test_a_smooth_budget_is_between_powers_of_two(stipple, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / 'a.blend'))
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    assert bpy.ops.stipple.splats_from_mesh(anchors=1500) == {'FINISHED'}
+    data = bpy.context.object.data
+    settings, count = data.stipple, stipple.scene.source.splat_data.count
+    assert count(data) == 1500
+    settings.smooth_budget = True
+    assert count(data) == 2048  # what is between 1,024 and 2,048 splats shows those of both
+    settings.anchors = 1024
+    assert count(data) == 1024
+    settings.detail = 0.5
+    assert count(data) == 2048

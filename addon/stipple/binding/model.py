@@ -30,6 +30,11 @@ class DecodeSettings:
     time: float = 0.0  # seconds, 0 where nothing moves
     smooth: bool = False  # a budget that moves makes no splat jump
 
+    @property
+    def most_splats(self):
+        """Number of splats that they give at most."""
+        return self.anchors * self.gaussians_per_anchor * (2 if self.smooth else 1)
+
     def check(self):
         """Refuses what does not fit the library's unsigned fields."""
         check_anchor_count(self.anchors)

@@ -35,7 +35,7 @@ class STIPPLE_OT_decode_budgets(JobOperator, bpy.types.Operator):
         data = context.object.data
         sources.check_unchanged(data)
         self._name, self._settings = context.object.name, frame_budgets.gather(context, data)
-        self._size = cloud_cache.bytes_of(sum(map(_count, self._settings)), splat_data.degree(data))
+        self._size = cloud_cache.bytes_of(sum(one.most_splats for one in self._settings), splat_data.degree(data))
         kept = decoded.cache_limit()
         if self._size > kept:
             raise StippleError(f"{self._what()} take {exporting.megabytes(self._size)}, and at most "
@@ -49,7 +49,7 @@ class STIPPLE_OT_decode_budgets(JobOperator, bpy.types.Operator):
         """In the task's thread. Returns (budgets that were not decoded before, seconds)."""
         settings, begin, made, ready = self._settings, time.monotonic(), 0, 0
         # Where work stands: splats are a fair measure of it.
-        ends = [0, *itertools.accumulate(map(_count, settings))]
+        ends = [0, *itertools.accumulate((one.most_splats for one in settings))]
         try:
             model = decoder.model(lambda job: task.run(job, 0.0, 0.0, 'Reading the source'))
             needed = self._size + max(model.decode_memory_bound(one) for one in settings)
@@ -74,10 +74,6 @@ class STIPPLE_OT_decode_budgets(JobOperator, bpy.types.Operator):
     def _what(self):
         count = len(self._settings)
         return f"{count:,} budget{'' if count == 1 else 's'} of '{self._name}'"
-
-
-def _count(settings):
-    return settings.anchors * settings.gaussians_per_anchor
 
 
 classes = (STIPPLE_OT_decode_budgets,)

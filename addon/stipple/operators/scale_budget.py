@@ -35,7 +35,8 @@ class STIPPLE_OT_scale_budget(bpy.types.Operator):
         elif stipple.is_sequence:
             after = max(1, round((before or stipple.anchors) * self.factor))
         else:
-            after = max(1, round(sources.decode_settings(stipple, mode).anchors * self.factor))
+            shown = sources.decode_settings(stipple, mode).anchors
+            after = max(1, round(shown * self.factor / 2.0 ** stipple.detail))
         setattr(stipple, name + '_render' if self.render else name, after)
         return {'FINISHED'}
 

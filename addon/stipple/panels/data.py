@@ -127,7 +127,9 @@ class STIPPLE_PT_advanced(_SplatPanel, bpy.types.Panel):
         elif known.max_gaussians > 1:
             _draw_fixed(layout, "Splats per Anchor", f"{known.max_gaussians}, as learned")
         if known.has_order:
-            layout.prop(stipple, 'order')
+            column = layout.column()
+            column.active = not stipple.smooth_budget
+            column.prop(stipple, 'order')
 
 
 def _draw_budget(self, context):
@@ -157,13 +159,17 @@ def _draw_budget(self, context):
     each = sources.gaussians_per_anchor(stipple)
     draw_anchors(column, stipple, 'anchors', each)
     draw_anchors(column, stipple, 'anchors_render', each, "Render")
+    column.prop(stipple, 'detail')
+    if known.has_smooth:
+        column.prop(stipple, 'smooth_budget')
     if known.has_seed:
         column.prop(stipple, 'seed')
     if frame_budgets.is_animated(data):
         column.operator('stipple.decode_budgets', icon='RENDER_ANIMATION')
     _draw_decoding(column, data)
     if known.is_learned:
-        used = (stipple.anchors, stipple.anchors_render or stipple.anchors)
+        chosen = (stipple.anchors, stipple.anchors_render or stipple.anchors)
+        used = [sources.detailed(count, stipple) for count in chosen]
         is_beyond = max(used) > known.most_learned or min(used) < known.least_learned
         column.label(text=f"Learned for {known.least_learned:,} to {known.most_learned:,}",
                      icon='INFO' if is_beyond else 'BLANK1')
@@ -234,6 +240,10 @@ def _draw_tree_budget(layout, stipple):
         for label, factor in (("\u00f7 2", 0.5), ("\u00d7 2", 2.0)):
             button = buttons.operator('stipple.scale_budget', text=label)
             button.factor, button.render = factor, render
+    layout.use_property_split = True
+    layout.prop(stipple, 'detail')
+    if source_settings.of(stipple).has_smooth and not stipple.is_sequence:
+        layout.prop(stipple, 'smooth_budget')
 
 
 def _draw_foreign(self, context):

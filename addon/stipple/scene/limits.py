@@ -100,7 +100,7 @@ def _budget(data, stipple, frame, mode):
         return None
     if not stipple.is_sequence:
         settings = sources.decode_settings(stipple, mode)
-        return max(settings.anchors * settings.gaussians_per_anchor, 0)
+        return max(settings.most_splats, 0)
     try:
         return sequences.frame_of(data, stipple, frame, mode).shown_count()
     except StippleError:

@@ -167,9 +167,10 @@ def frame_of_file(data, stipple, path, mode, most=None, ahead=()):
     if mode != 'FULL':
         rendering = mode == 'RENDER'
         if stipple.budget_by == 'RATIO':
-            ratio = stipple.ratio_render if rendering else stipple.ratio
+            ratio = min(1.0, 2.0 ** stipple.detail * (stipple.ratio_render if rendering else stipple.ratio))
         else:
-            count = stipple.anchors_render if rendering and stipple.anchors_render != 0 else stipple.anchors
+            chosen = stipple.anchors_render if rendering and stipple.anchors_render != 0 else stipple.anchors
+            count = sources.detailed(chosen, stipple)
             DecodeSettings(count).check()
     key = f'{os.path.basename(path)}|{stamp[0]}|{stamp[1]}|{ratio}|{count}|{most}'
     return Frame(key, path, stamp, source_settings.of(stipple).has_budget, ratio, count, most, ahead)

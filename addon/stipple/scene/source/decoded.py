@@ -90,7 +90,7 @@ class Decoder:
         return self._keep(settings, Cloud.of_job(job), job.seconds(), is_image)
 
     def _keep(self, settings, made, seconds, is_image):
-        times.note(self._source[0], _size(settings), seconds)
+        times.note(self._source[0], settings.most_splats, seconds)
         cloud = self._erased.applied(made)
         if is_image or seconds >= KEEP_SECONDS:
             _kept.put(self.key(settings), cloud, self._limit)
@@ -377,8 +377,4 @@ def _patience(data, settings):
 
 
 def _expected(data, settings):
-    return times.estimate(sources.source_key(data)[0], _size(settings))
-
-
-def _size(settings):
-    return settings.anchors * settings.gaussians_per_anchor
+    return times.estimate(sources.source_key(data)[0], settings.most_splats)

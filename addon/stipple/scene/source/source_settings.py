@@ -41,6 +41,7 @@ class SourceSettings:
     time_begin: float = 0.0      # seconds: from when
     time_end: float = 0.0        # and to when; both stand still outside
     least_budget: int = 1        # that it takes
+    has_smooth: bool = False     # budgets that move can make no splat jump
 
     @property
     def as_they_are(self):
@@ -58,7 +59,7 @@ class SourceSettings:
 
 _NOTHING = SourceSettings()
 _CLOUD = SourceSettings(has_source=True)
-_TREE = SourceSettings(has_source=True, has_budget=True, counts_splats=True)
+_TREE = SourceSettings(has_source=True, has_budget=True, counts_splats=True, has_smooth=True)
 
 
 def of_model(settings):
@@ -68,7 +69,7 @@ def of_model(settings):
         settings.minimum_learned_budget, settings.maximum_learned_budget, settings.minimum_gaussians_per_anchor,
         settings.maximum_gaussians_per_anchor, settings.default_gaussians_per_anchor, bool(settings.has_order),
         bool(settings.has_seed), bool(settings.has_time), settings.time_begin, settings.time_end,
-        settings.minimum_budget)
+        settings.minimum_budget, bool(settings.has_smooth))
 
 
 def of(stipple):
@@ -87,6 +88,8 @@ def _stored(text):
         chosen = {name: value for name, value in values.items() if name in known}
         if not all(isinstance(value, (bool, int, float)) for value in chosen.values()):
             return None
+        # Versions before it did not store it.
+        chosen.setdefault('has_smooth', bool(chosen.get('has_budget')) and not chosen.get('has_time'))
         return SourceSettings(**chosen)
     except (ValueError, RecursionError, AttributeError, TypeError):
         return None
@@ -105,7 +108,7 @@ def _known(kind, stored, gaussians, least, most):
         return _TREE
     # Files of versions that did not store settings, and texts that hold none.
     return SourceSettings(True, True, False, False, most or 20_000, least, most, gaussians or 1,
-                          gaussians or _MAX_GAUSSIANS, gaussians or 1, not gaussians, True)
+                          gaussians or _MAX_GAUSSIANS, gaussians or 1, not gaussians, True, has_smooth=True)
 
 
 def note_model(stipple, settings):

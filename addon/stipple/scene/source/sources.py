@@ -285,8 +285,7 @@ def count_of(data, budget):
     """Splats of a datablock at the budget 'RENDER' or 'FULL', without decoding."""
     stipple = data.stipple
     if source_settings.of(stipple).has_budget and not stipple.edited:
-        settings = decode_settings(stipple, budget)
-        return settings.anchors * settings.gaussians_per_anchor
+        return decode_settings(stipple, budget).most_splats
     return splat_data.count(data)
 
 
@@ -303,10 +302,16 @@ def decode_settings(stipple, mode='VIEWPORT', scene=None):
     if known.counts_splats:
         budget = max(_tree_budget(stipple, mode), min(known.least_budget, visible_count(stipple)))
     else:
-        budget = (mode == 'RENDER' and stipple.anchors_render) or stipple.anchors
+        budget = detailed((mode == 'RENDER' and stipple.anchors_render) or stipple.anchors, stipple)
     return DecodeSettings(budget, gaussians_per_anchor(stipple),
                           AnchorOrder[stipple.order] if known.has_order else AnchorOrder.SYSTEMATIC,
-                          stipple.seed if known.has_seed else 0, seconds(stipple, scene) if known.has_time else 0.0)
+                          stipple.seed if known.has_seed else 0, seconds(stipple, scene) if known.has_time else 0.0,
+                          known.has_smooth and stipple.smooth_budget and mode != 'FULL')
+
+
+def detailed(budget, stipple):
+    """A budget of a datablock with its Detail, which doubles it for each 1."""
+    return budget if stipple.detail == 0 else max(1, round(budget * 2.0 ** stipple.detail))
 
 
 def gaussians_per_anchor(stipple):
@@ -334,7 +339,8 @@ def at_most(settings, most, least=1):
     """The settings for that many splats at most, but not for a budget below `least`; most: None for as they are."""
     if most is None:
         return settings
-    return replace(settings, anchors=min(settings.anchors, max(least, most // settings.gaussians_per_anchor)))
+    each = replace(settings, anchors=1).most_splats
+    return replace(settings, anchors=min(settings.anchors, max(least, most // each)))
 
 
 def _tree_budget(stipple, mode):
@@ -343,9 +349,10 @@ def _tree_budget(stipple, mode):
     if mode == 'FULL':
         return total
     if stipple.budget_by == 'RATIO':
-        return max(1, round(total * (stipple.ratio_render if mode == 'RENDER' else stipple.ratio)))
+        share = 2.0 ** stipple.detail * (stipple.ratio_render if mode == 'RENDER' else stipple.ratio)
+        return min(total, max(1, round(total * share)))
     count = stipple.anchors_render if mode == 'RENDER' and stipple.anchors_render != 0 else stipple.anchors
-    return min(count, total)
+    return min(detailed(count, stipple), total)
 
 
 def visible_count(stipple):

@@ -159,6 +159,8 @@ def written_key(data, settings, carrier=None):
         parts.append(masks.key(data))
     if known.has_time:
         parts.append(f'{settings.time!r} s')
+    if settings.smooth:
+        parts.append('smooth')
     if erased.any_of(data):
         parts.append(erased.key(data))
     if carrier is not None:
