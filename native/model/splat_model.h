@@ -54,9 +54,10 @@ struct ModelRequest {
   uint64_t seed = 0;
   uint32_t gaussians_per_anchor = 1;  ///< K; 1 stands for the model's own where it cannot make 1
   double time = 0.0;                  ///< seconds, finite; 0 where nothing moves
-  /// Between two powers of two, splats on the way from one to the other, up to twice as many as the
-  /// budget, so that a budget that moves moves and grows splats and never makes one jump. Drawn in
-  /// the progressive order; at powers of two the splats of that order. For kinds that have it.
+  /// For a budget that moves: splats move and grow and none of them jumps. Between two powers of two
+  /// they are on the way from one to the other, up to twice as many as the budget, in the progressive
+  /// order; at powers of two the splats of that order. Of a tree, Decoder::decodeSmooth(). For kinds
+  /// that have it.
   bool smooth = false;
 };
 

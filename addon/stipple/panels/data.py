@@ -161,7 +161,7 @@ def _draw_budget(self, context):
     draw_anchors(column, stipple, 'anchors_render', each, "Render")
     column.prop(stipple, 'detail')
     if known.has_smooth:
-        column.prop(stipple, 'smooth_budget')
+        column.prop(stipple, 'smooth_budget', text="Smooth")
     if known.has_seed:
         column.prop(stipple, 'seed')
     if frame_budgets.is_animated(data):
@@ -243,7 +243,7 @@ def _draw_tree_budget(layout, stipple):
     layout.use_property_split = True
     layout.prop(stipple, 'detail')
     if source_settings.of(stipple).has_smooth and not stipple.is_sequence:
-        layout.prop(stipple, 'smooth_budget')
+        layout.prop(stipple, 'smooth_budget', text="Smooth")
 
 
 def _draw_foreign(self, context):

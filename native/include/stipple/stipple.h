@@ -677,10 +677,11 @@ typedef struct StippleDecodeOptions {
   uint64_t seed;                  /* of a learned field: 0, the default, gives the draws that it knows best */
   uint32_t gaussians_per_anchor;  /* K, 1..32, default 1; of a hierarchy: 1; of a field: 1, which stands for
                                      its own count, or that */
-  uint32_t smooth;                /* 1: for budgets that move. Between powers of two the splats are on their way
-                                     from the one to the other, up to twice as many as the budget, and none of
-                                     them jumps; the order is progressive. The model keeps what is around the
-                                     last budget. Default 0 */
+  uint32_t smooth;                /* 1: for budgets that move: none of the splats jumps. Up to twice as many as the
+                                     budget says are on their way to the next power of two; the order is
+                                     progressive, and the model keeps what is around the last budget. Of a
+                                     hierarchy, what the next half of a doubling splits is on its way, 1.41 times
+                                     as many at most. Default 0 */
   double time;                    /* seconds, finite, default 0; models without has_time give the same splats always */
 } StippleDecodeOptions;
 void stipple_decode_options_init(StippleDecodeOptions* options);

@@ -16,7 +16,9 @@ namespace {
 struct SurfaceMaker final : BudgetOctaves::Maker {
   SurfaceModel model;
 
-  explicit SurfaceMaker() {
+  uint32_t each = 1;
+
+  explicit SurfaceMaker(uint32_t gaussians = 1) : each(gaussians) {
     SurfaceModelOptions options;
     options.sampling.count = 20000;
     model = buildSurfaceModel(test::torus(1, 0.3, 48, 24), options);
@@ -28,6 +30,7 @@ struct SurfaceMaker final : BudgetOctaves::Maker {
         sampleAnchors(*model.density, {.count = budget, .order = AnchorOrder::kProgressive});
     DecodeRequest request;
     request.anchors = &step.anchors;
+    request.gaussians_per_anchor = each;
     step.splats = model.decoder->decode(request);
     return step;
   }
@@ -77,6 +80,22 @@ TEST(SmoothBudget, EveryOldSplatStaysOnce) {
     staying[growth.sources[i]] += growth.stays[i];
   }
   EXPECT_EQ(std::count(staying.begin(), staying.end(), 1), 500);
+}
+
+TEST(SmoothBudget, EverySplatOfAnAnchorStaysItself) {
+  constexpr uint32_t kEach = 3;
+  const SurfaceMaker maker(kEach);
+  const BudgetStep few = maker.step(256), many = maker.step(512);
+  const SplatGrowth growth = growthOfAnchors(few.anchors, few.splats, many.anchors, many.splats);
+  ASSERT_EQ(growth.sources.size(), 512u * kEach);
+  size_t staying = 0;
+  for (size_t i = 0; i < growth.sources.size(); ++i) {
+    if (!growth.stays[i]) continue;
+    ++staying;
+    EXPECT_EQ(growth.sources[i] % kEach, i % kEach);
+    EXPECT_EQ(few.anchors.leaves[growth.sources[i] / kEach], many.anchors.leaves[i / kEach]);
+  }
+  EXPECT_EQ(staying, 256u * kEach);
 }
 
 /// A tree of splats, and which of its nodes a smooth decode has.

@@ -57,6 +57,20 @@ std::shared_ptr<const SplatModel> field(bool nested) {
                          {true, nested, 7});
 }
 
+TEST(SplatModel, ACancelledSmoothDecodeLeavesNothingBehind) {
+  ModelRequest request;
+  request.budget = 700;
+  request.smooth = true;
+  const std::shared_ptr<const SplatModel> model = surface();
+  Progress progress;
+  progress.cancel();
+  expectError(ErrorCode::kCancelled, {}, [&] { model->decode(request, &progress); });
+  const SplatCloud after = model->decode(request), fresh = surface()->decode(request);
+  EXPECT_EQ(after.size(), 1024u);
+  EXPECT_EQ(after.positions, fresh.positions);
+  EXPECT_EQ(after.opacities, fresh.opacities);
+}
+
 ModelRequest small() {
   ModelRequest request;
   request.budget = 100;
