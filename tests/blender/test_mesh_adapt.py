@@ -226,6 +226,27 @@ def test_vertices_without_faces_are_a_target(stipple):
     np.testing.assert_allclose(np.linalg.norm(shown(obj), axis=1), 1.4, atol=0.08)
 
 
+def test_points_of_geometry_nodes_are_a_target(stipple):
+    ball = scenes.sphere('Points', 48, 24, radius=1.4)
+    group = bpy.data.node_groups.new('Points', 'GeometryNodeTree')
+    if bpy.app.version < (4, 0, 0):
+        group.inputs.new('NodeSocketGeometry', 'Geometry')
+        group.outputs.new('NodeSocketGeometry', 'Geometry')
+    else:
+        for way in ('INPUT', 'OUTPUT'):
+            group.interface.new_socket('Geometry', in_out=way, socket_type='NodeSocketGeometry')
+    start, points, end = (group.nodes.new(kind) for kind in ('NodeGroupInput', 'GeometryNodeMeshToPoints',
+                                                             'NodeGroupOutput'))
+    group.links.new(start.outputs[0], points.inputs['Mesh'])
+    group.links.new(points.outputs[0], end.inputs[0])
+    ball.modifiers.new('Points', 'NODES').node_group = group
+    ball.location.x = 2
+    obj = template()
+    obj.location.x = 2
+    assert adapt(ball, obj) == {'FINISHED'}
+    np.testing.assert_allclose(np.linalg.norm(shown(obj) - np.float32([2, 0, 0]), axis=1), 1.4, atol=0.08)
+
+
 def test_texts_and_curves_are_targets(stipple):
     bpy.ops.object.text_add()
     text = bpy.context.object

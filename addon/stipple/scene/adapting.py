@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from .. import version
 from ..binding.errors import invalid
 from ..binding.mesh import Mesh
 from . import meshes, shapes
@@ -68,15 +69,11 @@ def target_of(obj, depsgraph):
         mesh = shapes.bare_mesh(sources.context(), [obj], depsgraph, may_be_empty=True)
         if mesh is not None:
             return mesh
-    points = None
-    if obj.type == 'MESH':
-        points = _coordinates(evaluated.data.vertices)
-    elif obj.type == 'POINTCLOUD':
-        points = _coordinates(evaluated.data.points)
-    if points is None or len(points) == 0:
+    points = _points(obj, depsgraph)
+    if len(points) == 0:
         raise invalid(f"'{obj.name}' has neither faces nor points; a mesh, a point cloud or splats are needed as the "
                       'target.')
-    return points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3], None
+    return points, None
 
 
 def landmarks_of(obj, collection_name):
@@ -181,6 +178,25 @@ class Shown:
         return key
 
 
+def _points(obj, depsgraph):
+    """[P,3] vertices and points that an object shows, in the world: its own, and what geometry nodes make of it."""
+    found = [np.zeros((0, 3))]
+    for entry in depsgraph.object_instances:
+        owner = entry.parent.original if entry.is_instance else entry.object.original
+        data = entry.object.data
+        if owner != obj or not isinstance(data, (bpy.types.Mesh, bpy.types.PointCloud)):
+            continue
+        matrix = version.copy_of_evaluated_matrix(entry.matrix_world)
+        local = _coordinates(data.vertices) if isinstance(data, bpy.types.Mesh) else _positions(data)
+        found.append(local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(found)
+
+
+def _positions(cloud):
+    attribute = cloud.attributes.get('position')
+    return np.zeros((0, 3), np.float32) if attribute is None else _coordinates(attribute.data, 'vector')
+
+
 def _mixed(obj):
     """[V,3] of the shape keys as they are mixed now."""
     index = obj.active_shape_key_index
@@ -192,7 +208,7 @@ def _mixed(obj):
         obj.active_shape_key_index = index
 
 
-def _coordinates(elements):
+def _coordinates(elements, name='co'):
     positions = np.empty(len(elements) * 3, np.float32)
-    elements.foreach_get('co', positions)
+    elements.foreach_get(name, positions)
     return positions.reshape(-1, 3)
