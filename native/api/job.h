@@ -19,6 +19,7 @@ namespace stipple {
 
 class FitSession;
 class GenerateSession;
+class RegistrationWatch;
 struct RegisteredMesh;
 
 }  // namespace stipple
@@ -39,10 +40,11 @@ using JobResult =
 /// all that it uses, apart from the caller's buffers.
 using JobWork = std::function<JobResult(Progress&)>;
 
-/// In: fit, of a job of fitting, generation, of one that makes splats of an image: what can be
-/// asked while it runs and after any end of it.
+/// In: fit, of a job of fitting, generation, of one that makes splats of an image, adaptation, of
+/// one that adapts a mesh: what can be asked while it runs and after any end of it.
 StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit = nullptr,
-                     std::shared_ptr<GenerateSession> generation = nullptr);
+                     std::shared_ptr<GenerateSession> generation = nullptr,
+                     std::shared_ptr<RegistrationWatch> adaptation = nullptr);
 
 }  // namespace stipple::api
 
@@ -51,8 +53,9 @@ struct StippleJob {
 
   stipple::api::Context context;
   stipple::Progress progress;
-  std::shared_ptr<stipple::FitSession> fit;              ///< null of other jobs
-  std::shared_ptr<stipple::GenerateSession> generation;  ///< likewise
+  std::shared_ptr<stipple::FitSession> fit;                ///< null of other jobs
+  std::shared_ptr<stipple::GenerateSession> generation;    ///< likewise
+  std::shared_ptr<stipple::RegistrationWatch> adaptation;  ///< likewise
   std::thread thread;
   const stipple::Stopwatch watch;
 

@@ -15,11 +15,8 @@
 namespace stipple {
 namespace {
 
-TriMesh meshOf(const AdaptShape& shape) {
-  TriMesh mesh;
-  mesh.positions = shape.floats();
-  mesh.triangles = shape.triangles;
-  mesh.materials.resize(1);
+TriMesh meshWithNormals(const AdaptShape& shape) {
+  TriMesh mesh = meshOf(shape);
   mesh.corner_normals.assign(mesh.triangles.size() * 3, 0.57735f);
   return mesh;
 }
@@ -102,12 +99,12 @@ double radiusOf(const AdaptShape& shape) {
 }
 
 TEST(Adapting, TemplatesOfBadShapeStayFinite) {
-  const RegistrationTarget target = targetOfMesh(meshOf(sphere(3)), 500, 1);
+  const RegistrationTarget target = targetOfMesh(meshWithNormals(sphere(3)), 500, 1);
   for (const BadShape& bad : badShapes()) {
     SCOPED_TRACE(bad.name);
     AdaptShape shape = sphere(2);
     bad.change(shape);
-    const TriMesh given = meshOf(shape);
+    const TriMesh given = meshWithNormals(shape);
     for (const PreAlignment alignment : {PreAlignment::kNone, PreAlignment::kSimilarity}) {
       RegistrationOptions options = quick(MeshDensity::kAdaptive);
       options.alignment = alignment;
@@ -123,12 +120,12 @@ TEST(Adapting, TargetsOfBadShapeAreMetOnceTheTemplateIsAsLarge) {
     SCOPED_TRACE(bad.name);
     AdaptShape shape = sphere(3);
     bad.change(shape);
-    const TriMesh target = meshOf(shape);
+    const TriMesh target = meshWithNormals(shape);
     for (const MeshDensity density : {MeshDensity::kUniform, MeshDensity::kAdaptive}) {
       RegistrationOptions options = quick(density);
       options.alignment = PreAlignment::kSize;
       const RegisteredMesh made =
-          registerMesh(meshOf(sphere(2)), targetOfMesh(target, 500, 1), options);
+          registerMesh(meshWithNormals(sphere(2)), targetOfMesh(target, 500, 1), options);
       requireFinite(made.mesh);
       // Forty steps are few for a ball to become a needle, and 66 vertices have no room for fins.
       EXPECT_TRUE(made.report.after.distance < 0.2 * radiusOf(shape) ||
@@ -139,7 +136,7 @@ TEST(Adapting, TargetsOfBadShapeAreMetOnceTheTemplateIsAsLarge) {
 }
 
 TEST(Adapting, StrengthsAndStepsThatAreFarTooLargeStayFinite) {
-  const RegistrationTarget target = targetOfMesh(meshOf(sphere(3)), 500, 1);
+  const RegistrationTarget target = targetOfMesh(meshWithNormals(sphere(3)), 500, 1);
   for (const double strength : {0.0, 1e-300, 100.0, 1e6}) {
     for (const double step_size : {1e-300, 0.05, 10.0}) {
       for (const double smoothness : {0.0, 10.0, 1e6}) {
@@ -147,7 +144,7 @@ TEST(Adapting, StrengthsAndStepsThatAreFarTooLargeStayFinite) {
         options.adapter.strength = strength;
         options.adapter.step_size = step_size;
         options.adapter.smoothness = smoothness;
-        requireFinite(registerMesh(meshOf(sphere(2)), target, options).mesh);
+        requireFinite(registerMesh(meshWithNormals(sphere(2)), target, options).mesh);
       }
     }
   }

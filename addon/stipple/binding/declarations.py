@@ -87,6 +87,8 @@ FUNCTIONS = {
                                            _out_handle]),
     'stipple_mesh_adapt_memory_bound': (_status, [_handle, _to(s.StippleMeshAdaptTarget),
                                                   _to(s.StippleMeshAdaptOptions), POINTER(c_uint64)]),
+    'stipple_mesh_adapt_preview': (_status, [_handle, _out_handle]),
+    'stipple_mesh_adapt_finish': (_status, [_handle]),
     'stipple_job_adapt_report': (_status, [_handle, _to(s.StippleMeshAdaptReport)]),
     # layers of another renderer
     'stipple_layers_create': (_status, [_handle, c_uint32, c_uint32, _floats, _floats, _floats, _out_handle]),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes that take another shape and keep their triangles."""
 
-from ctypes import byref
+from ctypes import byref, c_void_p
 
 import numpy as np
 
@@ -13,8 +13,23 @@ from .mesh import Mesh
 from .structs import StippleMeshAdaptOptions, StippleMeshAdaptReport, StippleMeshAdaptTarget
 
 
+class Adaptation(Job):
+    """Such a job: it can be looked at and ended while it runs."""
+
+    def preview(self):
+        """The newest shape (Mesh), each once, or None; asks for the next. Never waits."""
+        pointer = c_void_p()
+        self._check(self.library.stipple_mesh_adapt_preview(self.pointer, byref(pointer)))
+        return Mesh(self.library, pointer.value) if pointer.value else None
+
+    def finish(self):
+        """Asks the steps to end soon: the job then ends well, with the shape that it has. Does not wait."""
+        self._check(self.library.stipple_mesh_adapt_finish(self.pointer))
+
+
 def start_adapt(template, target, landmarks=(), **settings):
-    """Starts giving a Mesh the shape of a target, as a job: Mesh.of_job() of it is the template with other positions.
+    """Starts giving a Mesh the shape of a target, as an Adaptation: Mesh.of_job() of it is the template with other
+    positions.
 
     target: a Mesh, a Cloud, or (points [P,3], normals [P,3] or None). landmarks: (vertex of the template, place [3])
     each, metres. settings: fields of StippleMeshAdaptOptions. Errors: StippleError."""
@@ -28,8 +43,8 @@ def start_adapt(template, target, landmarks=(), **settings):
     options.landmark_count = len(vertices)
     options.landmark_vertices, options.landmark_places = pointer_to(vertices), pointer_to(places)
     aim, kept = _target(target)
-    return Job(library, new_handle(library, 'stipple_mesh_adapt_start', template.pointer, byref(aim), byref(options)),
-               keep=(vertices, places, kept))
+    return Adaptation(library, new_handle(library, 'stipple_mesh_adapt_start', template.pointer, byref(aim),
+                                          byref(options)), keep=(vertices, places, kept))
 
 
 def adapt_report(job):

@@ -133,7 +133,7 @@ class StippleMeshAdaptTarget(_Sized):
 
 class StippleMeshAdaptOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('density', c_uint32), ('alignment', c_uint32), ('steps', c_uint32),
-                ('samples_per_point', c_uint32), ('reserved', c_uint32), ('target_count', c_uint64),
+                ('samples_per_point', c_uint32), ('lands_on_target', c_uint32), ('target_count', c_uint64),
                 ('report_count', c_uint64), ('seed', c_uint64), ('strength', c_double), ('adaptive_factor', c_double),
                 ('smoothness', c_double), ('step_size', c_double), ('position_weight', c_double),
                 ('normal_weight', c_double), ('landmark_weight', c_double), ('symmetric_weight', c_double),
@@ -144,7 +144,8 @@ class StippleMeshAdaptReport(_Sized):
     _fields_ = [('struct_size', c_uint32), ('is_measured', c_uint32), ('has_normals', c_uint32),
                 ('turned_normals', c_uint32), ('place_count', c_uint64), ('loose_count', c_uint64), ('loss', c_double),
                 ('distance_before', c_double), ('distance_after', c_double), ('squared_before', c_double),
-                ('squared_after', c_double), ('normals_before', c_double), ('normals_after', c_double)]
+                ('squared_after', c_double), ('normals_before', c_double), ('normals_after', c_double),
+                ('step_count', c_uint64)]
 
 
 class StippleDensityInfo(_Sized):

@@ -65,6 +65,15 @@ class STIPPLE_MT_select(bpy.types.Menu):
         layout.operator('stipple.fill_erased', text="Fill")
 
 
+def _draw_adapt(self, context):
+    active = context.object
+    if active is not None and active.type == 'MESH' and not splat_data.is_splat_object(active):
+        self.layout.separator()
+        self.layout.operator_context = 'INVOKE_DEFAULT'
+        self.layout.operator('stipple.mesh_adapt', icon='MOD_SHRINKWRAP')
+        self.layout.operator('stipple.mesh_even_out', icon='MOD_SMOOTH')
+
+
 def _draw_object(self, context):
     if splat_data.is_splat_object(context.object) or geometry.may_carry_splats(context.object):
         self.layout.separator()
@@ -104,7 +113,8 @@ def _draw_export(self, _context):
 
 
 _MENUS = (('VIEW3D_MT_add', _draw_add), ('VIEW3D_MT_object_convert', _draw_convert),
-          ('VIEW3D_MT_object', _draw_object), ('TOPBAR_MT_file_import', _draw_import),
+          ('VIEW3D_MT_object', _draw_object), ('VIEW3D_MT_object', _draw_adapt),
+          ('MESH_MT_shape_key_context_menu', _draw_adapt), ('TOPBAR_MT_file_import', _draw_import),
           ('TOPBAR_MT_file_export', _draw_export), ('TOPBAR_MT_file_external_data', _draw_external_data),
           ('DATA_PT_camera_background_image', _draw_background_images))
 

@@ -34,10 +34,10 @@ def box_matrix(obj):
     return matrix
 
 
-def bare_mesh(context, objects, depsgraph):
+def bare_mesh(context, objects, depsgraph, may_be_empty=False):
     """Triangles of objects and of what they instance, as one native mesh in the world, without colours.
 
-    Errors: StippleError for objects without faces.
+    Errors: StippleError for objects without faces; with may_be_empty, None.
     """
     wanted, mesh, count = set(objects), Mesh.create(context), 0
     for entry in depsgraph.object_instances:
@@ -49,18 +49,21 @@ def bare_mesh(context, objects, depsgraph):
         try:
             if temporary is None:
                 continue
-            positions, triangles = _arrays(temporary)
+            positions, triangles = mesh_arrays(temporary)
         finally:
             entry.object.to_mesh_clear()
         if len(triangles):
             mesh.add_part(positions, triangles, matrix)
             count += len(triangles)
+    if count == 0 and may_be_empty:
+        return None
     if count == 0:
         raise invalid('No mesh with faces is selected; select one along with the splats.')
     return mesh
 
 
-def _arrays(mesh):
+def mesh_arrays(mesh):
+    """(positions [V,3], triangles [T,3]) of a mesh of Blender."""
     mesh.calc_loop_triangles()
     triangles = np.empty(len(mesh.loop_triangles) * 3, np.int32)
     mesh.loop_triangles.foreach_get('vertices', triangles)

@@ -32,6 +32,8 @@ RegistrationOptions optionsFrom(const StippleMeshAdaptOptions* options) {
   made.target_count = given.target_count;
   made.samples_per_point = given.samples_per_point;
   made.report_count = given.report_count;
+  made.lands_on_target =
+      enumValue<uint32_t>(given.lands_on_target, 1, "options->lands_on_target") == 1;
   made.seed = given.seed;
   if (requireTriples(given.landmark_count, "options->landmark_count") > 0) {
     made.landmarks = landmarksOf(
@@ -57,6 +59,13 @@ TargetSource sourceFrom(const StippleMeshAdaptTarget* target) {
     if (given.normals) source.normals.assign(given.normals, given.normals + numbers);
   }
   return source;
+}
+
+RegistrationWatch& watchOf(StippleJob* job) {
+  if (!require(job, "job").adaptation) {
+    fail(ErrorCode::kInvalidArgument, "this job does not adapt a mesh");
+  }
+  return *job->adaptation;
 }
 
 }  // namespace
@@ -95,14 +104,16 @@ StippleStatus stipple_mesh_adapt_start(const StippleMesh* given,
     require(job, "job");
     given->context->requireMemory(registrationMemoryBound(*mesh, source, chosen),
                                   "adapting the mesh");
-    *job = startJob(given->context,
-                    [mesh, source = std::move(source),
-                     chosen = std::move(chosen)](Progress& progress) -> JobResult {
-                      const RegistrationTarget aim =
-                          targetOf(source, chosen.target_count, chosen.seed);
-                      return std::make_shared<const RegisteredMesh>(
-                          registerMesh(*mesh, aim, chosen, &progress));
-                    });
+    auto watch = std::make_shared<RegistrationWatch>();
+    *job = startJob(
+        given->context,
+        [mesh, watch, source = std::move(source),
+         chosen = std::move(chosen)](Progress& progress) -> JobResult {
+          const RegistrationTarget aim = targetOf(source, chosen.target_count, chosen.seed);
+          return std::make_shared<const RegisteredMesh>(
+              registerMesh(*mesh, aim, chosen, &progress, watch.get()));
+        },
+        nullptr, nullptr, watch);
   });
 }
 
@@ -117,6 +128,18 @@ StippleStatus stipple_mesh_adapt_memory_bound(const StippleMesh* given,
   });
 }
 
+StippleStatus stipple_mesh_adapt_preview(StippleJob* job, StippleMesh** mesh) {
+  return guarded([&] {
+    require(mesh, "mesh");
+    std::shared_ptr<TriMesh> newest = watchOf(job).takeShape();
+    *mesh = newest ? new StippleMesh{job->context, std::move(newest)} : nullptr;
+  });
+}
+
+StippleStatus stipple_mesh_adapt_finish(StippleJob* job) {
+  return guarded([&] { watchOf(job).finish(); });
+}
+
 StippleStatus stipple_job_adapt_report(const StippleJob* job, StippleMeshAdaptReport* report) {
   return guarded([&] {
     const auto& made = jobResult<std::shared_ptr<const RegisteredMesh>>(require(job, "job"),
@@ -128,6 +151,7 @@ StippleStatus stipple_job_adapt_report(const StippleJob* job, StippleMeshAdaptRe
     out.turned_normals = from.turned_normals ? 1 : 0;
     out.place_count = from.place_count;
     out.loose_count = from.loose_count;
+    out.step_count = from.step_count;
     out.loss = from.loss;
     out.distance_before = from.before.distance;
     out.distance_after = from.after.distance;

@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 
 #include "base/error.h"
 #include "base/random.h"
+#include "fit/registration/landing.h"
 #include "mesh/adapt/corner_normals.h"
 #include "mesh/adapt/merged_vertices.h"
 #include "mesh/adapt/point_rows.h"
@@ -183,13 +186,16 @@ uint64_t seedOfStep(uint64_t seed, uint32_t step) {
   return mixBits(seed) + step;
 }
 
-/// Runs all steps. Returns the loss of the last.
+/// Runs all steps, or as many as `watch` lets it; show() of it after each. Returns the loss of the
+/// last.
 double adapt(MeshAdapter& adapter, const MeshLinks& links, const RegistrationLoss& loss,
-             const RegistrationOptions& options, Progress* progress) {
+             const RegistrationOptions& options, Progress* progress, const RegistrationWatch* watch,
+             const std::function<void()>& show) {
   std::vector<Vec3d> gradient(links.vertexCount());
   double last = 0;
   for (uint32_t step = 0; step < options.adapter.steps; ++step) {
     advance(progress, static_cast<double>(step) / options.adapter.steps, kStage);
+    if (watch && watch->wantsEnd()) break;
     std::fill(gradient.begin(), gradient.end(), Vec3d::Zero());
     const RegistrationMatches matches =
         loss.match(links.triangles(), adapter.positions(), seedOfStep(options.seed, step));
@@ -199,6 +205,7 @@ double adapt(MeshAdapter& adapter, const MeshLinks& links, const RegistrationLos
     }
     last = loss.addGradient(links.triangles(), adapter.positions(), matches, gradient);
     adapter.step(gradient);
+    show();
   }
   return last;
 }
@@ -227,6 +234,16 @@ TriMesh movedMesh(const TriMesh& given, const MergedVertices& merged, std::span<
   return mesh;
 }
 
+/// Places in the ball, each brought to the nearest of the target's.
+std::vector<Vec3d> landed(const RegistrationTarget& target, const MeshLinks& links,
+                          std::span<const Vec3d> given, const Ball& ball) {
+  std::vector<Vec3d> places(given.begin(), given.end());
+  for (Vec3d& p : places) p = ball.outOf(p);
+  landOnSurface(target.positions, target.triangles, links, places);
+  for (Vec3d& p : places) p = ball.into(p);
+  return places;
+}
+
 MergedVertices mergedIn(const TriMesh& given, const Ball& ball) {
   MergedVertices merged = mergeVertices(given.positions, given.triangles);
   if (merged.triangles.size() / 3 < kFewestTriangles) {
@@ -252,10 +269,14 @@ void validate(const RegistrationOptions& options) {
 }
 
 RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& target,
-                            const RegistrationOptions& options, Progress* progress) {
+                            const RegistrationOptions& options, Progress* progress,
+                            RegistrationWatch* watch) {
   validate(options);
   validate(given);
   requireTarget(target);
+  if (options.lands_on_target && target.triangles.empty()) {
+    refuse("the target has no triangles that vertices could land on; only a mesh has some");
+  }
   advance(progress, 0.0, kStage);
   const Ball ball = ballOf(target);
   MergedVertices merged = mergedIn(given, ball);
@@ -275,8 +296,15 @@ RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& targ
   MeshAdapter adapter(links, merged.positions, options.adapter);
   const RegistrationLoss loss(std::move(aim), landmarks, options.weights,
                               options.samples_per_point);
-  report.loss = adapt(adapter, links, loss, options, progress);
-  made.mesh = movedMesh(given, merged, adapter.positions(), ball, alignment);
+  const auto moved = [&] { return movedMesh(given, merged, adapter.positions(), ball, alignment); };
+  report.loss = adapt(adapter, links, loss, options, progress, watch, [&] {
+    if (watch && watch->wantsShape()) watch->show(std::make_shared<TriMesh>(moved()));
+  });
+  report.step_count = adapter.stepCount();
+  made.mesh = options.lands_on_target
+                  ? movedMesh(given, merged, landed(target, links, adapter.positions(), ball), ball,
+                              alignment)
+                  : moved();
   if (options.report_count > 0) {
     advance(progress, 1.0, "Measuring the mesh");
     report.is_measured = true;

@@ -8,6 +8,7 @@
 #include "fit/registration/pre_alignment.h"
 #include "fit/registration/registration_loss.h"
 #include "fit/registration/registration_target.h"
+#include "fit/registration/registration_watch.h"
 #include "mesh/adapt/mesh_adapter.h"
 #include "mesh/adapt/surface_difference.h"
 
@@ -17,6 +18,8 @@ struct RegistrationOptions {
   MeshAdapterOptions adapter;  ///< density, smoothness and steps
   RegistrationWeights weights;
   PreAlignment alignment = PreAlignment::kNone;
+  bool lands_on_target = false;     ///< after the steps, vertices go to the nearest place of the
+                                    ///< target's triangles, those of borders to its borders
   uint64_t target_count = 20000;    ///< points of the target at most, 1 to 2^24: detail, and time
   uint32_t samples_per_point = 4;   ///< of the template for each of them, 1 to 64
   uint64_t report_count = 100000;   ///< samples of each side that the report is measured by; 0: no
@@ -35,6 +38,7 @@ struct RegistrationReport {
   uint64_t loose_count = 0;  ///< vertices without a triangle, which went with the alignment alone
   bool turned_normals = false;  ///< the target looked inwards where the template looks outwards, or
                                 ///< the other way round: its normals were taken the other way round
+  uint32_t step_count = 0;      ///< steps that were taken: fewer where a watch has ended them
   double loss = 0;              ///< of the last step, without density, in the unit ball
 };
 
@@ -51,12 +55,14 @@ struct RegisteredMesh {
 /// that validate() accepts, of four triangles with area at least. Options: adapter.density,
 /// adapter.steps; target_count, which detail cannot be finer than. Errors: kInvalidArgument for a
 /// template of fewer triangles, a target without points, extent or weight, landmarks of vertices
-/// that are missing or loose; kCancelled. Threads and determinism: parallel; same result for any
-/// number of threads. Cost: steps times a k-d tree of all samples and five solves;
-/// registrationMemoryBound() bytes. Source: Jung, Kim et al., Mesh Density Adaptation for
-/// Template-based Shape Reconstruction, SIGGRAPH 2023; docs/methods/mesh_adaptation.md.
+/// that are missing or loose, a target without triangles that is to be landed on; kCancelled. In:
+/// watch, or null: shows the shape after steps, and may end them. Threads and determinism:
+/// parallel; same result for any number of threads. Cost: steps times a k-d tree of all samples and
+/// five solves; registrationMemoryBound() bytes. Source: Jung, Kim et al., Mesh Density Adaptation
+/// for Template-based Shape Reconstruction, SIGGRAPH 2023; docs/methods/mesh_adaptation.md.
 RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& target,
-                            const RegistrationOptions& options, Progress* progress = nullptr);
+                            const RegistrationOptions& options, Progress* progress = nullptr,
+                            RegistrationWatch* watch = nullptr);
 
 /// Bytes at most of registerMesh() with a target of that, and of making the target.
 uint64_t registrationMemoryBound(const TriMesh& given, const TargetSource& source,

@@ -492,7 +492,8 @@ typedef struct StippleMeshAdaptOptions {
   uint32_t alignment;         /* StippleMeshAlignment, default none */
   uint32_t steps;             /* 1..1000000, default 800 */
   uint32_t samples_per_point; /* 1..64, default 4: of the template for each point of the target */
-  uint32_t reserved;
+  uint32_t lands_on_target;   /* 1: vertices end at the nearest place of the target's triangles, those of borders at
+                                 its borders; default 0. With the template itself as the target, they slide on it */
   uint64_t target_count;      /* points of the target at most, 1..2^24, default 20000: detail, and time */
   uint64_t report_count;      /* samples of each side that the report is measured by, default 100000; 0: none */
   uint64_t seed;              /* of all samples */
@@ -525,6 +526,7 @@ typedef struct StippleMeshAdaptReport {
   double squared_after;
   double normals_before;   /* mean squared difference of unit normals, 0..4 */
   double normals_after;
+  uint64_t step_count;     /* steps that were taken: fewer after stipple_mesh_adapt_finish */
 } StippleMeshAdaptReport;
 
 /* Gives a template the shape of a target by moving its vertices, as a job (stipple_job_mesh): triangles, their order,
@@ -541,6 +543,11 @@ StippleStatus stipple_mesh_adapt_start(const StippleMesh* given, const StippleMe
                                        const StippleMeshAdaptOptions* options, StippleJob** job);
 StippleStatus stipple_mesh_adapt_memory_bound(const StippleMesh* given, const StippleMeshAdaptTarget* target,
                                               const StippleMeshAdaptOptions* options, uint64_t* bytes);
+/* *mesh: the newest shape of a job that adapts a mesh, which is given once; NULL where there is no newer one. Asks for
+ * the next one too: shapes are made at the pace that they are taken, and the first call gives none. Never waits. */
+StippleStatus stipple_mesh_adapt_preview(StippleJob* job, StippleMesh** mesh);
+/* Asks the steps to end soon; the job then ends well, with the shape that it has. Does not wait. */
+StippleStatus stipple_mesh_adapt_finish(StippleJob* job);
 /* Of a job that adapted a mesh and has ended well. Errors: INVALID_ARGUMENT. */
 StippleStatus stipple_job_adapt_report(const StippleJob* job, StippleMeshAdaptReport* report);
 

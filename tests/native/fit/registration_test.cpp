@@ -16,14 +16,6 @@
 namespace stipple {
 namespace {
 
-TriMesh meshOf(const AdaptShape& shape) {
-  TriMesh mesh;
-  mesh.positions = shape.floats();
-  mesh.triangles = shape.triangles;
-  mesh.materials.resize(1);
-  return mesh;
-}
-
 /// A sphere that is drawn out to half-axes 1.2, 0.8 and 0.6, with a narrow spike.
 AdaptShape spikedEgg(int splits) {
   AdaptShape shape = sphere(splits);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "data/meshes/tri_mesh.h"
 #include "math/vec.h"
 
 namespace stipple {
@@ -24,6 +25,15 @@ struct AdaptShape {
     return values;
   }
 };
+
+/// It as a mesh of one material.
+inline TriMesh meshOf(const AdaptShape& shape) {
+  TriMesh mesh;
+  mesh.positions = shape.floats();
+  mesh.triangles = shape.triangles;
+  mesh.materials.resize(1);
+  return mesh;
+}
 
 /// The one whose energies and forces the tests know in numbers.
 inline AdaptShape tetrahedron() {

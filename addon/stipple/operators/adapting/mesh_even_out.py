@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Vertices of a mesh slide along its surface to where they are needed."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from ...binding.structs import MeshAlignment, MeshDensity
+from .mesh_adapt import AdaptOperator, length_text, problem_of
+
+_DENSITIES = (('UNIFORM', "Uniform", "All edges become about as long as each other"),
+              ('ADAPTIVE', "Adaptive", "Vertices are drawn to where the shape is complex"))
+
+
+class STIPPLE_OT_mesh_even_out(AdaptOperator, bpy.types.Operator):
+    """Let the vertices of the active mesh slide along its surface, so that its edges become even or its detail gets
+    more of them. The shape stays, and so do faces, UV maps, weights and materials. Esc keeps the shape so far"""
+
+    bl_idname = 'stipple.mesh_even_out'
+    bl_label = "Even Out Mesh"
+    bl_options = {'REGISTER', 'UNDO', 'PRESET'}
+
+    from_mix = True
+
+    density: EnumProperty(name="Density", description="Where vertices go along the surface", items=_DENSITIES)
+
+    @classmethod
+    def poll(cls, context):
+        problem = problem_of(context)
+        if problem:
+            cls.poll_message_set(problem)
+        return not problem
+
+    def start(self, context):
+        self._begin(context.view_layer.objects.active, 'Evened Out')
+        return self._start(self._template.native(), density=MeshDensity[self.density], alignment=MeshAlignment.NONE,
+                           lands_on_target=1)
+
+    def draw(self, _context):
+        self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'points', 'preview', 'seed'))
+
+    def _tell(self, context, report):
+        self.report({'INFO'}, f"The vertices of '{self._template.name}' are {self.density.lower()} now; its surface "
+                    f'moved by {length_text(context, report.distance_after)} on average')
+
+
+classes = (STIPPLE_OT_mesh_even_out,)
