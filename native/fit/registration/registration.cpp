@@ -13,21 +13,18 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "fit/registration/landing.h"
-#include "mesh/adapt/corner_normals.h"
-#include "mesh/adapt/merged_vertices.h"
+#include "fit/registration/moving_template.h"
 #include "mesh/adapt/point_rows.h"
 
 namespace stipple {
 
 namespace {
 
-constexpr size_t kFewestTriangles = 4;  ///< those of a tetrahedron
 constexpr uint64_t kMostPoints = uint64_t{1} << 24;
 constexpr uint32_t kMostSamplesPerPoint = 64;
 /// Of the largest it could be: below it nobody knows inside from outside.
 constexpr double kClearlyOutwards = 0.1;
 constexpr double kHeldWeight = 0.99;
-const char* const kStage = "Adapting the mesh";
 
 [[noreturn]] void refuse(const std::string& message) {
   fail(ErrorCode::kInvalidArgument, message);
@@ -43,15 +40,6 @@ void requireCount(uint64_t value, uint64_t first, uint64_t last, const char* nam
   refuse(std::string(name) + " is " + std::to_string(value) + "; " + std::to_string(first) +
          " to " + std::to_string(last) + " is allowed");
 }
-
-/// From metres to the unit ball around the target, and back.
-struct Ball {
-  Vec3d middle = Vec3d::Zero();
-  double radius = 1;
-
-  Vec3d into(const Vec3d& p) const { return (p - middle) / radius; }
-  Vec3d outOf(const Vec3d& p) const { return radius * p + middle; }
-};
 
 double weightOf(const RegistrationTarget& target, size_t i) {
   return target.weights.empty() ? 1.0 : static_cast<double>(target.weights[i]);
@@ -85,8 +73,8 @@ double radiusOf(const RegistrationTarget& target, const Vec3d& middle) {
   return reached.back().first;
 }
 
-Ball ballOf(const RegistrationTarget& target) {
-  Ball ball;
+UnitBall ballOf(const RegistrationTarget& target) {
+  UnitBall ball;
   double sum = 0;
   for (size_t i = 0; i < target.size(); ++i) {
     ball.middle += weightOf(target, i) * rowOf(target.points, i);
@@ -103,7 +91,7 @@ Ball ballOf(const RegistrationTarget& target) {
   return ball;
 }
 
-RegistrationTarget inBall(const RegistrationTarget& target, const Ball& ball) {
+RegistrationTarget inBall(const RegistrationTarget& target, const UnitBall& ball) {
   RegistrationTarget made;
   made.normals = target.normals;
   made.weights = target.weights;
@@ -116,7 +104,7 @@ RegistrationTarget inBall(const RegistrationTarget& target, const Ball& ball) {
 }
 
 /// Landmarks in the ball, at places of the merged mesh.
-std::vector<Landmark> landmarksIn(const std::vector<Landmark>& given, const Ball& ball,
+std::vector<Landmark> landmarksIn(const std::vector<Landmark>& given, const UnitBall& ball,
                                   const MergedVertices& merged) {
   std::vector<Landmark> made;
   for (size_t i = 0; i < given.size(); ++i) {
@@ -186,30 +174,6 @@ uint64_t seedOfStep(uint64_t seed, uint32_t step) {
   return mixBits(seed) + step;
 }
 
-/// Runs all steps, or as many as `watch` lets it; show() of it after each. Returns the loss of the
-/// last.
-double adapt(MeshAdapter& adapter, const MeshLinks& links, const RegistrationLoss& loss,
-             const RegistrationOptions& options, Progress* progress, const RegistrationWatch* watch,
-             const std::function<void()>& show) {
-  std::vector<Vec3d> gradient(links.vertexCount());
-  double last = 0;
-  for (uint32_t step = 0; step < options.adapter.steps; ++step) {
-    advance(progress, static_cast<double>(step) / options.adapter.steps, kStage);
-    if (watch && watch->wantsEnd()) break;
-    std::fill(gradient.begin(), gradient.end(), Vec3d::Zero());
-    const RegistrationMatches matches =
-        loss.match(links.triangles(), adapter.positions(), seedOfStep(options.seed, step));
-    if (matches.of_points.empty()) {
-      refuse("the template has lost its area at step " + std::to_string(step) +
-             "; a smaller step size or strength is needed");
-    }
-    last = loss.addGradient(links.triangles(), adapter.positions(), matches, gradient);
-    adapter.step(gradient);
-    show();
-  }
-  return last;
-}
-
 /// Samples of a mesh that surfaceDifference() reads.
 RegistrationTarget samplesOf(const TriMesh& mesh, const RegistrationOptions& options) {
   return targetOfMesh(mesh, options.report_count, options.seed);
@@ -220,39 +184,14 @@ ComparedSurface viewOf(const RegistrationTarget& surface) {
           surface.is_oriented};
 }
 
-/// The template with its vertices where the merged ones are.
-TriMesh movedMesh(const TriMesh& given, const MergedVertices& merged, std::span<const Vec3d> places,
-                  const Ball& ball, const Similarity& alignment) {
-  TriMesh mesh = given;
-  for (size_t v = 0; v < mesh.vertexCount(); ++v) {
-    const uint32_t place = merged.place_of[v];
-    const Vec3d in_ball =
-        place == kLooseVertex ? alignment(ball.into(rowOf(given.positions, v))) : places[place];
-    setRow(mesh.positions, v, ball.outOf(in_ball));
-  }
-  renewCornerNormals(mesh, merged.place_of);
-  return mesh;
-}
-
 /// Places in the ball, each brought to the nearest of the target's.
 std::vector<Vec3d> landed(const RegistrationTarget& target, const MeshLinks& links,
-                          std::span<const Vec3d> given, const Ball& ball) {
+                          std::span<const Vec3d> given, const UnitBall& ball) {
   std::vector<Vec3d> places(given.begin(), given.end());
   for (Vec3d& p : places) p = ball.outOf(p);
   landOnSurface(target.positions, target.triangles, links, places);
   for (Vec3d& p : places) p = ball.into(p);
   return places;
-}
-
-MergedVertices mergedIn(const TriMesh& given, const Ball& ball) {
-  MergedVertices merged = mergeVertices(given.positions, given.triangles);
-  if (merged.triangles.size() / 3 < kFewestTriangles) {
-    refuse("the template has " + std::to_string(merged.triangles.size() / 3) +
-           " triangles with three corners in different places; at least " +
-           std::to_string(kFewestTriangles) + " are needed");
-  }
-  for (Vec3d& p : merged.positions) p = ball.into(p);
-  return merged;
 }
 
 }  // namespace
@@ -277,41 +216,44 @@ RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& targ
   if (options.lands_on_target && target.triangles.empty()) {
     refuse("the target has no triangles that vertices could land on; only a mesh has some");
   }
-  advance(progress, 0.0, kStage);
-  const Ball ball = ballOf(target);
-  MergedVertices merged = mergedIn(given, ball);
-  const std::vector<Landmark> landmarks = landmarksIn(options.landmarks, ball, merged);
+  advance(progress, 0.0, kAdaptingStage);
+  const UnitBall ball = ballOf(target);
+  MovingTemplate moving(given, ball);
+  const std::vector<Landmark> landmarks = landmarksIn(options.landmarks, ball, moving.merged());
   RegistrationTarget aim = inBall(target, ball);
-  const Similarity alignment =
-      preAligned(merged.triangles, merged.positions, aim, landmarks, options.alignment);
-  for (Vec3d& p : merged.positions) p = alignment(p);
+  moving.align(preAligned(moving.merged().triangles, moving.merged().positions, aim, landmarks,
+                          options.alignment));
 
   RegisteredMesh made;
   RegistrationReport& report = made.report;
-  report.turned_normals = turnNormals(aim, merged);
-  report.place_count = merged.positions.size();
-  report.loose_count = static_cast<uint64_t>(
-      std::count(merged.place_of.begin(), merged.place_of.end(), kLooseVertex));
-  const MeshLinks links(merged.positions.size(), merged.triangles);
-  MeshAdapter adapter(links, merged.positions, options.adapter);
+  report.turned_normals = turnNormals(aim, moving.merged());
+  moving.report(report);
   const RegistrationLoss loss(std::move(aim), landmarks, options.weights,
                               options.samples_per_point);
-  const auto moved = [&] { return movedMesh(given, merged, adapter.positions(), ball, alignment); };
-  report.loss = adapt(adapter, links, loss, options, progress, watch, [&] {
-    if (watch && watch->wantsShape()) watch->show(std::make_shared<TriMesh>(moved()));
-  });
+  MeshAdapter adapter(moving.links(), moving.merged().positions, options.adapter);
+  report.loss = takeSteps(
+      moving, adapter, options.adapter.steps,
+      [&](uint32_t step, std::span<Vec3d> gradient) {
+        const RegistrationMatches matches = loss.match(
+            moving.links().triangles(), adapter.positions(), seedOfStep(options.seed, step));
+        if (matches.of_points.empty()) {
+          refuse("the template has lost its area at step " + std::to_string(step) +
+                 "; a smaller step size or strength is needed");
+        }
+        return loss.addGradient(moving.links().triangles(), adapter.positions(), matches, gradient);
+      },
+      progress, watch);
   report.step_count = adapter.stepCount();
   made.mesh = options.lands_on_target
-                  ? movedMesh(given, merged, landed(target, links, adapter.positions(), ball), ball,
-                              alignment)
-                  : moved();
+                  ? moving.mesh(landed(target, moving.links(), adapter.positions(), ball))
+                  : moving.mesh(adapter.positions());
   if (options.report_count > 0) {
     advance(progress, 1.0, "Measuring the mesh");
     report.is_measured = true;
     report.before = surfaceDifference(viewOf(samplesOf(given, options)), viewOf(target));
     report.after = surfaceDifference(viewOf(samplesOf(made.mesh, options)), viewOf(target));
   }
-  advance(progress, 1.0, kStage);
+  advance(progress, 1.0, kAdaptingStage);
   return made;
 }
 

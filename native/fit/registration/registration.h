@@ -25,6 +25,8 @@ struct RegistrationOptions {
   uint64_t report_count = 100000;   ///< samples of each side that the report is measured by; 0: no
                                     ///< report; 2^24 at most
   uint64_t seed = 0;                ///< of all samples
+  uint32_t picture_side = 256;      ///< of targets that are images: pixels of the longer side that
+                                    ///< are looked at, 16 to 4096
   std::vector<Landmark> landmarks;  ///< vertices of the template as it is given
 };
 
@@ -40,6 +42,8 @@ struct RegistrationReport {
                                 ///< the other way round: its normals were taken the other way round
   uint32_t step_count = 0;      ///< steps that were taken: fewer where a watch has ended them
   double loss = 0;              ///< of the last step, without density, in the unit ball
+  double picture_before = 0;    ///< of targets that are images: mean difference of their numbers
+  double picture_after = 0;     ///< from those of the template, as given and as it became
 };
 
 struct RegisteredMesh {
