@@ -1,5 +1,6 @@
 #include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -78,24 +79,44 @@ Landmarks landmarksOf(const std::vector<std::string>& texts) {
 struct Target {
   Mesh mesh;
   Cloud cloud;
+  std::string points;  ///< path of a file of them
 
   StippleMeshAdaptTarget given() const {
     auto target = sized<StippleMeshAdaptTarget>();
     target.mesh = mesh.get();
     target.cloud = cloud.get();
+    target.points_path_utf8 = points.empty() ? nullptr : points.c_str();
     return target;
   }
 };
+
+/// True for a PLY file whose vertices have no sizes: points of a scan, or vertices of a mesh.
+bool isPlyOfPoints(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  if (!std::getline(file, line) || !line.starts_with("ply")) return false;
+  constexpr size_t kMostLines = 4096;
+  for (size_t i = 0; i < kMostLines && std::getline(file, line); ++i) {
+    if (line.starts_with("end_header")) return true;
+    if (line.find(" scale_0") != std::string::npos || line.find(" packed_") != std::string::npos) {
+      return false;
+    }
+  }
+  return false;
+}
 
 Target targetOf(const Context& context, const std::string& path) {
   Target target;
   const FileKind kind = fileKind(path);
   if (kind == FileKind::kMesh) {
     target.mesh = make<Mesh>(stipple_mesh_load, context.get(), path.c_str());
+  } else if (kind == FileKind::kSplats && isPlyOfPoints(path)) {
+    target.points = path;
   } else if (kind == FileKind::kSplats) {
     target.cloud = make<Cloud>(stipple_cloud_load, context.get(), path.c_str());
   } else {
-    throw Failure("'" + path + "' is neither a mesh nor splats; a template takes the shape of one");
+    throw Failure("'" + path +
+                  "' is neither a mesh nor points nor splats; a template takes the shape of one");
   }
   return target;
 }
@@ -139,7 +160,11 @@ void adapt(const Context& context, Arguments& arguments) {
   const auto made = make<Mesh>(stipple_job_mesh, const_cast<const StippleJob*>(job.get()));
   auto figures = sized<StippleMeshAdaptReport>();
   check(stipple_job_adapt_report(job.get(), &figures));
-  check(stipple_mesh_save(made.get(), arguments.out.c_str()));
+  if (arguments.out.ends_with(".glb")) {
+    check(stipple_mesh_save_reshaped(made.get(), arguments.in.c_str(), arguments.out.c_str()));
+  } else {
+    check(stipple_mesh_save(made.get(), arguments.out.c_str()));
+  }
   auto info = sized<StippleMeshInfo>();
   check(stipple_mesh_info(made.get(), &info));
   Report report;
@@ -176,13 +201,17 @@ void addWeights(CLI::App& command, StippleMeshAdaptOptions& options) {
 void addAdapt(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
-      "adapt", "A mesh takes another's shape or that of splats, and keeps its triangles");
+      "adapt",
+      "A mesh takes the shape of another, of points or of splats, and keeps its triangles");
   command->add_option("template", arguments->in, "Mesh (.gltf, .glb) whose vertices move")
       ->required();
-  command->add_option("target", arguments->target, "Mesh (.gltf, .glb) or splat file")->required();
+  command
+      ->add_option("target", arguments->target, "Mesh (.gltf, .glb), points (.ply) or splat file")
+      ->required();
   command
       ->add_option("out", arguments->out,
-                   "Mesh (.glb, .ply): positions and triangles, in the template's order")
+                   "Mesh: .glb with all that the template's file holds, or .ply with positions and "
+                   "triangles in its order")
       ->required();
   command
       ->add_option("--density", arguments->density,

@@ -9,7 +9,7 @@
 
 namespace stipple {
 
-constexpr uint32_t kMediaTableVersion = 6;
+constexpr uint32_t kMediaTableVersion = 7;
 
 extern "C" {
 
@@ -59,6 +59,14 @@ struct StippleMediaMesh {
   uint64_t triangle_count;
   const float* positions;     ///< [V,3] metres, Z up
   const uint32_t* triangles;  ///< [T,3]
+};
+
+/// The shape of a mesh that was read from a file. The arrays are the caller's.
+struct StippleMediaShape {
+  uint64_t vertex_count;
+  uint64_t triangle_count;
+  const float* positions;       ///< [V,3] metres, Z up
+  const float* corner_normals;  ///< [T,3,3] or null
 };
 
 /// One texture of a mesh; its pixels are the array kMediaTexturePixels + index.
@@ -162,6 +170,9 @@ struct StippleMediaTable {
   void (*mesh_read)(const char* path, const StippleMediaSink* sink, StippleMediaStatus* status);
   /// GLB, Y up.
   void (*mesh_write)(const char* path, const StippleMediaMesh* mesh, StippleMediaStatus* status);
+  /// The file `source`, whose meshes have another shape, as a GLB: everything else in it stays.
+  void (*mesh_reshape)(const char* source, const char* path, const StippleMediaShape* shape,
+                       StippleMediaStatus* status);
   void (*volume_write)(const char* path, const StippleMediaVolume* volume,
                        StippleMediaStatus* status);
   void (*volume_read)(const char* path, double* voxel_size, double* origin,

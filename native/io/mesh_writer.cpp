@@ -59,4 +59,22 @@ void writeMeshFile(const TriMesh& mesh, const std::string& path) {
   }
 }
 
+void writeReshapedMesh(const TriMesh& mesh, const std::string& source, const std::string& path) {
+  validate(mesh);
+  if (lowerExtension(path) != ".glb") {
+    fail(ErrorCode::kUnsupported, path + " cannot be written with all that " + source +
+                                      " holds: its extension is '" + lowerExtension(path) +
+                                      "'; .glb is supported");
+  }
+  const StippleMediaShape shape = {
+      mesh.vertexCount(), mesh.triangleCount(), mesh.positions.data(),
+      mesh.corner_normals.empty() ? nullptr : mesh.corner_normals.data()};
+  const StippleMediaTable& media = mediaTable();
+  writeByLibrary(path, [&](const char* temporary) {
+    callMedia([&](StippleMediaStatus* status) {
+      media.mesh_reshape(source.c_str(), temporary, &shape, status);
+    });
+  });
+}
+
 }  // namespace stipple

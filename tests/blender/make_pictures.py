@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 import pytest
 
+import adapting_tour_steps
 import densify_tour_steps
 import fit_tour_steps
 import moving_tour_steps
@@ -29,7 +30,7 @@ IMAGES = Path(__file__).resolve().parent.parent.parent / 'docs' / 'images'
 
 @pytest.mark.parametrize('steps,size', ((picture_steps, (screen.WIDTH, screen.HEIGHT)), (tour_steps, (1600, 1300)),
                                         (fit_tour_steps, (1600, 1000)), (densify_tour_steps, (1400, 1100)),
-                                        (moving_tour_steps, (1400, 1000)),
+                                        (moving_tour_steps, (1400, 1000)), (adapting_tour_steps, (1600, 900)),
                                         (selection_tour_steps, (1280, selection_tour_steps.HEIGHT))),
                          ids=lambda value: getattr(value, '__name__', ''))
 def test_pictures_of_windows(tmp_path, steps, size):

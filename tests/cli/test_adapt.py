@@ -128,5 +128,130 @@ def test_bad_input_gets_one_sentence(shapes, tmp_path):
     assert 'off, uniform, adaptive' in error('adapt', sphere_glb, egg, out, '--density', 'much')
     assert 'strength of the density is -1' in error('adapt', sphere_glb, egg, out, '--strength', -1)
     assert '.glb or .ply' in error('adapt', sphere_glb, egg, tmp_path / 'out.obj')
-    assert 'neither a mesh nor splats' in error('adapt', sphere_glb, tmp_path / 'a.vdb', out)
+    assert 'neither a mesh nor points nor splats' in error('adapt', sphere_glb, tmp_path / 'a.vdb', out)
     assert not out.exists()
+
+
+# ---- what a file of the template keeps ------------------------------------------------------------
+
+def read_glb(path):
+    """(JSON, binary part) of a GLB."""
+    data = path.read_bytes()
+    length = struct.unpack_from('<I', data, 12)[0]
+    return json.loads(data[20:20 + length]), data[28 + length:]
+
+
+def rows(head, binary, index):
+    """An accessor of floats or bytes."""
+    accessor = head['accessors'][index]
+    view = head['bufferViews'][accessor['bufferView']]
+    kind = {5126: '<f4', 5121: 'u1', 5125: '<u4'}[accessor['componentType']]
+    width = {'SCALAR': 1, 'VEC2': 2, 'VEC3': 3, 'VEC4': 4, 'MAT4': 16}[accessor['type']]
+    return np.frombuffer(binary, kind, accessor['count'] * width, view.get('byteOffset', 0)).reshape(-1, width)
+
+
+def dressed(path):
+    """Gives a file of write_glb() normals, UVs, a skin with weights, a morph target, a material, and what nobody
+    knows."""
+    head, binary = read_glb(path)
+    binary = binary[:head['buffers'][0]['byteLength']]
+    places = rows(head, binary, 0)
+    count = len(places)
+    random = np.random.default_rng(3)
+
+    def add(values, kind, component):
+        nonlocal binary
+        binary += b'\0' * (-len(binary) % 4)
+        head['bufferViews'].append({'buffer': 0, 'byteOffset': len(binary), 'byteLength': values.nbytes})
+        binary += values.tobytes()
+        head['accessors'].append({'bufferView': len(head['bufferViews']) - 1, 'componentType': component,
+                                  'count': len(values), 'type': kind})
+        return len(head['accessors']) - 1
+
+    primitive = head['meshes'][0]['primitives'][0]
+    weights = random.random((count, 4)).astype('<f4')
+    primitive['attributes'] |= {
+        'NORMAL': add(places, 'VEC3', 5126), 'TANGENT': add(np.ones((count, 4), '<f4'), 'VEC4', 5126),
+        'TEXCOORD_0': add(random.random((count, 2)).astype('<f4'), 'VEC2', 5126),
+        'JOINTS_0': add(np.zeros((count, 4), 'u1'), 'VEC4', 5121),
+        'WEIGHTS_0': add(weights / weights.sum(axis=1, keepdims=True), 'VEC4', 5126),
+        '_MINE': add(random.random((count, 1)).astype('<f4'), 'SCALAR', 5126)}
+    difference = add(random.random((count, 3)).astype('<f4'), 'VEC3', 5126)
+    head['accessors'][difference] |= {'min': [0, 0, 0], 'max': [1, 1, 1]}
+    primitive |= {'material': 0, 'targets': [{'POSITION': difference}]}
+    head['materials'] = [{'name': 'Skin', 'pbrMetallicRoughness': {'roughnessFactor': 0.3}}]
+    head['meshes'][0] |= {'weights': [0.5], 'extras': {'targetNames': ['Smile']}}
+    matrices = add(np.eye(4, dtype='<f4').reshape(1, 16), 'MAT4', 5126)
+    head['nodes'][0]['skin'] = 0
+    head['nodes'].append({'name': 'Bone'})
+    head['scenes'][0]['nodes'].append(1)
+    head['skins'] = [{'joints': [1], 'inverseBindMatrices': matrices}]
+    head['extensionsUsed'] = ['MY_extension']
+    head['extensions'] = {'MY_extension': {'number': 0.1, 'list': [1, 'two']}}
+    head['buffers'][0]['byteLength'] = len(binary)
+    text = json.dumps(head).encode()
+    text += b' ' * (-len(text) % 4)
+    binary += b'\0' * (-len(binary) % 4)
+    path.write_bytes(struct.pack('<4sII', b'glTF', 2, 28 + len(text) + len(binary)) +
+                     struct.pack('<I4s', len(text), b'JSON') + text + struct.pack('<I4s', len(binary), b'BIN\0') +
+                     binary)
+
+
+def test_a_glb_keeps_all_that_the_template_has(shapes, tmp_path):
+    dressed(shapes[0])
+    run('adapt', *shapes, tmp_path / 'out.glb', *QUICK)
+    run('adapt', *shapes, tmp_path / 'out.ply', *QUICK)
+    before, old = read_glb(shapes[0])
+    after, new = read_glb(tmp_path / 'out.glb')
+    was, now = (head['meshes'][0]['primitives'][0].pop('attributes') for head in (before, after))
+    for name in ('TEXCOORD_0', 'JOINTS_0', 'WEIGHTS_0', '_MINE'):
+        np.testing.assert_array_equal(rows(after, new, now[name]), rows(before, old, was[name]))
+    assert set(now) == set(was) - {'TANGENT'}
+    for key in set(before) - {'buffers', 'bufferViews', 'accessors'}:
+        assert after[key] == before[key], key
+    places = rows(after, new, now['POSITION'])
+    positions, _ = read_ply(tmp_path / 'out.ply')
+    np.testing.assert_allclose(np.stack([places[:, 0], -places[:, 2], places[:, 1]], axis=1), positions, atol=1e-6)
+    accessor = after['accessors'][now['POSITION']]
+    np.testing.assert_array_equal(accessor['min'], places.min(axis=0))
+    np.testing.assert_array_equal(accessor['max'], places.max(axis=0))
+    normals = rows(after, new, now['NORMAL'])
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
+    # Those of an egg with half-axes of 1.2, 0.6 (up) and 0.8; each is the mean around a vertex.
+    wanted = places / np.square([1.2, 0.6, 0.8])
+    wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
+    assert (normals * wanted).sum(axis=1).mean() > 0.98
+    difference = after['meshes'][0]['primitives'][0]['targets'][0]['POSITION']
+    np.testing.assert_array_equal(rows(after, new, difference), rows(before, old, difference))
+
+
+def test_points_of_a_scan_are_a_target(shapes, tmp_path):
+    points, _ = sphere(5)
+    normals = points / [1.2, 0.8, 0.6]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    values = np.hstack([points * [1.2, 0.8, 0.6], normals]).astype('<f4')
+    names = ('x', 'y', 'z', 'nx', 'ny', 'nz')
+    for count, has_normals in ((6, True), (3, False)):
+        head = f'ply\nformat binary_little_endian 1.0\nelement vertex {len(values)}\n'
+        head += ''.join(f'property float {name}\n' for name in names[:count]) + 'end_header\n'
+        (tmp_path / 'scan.ply').write_bytes(head.encode() + np.ascontiguousarray(values[:, :count]).tobytes())
+        seen = figures('adapt', shapes[0], tmp_path / 'scan.ply', tmp_path / 'out.ply', *QUICK)
+        assert seen['distance_after'] < 0.05 and ('normals_after' in seen) == has_normals
+        positions, _ = read_ply(tmp_path / 'out.ply')
+        np.testing.assert_allclose(np.linalg.norm(positions / [1.2, 0.8, 0.6], axis=1), 1, atol=0.15)
+    (tmp_path / 'scan.ply').write_bytes(b'ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\n'
+                                        b'property float z\nend_header\n')
+    assert '0 points' in error('adapt', shapes[0], tmp_path / 'scan.ply', tmp_path / 'out.ply')
+
+
+def test_a_mesh_that_is_shown_twice_has_no_one_shape(shapes, tmp_path):
+    head, binary = read_glb(shapes[0])
+    head['nodes'].append({'mesh': 0, 'translation': [3, 0, 0]})
+    head['scenes'][0]['nodes'].append(1)
+    text = json.dumps(head).encode()
+    text += b' ' * (-len(text) % 4)
+    shapes[0].write_bytes(struct.pack('<4sII', b'glTF', 2, 28 + len(text) + len(binary)) +
+                          struct.pack('<I4s', len(text), b'JSON') + text +
+                          struct.pack('<I4s', len(binary), b'BIN\0') + binary)
+    assert 'shows mesh 0 several times' in error('adapt', *shapes, tmp_path / 'out.glb', '--steps', 1)
+    run('adapt', *shapes, tmp_path / 'out.ply', '--steps', 1)

@@ -82,6 +82,7 @@ FUNCTIONS = {
     'stipple_mesh_read': (_status, [_handle, _to(s.StippleMeshBuffers)]),
     'stipple_mesh_topology': (_status, [_handle, _to(s.StippleMeshTopology)]),
     'stipple_mesh_save': (_status, [_handle, _path]),
+    'stipple_mesh_save_reshaped': (_status, [_handle, _path, _path]),
     'stipple_mesh_adapt_options_init': (None, [_to(s.StippleMeshAdaptOptions)]),
     'stipple_mesh_adapt_start': (_status, [_handle, _to(s.StippleMeshAdaptTarget), _to(s.StippleMeshAdaptOptions),
                                            _out_handle]),

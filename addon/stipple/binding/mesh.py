@@ -108,3 +108,8 @@ class Mesh(Handle):
     def save(self, path):
         """Writes positions and triangles: .ply or .glb."""
         self._check(self.library.stipple_mesh_save(self.pointer, path_bytes(path)))
+
+    def save_reshaped(self, source, path):
+        """Writes the glTF file that the mesh was loaded from as a .glb, with its positions and normals; all else in it
+        stays."""
+        self._check(self.library.stipple_mesh_save_reshaped(self.pointer, path_bytes(source), path_bytes(path)))

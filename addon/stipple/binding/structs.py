@@ -128,7 +128,8 @@ class StippleMeshTopology(_Sized):
 
 class StippleMeshAdaptTarget(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('mesh', c_void_p), ('cloud', c_void_p),
-                ('points', _floats), ('normals', _floats), ('point_count', c_uint64)]
+                ('points', _floats), ('normals', _floats), ('point_count', c_uint64),
+                ('points_path_utf8', c_char_p)]
 
 
 class StippleMeshAdaptOptions(_Sized):

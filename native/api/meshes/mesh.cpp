@@ -190,4 +190,12 @@ StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8) 
       [&] { writeMeshFile(*require(mesh, "mesh").mesh, &require(path_utf8, "path_utf8")); });
 }
 
+StippleStatus stipple_mesh_save_reshaped(const StippleMesh* mesh, const char* source_utf8,
+                                         const char* path_utf8) {
+  return guarded([&] {
+    writeReshapedMesh(*require(mesh, "mesh").mesh, &require(source_utf8, "source_utf8"),
+                      &require(path_utf8, "path_utf8"));
+  });
+}
+
 }  // extern "C"

@@ -7,6 +7,7 @@
 #include "api/handles.h"
 #include "api/job.h"
 #include "fit/registration/registration.h"
+#include "io/views/ply_points.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -46,9 +47,12 @@ RegistrationOptions optionsFrom(const StippleMeshAdaptOptions* options) {
 
 TargetSource sourceFrom(const StippleMeshAdaptTarget* target) {
   const StippleMeshAdaptTarget given = complete(target, "target");
-  if ((given.mesh != nullptr) + (given.cloud != nullptr) + (given.points != nullptr) != 1) {
+  if ((given.mesh != nullptr) + (given.cloud != nullptr) + (given.points != nullptr) +
+          (given.points_path_utf8 != nullptr) !=
+      1) {
     fail(ErrorCode::kInvalidArgument,
-         "target has several of mesh, cloud and points, or none; exactly one must be given");
+         "target has several of mesh, cloud, points and the path of points, or none; exactly one "
+         "must be given");
   }
   TargetSource source;
   if (given.mesh) source.mesh = given.mesh->mesh;
@@ -57,6 +61,11 @@ TargetSource sourceFrom(const StippleMeshAdaptTarget* target) {
     const size_t numbers = requireTriples(given.point_count, "target->point_count");
     source.points.assign(given.points, given.points + numbers);
     if (given.normals) source.normals.assign(given.normals, given.normals + numbers);
+  }
+  if (given.points_path_utf8) {
+    PointSet points = readPlyPoints(given.points_path_utf8, true);
+    source.points = std::move(points.positions);
+    source.normals = std::move(points.normals);
   }
   return source;
 }

@@ -456,6 +456,13 @@ StippleStatus stipple_mesh_topology(const StippleMesh* mesh, StippleMeshTopology
 /* Writes positions and triangles in the format that the extension says: .ply, or .glb (Z up becomes Y up).
  * Errors: UNAVAILABLE without libstipple_media.so for .glb. */
 StippleStatus stipple_mesh_save(const StippleMesh* mesh, const char* path_utf8);
+/* Writes the glTF or GLB file that a mesh was loaded from as a .glb, with the positions of this mesh, which has its
+ * vertices and triangles in its order, and with its normals where the file has some. Everything else in the file stays:
+ * UVs, colours, materials, pictures, nodes, skins, animations, morph targets as differences from the new shape.
+ * Tangents go, since they belong to the old shape.
+ * Errors: IO; FORMAT; INVALID_ARGUMENT for a mesh of other numbers of vertices or triangles; UNSUPPORTED for another
+ * extension and for a file that shows a mesh several times; UNAVAILABLE without libstipple_media.so. */
+StippleStatus stipple_mesh_save_reshaped(const StippleMesh* mesh, const char* source_utf8, const char* path_utf8);
 
 /* ---- meshes that take another shape --------------------------------------------------------------- */
 
@@ -474,7 +481,7 @@ typedef enum StippleMeshAlignment {
   STIPPLE_MESH_ALIGN_SIMILARITY = 3 /* the same, and scaled */
 } StippleMeshAlignment;
 
-/* Exactly one of mesh, cloud and points is given. */
+/* Exactly one of mesh, cloud, points and points_path_utf8 is given. */
 typedef struct StippleMeshAdaptTarget {
   uint32_t struct_size;
   uint32_t reserved;
@@ -483,6 +490,7 @@ typedef struct StippleMeshAdaptTarget {
   const float* points;        /* [P,3] metres */
   const float* normals;       /* [P,3] of any length, or NULL: none are known */
   uint64_t point_count;       /* P */
+  const char* points_path_utf8; /* a .ply whose vertices are the points, with nx ny nz for normals where it has them */
 } StippleMeshAdaptTarget;
 
 /* Weights are those of the target in the unit ball, whatever the unit of the scene is. */
@@ -500,7 +508,7 @@ typedef struct StippleMeshAdaptOptions {
   double strength;            /* of the density, >= 0, default 1.5 */
   double adaptive_factor;     /* by which adapting is stronger than evening out, >= 0, default 3 */
   double smoothness;          /* lambda of I + lambda L, >= 0, default 10: broader steps, later detail */
-  double step_size;           /* 0..10, default 0.05 */
+  double step_size;           /* 0..10, default 0.05; it falls to a tenth over the last quarter of the steps */
   double position_weight;     /* of the mean squared distance, >= 0, default 1 */
   double normal_weight;       /* of the mean of 1 - cosine between normals, >= 0, default 1 */
   double landmark_weight;     /* of the mean squared distance of landmarks, >= 0, default 1 */

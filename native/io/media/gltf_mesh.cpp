@@ -15,6 +15,7 @@
 #include "io/media/gltf_accessor.h"
 #include "io/media/gltf_material.h"
 #include "io/media/gltf_model.h"
+#include "io/media/gltf_primitives.h"
 #include "io/media/gltf_scene.h"
 #include "io/media/media_calls.h"
 #include "math/vec.h"
@@ -23,53 +24,18 @@ namespace stipple::media {
 
 namespace {
 
-const std::set<std::string> kKnownExtensions = {"KHR_texture_transform", "KHR_mesh_quantization",
-                                                "KHR_materials_unlit", "EXT_texture_webp"};
-
-/// glTF is Y up and looks along +Z; here Z is up: (x, y, z) → (x, −z, y).
-Mat4d zUp() {
-  Mat4d matrix;
-  matrix << 1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1;
-  return matrix;
-}
-
-/// How many corners the triangles of a primitive with so many indices have.
-uint64_t cornerCount(uint64_t index_count, int mode) {
-  if (mode == TINYGLTF_MODE_TRIANGLES) return index_count / 3 * 3;
-  return index_count < 3 ? 0 : (index_count - 2) * 3;
-}
-
-/// Corners of the triangles of a primitive, three per triangle.
-std::vector<uint32_t> triangleCorners(const std::vector<uint32_t>& indices, int mode) {
-  if (mode == TINYGLTF_MODE_TRIANGLES) {
-    std::vector<uint32_t> corners = indices;
-    corners.resize(corners.size() / 3 * 3);
-    return corners;
-  }
-  std::vector<uint32_t> corners;
-  for (size_t i = 0; i + 2 < indices.size(); ++i) {
-    if (mode == TINYGLTF_MODE_TRIANGLE_FAN) {
-      corners.insert(corners.end(), {indices[0], indices[i + 1], indices[i + 2]});
-    } else {
-      // Every second triangle of a strip is turned.
-      const size_t odd = i % 2;
-      corners.insert(corners.end(), {indices[i], indices[i + 1 + odd], indices[i + 2 - odd]});
-    }
-  }
-  return corners;
-}
-
 class GltfReader {
  public:
   explicit GltfReader(const std::string& path)
       : path_(path),
-        scene_(path, kKnownExtensions, GltfScene::Content::kMesh),
+        scene_(path, knownMeshExtensions(), GltfScene::Content::kMesh),
         model_(scene_.model()),
         materials_(model_, path_, scene_, mesh_) {}
 
   TriMesh read() {
     requireAllowedUses();
-    scene_.visitMeshes(zUp(), [this](size_t mesh, const Mat4d& matrix) { addMesh(mesh, matrix); });
+    scene_.visitMeshes(gltfToZUp(),
+                       [this](size_t mesh, const Mat4d& matrix) { addMesh(mesh, matrix); });
     if (mesh_.triangles.empty()) {
       fail(ErrorCode::kFormat, path_ + " holds no triangles in its scene; at least one is needed");
     }
@@ -86,12 +52,12 @@ class GltfReader {
     constexpr uint64_t kCornerBytes = sizeof(uint32_t) + (3 + 4 + 2) * sizeof(float);
     constexpr uint64_t kBeyondMeasure = uint64_t{1} << 50;
     if (!hasSurface(primitive)) return 0;
-    const int position = attribute(primitive, "POSITION");
+    const int position = attributeOf(primitive, "POSITION");
     requireAccessor(model_, position, 3, what + ", POSITION");
     const uint64_t vertices = accessorCount(model_, position, what + ", POSITION");
-    const uint64_t indices = primitive.indices < 0 ? vertices
-                                                   : accessorCount(model_, primitive.indices,
-                                                                   what + ", indices");
+    const uint64_t indices = primitive.indices < 0
+                                 ? vertices
+                                 : accessorCount(model_, primitive.indices, what + ", indices");
     if (vertices > kBeyondMeasure || indices > kBeyondMeasure) return kBeyondMeasure;
     const uint64_t corners = cornerCount(indices, modeOf(primitive));
     return vertices * kVertexBytes + corners * kCornerBytes + corners / 3 * sizeof(uint32_t);
@@ -107,8 +73,8 @@ class GltfReader {
       const auto& primitives = model_.meshes[mesh].primitives;
       for (size_t p = 0; is_new && p < primitives.size(); ++p) {
         entry->second += bytesOf(primitives[p], nameOf(mesh, p));
-        requireInstances(entry->second, std::to_string(p + 1) + " primitives of mesh " +
-                                            std::to_string(mesh));
+        requireInstances(entry->second,
+                         std::to_string(p + 1) + " primitives of mesh " + std::to_string(mesh));
       }
       bytes += entry->second;
       requireInstances(bytes, std::to_string(++uses) + " uses of its meshes");
@@ -123,17 +89,6 @@ class GltfReader {
     return path_ + ": mesh " + std::to_string(mesh) + ", primitive " + std::to_string(primitive);
   }
 
-  static int modeOf(const tinygltf::Primitive& primitive) {
-    return primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
-  }
-
-  /// Points and lines have no surface.
-  static bool hasSurface(const tinygltf::Primitive& primitive) {
-    const int mode = modeOf(primitive);
-    return mode >= TINYGLTF_MODE_TRIANGLES && mode <= TINYGLTF_MODE_TRIANGLE_FAN &&
-           attribute(primitive, "POSITION") >= 0;
-  }
-
   void addMesh(size_t index, const Mat4d& matrix) {
     const tinygltf::Mesh& mesh = model_.meshes[index];
     for (size_t p = 0; p < mesh.primitives.size(); ++p) {
@@ -143,14 +98,9 @@ class GltfReader {
     }
   }
 
-  static int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
-    const auto found = primitive.attributes.find(name);
-    return found == primitive.attributes.end() ? -1 : found->second;
-  }
-
   void addPrimitive(const tinygltf::Primitive& primitive, const Mat4d& matrix,
                     const std::string& what) {
-    const int position = attribute(primitive, "POSITION");
+    const int position = attributeOf(primitive, "POSITION");
     const std::vector<float> positions = readFloats(model_, position, 3, what + ", POSITION");
     const size_t count = positions.size() / 3;
     requireFiniteHere(positions, 3, what + ", POSITION");
@@ -159,26 +109,9 @@ class GltfReader {
       fail(ErrorCode::kUnsupported, path_ + " holds more than 4,294,967,295 vertices");
     }
 
-    std::vector<uint32_t> indices;
-    if (primitive.indices >= 0) {
-      indices = readIndices(model_, primitive.indices, what + ", indices");
-      for (const uint32_t index : indices) {
-        if (index >= count) {
-          fail(ErrorCode::kFormat,
-               what + " uses vertex " + std::to_string(index) + " of " + std::to_string(count));
-        }
-      }
-    } else {
-      indices.resize(count);
-      for (size_t i = 0; i < count; ++i) indices[i] = static_cast<uint32_t>(i);
-    }
-    std::vector<uint32_t> corners = triangleCorners(indices, modeOf(primitive));
+    const std::vector<uint32_t> corners = surfaceCorners(model_, primitive, count, matrix, what);
     // Files have such parts although glTF wants one element at least; they add nothing.
     if (corners.empty()) return;
-    // A mirroring transform turns the triangles inside out; this turns them back.
-    if (matrix.topLeftCorner<3, 3>().determinant() < 0) {
-      for (size_t t = 0; t + 2 < corners.size(); t += 3) std::swap(corners[t + 1], corners[t + 2]);
-    }
 
     for (size_t i = 0; i < count; ++i) {
       const Eigen::Vector4d local(double(positions[i * 3]), double(positions[i * 3 + 1]),
@@ -194,7 +127,7 @@ class GltfReader {
     addNormals(primitive, matrix, corners, count, what);
     addColours(primitive, corners, count, what);
     const MaterialUse use =
-        materials_.use(primitive.material, attribute(primitive, "COLOR_0") >= 0);
+        materials_.use(primitive.material, attributeOf(primitive, "COLOR_0") >= 0);
     addUvs(primitive, use, corners, count, what);
     mesh_.triangle_materials.insert(mesh_.triangle_materials.end(), corners.size() / 3,
                                     use.material);
@@ -202,7 +135,7 @@ class GltfReader {
 
   void addNormals(const tinygltf::Primitive& primitive, const Mat4d& matrix,
                   const std::vector<uint32_t>& corners, size_t count, const std::string& what) {
-    const int accessor = attribute(primitive, "NORMAL");
+    const int accessor = attributeOf(primitive, "NORMAL");
     if (accessor < 0) {
       mesh_.corner_normals.resize(mesh_.corner_normals.size() + corners.size() * 3, 0.0f);
       return;
@@ -232,7 +165,7 @@ class GltfReader {
 
   void addColours(const tinygltf::Primitive& primitive, const std::vector<uint32_t>& corners,
                   size_t count, const std::string& what) {
-    const int accessor = attribute(primitive, "COLOR_0");
+    const int accessor = attributeOf(primitive, "COLOR_0");
     if (accessor < 0) {
       mesh_.corner_colours.resize(mesh_.corner_colours.size() + corners.size() * 4, 1.0f);
       return;
@@ -258,7 +191,7 @@ class GltfReader {
     }
     any_uvs_ = true;
     const std::string name = "TEXCOORD_" + std::to_string(use.uv_set);
-    const int accessor = attribute(primitive, name);
+    const int accessor = attributeOf(primitive, name);
     if (accessor < 0) {
       fail(ErrorCode::kFormat, what + " has a textured material but no " + name);
     }

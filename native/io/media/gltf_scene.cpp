@@ -118,6 +118,14 @@ Mat4d localMatrix(const tinygltf::Node& node) {
 
 }  // namespace
 
+std::string gltfText(const std::string& path) {
+  const InputFile file(path);
+  std::array<uint8_t, sizeof(uint32_t)> magic = {};
+  file.readAt(0, magic.data(), std::min<size_t>(magic.size(), file.size()));
+  const bool is_binary = loadLittleEndian<uint32_t>(magic.data()) == kGlbMagic;
+  return is_binary ? jsonPart(file) : readTextFile(path, std::numeric_limits<unsigned>::max());
+}
+
 struct GltfScene::Walk {
   const Visit& visit;
   size_t visited = 0;

@@ -13,6 +13,9 @@ namespace stipple::media {
 
 struct GltfModel;
 
+/// The JSON of a glTF or GLB file that GltfScene accepts.
+std::string gltfText(const std::string& path);
+
 /// A glTF or GLB file in memory, and walks through its default scene.
 /// Errors: kFormat with what tinygltf says, kUnsupported (a required extension that is not known).
 class GltfScene {

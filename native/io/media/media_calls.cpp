@@ -88,27 +88,18 @@ void stipple_media_mesh_read(const char* path, const StippleMediaSink* sink,
 }
 
 extern "C" const StippleMediaTable* stipple_media_table(uint32_t version) {
-  static const StippleMediaTable kTable = {kMediaTableVersion,
-                                           stipple_media_image_read,
-                                           stipple_media_image_header,
-                                           stipple_media_png_write,
-                                           stipple_media_exr_write,
-                                           stipple_media_exr_channels_read,
-                                           stipple_media_mesh_read,
-                                           stipple_media_mesh_write,
-                                           stipple_media_volume_write,
-                                           stipple_media_volume_read,
-                                           stipple_media_volume_surface,
-                                           stipple_media_gzip_unpack,
-                                           stipple_media_gzip_pack,
-                                           stipple_media_zstd_unpack,
-                                           stipple_media_zstd_pack,
-                                           stipple_media_webp_size,
-                                           stipple_media_webp_decode,
-                                           stipple_media_webp_encode,
-                                           stipple_media_zip_inflate,
-                                           stipple_media_zip_checksum,
-                                           stipple_media_gltf_splats_read};
+  static const StippleMediaTable kTable = {
+      kMediaTableVersion,         stipple_media_image_read,
+      stipple_media_image_header, stipple_media_png_write,
+      stipple_media_exr_write,    stipple_media_exr_channels_read,
+      stipple_media_mesh_read,    stipple_media_mesh_write,
+      stipple_media_mesh_reshape, stipple_media_volume_write,
+      stipple_media_volume_read,  stipple_media_volume_surface,
+      stipple_media_gzip_unpack,  stipple_media_gzip_pack,
+      stipple_media_zstd_unpack,  stipple_media_zstd_pack,
+      stipple_media_webp_size,    stipple_media_webp_decode,
+      stipple_media_webp_encode,  stipple_media_zip_inflate,
+      stipple_media_zip_checksum, stipple_media_gltf_splats_read};
   return version == kMediaTableVersion ? &kTable : nullptr;
 }
 

@@ -26,6 +26,8 @@ void stipple_media_mesh_read(const char* path, const StippleMediaSink* sink,
                              StippleMediaStatus* status);
 void stipple_media_mesh_write(const char* path, const StippleMediaMesh* mesh,
                               StippleMediaStatus* status);
+void stipple_media_mesh_reshape(const char* source, const char* path,
+                                const StippleMediaShape* shape, StippleMediaStatus* status);
 void stipple_media_volume_write(const char* path, const StippleMediaVolume* volume,
                                 StippleMediaStatus* status);
 void stipple_media_volume_read(const char* path, double* voxel_size, double* origin,

@@ -36,7 +36,7 @@ float fullScale(PlyType type) {
 
 }  // namespace
 
-PointSet readPlyPoints(const std::string& path) {
+PointSet readPlyPoints(const std::string& path, bool with_normals) {
   const InputFile file(path);
   const PlyHeader header = readPlyHeader(file);
   PlyRowReader rows(file, header);
@@ -70,6 +70,12 @@ PointSet readPlyPoints(const std::string& path) {
   for (size_t i = 0; has_colour && i < 3; ++i) {
     columns.push_back({*colour[i], &points.colours, i, 3});
   }
+  const std::optional<size_t> normal[3] = {find(*vertices, "nx"), find(*vertices, "ny"),
+                                           find(*vertices, "nz")};
+  const bool has_normals = with_normals && normal[0] && normal[1] && normal[2];
+  for (size_t i = 0; has_normals && i < 3; ++i) {
+    columns.push_back({*normal[i], &points.normals, i, 3});
+  }
   std::vector<float> times;
   const std::optional<size_t> time = find(*vertices, "time");
   if (time) columns.push_back({*time, &times, 0, 1});
@@ -78,6 +84,7 @@ PointSet readPlyPoints(const std::string& path) {
   points.positions.resize(count * 3);
   points.colours.assign(count * 3, kGrey);
   points.opacities.assign(count, 1.0f);
+  if (has_normals) points.normals.resize(count * 3);
   if (time) times.resize(count);
   const PlyRowLayout layout = rows.layout(*vertices);
   std::vector<char> block(std::min(count, kBlockRows) * layout.stride);
@@ -98,6 +105,7 @@ PointSet readPlyPoints(const std::string& path) {
   for (float& value : points.colours) value = srgbToLinear(value);
   try {
     requireFinite(points.positions.data(), points.positions.size(), 3, "position of vertex");
+    requireFinite(points.normals.data(), points.normals.size(), 3, "normal of vertex");
     requireFinite(points.colours.data(), points.colours.size(), 3, "colour of vertex");
     requireFinite(times.data(), times.size(), 1, "time of vertex");
   } catch (const Error& error) {
