@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/dataset.h"
 #include "cli/numbers.h"
 #include "cli/report.h"
 
@@ -36,6 +37,7 @@ struct Arguments {
   StippleMeshAdaptOptions options = defaults();
   int64_t steps = options.steps;
   int64_t points = static_cast<int64_t>(options.target_count);
+  int64_t image_size = options.picture_side;
   bool json = false;
 };
 
@@ -80,11 +82,13 @@ struct Target {
   Mesh mesh;
   Cloud cloud;
   std::string points;  ///< path of a file of them
+  Views views;
 
   StippleMeshAdaptTarget given() const {
     auto target = sized<StippleMeshAdaptTarget>();
     target.mesh = mesh.get();
     target.cloud = cloud.get();
+    target.views = views.get();
     target.points_path_utf8 = points.empty() ? nullptr : points.c_str();
     return target;
   }
@@ -114,9 +118,13 @@ Target targetOf(const Context& context, const std::string& path) {
     target.points = path;
   } else if (kind == FileKind::kSplats) {
     target.cloud = make<Cloud>(stipple_cloud_load, context.get(), path.c_str());
+  } else if (kind == FileKind::kViews) {
+    target.views = openViews(context, path, 1);
   } else {
     throw Failure("'" + path +
-                  "' is neither a mesh nor points nor splats; a template takes the shape of one");
+                  "' is neither a mesh nor points, splats or images with cameras; a template takes "
+                  "the shape of "
+                  "one");
   }
   return target;
 }
@@ -128,10 +136,15 @@ void requireMeshExtension(const std::string& path) {
   throw Failure("'" + path + "' cannot be written as a mesh; .glb or .ply is expected");
 }
 
-void addFigures(Report& report, const StippleMeshAdaptReport& figures) {
+void addFigures(Report& report, const StippleMeshAdaptReport& figures, bool is_of_views) {
   report.add("places", figures.place_count);
   report.add("loose_vertices", figures.loose_count);
   report.add("turned_normals", figures.turned_normals != 0 ? "yes" : "no");
+  if (is_of_views) {
+    report.add("difference_before", figures.picture_before);
+    report.add("difference_after", figures.picture_after);
+    return;
+  }
   report.add("distance_before", figures.distance_before);
   report.add("distance_after", figures.distance_after);
   if (figures.has_normals == 0) return;
@@ -147,6 +160,7 @@ void adapt(const Context& context, Arguments& arguments) {
   options.alignment = chosen(kAlignments, arguments.align, "--align");
   options.steps = counted32(arguments.steps, "--steps");
   options.target_count = counted(arguments.points, "--points");
+  options.picture_side = counted32(arguments.image_size, "--image-size");
   const Landmarks landmarks = landmarksOf(arguments.landmarks);
   options.landmark_count = landmarks.vertices.size();
   options.landmark_vertices = landmarks.vertices.data();
@@ -170,7 +184,7 @@ void adapt(const Context& context, Arguments& arguments) {
   Report report;
   report.add("vertices", info.vertex_count);
   report.add("triangles", info.triangle_count);
-  addFigures(report, figures);
+  addFigures(report, figures, static_cast<bool>(target.views));
   report.add("seconds", secondsSince(start));
   report.print(arguments.json);
 }
@@ -202,11 +216,14 @@ void addAdapt(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
       "adapt",
-      "A mesh takes the shape of another, of points or of splats, and keeps its triangles");
+      "A mesh takes the shape of another, of points, splats or images, and keeps its triangles");
   command->add_option("template", arguments->in, "Mesh (.gltf, .glb) whose vertices move")
       ->required();
   command
-      ->add_option("target", arguments->target, "Mesh (.gltf, .glb), points (.ply) or splat file")
+      ->add_option(
+          "target", arguments->target,
+          "Mesh (.gltf, .glb), points (.ply), splat file, or data set of images with alpha or "
+          "masks")
       ->required();
   command
       ->add_option("out", arguments->out,
@@ -222,6 +239,10 @@ void addAdapt(CLI::App& app, const Context& context) {
       ->capture_default_str();
   command->add_option("--steps", arguments->steps, "More: closer")->capture_default_str();
   command->add_option("--points", arguments->points, "Of the target; more: finer detail, and time")
+      ->capture_default_str();
+  command
+      ->add_option("--image-size", arguments->image_size,
+                   "Of images: pixels of the longer side that are looked at")
       ->capture_default_str();
   command->add_option("--landmark", arguments->landmarks,
                       "VERTEX:X,Y,Z: where a vertex of the template belongs, metres, Z up; "

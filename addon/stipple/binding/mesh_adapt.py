@@ -11,6 +11,7 @@ from .handle import contiguous, new_handle, pointer_to
 from .job import Job
 from .mesh import Mesh
 from .structs import StippleMeshAdaptOptions, StippleMeshAdaptReport, StippleMeshAdaptTarget
+from .views import Views
 
 
 class Adaptation(Job):
@@ -31,7 +32,7 @@ def start_adapt(template, target, landmarks=(), **settings):
     """Starts giving a Mesh the shape of a target, as an Adaptation: Mesh.of_job() of it is the template with other
     positions.
 
-    target: a Mesh, a Cloud, or (points [P,3], normals [P,3] or None). landmarks: (vertex of the template, place [3])
+    target: a Mesh, a Cloud, Views, or (points [P,3], normals [P,3] or None). landmarks: (vertex of the template, place [3])
     each, metres. settings: fields of StippleMeshAdaptOptions. Errors: StippleError."""
     library = template.library
     options = StippleMeshAdaptOptions()
@@ -58,6 +59,8 @@ def _target(target):
     """(struct, what it points to)."""
     if isinstance(target, Mesh):
         return StippleMeshAdaptTarget(mesh=target.pointer), target
+    if isinstance(target, Views):
+        return StippleMeshAdaptTarget(views=target.pointer), target
     if isinstance(target, Cloud):
         return StippleMeshAdaptTarget(cloud=target.pointer), target
     points = _rows(target[0], 'points of the target')

@@ -129,7 +129,7 @@ class StippleMeshTopology(_Sized):
 class StippleMeshAdaptTarget(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('mesh', c_void_p), ('cloud', c_void_p),
                 ('points', _floats), ('normals', _floats), ('point_count', c_uint64),
-                ('points_path_utf8', c_char_p)]
+                ('points_path_utf8', c_char_p), ('views', c_void_p)]
 
 
 class StippleMeshAdaptOptions(_Sized):
@@ -138,7 +138,8 @@ class StippleMeshAdaptOptions(_Sized):
                 ('report_count', c_uint64), ('seed', c_uint64), ('strength', c_double), ('adaptive_factor', c_double),
                 ('smoothness', c_double), ('step_size', c_double), ('position_weight', c_double),
                 ('normal_weight', c_double), ('landmark_weight', c_double), ('symmetric_weight', c_double),
-                ('landmark_count', c_uint64), ('landmark_vertices', POINTER(c_uint32)), ('landmark_places', _floats)]
+                ('landmark_count', c_uint64), ('landmark_vertices', POINTER(c_uint32)), ('landmark_places', _floats),
+                ('picture_side', c_uint32), ('reserved', c_uint32)]
 
 
 class StippleMeshAdaptReport(_Sized):
@@ -146,7 +147,7 @@ class StippleMeshAdaptReport(_Sized):
                 ('turned_normals', c_uint32), ('place_count', c_uint64), ('loose_count', c_uint64), ('loss', c_double),
                 ('distance_before', c_double), ('distance_after', c_double), ('squared_before', c_double),
                 ('squared_after', c_double), ('normals_before', c_double), ('normals_after', c_double),
-                ('step_count', c_uint64)]
+                ('step_count', c_uint64), ('picture_before', c_double), ('picture_after', c_double)]
 
 
 class StippleDensityInfo(_Sized):

@@ -3,10 +3,11 @@
 #include <string>
 #include <utility>
 
+#include "api/conversions.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
-#include "fit/registration/registration.h"
+#include "fit/registration/picture_registration.h"
 #include "io/views/ply_points.h"
 
 using namespace stipple;
@@ -36,6 +37,7 @@ RegistrationOptions optionsFrom(const StippleMeshAdaptOptions* options) {
   made.lands_on_target =
       enumValue<uint32_t>(given.lands_on_target, 1, "options->lands_on_target") == 1;
   made.seed = given.seed;
+  made.picture_side = given.picture_side;
   if (requireTriples(given.landmark_count, "options->landmark_count") > 0) {
     made.landmarks = landmarksOf(
         {&require(given.landmark_vertices, "options->landmark_vertices"), given.landmark_count},
@@ -48,15 +50,17 @@ RegistrationOptions optionsFrom(const StippleMeshAdaptOptions* options) {
 TargetSource sourceFrom(const StippleMeshAdaptTarget* target) {
   const StippleMeshAdaptTarget given = complete(target, "target");
   if ((given.mesh != nullptr) + (given.cloud != nullptr) + (given.points != nullptr) +
-          (given.points_path_utf8 != nullptr) !=
+          (given.points_path_utf8 != nullptr) + (given.views != nullptr) !=
       1) {
     fail(ErrorCode::kInvalidArgument,
-         "target has several of mesh, cloud, points and the path of points, or none; exactly one "
+         "target has several of mesh, cloud, points, the path of points and views, or none; "
+         "exactly one "
          "must be given");
   }
   TargetSource source;
   if (given.mesh) source.mesh = given.mesh->mesh;
   if (given.cloud) source.cloud = given.cloud->cloud;
+  if (given.views) source.views = sourceOf(*given.views);
   if (given.points) {
     const size_t numbers = requireTriples(given.point_count, "target->point_count");
     source.points.assign(given.points, given.points + numbers);
@@ -93,6 +97,7 @@ void stipple_mesh_adapt_options_init(StippleMeshAdaptOptions* options) {
   options->target_count = defaults.target_count;
   options->report_count = defaults.report_count;
   options->seed = defaults.seed;
+  options->picture_side = defaults.picture_side;
   options->strength = defaults.adapter.strength;
   options->adaptive_factor = defaults.adapter.adaptive_factor;
   options->smoothness = defaults.adapter.smoothness;
@@ -111,16 +116,15 @@ StippleStatus stipple_mesh_adapt_start(const StippleMesh* given,
     TargetSource source = sourceFrom(target);
     RegistrationOptions chosen = optionsFrom(options);
     require(job, "job");
-    given->context->requireMemory(registrationMemoryBound(*mesh, source, chosen),
+    given->context->requireMemory(registerToMemoryBound(*mesh, source, chosen),
                                   "adapting the mesh");
     auto watch = std::make_shared<RegistrationWatch>();
     *job = startJob(
         given->context,
         [mesh, watch, source = std::move(source),
          chosen = std::move(chosen)](Progress& progress) -> JobResult {
-          const RegistrationTarget aim = targetOf(source, chosen.target_count, chosen.seed);
           return std::make_shared<const RegisteredMesh>(
-              registerMesh(*mesh, aim, chosen, &progress, watch.get()));
+              registerTo(*mesh, source, chosen, &progress, watch.get()));
         },
         nullptr, nullptr, watch);
   });
@@ -132,8 +136,7 @@ StippleStatus stipple_mesh_adapt_memory_bound(const StippleMesh* given,
                                               uint64_t* bytes) {
   return guarded([&] {
     const TriMesh& mesh = *require(given, "given").mesh;
-    require(bytes, "bytes") =
-        registrationMemoryBound(mesh, sourceFrom(target), optionsFrom(options));
+    require(bytes, "bytes") = registerToMemoryBound(mesh, sourceFrom(target), optionsFrom(options));
   });
 }
 
@@ -161,6 +164,8 @@ StippleStatus stipple_job_adapt_report(const StippleJob* job, StippleMeshAdaptRe
     out.place_count = from.place_count;
     out.loose_count = from.loose_count;
     out.step_count = from.step_count;
+    out.picture_before = from.picture_before;
+    out.picture_after = from.picture_after;
     out.loss = from.loss;
     out.distance_before = from.before.distance;
     out.distance_after = from.after.distance;

@@ -103,4 +103,18 @@ uint64_t pictureRegistrationMemoryBound(const TriMesh& given, const ViewSource& 
   return bytes;
 }
 
+RegisteredMesh registerTo(const TriMesh& given, const TargetSource& source,
+                          const RegistrationOptions& options, Progress* progress,
+                          RegistrationWatch* watch) {
+  if (source.views) return registerToPictures(given, *source.views, options, progress, watch);
+  return registerMesh(given, targetOf(source, options.target_count, options.seed), options,
+                      progress, watch);
+}
+
+uint64_t registerToMemoryBound(const TriMesh& given, const TargetSource& source,
+                               const RegistrationOptions& options) {
+  return source.views ? pictureRegistrationMemoryBound(given, *source.views, options)
+                      : registrationMemoryBound(given, source, options);
+}
+
 }  // namespace stipple

@@ -21,4 +21,11 @@ RegisteredMesh registerToPictures(const TriMesh& given, const ViewSource& views,
 uint64_t pictureRegistrationMemoryBound(const TriMesh& given, const ViewSource& views,
                                         const RegistrationOptions& options);
 
+/// Whichever of both a target needs. Errors: theirs, and those of targetOf().
+RegisteredMesh registerTo(const TriMesh& given, const TargetSource& source,
+                          const RegistrationOptions& options, Progress* progress = nullptr,
+                          RegistrationWatch* watch = nullptr);
+uint64_t registerToMemoryBound(const TriMesh& given, const TargetSource& source,
+                               const RegistrationOptions& options);
+
 }  // namespace stipple

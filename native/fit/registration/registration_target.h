@@ -39,16 +39,19 @@ RegistrationTarget targetOfSplats(const SplatCloud& cloud, size_t count);
 RegistrationTarget targetOfPoints(std::span<const float> points, std::span<const float> normals,
                                   size_t count);
 
-/// What a target is made of, in shares: exactly one of the three, none being points of which there
+class ViewSource;
+
+/// What a target is made of, in shares: exactly one of the four, none being points of which there
 /// are none.
 struct TargetSource {
   std::shared_ptr<const TriMesh> mesh;
   std::shared_ptr<const SplatCloud> cloud;
+  std::shared_ptr<const ViewSource> views;
   std::vector<float> points, normals;  ///< as of targetOfPoints()
 };
 
-/// The target of whichever it is. Errors: as above. Options: the count is that of the points, seed
-/// of a mesh's.
+/// The target of whichever it is, views apart, which are no surface. Errors: as above. Options: the
+/// count is that of the points, seed of a mesh's.
 RegistrationTarget targetOf(const TargetSource& source, size_t count, uint64_t seed);
 
 }  // namespace stipple

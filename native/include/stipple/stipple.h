@@ -481,7 +481,7 @@ typedef enum StippleMeshAlignment {
   STIPPLE_MESH_ALIGN_SIMILARITY = 3 /* the same, and scaled */
 } StippleMeshAlignment;
 
-/* Exactly one of mesh, cloud, points and points_path_utf8 is given. */
+/* Exactly one of mesh, cloud, points, points_path_utf8 and views is given. */
 typedef struct StippleMeshAdaptTarget {
   uint32_t struct_size;
   uint32_t reserved;
@@ -491,6 +491,9 @@ typedef struct StippleMeshAdaptTarget {
   const float* normals;       /* [P,3] of any length, or NULL: none are known */
   uint64_t point_count;       /* P */
   const char* points_path_utf8; /* a .ply whose vertices are the points, with nx ny nz for normals where it has them */
+  const StippleViews* views;    /* images with alpha or masks, of one surface of one colour in one light: outlines
+                                   and shades tell its shape. Alignment none or size; no landmarks; the numbers of
+                                   points and samples and the weights of distances have no part */
 } StippleMeshAdaptTarget;
 
 /* Weights are those of the target in the unit ball, whatever the unit of the scene is. */
@@ -516,13 +519,16 @@ typedef struct StippleMeshAdaptOptions {
   uint64_t landmark_count;            /* L, default 0 */
   const uint32_t* landmark_vertices;  /* [L] of the template */
   const float* landmark_places;       /* [L,3] metres, where they belong */
+  uint32_t picture_side;      /* of views: pixels of the longer side that are looked at, 16..4096, default 256: finer
+                                 detail, and its square in time */
+  uint32_t reserved;
 } StippleMeshAdaptOptions;
 void stipple_mesh_adapt_options_init(StippleMeshAdaptOptions* options);
 
 /* Distances are means of both ways, metres: from samples of each side to the nearest place of the other. */
 typedef struct StippleMeshAdaptReport {
   uint32_t struct_size;
-  uint32_t is_measured;    /* 0: report_count was 0, and the six numbers at the end are 0 */
+  uint32_t is_measured;    /* 0: report_count was 0 or the target is views, and the six numbers from distance_before are 0 */
   uint32_t has_normals;    /* 0: the target knows none, and their differences are 0 */
   uint32_t turned_normals; /* 1: template and target looked opposite ways, one in and one out; the target was turned */
   uint64_t place_count;    /* of the template: vertices, those in one place once */
@@ -535,6 +541,8 @@ typedef struct StippleMeshAdaptReport {
   double normals_before;   /* mean squared difference of unit normals, 0..4 */
   double normals_after;
   uint64_t step_count;     /* steps that were taken: fewer after stipple_mesh_adapt_finish */
+  double picture_before;   /* of views, for which is_measured is 0: mean difference of linear colours and coverage */
+  double picture_after;
 } StippleMeshAdaptReport;
 
 /* Gives a template the shape of a target by moving its vertices, as a job (stipple_job_mesh): triangles, their order,
@@ -543,7 +551,7 @@ typedef struct StippleMeshAdaptReport {
  * of threads; a cancelled job leaves nothing.
  * Errors of the start: INVALID_ARGUMENT, MEMORY_LIMIT; of the job: INVALID_ARGUMENT for a template of fewer than four
  * triangles with area, NaN, a target without points, extent or visible splats, landmarks of vertices that are missing
- * or loose.
+ * or loose, views without alpha and masks, of which fewer than two are there, or which look the same way.
  * Cost: steps times a k-d tree of target_count * samples_per_point samples and some solves.
  * Source: Jung, Kim et al., Mesh Density Adaptation for Template-based Shape Reconstruction, SIGGRAPH 2023.
  * docs/methods/mesh_adaptation.md. */
