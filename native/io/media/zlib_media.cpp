@@ -2,6 +2,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
 #include <new>
 #include <string>
@@ -69,7 +70,7 @@ std::vector<uint8_t> packedPiece(const char* what, const uint8_t* bytes, uint64_
     fail(ErrorCode::kInternal,
          std::string(what) + " cannot be packed: zlib reports " + std::to_string(code));
   }
-  packed.resize(packed.size() - stream.avail_out);
+  packed.erase(packed.end() - static_cast<std::ptrdiff_t>(stream.avail_out), packed.end());
   return packed;
 }
 
