@@ -4,6 +4,7 @@ import struct
 
 import numpy as np
 import pytest
+from node_packages import gltf_issues
 from test_tool import error, figures, run
 
 
@@ -169,23 +170,25 @@ def dressed(path):
         return len(head['accessors']) - 1
 
     primitive = head['meshes'][0]['primitives'][0]
-    weights = random.random((count, 4)).astype('<f4')
+    shares = random.random(count)
+    weights = np.stack([shares, 1 - shares, 0 * shares, 0 * shares], axis=1).astype('<f4')
     primitive['attributes'] |= {
-        'NORMAL': add(places, 'VEC3', 5126), 'TANGENT': add(np.ones((count, 4), '<f4'), 'VEC4', 5126),
+        'NORMAL': add(places, 'VEC3', 5126), 'TANGENT': add(np.tile(np.float32([1, 0, 0, 1]), (count, 1)), 'VEC4', 5126),
         'TEXCOORD_0': add(random.random((count, 2)).astype('<f4'), 'VEC2', 5126),
-        'JOINTS_0': add(np.zeros((count, 4), 'u1'), 'VEC4', 5121),
-        'WEIGHTS_0': add(weights / weights.sum(axis=1, keepdims=True), 'VEC4', 5126),
+        'JOINTS_0': add(np.tile(np.uint8([0, 1, 0, 0]), (count, 1)), 'VEC4', 5121),
+        'WEIGHTS_0': add(weights, 'VEC4', 5126),
         '_MINE': add(random.random((count, 1)).astype('<f4'), 'SCALAR', 5126)}
     difference = add(random.random((count, 3)).astype('<f4'), 'VEC3', 5126)
-    head['accessors'][difference] |= {'min': [0, 0, 0], 'max': [1, 1, 1]}
+    values = rows(head, binary, difference)
+    head['accessors'][difference] |= {'min': values.min(axis=0).tolist(), 'max': values.max(axis=0).tolist()}
     primitive |= {'material': 0, 'targets': [{'POSITION': difference}]}
     head['materials'] = [{'name': 'Skin', 'pbrMetallicRoughness': {'roughnessFactor': 0.3}}]
     head['meshes'][0] |= {'weights': [0.5], 'extras': {'targetNames': ['Smile']}}
-    matrices = add(np.eye(4, dtype='<f4').reshape(1, 16), 'MAT4', 5126)
+    matrices = add(np.tile(np.eye(4, dtype='<f4').reshape(1, 16), (2, 1)), 'MAT4', 5126)
     head['nodes'][0]['skin'] = 0
-    head['nodes'].append({'name': 'Bone'})
+    head['nodes'] += [{'name': 'Bone', 'children': [2]}, {'name': 'Tip', 'translation': [0, 1, 0]}]
     head['scenes'][0]['nodes'].append(1)
-    head['skins'] = [{'joints': [1], 'inverseBindMatrices': matrices}]
+    head['skins'] = [{'joints': [1, 2], 'inverseBindMatrices': matrices}]
     head['extensionsUsed'] = ['MY_extension']
     head['extensions'] = {'MY_extension': {'number': 0.1, 'list': [1, 'two']}}
     head['buffers'][0]['byteLength'] = len(binary)
@@ -223,6 +226,13 @@ def test_a_glb_keeps_all_that_the_template_has(shapes, tmp_path):
     assert (normals * wanted).sum(axis=1).mean() > 0.98
     difference = after['meshes'][0]['primitives'][0]['targets'][0]['POSITION']
     np.testing.assert_array_equal(rows(after, new, difference), rows(before, old, difference))
+
+
+def test_a_glb_of_an_adapted_mesh_is_valid(shapes, tmp_path):
+    dressed(shapes[0])
+    run('adapt', *shapes, tmp_path / 'out.glb', '--steps', 10, '--points', 500)
+    wrong = [issue for issue in gltf_issues(tmp_path / 'out.glb') if issue['severity'] == 0]
+    assert not wrong, wrong[:3]
 
 
 def test_points_of_a_scan_are_a_target(shapes, tmp_path):
