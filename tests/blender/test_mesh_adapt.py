@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes that take the shape of a target, or even out: Adapt Mesh to Target, Even Out Mesh."""
 
+import importlib
 import re
 
 import bpy
@@ -9,6 +10,7 @@ import pytest
 from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 
+import photo_set
 import scenes
 
 QUICK = {'steps': 120, 'points': 4000}
@@ -426,6 +428,55 @@ def test_linked_meshes_are_refused(stipple, tmp_path):
         into.objects = ['Ball']
     target, obj = head(), scenes.link(bpy.data.objects['Ball'])
     assert "'Ball' is linked from another file" in refusal(lambda: adapt(target, obj))
+
+
+# ---- images --------------------------------------------------------------------------------------
+
+@pytest.fixture
+def photographed(stipple, tmp_path):
+    """(the head, its data set: 12 images around it in the light of a world)."""
+    target = head()
+    target.rotation_euler = (0.3, 0.0, 0.8)
+    scenes.material('Clay', obj=target)
+    bpy.context.view_layer.update()
+    capture = importlib.import_module('.scene.fit.view_capture', stipple.__name__)
+    rigs = importlib.import_module('.scene.fit.view_rigs', stipple.__name__)
+    photo_set.write(rigs, capture, target, tmp_path / 'set', 12, capture.CaptureSettings('CYCLES', 64, 4))
+    return target, tmp_path / 'set'
+
+
+def test_a_ball_takes_the_shape_that_images_show(stipple, photographed, capfd):
+    target, folder = photographed
+    obj = template()
+    obj.location, obj.scale = (1.0, 0.2, -0.5), (0.5, 0.5, 0.5)
+    scenes.select(obj)
+    weights = [[entry.weight for entry in vertex.groups] for vertex in obj.data.vertices]
+    done = bpy.ops.stipple.mesh_adapt_to_images(filepath=str(folder / 'transforms.json'), alignment='SIZE', steps=150,
+                                                image_size=64)
+    assert done == {'FINISHED'}
+    assert re.search(r"'Ball' differed from the images of 'set' by \d+\.\d\d% on average, and differs by 0\.\d\d% now",
+                     capfd.readouterr().out)
+    key = obj.data.shape_keys.key_blocks['Adapted to set']
+    assert key.value == 1.0
+    assert [[entry.weight for entry in vertex.groups] for vertex in obj.data.vertices] == weights
+    # A pixel is 0.06 where the head is. Half of the vertices, since the back of the eyes shows in no outline.
+    assert np.median(distances(shown(obj), target)) < 0.03
+
+
+def test_images_without_transparency_are_refused(stipple, photographed):
+    _, folder = photographed
+    for path in folder.glob('*.png'):
+        image = bpy.data.images.load(str(path))
+        pixels = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        pixels[3::4] = 1
+        image.pixels.foreach_set(pixels)
+        image.alpha_mode = 'NONE'
+        image.save()
+    obj = template()
+    scenes.select(obj)
+    words = refusal(lambda: bpy.ops.stipple.mesh_adapt_to_images(filepath=str(folder / 'transforms.json'), steps=5))
+    assert 'fitted to images that show where it ends' in words and obj.data.shape_keys is None
 
 
 # ---- what a preview leaves -----------------------------------------------------------------------

@@ -71,6 +71,7 @@ def _draw_adapt(self, context):
         self.layout.separator()
         self.layout.operator_context = 'INVOKE_DEFAULT'
         self.layout.operator('stipple.mesh_adapt', icon='MOD_SHRINKWRAP')
+        self.layout.operator('stipple.mesh_adapt_to_images', icon='IMAGE_BACKGROUND')
         self.layout.operator('stipple.mesh_even_out', icon='MOD_SMOOTH')
 
 

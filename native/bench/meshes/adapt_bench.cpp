@@ -1,5 +1,6 @@
-// Meshes that take a shape. Reference: the solves and the nearest-neighbour queries of the same
-// steps alone, which no implementation of the method goes without.
+// Meshes that take a shape. References: the solves and the nearest-neighbour queries of the same
+// steps alone, which no implementation of the method goes without; of images, drawing the mesh once
+// into each by the renderer that has no derivatives.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -10,9 +11,11 @@
 
 #include "base/parallel.h"
 #include "bench/comparison.h"
+#include "fit/registration/picture_loss.h"
 #include "fit/registration/registration_loss.h"
 #include "mesh/adapt/mesh_adapter.h"
 #include "mesh/adapt/point_rows.h"
+#include "mesh/mesh_image.h"
 
 namespace stipple::bench {
 
@@ -119,6 +122,61 @@ void step(benchmark::State& state) {
       });
   state.counters["step_ms"] = state.counters["best_ms"] / kSteps;
 }
+
+/// A camera on a ring around the origin, at three times the radius of the sphere.
+Camera onRing(size_t i, size_t count) {
+  constexpr uint32_t kSide = 128;
+  const double turn = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(count);
+  Camera camera;
+  camera.width = camera.height = kSide;
+  camera.fx = camera.fy = kSide;
+  camera.cx = camera.cy = 0.5 * kSide;
+  camera.world_to_camera.topRows<3>() << -std::sin(turn), std::cos(turn), 0, 0,  //
+      0, 0, -1, 0,                                                               //
+      -std::cos(turn), -std::sin(turn), 0, 3;
+  return camera;
+}
+
+void pictureStep(benchmark::State& state) {
+  constexpr size_t kViews = 24;
+  const Shape shape = tenThousand();
+  const MeshLinks links(shape.positions.size(), shape.triangles);
+  TriMesh mesh;
+  mesh.materials.resize(1);
+  mesh.triangles = shape.triangles;
+  for (const Vec3d& p : shape.positions) {
+    for (int axis = 0; axis < 3; ++axis) mesh.positions.push_back(static_cast<float>(p[axis]));
+  }
+  const SurfaceColour colour(mesh);
+  std::vector<TargetPicture> pictures;
+  for (size_t i = 0; i < kViews; ++i) {
+    TargetPicture picture{onRing(i, kViews), {}};
+    picture.pixels.resize(size_t{picture.camera.width} * picture.camera.height * 4);
+    drawMeshImage(mesh, colour, picture.camera, 1, picture.pixels);
+    pictures.push_back(std::move(picture));
+  }
+  std::vector<Vec3d> positions = shape.positions, gradient(positions.size());
+  for (Vec3d& p : positions) p *= 0.9;
+  PictureLoss loss(pictures, links);
+  std::vector<float> image(pictures[0].pixels.size());
+  compare(
+      state, "draws",
+      [&] {
+        std::fill(gradient.begin(), gradient.end(), Vec3d::Zero());
+        loss.addGradient(positions, 3.0, gradient);
+      },
+      [&] {
+        for (const TargetPicture& picture : pictures) {
+          drawMeshImage(mesh, colour, picture.camera, 1, image);
+        }
+      });
+}
+
+BENCHMARK(pictureStep)
+    ->Name("mesh.picture_step.10k")
+    ->UseManualTime()
+    ->Iterations(kRounds)
+    ->Unit(benchmark::kMillisecond);
 
 BENCHMARK(step)
     ->Name("mesh.adapt_steps.10k")

@@ -2,9 +2,9 @@
 // SIGGRAPH 2023, its inverse rendering. Differs: the light is not given but found.
 #include "fit/registration/picture_loss.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "base/error.h"
@@ -12,6 +12,7 @@
 #include "data/views/view_resample.h"
 #include "math/affine.h"
 #include "math/colour.h"
+#include "math/ray_meeting.h"
 #include "mesh/adapt/moving_samples.h"
 
 namespace stipple {
@@ -21,8 +22,6 @@ namespace {
 constexpr size_t kFewestViews = 2;
 /// What nearly nothing covers has no colour to speak of.
 constexpr float kLeastAlpha = 0.5f;
-/// Of the mean of the diagonal: light that no normal of the mesh can tell stays nearly dark.
-constexpr double kLightRidge = 1e-4;
 
 [[noreturn]] void refuse(const std::string& message) {
   fail(ErrorCode::kInvalidArgument, message);
@@ -106,13 +105,12 @@ std::vector<TargetPicture> targetPictures(const ViewSource& views, uint32_t side
 }
 
 UnitBall ballOfPictures(std::span<const TargetPicture> pictures) {
-  Mat3d matrix = Mat3d::Zero();
-  Vec3d right = Vec3d::Zero();
   struct Ray {
     const Camera& camera;
     double area;
   };
   std::vector<Ray> rays;
+  std::vector<Line> lines;
   for (const TargetPicture& picture : pictures) {
     const Covered covered = coveredOf(picture);
     if (!(covered.area > 0)) continue;
@@ -125,18 +123,13 @@ UnitBall ballOfPictures(std::span<const TargetPicture> pictures) {
               (Vec3d(direction.x(), direction.y(), 0) - translationPart(camera.world_to_camera));
       direction = Vec3d(0, 0, 1);
     }
-    direction = (to_world * direction).normalized();
-    const Mat3d across = Mat3d::Identity() - direction * direction.transpose();
-    matrix += across;
-    right += across * place;
+    lines.push_back({place, (to_world * direction).normalized()});
     rays.push_back({camera, covered.area});
   }
-  const Eigen::LDLT<Mat3d> solver(matrix);
-  // The smallest pivot of n rays is about n times the square of the angle between them.
-  const bool meet = solver.vectorD().minCoeff() > 1e-4 * static_cast<double>(rays.size());
-  if (!meet) refuse("the cameras all look the same way; their images leave the depth open");
+  const std::optional<Vec3d> middle = nearestToLines(lines);
+  if (!middle) refuse("the cameras all look the same way; their images leave the depth open");
   UnitBall ball;
-  ball.middle = solver.solve(right);
+  ball.middle = *middle;
   double sum = 0;
   for (const Ray& ray : rays) {
     const Vec3d seen = linearPart(ray.camera.world_to_camera) * ball.middle +
@@ -177,11 +170,9 @@ std::vector<Vec3d> PictureLoss::coloursOf(std::span<const Vec3d> normals) const 
 }
 
 void PictureLoss::findLight(std::span<const MeshView> views, std::span<const Vec3d> normals) {
-  using Matrix = Eigen::Matrix<double, HarmonicLight::kTerms, HarmonicLight::kTerms>;
-  using Right = Eigen::Matrix<double, HarmonicLight::kTerms, 3>;
   std::vector<HarmonicLight::Terms> terms(normals.size());
   for (size_t v = 0; v < terms.size(); ++v) terms[v] = HarmonicLight::terms(normals[v]);
-  std::vector<std::pair<Matrix, Right>> sums(views.size(), {Matrix::Zero(), Right::Zero()});
+  std::vector<LightFit> fits(views.size());
   const std::span<const uint32_t> triangles = links_.triangles();
   parallelFor(views.size(), 1, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
@@ -197,20 +188,14 @@ void PictureLoss::findLight(std::span<const MeshView> views, std::span<const Vec
         const Vec3d colour = Vec3d(static_cast<double>(shown[0]), static_cast<double>(shown[1]),
                                    static_cast<double>(shown[2])) /
                              static_cast<double>(shown[3]);
-        sums[i].first += here * here.transpose();
-        sums[i].second += here * colour.transpose();
+        fits[i].add(here, colour);
       }
     }
   });
-  Matrix matrix = Matrix::Zero();
-  Right right = Right::Zero();
-  for (const auto& [of_view, right_of_view] : sums) {
-    matrix += of_view;
-    right += right_of_view;
-  }
-  if (!(matrix.trace() > 0)) return;  // no image shows the mesh where it is
-  matrix.diagonal().array() += kLightRidge * matrix.trace() / HarmonicLight::kTerms;
-  light_.colours = matrix.ldlt().solve(right);
+  LightFit all;
+  for (const LightFit& of_view : fits) all.add(of_view);
+  if (all.isEmpty()) return;  // no image shows the mesh where it is
+  light_ = all.light();
   has_light_ = true;
 }
 

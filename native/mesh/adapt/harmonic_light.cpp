@@ -1,5 +1,6 @@
 #include "mesh/adapt/harmonic_light.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 
 #include "math/cross_product.h"
@@ -8,6 +9,9 @@
 namespace stipple {
 
 namespace {
+
+/// Of the mean of the diagonal.
+constexpr double kLightRidge = 1e-4;
 
 /// Sum of the area vectors of the triangles around a vertex.
 Vec3d areasAround(const MeshLinks& links, std::span<const Vec3d> positions, size_t vertex) {
@@ -33,6 +37,24 @@ Vec3d HarmonicLight::gradient(const Vec3d& normal, const Vec3d& by_colour) const
   return {by[3] + by[4] * y + by[7] * z + 2 * by[8] * x,
           by[1] + by[4] * x + by[5] * z - 2 * by[8] * y,
           by[2] + by[5] * y + 6 * by[6] * z + by[7] * x};
+}
+
+void LightFit::add(const HarmonicLight::Terms& terms, const Vec3d& colour) {
+  matrix_ += terms * terms.transpose();
+  right_ += terms * colour.transpose();
+}
+
+void LightFit::add(const LightFit& other) {
+  matrix_ += other.matrix_;
+  right_ += other.right_;
+}
+
+HarmonicLight LightFit::light() const {
+  auto matrix = matrix_;
+  matrix.diagonal().array() += kLightRidge * matrix.trace() / HarmonicLight::kTerms;
+  HarmonicLight light;
+  light.colours = matrix.ldlt().solve(right_);
+  return light;
 }
 
 std::vector<Vec3d> vertexNormals(const MeshLinks& links, std::span<const Vec3d> positions) {

@@ -26,6 +26,23 @@ struct HarmonicLight {
   Vec3d gradient(const Vec3d& normal, const Vec3d& by_colour) const;
 };
 
+/// Least squares for the light that gives surfaces their colours.
+class LightFit {
+ public:
+  /// In: terms of a normal, or a mixture of several; the linear colour seen there.
+  void add(const HarmonicLight::Terms& terms, const Vec3d& colour);
+  void add(const LightFit& other);
+  bool isEmpty() const { return !(matrix_.trace() > 0); }
+  /// Where what was added leaves the light open it is nearly dark. Not of an empty one.
+  HarmonicLight light() const;
+
+ private:
+  Eigen::Matrix<double, HarmonicLight::kTerms, HarmonicLight::kTerms> matrix_ =
+      Eigen::Matrix<double, HarmonicLight::kTerms, HarmonicLight::kTerms>::Zero();
+  Eigen::Matrix<double, HarmonicLight::kTerms, 3> right_ =
+      Eigen::Matrix<double, HarmonicLight::kTerms, 3>::Zero();
+};
+
 /// Normals of vertices: of the area vectors of their triangles, [n], unit; 0 where they sum up to
 /// 0.
 std::vector<Vec3d> vertexNormals(const MeshLinks& links, std::span<const Vec3d> positions);

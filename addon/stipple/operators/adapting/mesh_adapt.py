@@ -15,7 +15,7 @@ from ...scene import adapting
 from ...scene.source import splat_data
 
 _PREVIEW_SECONDS = 0.5
-_DENSITIES = (('ADAPTIVE', "Adaptive", "Vertices are drawn to where the shape is complex"),
+DENSITIES = (('ADAPTIVE', "Adaptive", "Vertices are drawn to where the shape is complex"),
               ('UNIFORM', "Uniform", "All edges become about as long as each other"),
               ('OFF', "Off", "Vertices go wherever the target pulls them"))
 _ALIGNMENTS = (('NONE', "None", "The mesh lies over the target already"),
@@ -108,7 +108,7 @@ class STIPPLE_OT_mesh_adapt(AdaptOperator, bpy.types.Operator):
     bl_label = "Adapt Mesh to Target"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
-    density: EnumProperty(name="Density", description="Where vertices go along the surface", items=_DENSITIES)
+    density: EnumProperty(name="Density", description="Where vertices go along the surface", items=DENSITIES)
     alignment: EnumProperty(name="Alignment", description="What is done to the whole mesh first", items=_ALIGNMENTS)
     landmarks: StringProperty(name="Landmarks", description="Collection of empties. Each one says where the vertex "
                               "belongs that weighs most in the vertex group of its name")
@@ -146,8 +146,8 @@ class STIPPLE_OT_mesh_adapt(AdaptOperator, bpy.types.Operator):
             self.report({'WARNING'}, f"The normals of '{self._target_name}' point inwards where those of "
                         f"'{self._template.name}' point outwards, or the other way round; they were taken turned")
         before, after = (length_text(context, value) for value in (report.distance_before, report.distance_after))
-        self.report({'INFO'}, f"'{self._template.name}' was {before} away from '{self._target_name}' on average, and is "
-                    f'{after} away now')
+        self.report({'INFO'}, f"'{self._template.name}' was {before} away from '{self._target_name}' on average, and "
+                    f'is {after} away now')
 
 
 def problem_of(context):
