@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import bpy
-from mathutils import Vector
+from mathutils import Euler, Vector
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
@@ -18,10 +18,10 @@ def build(window):
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
     with window.context():
-        bpy.ops.mesh.primitive_monkey_add(size=2)
-        head = bpy.context.object
-        head.modifiers.new('Subdivision', 'SUBSURF').levels = 2
-        head.data.polygons.foreach_set('use_smooth', [True] * len(head.data.polygons))
+        bpy.ops.mesh.primitive_cube_add(size=1.6)
+        stone = bpy.context.object
+        bevel = stone.modifiers.new('Bevel', 'BEVEL')
+        bevel.width, bevel.segments = 0.15, 6
         balls = []
         for density in ('', 'OFF', 'ADAPTIVE'):
             bpy.ops.mesh.primitive_cube_add(size=2)
@@ -35,21 +35,21 @@ def build(window):
                 bpy.ops.object.modifier_apply(modifier=modifier.name)
             balls.append(ball)
             if density:
-                scenes.select(ball, head)
+                scenes.select(ball, stone)
                 bpy.ops.stipple.mesh_adapt(density=density)
-    for place, obj in enumerate((head, *balls)):
-        obj.location.x = 2.7 * place
+    for place, obj in enumerate((stone, *balls)):
+        obj.location.x, obj.rotation_euler.z = 2.7 * place, 0.5
         obj.show_wire = obj.show_all_edges = place > 0
         obj.select_set(False)
     space = window.space
+    space.overlay.show_ortho_grid = space.overlay.show_axis_z = False
     space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
     space.overlay.show_text = space.overlay.show_cursor = space.overlay.show_object_origins = False
     space.show_gizmo = space.show_region_toolbar = space.show_region_header = False
     space.overlay.show_extras = False
-    with window.context():
-        bpy.ops.view3d.view_axis(type='FRONT')
     view = window.region_data
-    view.view_location, view.view_distance = Vector((1.5 * 2.7, 0.0, 0.0)), 11.0
+    view.view_perspective, view.view_rotation = 'ORTHO', Euler((1.15, 0.0, 0.0)).to_quaternion()
+    view.view_location, view.view_distance = Vector((1.5 * 2.7, 0.0, 0.0)), 10.0
 
 
 def wait(_window):

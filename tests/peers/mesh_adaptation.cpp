@@ -1,7 +1,7 @@
 // Sphere templates onto targets with density off, uniform and adaptive, and with a Laplacian
 // penalty: how far they are from the target, as a whole and where it is most curved. By hand:
-//   mesh_adaptation [--steps N] [--sides A,B] [--modes off,adaptive] [--penalty W] [--seed S]
-//   TARGET.glb...
+//   mesh_adaptation [--steps N] [--sides A,B] [--modes off,adaptive] [--penalty W] [--last SHARE]
+//   [--seed S] TARGET.glb...
 // Without targets, the two procedural ones alone.
 #include <algorithm>
 #include <array>
@@ -279,7 +279,8 @@ size_t selfIntersections(const TriMesh& mesh) {
 }
 
 void compare(const std::string& name, const TriMesh& target, const std::vector<int>& sides,
-             const std::string& modes, uint32_t steps, double penalty, uint64_t seed) {
+             const std::string& modes, uint32_t steps, double penalty, double last_share,
+             uint64_t seed) {
   const std::vector<double> curvature = curvatures(target);
   const Places of_target = sampled(target, 4);
   std::vector<double> sorted;
@@ -299,6 +300,7 @@ void compare(const std::string& name, const TriMesh& target, const std::vector<i
                                 : mode[0] == 'a' ? MeshDensity::kAdaptive
                                                  : MeshDensity::kOff;
       if (mode[0] == 'l') options.adapter.laplacian = penalty;
+      options.adapter.last_share = last_share;
       const auto start = std::chrono::steady_clock::now();
       const RegisteredMesh made =
           registerMesh(given, targetOfMesh(target, options.target_count, seed), options);
@@ -319,7 +321,7 @@ void compare(const std::string& name, const TriMesh& target, const std::vector<i
 int main(int argc, char** argv) {
   std::vector<int> sides = {18, 41};
   uint32_t steps = 800;
-  double penalty = 0.2;
+  double penalty = 0.2, last_share = MeshAdapterOptions().last_share;
   uint64_t seed = 0;
   std::string modes = "off,uniform,adaptive,laplacian";
   std::vector<std::string> targets;
@@ -329,6 +331,8 @@ int main(int argc, char** argv) {
       steps = static_cast<uint32_t>(std::atoi(argv[++i]));
     } else if (text == "--penalty" && i + 1 < argc) {
       penalty = std::atof(argv[++i]);
+    } else if (text == "--last" && i + 1 < argc) {
+      last_share = std::atof(argv[++i]);
     } else if (text == "--modes" && i + 1 < argc) {
       modes = argv[++i];
     } else if (text == "--seed" && i + 1 < argc) {
@@ -347,9 +351,9 @@ int main(int argc, char** argv) {
       "target | vertices | density | chamfer | salient | normals | salient | flipped | "
       "crossings | seconds\n");
   for (const std::string& path : targets) {
-    compare(path, readMeshFile(path), sides, modes, steps, penalty, seed);
+    compare(path, readMeshFile(path), sides, modes, steps, penalty, last_share, seed);
   }
-  compare("ripples", shaped(ripples), sides, modes, steps, penalty, seed);
-  compare("warts", shaped(warts), sides, modes, steps, penalty, seed);
+  compare("ripples", shaped(ripples), sides, modes, steps, penalty, last_share, seed);
+  compare("warts", shaped(warts), sides, modes, steps, penalty, last_share, seed);
   return 0;
 }

@@ -469,8 +469,8 @@ StippleStatus stipple_mesh_save_reshaped(const StippleMesh* mesh, const char* so
 /* Where vertices go while a template takes the shape of a target. */
 typedef enum StippleMeshDensity {
   STIPPLE_MESH_DENSITY_OFF = 0,     /* wherever the target alone pulls them */
-  STIPPLE_MESH_DENSITY_UNIFORM = 1, /* even edges, through the first half of the steps */
-  STIPPLE_MESH_DENSITY_ADAPTIVE = 2 /* even edges through a quarter, then shorter ones where the shape is complex */
+  STIPPLE_MESH_DENSITY_UNIFORM = 1, /* even edges, through the first two fifths of the steps */
+  STIPPLE_MESH_DENSITY_ADAPTIVE = 2 /* even edges through a fifth, then shorter ones where the shape is complex */
 } StippleMeshDensity;
 
 /* What is done to the whole template before that. */
@@ -511,7 +511,7 @@ typedef struct StippleMeshAdaptOptions {
   double strength;            /* of the density, >= 0, default 1.5 */
   double adaptive_factor;     /* by which adapting is stronger than evening out, >= 0, default 3 */
   double smoothness;          /* lambda of I + lambda L, >= 0, default 10: broader steps, later detail */
-  double step_size;           /* 0..10, default 0.05; it falls to a tenth over the last quarter of the steps */
+  double step_size;           /* 0..10, default 0.05; it falls to a tenth over the last tenth of the steps */
   double position_weight;     /* of the mean squared distance, >= 0, default 1 */
   double normal_weight;       /* of the mean of 1 - cosine between normals, >= 0, default 1 */
   double landmark_weight;     /* of the mean squared distance of landmarks, >= 0, default 1 */

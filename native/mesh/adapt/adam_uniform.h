@@ -15,9 +15,9 @@ namespace stipple {
 class AdamUniform {
  public:
   AdamUniform(size_t count, double step_size);
-  /// values [count] -= step_size * first moment / (1e-8 + the largest root of a second moment),
-  /// both corrected for their start at 0. One thread. Cost: O(count).
-  void step(std::span<Vec3d> values, std::span<const Vec3d> gradient);
+  /// values [count] -= share * step_size * first moment / (1e-8 + the largest root of a second
+  /// moment), both corrected for their start at 0. One thread. Cost: O(count).
+  void step(std::span<Vec3d> values, std::span<const Vec3d> gradient, double share = 1.0);
 
  private:
   double step_size_;

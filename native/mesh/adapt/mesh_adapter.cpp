@@ -2,7 +2,7 @@
 // SIGGRAPH 2023 (energies, schedule); Nicolet, Jacobson, Jakob, Large Steps in Inverse Rendering of
 // Geometry, SIGGRAPH Asia 2021 (u = M x). Differs: all is in double precision; the optimiser begins
 // anew with each phase, since the moments of a strong energy that has gone would hold the next one
-// up.
+// up, and its step size falls at the end.
 #include "mesh/adapt/mesh_adapter.h"
 
 #include <algorithm>
@@ -38,6 +38,10 @@ void validate(const MeshAdapterOptions& options) {
     fail(ErrorCode::kInvalidArgument, "shortest length is " + std::to_string(options.shortest) +
                                           " of the mean; 0 to 1 is allowed");
   }
+  if (!(options.last_share >= 0 && options.last_share <= 1)) {
+    fail(ErrorCode::kInvalidArgument, "last share is " + std::to_string(options.last_share) +
+                                          " of the step size; 0 to 1 is allowed");
+  }
   requireRange(options.smoothness, "smoothness");
   requireRange(options.laplacian, "weight of the Laplacian penalty");
   if (!(std::isfinite(options.step_size) && options.step_size > 0 && options.step_size <= 10)) {
@@ -51,12 +55,20 @@ void validate(const MeshAdapterOptions& options) {
 }
 
 DensityPhase densityPhase(const MeshAdapterOptions& options, uint32_t step) {
-  const bool first = step < options.steps / 4;
-  if (options.density == MeshDensity::kOff || step >= options.steps / 2) return {};
+  const uint64_t fifths = uint64_t{step} * 5 / options.steps;
+  const bool first = fifths < 1;
+  if (options.density == MeshDensity::kOff || fifths >= 2) return {};
   if (first || options.density == MeshDensity::kUniform) {
     return {MeshDensity::kUniform, options.strength};
   }
   return {MeshDensity::kAdaptive, options.strength * options.adaptive_factor};
+}
+
+double stepShare(const MeshAdapterOptions& options, uint32_t step) {
+  const uint32_t begin = options.steps - options.steps / 10;
+  if (step < begin) return 1.0;
+  const double done = static_cast<double>(step - begin) / std::max(options.steps - begin, 1u);
+  return 1.0 - (1.0 - options.last_share) * std::min(done, 1.0);
 }
 
 MeshAdapter::MeshAdapter(const MeshLinks& links, std::span<const Vec3d> positions,
@@ -78,7 +90,7 @@ double MeshAdapter::step(std::span<Vec3d> gradient) {
     optimiser_ = AdamUniform(links_.vertexCount(), options_.step_size);
   }
   diffusion_.solve(gradient);
-  optimiser_.step(spread_, gradient);
+  optimiser_.step(spread_, gradient, stepShare(options_, step_));
   std::copy(spread_.begin(), spread_.end(), positions_.begin());
   diffusion_.solve(std::span<Vec3d>(positions_));
   ++step_;

@@ -14,8 +14,8 @@ namespace stipple {
 
 enum class MeshDensity : uint32_t {
   kOff = 0,       ///< what fits the target alone
-  kUniform = 1,   ///< even edges, in the first half of the steps
-  kAdaptive = 2,  ///< even edges in the first quarter, then shorter ones where the shape is complex
+  kUniform = 1,   ///< even edges, in the first two fifths of the steps
+  kAdaptive = 2,  ///< even edges in the first fifth, then shorter ones where the shape is complex
 };
 
 /// Lengths and weights are those of a mesh in the unit ball.
@@ -27,6 +27,8 @@ struct MeshAdapterOptions {
   double smoothness = 10.0;  ///< >= 0, lambda of M = I + lambda L; larger: broader steps, and
                              ///< detail that comes later
   double step_size = 0.05;   ///< > 0
+  double last_share = 0.1;   ///< 0..1, of the step size that is left at the end: it falls evenly
+                             ///< over the last tenth of the steps, so that they come to rest
   double laplacian = 0.0;    ///< >= 0, weight of the mean of |L x|^2 in all steps: a penalty that
                              ///< smooths, for comparison, since it resists density
   uint32_t steps = 800;      ///< >= 1
@@ -41,9 +43,12 @@ struct DensityPhase {
   double weight = 0;
 };
 
-/// Steps 0 to N/4 even the edges out, from there to N/2 they adapt, and then the density is left
+/// Steps 0 to N/5 even the edges out, from there to 2N/5 they adapt, and then the density is left
 /// alone, so that the energy has no part in where the surface ends.
 DensityPhase densityPhase(const MeshAdapterOptions& options, uint32_t step);
+
+/// The share of the step size that a step takes: all of it to 9/10 of N, then less and less.
+double stepShare(const MeshAdapterOptions& options, uint32_t step);
 
 /// Moves the vertices of a mesh step by step: the caller's gradient and the forces of density, both
 /// spread by M^-1, since not the positions x are optimised but u = M x. Faces are never changed.

@@ -88,16 +88,29 @@ TEST(MeshAdapter, EvensOutACrowdedSphere) {
 
 TEST(MeshAdapter, HasThreePhases) {
   MeshAdapterOptions options;
-  EXPECT_EQ(densityPhase(options, 199).goal, MeshDensity::kUniform);
-  EXPECT_EQ(densityPhase(options, 199).weight, 1.5);
-  EXPECT_EQ(densityPhase(options, 200).goal, MeshDensity::kAdaptive);
-  EXPECT_EQ(densityPhase(options, 399).weight, 4.5);
-  EXPECT_EQ(densityPhase(options, 400).goal, MeshDensity::kOff);
+  EXPECT_EQ(densityPhase(options, 159).goal, MeshDensity::kUniform);
+  EXPECT_EQ(densityPhase(options, 159).weight, 1.5);
+  EXPECT_EQ(densityPhase(options, 160).goal, MeshDensity::kAdaptive);
+  EXPECT_EQ(densityPhase(options, 319).weight, 4.5);
+  EXPECT_EQ(densityPhase(options, 320).goal, MeshDensity::kOff);
   options.density = MeshDensity::kUniform;
-  EXPECT_EQ(densityPhase(options, 399).goal, MeshDensity::kUniform);
-  EXPECT_EQ(densityPhase(options, 400).goal, MeshDensity::kOff);
+  EXPECT_EQ(densityPhase(options, 319).goal, MeshDensity::kUniform);
+  EXPECT_EQ(densityPhase(options, 320).goal, MeshDensity::kOff);
   options.density = MeshDensity::kOff;
   EXPECT_EQ(densityPhase(options, 0).goal, MeshDensity::kOff);
+}
+
+TEST(MeshAdapter, TakesShorterStepsTowardsTheEnd) {
+  MeshAdapterOptions options;
+  EXPECT_EQ(stepShare(options, 0), 1.0);
+  EXPECT_EQ(stepShare(options, 720), 1.0);
+  EXPECT_NEAR(stepShare(options, 760), 0.55, 1e-12);  // half the way from 1 to 0.1
+  EXPECT_NEAR(stepShare(options, 800), 0.1, 1e-12);
+  EXPECT_NEAR(stepShare(options, 900), 0.1, 1e-12);  // who goes on does so by small steps
+  options.steps = 1;
+  EXPECT_EQ(stepShare(options, 0), 1.0);
+  options.last_share = 1.5;
+  EXPECT_THROW(validate(options), Error);
 }
 
 TEST(MeshAdapter, IsNotHeldUpByADensityThatHasGone) {
@@ -109,7 +122,7 @@ TEST(MeshAdapter, IsNotHeldUpByADensityThatHasGone) {
   options.strength = 1000;
   MeshAdapter adapter(links, shape.positions, options);
   std::vector<Vec3d> gradient(shape.positions.size());
-  for (uint32_t step = 0; step < 20; ++step) {
+  for (uint32_t step = 0; step < 16; ++step) {
     std::fill(gradient.begin(), gradient.end(), Vec3d::Zero());
     adapter.step(gradient);
   }
