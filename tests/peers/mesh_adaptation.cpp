@@ -2,7 +2,8 @@
 // penalty: how far they are from the target, as a whole and where it is most curved. By hand:
 //   mesh_adaptation [--steps N] [--sides A,B] [--modes off,adaptive] [--penalty W] [--last SHARE]
 //   [--seed S] TARGET.glb...
-// Without targets, the two procedural ones alone.
+// Without targets, the two procedural ones alone. With --images, the sphere sees N images of 256 x
+// 256 of the target in place of its surface.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -16,6 +17,8 @@
 #include <utility>
 #include <vector>
 
+#include "../native/fit/mesh_images.h"
+#include "fit/registration/picture_registration.h"
 #include "fit/registration/registration.h"
 #include "io/mesh_file.h"
 #include "math/cross_product.h"
@@ -29,6 +32,7 @@ namespace {
 using namespace stipple;
 
 constexpr size_t kSamples = 100000;
+constexpr uint32_t kImageSide = 256;
 
 /// A unit sphere: the grid of a cube's faces, 6 side^2 + 2 vertices.
 TriMesh cubeSphere(int side) {
@@ -280,7 +284,10 @@ size_t selfIntersections(const TriMesh& mesh) {
 
 void compare(const std::string& name, const TriMesh& target, const std::vector<int>& sides,
              const std::string& modes, uint32_t steps, double penalty, double last_share,
-             uint64_t seed) {
+             uint64_t seed, size_t image_count, double step_size) {
+  const MergedVertices merged = mergeVertices(target.positions, target.triangles);
+  const MemoryViewSource pictures =
+      imagesOf(merged.positions, merged.triangles, image_count, kImageSide);
   const std::vector<double> curvature = curvatures(target);
   const Places of_target = sampled(target, 4);
   std::vector<double> sorted;
@@ -301,9 +308,12 @@ void compare(const std::string& name, const TriMesh& target, const std::vector<i
                                                  : MeshDensity::kOff;
       if (mode[0] == 'l') options.adapter.laplacian = penalty;
       options.adapter.last_share = last_share;
+      options.adapter.step_size = step_size;
       const auto start = std::chrono::steady_clock::now();
       const RegisteredMesh made =
-          registerMesh(given, targetOfMesh(target, options.target_count, seed), options);
+          image_count > 0
+              ? registerToPictures(given, pictures, options)
+              : registerMesh(given, targetOfMesh(target, options.target_count, seed), options);
       const double seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       const Figures seen = measured(made.mesh, target, of_target, curvature, *fifth);
@@ -324,6 +334,8 @@ int main(int argc, char** argv) {
   double penalty = 0.2, last_share = MeshAdapterOptions().last_share;
   uint64_t seed = 0;
   std::string modes = "off,uniform,adaptive,laplacian";
+  size_t image_count = 0;
+  double step_size = MeshAdapterOptions().step_size;
   std::vector<std::string> targets;
   for (int i = 1; i < argc; ++i) {
     const std::string text = argv[i];
@@ -333,6 +345,10 @@ int main(int argc, char** argv) {
       penalty = std::atof(argv[++i]);
     } else if (text == "--last" && i + 1 < argc) {
       last_share = std::atof(argv[++i]);
+    } else if (text == "--step" && i + 1 < argc) {
+      step_size = std::atof(argv[++i]);
+    } else if (text == "--images" && i + 1 < argc) {
+      image_count = static_cast<size_t>(std::atoi(argv[++i]));
     } else if (text == "--modes" && i + 1 < argc) {
       modes = argv[++i];
     } else if (text == "--seed" && i + 1 < argc) {
@@ -351,9 +367,12 @@ int main(int argc, char** argv) {
       "target | vertices | density | chamfer | salient | normals | salient | flipped | "
       "crossings | seconds\n");
   for (const std::string& path : targets) {
-    compare(path, readMeshFile(path), sides, modes, steps, penalty, last_share, seed);
+    compare(path, readMeshFile(path), sides, modes, steps, penalty, last_share, seed, image_count,
+            step_size);
   }
-  compare("ripples", shaped(ripples), sides, modes, steps, penalty, last_share, seed);
-  compare("warts", shaped(warts), sides, modes, steps, penalty, last_share, seed);
+  compare("ripples", shaped(ripples), sides, modes, steps, penalty, last_share, seed, image_count,
+          step_size);
+  compare("warts", shaped(warts), sides, modes, steps, penalty, last_share, seed, image_count,
+          step_size);
   return 0;
 }
