@@ -9,8 +9,9 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import photo_set  # noqa: E402
 import scenes  # noqa: E402
-from fit_steps import press  # noqa: E402
+from fit_steps import module, press  # noqa: E402
 
 folder = Path(sys.argv[sys.argv.index('--') + 2])
 facts = {}
@@ -79,7 +80,8 @@ def previewed(_window):
     key.data.foreach_get('co', places)
     if np.ptp(np.linalg.norm(places.reshape(-1, 3), axis=1)) < 0.3:
         return False
-    note('while_running', [op.bl_idname for op in bpy.context.window_manager.operators])
+    facts.setdefault('while_running', [])
+    note('while_running', facts['while_running'] + [op.bl_idname for op in bpy.context.window_manager.operators])
     return 'running'
 
 
@@ -136,5 +138,57 @@ def evened_out(_window):
     return 'evened'
 
 
+def photograph(window):
+    """Images of the head, and a fresh ball."""
+    capture = module('.scene.fit.view_capture')
+    rigs = module('.scene.fit.view_rigs')
+    head = bpy.data.objects['Head']
+    head.display_type = 'TEXTURED'
+    photo_set.write(rigs, capture, head, folder / 'set', 12, capture.CaptureSettings('CYCLES', 64, 4))
+    bpy.data.objects.remove(bpy.data.objects['Ball'])
+    with window.context():
+        scenes.select(scenes.sphere('Ball', 48, 24))
+        bpy.context.preferences.view.filebrowser_display_type = 'WINDOW'
+        bpy.ops.stipple.mesh_adapt_to_images('INVOKE_DEFAULT', steps=100000, image_size=64, alignment='SIZE')
+
+
+def browser():
+    """(window, area) of the file browser, or None."""
+    return next(((window, area) for window in bpy.context.window_manager.windows for area in window.screen.areas
+                 if area.type == 'FILE_BROWSER'), None)
+
+
+def find_images(_window):
+    found = browser()
+    params = None if found is None else found[1].spaces.active.params
+    if params is None:
+        return False
+    params.directory, params.filename = str(folder / 'set').encode(), 'transforms.json'
+    return None
+
+
+def browse(_window):
+    return 'browser'
+
+
+def choose(_window):
+    window, area = browser()
+    region = next(region for region in area.regions if region.type == 'WINDOW')
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.file.execute()
+
+
+def taught(_window):
+    if 'STIPPLE_OT_mesh_adapt_to_images' not in [op.bl_idname for op in bpy.context.window_manager.operators]:
+        return False
+    note('taught', keys())
+    return None
+
+
+def shown(_window):
+    return 'from_images'
+
+
 steps = [build, wait, ball, open_menu, wait, menu, close_menu, wait, start, previewed, escape, ended, wait, kept,
-         open_settings, wait, settings, close_menu, wait, undo, wait, undone, even_out, evened, wait, evened_out]
+         open_settings, wait, settings, close_menu, wait, undo, wait, undone, even_out, evened, wait, evened_out, photograph, find_images,
+         wait, wait, browse, choose, previewed, wait, escape, taught, wait, shown]

@@ -51,6 +51,12 @@ def test_evening_out_runs_beside_the_window_too(shots):
     assert facts['evening'] == ['RUNNING_MODAL'] and facts['evened'] == ['Basis', 'Evened Out']
 
 
+def test_images_are_chosen_in_a_file_browser(shots):
+    pictures, facts, _ = shots
+    assert facts['taught'] == ['Basis', 'Adapted to set']
+    assert differ(pictures, 'ball', 'from_images') > 3000 and 'browser' in pictures
+
+
 def test_the_menu_and_the_settings_are_shown(shots):
     pictures, _, _ = shots
     height, width = pictures['ball'].shape[:2]
