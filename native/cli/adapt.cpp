@@ -32,7 +32,7 @@ StippleMeshAdaptOptions defaults() {
 }
 
 struct Arguments {
-  std::string in, target, out, density = "adaptive", align = "none";
+  std::string in, target, out, density, align = "none";
   std::vector<std::string> landmarks;
   StippleMeshAdaptOptions options = defaults();
   int64_t steps = options.steps;
@@ -156,7 +156,6 @@ void adapt(const Context& context, Arguments& arguments) {
   const auto start = std::chrono::steady_clock::now();
   requireMeshExtension(arguments.out);
   StippleMeshAdaptOptions& options = arguments.options;
-  options.density = chosen(kDensities, arguments.density, "--density");
   options.alignment = chosen(kAlignments, arguments.align, "--align");
   options.steps = counted32(arguments.steps, "--steps");
   options.target_count = counted(arguments.points, "--points");
@@ -168,6 +167,9 @@ void adapt(const Context& context, Arguments& arguments) {
   const auto given = make<Mesh>(stipple_mesh_load, context.get(), arguments.in.c_str());
   const Target target = targetOf(context, arguments.target);
   const StippleMeshAdaptTarget aim = target.given();
+  const char* usual = target.views ? "off" : "adaptive";
+  options.density =
+      chosen(kDensities, arguments.density.empty() ? usual : arguments.density, "--density");
   const auto job = make<Job>(stipple_mesh_adapt_start, const_cast<const StippleMesh*>(given.get()),
                              &aim, const_cast<const StippleMeshAdaptOptions*>(&options));
   finish(job);
@@ -230,10 +232,10 @@ void addAdapt(CLI::App& app, const Context& context) {
                    "Mesh: .glb with all that the template's file holds, or .ply with positions and "
                    "triangles in its order")
       ->required();
-  command
-      ->add_option("--density", arguments->density,
-                   "off, uniform (even edges) or adaptive (shorter ones where shape is complex)")
-      ->capture_default_str();
+  command->add_option(
+      "--density", arguments->density,
+      "off, uniform (even edges) or adaptive (shorter ones where shape is complex); "
+      "default: adaptive, to images off");
   command
       ->add_option("--align", arguments->align, "First as a whole: none, size, rigid or similarity")
       ->capture_default_str();

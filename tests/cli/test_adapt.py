@@ -1,5 +1,6 @@
 """A mesh that takes the shape of another, or of splats, and keeps its triangles."""
 import json
+import math
 import struct
 
 import numpy as np
@@ -129,7 +130,7 @@ def test_bad_input_gets_one_sentence(shapes, tmp_path):
     assert 'off, uniform, adaptive' in error('adapt', sphere_glb, egg, out, '--density', 'much')
     assert 'strength of the density is -1' in error('adapt', sphere_glb, egg, out, '--strength', -1)
     assert '.glb or .ply' in error('adapt', sphere_glb, egg, tmp_path / 'out.obj')
-    assert 'neither a mesh nor points nor splats' in error('adapt', sphere_glb, tmp_path / 'a.vdb', out)
+    assert 'neither a mesh nor points, splats or images' in error('adapt', sphere_glb, tmp_path / 'a.vdb', out)
     assert not out.exists()
 
 
@@ -265,3 +266,33 @@ def test_a_mesh_that_is_shown_twice_has_no_one_shape(shapes, tmp_path):
                           struct.pack('<I4s', len(binary), b'BIN\0') + binary)
     assert 'shows mesh 0 several times' in error('adapt', *shapes, tmp_path / 'out.glb', '--steps', 1)
     run('adapt', *shapes, tmp_path / 'out.ply', '--steps', 1)
+
+
+def test_a_mesh_takes_the_shape_that_images_show(shapes, tmp_path):
+    """Images of splats of the egg: what the tool itself draws is enough."""
+    template, target = shapes
+    run('decode', target, tmp_path / 'egg.ply', '--anchors', 8000)
+    frames = []
+    for i in range(8):
+        turn, up = math.tau * i / 8, 0.6 if i % 2 else -0.6
+        back = np.array([math.cos(turn), math.sin(turn), up])
+        back /= np.linalg.norm(back)
+        right = np.array([-math.sin(turn), math.cos(turn), 0.0])
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = np.stack([right, np.cross(back, right), back], axis=1), 4 * back
+        frames.append({'file_path': f'{i}.png', 'transform_matrix': matrix.tolist()})
+    (tmp_path / 'transforms.json').write_text(json.dumps(
+        {'w': 64, 'h': 64, 'fl_x': 80, 'fl_y': 80, 'cx': 32, 'cy': 32, 'frames': frames}))
+    for i in range(8):
+        run('render', tmp_path / 'egg.ply', '--camera', tmp_path / 'transforms.json', '--view', i, '-o',
+            tmp_path / f'{i}.png')
+    told = figures('adapt', template, tmp_path / 'transforms.json', tmp_path / 'out.ply', '--align', 'size',
+                   '--steps', 150)
+    assert float(told['difference_after']) < 0.2 * float(told['difference_before'])
+    positions, triangles = read_ply(tmp_path / 'out.ply')
+    assert len(triangles) == len(sphere(3)[1])
+    # A pixel is 0.05 where the egg is; the sphere of its size is up to 0.37 away from it.
+    scaled = np.linalg.norm(positions / [1.2, 0.8, 0.6], axis=1)
+    assert np.abs(scaled - 1).mean() < 0.05
+    assert 'landmarks are for targets' in error(
+        'adapt', template, tmp_path / 'transforms.json', tmp_path / 'no.ply', '--landmark', '3:0,0,1')

@@ -30,7 +30,8 @@ class STIPPLE_OT_mesh_adapt_to_images(AdaptOperator, bpy.types.Operator, ImportH
 
     filename_ext = '.json'
     filter_glob: StringProperty(default='*.json;cameras.bin;cameras.txt;images.bin;images.txt', options={'HIDDEN'})
-    density: EnumProperty(name="Density", description="Where vertices go along the surface", items=DENSITIES)
+    density: EnumProperty(name="Density", description="Where vertices go along the surface", items=DENSITIES,
+                          default='OFF')
     alignment: EnumProperty(name="Alignment", description="What is done to the whole mesh first", items=_ALIGNMENTS)
     image_size: IntProperty(name="Image Size", description="Pixels of the longer side of the images that are compared. "
                             "Larger ones show finer detail, and take longer by the square", default=256, min=16,
