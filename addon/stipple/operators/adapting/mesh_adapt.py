@@ -46,6 +46,18 @@ class AdaptOperator(JobOperator):
     preview: BoolProperty(name="Preview", description="Show the mesh on its way", default=True)
     seed: IntProperty(name="Seed", description="Another seed measures the surface at other points", default=0, min=0)
 
+    @classmethod
+    def poll(cls, context):
+        problem = problem_of(context) or cls.further_problem(context)
+        if problem:
+            cls.poll_message_set(problem)
+        return not problem
+
+    @classmethod
+    def further_problem(cls, _context):
+        """Why the operator cannot run on the active object, which is a mesh that could be adapted, or ''."""
+        return ''
+
     def invoke(self, context, _event):
         return self.run_in_window(context)
 
@@ -117,13 +129,8 @@ class STIPPLE_OT_mesh_adapt(AdaptOperator, bpy.types.Operator):
                              default=0.0, min=0.0, soft_max=1.0)
 
     @classmethod
-    def poll(cls, context):
-        problem = problem_of(context)
-        if not problem:
-            problem = _problem_of_targets(context)
-        if problem:
-            cls.poll_message_set(problem)
-        return not problem
+    def further_problem(cls, context):
+        return _problem_of_targets(context)
 
     def start(self, context):
         obj = context.view_layer.objects.active

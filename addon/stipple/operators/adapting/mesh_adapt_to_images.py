@@ -14,7 +14,7 @@ from ...binding.views import Views
 from ...scene.sequence import frames
 from ...scene.source import sources
 from ...scene.view import photo_cameras
-from .mesh_adapt import DENSITIES, AdaptOperator, problem_of
+from .mesh_adapt import DENSITIES, AdaptOperator
 
 _ALIGNMENTS = (('NONE', "None", "The mesh lies where the images show the object"),
                ('SIZE', "Location and Size", "The mesh gets the middle and the size of what the images show first"))
@@ -40,13 +40,6 @@ class STIPPLE_OT_mesh_adapt_to_images(AdaptOperator, bpy.types.Operator, ImportH
                                                       "cameras", items=photo_cameras.UP_AXES)
 
     _asked = False
-
-    @classmethod
-    def poll(cls, context):
-        problem = problem_of(context)
-        if problem:
-            cls.poll_message_set(problem)
-        return not problem
 
     def execute(self, context):
         if bpy.app.background or not self._asked:

@@ -5,7 +5,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from ...binding.structs import MeshAlignment, MeshDensity
-from .mesh_adapt import AdaptOperator, length_text, problem_of
+from .mesh_adapt import AdaptOperator, length_text
 
 _DENSITIES = (('UNIFORM', "Uniform", "All edges become about as long as each other"),
               ('ADAPTIVE', "Adaptive", "Vertices are drawn to where the shape is complex"))
@@ -22,13 +22,6 @@ class STIPPLE_OT_mesh_even_out(AdaptOperator, bpy.types.Operator):
     from_mix = True
 
     density: EnumProperty(name="Density", description="Where vertices go along the surface", items=_DENSITIES)
-
-    @classmethod
-    def poll(cls, context):
-        problem = problem_of(context)
-        if problem:
-            cls.poll_message_set(problem)
-        return not problem
 
     def start(self, context):
         self._begin(context.view_layer.objects.active, 'Evened Out')
