@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import file_browser  # noqa: E402
 import photo_set  # noqa: E402
 import scenes  # noqa: E402
 from fit_steps import module, press  # noqa: E402
@@ -152,19 +153,8 @@ def photograph(window):
         bpy.ops.stipple.mesh_adapt_to_images('INVOKE_DEFAULT', steps=100000, image_size=64, alignment='SIZE')
 
 
-def browser():
-    """(window, area) of the file browser, or None."""
-    return next(((window, area) for window in bpy.context.window_manager.windows for area in window.screen.areas
-                 if area.type == 'FILE_BROWSER'), None)
-
-
 def find_images(_window):
-    found = browser()
-    params = None if found is None else found[1].spaces.active.params
-    if params is None:
-        return False
-    params.directory, params.filename = str(folder / 'set').encode(), 'transforms.json'
-    return None
+    return None if file_browser.point_at(folder / 'set' / 'transforms.json') else False
 
 
 def browse(_window):
@@ -172,10 +162,7 @@ def browse(_window):
 
 
 def choose(_window):
-    window, area = browser()
-    region = next(region for region in area.regions if region.type == 'WINDOW')
-    with bpy.context.temp_override(window=window, area=area, region=region):
-        bpy.ops.file.execute()
+    file_browser.accept()
 
 
 def taught(_window):

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import file_browser  # noqa: E402
 from window_steps import addon  # noqa: E402
 
 folder, weights, image = (Path(sys.argv[sys.argv.index('--') + i]) for i in (2, 4, 5))
@@ -25,20 +26,8 @@ def build(window):
         bpy.ops.stipple.splats_from_image('INVOKE_DEFAULT', canvas='512', tokens=TOKENS, steps=STEPS, anchors=64)
 
 
-def browser():
-    """(window, area) of the file browser, or None."""
-    return next(((window, area) for window in bpy.context.window_manager.windows for area in window.screen.areas
-                 if area.type == 'FILE_BROWSER'), None)
-
-
 def open_browser(_window):
-    found = browser()
-    params = None if found is None else found[1].spaces.active.params
-    if params is None:
-        return False
-    params.directory = str(image.parent).encode()
-    params.filename = image.name
-    return None
+    return None if file_browser.point_at(image) else False
 
 
 def wait(_window):
@@ -50,10 +39,7 @@ def browse(_window):
 
 
 def choose(_window):
-    window, area = browser()
-    with bpy.context.temp_override(window=window, area=area,
-                                   region=next(r for r in area.regions if r.type == 'WINDOW')):
-        bpy.ops.file.execute()
+    file_browser.accept()
 
 
 def preview(window):

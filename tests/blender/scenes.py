@@ -170,3 +170,12 @@ def picture_pixels(path):
     image.pixels.foreach_get(values)
     bpy.data.images.remove(image)
     return values.reshape(height, width, 4)
+
+
+def make_linear(data):
+    """Values of a datablock go straight from keyframe to keyframe, whichever way this Blender keeps its curves."""
+    action = data.animation_data.action
+    curves = action.fcurves if hasattr(action, 'fcurves') else action.layers[0].strips[0].channelbags[0].fcurves
+    for curve in curves:
+        for point in curve.keyframe_points:
+            point.interpolation = 'LINEAR'

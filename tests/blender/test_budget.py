@@ -114,10 +114,7 @@ def test_a_ramp_of_detail_is_even_and_smooth(stipple, budgeted):
     for frame, detail in ((1, -2.0), (41, 0.0)):
         settings.detail = detail
         settings.keyframe_insert('detail', frame=frame)
-    action = budgeted.data.animation_data.action
-    curves = action.fcurves if hasattr(action, 'fcurves') else action.layers[0].strips[0].channelbags[0].fcurves
-    for point in curves[0].keyframe_points:
-        point.interpolation = 'LINEAR'
+    scenes.make_linear(budgeted.data)
 
     def opacity(frame):
         bpy.context.scene.frame_set(frame)

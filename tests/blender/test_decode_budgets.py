@@ -23,10 +23,7 @@ def animated(source, splats):  # noqa: F811
         settings.anchors = anchors
         settings.keyframe_insert('anchors', frame=frame)
     settings.anchors_render = 70
-    action = splats.data.animation_data.action
-    curves = action.fcurves if hasattr(action, 'fcurves') else action.layers[0].strips[0].channelbags[0].fcurves
-    for point in curves[0].keyframe_points:
-        point.interpolation = 'LINEAR'
+    scenes.make_linear(splats.data)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 5
     scene.frame_set(2)

@@ -218,10 +218,7 @@ def test_a_range_of_frames_renders_in_the_background(tmp_path, engine):
     for frame, budget in ((1, 100), (11, 1100)):
         settings.anchors = budget
         settings.keyframe_insert('anchors', frame=frame)
-    action = settings.id_data.animation_data.action
-    curves = action.fcurves if hasattr(action, 'fcurves') else action.layers[0].strips[0].channelbags[0].fcurves
-    for point in curves[0].keyframe_points:
-        point.interpolation = 'LINEAR'
+    scenes.make_linear(settings.id_data)
     scene = prepare(engine, samples=1)
     scene.frame_start, scene.frame_end = 1, 11
     scene.render.resolution_percentage = 50
