@@ -179,12 +179,12 @@ def test_landmarks_are_vertex_groups_with_empties_of_their_names(stipple):
     bpy.context.scene.collection.children.link(marks)
     nose = bpy.data.objects.new('Nose', None)
     marks.objects.link(nose)
-    nose.location = (1.2 * np.cos(0.3), 1.2 * np.sin(0.3), 0)
+    nose.location = (1.2 * np.cos(0.5), 1.2 * np.sin(0.5), 0)
     assert adapt(target, obj) == {'FINISHED'}
     free = shown(obj)[vertex]
     assert adapt(target, obj, landmarks='Marks') == {'FINISHED'}
     held = shown(obj)[vertex]
-    assert np.linalg.norm(free - nose.location) > 0.3
+    assert np.linalg.norm(free - nose.location) > 0.4  # 0.59 where the free vertex stays
     assert np.linalg.norm(held - nose.location) < 0.15
     assert distances(shown(obj), target).mean() < NEAR
 
