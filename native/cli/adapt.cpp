@@ -24,6 +24,8 @@ const std::vector<std::pair<const char*, uint32_t>> kAlignments = {
     {"size", STIPPLE_MESH_ALIGN_SIZE},
     {"rigid", STIPPLE_MESH_ALIGN_RIGID},
     {"similarity", STIPPLE_MESH_ALIGN_SIMILARITY}};
+const std::vector<std::pair<const char*, uint32_t>> kDrawings = {
+    {"triangles", STIPPLE_PICTURE_DRAWING_TRIANGLES}, {"splats", STIPPLE_PICTURE_DRAWING_SPLATS}};
 
 StippleMeshAdaptOptions defaults() {
   StippleMeshAdaptOptions options;
@@ -32,7 +34,7 @@ StippleMeshAdaptOptions defaults() {
 }
 
 struct Arguments {
-  std::string in, target, out, density, align = "none";
+  std::string in, target, out, density, align = "none", draw = "triangles";
   std::vector<std::string> landmarks;
   StippleMeshAdaptOptions options = defaults();
   int64_t steps = options.steps;
@@ -160,6 +162,7 @@ void adapt(const Context& context, Arguments& arguments) {
   options.steps = counted32(arguments.steps, "--steps");
   options.target_count = counted(arguments.points, "--points");
   options.picture_side = counted32(arguments.image_size, "--image-size");
+  options.picture_drawing = chosen(kDrawings, arguments.draw, "--draw");
   const Landmarks landmarks = landmarksOf(arguments.landmarks);
   options.landmark_count = landmarks.vertices.size();
   options.landmark_vertices = landmarks.vertices.data();
@@ -245,6 +248,10 @@ void addAdapt(CLI::App& app, const Context& context) {
   command
       ->add_option("--image-size", arguments->image_size,
                    "Of images: pixels of the longer side that are looked at")
+      ->capture_default_str();
+  command
+      ->add_option("--draw", arguments->draw,
+                   "What the template is drawn as beside images: triangles, or splats bound to them")
       ->capture_default_str();
   command->add_option("--landmark", arguments->landmarks,
                       "VERTEX:X,Y,Z: where a vertex of the template belongs, metres, Z up; "

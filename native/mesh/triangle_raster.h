@@ -47,12 +47,23 @@ class TriangleRaster {
     return z >= camera_.near_plane && z <= camera_.far_plane;
   }
 
+  /// Pixels [x0, x1) x [y0, y1).
+  struct Box {
+    uint32_t x0 = 0, x1 = 0, y0 = 0, y1 = 0;
+  };
+
   /// Calls put(x, y, z, weights) for every pixel whose ray meets the triangle.
   template <typename Put>
   void draw(const Vec3d (&corners)[3], const Put& put) const {
     Box box;
     FlatTriangle flat;
     if (!boxOf(corners, box) || !flatten(corners, flat)) return;
+    draw(flat, box, put);
+  }
+
+  /// The same of what flatten() and boxOf() made.
+  template <typename Put>
+  void draw(const FlatTriangle& flat, const Box& box, const Put& put) const {
     double z = 0;
     Vec3d weights;
     for (uint32_t y = box.y0; y < box.y1; ++y) {
@@ -62,17 +73,12 @@ class TriangleRaster {
     }
   }
 
+  /// The pixels that the part of the triangle behind the near plane may cover. False: none.
+  bool boxOf(const Vec3d (&corners)[3], Box& box) const;
+
  private:
   /// Below, a triangle is seen from the edge, or has no area.
   static constexpr double kNoArea = 1e-200;
-
-  /// Pixels [x0, x1) x [y0, y1).
-  struct Box {
-    uint32_t x0, x1, y0, y1;
-  };
-
-  /// The pixels that the part of the triangle behind the near plane may cover. False: none.
-  bool boxOf(const Vec3d (&corners)[3], Box& box) const;
 
   const Camera& camera_;
 };

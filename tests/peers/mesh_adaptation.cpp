@@ -1,9 +1,10 @@
 // Sphere templates onto targets with density off, uniform and adaptive, and with a Laplacian
 // penalty: how far they are from the target, as a whole and where it is most curved. By hand:
 //   mesh_adaptation [--steps N] [--sides A,B] [--modes off,adaptive] [--penalty W] [--last SHARE]
-//   [--seed S] TARGET.glb...
-// Without targets, the two procedural ones alone. With --images, the sphere sees N images of 256 x
-// 256 of the target in place of its surface.
+//   [--step S] [--smoothness L] [--strength W] [--factor K] [--seed S]
+//   [--images N] [--image-size PIXELS] [--draw splats] ripples warts TARGET.glb...
+// ripples and warts are made here, the .glb files by make_adapt_targets.py. With --images, the
+// sphere sees N images of the target in place of its surface.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -11,6 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <string>
@@ -26,13 +28,13 @@
 #include "mesh/adapt/mesh_links.h"
 #include "mesh/adapt/point_rows.h"
 #include "mesh/surface_search.h"
+#include "train/backend/backend_factory.h"
 
 namespace {
 
 using namespace stipple;
 
 constexpr size_t kSamples = 100000;
-constexpr uint32_t kImageSide = 256;
 
 /// A unit sphere: the grid of a cube's faces, 6 side^2 + 2 vertices.
 TriMesh cubeSphere(int side) {
@@ -282,38 +284,39 @@ size_t selfIntersections(const TriMesh& mesh) {
   return found;
 }
 
-void compare(const std::string& name, const TriMesh& target, const std::vector<int>& sides,
-             const std::string& modes, uint32_t steps, double penalty, double last_share,
-             uint64_t seed, size_t image_count, double step_size) {
+struct Study {
+  std::vector<int> sides = {18, 41};
+  std::string modes = "off,uniform,adaptive,laplacian";
+  double penalty = 0.2;
+  size_t image_count = 0;
+  RegistrationOptions options;
+};
+
+void compare(const std::string& name, const TriMesh& target, const Study& study) {
   const MergedVertices merged = mergeVertices(target.positions, target.triangles);
   const MemoryViewSource pictures =
-      imagesOf(merged.positions, merged.triangles, image_count, kImageSide);
+      imagesOf(merged.positions, merged.triangles, study.image_count, study.options.picture_side);
   const std::vector<double> curvature = curvatures(target);
   const Places of_target = sampled(target, 4);
   std::vector<double> sorted;
   for (const uint32_t t : of_target.triangles) sorted.push_back(curvature[t]);
   const auto fifth = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 4 / 5);
   std::nth_element(sorted.begin(), fifth, sorted.end());
-  for (const int side : sides) {
+  for (const int side : study.sides) {
     const TriMesh given = cubeSphere(side);
     for (const char* mode : {"off", "uniform", "adaptive", "laplacian"}) {
-      if (modes.find(mode) == std::string::npos) continue;
-      RegistrationOptions options;
-      options.seed = seed;
-      options.alignment = PreAlignment::kSize;
-      options.adapter.steps = steps;
-      options.report_count = 0;
+      if (study.modes.find(mode) == std::string::npos) continue;
+      RegistrationOptions options = study.options;
       options.adapter.density = mode[0] == 'u'   ? MeshDensity::kUniform
                                 : mode[0] == 'a' ? MeshDensity::kAdaptive
                                                  : MeshDensity::kOff;
-      if (mode[0] == 'l') options.adapter.laplacian = penalty;
-      options.adapter.last_share = last_share;
-      options.adapter.step_size = step_size;
+      if (mode[0] == 'l') options.adapter.laplacian = study.penalty;
       const auto start = std::chrono::steady_clock::now();
       const RegisteredMesh made =
-          image_count > 0
-              ? registerToPictures(given, pictures, options)
-              : registerMesh(given, targetOfMesh(target, options.target_count, seed), options);
+          study.image_count > 0
+              ? registerToPictures(given, pictures, options, *cpuBackends())
+              : registerMesh(given, targetOfMesh(target, options.target_count, options.seed),
+                             options);
       const double seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       const Figures seen = measured(made.mesh, target, of_target, curvature, *fifth);
@@ -329,50 +332,55 @@ void compare(const std::string& name, const TriMesh& target, const std::vector<i
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::vector<int> sides = {18, 41};
-  uint32_t steps = 800;
-  double penalty = 0.2, last_share = MeshAdapterOptions().last_share;
-  uint64_t seed = 0;
-  std::string modes = "off,uniform,adaptive,laplacian";
-  size_t image_count = 0;
-  double step_size = MeshAdapterOptions().step_size;
+  Study study;
+  RegistrationOptions& options = study.options;
+  options.alignment = PreAlignment::kSize;
+  options.report_count = 0;
   std::vector<std::string> targets;
+  const std::map<std::string, std::function<void(const char*)>> known = {
+      {"--steps",
+       [&](const char* text) { options.adapter.steps = static_cast<uint32_t>(std::atoi(text)); }},
+      {"--penalty", [&](const char* text) { study.penalty = std::atof(text); }},
+      {"--last", [&](const char* text) { options.adapter.last_share = std::atof(text); }},
+      {"--step", [&](const char* text) { options.adapter.step_size = std::atof(text); }},
+      {"--smoothness", [&](const char* text) { options.adapter.smoothness = std::atof(text); }},
+      {"--strength", [&](const char* text) { options.adapter.strength = std::atof(text); }},
+      {"--factor", [&](const char* text) { options.adapter.adaptive_factor = std::atof(text); }},
+      {"--images",
+       [&](const char* text) { study.image_count = static_cast<size_t>(std::atoi(text)); }},
+      {"--image-size",
+       [&](const char* text) { options.picture_side = static_cast<uint32_t>(std::atoi(text)); }},
+      {"--draw",
+       [&](const char* text) {
+         options.picture_drawing =
+             text[0] == 's' ? PictureDrawing::kSplats : PictureDrawing::kTriangles;
+       }},
+      {"--modes", [&](const char* text) { study.modes = text; }},
+      {"--seed", [&](const char* text) { options.seed = static_cast<uint64_t>(std::atoi(text)); }},
+      {"--sides", [&](const char* text) {
+         study.sides.clear();
+         for (const char* at = text; at; at = std::strchr(at, ',')) {
+           if (*at == ',') ++at;
+           study.sides.push_back(std::atoi(at));
+         }
+       }}};
   for (int i = 1; i < argc; ++i) {
-    const std::string text = argv[i];
-    if (text == "--steps" && i + 1 < argc) {
-      steps = static_cast<uint32_t>(std::atoi(argv[++i]));
-    } else if (text == "--penalty" && i + 1 < argc) {
-      penalty = std::atof(argv[++i]);
-    } else if (text == "--last" && i + 1 < argc) {
-      last_share = std::atof(argv[++i]);
-    } else if (text == "--step" && i + 1 < argc) {
-      step_size = std::atof(argv[++i]);
-    } else if (text == "--images" && i + 1 < argc) {
-      image_count = static_cast<size_t>(std::atoi(argv[++i]));
-    } else if (text == "--modes" && i + 1 < argc) {
-      modes = argv[++i];
-    } else if (text == "--seed" && i + 1 < argc) {
-      seed = static_cast<uint64_t>(std::atoi(argv[++i]));
-    } else if (text == "--sides" && i + 1 < argc) {
-      sides.clear();
-      for (const char* at = argv[++i]; at; at = std::strchr(at, ',')) {
-        if (*at == ',') ++at;
-        sides.push_back(std::atoi(at));
-      }
+    const auto found = known.find(argv[i]);
+    if (found != known.end() && i + 1 < argc) {
+      found->second(argv[++i]);
     } else {
-      targets.push_back(text);
+      targets.emplace_back(argv[i]);
     }
   }
   std::printf(
       "target | vertices | density | chamfer | salient | normals | salient | flipped | "
       "crossings | seconds\n");
   for (const std::string& path : targets) {
-    compare(path, readMeshFile(path), sides, modes, steps, penalty, last_share, seed, image_count,
-            step_size);
+    if (path == "ripples" || path == "warts") {
+      compare(path, shaped(path == "warts" ? warts : ripples), study);
+    } else {
+      compare(path, readMeshFile(path), study);
+    }
   }
-  compare("ripples", shaped(ripples), sides, modes, steps, penalty, last_share, seed, image_count,
-          step_size);
-  compare("warts", shaped(warts), sides, modes, steps, penalty, last_share, seed, image_count,
-          step_size);
   return 0;
 }

@@ -196,6 +196,11 @@ class MeshAlignment(IntEnum):
     SIMILARITY = 3
 
 
+class PictureDrawing(IntEnum):
+    TRIANGLES = 0
+    SPLATS = 1
+
+
 class BindingReach(IntEnum):
     SURFACE = 0
     AROUND = 1
@@ -273,6 +278,7 @@ ENUMS = {
     'StippleSide': (Side, 'STIPPLE_SIDE_'),
     'StippleMeshDensity': (MeshDensity, 'STIPPLE_MESH_DENSITY_'),
     'StippleMeshAlignment': (MeshAlignment, 'STIPPLE_MESH_ALIGN_'),
+    'StipplePictureDrawing': (PictureDrawing, 'STIPPLE_PICTURE_DRAWING_'),
     'StippleBindingReach': (BindingReach, 'STIPPLE_BIND_'),
     'StippleRegionKind': (RegionKind, 'STIPPLE_REGION_'),
     'StippleRegionOperation': (RegionOperation, 'STIPPLE_REGION_'),

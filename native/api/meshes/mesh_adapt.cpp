@@ -38,6 +38,8 @@ RegistrationOptions optionsFrom(const StippleMeshAdaptOptions* options) {
       enumValue<uint32_t>(given.lands_on_target, 1, "options->lands_on_target") == 1;
   made.seed = given.seed;
   made.picture_side = given.picture_side;
+  made.picture_drawing = enumValue<PictureDrawing>(
+      given.picture_drawing, STIPPLE_PICTURE_DRAWING_SPLATS, "options->picture_drawing");
   if (requireTriples(given.landmark_count, "options->landmark_count") > 0) {
     made.landmarks = landmarksOf(
         {&require(given.landmark_vertices, "options->landmark_vertices"), given.landmark_count},
@@ -98,6 +100,7 @@ void stipple_mesh_adapt_options_init(StippleMeshAdaptOptions* options) {
   options->report_count = defaults.report_count;
   options->seed = defaults.seed;
   options->picture_side = defaults.picture_side;
+  options->picture_drawing = static_cast<uint32_t>(defaults.picture_drawing);
   options->strength = defaults.adapter.strength;
   options->adaptive_factor = defaults.adapter.adaptive_factor;
   options->smoothness = defaults.adapter.smoothness;
@@ -116,15 +119,16 @@ StippleStatus stipple_mesh_adapt_start(const StippleMesh* given,
     TargetSource source = sourceFrom(target);
     RegistrationOptions chosen = optionsFrom(options);
     require(job, "job");
-    given->context->requireMemory(registerToMemoryBound(*mesh, source, chosen),
-                                  "adapting the mesh");
+    given->context->requireMemory(
+        registerToMemoryBound(*mesh, source, chosen, *given->context->backends),
+        "adapting the mesh");
     auto watch = std::make_shared<RegistrationWatch>();
     *job = startJob(
         given->context,
-        [mesh, watch, source = std::move(source),
+        [mesh, watch, backends = given->context->backends, source = std::move(source),
          chosen = std::move(chosen)](Progress& progress) -> JobResult {
           return std::make_shared<const RegisteredMesh>(
-              registerTo(*mesh, source, chosen, &progress, watch.get()));
+              registerTo(*mesh, source, chosen, *backends, &progress, watch.get()));
         },
         nullptr, nullptr, watch);
   });
@@ -136,7 +140,8 @@ StippleStatus stipple_mesh_adapt_memory_bound(const StippleMesh* given,
                                               uint64_t* bytes) {
   return guarded([&] {
     const TriMesh& mesh = *require(given, "given").mesh;
-    require(bytes, "bytes") = registerToMemoryBound(mesh, sourceFrom(target), optionsFrom(options));
+    require(bytes, "bytes") = registerToMemoryBound(mesh, sourceFrom(target), optionsFrom(options),
+                                                    *given->context->backends);
   });
 }
 

@@ -1,6 +1,7 @@
 // Meshes that take a shape. References: the solves and the nearest-neighbour queries of the same
 // steps alone, which no implementation of the method goes without; of images, drawing the mesh once
-// into each by the renderer that has no derivatives.
+// into each by the renderer that has no derivatives; of images by splats, both passes of the
+// renderer of splats.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include "mesh/adapt/mesh_adapter.h"
 #include "mesh/adapt/point_rows.h"
 #include "mesh/mesh_image.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple::bench {
 
@@ -137,43 +139,81 @@ Camera onRing(size_t i, size_t count) {
   return camera;
 }
 
-void pictureStep(benchmark::State& state) {
-  constexpr size_t kViews = 24;
-  const Shape shape = tenThousand();
-  const MeshLinks links(shape.positions.size(), shape.triangles);
+/// A mesh, images of it, and it a tenth smaller, which steps make larger.
+struct PictureCase {
+  static constexpr size_t kViews = 24;
+  Shape shape = tenThousand();
+  MeshLinks links{shape.positions.size(), shape.triangles};
   TriMesh mesh;
-  mesh.materials.resize(1);
-  mesh.triangles = shape.triangles;
-  for (const Vec3d& p : shape.positions) {
-    for (int axis = 0; axis < 3; ++axis) mesh.positions.push_back(static_cast<float>(p[axis]));
-  }
-  const SurfaceColour colour(mesh);
   std::vector<TargetPicture> pictures;
-  for (size_t i = 0; i < kViews; ++i) {
-    TargetPicture picture{onRing(i, kViews), {}};
-    picture.pixels.resize(size_t{picture.camera.width} * picture.camera.height * 4);
-    drawMeshImage(mesh, colour, picture.camera, 1, picture.pixels);
-    pictures.push_back(std::move(picture));
+  std::vector<Vec3d> positions = shape.positions, gradient = shape.positions;
+
+  PictureCase() {
+    mesh.materials.resize(1);
+    mesh.triangles = shape.triangles;
+    for (const Vec3d& p : shape.positions) {
+      for (int axis = 0; axis < 3; ++axis) mesh.positions.push_back(static_cast<float>(p[axis]));
+    }
+    const SurfaceColour colour(mesh);
+    for (size_t i = 0; i < kViews; ++i) {
+      TargetPicture picture{onRing(i, kViews), {}};
+      picture.pixels.resize(size_t{picture.camera.width} * picture.camera.height * 4);
+      drawMeshImage(mesh, colour, picture.camera, 1, picture.pixels);
+      pictures.push_back(std::move(picture));
+    }
+    for (Vec3d& p : positions) p *= 0.9;
   }
-  std::vector<Vec3d> positions = shape.positions, gradient(positions.size());
-  for (Vec3d& p : positions) p *= 0.9;
-  PictureLoss loss(pictures, links);
-  std::vector<float> image(pictures[0].pixels.size());
+
+  void step(PictureLoss& loss) {
+    std::fill(gradient.begin(), gradient.end(), Vec3d::Zero());
+    loss.addGradient(positions, 3.0, gradient);
+  }
+};
+
+void pictureStep(benchmark::State& state) {
+  PictureCase of;
+  PictureLoss loss(of.pictures, of.links);
+  const SurfaceColour colour(of.mesh);
+  std::vector<float> image(of.pictures[0].pixels.size());
   compare(
-      state, "draws",
+      state, "draws", [&] { of.step(loss); },
       [&] {
-        std::fill(gradient.begin(), gradient.end(), Vec3d::Zero());
-        loss.addGradient(positions, 3.0, gradient);
-      },
-      [&] {
-        for (const TargetPicture& picture : pictures) {
-          drawMeshImage(mesh, colour, picture.camera, 1, image);
+        for (const TargetPicture& picture : of.pictures) {
+          drawMeshImage(of.mesh, colour, picture.camera, 1, image);
         }
       });
 }
 
+void pictureStepBySplats(benchmark::State& state) {
+  PictureCase of;
+  PictureLoss loss(of.pictures, of.links);
+  loss.drawSplats(*cpuBackends(), of.positions);
+  const BoundSplats splats(of.links, of.positions, 3.0 / of.pictures[0].camera.fx);
+  SplatCloud cloud;
+  splats.place(of.positions, of.positions, cloud);
+  const auto pass = cpuBackends()->makeViewPass();
+  const std::vector<float> ones(of.pictures[0].pixels.size(), 1.0f);
+  compare(
+      state, "passes", [&] { of.step(loss); },
+      [&] {
+        pass->forget();
+        for (const TargetPicture& picture : of.pictures) {
+          pass->forward(cloud, picture.camera, boundSplatsDrawing());
+          pass->setLossGradient(ones);
+          pass->backward({});
+        }
+      });
+  state.counters["splats"] = static_cast<double>(splats.count());
+}
+
 BENCHMARK(pictureStep)
     ->Name("mesh.picture_step.10k")
+    ->UseManualTime()
+    ->Iterations(kRounds)
+    ->Unit(benchmark::kMillisecond);
+
+BENCHMARK(pictureStepBySplats)
+    ->Name("mesh.picture_splats_step.10k")
     ->UseManualTime()
     ->Iterations(kRounds)
     ->Unit(benchmark::kMillisecond);

@@ -5,8 +5,10 @@
 #include <utility>
 
 #include "base/error.h"
+#include "data/views/view_resample.h"
 #include "fit/registration/moving_template.h"
 #include "fit/registration/picture_loss.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 
@@ -39,7 +41,8 @@ Similarity sizeAlignment(const MovingTemplate& moving) {
 }  // namespace
 
 RegisteredMesh registerToPictures(const TriMesh& given, const ViewSource& views,
-                                  const RegistrationOptions& options, Progress* progress,
+                                  const RegistrationOptions& options,
+                                  const BackendFactory& backends, Progress* progress,
                                   RegistrationWatch* watch) {
   validate(options);
   validate(given);
@@ -59,14 +62,18 @@ RegisteredMesh registerToPictures(const TriMesh& given, const ViewSource& views,
   RegisteredMesh made;
   RegistrationReport& report = made.report;
   moving.report(report);
-  PictureLoss loss(std::move(pictures), moving.links());
   const auto inMetres = [&](std::span<const Vec3d> places) {
     std::vector<Vec3d> metres(places.begin(), places.end());
     for (Vec3d& p : metres) p = ball.outOf(p);
     return metres;
   };
-  report.picture_before = loss.at(inMetres(moving.merged().positions));
+  const std::vector<Vec3d> as_given = inMetres(moving.merged().positions);
   if (options.alignment == PreAlignment::kSize) moving.align(sizeAlignment(moving));
+  PictureLoss loss(std::move(pictures), moving.links());
+  report.picture_before = loss.at(as_given);
+  if (options.picture_drawing == PictureDrawing::kSplats) {
+    loss.drawSplats(backends, inMetres(moving.merged().positions));
+  }
   MeshAdapter adapter(moving.links(), moving.merged().positions, options.adapter);
   std::vector<Vec3d> by_metres(moving.links().vertexCount());
   report.loss = takeSteps(
@@ -87,33 +94,50 @@ RegisteredMesh registerToPictures(const TriMesh& given, const ViewSource& views,
 }
 
 uint64_t pictureRegistrationMemoryBound(const TriMesh& given, const ViewSource& views,
-                                        const RegistrationOptions& options) {
-  // Four floats of the target; drawn, plain and derivatives in double, a triangle and a depth.
-  constexpr uint64_t kPixelBytes = 16 + 3 * 32 + 12 + 2 * 40;
+                                        const RegistrationOptions& options,
+                                        const BackendFactory& backends) {
+  // Four floats of the target; drawn, plain and derivatives in double, a triangle and a depth;
+  // two outlines at most.
+  constexpr uint64_t kPixelBytes = 16 + 3 * 32 + 12 + 2 * 72;
   constexpr uint64_t kTriangleBytes = 120, kVertexBytes = 48, kMeshBytes = 400;
   uint64_t bytes = meshAdapterMemoryBound(given.vertexCount(), given.triangleCount()) +
                    kMeshBytes * given.triangleCount();
+  SplatCloud splats;
+  if (options.picture_drawing == PictureDrawing::kSplats) {
+    splats.resize(BoundSplats::countBound(given.triangleCount()));
+  }
+  uint64_t of_splats = 0;
   for (size_t i = 0; i < views.count(); ++i) {
     const Camera& camera = views.camera(i);
     const double longer = std::max(camera.width, camera.height);
     const double factor = std::min(1.0, options.picture_side / std::max(longer, 1.0));
     bytes += static_cast<uint64_t>(kPixelBytes * factor * factor * camera.width * camera.height) +
              kTriangleBytes * given.triangleCount() + kVertexBytes * given.vertexCount();
+    if (splats.size() > 0) {
+      const auto scaled = [&](uint32_t side) { return static_cast<uint32_t>(factor * side) + 1; };
+      of_splats = std::max(
+          of_splats,
+          backends.passMemory(splats, resized(camera, scaled(camera.width), scaled(camera.height)),
+                              boundSplatsDrawing()));
+    }
   }
-  return bytes;
+  constexpr uint64_t kSplatBytes = 2 * 14 * 4;  // a cloud, and its derivatives
+  return bytes + of_splats + kSplatBytes * splats.size();
 }
 
 RegisteredMesh registerTo(const TriMesh& given, const TargetSource& source,
-                          const RegistrationOptions& options, Progress* progress,
-                          RegistrationWatch* watch) {
-  if (source.views) return registerToPictures(given, *source.views, options, progress, watch);
+                          const RegistrationOptions& options, const BackendFactory& backends,
+                          Progress* progress, RegistrationWatch* watch) {
+  if (source.views) {
+    return registerToPictures(given, *source.views, options, backends, progress, watch);
+  }
   return registerMesh(given, targetOf(source, options.target_count, options.seed), options,
                       progress, watch);
 }
 
 uint64_t registerToMemoryBound(const TriMesh& given, const TargetSource& source,
-                               const RegistrationOptions& options) {
-  return source.views ? pictureRegistrationMemoryBound(given, *source.views, options)
+                               const RegistrationOptions& options, const BackendFactory& backends) {
+  return source.views ? pictureRegistrationMemoryBound(given, *source.views, options, backends)
                       : registrationMemoryBound(given, source, options);
 }
 

@@ -14,19 +14,26 @@
 
 namespace stipple {
 
+/// What a template is drawn as, to be compared with images.
+enum class PictureDrawing : uint32_t {
+  kTriangles = 0,  ///< MeshRenderer, whose outlines are sharp
+  kSplats = 1,     ///< splats bound to the triangles, by the renderer of splats
+};
+
 struct RegistrationOptions {
   MeshAdapterOptions adapter;  ///< density, smoothness and steps
   RegistrationWeights weights;
   PreAlignment alignment = PreAlignment::kNone;
-  bool lands_on_target = false;     ///< after the steps, vertices go to the nearest place of the
-                                    ///< target's triangles, those of borders to its borders
-  uint64_t target_count = 20000;    ///< points of the target at most, 1 to 2^24: detail, and time
-  uint32_t samples_per_point = 4;   ///< of the template for each of them, 1 to 64
-  uint64_t report_count = 100000;   ///< samples of each side that the report is measured by; 0: no
-                                    ///< report; 2^24 at most
-  uint64_t seed = 0;                ///< of all samples
-  uint32_t picture_side = 256;      ///< of targets that are images: pixels of the longer side that
-                                    ///< are looked at, 16 to 4096
+  bool lands_on_target = false;    ///< after the steps, vertices go to the nearest place of the
+                                   ///< target's triangles, those of borders to its borders
+  uint64_t target_count = 20000;   ///< points of the target at most, 1 to 2^24: detail, and time
+  uint32_t samples_per_point = 4;  ///< of the template for each of them, 1 to 64
+  uint64_t report_count = 100000;  ///< samples of each side that the report is measured by; 0: no
+                                   ///< report; 2^24 at most
+  uint64_t seed = 0;               ///< of all samples
+  uint32_t picture_side = 256;     ///< of targets that are images: pixels of the longer side that
+                                   ///< are looked at, 16 to 4096
+  PictureDrawing picture_drawing = PictureDrawing::kTriangles;  ///< of the same targets
   std::vector<Landmark> landmarks;  ///< vertices of the template as it is given
 };
 

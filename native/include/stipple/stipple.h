@@ -481,6 +481,12 @@ typedef enum StippleMeshAlignment {
   STIPPLE_MESH_ALIGN_SIMILARITY = 3 /* the same, and scaled */
 } StippleMeshAlignment;
 
+/* What a template is drawn as, to be compared with images. */
+typedef enum StipplePictureDrawing {
+  STIPPLE_PICTURE_DRAWING_TRIANGLES = 0, /* with sharp outlines */
+  STIPPLE_PICTURE_DRAWING_SPLATS = 1     /* flat splats that follow the triangles, by the renderer of splats */
+} StipplePictureDrawing;
+
 /* Exactly one of mesh, cloud, points, points_path_utf8 and views is given. */
 typedef struct StippleMeshAdaptTarget {
   uint32_t struct_size;
@@ -521,7 +527,7 @@ typedef struct StippleMeshAdaptOptions {
   const float* landmark_places;       /* [L,3] metres, where they belong */
   uint32_t picture_side;      /* of views: pixels of the longer side that are looked at, 16..4096, default 256: finer
                                  detail, and its square in time */
-  uint32_t reserved;
+  uint32_t picture_drawing;   /* StipplePictureDrawing, of views, default triangles */
 } StippleMeshAdaptOptions;
 void stipple_mesh_adapt_options_init(StippleMeshAdaptOptions* options);
 

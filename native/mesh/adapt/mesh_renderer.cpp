@@ -79,6 +79,27 @@ void addEdges(const FlatTriangle& flat, const Vec3d& edges, const Vec3d& by_edge
   for (size_t i = 0; i < 3; ++i) by_corners[i] -= edges[static_cast<Eigen::Index>(i)] * back;
 }
 
+/// Makes a view empty: all of it where it is another camera's, else what it shows.
+void clear(const Camera& camera, MeshView& view) {
+  view.outlines.clear();
+  if (view.width != camera.width || view.height != camera.height) {
+    view.width = camera.width;
+    view.height = camera.height;
+    view.box = {0, camera.width, 0, camera.height};
+    const size_t pixel_count = size_t{camera.width} * camera.height;
+    view.plain.resize(pixel_count * 4);
+    view.pixels.resize(pixel_count * 4);
+    view.depths.resize(pixel_count);
+    view.triangles.resize(pixel_count);
+  }
+  view.forEachRow([&](size_t begin, size_t end) {
+    std::fill_n(&view.plain[begin * 4], (end - begin) * 4, 0.0);
+    std::fill_n(&view.pixels[begin * 4], (end - begin) * 4, 0.0);
+    std::fill_n(&view.depths[begin], end - begin, std::numeric_limits<double>::infinity());
+    std::fill_n(&view.triangles[begin], end - begin, MeshView::kNoTriangle);
+  });
+}
+
 }  // namespace
 
 MeshRenderer::MeshRenderer(std::span<const uint32_t> triangles)
@@ -91,10 +112,21 @@ Vec3d MeshRenderer::weightsAt(const MeshView& view, const Camera& camera, uint32
 
 MeshView MeshRenderer::draw(const Camera& camera, std::span<const Vec3d> positions,
                             std::span<const Vec3d> colours) const {
-  requireImagePlane(camera, "the drawing of a mesh");
   MeshView view;
+  draw(camera, positions, colours, view);
+  return view;
+}
+
+void MeshRenderer::draw(const Camera& camera, std::span<const Vec3d> positions,
+                        std::span<const Vec3d> colours, MeshView& view) const {
+  requireImagePlane(camera, "the drawing of a mesh");
+  clear(camera, view);
   drawPlain(camera, placed(camera, positions), colours, view);
-  view.pixels = view.plain;
+  view.forEachRow([&](size_t begin, size_t end) {
+    std::copy(view.plain.begin() + static_cast<std::ptrdiff_t>(begin * 4),
+              view.plain.begin() + static_cast<std::ptrdiff_t>(end * 4),
+              view.pixels.begin() + static_cast<std::ptrdiff_t>(begin * 4));
+  });
   for (const OutlineCrossing& crossing : view.outlines) {
     const bool is_inside = crossing.along < 0.5;
     const size_t changed = is_inside ? crossing.inside : crossing.outside;
@@ -105,19 +137,15 @@ MeshView MeshRenderer::draw(const Camera& camera, std::span<const Vec3d> positio
           share * (view.plain[other * 4 + c] - view.plain[changed * 4 + c]);
     }
   }
-  return view;
 }
 
 void MeshRenderer::drawPlain(const Camera& camera, std::span<const Vec3d> vertices,
                              std::span<const Vec3d> colours, MeshView& view) const {
   const size_t count = triangles_.size() / 3;
-  const size_t pixel_count = size_t{camera.width} * camera.height;
-  view.plain.assign(pixel_count * 4, 0.0);
-  view.triangles.assign(pixel_count, MeshView::kNoTriangle);
   view.flat.resize(count);
   view.faces_camera.assign(count, 0);
-  std::vector<double> depths(pixel_count, std::numeric_limits<double>::infinity());
   const TriangleRaster raster(camera);
+  TriangleRaster::Box all{camera.width, 0, camera.height, 0};
   for (uint32_t t = 0; t < count; ++t) {
     const uint32_t* v = &triangles_[size_t{t} * 3];
     const Vec3d corners[3] = {vertices[v[0]], vertices[v[1]], vertices[v[2]]};
@@ -126,10 +154,14 @@ void MeshRenderer::drawPlain(const Camera& camera, std::span<const Vec3d> vertic
     Vec3d second = corners[1], third = corners[2];
     if (camera.model == CameraModel::kOrthographic) second.z() = third.z() = 1;
     view.faces_camera[t] = crossProduct(second, third).dot(view.flat[t].edges[0]) > 0;
-    raster.draw(corners, [&](uint32_t x, uint32_t y, double z, const Vec3d& weights) {
+    TriangleRaster::Box box;
+    if (!raster.boxOf(corners, box)) continue;
+    all = {std::min(all.x0, box.x0), std::max(all.x1, box.x1), std::min(all.y0, box.y0),
+           std::max(all.y1, box.y1)};
+    raster.draw(view.flat[t], box, [&](uint32_t x, uint32_t y, double z, const Vec3d& weights) {
       const size_t pixel = size_t{y} * camera.width + x;
-      if (z >= depths[pixel]) return;
-      depths[pixel] = z;
+      if (z >= view.depths[pixel]) return;
+      view.depths[pixel] = z;
       view.triangles[pixel] = t;
       const Vec3d colour =
           weights[0] * colours[v[0]] + weights[1] * colours[v[1]] + weights[2] * colours[v[2]];
@@ -137,11 +169,13 @@ void MeshRenderer::drawPlain(const Camera& camera, std::span<const Vec3d> vertic
       view.plain[pixel * 4 + 3] = 1.0;
     });
   }
-  findOutlines(camera, depths, view);
+  // Boxes of triangles have the pixel more that outlines need.
+  view.box = all.x0 < all.x1 && all.y0 < all.y1 ? all : TriangleRaster::Box{};
+  findOutlines(camera, view);
 }
 
-void MeshRenderer::findOutlines(const Camera& camera, std::span<const double> depths,
-                                MeshView& view) const {
+void MeshRenderer::findOutlines(const Camera& camera, MeshView& view) const {
+  const std::vector<double>& depths = view.depths;
   const auto between = [&](uint32_t a, uint32_t b, bool is_row) {
     const uint32_t ta = view.triangles[a], tb = view.triangles[b];
     if (ta == tb) return;
@@ -167,11 +201,11 @@ void MeshRenderer::findOutlines(const Camera& camera, std::span<const double> de
       if (!from(b, a, ray_b, ray_a)) from(a, b, ray_a, ray_b);
     }
   };
-  for (uint32_t y = 0; y < camera.height; ++y) {
-    for (uint32_t x = 0; x < camera.width; ++x) {
+  for (uint32_t y = view.box.y0; y < view.box.y1; ++y) {
+    for (uint32_t x = view.box.x0; x < view.box.x1; ++x) {
       const uint32_t pixel = y * camera.width + x;
-      if (x + 1 < camera.width) between(pixel, pixel + 1, true);
-      if (y + 1 < camera.height) between(pixel, pixel + camera.width, false);
+      if (x + 1 < view.box.x1) between(pixel, pixel + 1, true);
+      if (y + 1 < view.box.y1) between(pixel, pixel + camera.width, false);
     }
   }
 }
@@ -212,7 +246,7 @@ bool MeshRenderer::outlineFrom(const MeshView& view, const Vec3d& from, const Ve
 }
 
 void MeshRenderer::addGradient(const MeshView& view, const Camera& camera,
-                               std::span<const Vec3d> colours, std::span<const double> by_pixel,
+                               std::span<const Vec3d> colours, std::span<double> by_pixel,
                                double outline_weight, std::span<Vec3d> by_position,
                                std::span<Vec3d> by_colour) const {
   const Mat3d to_world = linearPart(camera.world_to_camera).transpose();
@@ -224,18 +258,27 @@ void MeshRenderer::addGradient(const MeshView& view, const Camera& camera,
       by_position[triangles_[size_t{triangle} * 3 + i]] += to_world * by_corner;
     }
   };
-  std::vector<double> by_plain(by_pixel.begin(), by_pixel.end());
-  for (const OutlineCrossing& crossing : view.outlines) {
+  // What the pixels that outlines change have before any of them passes a part on.
+  std::vector<Vec4d> by_changed(view.outlines.size());
+  for (size_t i = 0; i < view.outlines.size(); ++i) {
+    const OutlineCrossing& crossing = view.outlines[i];
+    const size_t changed = crossing.along < 0.5 ? crossing.inside : crossing.outside;
+    for (size_t c = 0; c < 4; ++c) {
+      by_changed[i][static_cast<Eigen::Index>(c)] = by_pixel[changed * 4 + c];
+    }
+  }
+  for (size_t i = 0; i < view.outlines.size(); ++i) {
+    const OutlineCrossing& crossing = view.outlines[i];
     const bool is_inside = crossing.along < 0.5;
     const size_t changed = is_inside ? crossing.inside : crossing.outside;
     const size_t other = is_inside ? crossing.outside : crossing.inside;
     const double share = is_inside ? 0.5 - crossing.along : crossing.along - 0.5;
     double by_share = 0;
     for (size_t c = 0; c < 4; ++c) {
-      const double by = by_pixel[changed * 4 + c];
+      const double by = by_changed[i][static_cast<Eigen::Index>(c)];
       by_share += by * (view.plain[other * 4 + c] - view.plain[changed * 4 + c]);
-      by_plain[other * 4 + c] += share * by;
-      by_plain[changed * 4 + c] -= share * by;
+      by_pixel[other * 4 + c] += share * by;
+      by_pixel[changed * 4 + c] -= share * by;
     }
     const FlatTriangle& flat = view.flat[crossing.triangle];
     const Vec3d first = edgesAt(flat, rayOf(camera, crossing.inside));
@@ -252,11 +295,11 @@ void MeshRenderer::addGradient(const MeshView& view, const Camera& camera,
     addEdges(flat, last, by_last, by_corners);
     addCorners(crossing.triangle, by_corners);
   }
-  for (uint32_t pixel = 0; pixel < view.triangles.size(); ++pixel) {
+  const auto addPixel = [&](uint32_t pixel) {
     const uint32_t t = view.triangles[pixel];
-    if (t == MeshView::kNoTriangle) continue;
-    const Vec3d by(by_plain[pixel * 4], by_plain[pixel * 4 + 1], by_plain[pixel * 4 + 2]);
-    if (by.isZero(0)) continue;
+    if (t == MeshView::kNoTriangle) return;
+    const Vec3d by(by_pixel[pixel * 4], by_pixel[pixel * 4 + 1], by_pixel[pixel * 4 + 2]);
+    if (by.isZero(0)) return;
     const uint32_t* v = &triangles_[size_t{t} * 3];
     const FlatTriangle& flat = view.flat[t];
     const Vec3d edges = edgesAt(flat, rayOf(camera, pixel));
@@ -268,7 +311,10 @@ void MeshRenderer::addGradient(const MeshView& view, const Camera& camera,
     CornerGradients by_corners = {Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero()};
     addEdges(flat, edges, by_edges, by_corners);
     addCorners(t, by_corners);
-  }
+  };
+  view.forEachRow([&](uint32_t begin, uint32_t end) {
+    for (uint32_t pixel = begin; pixel < end; ++pixel) addPixel(pixel);
+  });
 }
 
 }  // namespace stipple

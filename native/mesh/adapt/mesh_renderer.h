@@ -21,15 +21,25 @@ struct OutlineCrossing {
 };
 
 /// A mesh as a camera sees it, and what its derivatives need. The mesh must not change meanwhile.
+/// Outside of the box nothing is drawn.
 struct MeshView {
+  uint32_t width = 0, height = 0;
+  TriangleRaster::Box box;     ///< of the mesh, and a pixel more on each side
   std::vector<double> pixels;  ///< [H,W,4] linear colour times coverage, and coverage
 
   std::vector<double> plain;        ///< the same without smooth outlines
+  std::vector<double> depths;       ///< [H,W] planar z, infinity for none
   std::vector<uint32_t> triangles;  ///< [H,W] that each centre meets, kNoTriangle for none
   std::vector<OutlineCrossing> outlines;
   std::vector<FlatTriangle> flat;     ///< [F]
   std::vector<uint8_t> faces_camera;  ///< [F] 1: corners are clockwise in the image
   static constexpr uint32_t kNoTriangle = ~uint32_t{0};
+
+  /// Calls each(begin, end) with the indices of the pixels of every row of the box.
+  template <typename Each>
+  void forEachRow(const Each& each) const {
+    for (uint32_t y = box.y0; y < box.y1; ++y) each(y * width + box.x0, y * width + box.x1);
+  }
 };
 
 /// Draws a mesh with a colour at each vertex so that the image has derivatives by both, the places
@@ -52,14 +62,17 @@ class MeshRenderer {
   /// about 20 ns a pixel that triangles' boxes cover.
   MeshView draw(const Camera& camera, std::span<const Vec3d> positions,
                 std::span<const Vec3d> colours) const;
+  /// The same into memory that may have held another view.
+  void draw(const Camera& camera, std::span<const Vec3d> positions, std::span<const Vec3d> colours,
+            MeshView& view) const;
 
   /// Adds the derivatives of a loss. In: the view that draw() made of the same numbers; by_pixel
-  /// [H,W,4], the derivative of the loss by view.pixels; outline_weight: what the part by the
-  /// places of outlines is multiplied by, 1 for the derivative itself. Out: by_position and
-  /// by_colour [n], added to.
+  /// [H,W,4], the derivative of the loss by view.pixels, of which the box is read; outline_weight:
+  /// what the part by the places of outlines is multiplied by, 1 for the derivative itself. Out:
+  /// by_position and by_colour [n], added to; by_pixel has become the derivative by view.plain.
   void addGradient(const MeshView& view, const Camera& camera, std::span<const Vec3d> colours,
-                   std::span<const double> by_pixel, double outline_weight,
-                   std::span<Vec3d> by_position, std::span<Vec3d> by_colour) const;
+                   std::span<double> by_pixel, double outline_weight, std::span<Vec3d> by_position,
+                   std::span<Vec3d> by_colour) const;
 
   std::span<const uint32_t> triangles() const { return triangles_; }
   /// Of the triangle that the centre of a pixel meets, the weights of its corners there, sum 1.
@@ -68,7 +81,7 @@ class MeshRenderer {
  private:
   void drawPlain(const Camera& camera, std::span<const Vec3d> vertices,
                  std::span<const Vec3d> colours, MeshView& view) const;
-  void findOutlines(const Camera& camera, std::span<const double> depths, MeshView& view) const;
+  void findOutlines(const Camera& camera, MeshView& view) const;
   /// The outline between two centres of a sheet that holds the first of them.
   bool outlineFrom(const MeshView& view, const Vec3d& from, const Vec3d& to, uint32_t triangle,
                    OutlineCrossing& found) const;

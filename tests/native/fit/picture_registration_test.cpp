@@ -12,6 +12,7 @@
 #include "fit/mesh_images.h"
 #include "fit/registration/picture_loss.h"
 #include "mesh/adapt_meshes.h"
+#include "train/backend/backend_factory.h"
 
 namespace stipple {
 namespace {
@@ -47,8 +48,8 @@ TEST(PictureLoss, HasTheDerivativesOfItsFiniteDifferences) {
   const MeshLinks links(shape.positions.size(), shape.triangles);
   PictureLoss loss(targetPictures(imagesOf(target.positions, target.triangles, 5, 32), 32, nullptr),
                    links);
-  loss.at(shape.positions);  // finds the light
-  std::vector<Vec3d> gradient(shape.positions.size(), Vec3d::Zero());
+  std::vector<Vec3d> gradient(shape.positions.size(), Vec3d::Zero()), unknown = gradient;
+  loss.addGradient(shape.positions, 1.0, unknown);  // finds the light, which serves ten steps
   PictureLoss(loss).addGradient(shape.positions, 1.0, gradient);
   const auto lossOf = [&](const std::vector<Vec3d>& positions) {
     std::vector<Vec3d> unused(positions.size(), Vec3d::Zero());
@@ -72,6 +73,40 @@ TEST(PictureLoss, HasTheDerivativesOfItsFiniteDifferences) {
   EXPECT_GT(largest, 0.002);
 }
 
+TEST(PictureLoss, SplatsHaveDerivativesThatSumUpToWhatTheLossChangesBy) {
+  const AdaptShape target = spiked(), shape = sphere(2);
+  const MeshLinks links(shape.positions.size(), shape.triangles);
+  PictureLoss loss(targetPictures(imagesOf(target.positions, target.triangles, 5, 32), 32, nullptr),
+                   links);
+  loss.drawSplats(*cpuBackends(), shape.positions);
+  std::vector<Vec3d> unused(shape.positions.size(), Vec3d::Zero());
+  loss.addGradient(shape.positions, 1.0, unused);  // finds the light, which serves ten steps
+  // Each splat ends at an alpha of 1/255, where its image jumps by as much; derivatives know
+  // nothing of that. So ways are compared, along which many pixels are passed, not single places.
+  constexpr int kPlaces = 64;
+  constexpr double kWay = 0.1;
+  const auto towards = [](int which, const Vec3d& p) {
+    return which == 0 ? p : which == 1 ? Vec3d(0, 1, 0) : Vec3d(std::sin(5 * p[1]) * p);
+  };
+  for (int which = 0; which < 3; ++which) {
+    double sum = 0, first = 0, last = 0;
+    for (int place = 0; place <= kPlaces; ++place) {
+      std::vector<Vec3d> moved = shape.positions, gradient(moved.size(), Vec3d::Zero());
+      for (Vec3d& p : moved) p += kWay * place / kPlaces * towards(which, p);
+      last = PictureLoss(loss).addGradient(moved, 1.0, gradient);
+      if (place == 0) first = last;
+      double slope = 0;
+      for (size_t v = 0; v < moved.size(); ++v) {
+        slope += gradient[v].dot(towards(which, shape.positions[v]));
+      }
+      sum += (place == 0 || place == kPlaces ? 0.5 : 1.0) * slope * kWay / kPlaces;
+    }
+    // The rims of splats are 4 % of what they cover.
+    EXPECT_NEAR(sum, last - first, 0.1 * std::abs(last - first)) << which;
+    EXPECT_GT(std::abs(last - first), 2e-4) << which;
+  }
+}
+
 TEST(PictureRegistration, ASphereTakesTheShapeThatImagesShow) {
   const AdaptShape target = spiked();
   AdaptShape start = sphere(3);
@@ -80,14 +115,19 @@ TEST(PictureRegistration, ASphereTakesTheShapeThatImagesShow) {
   RegistrationOptions options = quick();
   options.alignment = PreAlignment::kSize;
   const MemoryViewSource views = imagesOf(target.positions, target.triangles, 10, 64);
-  const RegisteredMesh made = registerToPictures(given, views, options);
+  const RegisteredMesh made = registerToPictures(given, views, options, *cpuBackends());
   EXPECT_EQ(made.mesh.triangles, given.triangles);
   EXPECT_LT(made.report.picture_after, 0.1 * made.report.picture_before);
   // Pixels are 0.055 wide where the shape is; a ball of its size is 0.13 away.
   EXPECT_LT(distanceBetween(made.mesh, target), 0.02);
   RegisteredMesh alone;
-  withThreads(1, [&] { alone = registerToPictures(given, views, options); });
+  withThreads(1, [&] { alone = registerToPictures(given, views, options, *cpuBackends()); });
   EXPECT_EQ(alone.mesh.positions, made.mesh.positions);
+  options.picture_drawing = PictureDrawing::kSplats;
+  const RegisteredMesh by_splats = registerToPictures(given, views, options, *cpuBackends());
+  EXPECT_LT(distanceBetween(by_splats.mesh, target), 0.04);  // outlines are as soft as splats
+  withThreads(1, [&] { alone = registerToPictures(given, views, options, *cpuBackends()); });
+  EXPECT_EQ(alone.mesh.positions, by_splats.mesh.positions);
 }
 
 TEST(PictureRegistration, RefusesWhatImagesDoNotSay) {
@@ -95,7 +135,7 @@ TEST(PictureRegistration, RefusesWhatImagesDoNotSay) {
   const AdaptShape target = sphere(2);
   const auto messageOf = [&](const ViewSource& views, const RegistrationOptions& options) {
     try {
-      registerToPictures(given, views, options);
+      registerToPictures(given, views, options, *cpuBackends());
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
       return std::string(error.what());

@@ -66,7 +66,8 @@ TEST_P(MeshRendererOf, DerivativesAreThoseOfFiniteDifferences) {
   EXPECT_GT(view.outlines.size(), 80u);
   std::vector<Vec3d> by_position(shape.positions.size(), Vec3d::Zero());
   std::vector<Vec3d> by_colour = by_position;
-  renderer.addGradient(view, camera, colours, by_pixel, 1.0, by_position, by_colour);
+  std::vector<double> passed_on = by_pixel;
+  renderer.addGradient(view, camera, colours, passed_on, 1.0, by_position, by_colour);
 
   const auto lossOf = [&](const std::vector<Vec3d>& positions, const std::vector<Vec3d>& shades) {
     return dotOf(renderer.draw(camera, positions, shades).pixels, by_pixel);

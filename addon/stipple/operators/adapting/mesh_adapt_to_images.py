@@ -9,7 +9,7 @@ import numpy as np
 from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...binding.structs import MeshAlignment, MeshDensity
+from ...binding.structs import MeshAlignment, MeshDensity, PictureDrawing
 from ...binding.views import Views
 from ...scene.sequence import frames
 from ...scene.source import sources
@@ -18,6 +18,8 @@ from .mesh_adapt import DENSITIES, AdaptOperator
 
 _ALIGNMENTS = (('NONE', "None", "The mesh lies where the images show the object"),
                ('SIZE', "Location and Size", "The mesh gets the middle and the size of what the images show first"))
+_DRAWINGS = (('TRIANGLES', "Triangles", "The mesh is drawn as it is, with sharp outlines"),
+             ('SPLATS', "Splats", "The mesh is drawn as splats that follow its faces"))
 
 
 class STIPPLE_OT_mesh_adapt_to_images(AdaptOperator, bpy.types.Operator, ImportHelper):
@@ -36,6 +38,8 @@ class STIPPLE_OT_mesh_adapt_to_images(AdaptOperator, bpy.types.Operator, ImportH
     image_size: IntProperty(name="Image Size", description="Pixels of the longer side of the images that are compared. "
                             "Larger ones show finer detail, and take longer by the square", default=256, min=16,
                             max=4096, subtype='PIXEL')
+    drawing: EnumProperty(name="Drawn As", description="What the mesh is drawn as to be compared with the images",
+                          items=_DRAWINGS)
     up_axis: EnumProperty(name="Up Axis", description="The up direction of the data set; choose the same for its "
                                                       "cameras", items=photo_cameras.UP_AXES)
 
@@ -58,11 +62,11 @@ class STIPPLE_OT_mesh_adapt_to_images(AdaptOperator, bpy.types.Operator, ImportH
         to_images = np.linalg.inv(frames.to_world(photo_cameras.chosen_frame(path, self.up_axis)))
         self._template = replace(self._template, matrix=to_images @ self._template.matrix)
         return self._start(views, density=MeshDensity[self.density], alignment=MeshAlignment[self.alignment],
-                           picture_side=self.image_size)
+                           picture_side=self.image_size, picture_drawing=PictureDrawing[self.drawing])
 
     def draw(self, _context):
-        self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'image_size', 'alignment', 'up_axis',
-                    'preview'))
+        self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'image_size', 'drawing', 'alignment',
+                    'up_axis', 'preview'))
 
     def _tell(self, _context, report):
         self.report({'INFO'}, f"'{self._template.name}' differed from the images of '{self._images_name}' by "
