@@ -445,14 +445,15 @@ def photographed(stipple, tmp_path):
     return target, tmp_path / 'set'
 
 
-def test_a_ball_takes_the_shape_that_images_show(stipple, photographed, capfd):
+@pytest.mark.parametrize('drawing', ['TRIANGLES', 'SPLATS'])
+def test_a_ball_takes_the_shape_that_images_show(stipple, photographed, capfd, drawing):
     target, folder = photographed
     obj = template()
     obj.location, obj.scale = (1.0, 0.2, -0.5), (0.5, 0.5, 0.5)
     scenes.select(obj)
     weights = [[entry.weight for entry in vertex.groups] for vertex in obj.data.vertices]
     done = bpy.ops.stipple.mesh_adapt_to_images(filepath=str(folder / 'transforms.json'), alignment='SIZE', steps=150,
-                                                image_size=64)
+                                                image_size=64, drawing=drawing)
     assert done == {'FINISHED'}
     assert re.search(r"'Ball' differed from the images of 'set' by \d+\.\d\d% on average, and differs by 0\.\d\d% now",
                      capfd.readouterr().out)

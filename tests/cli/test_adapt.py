@@ -268,7 +268,8 @@ def test_a_mesh_that_is_shown_twice_has_no_one_shape(shapes, tmp_path):
     run('adapt', *shapes, tmp_path / 'out.ply', '--steps', 1)
 
 
-def test_a_mesh_takes_the_shape_that_images_show(shapes, tmp_path):
+@pytest.mark.parametrize('drawing', ['triangles', 'splats'])
+def test_a_mesh_takes_the_shape_that_images_show(shapes, tmp_path, drawing):
     """Images of splats of the egg: what the tool itself draws is enough."""
     template, target = shapes
     run('decode', target, tmp_path / 'egg.ply', '--anchors', 8000)
@@ -287,12 +288,14 @@ def test_a_mesh_takes_the_shape_that_images_show(shapes, tmp_path):
         run('render', tmp_path / 'egg.ply', '--camera', tmp_path / 'transforms.json', '--view', i, '-o',
             tmp_path / f'{i}.png')
     told = figures('adapt', template, tmp_path / 'transforms.json', tmp_path / 'out.ply', '--align', 'size',
-                   '--steps', 150)
+                   '--steps', 150, '--draw', drawing)
     assert float(told['difference_after']) < 0.2 * float(told['difference_before'])
     positions, triangles = read_ply(tmp_path / 'out.ply')
     assert len(triangles) == len(sphere(3)[1])
     # A pixel is 0.05 where the egg is; the sphere of its size is up to 0.37 away from it.
     scaled = np.linalg.norm(positions / [1.2, 0.8, 0.6], axis=1)
     assert np.abs(scaled - 1).mean() < 0.05
+    assert "--draw is 'points'; triangles, splats are allowed" in error(
+        'adapt', template, tmp_path / 'transforms.json', tmp_path / 'no.ply', '--draw', 'points')
     assert 'landmarks are for targets' in error(
         'adapt', template, tmp_path / 'transforms.json', tmp_path / 'no.ply', '--landmark', '3:0,0,1')

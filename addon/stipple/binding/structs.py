@@ -139,7 +139,7 @@ class StippleMeshAdaptOptions(_Sized):
                 ('smoothness', c_double), ('step_size', c_double), ('position_weight', c_double),
                 ('normal_weight', c_double), ('landmark_weight', c_double), ('symmetric_weight', c_double),
                 ('landmark_count', c_uint64), ('landmark_vertices', POINTER(c_uint32)), ('landmark_places', _floats),
-                ('picture_side', c_uint32), ('picture_drawing', c_uint32)]
+                ('picture_side', c_uint32), ('picture_drawing', c_uint32), ('sharp_angle', c_double)]
 
 
 class StippleMeshAdaptReport(_Sized):

@@ -7,7 +7,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
-#include "fit/registration/picture_registration.h"
+#include "fit/registration/register_to.h"
 #include "io/views/ply_points.h"
 
 using namespace stipple;
@@ -37,6 +37,7 @@ RegistrationOptions optionsFrom(const StippleMeshAdaptOptions* options) {
   made.lands_on_target =
       enumValue<uint32_t>(given.lands_on_target, 1, "options->lands_on_target") == 1;
   made.seed = given.seed;
+  made.sharp_angle = given.sharp_angle;
   made.picture_side = given.picture_side;
   made.picture_drawing = enumValue<PictureDrawing>(
       given.picture_drawing, STIPPLE_PICTURE_DRAWING_SPLATS, "options->picture_drawing");
@@ -99,6 +100,7 @@ void stipple_mesh_adapt_options_init(StippleMeshAdaptOptions* options) {
   options->target_count = defaults.target_count;
   options->report_count = defaults.report_count;
   options->seed = defaults.seed;
+  options->sharp_angle = defaults.sharp_angle;
   options->picture_side = defaults.picture_side;
   options->picture_drawing = static_cast<uint32_t>(defaults.picture_drawing);
   options->strength = defaults.adapter.strength;

@@ -125,20 +125,4 @@ uint64_t pictureRegistrationMemoryBound(const TriMesh& given, const ViewSource& 
   return bytes + of_splats + kSplatBytes * splats.size();
 }
 
-RegisteredMesh registerTo(const TriMesh& given, const TargetSource& source,
-                          const RegistrationOptions& options, const BackendFactory& backends,
-                          Progress* progress, RegistrationWatch* watch) {
-  if (source.views) {
-    return registerToPictures(given, *source.views, options, backends, progress, watch);
-  }
-  return registerMesh(given, targetOf(source, options.target_count, options.seed), options,
-                      progress, watch);
-}
-
-uint64_t registerToMemoryBound(const TriMesh& given, const TargetSource& source,
-                               const RegistrationOptions& options, const BackendFactory& backends) {
-  return source.views ? pictureRegistrationMemoryBound(given, *source.views, options, backends)
-                      : registrationMemoryBound(given, source, options);
-}
-
 }  // namespace stipple

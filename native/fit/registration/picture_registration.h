@@ -25,11 +25,4 @@ uint64_t pictureRegistrationMemoryBound(const TriMesh& given, const ViewSource& 
                                         const RegistrationOptions& options,
                                         const BackendFactory& backends);
 
-/// Whichever of both a target needs. Errors: theirs, and those of targetOf().
-RegisteredMesh registerTo(const TriMesh& given, const TargetSource& source,
-                          const RegistrationOptions& options, const BackendFactory& backends,
-                          Progress* progress = nullptr, RegistrationWatch* watch = nullptr);
-uint64_t registerToMemoryBound(const TriMesh& given, const TargetSource& source,
-                               const RegistrationOptions& options, const BackendFactory& backends);
-
 }  // namespace stipple

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include "base/random.h"
 #include "fit/registration/landing.h"
 #include "fit/registration/moving_template.h"
+#include "fit/registration/registration_report.h"
 #include "mesh/adapt/point_rows.h"
 
 namespace stipple {
@@ -174,16 +176,6 @@ uint64_t seedOfStep(uint64_t seed, uint32_t step) {
   return mixBits(seed) + step;
 }
 
-/// Samples of a mesh that surfaceDifference() reads.
-RegistrationTarget samplesOf(const TriMesh& mesh, const RegistrationOptions& options) {
-  return targetOfMesh(mesh, options.report_count, options.seed);
-}
-
-ComparedSurface viewOf(const RegistrationTarget& surface) {
-  return {surface.points, surface.normals, surface.positions, surface.triangles,
-          surface.is_oriented};
-}
-
 /// Places in the ball, each brought to the nearest of the target's.
 std::vector<Vec3d> landed(const RegistrationTarget& target, const MeshLinks& links,
                           std::span<const Vec3d> given, const UnitBall& ball) {
@@ -205,6 +197,10 @@ void validate(const RegistrationOptions& options) {
   requireCount(options.target_count, 1, kMostPoints, "number of points of the target");
   requireCount(options.samples_per_point, 1, kMostSamplesPerPoint, "number of samples per point");
   requireCount(options.report_count, 0, kMostPoints, "number of samples of the report");
+  if (!(options.sharp_angle >= 0 && options.sharp_angle <= std::numbers::pi)) {
+    refuse("sharp angle is " + std::to_string(options.sharp_angle) +
+           " radians; 0 to 3.141593 is allowed");
+  }
 }
 
 RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& target,
@@ -247,13 +243,7 @@ RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& targ
   made.mesh = options.lands_on_target
                   ? moving.mesh(landed(target, moving.links(), adapter.positions(), ball))
                   : moving.mesh(adapter.positions());
-  if (options.report_count > 0) {
-    advance(progress, 1.0, "Measuring the mesh");
-    report.is_measured = true;
-    report.before = surfaceDifference(viewOf(samplesOf(given, options)), viewOf(target));
-    report.after = surfaceDifference(viewOf(samplesOf(made.mesh, options)), viewOf(target));
-  }
-  advance(progress, 1.0, kAdaptingStage);
+  measureRegistration(given, target, options, made, progress);
   return made;
 }
 

@@ -24,8 +24,11 @@ struct RegistrationOptions {
   MeshAdapterOptions adapter;  ///< density, smoothness and steps
   RegistrationWeights weights;
   PreAlignment alignment = PreAlignment::kNone;
-  bool lands_on_target = false;    ///< after the steps, vertices go to the nearest place of the
-                                   ///< target's triangles, those of borders to its borders
+  /// After the steps, vertices go to the nearest place of the target's triangles, those of borders
+  /// to its borders. A template that is its own target slides on itself instead (slideOnItself()).
+  bool lands_on_target = false;
+  /// 0..pi radians, of templates that slide: what differs by more stays sharp.
+  double sharp_angle = 0.7853981633974483;
   uint64_t target_count = 20000;   ///< points of the target at most, 1 to 2^24: detail, and time
   uint32_t samples_per_point = 4;  ///< of the template for each of them, 1 to 64
   uint64_t report_count = 100000;  ///< samples of each side that the report is measured by; 0: no

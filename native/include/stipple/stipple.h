@@ -510,7 +510,8 @@ typedef struct StippleMeshAdaptOptions {
   uint32_t steps;             /* 1..1000000, default 800 */
   uint32_t samples_per_point; /* 1..64, default 4: of the template for each point of the target */
   uint32_t lands_on_target;   /* 1: vertices end at the nearest place of the target's triangles, those of borders at
-                                 its borders; default 0. With the template itself as the target, they slide on it */
+                                 its borders; default 0. With the template itself as the target, they slide on it in every
+                                 step, landmarks are refused and numbers of points and weights have no part */
   uint64_t target_count;      /* points of the target at most, 1..2^24, default 20000: detail, and time */
   uint64_t report_count;      /* samples of each side that the report is measured by, default 100000; 0: none */
   uint64_t seed;              /* of all samples */
@@ -528,6 +529,8 @@ typedef struct StippleMeshAdaptOptions {
   uint32_t picture_side;      /* of views: pixels of the longer side that are looked at, 16..4096, default 256: finer
                                  detail, and its square in time */
   uint32_t picture_drawing;   /* StipplePictureDrawing, of views, default triangles */
+  double sharp_angle;         /* 0..pi, default pi/4, of templates that slide on themselves: edges whose faces, and lines of
+                                 edges that differ by more stay as they are; vertices on them move along them alone */
 } StippleMeshAdaptOptions;
 void stipple_mesh_adapt_options_init(StippleMeshAdaptOptions* options);
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Vertices of a mesh slide along its surface to where they are needed."""
 
+import math
+
 import bpy
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, FloatProperty
 
 from ...binding.structs import MeshAlignment, MeshDensity
 from .mesh_adapt import AdaptOperator, length_text
@@ -22,14 +24,17 @@ class STIPPLE_OT_mesh_even_out(AdaptOperator, bpy.types.Operator):
     from_mix = True
 
     density: EnumProperty(name="Density", description="Where vertices go along the surface", items=_DENSITIES)
+    sharp_angle: FloatProperty(name="Sharp Edges", description="Edges whose faces differ by more than this stay as they "
+                               "are, and vertices on them move along them alone", default=math.radians(45), min=0.0,
+                               max=math.pi, subtype='ANGLE')
 
     def start(self, context):
         self._begin(context.view_layer.objects.active, 'Evened Out')
         return self._start(self._template.native(), density=MeshDensity[self.density], alignment=MeshAlignment.NONE,
-                           lands_on_target=1)
+                           lands_on_target=1, sharp_angle=self.sharp_angle)
 
     def draw(self, _context):
-        self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'points', 'preview', 'seed'))
+        self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'sharp_angle', 'preview'))
 
     def _tell(self, context, report):
         self.report({'INFO'}, f"The vertices of '{self._template.name}' are {self.density.lower()} now; its surface "

@@ -1,0 +1,27 @@
+#include "fit/registration/register_to.h"
+
+#include "fit/registration/picture_registration.h"
+#include "fit/registration/sliding.h"
+
+namespace stipple {
+
+RegisteredMesh registerTo(const TriMesh& given, const TargetSource& source,
+                          const RegistrationOptions& options, const BackendFactory& backends,
+                          Progress* progress, RegistrationWatch* watch) {
+  if (source.views) {
+    return registerToPictures(given, *source.views, options, backends, progress, watch);
+  }
+  if (source.mesh && options.lands_on_target && isItself(given, *source.mesh)) {
+    return slideOnItself(given, options, progress, watch);
+  }
+  return registerMesh(given, targetOf(source, options.target_count, options.seed), options,
+                      progress, watch);
+}
+
+uint64_t registerToMemoryBound(const TriMesh& given, const TargetSource& source,
+                               const RegistrationOptions& options, const BackendFactory& backends) {
+  return source.views ? pictureRegistrationMemoryBound(given, *source.views, options, backends)
+                      : registrationMemoryBound(given, source, options);
+}
+
+}  // namespace stipple
