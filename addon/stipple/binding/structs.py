@@ -7,8 +7,9 @@ from ctypes import (POINTER, Structure, c_char, c_char_p, c_double, c_float, c_i
 from .enums import (AccuracyLevel, AnchorOrder, Antialias, BindingReach, BlendSpace, BudgetUnit, CameraModel,
                     ColourSpace, ENUMS, Effect, EffectChoice, FitBackground, FitModel, FitOptionKind, FitQuality,
                     FitShell, Frame, JobState, LowPass, MaterialColour, MeshAlignment, MeshDensity, NoiseSource,
-                    ObjectOrder, OutputColour, Precision, Projection, RegionKind, RegionOperation, RenderMethod, Sampling, Side, SplatOrder,
-                    SplatQuantity, Status, Transfer, ViewRig, ViewSplit, WeightsRole, WeightsState)
+                    ObjectOrder, OutputColour, PictureDrawing, Precision, Projection, RegionKind, RegionOperation,
+                    RenderMethod, Sampling, Side, SplatOrder, SplatQuantity, Status, Transfer, ViewRig, ViewSplit,
+                    WeightsRole, WeightsState)
 
 ABI_VERSION = 4
 MAX_ANCHORS = 1 << 28
