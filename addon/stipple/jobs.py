@@ -78,12 +78,26 @@ class Task:
             self._error = error
 
 
+class ViewsFirst:
+    """Mix-in before JobOperator, of an operator whose job is a ViewTask: while it renders views of the scene, nothing may
+    change in Blender, and Esc leaves everything as it was."""
+
+    @property
+    def escape_text(self):
+        return 'Esc cancels' if self._job.holds_scene else super().escape_text
+
+    def modal(self, context, event):
+        result = super().modal(context, event)
+        return {'RUNNING_MODAL'} if self._job is not None and self._job.holds_scene else result
+
+
 class JobOperator:
     """Mix-in. The operator gives start(context) → job (or None: nothing to wait for), then finish(context, job)."""
 
     _timer = None
     _job = None
     _is_shown = False
+    _has_begun = False
     escape_text = 'Esc cancels'  # what the status bar says
 
     def __init_subclass__(cls, **options):
@@ -113,6 +127,11 @@ class JobOperator:
 
     def run_in_window(self, context):
         """What invoke() calls instead of execute()."""
+        if self._has_begun:
+            # Blender repeats an operator of its list of what was done. It would put one that ends later into the list
+            # once more, and crash: this one holds the window until it is over.
+            return JobOperator.execute(self, context)
+        self._has_begun = True
         try:
             self._job = self.start(context)
         except StippleError as error:

@@ -4,12 +4,12 @@
 import bpy
 from bpy.props import IntProperty, StringProperty
 
-from ..jobs import JobOperator
+from ..jobs import JobOperator, ViewsFirst
 from ..scene.fit import densifying, fitting, strategies
 from ..scene.source import bound, decoded, edits, masks, source_paths, sources, splat_data, sync
 
 
-class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
+class STIPPLE_OT_splats_densify(ViewsFirst, JobOperator, bpy.types.Operator):
     """Split, copy and remove the active object's splats where renders of the selected objects, or the photographs of a
     data set, ask for it. Nothing is trained"""
 
@@ -45,11 +45,6 @@ class STIPPLE_OT_splats_densify(JobOperator, bpy.types.Operator):
         chosen = {'strategy': strategy, 'event_count': self.events,
                   'max_splats': self.max_splats, 'seed': settings.seed}
         return densifying.DensifyTask(context, objects, settings, self._object, cloud, chosen)
-
-    def modal(self, context, event):
-        result = super().modal(context, event)
-        # Nothing may change while views are rendered.
-        return {'RUNNING_MODAL'} if self._job is not None and self._job.holds_scene else result
 
     def finish(self, _context, job):
         model, cloud = job.result

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from .. import version
-from ..jobs import JobOperator
+from ..jobs import JobOperator, ViewsFirst
 from ..scene import overlays
 from ..scene.fit import fit_proposal, fit_reports, fitting
 from ..scene.source import source_paths, sources, splat_data, sync
@@ -15,7 +15,7 @@ from ..scene.source import source_paths, sources, splat_data, sync
 _PREVIEW_SECONDS = 1.5
 
 
-class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
+class STIPPLE_OT_splats_fit(ViewsFirst, JobOperator, bpy.types.Operator):
     """Make splats that look like renders of the selected objects, or like the photographs of a data set. Esc keeps the
     best so far"""
 
@@ -55,13 +55,10 @@ class STIPPLE_OT_splats_fit(JobOperator, bpy.types.Operator):
 
     def modal(self, context, event):
         result = super().modal(context, event)
-        if self._job is None:
-            return result
-        if event.type == 'TIMER':
+        if self._job is not None and event.type == 'TIMER':
             self._show(context)
             _redraw(context)
-        # Nothing may change while views are rendered.
-        return {'RUNNING_MODAL'} if self._job.holds_scene else result
+        return result
 
     def cancel(self, context):
         super().cancel(context)

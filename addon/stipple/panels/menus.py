@@ -72,6 +72,7 @@ def _draw_adapt(self, context):
         self.layout.operator_context = 'INVOKE_DEFAULT'
         self.layout.operator('stipple.mesh_adapt', icon='MOD_SHRINKWRAP')
         self.layout.operator('stipple.mesh_adapt_to_images', icon='IMAGE_BACKGROUND')
+        self.layout.operator('stipple.mesh_adapt_to_renders', icon='RENDER_STILL')
         self.layout.operator('stipple.mesh_even_out', icon='MOD_SMOOTH')
 
 

@@ -10,10 +10,12 @@ from .. import version
 from ..binding.errors import invalid
 from ..binding.mesh import Mesh
 from . import meshes, shapes
+from .fit import view_rigs
 from .source import placement, sources, splat_data
 
 RESULTS = (('SHAPE_KEY', "Shape Key", "The new shape is a shape key of the mesh, at a value of 1. The other shape keys "
             "go to 0"), ('APPLY', "Apply", "The vertices of the mesh move; its old shape is not kept"))
+_UNSEEN = {'ARMATURE', 'CAMERA', 'LATTICE', 'LIGHT', 'LIGHT_PROBE', 'SPEAKER'}
 
 
 @dataclass
@@ -29,9 +31,12 @@ class Template:
         """As a native mesh, in the world. A matrix that mirrors would turn its faces inside out."""
         mesh = Mesh.create(sources.context())
         is_mirrored = np.linalg.det(self.matrix[:3, :3]) < 0
-        mesh.add_part(self.positions.astype(np.float64) @ self.matrix[:3, :3].T + self.matrix[:3, 3],
-                      self.triangles[:, ::-1] if is_mirrored else self.triangles, np.eye(4))
+        mesh.add_part(self.world(), self.triangles[:, ::-1] if is_mirrored else self.triangles, np.eye(4))
         return mesh
+
+    def world(self):
+        """[V,3] positions in the world."""
+        return self.positions.astype(np.float64) @ self.matrix[:3, :3].T + self.matrix[:3, 3]
 
     def local(self, mesh):
         """[V,3] positions of a native mesh in the world, in object space."""
@@ -74,6 +79,34 @@ def target_of(obj, depsgraph):
         raise invalid(f"'{obj.name}' has neither faces nor points; a mesh, a point cloud or splats are needed as the "
                       'target.')
     return points, None
+
+
+def can_render(obj):
+    """Whether an object is of a kind that Cycles shows."""
+    if obj.type in _UNSEEN or splat_data.is_splat_object(obj):
+        return False
+    return obj.type != 'EMPTY' or obj.instance_type != 'NONE'
+
+
+def require_shown_instances(objects, view_layer):
+    """Errors: StippleError where an object shows another one that has to be hidden from the renders at its own place:
+    Blender then hides it in the collection's instances, too."""
+    for obj in objects:
+        collection = obj.instance_collection if obj.instance_type == 'COLLECTION' else None
+        for shown in () if collection is None else collection.all_objects:
+            if shown not in objects and shown.name in view_layer.objects and not shown.hide_render:
+                raise invalid(f"'{shown.name}' is in the scene itself and in the collection that '{obj.name}' shows; "
+                              'select it, too, or exclude its collection from the view layer.')
+
+
+def require_nearness(template, objects, depsgraph):
+    """Errors: StippleError where the box of a Template and that of objects have no part in common, so that no image of
+    them can say where its vertices belong; or where nothing of the objects is visible."""
+    bounds = view_rigs.bounds_of(objects, depsgraph)
+    places = template.world()
+    if (places.min(0) > bounds.highest).any() or (places.max(0) < bounds.lowest).any():
+        raise invalid(f"'{template.name}' lies apart from what is rendered; move it there, or choose the alignment "
+                      'Location and Size.')
 
 
 def landmarks_of(obj, collection_name):

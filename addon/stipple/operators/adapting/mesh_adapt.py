@@ -134,10 +134,8 @@ class STIPPLE_OT_mesh_adapt(AdaptOperator, bpy.types.Operator):
 
     def start(self, context):
         obj = context.view_layer.objects.active
-        target = _targets(context)[0]
-        if target.data is not None and target.data == obj.data:
-            raise invalid(f"'{target.name}' and '{obj.name}' share one mesh, so that the target would change too; make "
-                          'it a single user first.')
+        target = other_objects(context)[0]
+        require_own_mesh(obj, target)
         self._target_name = target.name
         self._begin(obj, f'Adapted to {target.name}')
         return self._start(adapting.target_of(target, context.evaluated_depsgraph_get()),
@@ -167,13 +165,21 @@ def problem_of(context):
     return ''
 
 
-def _targets(context):
+def other_objects(context):
+    """What is selected beside the active object."""
     active = context.view_layer.objects.active
     return [obj for obj in context.view_layer.objects.selected if obj != active]
 
 
+def require_own_mesh(obj, target):
+    """Errors: StippleError where an object changes with the mesh that takes its shape."""
+    if target.data is not None and target.data == obj.data:
+        raise invalid(f"'{target.name}' and '{obj.name}' share one mesh, so that the target would change too; make "
+                      'it a single user first.')
+
+
 def _problem_of_targets(context):
-    count = len(_targets(context))
+    count = len(other_objects(context))
     if count == 0:
         return 'Select the target first, then the mesh that takes its shape'
     return '' if count == 1 else f'{count} targets are selected; one is allowed'

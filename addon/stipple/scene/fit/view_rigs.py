@@ -72,6 +72,11 @@ def _pose(camera):
                 camera.far_plane)
 
 
+def meets_nothing(rays):
+    """A cast of poses() where nothing but the bounds is in the images, so that nothing is in a camera's way."""
+    return np.full(len(rays), np.inf), np.zeros((len(rays), 3)), np.zeros(len(rays), np.uint32), np.zeros((0, 3))
+
+
 class Numbers:
     """Numbers objects as they are met, with the sides of their boxes then."""
 

@@ -34,6 +34,20 @@ class Shot:
     camera: object = None  # its name, where whole cameras are held out
 
 
+@dataclass(frozen=True)
+class RigSettings:
+    """What a ViewTask asks of its settings, for renders of the scene as it is by a rig of cameras."""
+
+    view_count: int
+    view_size: int     # pixels of both sides
+    samples: int       # per pixel
+    seed: int = 0
+    views_from: str = 'RIG'
+    rig: str = 'AROUND'
+    engine: str = 'CYCLES'
+    transparent: bool = True
+
+
 class ViewTask:
     """Polled like a native job, from Blender's main thread: rendering views needs Blender itself.
 
@@ -43,6 +57,7 @@ class ViewTask:
 
     parts = {'points': 0.05, 'views': 0.30, 'use': 0.62, 'keep': 0.03}  # of the work, and their usual shares
     colour_space = ColourSpace.DISPLAY  # of the splats that the views are for
+    cast = None                         # what rays of the rig meet, as view_rigs.poses() takes it
     plan = None                         # view_times.Plan of views at several times; None: the scene as it is
 
     def __init__(self, context, objects, settings):
@@ -210,7 +225,7 @@ class ViewTask:
         depsgraph = self._context.evaluated_depsgraph_get()
         bounds = view_rigs.bounds_of(self._objects, depsgraph)
         poses = view_rigs.poses(settings.rig, self._context.scene, depsgraph, bounds, settings.view_count,
-                                settings.seed)
+                                settings.seed, cast=self.cast)
         return [Shot(f'view_{i:04d}', pose) for i, pose in enumerate(poses)]
 
     def _moving_shots(self, frames, bounds):
