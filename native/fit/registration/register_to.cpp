@@ -1,7 +1,6 @@
 #include "fit/registration/register_to.h"
 
 #include "fit/registration/picture_registration.h"
-#include "fit/registration/sliding.h"
 
 namespace stipple {
 
@@ -10,9 +9,6 @@ RegisteredMesh registerTo(const TriMesh& given, const TargetSource& source,
                           Progress* progress, RegistrationWatch* watch) {
   if (source.views) {
     return registerToPictures(given, *source.views, options, backends, progress, watch);
-  }
-  if (source.mesh && options.lands_on_target && isItself(given, *source.mesh)) {
-    return slideOnItself(given, options, progress, watch);
   }
   return registerMesh(given, targetOf(source, options.target_count, options.seed), options,
                       progress, watch);

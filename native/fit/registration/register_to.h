@@ -7,8 +7,7 @@ namespace stipple {
 class BackendFactory;
 
 /// Gives a template the shape of whatever its target is: a surface, points or splats
-/// (registerMesh()), images (registerToPictures()), or where it is to land on itself, its own
-/// (slideOnItself()). Errors: theirs, and those of targetOf().
+/// (registerMesh()) or images (registerToPictures()). Errors: theirs, and those of targetOf().
 RegisteredMesh registerTo(const TriMesh& given, const TargetSource& source,
                           const RegistrationOptions& options, const BackendFactory& backends,
                           Progress* progress = nullptr, RegistrationWatch* watch = nullptr);

@@ -16,6 +16,7 @@
 #include "fit/registration/landing.h"
 #include "fit/registration/moving_template.h"
 #include "fit/registration/registration_report.h"
+#include "fit/registration/sliding_surface.h"
 #include "mesh/adapt/point_rows.h"
 
 namespace stipple {
@@ -176,6 +177,10 @@ uint64_t seedOfStep(uint64_t seed, uint32_t step) {
   return mixBits(seed) + step;
 }
 
+bool isItself(const TriMesh& given, const RegistrationTarget& target) {
+  return given.positions == target.positions && given.triangles == target.triangles;
+}
+
 /// Places in the ball, each brought to the nearest of the target's.
 std::vector<Vec3d> landed(const RegistrationTarget& target, const MeshLinks& links,
                           std::span<const Vec3d> given, const UnitBall& ball) {
@@ -215,11 +220,13 @@ RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& targ
   advance(progress, 0.0, kAdaptingStage);
   const UnitBall ball = ballOf(target);
   MovingTemplate moving(given, ball);
+  const std::vector<Vec3d> at_first = moving.merged().positions;
   const std::vector<Landmark> landmarks = landmarksIn(options.landmarks, ball, moving.merged());
   RegistrationTarget aim = inBall(target, ball);
   moving.align(preAligned(moving.merged().triangles, moving.merged().positions, aim, landmarks,
                           options.alignment));
 
+  const bool slides = options.lands_on_target && isItself(given, target);
   RegisteredMesh made;
   RegistrationReport& report = made.report;
   report.turned_normals = turnNormals(aim, moving.merged());
@@ -240,9 +247,13 @@ RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& targ
       },
       progress, watch);
   report.step_count = adapter.stepCount();
-  made.mesh = options.lands_on_target
-                  ? moving.mesh(landed(target, moving.links(), adapter.positions(), ball))
-                  : moving.mesh(adapter.positions());
+  std::vector<Vec3d> places(adapter.positions().begin(), adapter.positions().end());
+  if (slides) {
+    SlidingSurface(moving.links(), at_first, options.sharp_angle).landUnfolded(places);
+  } else if (options.lands_on_target) {
+    places = landed(target, moving.links(), places, ball);
+  }
+  made.mesh = moving.mesh(places);
   measureRegistration(given, target, options, made, progress);
   return made;
 }

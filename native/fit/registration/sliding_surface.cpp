@@ -14,6 +14,7 @@ namespace stipple {
 namespace {
 
 constexpr size_t kGrain = 1024;
+constexpr int kMostRounds = 32;
 
 /// Sets that grow together.
 class JoinedSets {
@@ -71,7 +72,8 @@ bool differ(const Vec3d& a, const Vec3d& b, double least_cosine) {
 
 SlidingSurface::SlidingSurface(const MeshLinks& links, std::span<const Vec3d> positions,
                                double sharp_angle)
-    : positions_(positions.begin(), positions.end()),
+    : links_(links),
+      positions_(positions.begin(), positions.end()),
       floats_(positions.size() * 3),
       part_of_(positions.size(), kHeld) {
   for (size_t v = 0; v < positions.size(); ++v) setRow(floats_, v, positions[v]);
@@ -157,6 +159,29 @@ void SlidingSurface::land(std::span<Vec3d> vertices) const {
       }
     }
   });
+}
+
+void SlidingSurface::landUnfolded(std::span<Vec3d> vertices) const {
+  land(vertices);
+  const std::span<const uint32_t> triangles = links_.triangles();
+  for (int round = 0; round < kMostRounds; ++round) {
+    std::vector<uint8_t> comes_back(vertices.size(), 0);
+    bool is_folded = false;
+    for (uint32_t t = 0; t < links_.triangleCount(); ++t) {
+      const Vec3d before = areaVector(triangles, positions_, t);
+      if (!(before.squaredNorm() > 0) || !differ(areaVector(triangles, vertices, t), before, 0.0)) {
+        continue;
+      }
+      is_folded = true;
+      for (size_t k = 0; k < 3; ++k) comes_back[triangles[size_t{t} * 3 + k]] = 1;
+    }
+    if (!is_folded) return;
+    for (size_t v = 0; v < vertices.size(); ++v) {
+      if (!comes_back[v]) continue;
+      vertices[v] = round + 1 < kMostRounds ? 0.5 * (vertices[v] + positions_[v]) : positions_[v];
+    }
+    land(vertices);
+  }
 }
 
 size_t SlidingSurface::heldCount() const {

@@ -27,6 +27,10 @@ class SlidingSurface {
   /// Threads and determinism: parallel; same result for any number of threads. Cost: O(n log F).
   void land(std::span<Vec3d> vertices) const;
 
+  /// The same, and vertices of triangles that are turned over by it come back, half of the way and
+  /// half again, until none is, or they are where they were.
+  void landUnfolded(std::span<Vec3d> vertices) const;
+
   size_t heldCount() const;  ///< vertices that stay
   size_t lineCount() const;  ///< vertices that keep to lines
 
@@ -38,6 +42,7 @@ class SlidingSurface {
   };
   static constexpr uint32_t kHeld = ~uint32_t{0};
 
+  const MeshLinks& links_;
   std::vector<Vec3d> positions_;
   std::vector<float> floats_;      ///< the same, which searches read
   std::vector<Part> parts_;        ///< regions of faces, then lines

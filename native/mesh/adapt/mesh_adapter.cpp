@@ -42,11 +42,6 @@ void validate(const MeshAdapterOptions& options) {
     fail(ErrorCode::kInvalidArgument, "last share is " + std::to_string(options.last_share) +
                                           " of the step size; 0 to 1 is allowed");
   }
-  if (!(options.density_share >= 0 && options.density_share <= 1)) {
-    fail(ErrorCode::kInvalidArgument, "share of the density is " +
-                                          std::to_string(options.density_share) +
-                                          " of the steps; 0 to 1 is allowed");
-  }
   requireRange(options.smoothness, "smoothness");
   requireRange(options.laplacian, "weight of the Laplacian penalty");
   if (!(std::isfinite(options.step_size) && options.step_size > 0 && options.step_size <= 10)) {
@@ -60,9 +55,9 @@ void validate(const MeshAdapterOptions& options) {
 }
 
 DensityPhase densityPhase(const MeshAdapterOptions& options, uint32_t step) {
-  const double halves = 2.0 * step / (options.density_share * options.steps);
-  const bool first = halves < 1;
-  if (options.density == MeshDensity::kOff || !(halves < 2)) return {};
+  const uint64_t fifths = uint64_t{step} * 5 / options.steps;
+  const bool first = fifths < 1;
+  if (options.density == MeshDensity::kOff || fifths >= 2) return {};
   if (first || options.density == MeshDensity::kUniform) {
     return {MeshDensity::kUniform, options.strength};
   }
@@ -85,12 +80,6 @@ MeshAdapter::MeshAdapter(const MeshLinks& links, std::span<const Vec3d> position
       optimiser_(links.vertexCount(), options.step_size),
       positions_(positions.begin(), positions.end()),
       spread_(positions_) {
-  diffusion_.multiply(spread_);
-}
-
-void MeshAdapter::place(std::span<const Vec3d> positions) {
-  std::copy(positions.begin(), positions.end(), positions_.begin());
-  spread_ = positions_;
   diffusion_.multiply(spread_);
 }
 

@@ -14,9 +14,8 @@ namespace stipple {
 
 enum class MeshDensity : uint32_t {
   kOff = 0,       ///< what fits the target alone
-  kUniform = 1,   ///< even edges, in all steps that the density has a share in
-  kAdaptive = 2,  ///< even edges in the first half of them, then shorter ones where the shape is
-                  ///< complex
+  kUniform = 1,   ///< even edges, in the first two fifths of the steps
+  kAdaptive = 2,  ///< even edges in the first fifth, then shorter ones where the shape is complex
 };
 
 /// Lengths and weights are those of a mesh in the unit ball.
@@ -25,15 +24,14 @@ struct MeshAdapterOptions {
   double strength = 1.5;         ///< >= 0, weight of the density energy
   double adaptive_factor = 3.0;  ///< >= 0, by which the adaptive energy weighs more than that
   double shortest = 0.5;  ///< 0..1, of the mean length: nothing is told to become shorter than that
-  double smoothness = 10.0;    ///< >= 0, lambda of M = I + lambda L; larger: broader steps, and
-                               ///< detail that comes later
-  double density_share = 0.4;  ///< 0..1, of the steps, in which the density acts
-  double step_size = 0.05;     ///< > 0
-  double last_share = 0.1;     ///< 0..1, of the step size that is left at the end: it falls evenly
-                               ///< over the last tenth of the steps, so that they come to rest
-  double laplacian = 0.0;      ///< >= 0, weight of the mean of |L x|^2 in all steps: a penalty that
-                               ///< smooths, for comparison, since it resists density
-  uint32_t steps = 800;        ///< >= 1
+  double smoothness = 10.0;  ///< >= 0, lambda of M = I + lambda L; larger: broader steps, and
+                             ///< detail that comes later
+  double step_size = 0.05;   ///< > 0
+  double last_share = 0.1;   ///< 0..1, of the step size that is left at the end: it falls evenly
+                             ///< over the last tenth of the steps, so that they come to rest
+  double laplacian = 0.0;    ///< >= 0, weight of the mean of |L x|^2 in all steps: a penalty that
+                             ///< smooths, for comparison, since it resists density
+  uint32_t steps = 800;      ///< >= 1
 };
 
 /// Errors: kInvalidArgument with the option, its value and what is allowed.
@@ -45,9 +43,8 @@ struct DensityPhase {
   double weight = 0;
 };
 
-/// The first half of the steps that the density has a share in even the edges out, in the second
-/// half they adapt, and then the density is left alone, so that the energy has no part in where the
-/// surface ends.
+/// Steps 0 to N/5 even the edges out, from there to 2N/5 they adapt, and then the density is left
+/// alone, so that the energy has no part in where the surface ends.
 DensityPhase densityPhase(const MeshAdapterOptions& options, uint32_t step);
 
 /// The share of the step size that a step takes: all of it to 9/10 of N, then less and less.
@@ -65,8 +62,6 @@ class MeshAdapter {
 
   std::span<const Vec3d> positions() const { return positions_; }
   uint32_t stepCount() const { return step_; }
-  /// Puts the vertices elsewhere, and goes on from there. In: positions [n].
-  void place(std::span<const Vec3d> positions);
   /// In: gradient [n] of the caller's loss at positions(); it is overwritten.
   /// Returns the energy of density at those positions, times its weight. Cost: two solves of three
   /// columns, three of one where density adapts.

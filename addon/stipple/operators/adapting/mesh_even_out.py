@@ -34,7 +34,7 @@ class STIPPLE_OT_mesh_even_out(AdaptOperator, bpy.types.Operator):
                            lands_on_target=1, sharp_angle=self.sharp_angle)
 
     def draw(self, _context):
-        self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'sharp_angle', 'preview'))
+        self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'points', 'sharp_angle', 'preview', 'seed'))
 
     def _tell(self, context, report):
         self.report({'INFO'}, f"The vertices of '{self._template.name}' are {self.density.lower()} now; its surface "
