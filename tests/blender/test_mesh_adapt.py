@@ -2,6 +2,7 @@
 """Meshes that take the shape of a target, or even out: Adapt Mesh to Target, Even Out Mesh."""
 
 import importlib
+import math
 import re
 
 import bpy
@@ -179,12 +180,14 @@ def test_landmarks_are_vertex_groups_with_empties_of_their_names(stipple):
     bpy.context.scene.collection.children.link(marks)
     nose = bpy.data.objects.new('Nose', None)
     marks.objects.link(nose)
-    nose.location = (1.2 * np.cos(0.5), 1.2 * np.sin(0.5), 0)
+    nose.location = (1.2 * np.cos(0.3), 1.2 * np.sin(0.3), 0)
     assert adapt(target, obj) == {'FINISHED'}
     free = shown(obj)[vertex]
     assert adapt(target, obj, landmarks='Marks') == {'FINISHED'}
     held = shown(obj)[vertex]
-    assert np.linalg.norm(free - nose.location) > 0.4  # 0.59 where the free vertex stays
+    # 0.36 where the free vertex stays. Nothing holds a ball from turning a little on a ball, and Blender 3.4 gives
+    # normals that differ in their last bits from run to run: it has come as near as 0.28.
+    assert np.linalg.norm(free - nose.location) > 0.2
     assert np.linalg.norm(held - nose.location) < 0.15
     assert distances(shown(obj), target).mean() < NEAR
 
@@ -324,6 +327,25 @@ def test_edges_become_even_and_the_shape_stays(stipple):
     assert distances(after, obj).max() < 1e-5
 
 
+@pytest.mark.parametrize('angle, keeps_edges', [(math.radians(45), True), (math.pi, False)])
+def test_a_box_keeps_its_edges_and_corners(stipple, angle, keeps_edges):
+    """A box whose vertices crowd at one corner. With a sharp angle of 180 degrees nothing is sharp."""
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.object.mode_set(mode='EDIT')
+    bpy.ops.mesh.subdivide(number_cuts=9)
+    bpy.ops.object.mode_set(mode='OBJECT')
+    obj = bpy.context.object
+    for vertex in obj.data.vertices:
+        vertex.co = [2 * ((c + 1) / 2) ** 2 - 1 for c in vertex.co]
+    before = shown(obj)
+    assert bpy.ops.stipple.mesh_even_out(sharp_angle=angle, **QUICK) == {'FINISHED'}
+    after = shown(obj)
+    lengths = [edges_of(obj, places) for places in (before, after)]
+    assert lengths[1].std() / lengths[1].mean() < 0.8 * lengths[0].std() / lengths[0].mean()
+    planes = [(np.abs(np.abs(places) - 1) < 1e-6).sum(axis=1) for places in (before, after)]
+    assert (planes[1] >= planes[0]).all() == keeps_edges
+
+
 def test_detail_gets_more_vertices(stipple):
     """A sheet with a narrow bump: edges on it are shorter afterwards."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=30, y_subdivisions=30, size=2)
@@ -460,8 +482,9 @@ def test_a_ball_takes_the_shape_that_images_show(stipple, photographed, capfd, d
     key = obj.data.shape_keys.key_blocks['Adapted to set']
     assert key.value == 1.0
     assert [[entry.weight for entry in vertex.groups] for vertex in obj.data.vertices] == weights
-    # A pixel is 0.06 where the head is. Half of the vertices, since the back of the eyes shows in no outline.
-    assert np.median(distances(shown(obj), target)) < 0.03
+    # A pixel is 0.06 where the head is. Half of the vertices, since the back of the eyes shows in no outline; and
+    # splats have softer ones than triangles.
+    assert np.median(distances(shown(obj), target)) < (0.03 if drawing == 'TRIANGLES' else 0.05)
 
 
 def test_images_without_transparency_are_refused(stipple, photographed):

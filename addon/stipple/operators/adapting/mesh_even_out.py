@@ -31,7 +31,7 @@ class STIPPLE_OT_mesh_even_out(AdaptOperator, bpy.types.Operator):
     def start(self, context):
         self._begin(context.view_layer.objects.active, 'Evened Out')
         return self._start(self._template.native(), density=MeshDensity[self.density], alignment=MeshAlignment.NONE,
-                           lands_on_target=1, sharp_angle=self.sharp_angle)
+                           lands_on_target=1, sharp_angle=min(self.sharp_angle, math.pi))  # float32 rounds 180° up
 
     def draw(self, _context):
         self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'points', 'sharp_angle', 'preview', 'seed'))
