@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,6 +28,9 @@ const std::vector<std::pair<const char*, uint32_t>> kAlignments = {
 const std::vector<std::pair<const char*, uint32_t>> kDrawings = {
     {"triangles", STIPPLE_PICTURE_DRAWING_TRIANGLES}, {"splats", STIPPLE_PICTURE_DRAWING_SPLATS}};
 
+/// Of the density, to images: what they say of a surface is weaker than what a surface says.
+constexpr double kImagesStrength = 0.3;
+
 StippleMeshAdaptOptions defaults() {
   StippleMeshAdaptOptions options;
   stipple_mesh_adapt_options_init(&options);
@@ -40,6 +44,7 @@ struct Arguments {
   int64_t steps = options.steps;
   int64_t points = static_cast<int64_t>(options.target_count);
   int64_t image_size = options.picture_side;
+  std::optional<double> strength;
   bool json = false;
 };
 
@@ -171,6 +176,7 @@ void adapt(const Context& context, Arguments& arguments) {
   const Target target = targetOf(context, arguments.target);
   const StippleMeshAdaptTarget aim = target.given();
   const char* usual = target.views ? "off" : "adaptive";
+  options.strength = arguments.strength.value_or(target.views ? kImagesStrength : options.strength);
   options.density =
       chosen(kDensities, arguments.density.empty() ? usual : arguments.density, "--density");
   const auto job = make<Job>(stipple_mesh_adapt_start, const_cast<const StippleMesh*>(given.get()),
@@ -194,9 +200,10 @@ void adapt(const Context& context, Arguments& arguments) {
   report.print(arguments.json);
 }
 
-void addWeights(CLI::App& command, StippleMeshAdaptOptions& options) {
-  command.add_option("--strength", options.strength, "Of the density; 0: none")
-      ->capture_default_str();
+void addWeights(CLI::App& command, Arguments& arguments) {
+  StippleMeshAdaptOptions& options = arguments.options;
+  command.add_option("--strength", arguments.strength,
+                     "Of the density; 0: none; default: 1.5, to images 0.3");
   command
       .add_option("--smoothness", options.smoothness,
                   "Larger: broader steps, and detail that comes later")
@@ -250,14 +257,15 @@ void addAdapt(CLI::App& app, const Context& context) {
                    "Of images: pixels of the longer side that are looked at")
       ->capture_default_str();
   command
-      ->add_option("--draw", arguments->draw,
-                   "What the template is drawn as beside images: triangles, or splats bound to them")
+      ->add_option(
+          "--draw", arguments->draw,
+          "What the template is drawn as beside images: triangles, or splats bound to them")
       ->capture_default_str();
   command->add_option("--landmark", arguments->landmarks,
                       "VERTEX:X,Y,Z: where a vertex of the template belongs, metres, Z up; "
                       "may be given several times");
   command->add_option("--seed", arguments->options.seed, "Of all samples")->capture_default_str();
-  addWeights(*command, arguments->options);
+  addWeights(*command, *arguments);
   command->add_flag("--json", arguments->json, "Figures as JSON");
   command->callback([arguments, &context] { adapt(context, *arguments); });
 }

@@ -2,7 +2,7 @@
 """What the operators have in common that give a mesh the shape that images show."""
 
 import bpy
-from bpy.props import EnumProperty, IntProperty
+from bpy.props import EnumProperty, FloatProperty, IntProperty
 
 from ...binding.structs import MeshAlignment, MeshDensity, PictureDrawing
 from .mesh_adapt import DENSITIES, AdaptOperator
@@ -18,6 +18,9 @@ class AdaptToViewsOperator(AdaptOperator):
 
     density: EnumProperty(name="Density", description="Where vertices go along the surface", items=DENSITIES,
                           default='OFF')
+    strength: FloatProperty(name="Strength", description="How strongly edges are shortened and evened out against what "
+                            "the images say, which is weaker than what a surface says", default=0.3, min=0.0,
+                            soft_max=10.0)
     alignment: EnumProperty(name="Alignment", description="What is done to the whole mesh first", items=_ALIGNMENTS)
     image_size: IntProperty(name="Image Size", description="Pixels of the longer side of the images that are compared. "
                             "Larger ones show finer detail, and take longer by the square", default=256, min=16,
