@@ -9,31 +9,12 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "mesh/joined_groups.h"
 #include "mesh/point_tree.h"
 
 namespace stipple {
 
 namespace {
-
-/// Groups under union; the root of a group is its smallest index.
-class Groups {
- public:
-  explicit Groups(size_t count) : parents_(count) {
-    std::iota(parents_.begin(), parents_.end(), 0u);
-  }
-  uint32_t root(uint32_t i) {
-    while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
-    return i;
-  }
-  void join(uint32_t a, uint32_t b) {
-    const uint32_t first = root(a);
-    const uint32_t second = root(b);
-    parents_[std::max(first, second)] = std::min(first, second);
-  }
-
- private:
-  std::vector<uint32_t> parents_;
-};
 
 /// Integer cell coordinates, as doubles: far points have cells beyond any integer type.
 using Cell = std::array<double, 3>;
@@ -160,7 +141,7 @@ std::vector<uint32_t> pointComponents(std::span<const float> points, double radi
   // apart than the radius.
   const CellGrid grid(points, radius * (0.57735026918962573 * (1 - 1e-12)));
   const std::vector<std::array<int, 3>> offsets = halfOfNeighbours();
-  Groups groups(count);
+  JoinedGroups groups(count);
   for (size_t c = 0; c < grid.size(); ++c) {
     const std::span<const uint32_t> here = grid.pointsOf(c);
     for (const uint32_t i : here) groups.join(here[0], i);

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "base/parallel.h"
 #include "mesh/adapt/moving_samples.h"
 #include "mesh/adapt/point_rows.h"
+#include "mesh/joined_groups.h"
 
 namespace stipple {
 
@@ -16,33 +16,16 @@ namespace {
 constexpr size_t kGrain = 1024;
 constexpr int kMostRounds = 32;
 
-/// Sets that grow together.
-class JoinedSets {
- public:
-  explicit JoinedSets(size_t count) : parents_(count) {
-    std::iota(parents_.begin(), parents_.end(), 0u);
+/// Numbers of the groups from 0 on, of each member.
+std::vector<uint32_t> numbersOf(JoinedGroups& groups, size_t members, uint32_t& count) {
+  std::vector<uint32_t> numbers(members);
+  count = 0;
+  for (uint32_t i = 0; i < members; ++i) {
+    const uint32_t root = groups.root(i);
+    numbers[i] = root == i ? count++ : numbers[root];
   }
-  uint32_t setOf(uint32_t i) {
-    while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
-    return i;
-  }
-  void join(uint32_t a, uint32_t b) {
-    const uint32_t first = setOf(a), second = setOf(b);
-    parents_[std::max(first, second)] = std::min(first, second);
-  }
-  /// Numbers of the sets from 0 on, of each member.
-  std::vector<uint32_t> numbers(uint32_t& count) {
-    std::vector<uint32_t> numbers(parents_.size());
-    count = 0;
-    for (uint32_t i = 0; i < numbers.size(); ++i) {
-      numbers[i] = setOf(i) == i ? count++ : numbers[setOf(i)];
-    }
-    return numbers;
-  }
-
- private:
-  std::vector<uint32_t> parents_;  ///< none is larger than its own index
-};
+  return numbers;
+}
 
 struct EdgeSide {
   std::pair<uint32_t, uint32_t> ends;
@@ -80,7 +63,7 @@ SlidingSurface::SlidingSurface(const MeshLinks& links, std::span<const Vec3d> po
   const std::span<const uint32_t> triangles = links.triangles();
   const double least_cosine = std::cos(sharp_angle);
   const std::vector<EdgeSide> sides = sortedSides(triangles);
-  JoinedSets regions(links.triangleCount());
+  JoinedGroups regions(links.triangleCount());
   std::vector<std::pair<uint32_t, uint32_t>> sharp;
   for (size_t i = 0; i < sides.size();) {
     size_t end = i;
@@ -100,7 +83,7 @@ SlidingSurface::SlidingSurface(const MeshLinks& links, std::span<const Vec3d> po
     edges_at[sharp[e].first].push_back(e);
     edges_at[sharp[e].second].push_back(e);
   }
-  JoinedSets lines(sharp.size());
+  JoinedGroups lines(sharp.size());
   std::vector<uint8_t> is_on_line(positions.size(), 0);
   for (uint32_t v = 0; v < positions.size(); ++v) {
     if (edges_at[v].size() != 2) continue;
@@ -114,8 +97,8 @@ SlidingSurface::SlidingSurface(const MeshLinks& links, std::span<const Vec3d> po
   }
 
   uint32_t region_count = 0, line_count = 0;
-  const std::vector<uint32_t> region_of = regions.numbers(region_count);
-  const std::vector<uint32_t> line_of = lines.numbers(line_count);
+  const std::vector<uint32_t> region_of = numbersOf(regions, links.triangleCount(), region_count);
+  const std::vector<uint32_t> line_of = numbersOf(lines, sharp.size(), line_count);
   region_count_ = region_count;
   parts_.resize(size_t{region_count} + line_count);
   for (uint32_t t = 0; t < links.triangleCount(); ++t) {
