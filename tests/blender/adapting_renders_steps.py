@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Steps of test_mesh_adapt_renders_window.py inside the Blender with a window; window.py runs them."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -9,20 +8,10 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import scenes  # noqa: E402
+from adapting_steps import keys  # noqa: E402
 from fit_steps import press  # noqa: E402
 
-folder = Path(sys.argv[sys.argv.index('--') + 2])
 facts = {}
-
-
-def note(name, value):
-    facts[name] = value
-    (folder / 'facts.json').write_text(json.dumps(facts))
-
-
-def keys():
-    found = bpy.data.objects['Ball'].data.shape_keys
-    return [] if found is None else [key.name for key in found.key_blocks]
 
 
 def state():
@@ -53,7 +42,7 @@ def build(window):
         bpy.ops.view3d.view_axis(type='FRONT')
         bpy.ops.ed.undo_push(message='before')
     window.region_data.view_distance = 6
-    note('before', state())
+    facts['before'] = state()
 
 
 def ball(_window):
@@ -94,15 +83,15 @@ def rendering(_window):
     """Blender draws between two views, whose camera is in the scene."""
     if 'Stipple View' not in bpy.data.objects:
         return False
-    note('while_rendering', state())
+    facts['while_rendering'] = state()
     return 'rendering'
 
 
 def cancelled(_window):
     if 'Stipple View' in bpy.data.objects:
         return False
-    note('cancelled', state())
-    note('finished_after_cancel', finished())
+    facts['cancelled'] = state()
+    facts['finished_after_cancel'] = finished()
     return None
 
 
@@ -115,21 +104,21 @@ def adapting(_window):
     if not keys() or min(abs(point.co.z) for point in bpy.data.objects['Ball'].data.shape_keys.key_blocks[-1].data
                          if point.co.xy.length < 0.05) > 0.8:
         return False
-    note('camera_is_gone', 'Stipple View' not in bpy.data.objects)
+    facts['camera_is_gone'] = 'Stipple View' not in bpy.data.objects
     return 'adapting'
 
 
 def ended(_window):
     if not finished():
         return False
-    note('ended', keys())
+    facts['ended'] = keys()
     return 'ended'
 
 
 def undo(window):
     with window.context():
         bpy.ops.ed.undo()
-    note('undone', keys())
+    facts['undone'] = keys()
 
 
 def ask_for_few(window):
@@ -140,15 +129,15 @@ def repeated(window):
     """Shift R once it is over: Blender has the same operator run again."""
     if not finished():
         return False
-    note('once', keys())
+    facts['once'] = keys()
     with window.context():
         bpy.ops.screen.repeat_last('INVOKE_DEFAULT')
     return None
 
 
 def twice(_window):
-    note('twice', keys())
-    note('in_list', finished())
+    facts['twice'] = keys()
+    facts['in_list'] = finished()
     return 'repeated'
 
 

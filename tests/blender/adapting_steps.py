@@ -18,11 +18,6 @@ folder = Path(sys.argv[sys.argv.index('--') + 2])
 facts = {}
 
 
-def note(name, value):
-    facts[name] = value
-    (folder / 'facts.json').write_text(json.dumps(facts))
-
-
 def keys():
     found = bpy.data.objects['Ball'].data.shape_keys
     return [] if found is None else [key.name for key in found.key_blocks]
@@ -49,7 +44,7 @@ def wait(_window):
 
 
 def ball(_window):
-    note('before', keys())
+    facts['before'] = keys()
     return 'ball'
 
 
@@ -69,7 +64,7 @@ def close_menu(window):
 def start(window):
     with window.context():
         # More steps than anybody waits for.
-        note('started', list(bpy.ops.stipple.mesh_adapt('INVOKE_DEFAULT', steps=1000000, points=4000)))
+        facts['started'] = list(bpy.ops.stipple.mesh_adapt('INVOKE_DEFAULT', steps=1000000, points=4000))
 
 
 def previewed(_window):
@@ -82,7 +77,7 @@ def previewed(_window):
     if np.ptp(np.linalg.norm(places.reshape(-1, 3), axis=1)) < 0.3:
         return False
     facts.setdefault('while_running', [])
-    note('while_running', facts['while_running'] + [op.bl_idname for op in bpy.context.window_manager.operators])
+    facts['while_running'] = facts['while_running'] + [op.bl_idname for op in bpy.context.window_manager.operators]
     return 'running'
 
 
@@ -93,8 +88,8 @@ def escape(window):
 def ended(_window):
     if 'STIPPLE_OT_mesh_adapt' not in [op.bl_idname for op in bpy.context.window_manager.operators]:
         return False
-    note('ended', keys())
-    note('value', bpy.data.objects['Ball'].data.shape_keys.key_blocks[-1].value)
+    facts['ended'] = keys()
+    facts['value'] = bpy.data.objects['Ball'].data.shape_keys.key_blocks[-1].value
     return None
 
 
@@ -115,7 +110,7 @@ def settings(_window):
 def undo(window):
     with window.context():
         bpy.ops.ed.undo()
-    note('undone', keys())
+    facts['undone'] = keys()
 
 
 def undone(_window):
@@ -125,13 +120,13 @@ def undone(_window):
 def even_out(window):
     scenes.select(bpy.data.objects['Ball'])
     with window.context():
-        note('evening', list(bpy.ops.stipple.mesh_even_out('INVOKE_DEFAULT', steps=100, points=4000, preview=False)))
+        facts['evening'] = list(bpy.ops.stipple.mesh_even_out('INVOKE_DEFAULT', steps=100, points=4000, preview=False))
 
 
 def evened(_window):
     if 'STIPPLE_OT_mesh_even_out' not in [op.bl_idname for op in bpy.context.window_manager.operators]:
         return False
-    note('evened', keys())
+    facts['evened'] = keys()
     return None
 
 
@@ -168,7 +163,7 @@ def choose(_window):
 def taught(_window):
     if 'STIPPLE_OT_mesh_adapt_to_images' not in [op.bl_idname for op in bpy.context.window_manager.operators]:
         return False
-    note('taught', keys())
+    facts['taught'] = keys()
     return None
 
 

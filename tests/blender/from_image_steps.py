@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Steps of test_from_image_window.py inside the Blender with a window; window.py runs them."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -70,7 +69,6 @@ def stopped(_window):
         return False
     facts['objects'] = sorted(obj.name for obj in bpy.data.objects)
     facts['kept'] = sorted(path.name for path in (weights.parent / 'cache').rglob('*') if path.is_file())
-    (folder / 'facts.json').write_text(json.dumps(facts))
     return 'stopped'
 
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Steps of test_overlay_window.py inside the Blender with a window; window.py runs them."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -113,10 +112,6 @@ def popover_shot(_window):
     return 'popover'
 
 
-def write(_window):
-    (Path(sys.argv[sys.argv.index('--') + 2]) / 'facts.json').write_text(json.dumps(facts))
-
-
 steps = [build, start, live, stop, ended, accept, *of('OFF', 'own'), *of('AGE', 'age'), *of('SCORE', 'score'),
          *of('SPLIT_AXIS', 'axis'), *of('CONTRIBUTION', 'contribution'), without_overlays, hidden, with_overlays,
-         densify, *of('AGE', 'densified'), popover, wait, popover_shot, write]
+         densify, *of('AGE', 'densified'), popover, wait, popover_shot]

@@ -2,7 +2,6 @@
 """Steps of test_quality_window.py inside the Blender with a window; window.py runs them."""
 
 import importlib
-import json
 import sys
 from pathlib import Path
 
@@ -93,9 +92,4 @@ def plotted(window):
     return 'plotted'
 
 
-def finish(_window):
-    (Path(sys.argv[sys.argv.index('--') + 2]) / 'facts.json').write_text(json.dumps(facts))
-
-
-steps = [build, fresh, measure, measured, figures, compared('WIPE'), is_shown, compared('ERROR'), settled, plotted,
-         finish]
+steps = [build, fresh, measure, measured, figures, compared('WIPE'), is_shown, compared('ERROR'), settled, plotted]

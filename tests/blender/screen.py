@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A virtual screen, a Blender with a window on it, and what it shows."""
 
+import json
 import os
 import shutil
 import struct
@@ -17,8 +18,8 @@ WIDTH, HEIGHT = 1280, 800
 
 def run_steps(steps_file, folder, blender, timeout=300, size=(WIDTH, HEIGHT), arguments=(),
               options=()):
-    """Runs the steps of a file (window.py) in a Blender with these options, and returns {name: picture [H,W,3] uint8}
-    and what Blender has written."""
+    """Runs the steps of a file (window.py) in a Blender with these options, and returns {name: picture [H,W,3] uint8},
+    the facts that the steps have noted, and what Blender has written."""
     if shutil.which('Xvfb') is None:
         pytest.skip('Xvfb is not installed: nothing can be shown in a window')
     with Screen(folder, size) as screen:
@@ -36,7 +37,8 @@ def run_steps(steps_file, folder, blender, timeout=300, size=(WIDTH, HEIGHT), ar
     failed = folder / 'failed'
     assert not failed.exists(), failed.read_text() + text
     assert (folder / 'done').exists(), text
-    return {path.stem: read_xwd(path) for path in sorted(folder.glob('*.xwd'))}, text
+    pictures = {path.stem: read_xwd(path) for path in sorted(folder.glob('*.xwd'))}
+    return pictures, json.loads((folder / 'facts.json').read_text()), text
 
 
 class Screen:

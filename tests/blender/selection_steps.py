@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Steps of test_selection_window.py inside the Blender with a window; window.py runs them. All is done with the mouse."""
 
-import json
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -295,10 +294,6 @@ def tool_names():
     return [item.idname for item in found if item is not None and item.idname.startswith('stipple.')]
 
 
-def write(_window):
-    (folder() / 'facts.json').write_text(json.dumps(facts))
-
-
 LINE = ((-120, 60), (-60, 70), (0, 60), (60, 70), (120, 60))
 OUTLINE = ((-100, -100), (100, -100), (100, 20), (20, 20), (-100, 20))
 WHEEL = ('WHEELUPMOUSE', 'PRESS', (10, 0), ())
@@ -319,4 +314,4 @@ steps = [build, note_theme, watch_preview, forget_source, note_prepared, tool('s
          taken('lasso'), lambda _window: 'lasso_done', tool('stipple.select_sphere'), *drag(((40, 0), (80, 30), (100, 40)), shot='sphere'),
          taken('sphere'), tool('stipple.select_color'), *drag(((-80, 0),)), note_color, taken('color', True),
          tool('stipple.select_brush'), quad_view, quad_drag, taken('quad', True), quad_view, panoramic_camera, *drag(LINE),
-         taken('panorama', True), plain_view, lambda _window: None, *drag(LINE), erase, taken('erased'), lambda _window: 'erased', disable_and_enable, write]
+         taken('panorama', True), plain_view, lambda _window: None, *drag(LINE), erase, taken('erased'), lambda _window: 'erased', disable_and_enable]

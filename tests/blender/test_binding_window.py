@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splats on a mesh in a window on a virtual screen: they follow what somebody does to it, and undo."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -15,8 +14,7 @@ STEPS = Path(__file__).resolve().parent / 'binding_steps.py'
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
-    pictures, text = screen.run_steps(STEPS, folder, bpy.app.binary_path)
-    return pictures, json.loads((folder / 'facts.json').read_text()), text
+    return screen.run_steps(STEPS, folder, bpy.app.binary_path)
 
 
 def differ(pictures, a, b):

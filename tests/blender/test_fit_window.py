@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A fit in a window on a virtual screen: panel, preview while it runs, the decision at its end."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -15,9 +14,8 @@ import screen
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
-    pictures, text = screen.run_steps(Path(fit_steps.__file__), folder, bpy.app.binary_path, timeout=500,
-                                      size=(1280, 1060), options=('--enable-event-simulate',))
-    return pictures, json.loads((folder / 'facts.json').read_text()), text
+    return screen.run_steps(Path(fit_steps.__file__), folder, bpy.app.binary_path, timeout=500,
+                            size=(1280, 1060), options=('--enable-event-simulate',))
 
 
 def red_pixels(picture):

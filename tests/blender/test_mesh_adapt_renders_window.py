@@ -2,7 +2,6 @@
 """A mesh takes the shape of renders in a window on a virtual screen: dialog, Esc while views are rendered and later, undo,
 once more."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -16,9 +15,8 @@ STEPS = Path(__file__).resolve().parent / 'adapting_renders_steps.py'
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
-    pictures, text = screen.run_steps(STEPS, folder, bpy.app.binary_path, size=(1280, 1060),
-                                      options=('--enable-event-simulate',))
-    return pictures, json.loads((folder / 'facts.json').read_text()), text
+    return screen.run_steps(STEPS, folder, bpy.app.binary_path, size=(1280, 1060),
+                            options=('--enable-event-simulate',))
 
 
 def differ(pictures, a, b):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mesh takes another shape in a window on a virtual screen: preview, Esc, one undo step."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -15,9 +14,8 @@ STEPS = Path(__file__).resolve().parent / 'adapting_steps.py'
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
-    pictures, text = screen.run_steps(STEPS, folder, bpy.app.binary_path, size=(1280, 1060),
-                                      options=('--enable-event-simulate',))
-    return pictures, json.loads((folder / 'facts.json').read_text()), text
+    return screen.run_steps(STEPS, folder, bpy.app.binary_path, size=(1280, 1060),
+                            options=('--enable-event-simulate',))
 
 
 def differ(pictures, a, b):

@@ -2,7 +2,6 @@
 """A fit of splats that move in a window: what the panel says before it, Esc while views are rendered, the preview at
 the present frame, the clip that plays."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -16,9 +15,8 @@ import screen
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
-    pictures, text = screen.run_steps(Path(motion_fit_steps.__file__), folder, bpy.app.binary_path, timeout=500,
-                                      size=(1280, 1060), options=('--enable-event-simulate',))
-    return pictures, json.loads((folder / 'facts.json').read_text()), text
+    return screen.run_steps(Path(motion_fit_steps.__file__), folder, bpy.app.binary_path, timeout=500,
+                            size=(1280, 1060), options=('--enable-event-simulate',))
 
 
 def ball_column(picture):

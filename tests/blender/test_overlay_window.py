@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The overlay that colours splats by what density control saw, in a window on a virtual screen."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -15,10 +14,10 @@ import screen
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
-    pictures, text = screen.run_steps(Path(overlay_steps.__file__), folder, bpy.app.binary_path, timeout=500,
-                                      size=(1000, 800), options=('--enable-event-simulate',))
+    pictures, facts, text = screen.run_steps(Path(overlay_steps.__file__), folder, bpy.app.binary_path, timeout=500,
+                                             size=(1000, 800), options=('--enable-event-simulate',))
     assert 'Traceback' not in text, text
-    return pictures, json.loads((folder / 'facts.json').read_text())
+    return pictures, facts
 
 
 def middle(shots, name):

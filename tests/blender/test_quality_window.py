@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Accuracy in a window on a virtual screen: figures and plot in the panels, comparisons, what ends when."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -15,8 +14,7 @@ import screen
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
-    pictures, text = screen.run_steps(Path(quality_steps.__file__), folder, bpy.app.binary_path, size=(1500, 1700))
-    return pictures, json.loads((folder / 'facts.json').read_text()), text
+    return screen.run_steps(Path(quality_steps.__file__), folder, bpy.app.binary_path, size=(1500, 1700))
 
 
 def panels(shots, name):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rendered shading through a camera, in a window on a virtual screen: lenses and panoramas as in final pictures."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -15,8 +14,8 @@ import view_lens_steps
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('view_lens')
-    pictures, _ = screen.run_steps(Path(view_lens_steps.__file__), folder, bpy.app.binary_path, timeout=560)
-    return pictures, json.loads((folder / 'facts.json').read_text()), folder
+    pictures, facts, _ = screen.run_steps(Path(view_lens_steps.__file__), folder, bpy.app.binary_path, timeout=560)
+    return pictures, facts, folder
 
 
 def of_view(shots, name):

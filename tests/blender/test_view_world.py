@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Worlds in Rendered shading of the engine Stipple, in a window on a virtual screen, against final pictures."""
 
-import json
 import os
 from pathlib import Path
 
@@ -19,9 +18,9 @@ NAMES = ('panorama_world', 'turned', 'dimmer', 'gradient', 'green', 'pink', 'und
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('view_world')
-    pictures, text = screen.run_steps(Path(view_world_steps.__file__), folder, bpy.app.binary_path, timeout=560)
+    pictures, facts, text = screen.run_steps(Path(view_world_steps.__file__), folder, bpy.app.binary_path, timeout=560)
     assert 'Traceback' not in text, text
-    return pictures, json.loads((folder / 'facts.json').read_text()), folder
+    return pictures, facts, folder
 
 
 @pytest.mark.parametrize('name', NAMES)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """3D views and panels in a window on a virtual screen (Xvfb): what the screen shows."""
 
-import json
 from pathlib import Path
 
 import bpy
@@ -19,8 +18,7 @@ TOLERANCE = 6
 @pytest.fixture(scope='module')
 def shots(tmp_path_factory):
     folder = tmp_path_factory.mktemp('window')
-    pictures, text = screen.run_steps(Path(window_steps.__file__), folder, bpy.app.binary_path)
-    return pictures, json.loads((folder / 'facts.json').read_text()), text
+    return screen.run_steps(Path(window_steps.__file__), folder, bpy.app.binary_path)
 
 
 def pixel(shots, picture, name):

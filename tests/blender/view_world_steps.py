@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Steps of test_view_world.py inside the Blender with a window; window.py runs them."""
 
-import json
 import sys
 import time
 from importlib import import_module
@@ -137,7 +136,6 @@ def finish(_window):
     state = painter()._state
     facts['process'] = state.painter._process.pid
     facts['sizes'] = list(state.shown[1].pixels.shape)
-    (views.folder() / 'facts.json').write_text(json.dumps(facts))
 
 
 steps = [build, views.watch, *taken('panorama_world'), turn, views.taken('turned'), views.rendered('turned'), brighter,

@@ -7,9 +7,11 @@ STEPS.py defines `steps`: a list of functions of a Window, called one after the 
 Blender to draw. A step that returns False is called again: it waits for something. One that returns a
 name gets its picture, FOLDER/name.xwd, a copy of SCREEN: the frame
 buffer file of `Xvfb -fbdir`, since Blender's own screenshots are black there from 4.0 on. `done` is
-written at the end, `failed` with the traceback where a step raises.
+written at the end, `failed` with the traceback where a step raises. What the steps have put into a dictionary `facts`,
+if STEPS.py defines one, is in FOLDER/facts.json then.
 """
 
+import json
 import runpy
 import shutil
 import sys
@@ -67,7 +69,7 @@ def main():
     folder = Path(folder)
     bpy.context.preferences.view.show_splash = False
     bpy.ops.preferences.addon_enable(module='stipple')
-    state = {'step': 0, 'shot': None, 'until': 0}
+    state = {'step': 0, 'shot': None, 'until': 0, 'facts': {}}
 
     def finish(name, text=''):
         (folder / name).write_text(text)
@@ -77,7 +79,8 @@ def main():
         try:
             if 'window' not in state:
                 state['window'] = Window()
-                state['steps'] = runpy.run_path(steps_file)['steps']
+                defined = runpy.run_path(steps_file)
+                state['steps'], state['facts'] = defined['steps'], defined.get('facts', {})
             window = state['window']
             if window.redraws < state['until']:
                 window.redraw()
@@ -87,6 +90,7 @@ def main():
                 shutil.copy(screen, folder / f"{state['shot']}.xwd")
                 state['shot'] = None
             if state['step'] == len(state['steps']):
+                (folder / 'facts.json').write_text(json.dumps(state['facts']))
                 finish('done')
                 return None
             step = state['steps'][state['step']]

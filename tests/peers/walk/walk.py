@@ -12,7 +12,6 @@ another scan, and fits splats to photographs. Screenshots and renders end up in 
 at."""
 
 import hashlib
-import json
 import os
 import shutil
 from pathlib import Path
@@ -75,15 +74,16 @@ def walked(folder, part):
     shots = Path(os.environ.get('STIPPLE_WALK_SHOTS', folder / 'shots')).resolve()
     shots.mkdir(parents=True, exist_ok=True)
     inside.mkdir()
-    images, log = screen.run_steps(HERE / f'walk_{part}.py', inside, bpy.app.binary_path, timeout=1500, size=SIZE,
-                                   arguments=(str(folder), str(assets)), options=('--enable-event-simulate',))
+    images, facts, log = screen.run_steps(HERE / f'walk_{part}.py', inside, bpy.app.binary_path, timeout=1500,
+                                          size=SIZE, arguments=(str(folder), str(assets)),
+                                          options=('--enable-event-simulate',))
     (shots / f'{part}.log').write_text(log)
     for name, pixels in images.items():
         save_png(pixels, shots / f'{part}_{name}.png')
     for made in inside.glob('*.png'):
         shutil.copy(made, shots / f'{part}_{made.name}')
     assert 'Traceback' not in log, log
-    return json.loads((inside / 'facts.json').read_text())
+    return facts
 
 
 def save_png(pixels, path):

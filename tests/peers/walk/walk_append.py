@@ -29,4 +29,5 @@ def save(_window):
     return 'appended'
 
 
+facts = parts.facts
 steps = [append, save, parts.render_all]

@@ -144,5 +144,6 @@ def save_here_and_elsewhere(window):
     return 'saved'
 
 
+facts = parts.facts
 steps = [import_truck, level, crop, select_tool, stroke, stroked, erase, erased, budget, note_budget,
          helmet, camera_and_ground, save_here_and_elsewhere]

@@ -164,5 +164,6 @@ def look_beside_the_camera(window):
     return 'fox_beside'
 
 
+facts = parts.facts
 steps = [import_burger, front_only, brush, press_and_move, while_drawing, release, selected, erase, erased, export,
          exported, import_again, cameras, fit, fit_enough, stop, stopped, accept, look_beside_the_camera]

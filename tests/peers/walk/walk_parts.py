@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the three Blenders of walk.py share."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -18,7 +17,6 @@ facts = {}
 
 def note(**values):
     facts.update(values)
-    (OUT / 'facts.json').write_text(json.dumps(facts))
 
 
 def splats():

@@ -19,4 +19,5 @@ def look(_window):
     return 'opened'
 
 
+facts = parts.facts
 steps = [open_file, look, parts.render_all]
