@@ -172,5 +172,5 @@ def shown(_window):
 
 
 steps = [build, wait, ball, open_menu, wait, menu, close_menu, wait, start, previewed, escape, ended, wait, kept,
-         open_settings, wait, settings, close_menu, wait, undo, wait, undone, even_out, evened, wait, evened_out, photograph, find_images,
-         wait, wait, browse, choose, previewed, wait, escape, taught, wait, shown]
+         open_settings, wait, settings, close_menu, wait, undo, wait, undone, even_out, evened, wait, evened_out,
+         photograph, find_images, wait, wait, browse, choose, previewed, wait, escape, taught, wait, shown]

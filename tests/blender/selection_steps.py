@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps of test_selection_window.py inside the Blender with a window; window.py runs them. All is done with the mouse."""
+"""Steps of test_selection_window.py inside the Blender with a window; window.py runs them. All is done with the
+mouse."""
 
 import sys
 from importlib import import_module
@@ -308,10 +309,14 @@ steps = [build, note_theme, watch_preview, forget_source, note_prepared, tool('s
          events(*key('LEFT_BRACKET'), *key('LEFT_BRACKET')), note_radius('smaller'), note_distance('before'),
          events(*press(((0, 0), (10, 0))), WHEEL, WHEEL, released((10, 0))), note_radius('wheel'),
          note_distance('after'), events(WHEEL), note_distance('zoomed'), zoom_back, set_to(radius=40),
-         events(*key('F')), events(('MOUSEMOVE', 'NOTHING', (30, 0), ())), events(*press(((30, 0),)), released((30, 0))),
+         events(*key('F')), events(('MOUSEMOVE', 'NOTHING', (30, 0), ())),
+         events(*press(((30, 0),)), released((30, 0))),
          note_radius('dragged'), set_to(radius=40, front_only=True), *drag(LINE), taken('front'),
          set_to(front_only=False), press_panel_button('stipple.select_lasso'), *drag(OUTLINE, shot='lasso'),
-         taken('lasso'), lambda _window: 'lasso_done', tool('stipple.select_sphere'), *drag(((40, 0), (80, 30), (100, 40)), shot='sphere'),
+         taken('lasso'), lambda _window: 'lasso_done', tool('stipple.select_sphere'),
+         *drag(((40, 0), (80, 30), (100, 40)), shot='sphere'),
          taken('sphere'), tool('stipple.select_color'), *drag(((-80, 0),)), note_color, taken('color', True),
-         tool('stipple.select_brush'), quad_view, quad_drag, taken('quad', True), quad_view, panoramic_camera, *drag(LINE),
-         taken('panorama', True), plain_view, lambda _window: None, *drag(LINE), erase, taken('erased'), lambda _window: 'erased', disable_and_enable]
+         tool('stipple.select_brush'), quad_view, quad_drag, taken('quad', True), quad_view, panoramic_camera,
+         *drag(LINE),
+         taken('panorama', True), plain_view, lambda _window: None, *drag(LINE), erase, taken('erased'),
+         lambda _window: 'erased', disable_and_enable]
