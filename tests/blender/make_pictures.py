@@ -35,7 +35,7 @@ IMAGES = Path(__file__).resolve().parent.parent.parent / 'docs' / 'images'
                          ids=lambda value: getattr(value, '__name__', ''))
 def test_pictures_of_windows(tmp_path, steps, size):
     shots, _, _ = screen.run_steps(Path(steps.__file__), tmp_path, bpy.app.binary_path, timeout=1500, size=size,
-                                options=('--enable-event-simulate',))
+                                   options=('--enable-event-simulate',))
     for made in tmp_path.glob('*.png'):  # by the steps themselves
         shutil.copy(made, IMAGES / made.name)
     for name, shot in shots.items():
