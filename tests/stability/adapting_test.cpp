@@ -70,6 +70,49 @@ TEST(Adapting, TargetsOfBadShapeAreMetOnceTheTemplateIsAsLarge) {
   }
 }
 
+TEST(Adapting, MeshesOfBadShapeSlideOnThemselves) {
+  for (const BadShape& bad : badShapes()) {
+    SCOPED_TRACE(bad.name);
+    AdaptShape shape = sphere(3);
+    bad.change(shape);
+    const TriMesh given = meshWithNormals(shape);
+    for (const MeshDensity density : {MeshDensity::kUniform, MeshDensity::kAdaptive}) {
+      for (const double sharp_angle : {0.0, 0.8, 3.141592}) {
+        RegistrationOptions options = quick(density);
+        options.lands_on_target = true;
+        options.sharp_angle = sharp_angle;
+        const RegisteredMesh made = registerMesh(given, targetOfMesh(given, 500, 1), options);
+        EXPECT_EQ(made.mesh.triangles, given.triangles);
+        requireFinite(made.mesh);
+        // Chords cut the surface by less than its triangles are long.
+        EXPECT_LT(made.report.after.distance, 0.1 * radiusOf(shape));
+      }
+    }
+  }
+}
+
+TEST(Adapting, WhatIsFlatButForRoundingHasNoDetail) {
+  // A sheet whose heights are those that rounding leaves: to adapt is to even out.
+  AdaptShape sheet = bumpySheet(24, 0);
+  for (size_t v = 0; v < sheet.positions.size(); ++v) {
+    sheet.positions[v].x() *= sheet.positions[v].x();
+    sheet.positions[v].z() = 1e-8 * static_cast<double>(v * 7919 % 13);
+  }
+  const TriMesh given = meshWithNormals(sheet);
+  std::vector<std::vector<float>> made;
+  for (const MeshDensity density : {MeshDensity::kUniform, MeshDensity::kAdaptive}) {
+    RegistrationOptions options = quick(density);
+    options.lands_on_target = true;
+    made.push_back(registerMesh(given, targetOfMesh(given, 500, 1), options).mesh.positions);
+  }
+  EXPECT_EQ(made[0], made[1]);
+  // Columns of the sheet are as wide as each other now: their last one was twice as wide as the
+  // mean.
+  for (size_t v = 0; v < sheet.positions.size(); ++v) {
+    EXPECT_NEAR(made[0][v * 3], static_cast<double>(v % 25) / 24, 0.01) << v;
+  }
+}
+
 TEST(Adapting, StrengthsAndStepsThatAreFarTooLargeStayFinite) {
   const RegistrationTarget target = targetOfMesh(meshWithNormals(sphere(3)), 500, 1);
   for (const double strength : {0.0, 1e-300, 100.0, 1e6}) {

@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "fit/registration/even_sliding.h"
 #include "fit/registration/landing.h"
 #include "fit/registration/moving_template.h"
 #include "fit/registration/registration_report.h"
@@ -181,6 +182,32 @@ bool isItself(const TriMesh& given, const RegistrationTarget& target) {
   return given.positions == target.positions && given.triangles == target.triangles;
 }
 
+RegisteredMesh slideOnItself(const TriMesh& given, const RegistrationTarget& target,
+                             const UnitBall& ball, const RegistrationOptions& options,
+                             Progress* progress, RegistrationWatch* watch) {
+  if (!options.landmarks.empty()) {
+    refuse("there are " + std::to_string(options.landmarks.size()) +
+           " landmarks, but a mesh that slides on itself stays where it is");
+  }
+  const MovingTemplate moving(given, ball);
+  RegisteredMesh made;
+  moving.report(made.report);
+  const SlidingSurface surface(moving.links(), moving.merged().positions, options.sharp_angle);
+  const EvenSliding slid = slideEvenly(
+      moving.links(), moving.merged().positions, surface, options.adapter,
+      [&](uint32_t step, std::span<const Vec3d> places) {
+        advance(progress, std::min(1.0, static_cast<double>(step) / options.adapter.steps),
+                kAdaptingStage);
+        if (!watch) return true;
+        if (watch->wantsShape()) watch->show(std::make_shared<TriMesh>(moving.mesh(places)));
+        return !watch->wantsEnd();
+      });
+  made.report.step_count = slid.step_count;
+  made.mesh = moving.mesh(slid.places);
+  measureRegistration(given, target, options, made, progress);
+  return made;
+}
+
 /// Places in the ball, each brought to the nearest of the target's.
 std::vector<Vec3d> landed(const RegistrationTarget& target, const MeshLinks& links,
                           std::span<const Vec3d> given, const UnitBall& ball) {
@@ -219,14 +246,15 @@ RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& targ
   }
   advance(progress, 0.0, kAdaptingStage);
   const UnitBall ball = ballOf(target);
+  if (options.lands_on_target && isItself(given, target)) {
+    return slideOnItself(given, target, ball, options, progress, watch);
+  }
   MovingTemplate moving(given, ball);
-  const std::vector<Vec3d> at_first = moving.merged().positions;
   const std::vector<Landmark> landmarks = landmarksIn(options.landmarks, ball, moving.merged());
   RegistrationTarget aim = inBall(target, ball);
   moving.align(preAligned(moving.merged().triangles, moving.merged().positions, aim, landmarks,
                           options.alignment));
 
-  const bool slides = options.lands_on_target && isItself(given, target);
   RegisteredMesh made;
   RegistrationReport& report = made.report;
   report.turned_normals = turnNormals(aim, moving.merged());
@@ -248,11 +276,7 @@ RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& targ
       progress, watch);
   report.step_count = adapter.stepCount();
   std::vector<Vec3d> places(adapter.positions().begin(), adapter.positions().end());
-  if (slides) {
-    SlidingSurface(moving.links(), at_first, options.sharp_angle).landUnfolded(places);
-  } else if (options.lands_on_target) {
-    places = landed(target, moving.links(), places, ball);
-  }
+  if (options.lands_on_target) places = landed(target, moving.links(), places, ball);
   made.mesh = moving.mesh(places);
   measureRegistration(given, target, options, made, progress);
   return made;

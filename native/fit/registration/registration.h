@@ -25,8 +25,9 @@ struct RegistrationOptions {
   RegistrationWeights weights;
   PreAlignment alignment = PreAlignment::kNone;
   /// After the steps, vertices go to the nearest place of the target's triangles, those of borders
-  /// to its borders. A template that is its own target slides on itself: each vertex goes to the
-  /// nearest of the places that SlidingSurface leaves it, and no triangle is turned over.
+  /// to its borders. A template that is its own target slides on itself, by slideEvenly(): of the
+  /// other options density, steps, shortest, sharp_angle and those of the report have a part, and
+  /// landmarks are refused.
   bool lands_on_target = false;
   /// 0..pi radians, of templates that slide: what differs by more stays sharp.
   double sharp_angle = 0.7853981633974483;

@@ -510,8 +510,9 @@ typedef struct StippleMeshAdaptOptions {
   uint32_t steps;             /* 1..1000000, default 800 */
   uint32_t samples_per_point; /* 1..64, default 4: of the template for each point of the target */
   uint32_t lands_on_target;   /* 1: vertices end at the nearest place of the target's triangles, those of borders at
-                                 its borders; default 0. With the template itself as the target, they slide on it: see
-                                 sharp_angle */
+                                 its borders; default 0. With the template itself as the target, they slide on it until
+                                 they are even: only density, steps, sharp_angle and report_count have a part then, a
+                                 few dozen steps are enough, and landmarks are refused */
   uint64_t target_count;      /* points of the target at most, 1..2^24, default 20000: detail, and time */
   uint64_t report_count;      /* samples of each side that the report is measured by, default 100000; 0: none */
   uint64_t seed;              /* of all samples */
