@@ -120,7 +120,7 @@ def undone(_window):
 def even_out(window):
     scenes.select(bpy.data.objects['Ball'])
     with window.context():
-        facts['evening'] = list(bpy.ops.stipple.mesh_even_out('INVOKE_DEFAULT', steps=100, points=4000, preview=False))
+        facts['evening'] = list(bpy.ops.stipple.mesh_even_out('INVOKE_DEFAULT', preview=False))
 
 
 def evened(_window):

@@ -5,7 +5,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
 from ...binding.structs import MeshAlignment, MeshDensity, PictureDrawing
-from .mesh_adapt import DENSITIES, AdaptOperator
+from .mesh_adapt import DENSITIES, TargetedOperator
 
 _ALIGNMENTS = (('NONE', "None", "The mesh lies where the images show the object"),
                ('SIZE', "Location and Size", "The mesh gets the middle and the size of what the images show first"))
@@ -13,7 +13,7 @@ _DRAWINGS = (('TRIANGLES', "Triangles", "The mesh is drawn as it is, with sharp 
              ('SPLATS', "Splats", "The mesh is drawn as splats that follow its faces"))
 
 
-class AdaptToViewsOperator(AdaptOperator):
+class AdaptToViewsOperator(TargetedOperator):
     """Mix-in. The operator gives invoke(), which sets _asked and asks for settings."""
 
     density: EnumProperty(name="Density", description="Where vertices go along the surface", items=DENSITIES,

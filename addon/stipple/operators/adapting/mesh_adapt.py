@@ -34,17 +34,7 @@ class AdaptOperator(JobOperator):
     _shown_at = 0.0
 
     result: EnumProperty(name="Result", description="Where the new shape goes", items=adapting.RESULTS)
-    strength: FloatProperty(name="Strength", description="How strongly edges are shortened and evened out against what "
-                            "pulls the vertices to the surface", default=1.5, min=0.0, soft_max=10.0)
-    smoothness: FloatProperty(name="Smoothness", description="Larger values move broad parts of the mesh as one, and "
-                              "let detail come later", default=10.0, min=0.0, soft_max=100.0)
-    steps: IntProperty(name="Steps", description="More steps come closer, and take longer", default=800, min=1,
-                       soft_min=50, soft_max=5000, max=1000000)
-    points: IntProperty(name="Points", description="Points that the surface of the target is measured at. More of them "
-                        "show finer detail, and take longer", default=20000, min=1, soft_min=1000, soft_max=200000,
-                        max=1 << 24)
     preview: BoolProperty(name="Preview", description="Show the mesh on its way", default=True)
-    seed: IntProperty(name="Seed", description="Another seed measures the surface at other points", default=0, min=0)
 
     @classmethod
     def poll(cls, context):
@@ -82,11 +72,6 @@ class AdaptOperator(JobOperator):
         self._template = adapting.template_of(obj, self.result, self.from_mix)
         self._shown = adapting.Shown(self._template, self.result, key_name)
 
-    def _start(self, target, landmarks=(), **settings):
-        return start_adapt(self._template.native(), target, landmarks, strength=self.strength,
-                           smoothness=self.smoothness, steps=self.steps, target_count=self.points, seed=self.seed,
-                           **settings)
-
     def _show(self):
         """Brings the mesh up to date, now and then."""
         if time.monotonic() - self._shown_at < _PREVIEW_SECONDS or self._shown.problem():
@@ -112,7 +97,27 @@ class AdaptOperator(JobOperator):
                 layout.prop(self, name)
 
 
-class STIPPLE_OT_mesh_adapt(AdaptOperator, bpy.types.Operator):
+class TargetedOperator(AdaptOperator):
+    """Mix-in of what takes the shape of something else."""
+
+    strength: FloatProperty(name="Strength", description="How strongly edges are shortened and evened out against what "
+                            "pulls the vertices to the surface", default=1.5, min=0.0, soft_max=10.0)
+    smoothness: FloatProperty(name="Smoothness", description="Larger values move broad parts of the mesh as one, and "
+                              "let detail come later", default=10.0, min=0.0, soft_max=100.0)
+    steps: IntProperty(name="Steps", description="More steps come closer, and take longer", default=800, min=1,
+                       soft_min=50, soft_max=5000, max=1000000)
+    points: IntProperty(name="Points", description="Points that the surface of the target is measured at. More of them "
+                        "show finer detail, and take longer", default=20000, min=1, soft_min=1000, soft_max=200000,
+                        max=1 << 24)
+    seed: IntProperty(name="Seed", description="Another seed measures the surface at other points", default=0, min=0)
+
+    def _start(self, target, landmarks=(), **settings):
+        return start_adapt(self._template.native(), target, landmarks, strength=self.strength,
+                           smoothness=self.smoothness, steps=self.steps, target_count=self.points, seed=self.seed,
+                           **settings)
+
+
+class STIPPLE_OT_mesh_adapt(TargetedOperator, bpy.types.Operator):
     """Give the active mesh the shape of the other selected object by moving its vertices: a mesh, a point cloud or
     splats. Faces, UV maps, weights and materials stay. Esc keeps the shape so far"""
 

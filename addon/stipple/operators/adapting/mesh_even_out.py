@@ -4,8 +4,9 @@
 import math
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty
+from bpy.props import EnumProperty, FloatProperty, IntProperty
 
+from ...binding.mesh_adapt import start_adapt
 from ...binding.structs import MeshAlignment, MeshDensity
 from .mesh_adapt import AdaptOperator, length_text
 
@@ -24,17 +25,21 @@ class STIPPLE_OT_mesh_even_out(AdaptOperator, bpy.types.Operator):
     from_mix = True
 
     density: EnumProperty(name="Density", description="Where vertices go along the surface", items=_DENSITIES)
+    steps: IntProperty(name="Steps", description="More steps make the mesh more even. They end early once nothing "
+                       "becomes better", default=48, min=1, soft_max=200, max=1000000)
     sharp_angle: FloatProperty(name="Sharp Edges", description="Edges whose faces differ by more than this stay as they "
                                "are, and vertices on them move along them alone", default=math.radians(45), min=0.0,
                                max=math.pi, subtype='ANGLE')
 
     def start(self, context):
         self._begin(context.view_layer.objects.active, 'Evened Out')
-        return self._start(self._template.native(), density=MeshDensity[self.density], alignment=MeshAlignment.NONE,
-                           lands_on_target=1, sharp_angle=min(self.sharp_angle, math.pi))  # float32 rounds 180° up
+        mesh = self._template.native()
+        return start_adapt(mesh, mesh, density=MeshDensity[self.density], alignment=MeshAlignment.NONE,
+                           steps=self.steps, lands_on_target=1,
+                           sharp_angle=min(self.sharp_angle, math.pi))  # float32 rounds 180° up
 
     def draw(self, _context):
-        self._draw(('result', 'density', 'strength', 'smoothness', 'steps', 'points', 'sharp_angle', 'preview', 'seed'))
+        self._draw(('result', 'density', 'steps', 'sharp_angle', 'preview'))
 
     def _tell(self, context, report):
         self.report({'INFO'}, f"The vertices of '{self._template.name}' are {self.density.lower()} now; its surface "
