@@ -1,7 +1,7 @@
 // Meshes that take a shape. References: the solves and the nearest-neighbour queries of the same
-// steps alone, which no implementation of the method goes without; of images, drawing the mesh once
-// into each by the renderer that has no derivatives; of images by splats, both passes of the
-// renderer of splats.
+// steps alone, which no implementation of the method goes without; of evening out, the factors,
+// solves and landings; of images, drawing the mesh once into each by the renderer that has no
+// derivatives; of images by splats, both passes of the renderer of splats.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -12,10 +12,12 @@
 
 #include "base/parallel.h"
 #include "bench/comparison.h"
+#include "fit/registration/even_sliding.h"
 #include "fit/registration/picture_loss.h"
 #include "fit/registration/registration_loss.h"
 #include "mesh/adapt/mesh_adapter.h"
 #include "mesh/adapt/point_rows.h"
+#include "mesh/adapt/weighted_diffusion.h"
 #include "mesh/mesh_image.h"
 #include "train/backend/backend_factory.h"
 
@@ -125,6 +127,39 @@ void step(benchmark::State& state) {
   state.counters["step_ms"] = state.counters["best_ms"] / kSteps;
 }
 
+/// Steps of a mesh that is evened out: its reference is the factor, the solve and the landings of
+/// the same steps.
+void evenOut(benchmark::State& state) {
+  Shape shape = tenThousand();
+  for (Vec3d& p : shape.positions) p += Vec3d(0.6, -0.5, 0.62) * std::pow(std::max(0.0, p.z()), 4);
+  const MeshLinks links(shape.positions.size(), shape.triangles);
+  const SlidingSurface surface(links, shape.positions, 3.0);
+  MeshAdapterOptions options;
+  options.steps = kSteps;
+  options.density = MeshDensity::kUniform;
+  const std::vector<uint8_t> moves(links.vertexCount(), 1);
+  WeightedDiffusion diffusion(links, moves);
+  const std::vector<double> weights(links.vertexCount(), 1.0);
+  std::vector<Vec3d> pull(links.vertexCount()), places;
+  compare(
+      state, "factors_and_landings",
+      [&] {
+        const EvenSliding slid = slideEvenly(links, shape.positions, surface, options,
+                                             [](uint32_t, std::span<const Vec3d>) { return true; });
+        benchmark::DoNotOptimize(slid.places.data());
+      },
+      [&] {
+        for (uint32_t i = 0; i < kSteps; ++i) {
+          diffusion.factor(weights, 1.0);
+          diffusion.solve(pull);
+          places = shape.positions;
+          surface.land(places);
+          benchmark::DoNotOptimize(surface.turnedCount(places));
+        }
+      });
+  state.counters["step_ms"] = state.counters["best_ms"] / kSteps;
+}
+
 /// A camera on a ring around the origin, at three times the radius of the sphere.
 Camera onRing(size_t i, size_t count) {
   constexpr uint32_t kSide = 128;
@@ -214,6 +249,12 @@ BENCHMARK(pictureStep)
 
 BENCHMARK(pictureStepBySplats)
     ->Name("mesh.picture_splats_step.10k")
+    ->UseManualTime()
+    ->Iterations(kRounds)
+    ->Unit(benchmark::kMillisecond);
+
+BENCHMARK(evenOut)
+    ->Name("mesh.even_out.10k")
     ->UseManualTime()
     ->Iterations(kRounds)
     ->Unit(benchmark::kMillisecond);
