@@ -154,7 +154,7 @@ void evenOut(benchmark::State& state) {
           diffusion.solve(pull);
           places = shape.positions;
           surface.land(places);
-          benchmark::DoNotOptimize(surface.turnedCount(places));
+          benchmark::DoNotOptimize(surface.turned(places).data());
         }
       });
   state.counters["step_ms"] = state.counters["best_ms"] / kSteps;

@@ -23,6 +23,7 @@ constexpr double kIdleGain = 0.01;
 constexpr double kMostRise = 1.05;
 constexpr double kStay = 0.5, kSpread = 0.5;
 constexpr int kSmoothings = 3;
+constexpr int kTurnBacks = 32;
 /// Radians between two faces: below it, what bends is the rounding of float32, as on a plane.
 constexpr double kNoBend = 5e-4;
 
@@ -114,7 +115,7 @@ class Slide {
     best_ = given_;
     const Evenness evenness = evennessOf(links_, given_, goals_);
     best_unevenness_ = evenness.unevenness;
-    given_turned_ = surface_.turnedCount(given_);
+    given_turned_ = surface_.turned(given_);
     start(1.0);
   }
 
@@ -179,7 +180,6 @@ class Slide {
     std::vector<Vec3d> places;
     std::vector<SurfaceLanding> landings;
     Evenness evenness;
-    size_t turned = 0;
   };
 
   static std::vector<uint8_t> movesOf(const SlidingSurface& surface, size_t count) {
@@ -194,13 +194,34 @@ class Slide {
     std::vector<double> goals(given_.size());
     for (size_t v = 0; v < goals.size(); ++v) goals[v] = state.landings[v].of(goals_);
     state.evenness = evennessOf(links_, state.places, goals);
-    state.turned = surface_.turnedCount(state.places);
+  }
+
+  /// Brings vertices back to where they are in the best state, around every triangle that is
+  /// turned over though it was not in the given mesh, until there is none. False where some stay.
+  bool turnBack(std::vector<Vec3d>& places) const {
+    const std::span<const uint32_t> triangles = links_.triangles();
+    for (int round = 0; round < kTurnBacks; ++round) {
+      const std::vector<uint8_t> turned = surface_.turned(places);
+      bool is_sound = true;
+      for (size_t corner = 0; corner < triangles.size(); ++corner) {
+        if (turned[corner / 3] <= given_turned_[corner / 3]) continue;
+        places[triangles[corner]] = best_[triangles[corner]];
+        is_sound = false;
+      }
+      if (is_sound) return true;
+    }
+    return false;
   }
 
   void keepBest() {
-    if (state_.turned > given_turned_ || !(state_.evenness.unevenness < best_unevenness_)) return;
-    best_ = state_.places;
-    best_unevenness_ = state_.evenness.unevenness;
+    if (!(state_.evenness.unevenness < best_unevenness_)) return;
+    State sound;
+    sound.places = state_.places;
+    if (!turnBack(sound.places)) return;
+    enter(sound);
+    if (!(sound.evenness.unevenness < best_unevenness_)) return;
+    best_ = std::move(sound.places);
+    best_unevenness_ = sound.evenness.unevenness;
     is_better_ = true;
   }
 
@@ -212,7 +233,7 @@ class Slide {
   std::vector<Vec3d> given_, best_;
   double rest_, best_unevenness_ = 0, seconds_ = kFirstSeconds;
   double idle_from_ = 0;
-  size_t given_turned_ = 0;
+  std::vector<uint8_t> given_turned_;  ///< [F]
   int idle_steps_ = 0;
   State state_;
   bool is_better_ = false, is_at_rest_ = false;

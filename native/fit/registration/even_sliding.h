@@ -27,8 +27,9 @@ std::vector<double> edgeGoals(const MeshLinks& links, std::span<const Vec3d> pos
 /// each other, or as the goals at their places say. Lines are divided first; then each implicit
 /// step draws each vertex to its neighbours, to those of larger area more, along the plane that
 /// touches the surface at it, and lands. A step that makes the mesh clearly less even is taken
-/// again with half of the time. What comes out is the most even mesh that was met: it is never less
-/// even than the given one, and no more of its triangles are turned over. Steps end early once
+/// again with half of the time. What comes out is the most even mesh that was met, in which the
+/// vertices of triangles that steps turned over are back where they were before: it is never less
+/// even than the given one, and no triangle is turned over that was not. Steps end early once
 /// nothing becomes better. In: positions [n], those of the surface; options: density, steps,
 /// shortest; goes_on: called before each step with the number of steps so far and the present
 /// places; false ends them. Threads and determinism: parallel; same result for any number of

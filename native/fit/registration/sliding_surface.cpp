@@ -208,7 +208,7 @@ void SlidingSurface::divideLines(std::span<Vec3d> vertices, std::span<const doub
   }
 }
 
-size_t SlidingSurface::turnedCount(std::span<const Vec3d> vertices) const {
+std::vector<uint8_t> SlidingSurface::turned(std::span<const Vec3d> vertices) const {
   const std::span<const uint32_t> triangles = links_.triangles();
   std::vector<uint8_t> is_turned(links_.triangleCount(), 0);
   parallelFor(is_turned.size(), kGrain, [&](size_t begin, size_t end) {
@@ -222,7 +222,7 @@ size_t SlidingSurface::turnedCount(std::span<const Vec3d> vertices) const {
       is_turned[t] = areaVector(triangles, vertices, index).dot(across) < 0;
     }
   });
-  return static_cast<size_t>(std::count(is_turned.begin(), is_turned.end(), 1));
+  return is_turned;
 }
 
 bool SlidingSurface::isSharp(uint32_t a, uint32_t b) const {

@@ -47,9 +47,9 @@ class SlidingSurface {
   /// [n]; others stay. Cost: O(length of the lines).
   void divideLines(std::span<Vec3d> vertices, std::span<const double> goals, double share) const;
 
-  /// Triangles that look to the other side than the surface where their middle lands on it. In:
-  /// vertices [n]. Threads and determinism and cost: those of land().
-  size_t turnedCount(std::span<const Vec3d> vertices) const;
+  /// Whether triangles look to the other side than the surface where their middle lands on it. In:
+  /// vertices [n]. Out: [F], 0 or 1. Threads and determinism and cost: those of land().
+  std::vector<uint8_t> turned(std::span<const Vec3d> vertices) const;
 
   bool isFree(size_t vertex) const {  ///< it may go anywhere on the faces around it
     return part_of_[vertex] < region_count_;
