@@ -5,9 +5,10 @@
 namespace stipple {
 
 struct ContributionNormalisation {
-  bool clamp = true;   ///< anchors that do harm count as neutral: min(g, 0)
-  bool clip = true;    ///< beyond the 90th percentile of |g| where g is not 0
-  bool centre = true;  ///< minus the mean over all anchors
+  bool clamp = true;            ///< anchors that do harm count as neutral: min(g, 0)
+  bool clip = true;             ///< beyond the 90th percentile of |g| where g is not 0
+  bool centre = true;           ///< minus the mean over all anchors
+  bool counts_neutral = false;  ///< that percentile is of all anchors, as published
 };
 
 /// Makes what each anchor does to the loss (negative: lowers it) into the derivative that reaches

@@ -20,6 +20,13 @@ void activate(Activation activation, std::span<float> values) {
   });
 }
 
+void activateBackward(Activation activation, std::span<const float> in, std::span<float> gradient) {
+  const LayerKernel& kernel = chosenLayerKernel();
+  parallelFor(gradient.size(), kGrain, [&](size_t begin, size_t end) {
+    kernel.scaleBySlope(activation, end - begin, in.data() + begin, gradient.data() + begin);
+  });
+}
+
 void siluGate(size_t count, const float* gate, const float* up, float* out) {
   const LayerKernel& kernel = chosenLayerKernel();
   parallelFor(count, kGrain, [&](size_t begin, size_t end) {

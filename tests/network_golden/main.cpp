@@ -68,7 +68,8 @@ bool runFile(const char* path, const Arguments& arguments) {
   const Group groups[] = {{"encoders", encoderStages},
                           {"flow", flowStages},
                           {"decoder", decoderStages},
-                          {"whole", wholeStages}};
+                          {"whole", wholeStages},
+                          {"training", trainingStages}};
   for (const Group& group : groups) {
     try {
       group.run(file, report);

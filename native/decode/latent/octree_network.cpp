@@ -19,12 +19,7 @@ namespace stipple {
 namespace {
 
 constexpr size_t kChildren = 8;
-/// Of the encoding of the level, which the network reads as the number of cells along a side.
-constexpr size_t kLevelWidth = 256;
 constexpr double kLongestLevel = 1024;
-/// What the blocks' norms and the last one add to variances.
-constexpr float kBlockEpsilon = 1e-6f;
-constexpr float kLastEpsilon = 1e-5f;
 
 /// In float32 by our own kernels, which alone add up few rows in the order of many. They are within
 /// some hundredths of the fastest.
@@ -82,10 +77,14 @@ std::vector<float> OctreeNetwork::centresOf(int level, std::span<const uint64_t>
   return centres;
 }
 
-std::vector<float> OctreeNetwork::modulationOf(const NetworkRun& run, int level) const {
-  // The network is told of the children's level.
+std::vector<float> OctreeNetwork::levelEncoding(int level) {
+  // The network is told how many cells the children's level has along a side.
   const double side = std::ldexp(2 * std::numbers::pi, level + 1);
-  const std::vector<float> encoding = timeEncoding(side, kLongestLevel, kLevelWidth);
+  return timeEncoding(side, kLongestLevel, kLevelWidth);
+}
+
+std::vector<float> OctreeNetwork::modulationOf(const NetworkRun& run, int level) const {
+  const std::vector<float> encoding = levelEncoding(level);
   const size_t width = heads_.tokenWidth();
   std::vector<float> hidden(width), embedded(width), modulation(6 * width);
   level_in_.apply(run, 1, encoding.data(), hidden.data());

@@ -17,6 +17,9 @@ class OctreeNetwork {
   static constexpr int kLeafLevel = 8;
   /// Cells that are worked on at once; memory and the time between two looks at Progress go by it.
   static constexpr size_t kRows = 1024;
+  static constexpr size_t kLevelWidth = 256;  ///< of the encoding of a level
+  /// What the blocks' norms and the last one add to variances.
+  static constexpr float kBlockEpsilon = 1e-6f, kLastEpsilon = 1e-5f;
 
   /// In: network, under "octree.". Errors: kFormat.
   explicit OctreeNetwork(const WeightTable& network);
@@ -37,6 +40,8 @@ class OctreeNetwork {
 
   /// Middles of cells in the unit cube, [cells, 3].
   static std::vector<float> centresOf(int level, std::span<const uint64_t> cells);
+  /// What tells the network of the parents' level, [kLevelWidth].
+  static std::vector<float> levelEncoding(int level);
 
  private:
   struct Block {

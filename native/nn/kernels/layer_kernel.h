@@ -40,6 +40,8 @@ struct SoftmaxColumns {
 struct LayerKernel {
   const char* target;  ///< "scalar", or Highway's name of an instruction set
   void (*activate)(Activation activation, size_t count, float* values);
+  /// gradient[i] *= the derivative of the activation at in[i].
+  void (*scaleBySlope)(Activation activation, size_t count, const float* in, float* gradient);
   /// out[i] = silu(gate[i]) up[i].
   void (*siluGate)(size_t count, const float* gate, const float* up, float* out);
   void (*softmax)(SoftmaxRow& row);

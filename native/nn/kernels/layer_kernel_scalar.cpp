@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kRootTwoOverPi = 0.79788456080286536;
 constexpr double kRootHalf = 0.70710678118654752;
+constexpr double kDensityAtZero = 0.39894228040143268;  // of the normal distribution
 
 /// In double, so that each is right to the last bit of float32 or two.
 double activated(Activation activation, double x) {
@@ -29,6 +30,32 @@ double activated(Activation activation, double x) {
 void activateScalar(Activation activation, size_t count, float* values) {
   for (size_t i = 0; i < count; ++i) {
     values[i] = static_cast<float>(activated(activation, static_cast<double>(values[i])));
+  }
+}
+
+double slopeOf(Activation activation, double x) {
+  switch (activation) {
+    case Activation::kSilu: {
+      const double logistic = 1.0 / (1.0 + std::exp(-x));
+      return logistic * (1.0 + x * (1.0 - logistic));
+    }
+    case Activation::kRelu:
+      return x > 0.0 ? 1.0 : 0.0;
+    case Activation::kGeluTanh: {
+      const double held = std::clamp(x, -30.0, 30.0);  // Beyond, the slope is 0 or 1.
+      const double t = std::tanh(kRootTwoOverPi * (held + 0.044715 * held * held * held));
+      const double inner = kRootTwoOverPi * (1.0 + 3.0 * 0.044715 * held * held);
+      return 0.5 * (1.0 + t) + 0.5 * held * (1.0 - t * t) * inner;
+    }
+    case Activation::kGeluErf:
+      return 0.5 * std::erfc(-kRootHalf * x) + x * kDensityAtZero * std::exp(-0.5 * x * x);
+  }
+  return 1.0;
+}
+
+void scaleBySlopeScalar(Activation activation, size_t count, const float* in, float* gradient) {
+  for (size_t i = 0; i < count; ++i) {
+    gradient[i] *= static_cast<float>(slopeOf(activation, static_cast<double>(in[i])));
   }
 }
 
@@ -91,8 +118,8 @@ void widenScalar(WeightType type, size_t count, const uint8_t* bytes, float* to)
 }  // namespace
 
 LayerKernel scalarLayerKernel() {
-  return {"scalar",     activateScalar, siluGateScalar, softmaxScalar, softmaxColumnsScalar,
-          narrowScalar, widenScalar};
+  return {"scalar",      activateScalar,       scaleBySlopeScalar, siluGateScalar,
+          softmaxScalar, softmaxColumnsScalar, narrowScalar,       widenScalar};
 }
 
 }  // namespace stipple

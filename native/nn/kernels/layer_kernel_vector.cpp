@@ -30,12 +30,24 @@ HWY_INLINE Vec logisticOf(Tag d, Vec z) {
   return hn::Div(one, hn::Add(one, hn::Exp(d, hn::Neg(held))));
 }
 
+/// Slopes are 0 or 1 to float32 beyond it, and squares of it are far from the greatest float.
+HWY_INLINE Vec heldForSlope(Tag d, Vec x) {
+  return hn::Min(hn::Max(x, hn::Set(d, -30.0f)), hn::Set(d, 30.0f));
+}
+
 struct Silu {
   static HWY_INLINE Vec of(Tag d, Vec x) { return hn::Mul(x, logisticOf(d, x)); }
+  static HWY_INLINE Vec slope(Tag d, Vec given) {
+    const Vec one = hn::Set(d, 1.0f), x = heldForSlope(d, given), share = logisticOf(d, x);
+    return hn::Mul(share, hn::MulAdd(x, hn::Sub(one, share), one));
+  }
 };
 
 struct Relu {
   static HWY_INLINE Vec of(Tag d, Vec x) { return hn::Max(x, hn::Zero(d)); }
+  static HWY_INLINE Vec slope(Tag d, Vec x) {
+    return hn::IfThenElseZero(hn::Gt(x, hn::Zero(d)), hn::Set(d, 1.0f));
+  }
 };
 
 /// (1 + tanh(u)) / 2 is the logistic of 2 u, which has no difference of nearly equal numbers.
@@ -45,6 +57,14 @@ struct GeluTanh {
     const Vec slope =
         hn::MulAdd(hn::Mul(x, x), hn::Set(d, 0.0713548162726f), hn::Set(d, 1.5957691216057308f));
     return hn::Mul(x, logisticOf(d, hn::Mul(x, slope)));
+  }
+  static HWY_INLINE Vec slope(Tag d, Vec given) {
+    const Vec one = hn::Set(d, 1.0f), x = heldForSlope(d, given), squared = hn::Mul(x, x);
+    const Vec first = hn::Set(d, 1.5957691216057308f), third = hn::Set(d, 0.0713548162726f);
+    const Vec share = logisticOf(d, hn::Mul(x, hn::MulAdd(squared, third, first)));
+    const Vec inner = hn::MulAdd(squared, hn::Mul(hn::Set(d, 3.0f), third), first);
+    const Vec bend = hn::Mul(hn::Mul(x, inner), hn::Sub(one, share));
+    return hn::Mul(share, hn::Add(one, bend));
   }
 };
 
@@ -76,6 +96,16 @@ struct GeluErf {
     const Vec tail = hn::Mul(hn::Mul(hn::Set(d, 0.5f), magnitude), hn::Mul(fall, scaledErfc(d, y)));
     return hn::Sub(hn::Max(x, hn::Zero(d)), tail);
   }
+  static HWY_INLINE Vec slope(Tag d, Vec given) {
+    const Vec one = hn::Set(d, 1.0f),
+              x = hn::Min(hn::Max(given, hn::Set(d, -13.0f)), hn::Set(d, 13.0f));
+    const Vec magnitude = hn::Abs(x);
+    const Vec fall = hn::Exp(d, hn::Mul(hn::Mul(magnitude, magnitude), hn::Set(d, -0.5f)));
+    const Vec rest = hn::Mul(hn::Mul(hn::Set(d, 0.5f), fall),
+                             scaledErfc(d, hn::Mul(magnitude, hn::Set(d, 0.70710678f))));
+    const Vec share = hn::IfThenElse(hn::Gt(x, hn::Zero(d)), hn::Sub(one, rest), rest);
+    return hn::MulAdd(hn::Mul(x, fall), hn::Set(d, 0.39894228f), share);
+  }
 };
 
 /// values[i] = Function(values[i]); what is left of a vector goes through one of its own, so that a
@@ -105,6 +135,37 @@ void activateVector(Activation activation, size_t count, float* values) {
       return activateAll<GeluTanh>(count, values);
     case Activation::kGeluErf:
       return activateAll<GeluErf>(count, values);
+  }
+}
+
+template <class Function>
+void scaleBySlopes(size_t count, const float* in, float* gradient) {
+  const Tag d;
+  const size_t lanes = hn::Lanes(d);
+  size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    const Vec slope = Function::slope(d, hn::LoadU(d, in + i));
+    hn::StoreU(hn::Mul(slope, hn::LoadU(d, gradient + i)), d, gradient + i);
+  }
+  if (i == count) return;
+  HWY_ALIGN float rest[hn::MaxLanes(d)] = {};
+  HWY_ALIGN float factor[hn::MaxLanes(d)] = {};
+  std::copy(in + i, in + count, rest);
+  std::copy(gradient + i, gradient + count, factor);
+  hn::Store(hn::Mul(Function::slope(d, hn::Load(d, rest)), hn::Load(d, factor)), d, rest);
+  std::copy_n(rest, count - i, gradient + i);
+}
+
+void scaleBySlopeVector(Activation activation, size_t count, const float* in, float* gradient) {
+  switch (activation) {
+    case Activation::kSilu:
+      return scaleBySlopes<Silu>(count, in, gradient);
+    case Activation::kRelu:
+      return scaleBySlopes<Relu>(count, in, gradient);
+    case Activation::kGeluTanh:
+      return scaleBySlopes<GeluTanh>(count, in, gradient);
+    case Activation::kGeluErf:
+      return scaleBySlopes<GeluErf>(count, in, gradient);
   }
 }
 
@@ -327,6 +388,7 @@ void widenVector(WeightType type, size_t count, const uint8_t* bytes, float* to)
 LayerKernel namedLayerKernel() {
   return {HWY_TARGET == HWY_SCALAR ? "highway_scalar" : hwy::TargetName(HWY_TARGET),
           activateVector,
+          scaleBySlopeVector,
           siluGateVector,
           softmaxVector,
           softmaxColumnsVector,
