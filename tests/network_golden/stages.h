@@ -15,8 +15,9 @@ void flowStages(const GoldenFile& file, StageReport& report);
 void decoderStages(const GoldenFile& file, StageReport& report);
 /// From an image and a seed to splats; of recorded numbers only those that anchors are drawn by.
 void wholeStages(const GoldenFile& file, StageReport& report);
-/// Derivatives of networks that are trained, and what optimisers do with them. These are always in
-/// float32, with the weights that the file has.
+/// Derivatives of networks that are trained; always in float32, with the weights that the file has.
 void trainingStages(const GoldenFile& file, StageReport& report);
+/// What the optimiser does with derivatives.
+void optimiserStages(const GoldenFile& file, StageReport& report);
 
 }  // namespace stipple

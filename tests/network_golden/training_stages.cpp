@@ -1,14 +1,17 @@
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "decode/splat_layout.h"
 #include "density/contribution_normalisation.h"
 #include "math/morton.h"
+#include "network_golden/compare_share.h"
 #include "network_golden/stages.h"
+#include "train/networks/autoencoder_losses.h"
+#include "train/networks/trained_encoder.h"
+#include "train/networks/trained_gaussians.h"
 #include "train/networks/trained_octree.h"
-#include "train/optimiser/weight_optimiser.h"
 
 namespace stipple {
 namespace {
@@ -20,22 +23,6 @@ constexpr double kShareOfLargest = 3e-5;
 // and their angles reach 1,600: numbers of order one are 5.4e-5 apart there, and so is what they
 // are multiplied by.
 constexpr double kShareOfEncoding = 1e-4;
-// One formula of the optimiser after the other, twenty steps of float32.
-constexpr double kShareOfSteps = 2e-6;
-
-/// `share` of the largest of the expected numbers, wherever it is.
-StageTolerance shareOfLargest(std::span<const float> expected, double share) {
-  double largest = 0;
-  for (const float value : expected) {
-    largest = std::max(largest, std::abs(static_cast<double>(value)));
-  }
-  return {share * largest, 0};
-}
-
-void compareShare(const std::string& stage, std::span<const float> seen,
-                  std::span<const float> expected, double share, StageReport& report) {
-  report.compare(stage, seen, expected, shareOfLargest(expected, share));
-}
 
 std::vector<float> narrowed(std::span<const double> values) {
   return {values.begin(), values.end()};
@@ -134,100 +121,197 @@ void densityStages(const GoldenFile& file, StageReport& report) {
   compareGradients(file, layout, gradients, report);
 }
 
-WeightOptimiserOptions optionsOf(const nlohmann::json& run) {
-  WeightOptimiserOptions options;
-  options.learning_rate = run.at("lr").get<double>();
-  options.beta1 = run.at("betas").at(0).get<double>();
-  options.beta2 = run.at("betas").at(1).get<double>();
-  options.epsilon = run.at("eps").get<double>();
-  options.weight_decay = run.at("weight_decay").get<double>();
-  options.warm_up = run.at("warmup").get<uint64_t>();
-  options.total_steps = run.at("total_steps").get<uint64_t>();
-  options.least_share = run.at("min_lr_ratio").get<double>();
-  options.most_norm = run.at("max_norm").get<double>();
-  options.mean_decay = run.at("ema").get<double>();
-  options.clip_buffer = run.value("clip_buffer", uint64_t{0});
-  options.clip_percentile = run.value("clip_percentile", 95.0);
-  return options;
+/// Rows of sample b of a tensor [batch, ...].
+template <class Number>
+std::vector<Number> sampleOf(const std::vector<Number>& all, size_t batch, size_t b) {
+  const auto count = static_cast<long>(all.size() / batch), first = static_cast<long>(b) * count;
+  return {all.begin() + first, all.begin() + first + count};
 }
 
-void optimiserRun(const GoldenFile& file, const std::string& name, const nlohmann::json& run,
-                  StageReport& report) {
-  const std::vector<std::string> letters = {"a", "b", "c"};
-  std::vector<float> values;
-  std::vector<size_t> counts;
-  for (const std::string& letter : letters) {
-    const std::vector<float> given = file.floats("input.param." + letter);
-    values.insert(values.end(), given.begin(), given.end());
-    counts.push_back(given.size());
-  }
-  const std::vector<float> start = values;
-  WeightOptimiser optimiser(optionsOf(run), values);
+uint64_t leafOf(const float* point) {
+  constexpr float kSide = 256;
+  const auto cell = [](float at) {
+    return static_cast<uint32_t>(std::clamp(at * kSide, 0.0f, kSide - 1));
+  };
+  return mortonEncode(cell(point[0]), cell(point[1]), cell(point[2]));
+}
+
+/// The networks of an autoencoder, and all that a step of its training adds up.
+struct Autoencoder {
+  explicit Autoencoder(const GoldenFile& golden)
+      : file(golden),
+        batch(file.shape("input.points1").at(0)),
+        loss_weights(file.floats("input.loss_weights")) {}
+
+  const GoldenFile& file;
+  size_t batch;
+  std::vector<float> loss_weights;  // lin, vol, op, sph, kl, struct
+  ParameterLayout layout;
+  const NetworkShape shape = {
+      file.config().at("enc_heads").get<size_t>(),
+      file.config().at("C").get<size_t>() / file.config().at("enc_heads").get<size_t>(),
+      file.config().at("latent_channels").get<size_t>(),
+      file.config().at("enc_blocks").get<size_t>(), 4};
+  const std::vector<size_t> features = {file.config().at("cond").get<size_t>(),
+                                        file.config().at("cond2").get<size_t>()};
+  const uint32_t gaussians = file.config().at("gaussians_per_anchor").get<uint32_t>();
+  const TrainedEncoder encoder{layout, "encoder.", shape, features};
+  const TrainedOctree octree{layout, "octree.", shape};
+  const TrainedGaussians splats{layout, "gs.", shape, gaussians};
+  const std::vector<float> values = layout.read(file.weights());
+  std::vector<float> gradients = std::vector<float>(layout.size(), 0.0f);
+  std::vector<double> losses = std::vector<double>(9, 0.0);
   std::map<std::string, std::vector<float>> seen;
-  const auto steps = file.config().at("steps").get<size_t>();
-  for (size_t step = 0; step < steps; ++step) {
-    std::vector<float> gradient;
-    for (size_t i = 0; i < letters.size(); ++i) {
-      const std::vector<float> all = file.floats("input.gradient." + letters[i]);
-      gradient.insert(gradient.end(), all.begin() + static_cast<long>(step * counts[i]),
-                      all.begin() + static_cast<long>((step + 1) * counts[i]));
-    }
-    const WeightStep done = optimiser.step(gradient, values);
-    seen["lr"].push_back(static_cast<float>(done.learning_rate));
-    seen["grad_norm"].push_back(static_cast<float>(done.gradient_norm));
-    seen["max_norm"].push_back(static_cast<float>(done.most_norm));
-    seen["clip_scale"].push_back(static_cast<float>(done.clip_scale));
-    size_t first = 0;
-    for (size_t i = 0; i < letters.size(); first += counts[i++]) {
-      for (size_t k = first; k < first + counts[i]; ++k) {
-        const double mean = optimiser.state().mean[k], from = static_cast<double>(start[k]);
-        seen["param." + letters[i]].push_back(values[k]);
-        seen["ema." + letters[i]].push_back(static_cast<float>(mean));
-        seen["ema_delta." + letters[i]].push_back(static_cast<float>(mean - from));
-      }
-    }
-  }
-  size_t first = 0;
-  for (size_t i = 0; i < letters.size(); first += counts[i++]) {
-    const auto last = [&](const std::vector<float>& all) {
-      return std::vector<float>(all.begin() + static_cast<long>(first),
-                                all.begin() + static_cast<long>(first + counts[i]));
-    };
-    seen["m." + letters[i]] = last(optimiser.state().first);
-    seen["v." + letters[i]] = last(optimiser.state().second);
-  }
-  for (const auto& [what, numbers] : seen) {
-    const std::string stage = "expect." + name + "." + what;
-    // A weight of order one keeps 6e-8 of itself, and the mean moves by 1e-4 of what it moved.
-    const double share = what.starts_with("ema_delta") ? 1e-4 : kShareOfSteps;
-    compareShare(stage, numbers, file.floats(stage), share, report);
-  }
-}
 
-void optimiserStages(const GoldenFile& file, StageReport& report) {
-  if (!file.has("input.schedule.step")) return;
-  const nlohmann::json& schedule = file.config().at("schedule");
-  for (const auto& [kind, least] : schedule.at("min_lr_ratio").items()) {
-    WeightOptimiserOptions options;
-    options.warm_up = schedule.at("warmup").get<uint64_t>();
-    options.total_steps = schedule.at("total_steps").get<uint64_t>();
-    options.least_share = least.get<double>();
-    std::vector<float> shares;
-    for (const int64_t step : file.integers("input.schedule.step")) {
-      shares.push_back(static_cast<float>(rateShare(options, static_cast<uint64_t>(step))));
+  void keep(const std::string& name, std::span<const float> numbers) {
+    seen[name].insert(seen[name].end(), numbers.begin(), numbers.end());
+  }
+  std::vector<float> part(const std::string& name, size_t b) const {
+    return sampleOf(file.floats(name), batch, b);
+  }
+
+  /// The linear loss, and the derivative by it.
+  void addWeighted(size_t b, const SplatCloud& cloud, SplatCloud& gradient) {
+    const auto add = [&](const char* name, const std::vector<float>& of_cloud,
+                         std::vector<float>& of_gradient, double shift) {
+      const std::vector<float> weights = part(std::string("input.w.") + name, b);
+      for (size_t i = 0; i < weights.size(); ++i) {
+        losses[0] += static_cast<double>(weights[i]) * (static_cast<double>(of_cloud[i]) - shift);
+        of_gradient[i] += loss_weights[0] * weights[i];
+      }
+    };
+    add("position", cloud.positions, gradient.positions, 0.5);
+    add("scale", cloud.scales, gradient.scales, 0);
+    add("rotation_wxyz", cloud.rotations, gradient.rotations, 0);
+    add("opacity", cloud.opacities, gradient.opacities, 0);
+    add("sh_dc", cloud.sh, gradient.sh, 0);
+  }
+
+  /// Derivatives by the latent of what its splats lose.
+  void splatsOf(size_t b, const ContextRows& latent, float* by_latent) {
+    const std::vector<float> anchors = part("input.anchors", b);
+    const size_t count = anchors.size() / 3;
+    const std::vector<float> units(count, 1.0f);
+    const SplatLayout outputs = {gaussians, 0};
+    TrainedGaussians::Tape tape;
+    const std::vector<float> raw = splats.forward(values, latent, count, anchors.data(), tape);
+    SplatCloud cloud, gradient;
+    activateSplats(outputs, {anchors, units}, raw.data(), outputs.outputs(), cloud);
+    gradient.sh_degree = 0;
+    gradient.resize(cloud.size());
+    for (auto* numbers : {&gradient.positions, &gradient.scales, &gradient.rotations,
+                          &gradient.opacities, &gradient.sh}) {
+      std::fill(numbers->begin(), numbers->end(), 0.0f);
     }
-    compareShare("schedule." + kind, shares, file.floats("expect.schedule." + kind), 1e-6, report);
+    addWeighted(b, cloud, gradient);
+    const double share = 1.0 / static_cast<double>(batch);
+    const SplatLosses found =
+        addSplatLosses({static_cast<double>(loss_weights[1]), static_cast<double>(loss_weights[2]),
+                        static_cast<double>(loss_weights[3])},
+                       share, anchors, gaussians, cloud, gradient);
+    losses[1] += share * found.volume;
+    losses[2] += share * found.opacity;
+    losses[6] += share * found.off_centre;
+    losses[7] += share * found.overlap;
+    std::vector<float> by_raw(raw.size());
+    activateSplatsBackward(outputs, {anchors, units}, raw.data(), outputs.outputs(), cloud,
+                           gradient, by_raw.data());
+    splats.backward(values, latent, count, anchors.data(), tape, by_raw, gradients, by_latent);
+    keep("expect.features", raw);
+    keep("grad.expect.features", by_raw);
+    keep("expect.gaussians.scale", cloud.scales);
+    keep("expect.gaussians.opacity", cloud.opacities);
+    keep("expect.gaussians.rotation_wxyz", cloud.rotations);
   }
-  for (const auto& [name, run] : file.config().at("runs").items()) {
-    optimiserRun(file, name, run, report);
+
+  /// The same of where its density is.
+  void densityOf(size_t b, const ContextRows& latent, float* by_latent) {
+    const std::vector<float> points = part("input.surface_points", b);
+    std::vector<uint64_t> leaves;
+    for (size_t i = 0; i < points.size() / 3; ++i) leaves.push_back(leafOf(&points[i * 3]));
+    const std::vector<double> shares(leaves.size(), 1.0 / static_cast<double>(leaves.size()));
+    const std::vector<OctreeLevel> levels =
+        levelsAbove(leaves, file.config().at("levels").get<int>(), shares);
+    TrainedOctree::Tape tape;
+    const std::vector<float> logits =
+        octree.forward(values, latent.count, latent.values, levels, tape);
+    std::vector<float> by_logits(logits.size());
+    const auto weight = static_cast<double>(loss_weights[5]);
+    const double share = 1.0 / static_cast<double>(batch);
+    losses[5] += weighLogProbabilities(levels, logits, -weight * share, by_logits) / weight;
+    for (const OctreeLevel& level : levels) {
+      losses[5] -= share * leastCrossEntropy(level);
+      const std::vector<float> least = {static_cast<float>(leastCrossEntropy(level))};
+      keep("expect.struct.base", least);
+    }
+    octree.backward(values, latent.count, latent.values, levels, tape, by_logits, gradients,
+                    by_latent);
   }
+
+  void addSample(size_t b, StageReport& report) {
+    const std::vector<float> points1 = part("input.points1", b), feat1 = part("input.feat1", b);
+    const std::vector<float> points2 = part("input.points2", b), feat2 = part("input.feat2", b);
+    const std::vector<float> noise = part("input.eps", b);
+    const std::vector<int64_t> recorded = sampleOf(file.integers("input.fps_index"), batch, b);
+    const std::vector<uint32_t> queries = farthestPoints(points1, recorded.size());
+    const std::vector<int64_t> taken(queries.begin(), queries.end());
+    report.compareExactly("farthest points " + std::to_string(b), taken, recorded);
+    const std::vector<FeaturePoints> points = {{points1.size() / 3, points1.data(), feat1.data()},
+                                               {points2.size() / 3, points2.data(), feat2.data()}};
+    TrainedEncoder::Tape tape;
+    const EncodedLatent encoded = encoder.forward(values, points, queries, tape);
+    const std::vector<float> z = drawLatent(encoded, noise);
+    std::vector<float> by_z(z.size(), 0.0f);
+    splatsOf(b, {queries.size(), z.data()}, by_z.data());
+    densityOf(b, {queries.size(), z.data()}, by_z.data());
+    EncodedLatent by;
+    by.mean.assign(z.size(), 0.0f);
+    by.log_variance.assign(z.size(), 0.0f);
+    losses[4] += addDivergence(encoded, static_cast<double>(batch * z.size()),
+                               static_cast<double>(loss_weights[4]), by);
+    drawLatentBackward(encoded, noise, by_z, by);
+    std::vector<float> by_feat1(feat1.size()), by_feat2(feat2.size());
+    float* const by_features[] = {by_feat1.data(), by_feat2.data()};
+    encoder.backward(values, points, tape, by, gradients, by_features);
+    keep("expect.mu", encoded.mean);
+    keep("expect.logvar", encoded.log_variance);
+    keep("expect.z", z);
+    keep("grad.expect.z", by_z);
+    keep("grad.expect.mu", by.mean);
+    keep("grad.expect.logvar", by.log_variance);
+    keep("grad.input.feat1", by_feat1);
+    keep("grad.input.feat2", by_feat2);
+  }
+};
+
+/// A step of the autoencoder: losses, and the derivative of their sum by every weight.
+void autoencoderStages(const GoldenFile& file, StageReport& report) {
+  if (!file.has("input.surface_points")) return;
+  Autoencoder all(file);
+  for (size_t b = 0; b < all.batch; ++b) all.addSample(b, report);
+  all.losses[3] = all.losses[6] + all.losses[7];
+  for (size_t i = 0; i < all.loss_weights.size(); ++i) {
+    all.losses[8] += static_cast<double>(all.loss_weights[i]) * all.losses[i];
+  }
+  const std::vector<float> expected = file.floats("expect.losses");
+  const std::vector<std::string> order =
+      file.config().at("loss_order").get<std::vector<std::string>>();
+  for (size_t i = 0; i < order.size(); ++i) {
+    const std::vector<float> loss = {static_cast<float>(all.losses[i])};
+    compareShare("loss " + order[i], loss, std::span(expected).subspan(i, 1), kShareOfLargest,
+                 report);
+  }
+  for (const auto& [name, numbers] : all.seen) {
+    compareShare(name, numbers, file.floats(name), kShareOfLargest, report);
+  }
+  compareGradients(file, all.layout, all.gradients, report);
 }
 
 }  // namespace
 
 void trainingStages(const GoldenFile& file, StageReport& report) {
   densityStages(file, report);
-  optimiserStages(file, report);
+  autoencoderStages(file, report);
 }
 
 }  // namespace stipple

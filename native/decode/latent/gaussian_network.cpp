@@ -20,8 +20,6 @@ constexpr uint64_t kLeastGaussians = 4;
 constexpr uint64_t kMostGaussians = 32;
 /// Anchors whose MLP is worked on at once.
 constexpr size_t kMlpRows = 2048;
-constexpr float kBlockEpsilon = 1e-6f;
-constexpr float kLastEpsilon = 1e-5f;
 
 /// K of the file.
 uint32_t readGaussians(const WeightTable& network) {
@@ -108,14 +106,14 @@ std::vector<float> GaussianNetwork::features(const NetworkRun& run, const Latent
   WorkDone work(run.progress, static_cast<double>(blocks_.size()) * (self + cross + mlp));
   work.add(0);
   embedding_.apply(run, rows, points, scratch.data(), tokens.data());
-  const LayerNorm plain = {width, kBlockEpsilon, {}, {}, {}, {}};
+  const LayerNorm plain = {width, kTokenEpsilon, {}, {}, {}, {}};
   for (size_t i = 0; i < blocks_.size(); ++i) {
     const Block& block = blocks_[i];
     layerNorm(plain, rows, tokens.data(), room.data());
     block.self.apply(run, rows, room.data(), scratch.data(), room.data());
     addScaled(rows, width, {}, room.data(), tokens.data());
     work.add(self);
-    layerNorm({width, kBlockEpsilon, block.cross_weight, block.cross_bias, {}, {}}, rows,
+    layerNorm({width, kTokenEpsilon, block.cross_weight, block.cross_bias, {}, {}}, rows,
               tokens.data(), room.data());
     block.cross.apply(run, rows, room.data(), keys.rows, keys.rates[i], scratch.data(),
                       room.data());
@@ -130,7 +128,7 @@ std::vector<float> GaussianNetwork::features(const NetworkRun& run, const Latent
       work.add(mlp * static_cast<double>(count) / static_cast<double>(rows));
     }
   }
-  const LayerNorm last = {width, kLastEpsilon, {}, {}, {}, {}};
+  const LayerNorm last = lastTokenNorm(width);
   layerNorm(last, rows, tokens.data(), tokens.data());
   std::vector<float> features(rows * out_.outputs());
   out_.apply(run, rows, tokens.data(), features.data());

@@ -101,9 +101,9 @@ void OctreeNetwork::logits(const NetworkRun& asked, const LatentKeys& keys, int 
   const size_t width = heads_.tokenWidth();
   const std::vector<float> modulation = modulationOf(run, level);
   const auto part = [&](size_t i) { return std::span(modulation).subspan(i * width, width); };
-  const LayerNorm before_attention = {width, kBlockEpsilon, {}, {}, part(1), part(0)};
-  const LayerNorm before_mlp = {width, kBlockEpsilon, {}, {}, part(4), part(3)};
-  const LayerNorm last = {width, kLastEpsilon, {}, {}, {}, {}};
+  const LayerNorm before_attention = {width, kTokenEpsilon, {}, {}, part(1), part(0)};
+  const LayerNorm before_mlp = {width, kTokenEpsilon, {}, {}, part(4), part(3)};
+  const LayerNorm last = lastTokenNorm(width);
   const size_t most = std::min(cells.size(), kRows);
   std::vector<float> tokens(most * width), room(most * width), scratch(most * width);
   std::vector<float> hidden(most * blocks_.front().mlp.hiddenWidth());

@@ -18,8 +18,6 @@ class OctreeNetwork {
   /// Cells that are worked on at once; memory and the time between two looks at Progress go by it.
   static constexpr size_t kRows = 1024;
   static constexpr size_t kLevelWidth = 256;  ///< of the encoding of a level
-  /// What the blocks' norms and the last one add to variances.
-  static constexpr float kBlockEpsilon = 1e-6f, kLastEpsilon = 1e-5f;
 
   /// In: network, under "octree.". Errors: kFormat.
   explicit OctreeNetwork(const WeightTable& network);

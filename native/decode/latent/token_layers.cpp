@@ -10,7 +10,6 @@
 #include "base/parallel.h"
 #include "nn/activations.h"
 #include "nn/attention.h"
-#include "nn/norms.h"
 #include "nn/positions.h"
 
 namespace stipple {
@@ -39,6 +38,11 @@ float inverseLength(size_t count, const float* values) {
 }
 
 }  // namespace
+
+LayerNorm lastTokenNorm(size_t width) {
+  constexpr float kLastEpsilon = 1e-5f;
+  return {width, kLastEpsilon, {}, {}, {}, {}};
+}
 
 TokenHeads readTokenHeads(const WeightTable& network) {
   constexpr char kGamma[] = "blocks.0.cross_attn.q_rms_norm.gamma";

@@ -13,6 +13,7 @@
 #include "data/weight_table.h"
 #include "nn/linear.h"
 #include "nn/network_run.h"
+#include "nn/norms.h"
 #include "nn/shared_attention.h"
 
 namespace stipple {
@@ -20,6 +21,11 @@ namespace stipple {
 // The layers that the octree network and the Gaussian network of density-sampled Gaussians have in
 // common. Tokens lie as rows of `width` floats without gaps. None of these takes a decision: which
 // is applied to what is the networks' (octree_network.cpp, gaussian_network.cpp).
+
+/// What norms inside of blocks add to variances.
+constexpr float kTokenEpsilon = 1e-6f;
+/// The norm before a network's last layer.
+LayerNorm lastTokenNorm(size_t width);
 
 /// How the tokens of a network are cut into heads, which no other tensor of its file tells.
 struct TokenHeads {

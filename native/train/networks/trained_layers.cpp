@@ -126,6 +126,52 @@ void TrainedCrossAttention::backwardOfLatent(std::span<const float> values, size
   addAll(by_latent, latent_gradient);
 }
 
+TrainedSelfAttention::TrainedSelfAttention(ParameterLayout& layout, const std::string& prefix,
+                                           const NetworkShape& shape)
+    : shape_(shape),
+      to_all_(layout, prefix + "to_qkv", shape.width(), 3 * shape.width()),
+      query_gamma_(layout.add(prefix + "q_rms_norm.gamma", {shape.heads, shape.head_width})),
+      key_gamma_(layout.add(prefix + "k_rms_norm.gamma", {shape.heads, shape.head_width})),
+      to_out_(layout, prefix + "to_out", shape.width(), shape.width()) {}
+
+void TrainedSelfAttention::apply(std::span<const float> values, size_t rows, const float* in,
+                                 Tape& tape, float* out) const {
+  const size_t width = shape_.width(), stride = 3 * width;
+  tape.made.resize(rows * stride);
+  tape.attended.resize(rows * width);
+  to_all_.apply(values, rows, in, tape.made.data());
+  tape.normal = tape.made;
+  float* normal = tape.normal.data();
+  rmsNormHeads(rows, shape_.heads, shape_.head_width, values.subspan(query_gamma_, width), normal,
+               stride);
+  rmsNormHeads(rows, shape_.heads, shape_.head_width, values.subspan(key_gamma_, width),
+               normal + width, stride);
+  attention({}, {shape_.heads, shape_.head_width, rows, rows}, {normal, stride},
+            {normal + width, stride}, {normal + 2 * width, stride}, tape.attended.data(), width);
+  to_out_.apply(values, rows, tape.attended.data(), out);
+}
+
+void TrainedSelfAttention::backward(std::span<const float> values, size_t rows, const float* in,
+                                    const Tape& tape, const float* out_gradient,
+                                    std::span<float> gradients, float* in_gradient) const {
+  const size_t width = shape_.width(), stride = 3 * width;
+  std::vector<float> by_attended(rows * width), by_all(rows * stride);
+  to_out_.backward(values, rows, tape.attended.data(), out_gradient, gradients, by_attended.data());
+  const float* normal = tape.normal.data();
+  attentionBackward({shape_.heads, shape_.head_width, rows, rows}, {normal, stride},
+                    {normal + width, stride}, {normal + 2 * width, stride},
+                    {tape.attended.data(), width}, {by_attended.data(), width},
+                    {by_all.data(), stride}, {by_all.data() + width, stride},
+                    {by_all.data() + 2 * width, stride});
+  rmsNormHeadsBackward(rows, shape_.heads, shape_.head_width, values.subspan(query_gamma_, width),
+                       tape.made.data(), stride, by_all.data(), stride,
+                       gradients.data() + query_gamma_);
+  rmsNormHeadsBackward(rows, shape_.heads, shape_.head_width, values.subspan(key_gamma_, width),
+                       tape.made.data() + width, stride, by_all.data() + width, stride,
+                       gradients.data() + key_gamma_);
+  to_all_.backward(values, rows, in, by_all.data(), gradients, in_gradient);
+}
+
 TrainedTokenMlp::TrainedTokenMlp(ParameterLayout& layout, const std::string& prefix,
                                  const NetworkShape& shape)
     : up_(layout, prefix + "0", shape.width(), shape.mlp_ratio * shape.width()),

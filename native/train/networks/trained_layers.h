@@ -87,6 +87,33 @@ class TrainedCrossAttention {
   TrainedLinear to_out_;
 };
 
+/// Tokens look at each other.
+class TrainedSelfAttention {
+ public:
+  /// What apply() leaves for backward().
+  struct Tape {
+    std::vector<float> made;      ///< [rows, 3 width]: queries, keys, values, before their norms
+    std::vector<float> normal;    ///< [rows, 3 width]: after them
+    std::vector<float> attended;  ///< [rows, width]
+  };
+
+  /// Adds `prefix`to_qkv, q_rms_norm, k_rms_norm and to_out.
+  TrainedSelfAttention(ParameterLayout& layout, const std::string& prefix,
+                       const NetworkShape& shape);
+  /// In: in [rows, width]. Out: out [rows, width], apart from `in`.
+  void apply(std::span<const float> values, size_t rows, const float* in, Tape& tape,
+             float* out) const;
+  /// In: in and tape of apply(). Out: gradients; in_gradient [rows, width], written over.
+  void backward(std::span<const float> values, size_t rows, const float* in, const Tape& tape,
+                const float* out_gradient, std::span<float> gradients, float* in_gradient) const;
+
+ private:
+  NetworkShape shape_;
+  TrainedLinear to_all_;
+  size_t query_gamma_ = 0, key_gamma_ = 0;
+  TrainedLinear to_out_;
+};
+
 /// Each token by itself: two linear layers with a GELU between them.
 class TrainedTokenMlp {
  public:

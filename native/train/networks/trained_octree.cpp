@@ -26,10 +26,6 @@ std::vector<float> middlesOf(std::span<const OctreeLevel> levels) {
   return middles;
 }
 
-LayerNorm lastNorm(size_t width) {
-  return {width, OctreeNetwork::kLastEpsilon, {}, {}, {}, {}};
-}
-
 }  // namespace
 
 TrainedOctree::TrainedOctree(ParameterLayout& layout, const std::string& prefix,
@@ -86,8 +82,8 @@ std::vector<float> TrainedOctree::runBlock(std::span<const float> values, const 
   const auto normalise = [&](size_t which, const std::vector<float>& from, std::vector<float>& to) {
     to.resize(from.size());
     for (const Segment& segment : segments) {
-      const LayerNorm norm = {width, OctreeNetwork::kBlockEpsilon, {},
-                              {},    part(segment, which + 1),     part(segment, which)};
+      const LayerNorm norm = {
+          width, kTokenEpsilon, {}, {}, part(segment, which + 1), part(segment, which)};
       layerNorm(norm, segment.count, &from[segment.first * width], &to[segment.first * width]);
     }
   };
@@ -132,7 +128,7 @@ void TrainedOctree::backwardOfBlock(std::span<const float> values, const Block& 
       const size_t first = segment.first * width;
       const std::span<const float> all = segment.modulation;
       const LayerNorm norm = {width,
-                              OctreeNetwork::kBlockEpsilon,
+                              kTokenEpsilon,
                               {},
                               {},
                               all.subspan((which + 1) * width, width),
@@ -182,7 +178,7 @@ std::vector<float> TrainedOctree::forward(std::span<const float> values, size_t 
         runBlock(values, block, segments, tape.latent.back(), tape.tokens.back(), inside));
   }
   std::vector<float> normal(rows * width), logits(rows * kChildren);
-  layerNorm(lastNorm(width), rows, tape.tokens.back().data(), normal.data());
+  layerNorm(lastTokenNorm(width), rows, tape.tokens.back().data(), normal.data());
   out_.apply(values, rows, normal.data(), logits.data());
   return logits;
 }
@@ -197,9 +193,10 @@ void TrainedOctree::backward(std::span<const float> values, size_t tokens, const
   std::vector<Segment> segments = segmentsOf(values, levels);
   std::vector<float> normal(rows * width), by_normal(rows * width), by_tokens(rows * width, 0.0f);
   const std::vector<float>& last = tape.tokens.back();
-  layerNorm(lastNorm(width), rows, last.data(), normal.data());
+  layerNorm(lastTokenNorm(width), rows, last.data(), normal.data());
   out_.backward(values, rows, normal.data(), logit_gradient.data(), gradients, by_normal.data());
-  layerNormBackward(lastNorm(width), rows, last.data(), by_normal.data(), {}, by_tokens.data());
+  layerNormBackward(lastTokenNorm(width), rows, last.data(), by_normal.data(), {},
+                    by_tokens.data());
   for (size_t i = blocks_.size(); i-- > 0;) {
     backwardOfBlock(values, blocks_[i], segments, tape.latent[i], tape.tokens[i], by_tokens,
                     gradients);
