@@ -18,13 +18,11 @@ namespace stipple {
 
 namespace {
 
-constexpr float kBlockEpsilon = 1e-6f;
-constexpr float kRotaryEpsilon = 1e-5f;
-constexpr size_t kAxes = 3;
 constexpr size_t kAngleGrain = 1 << 12;  // of cosines and sines in a task
 
 size_t widestOf(const FlowBlockSizes& sizes) {
-  return std::max({sizes.mlp_width, sizes.channels, 2 * sizes.rotary_width + kAxes * sizes.heads});
+  return std::max(
+      {sizes.mlp_width, sizes.channels, 2 * sizes.rotary_width + kFlowAxes * sizes.heads});
 }
 
 void reserveRows(const FlowBlockSizes& sizes, size_t rows, FlowBlockMemory& memory) {
@@ -40,7 +38,7 @@ void reserveRows(const FlowBlockSizes& sizes, size_t rows, FlowBlockMemory& memo
 /// The first axis has the frequencies of freqs_0, and so on; together they are the pairs of a head.
 void readFrequencies(const WeightTable& weights, const std::string& name, size_t pairs,
                      std::vector<float>& frequencies, std::vector<uint8_t>& axes) {
-  for (size_t axis = 0; axis < kAxes; ++axis) {
+  for (size_t axis = 0; axis < kFlowAxes; ++axis) {
     const std::vector<float> some =
         weights.floats(name + ".freqs_" + std::to_string(axis), {kAnySize});
     for (const float frequency : some) {
@@ -71,7 +69,7 @@ ContentRotary::ContentRotary(const WeightTable& weights, const std::string& name
       gate_(weights, name + ".gate_map", sizes.channels, sizes.rotary_width, LinearBias::kNone),
       content_(weights, name + ".content_map", sizes.channels, sizes.rotary_width,
                LinearBias::kNone),
-      final_(weights, name + ".final_map", sizes.rotary_width, kAxes * sizes.heads,
+      final_(weights, name + ".final_map", sizes.rotary_width, kFlowAxes * sizes.heads,
              LinearBias::kNone) {
   readFrequencies(weights, name, sizes.head_width / 2, frequencies_, axes_);
 }
@@ -85,7 +83,7 @@ void ContentRotary::angles(const NetworkRun& run, size_t rows, const float* h,
   float* places = content + rows * width;  // [rows, heads, 3]
   LayerNorm norm;
   norm.width = sizes_.channels;
-  norm.epsilon = kRotaryEpsilon;
+  norm.epsilon = kFlowRotaryEpsilon;
   norm.weight = norm_weight_;
   norm.bias = norm_bias_;
   layerNorm(norm, rows, h, normed);
@@ -101,7 +99,7 @@ void ContentRotary::angles(const NetworkRun& run, size_t rows, const float* h,
   parallelFor(rows, 1 + kAngleGrain / table.pairs, [&](size_t begin, size_t end) {
     for (size_t r = begin; r < end; ++r) {
       for (size_t head = 0; head < sizes_.heads; ++head) {
-        const float* place = places + (r * sizes_.heads + head) * kAxes;
+        const float* place = places + (r * sizes_.heads + head) * kFlowAxes;
         float* cosines = table.cosines.data() + r * table.pairs + head * pairs;
         float* sines = table.sines.data() + r * table.pairs + head * pairs;
         for (size_t i = 0; i < pairs; ++i) {
@@ -184,7 +182,7 @@ void FlowBlock::apply(const NetworkRun& run, size_t rows, float* h, std::span<co
   Modulated modulated;
   for (LayerNorm* norm : {&modulated.attention_norm, &modulated.mlp_norm}) {
     norm->width = channels;
-    norm->epsilon = kBlockEpsilon;
+    norm->epsilon = kFlowBlockEpsilon;
   }
   modulated.attention_norm.weight = norm1_weight_;
   modulated.attention_norm.bias = norm1_bias_;

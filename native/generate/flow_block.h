@@ -15,6 +15,11 @@
 
 namespace stipple {
 
+/// What the norms of blocks, and those before places of tokens, add to variances.
+constexpr float kFlowBlockEpsilon = 1e-6f, kFlowRotaryEpsilon = 1e-5f;
+/// Coordinates of a place.
+constexpr size_t kFlowAxes = 3;
+
 /// Sizes that all blocks of a flow network share.
 struct FlowBlockSizes {
   size_t channels = 0;

@@ -19,10 +19,9 @@ namespace stipple {
 
 namespace {
 
-constexpr float kLongestPeriod = 10000.0f;
+constexpr double kLongestPeriod = 10000.0;
 /// The network was trained with times of 0 to 1000.
 constexpr double kTimeUnits = 1000.0;
-constexpr float kHeadEpsilon = 1e-5f;
 /// A buffer of the training program that files of one's own training hold: the places of tokens,
 /// which are known.
 constexpr const char* kPlacesBuffer = "pos_pe";
@@ -35,22 +34,6 @@ uint64_t layerBytes(const FlowBlockSizes& sizes, uint64_t rows) {
   const uint64_t weights =
       sizeof(float) * sizes.channels * std::max(3 * sizes.channels, sizes.mlp_width);
   return std::min(keys, kMostKeys) + std::min(weights, kMostWeights) + threadLimit() * kThread;
-}
-
-/// [cos(t w_i), sin(t w_i)], w_i = exp(-ln(longest) i / (width / 2)), step by step in float32:
-/// angles of up to 1000 round by 3e-5, and networks were trained with the rounded ones.
-std::vector<float> timeWaves(float t, size_t width) {
-  const size_t count = width / 2;
-  const float rate = -std::log(kLongestPeriod);
-  std::vector<float> waves(2 * count);
-  for (size_t i = 0; i < count; ++i) {
-    const float exponent = rate * static_cast<float>(i) / static_cast<float>(count);
-    const auto frequency = static_cast<float>(std::exp(static_cast<double>(exponent)));
-    const auto angle = static_cast<double>(t * frequency);
-    waves[i] = static_cast<float>(std::cos(angle));
-    waves[count + i] = static_cast<float>(std::sin(angle));
-  }
-  return waves;
 }
 
 std::string numbered(const char* name, size_t i) {
@@ -69,6 +52,10 @@ std::string numbered(const char* name, size_t i) {
 }
 
 }  // namespace
+
+std::vector<float> flowTimeEncoding(double time, size_t width) {
+  return timeEncoding(kTimeUnits * time, kLongestPeriod, width);
+}
 
 /// A time as the network sees it.
 struct FlowNetwork::Time {
@@ -199,8 +186,7 @@ FlowContext FlowNetwork::emptyContext(const NetworkRun& run, uint64_t rows) cons
 
 FlowNetwork::Time FlowNetwork::embedTime(const NetworkRun& run, double time) const {
   const size_t channels = sizes_.block.channels;
-  const std::vector<float> waves =
-      timeWaves(static_cast<float>(kTimeUnits * time), sizes_.time_width);
+  const std::vector<float> waves = flowTimeEncoding(time, sizes_.time_width);
   Time result;
   std::vector<float> hidden(channels);
   result.embedding.resize(channels);
@@ -262,7 +248,7 @@ void FlowNetwork::readOut(const NetworkRun& run, const Time& time, size_t rows, 
   }
   LayerNorm norm;
   norm.width = channels;
-  norm.epsilon = kHeadEpsilon;
+  norm.epsilon = kFlowHeadEpsilon;
   norm.scale = scale;
   norm.shift = shift;
   float* camera = h + (rows - 1) * channels;

@@ -20,6 +20,11 @@ constexpr size_t kCameraWidth = 5;
 /// Published networks make 8192 tokens; those of earlier stages of training 1024 to 4096.
 constexpr uint64_t kMostFlowTokens = 65536;
 
+/// What the last norms add to variances.
+constexpr float kFlowHeadEpsilon = 1e-5f;
+/// How the network is told of a time of 0 to 1. Out: [width].
+std::vector<float> flowTimeEncoding(double time, size_t width);
+
 /// Sizes of a flow network, as its tensors have them. In brackets: the published network.
 struct FlowSizes {
   FlowBlockSizes block;              ///< 1024 channels, 16 heads of 64, MLP 4096, rotary 128

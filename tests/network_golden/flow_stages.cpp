@@ -147,6 +147,7 @@ void stepStages(const GoldenFile& file, StageReport& report) {
 }  // namespace
 
 void flowStages(const GoldenFile& file, StageReport& report) {
+  if (file.has("input.uncond")) return;  // of training
   callStages(file, report);
   stepStages(file, report);
 }

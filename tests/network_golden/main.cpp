@@ -65,9 +65,11 @@ bool runFile(const char* path, const Arguments& arguments) {
     const char* name;
     void (*run)(const GoldenFile&, StageReport&);
   };
-  const Group groups[] = {{"encoders", encoderStages},  {"flow", flowStages},
-                          {"decoder", decoderStages},   {"whole", wholeStages},
-                          {"training", trainingStages}, {"optimiser", optimiserStages}};
+  const Group groups[] = {
+      {"encoders", encoderStages},   {"flow", flowStages},
+      {"decoder", decoderStages},    {"whole", wholeStages},
+      {"training", trainingStages},  {"training of the flow", flowTrainingStages},
+      {"optimiser", optimiserStages}};
   for (const Group& group : groups) {
     try {
       group.run(file, report);

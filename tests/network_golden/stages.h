@@ -17,6 +17,8 @@ void decoderStages(const GoldenFile& file, StageReport& report);
 void wholeStages(const GoldenFile& file, StageReport& report);
 /// Derivatives of networks that are trained; always in float32, with the weights that the file has.
 void trainingStages(const GoldenFile& file, StageReport& report);
+/// The same of the flow network.
+void flowTrainingStages(const GoldenFile& file, StageReport& report);
 /// What the optimiser does with derivatives.
 void optimiserStages(const GoldenFile& file, StageReport& report);
 

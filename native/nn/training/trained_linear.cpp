@@ -32,18 +32,20 @@ void transpose(size_t rows, size_t columns, const float* in, float* out) {
 }  // namespace
 
 TrainedLinear::TrainedLinear(ParameterLayout& layout, const std::string& name, size_t inputs,
-                             size_t outputs)
+                             size_t outputs, LinearBias bias)
     : inputs_(inputs),
       outputs_(outputs),
       weight_(layout.add(name + ".weight", {outputs, inputs})),
-      bias_(layout.add(name + ".bias", {outputs})) {}
+      has_bias_(bias == LinearBias::kNeeded) {
+  if (has_bias_) bias_ = layout.add(name + ".bias", {outputs});
+}
 
 void TrainedLinear::apply(std::span<const float> values, size_t rows, const float* in,
                           float* out) const {
   Scratch turned(inputs_ * outputs_);
   transpose(outputs_, inputs_, values.data() + weight_, turned.data());
   multiply({rows, inputs_, outputs_}, {in, inputs_}, {turned.data(), outputs_}, {out, outputs_},
-           values.data() + bias_);
+           has_bias_ ? values.data() + bias_ : nullptr);
 }
 
 void TrainedLinear::backward(std::span<const float> values, size_t rows, const float* in,
@@ -56,14 +58,15 @@ void TrainedLinear::backward(std::span<const float> values, size_t rows, const f
   parallelFor(inputs_ * outputs_, kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) weight_gradient[i] += made.data()[i];
   });
-  addColumnSums(
-      rows, outputs_,
-      [&](size_t row, double* part) {
-        for (size_t i = 0; i < outputs_; ++i) {
-          part[i] += static_cast<double>(out_gradient[row * outputs_ + i]);
-        }
-      },
-      gradients.data() + bias_);
+  if (has_bias_)
+    addColumnSums(
+        rows, outputs_,
+        [&](size_t row, double* part) {
+          for (size_t i = 0; i < outputs_; ++i) {
+            part[i] += static_cast<double>(out_gradient[row * outputs_ + i]);
+          }
+        },
+        gradients.data() + bias_);
   if (in_gradient == nullptr) return;
   multiply({rows, outputs_, inputs_}, {out_gradient, outputs_}, {values.data() + weight_, inputs_},
            {in_gradient, inputs_});

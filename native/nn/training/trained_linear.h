@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "nn/linear.h"
 #include "nn/training/parameter_layout.h"
 
 namespace stipple {
@@ -13,8 +14,9 @@ namespace stipple {
 class TrainedLinear {
  public:
   TrainedLinear() = default;
-  /// Adds `name`.weight and `name`.bias.
-  TrainedLinear(ParameterLayout& layout, const std::string& name, size_t inputs, size_t outputs);
+  /// Adds `name`.weight and, where it is needed, `name`.bias.
+  TrainedLinear(ParameterLayout& layout, const std::string& name, size_t inputs, size_t outputs,
+                LinearBias bias = LinearBias::kNeeded);
 
   size_t inputs() const { return inputs_; }
   size_t outputs() const { return outputs_; }
@@ -29,6 +31,7 @@ class TrainedLinear {
  private:
   size_t inputs_ = 0, outputs_ = 0;
   size_t weight_ = 0, bias_ = 0;  ///< where they begin
+  bool has_bias_ = false;
 };
 
 }  // namespace stipple

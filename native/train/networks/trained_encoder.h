@@ -61,10 +61,10 @@ class TrainedEncoder {
 };
 
 /// Points that are far from each other: the first, then again and again the one that is farthest
-/// from all that are taken; of equally far ones the first; none twice. In: points [count,3], count >= 1;
-/// wanted, at most count. Threads and determinism: parallel; same result for any number of threads.
-/// Cost: O(count * wanted). Source: Eldar et al., The Farthest Point Strategy for Progressive Image
-/// Sampling, 1997.
+/// from all that are taken; of equally far ones the first; none twice. In: points [count,3], count
+/// >= 1; wanted, at most count. Threads and determinism: parallel; same result for any number of
+/// threads. Cost: O(count * wanted). Source: Eldar et al., The Farthest Point Strategy for
+/// Progressive Image Sampling, 1997.
 std::vector<uint32_t> farthestPoints(std::span<const float> points, size_t wanted);
 
 /// z = mean + exp(log_variance / 2) noise. In: noise, as many. Out: z.
