@@ -66,10 +66,10 @@ bool runFile(const char* path, const Arguments& arguments) {
     void (*run)(const GoldenFile&, StageReport&);
   };
   const Group groups[] = {
-      {"encoders", encoderStages},   {"flow", flowStages},
-      {"decoder", decoderStages},    {"whole", wholeStages},
-      {"training", trainingStages},  {"training of the flow", flowTrainingStages},
-      {"optimiser", optimiserStages}};
+      {"encoders", encoderStages},  {"flow", flowStages},
+      {"decoder", decoderStages},   {"whole", wholeStages},
+      {"training", trainingStages}, {"training of the flow", flowTrainingStages},
+      {"detail", detailStages},     {"optimiser", optimiserStages}};
   for (const Group& group : groups) {
     try {
       group.run(file, report);

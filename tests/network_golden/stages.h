@@ -19,6 +19,8 @@ void wholeStages(const GoldenFile& file, StageReport& report);
 void trainingStages(const GoldenFile& file, StageReport& report);
 /// The same of the flow network.
 void flowTrainingStages(const GoldenFile& file, StageReport& report);
+/// Points with features that become finer points, and their derivatives.
+void detailStages(const GoldenFile& file, StageReport& report);
 /// What the optimiser does with derivatives.
 void optimiserStages(const GoldenFile& file, StageReport& report);
 

@@ -14,7 +14,7 @@ TrainedTokenBlock::TrainedTokenBlock(ParameterLayout& layout, const std::string&
                                      const NetworkShape& shape, size_t contexts)
     : width_(shape.width()),
       self_(layout, prefix + "self_attn.", shape),
-      mlp_(layout, prefix + "mlp.mlp.", shape) {
+      mlp_(trainedTokenMlp(layout, prefix + "mlp.mlp.", shape)) {
   for (size_t i = 0; i < contexts; ++i) {
     const std::string norm = prefix + (i == 0 ? "norm2" : "norm2_1");
     const std::string attention = prefix + (i == 0 ? "cross_attn." : "cross_attn2.");

@@ -54,7 +54,7 @@ class TrainedTokenBlock {
     std::vector<std::vector<float>> tokens, normal;  ///< before each part, and normalised
     TrainedSelfAttention::Tape self;
     std::vector<TrainedCrossAttention::Tape> looks;
-    TrainedTokenMlp::Tape mlp;
+    TrainedMlp::Tape mlp;
   };
 
   LayerNorm normOf(std::span<const float> values, const Look& look) const;
@@ -64,7 +64,7 @@ class TrainedTokenBlock {
   size_t width_;
   TrainedSelfAttention self_;
   std::vector<Look> looks_;
-  TrainedTokenMlp mlp_;
+  TrainedMlp mlp_;
 };
 
 /// Blocks of that kind in a row.

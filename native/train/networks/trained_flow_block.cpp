@@ -123,7 +123,7 @@ struct TrainedFlowBlock::Inside {
   std::vector<float> attended, made;    // [rows, channels]
   std::vector<float> middle;            // [rows, channels]: tokens between attention and MLP
   std::vector<float> before_mlp, passed;
-  TrainedTokenMlp::Tape mlp;
+  TrainedMlp::Tape mlp;
 };
 
 TrainedFlowBlock::TrainedFlowBlock(ParameterLayout& layout, const std::string& block,
@@ -136,7 +136,7 @@ TrainedFlowBlock::TrainedFlowBlock(ParameterLayout& layout, const std::string& b
       query_gamma_(layout.add(block + ".attn.q_norm.gamma", {sizes.heads, sizes.head_width})),
       key_gamma_(layout.add(block + ".attn.k_norm.gamma", {sizes.heads, sizes.head_width})),
       out_(layout, block + ".attn.out", sizes.channels, sizes.channels),
-      mlp_(layout, block + ".mlp.mlp.", shapeOf(sizes)) {
+      mlp_(trainedTokenMlp(layout, block + ".mlp.mlp.", shapeOf(sizes))) {
   if (modulation == FlowModulation::kTime) {
     shift_table_ = layout.add(block + ".shift_table", {1, 6 * sizes.channels});
     return;

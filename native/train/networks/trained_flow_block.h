@@ -86,7 +86,7 @@ class TrainedFlowBlock {
   TrainedLinear to_all_;
   size_t query_gamma_ = 0, key_gamma_ = 0;
   TrainedLinear out_;
-  TrainedTokenMlp mlp_;
+  TrainedMlp mlp_;
 };
 
 }  // namespace stipple

@@ -172,27 +172,14 @@ void TrainedSelfAttention::backward(std::span<const float> values, size_t rows, 
   to_all_.backward(values, rows, in, by_all.data(), gradients, in_gradient);
 }
 
-TrainedTokenMlp::TrainedTokenMlp(ParameterLayout& layout, const std::string& prefix,
-                                 const NetworkShape& shape)
-    : up_(layout, prefix + "0", shape.width(), shape.mlp_ratio * shape.width()),
-      down_(layout, prefix + "2", up_.outputs(), shape.width()) {}
-
-void TrainedTokenMlp::apply(std::span<const float> values, size_t rows, const float* in, Tape& tape,
-                            float* out) const {
-  tape.sums.resize(rows * up_.outputs());
-  up_.apply(values, rows, in, tape.sums.data());
-  tape.activated = tape.sums;
-  activate(Activation::kGeluTanh, tape.activated);
-  down_.apply(values, rows, tape.activated.data(), out);
-}
-
-void TrainedTokenMlp::backward(std::span<const float> values, size_t rows, const float* in,
-                               const Tape& tape, const float* out_gradient,
-                               std::span<float> gradients, float* in_gradient) const {
-  std::vector<float> by_sums(rows * up_.outputs());
-  down_.backward(values, rows, tape.activated.data(), out_gradient, gradients, by_sums.data());
-  activateBackward(Activation::kGeluTanh, tape.sums, by_sums);
-  up_.backward(values, rows, in, by_sums.data(), gradients, in_gradient);
+TrainedMlp trainedTokenMlp(ParameterLayout& layout, const std::string& prefix,
+                           const NetworkShape& shape) {
+  const size_t width = shape.width();
+  return {layout,
+          prefix + "0",
+          prefix + "2",
+          {width, shape.mlp_ratio * width, width},
+          Activation::kGeluTanh};
 }
 
 }  // namespace stipple

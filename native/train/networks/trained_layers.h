@@ -7,6 +7,7 @@
 
 #include "nn/training/parameter_layout.h"
 #include "nn/training/trained_linear.h"
+#include "nn/training/trained_mlp.h"
 
 namespace stipple {
 
@@ -114,25 +115,8 @@ class TrainedSelfAttention {
   TrainedLinear to_out_;
 };
 
-/// Each token by itself: two linear layers with a GELU between them.
-class TrainedTokenMlp {
- public:
-  /// What apply() leaves for backward(), [rows, width times the ratio] each.
-  struct Tape {
-    std::vector<float> sums, activated;
-  };
-
-  /// Adds `prefix`0 and `prefix`2.
-  TrainedTokenMlp(ParameterLayout& layout, const std::string& prefix, const NetworkShape& shape);
-  /// In: in [rows, width]. Out: out [rows, width], apart from `in`.
-  void apply(std::span<const float> values, size_t rows, const float* in, Tape& tape,
-             float* out) const;
-  /// In: in and tape of apply(). Out: gradients; in_gradient [rows, width], written over.
-  void backward(std::span<const float> values, size_t rows, const float* in, const Tape& tape,
-                const float* out_gradient, std::span<float> gradients, float* in_gradient) const;
-
- private:
-  TrainedLinear up_, down_;
-};
+/// Each token by itself: adds `prefix`0 and `prefix`2, with a GELU between them.
+TrainedMlp trainedTokenMlp(ParameterLayout& layout, const std::string& prefix,
+                           const NetworkShape& shape);
 
 }  // namespace stipple

@@ -38,7 +38,7 @@ TrainedOctree::TrainedOctree(ParameterLayout& layout, const std::string& prefix,
   for (size_t i = 0; i < shape.block_count; ++i) {
     const std::string block = prefix + "blocks." + std::to_string(i) + ".";
     blocks_.push_back({TrainedCrossAttention(layout, block + "cross_attn.", shape),
-                       TrainedTokenMlp(layout, block + "mlp.mlp.", shape)});
+                       trainedTokenMlp(layout, block + "mlp.mlp.", shape)});
   }
   out_ = TrainedLinear(layout, prefix + "out_proj", shape.width(), kChildren);
 }

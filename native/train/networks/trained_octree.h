@@ -42,7 +42,7 @@ class TrainedOctree {
  private:
   struct Block {
     TrainedCrossAttention attention;
-    TrainedTokenMlp mlp;
+    TrainedMlp mlp;
   };
   /// Rows of one level, which share a modulation.
   struct Segment {
@@ -56,7 +56,7 @@ class TrainedOctree {
   struct Inside {
     std::vector<float> before_attention, looked, middle, before_mlp, passed;
     TrainedCrossAttention::Tape attention;
-    TrainedTokenMlp::Tape mlp;
+    TrainedMlp::Tape mlp;
   };
 
   std::vector<Segment> segmentsOf(std::span<const float> values,
