@@ -9,6 +9,19 @@
 
 namespace stipple {
 
+void logProbabilitiesOf(std::span<const float> logits, std::span<float> out) {
+  for (size_t first = 0; first < logits.size(); first += 8) {
+    const std::span<const float> of = logits.subspan(first, 8);
+    const auto peak = static_cast<double>(*std::max_element(of.begin(), of.end()));
+    double sum = 0;
+    for (const float logit : of) sum += std::exp(static_cast<double>(logit) - peak);
+    const double whole = peak + std::log(sum);
+    for (size_t k = 0; k < 8; ++k) {
+      out[first + k] = static_cast<float>(static_cast<double>(of[k]) - whole);
+    }
+  }
+}
+
 LatentDensity::LatentDensity(std::shared_ptr<const OctreeNetwork> network,
                              std::shared_ptr<const Latent> latent, const NetworkRun& run,
                              int leaf_level)
@@ -37,16 +50,7 @@ void LatentDensity::childLogProbabilities(int level, std::span<const uint64_t> c
   run.progress = progress;
   const auto keys = keys_.get([&] { return network_->keysOf(run, *latent_); });
   network_->logits(run, *keys, level, cells, out);
-  for (size_t i = 0; i < cells.size(); ++i) {
-    float* logits = &out[i * 8];
-    const double most = static_cast<double>(*std::max_element(logits, logits + 8));
-    double sum = 0;
-    for (size_t k = 0; k < 8; ++k) sum += std::exp(static_cast<double>(logits[k]) - most);
-    const double whole = most + std::log(sum);
-    for (size_t k = 0; k < 8; ++k) {
-      logits[k] = static_cast<float>(static_cast<double>(logits[k]) - whole);
-    }
-  }
+  logProbabilitiesOf(out.first(8 * cells.size()), out);
 }
 
 uint64_t LatentDensity::answerMemoryBound() const {

@@ -7,6 +7,10 @@
 
 namespace stipple {
 
+/// Log-softmax of each cell's eight logits. In: logits [cells, 8]. Out: [cells, 8]; it may be
+/// `logits`.
+void logProbabilitiesOf(std::span<const float> logits, std::span<float> out);
+
 /// The density of a latent's object over the cube of side 1 around the origin, or where the
 /// latent's placement has that cube, as a network tells it. What cells see of the latent is
 /// computed at the first question and kept: a float for each token, head and block, and the tokens

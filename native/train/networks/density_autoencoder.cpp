@@ -1,0 +1,315 @@
+// Based on: DeG, density-sampled Gaussians (arXiv 2605.16355), a step of its training.
+#include "train/networks/density_autoencoder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/random.h"
+#include "decode/latent/latent_density.h"
+#include "decode/splat_layout.h"
+#include "density/anchor_sampling.h"
+#include "density/contribution_normalisation.h"
+#include "math/morton.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr float kMiddle = 0.5f;  ///< of the unit cube, which is the origin of views
+
+NetworkShape shapeOf(const AutoencoderSizes& sizes, size_t blocks) {
+  return {sizes.heads, sizes.head_width, sizes.latent_width, blocks, sizes.mlp_ratio};
+}
+
+/// The density of a latent, for the sampler.
+class SampledDensity final : public DensityModel {
+ public:
+  SampledDensity(const TrainedOctree& octree, std::span<const float> values,
+                 const ContextRows& latent, int leaf_level)
+      : octree_(octree), values_(values), latent_(latent), leaf_level_(leaf_level) {}
+  int leafLevel() const override { return leaf_level_; }
+  const RootCube& root() const override { return root_; }
+  void childLogProbabilities(int level, std::span<const uint64_t> cells, std::span<float> out,
+                             Progress* progress) const override {
+    if (progress != nullptr) progress->throwIfCancelled();
+    const OctreeLevel asked = {level, {cells.begin(), cells.end()}, {}};
+    TrainedOctree::Tape tape;
+    const std::vector<float> logits =
+        octree_.forward(values_, latent_.count, latent_.values, {&asked, 1}, tape);
+    logProbabilitiesOf(logits, out);
+  }
+
+ private:
+  const TrainedOctree& octree_;
+  std::span<const float> values_;
+  const ContextRows& latent_;
+  int leaf_level_;
+  RootCube root_;
+};
+
+void addTo(std::span<const float> from, double factor, std::vector<float>& to) {
+  const auto by = static_cast<float>(factor);
+  for (size_t i = 0; i < from.size(); ++i) to[i] += by * from[i];
+}
+
+void addCloud(const SplatCloud& from, double factor, SplatCloud& to) {
+  addTo(from.positions, factor, to.positions);
+  addTo(from.scales, factor, to.scales);
+  addTo(from.rotations, factor, to.rotations);
+  addTo(from.opacities, factor, to.opacities);
+  addTo(from.sh, factor, to.sh);
+}
+
+SplatCloud zerosLike(const SplatCloud& cloud) {
+  SplatCloud made;
+  made.sh_degree = cloud.sh_degree;
+  made.positions.assign(cloud.positions.size(), 0.0f);
+  made.scales.assign(cloud.scales.size(), 0.0f);
+  made.rotations.assign(cloud.rotations.size(), 0.0f);
+  made.opacities.assign(cloud.opacities.size(), 0.0f);
+  made.sh.assign(cloud.sh.size(), 0.0f);
+  return made;
+}
+
+/// Of `count` things, `wanted` different ones.
+std::vector<size_t> drawn(size_t count, size_t wanted, uint64_t seed) {
+  std::vector<std::pair<uint64_t, size_t>> keys;
+  for (size_t i = 0; i < count; ++i) {
+    keys.emplace_back(keyedBits(seed, RandomUse::kViewOrder, i), i);
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<size_t> made;
+  for (size_t i = 0; i < std::min(wanted, count); ++i) made.push_back(keys[i].second);
+  return made;
+}
+
+std::vector<float> noiseOf(size_t count, uint64_t seed) {
+  std::vector<float> noise(count);
+  for (size_t i = 0; i < count; ++i) {
+    const uint64_t bits = keyedBits(seed, RandomUse::kTokenNoise, i);
+    noise[i] = static_cast<float>(normalOf(unitDouble(bits), unitDouble(mixBits(bits))));
+  }
+  return noise;
+}
+
+}  // namespace
+
+/// Splats of a latent, and how they came to be.
+struct DensityAutoencoder::Splats {
+  AnchorSet anchors;
+  std::vector<float> units, raw;
+  TrainedGaussians::Tape tape;
+  SplatCloud unit_cloud;  // in the unit cube
+
+  LayoutAnchors layoutAnchors() const { return {anchors.positions, units}; }
+  SplatCloud aroundOrigin() const {
+    SplatCloud cloud = unit_cloud;
+    for (float& value : cloud.positions) value -= kMiddle;
+    return cloud;
+  }
+};
+
+DensityAutoencoder::DensityAutoencoder(const AutoencoderSizes& sizes)
+    : sizes_(sizes),
+      encoder_(layout_, "encoder.", shapeOf(sizes, sizes.encoder_blocks), sizes.feature_widths),
+      octree_(layout_, "octree.", shapeOf(sizes, sizes.octree_blocks)),
+      splats_(layout_, "gs.", shapeOf(sizes, sizes.splat_blocks), sizes.gaussians) {}
+
+std::vector<float> DensityAutoencoder::startValues(uint64_t seed) const {
+  const std::vector<std::string> silent = {"encoder.logvar_out.weight", "octree.out_proj.weight",
+                                           "octree.adaLN_modulation.1.weight",
+                                           "gs.out_proj.weight"};
+  std::vector<float> values(layout_.size(), 0.0f);
+  for (const Parameter& parameter : layout_.parameters()) {
+    const bool is_factor = parameter.name.ends_with("gamma") ||
+                           (parameter.shape.size() == 1 && parameter.name.ends_with(".weight"));
+    const bool is_silent = std::find(silent.begin(), silent.end(), parameter.name) != silent.end();
+    for (size_t i = 0; i < parameter.count; ++i) {
+      float& value = values[parameter.first + i];
+      if (is_factor) value = 1.0f;
+      if (is_factor || is_silent || parameter.shape.size() != 2) continue;
+      const auto sides = static_cast<double>(parameter.shape[0] + parameter.shape[1]);
+      const double u = unitDouble(keyedBits(seed, RandomUse::kNetworkStart, parameter.first + i));
+      value = static_cast<float>(std::sqrt(6 / sides) * (2 * u - 1));
+    }
+  }
+  return values;
+}
+
+std::vector<FeaturePoints> DensityAutoencoder::pointsOf(const TrainingObject& object) const {
+  const size_t kinds = sizes_.feature_widths.size();
+  std::vector<FeaturePoints> points;
+  for (size_t i = 0; i < kinds && i < object.points.size() && i < object.features.size(); ++i) {
+    const size_t count = object.points[i].size() / 3;
+    if (count == 0 || object.features[i].size() != count * sizes_.feature_widths[i]) break;
+    points.push_back({count, object.points[i].data(), object.features[i].data()});
+  }
+  if (points.size() != kinds || object.surface.empty()) {
+    fail(ErrorCode::kInvalidArgument,
+         "an object to learn from has " + std::to_string(object.surface.size() / 3) +
+             " points of its surface and " + std::to_string(points.size()) +
+             " kinds of points with features as wide as the network reads; one or more, and " +
+             std::to_string(kinds) + ", are needed");
+  }
+  return points;
+}
+
+DensityAutoencoder::Splats DensityAutoencoder::splatsOf(std::span<const float> values,
+                                                        const ContextRows& latent, uint64_t anchors,
+                                                        uint64_t seed) const {
+  Splats made;
+  const SampledDensity density(octree_, values, latent, sizes_.leaf_level);
+  made.anchors = sampleAnchors(density, {.count = anchors, .seed = seed});
+  made.units.assign(made.anchors.size(), 1.0f);
+  made.raw = splats_.forward(values, latent, made.anchors.size(), made.anchors.positions.data(),
+                             made.tape);
+  const SplatLayout layout = {sizes_.gaussians, 0};
+  made.unit_cloud.frame = Frame::kRFU;
+  made.unit_cloud.antialias = Antialias::kMip;
+  activateSplats(layout, made.layoutAnchors(), made.raw.data(), layout.outputs(), made.unit_cloud);
+  return made;
+}
+
+void DensityAutoencoder::addDensity(std::span<const float> values, const ContextRows& latent,
+                                    std::span<const OctreeLevel> levels, double factor,
+                                    std::span<float> gradients, float* by_latent,
+                                    double& loss) const {
+  TrainedOctree::Tape tape;
+  const std::vector<float> logits =
+      octree_.forward(values, latent.count, latent.values, levels, tape);
+  std::vector<float> by_logits(logits.size());
+  loss += weighLogProbabilities(levels, logits, factor, by_logits);
+  octree_.backward(values, latent.count, latent.values, levels, tape, by_logits, gradients,
+                   by_latent);
+}
+
+void DensityAutoencoder::addImages(std::span<const float> values, const AutoencoderExample& example,
+                                   const AutoencoderLossWeights& weights,
+                                   const BackendFactory& backends, const ContextRows& latent,
+                                   std::span<float> gradients, float* by_latent,
+                                   AutoencoderLosses& losses, Progress* progress) const {
+  Splats splats = splatsOf(values, latent, example.anchors, example.seed);
+  const SplatCloud cloud = splats.aroundOrigin();
+  SplatCloud by_cloud = zerosLike(cloud), by_view;
+  std::vector<double> contributions(splats.anchors.size(), 0.0);
+  const std::vector<size_t> views =
+      drawn(example.object->views.size(), example.views, example.seed);
+  if (views.empty()) fail(ErrorCode::kInvalidArgument, "an object to learn from has no views");
+  const double view_share = 1 / static_cast<double>(views.size());
+  StatisticRequest request;
+  request.contributions = example.stage == AutoencoderStage::kJoint;
+  losses.ssim = 0;
+  const std::unique_ptr<ViewPass> pass = backends.makeViewPass();
+  for (const size_t index : views) {
+    if (progress != nullptr) progress->throwIfCancelled();
+    const ObjectView& view = example.object->views[index];
+    const bool is_white = keyedBits(example.seed, RandomUse::kBackground, index) & 1;
+    std::vector<float> target = view.image;
+    RenderOptions options;
+    options.with_depth = false;
+    options.with_background = true;
+    std::fill_n(options.background, 3, is_white ? 1.0f : 0.0f);
+    for (size_t i = 0; i < target.size() && is_white; ++i) target[i] += 1 - view.alpha[i / 3];
+    pass->forward(cloud, view.camera, options, progress);
+    // L1 and `ssim` times 1 - SSIM, as a multiple of the loss that shares one between them.
+    const double whole = 1 + weights.ssim;
+    const ImageLossValue loss = pass->loss(target, {}, lossFor(request, weights.ssim / whole));
+    losses.l1 += view_share * loss.l1;
+    losses.ssim += view_share * loss.ssim;
+    pass->backward(request, 0.0, progress);
+    pass->swapGradients(by_view);
+    addCloud(by_view, view_share * example.share * whole, by_cloud);
+    pass->swapGradients(by_view);
+    if (!request.contributions) continue;
+    const std::span<const float> of_view = pass->statistic(Statistic::kContributions);
+    for (size_t n = 0; n < of_view.size(); ++n) {
+      // Of the sum over channels, as published, where L1 is their mean.
+      contributions[n / sizes_.gaussians] += 3 * view_share * static_cast<double>(of_view[n]);
+    }
+  }
+  losses.splats = addSplatLosses(weights.splats, example.share, splats.anchors.positions,
+                                 sizes_.gaussians, splats.unit_cloud, by_cloud);
+  const SplatLayout layout = {sizes_.gaussians, 0};
+  std::vector<float> by_raw(splats.raw.size());
+  activateSplatsBackward(layout, splats.layoutAnchors(), splats.raw.data(), layout.outputs(),
+                         splats.unit_cloud, by_cloud, by_raw.data());
+  splats_.backward(values, latent, splats.anchors.size(), splats.anchors.positions.data(),
+                   splats.tape, by_raw, gradients, by_latent);
+  losses.total += losses.l1 + weights.ssim * (1 - losses.ssim) +
+                  weights.splats.volume * losses.splats.volume +
+                  weights.splats.opacity * losses.splats.opacity +
+                  weights.splats.cluster * (losses.splats.off_centre + losses.splats.overlap);
+  if (!request.contributions) return;
+  normaliseContributions({.counts_neutral = true}, contributions);
+  const std::vector<OctreeLevel> levels =
+      levelsAbove(splats.anchors.leaves, sizes_.leaf_level, contributions);
+  double surrogate = 0;  // It has a derivative that counts, and no value that does.
+  addDensity(values, latent, levels, weights.density * example.share, gradients, by_latent,
+             surrogate);
+}
+
+AutoencoderLosses DensityAutoencoder::addExample(std::span<const float> values,
+                                                 const AutoencoderExample& example,
+                                                 const AutoencoderLossWeights& weights,
+                                                 const BackendFactory& backends,
+                                                 std::span<float> gradients,
+                                                 Progress* progress) const {
+  const TrainingObject& object = *example.object;
+  const std::vector<FeaturePoints> points = pointsOf(object);
+  const std::vector<uint32_t> queries = farthestPoints(object.points[0], example.tokens);
+  TrainedEncoder::Tape tape;
+  const EncodedLatent encoded = encoder_.forward(values, points, queries, tape);
+  const std::vector<float> noise = noiseOf(encoded.mean.size(), example.seed);
+  const std::vector<float> drawn_latent = drawLatent(encoded, noise);
+  const ContextRows latent = {queries.size(), drawn_latent.data()};
+  std::vector<float> by_latent(drawn_latent.size(), 0.0f);
+  AutoencoderLosses losses;
+
+  std::vector<uint64_t> leaves;
+  const auto side = static_cast<float>(1 << sizes_.leaf_level);
+  for (size_t i = 0; i < object.surface.size(); i += 3) {
+    const auto cell = [&](size_t axis) {
+      return static_cast<uint32_t>(std::clamp(object.surface[i + axis] * side, 0.0f, side - 1));
+    };
+    leaves.push_back(mortonEncode(cell(0), cell(1), cell(2)));
+  }
+  const std::vector<double> shares(leaves.size(), 1.0 / static_cast<double>(leaves.size()));
+  const std::vector<OctreeLevel> levels = levelsAbove(leaves, sizes_.leaf_level, shares);
+  const double factor = weights.structure * example.share;
+  addDensity(values, latent, levels, -factor, gradients, by_latent.data(), losses.structure);
+  losses.structure = factor > 0 ? losses.structure / factor : 0.0;
+  for (const OctreeLevel& level : levels) losses.structure -= leastCrossEntropy(level);
+
+  EncodedLatent by = {std::vector<float>(noise.size(), 0.0f),
+                      std::vector<float>(noise.size(), 0.0f)};
+  losses.divergence = addDivergence(encoded, static_cast<double>(noise.size()),
+                                    weights.divergence * example.share, by);
+  losses.total = weights.structure * losses.structure + weights.divergence * losses.divergence;
+  if (example.stage != AutoencoderStage::kStructure) {
+    addImages(values, example, weights, backends, latent, gradients, by_latent.data(), losses,
+              progress);
+  }
+  drawLatentBackward(encoded, noise, by_latent, by);
+  const std::vector<float*> nobody(points.size(), nullptr);
+  encoder_.backward(values, points, tape, by, gradients, nobody);
+  return losses;
+}
+
+std::vector<float> DensityAutoencoder::encode(std::span<const float> values,
+                                              const TrainingObject& object, size_t tokens) const {
+  TrainedEncoder::Tape tape;
+  return encoder_.forward(values, pointsOf(object), farthestPoints(object.points[0], tokens), tape)
+      .mean;
+}
+
+SplatCloud DensityAutoencoder::decode(std::span<const float> values, std::span<const float> latent,
+                                      uint64_t anchors, uint64_t seed) const {
+  const ContextRows rows = {latent.size() / sizes_.latent_width, latent.data()};
+  return splatsOf(values, rows, anchors, seed).aroundOrigin();
+}
+
+}  // namespace stipple

@@ -1,0 +1,128 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "math/camera.h"
+#include "train/backend/backend_factory.h"
+#include "train/networks/autoencoder_losses.h"
+#include "train/networks/trained_encoder.h"
+#include "train/networks/trained_gaussians.h"
+#include "train/networks/trained_octree.h"
+
+namespace stipple {
+
+/// Sizes of the three networks, which are as wide as each other.
+struct AutoencoderSizes {
+  size_t heads = 4;
+  size_t head_width = 32;
+  size_t latent_width = 16;
+  size_t mlp_ratio = 4;
+  size_t encoder_blocks = 4, octree_blocks = 2, splat_blocks = 4;
+  std::vector<size_t> feature_widths = {3};  ///< of one or two kinds
+  uint32_t gaussians = 8;                    ///< of each anchor, 4 to 32
+  int leaf_level = 8;                        ///< 1 to kMaxLeafLevel
+};
+
+/// A view of an object, whose unit cube has its middle in the origin.
+struct ObjectView {
+  Camera camera;
+  std::vector<float> image;  ///< [H,W,3], before `background`
+  std::vector<float> alpha;  ///< [H,W], of the object
+};
+
+/// An object of a collection.
+struct TrainingObject {
+  std::vector<std::vector<float>> points;    ///< of each kind [count,3], in the unit cube 0..1
+  std::vector<std::vector<float>> features;  ///< of each kind [count, width]
+  std::vector<float> surface;                ///< [count,3], in the unit cube
+  std::vector<ObjectView> views;             ///< images of the object before black
+};
+
+/// What is learned.
+enum class AutoencoderStage {
+  kStructure,   ///< encoder and density, from the surface
+  kAttributes,  ///< splats, too, from images; the density from the surface alone
+  kJoint,       ///< the density also from what its anchors do to images
+};
+
+struct AutoencoderLossWeights {
+  double structure = 1;
+  double divergence = 0.01;
+  double ssim = 0.2;  ///< of 1 - SSIM, beside L1 with a weight of 1
+  double density = 1;
+  SplatLossWeights splats;
+};
+
+/// One example of one step.
+struct AutoencoderExample {
+  const TrainingObject* object = nullptr;
+  AutoencoderStage stage = AutoencoderStage::kStructure;
+  size_t tokens = 256;     ///< of the latent, at most as many as points of the first kind
+  uint64_t anchors = 256;  ///< that are drawn
+  size_t views = 4;        ///< that are looked at, at most as many as there are
+  uint64_t seed = 0;       ///< of noise, anchors, views and backgrounds
+  double share = 1;        ///< of the step: one over its examples
+};
+
+/// What an example lost, without weights.
+struct AutoencoderLosses {
+  double total = 0;  ///< with weights
+  double structure = 0, divergence = 0;
+  double l1 = 0, ssim = 1;
+  SplatLosses splats;
+};
+
+/// The density autoencoder as it is trained: encoder, density and splats.
+class DensityAutoencoder {
+ public:
+  explicit DensityAutoencoder(const AutoencoderSizes& sizes);
+
+  const ParameterLayout& layout() const { return layout_; }
+  const AutoencoderSizes& sizes() const { return sizes_; }
+  /// Weights to begin with: Xavier-uniform, keyed by the seed; what the networks say is 0, so that
+  /// the density begins even and splats fill their lattice.
+  std::vector<float> startValues(uint64_t seed) const;
+
+  /// Loss of an example, and its derivatives. Out: gradients of the layout, which this adds to.
+  /// Errors: kInvalidArgument for an object that is empty or has other features; kCancelled.
+  /// Threads and determinism: parallel; same bits for any number of threads.
+  AutoencoderLosses addExample(std::span<const float> values, const AutoencoderExample& example,
+                               const AutoencoderLossWeights& weights,
+                               const BackendFactory& backends, std::span<float> gradients,
+                               Progress* progress = nullptr) const;
+
+  /// The latent of an object, the mean of what is drawn. Out: [tokens, latent_width].
+  std::vector<float> encode(std::span<const float> values, const TrainingObject& object,
+                            size_t tokens) const;
+  /// Splats of a latent, in the cube around the origin. In: latent [tokens, latent_width].
+  SplatCloud decode(std::span<const float> values, std::span<const float> latent, uint64_t anchors,
+                    uint64_t seed) const;
+
+ private:
+  struct Splats;
+
+  std::vector<FeaturePoints> pointsOf(const TrainingObject& object) const;
+  Splats splatsOf(std::span<const float> values, const ContextRows& latent, uint64_t anchors,
+                  uint64_t seed) const;
+  /// Derivatives by the latent; losses of images go to `losses`.
+  void addImages(std::span<const float> values, const AutoencoderExample& example,
+                 const AutoencoderLossWeights& weights, const BackendFactory& backends,
+                 const ContextRows& latent, std::span<float> gradients, float* by_latent,
+                 AutoencoderLosses& losses, Progress* progress) const;
+  void addDensity(std::span<const float> values, const ContextRows& latent,
+                  std::span<const OctreeLevel> levels, double factor, std::span<float> gradients,
+                  float* by_latent, double& loss) const;
+
+  AutoencoderSizes sizes_;
+  ParameterLayout layout_;
+  TrainedEncoder encoder_;
+  TrainedOctree octree_;
+  TrainedGaussians splats_;
+};
+
+}  // namespace stipple
