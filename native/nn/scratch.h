@@ -19,6 +19,7 @@ class Scratch {
   Scratch& operator=(const Scratch&) = delete;
   /// At a cache line.
   float* data() { return line_; }
+  const float* data() const { return line_; }
 
  private:
   void findLine();

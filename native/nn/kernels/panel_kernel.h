@@ -20,6 +20,7 @@ struct PanelProduct {
   MatmulShape shape;
   const float* a = nullptr;  ///< [rows, inner]
   size_t a_stride = 0;
+  bool is_turned = false;    ///< element (row, k) of a is at a[k * a_stride + row] instead
   const float* b = nullptr;  ///< [inner, columns] in strips
   PanelStart start = PanelStart::kBias;
   const float* bias = nullptr;  ///< [columns], or null for zeros

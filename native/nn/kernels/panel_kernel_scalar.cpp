@@ -21,7 +21,9 @@ void multiplyScalar(const PanelProduct& product) {
       }
       const float* b = product.b + column / kStrip * shape.inner * kStrip + column % kStrip;
       for (size_t k = 0; k < shape.inner; ++k) {
-        sum += product.a[row * product.a_stride + k] * b[k * kStrip];
+        const size_t at =
+            product.is_turned ? k * product.a_stride + row : row * product.a_stride + k;
+        sum += product.a[at] * b[k * kStrip];
       }
       out = sum;
     }

@@ -29,7 +29,7 @@ constexpr size_t kInner = 256;
 constexpr size_t kBlockRows = 96;
 
 /// One strip or its first vector, kRows rows, `inner` steps.
-template <size_t kRows, size_t kVectors>
+template <bool kTurned, size_t kRows, size_t kVectors>
 HWY_INLINE void multiplyTile(size_t inner, const float* a, size_t a_stride, const float* strip,
                              Vec (&sums)[kRows][kVectors]) {
   const Tag d;
@@ -39,7 +39,7 @@ HWY_INLINE void multiplyTile(size_t inner, const float* a, size_t a_stride, cons
     for (size_t v = 0; v < kVectors; ++v) b[v] = hn::LoadU(d, strip + v * lanes);
     strip += 2 * lanes;
     for (size_t row = 0; row < kRows; ++row) {
-      const Vec factor = hn::Set(d, a[row * a_stride + k]);
+      const Vec factor = hn::Set(d, a[kTurned ? k * a_stride + row : row * a_stride + k]);
       for (size_t v = 0; v < kVectors; ++v) {
         sums[row][v] = hn::MulAdd(factor, b[v], sums[row][v]);
       }
@@ -76,9 +76,15 @@ HWY_NOINLINE void multiplyPiece(const PanelProduct& product, const Piece& piece)
     }
   }
   const float* strip = product.b + piece.column * product.shape.inner + piece.begin * 2 * lanes;
-  multiplyTile<kRows>(piece.end - piece.begin,
-                      product.a + piece.row * product.a_stride + piece.begin, product.a_stride,
-                      strip, sums);
+  if (product.is_turned) {
+    multiplyTile<true, kRows>(piece.end - piece.begin,
+                              product.a + piece.begin * product.a_stride + piece.row,
+                              product.a_stride, strip, sums);
+  } else {
+    multiplyTile<false, kRows>(piece.end - piece.begin,
+                               product.a + piece.row * product.a_stride + piece.begin,
+                               product.a_stride, strip, sums);
+  }
   for (size_t row = 0; row < kRows; ++row) {
     float* to = is_whole ? c + row * product.c_stride : edge;
     for (size_t v = 0; v < kVectors; ++v) hn::StoreU(sums[row][v], d, to + v * lanes);

@@ -7,8 +7,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "nn/kernels/layer_kernel.h"
-#include "nn/matmul.h"
 #include "nn/scratch.h"
+#include "nn/training/packed_product.h"
 
 namespace stipple {
 
@@ -16,14 +16,6 @@ namespace {
 
 /// Queries of a tile.
 constexpr size_t kTile = 128;
-
-/// [width, keys] from the rows of a head.
-void turnHead(const HeadRows& rows, size_t head_first, size_t keys, size_t width, float* out) {
-  for (size_t key = 0; key < keys; ++key) {
-    const float* from = rows.values + key * rows.row_stride + head_first;
-    for (size_t i = 0; i < width; ++i) out[i * keys + key] = from[i];
-  }
-}
 
 /// to += from, [rows, width] each.
 void addRows(size_t rows, size_t width, const float* from, HeadGradients to, size_t first) {
@@ -57,14 +49,14 @@ void shareOut(size_t count, size_t keys, float scale, float* scores) {
 
 void backwardOfHead(const HeadWork& work, size_t head) {
   const size_t width = work.shape.head_width, keys = work.shape.keys, first = head * width;
-  Scratch room(2 * keys * width + keys * width + 2 * kTile * keys);
-  float* turned_keys = room.data();
-  float* turned_values = turned_keys + keys * width;
-  float* made = turned_values + keys * width;
+  Scratch room(keys * width + 2 * kTile * keys);
+  float* made = room.data();
   float* shares = made + keys * width;
   float* inner = shares + kTile * keys;
-  turnHead(work.k, first, keys, width, turned_keys);
-  turnHead(work.v, first, keys, width, turned_values);
+  const MatrixView all_keys = {work.k.values + first, work.k.row_stride};
+  const PackedMatrix keys_turned(width, keys, {all_keys.values, 1, all_keys.row_stride});
+  const PackedMatrix values_turned(width, keys, {work.v.values + first, 1, work.v.row_stride});
+  const PackedMatrix packed_keys(keys, width, all_keys);
   for (size_t key = 0; key < keys; ++key) {
     std::fill_n(work.k_gradient.values + key * work.k_gradient.row_stride + first, width, 0.0f);
     std::fill_n(work.v_gradient.values + key * work.v_gradient.row_stride + first, width, 0.0f);
@@ -75,11 +67,11 @@ void backwardOfHead(const HeadWork& work, size_t head) {
       return MatrixView{rows.values + begin * rows.row_stride + first, rows.row_stride};
     };
     const MatrixView queries = rowsOf(work.q), outer = rowsOf(work.out_gradient);
-    multiply({count, width, keys}, queries, {turned_keys, keys}, {shares, keys});
+    keys_turned.multiply(count, queries, {shares, keys});
     shareOut(count, keys, work.scale, shares);
-    multiply({keys, count, width}, {shares, 1, keys}, outer, {made, width});
+    PackedMatrix(count, width, outer).multiply(keys, {shares, 1, keys}, {made, width});
     addRows(keys, width, made, work.v_gradient, first);
-    multiply({count, width, keys}, outer, {turned_values, keys}, {inner, keys});
+    values_turned.multiply(count, outer, {inner, keys});
     const MatrixView results = rowsOf(work.out);
     for (size_t i = 0; i < count; ++i) {
       float along = 0;
@@ -92,10 +84,10 @@ void backwardOfHead(const HeadWork& work, size_t head) {
         value = work.scale * shares[i * keys + key] * (value - along);
       }
     }
-    multiply({count, keys, width}, {inner, keys}, {work.k.values + first, work.k.row_stride},
-             {work.q_gradient.values + begin * work.q_gradient.row_stride + first,
-              work.q_gradient.row_stride});
-    multiply({keys, count, width}, {inner, 1, keys}, queries, {made, width});
+    packed_keys.multiply(count, {inner, keys},
+                         {work.q_gradient.values + begin * work.q_gradient.row_stride + first,
+                          work.q_gradient.row_stride});
+    PackedMatrix(count, width, queries).multiply(keys, {inner, 1, keys}, {made, width});
     addRows(keys, width, made, work.k_gradient, first);
   }
 }
