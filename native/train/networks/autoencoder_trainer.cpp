@@ -1,0 +1,194 @@
+// Based on: DeG, density-sampled Gaussians (arXiv 2605.16355), its stages. Differs: tokens and
+// anchors are drawn by keys of the step.
+#include "train/networks/autoencoder_trainer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "base/random.h"
+
+namespace stipple {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& message) {
+  fail(ErrorCode::kInvalidArgument, message);
+}
+
+void requireCount(uint64_t value, uint64_t least, uint64_t most, const char* name) {
+  if (value >= least && value <= most) return;
+  refuse(std::string("the number of ") + name + " is " + std::to_string(value) + "; " +
+         std::to_string(least) + " to " + std::to_string(most) + " is allowed");
+}
+
+/// Adds a share of the losses of an example.
+void addLosses(const AutoencoderLosses& from, double share, AutoencoderLosses& to) {
+  to.total += share * from.total;
+  to.structure += share * from.structure;
+  to.divergence += share * from.divergence;
+  to.l1 += share * from.l1;
+  to.ssim += share * from.ssim;
+  to.splats.volume += share * from.splats.volume;
+  to.splats.opacity += share * from.splats.opacity;
+  to.splats.off_centre += share * from.splats.off_centre;
+  to.splats.overlap += share * from.splats.overlap;
+}
+
+template <class T>
+void put(const std::string& name, const std::vector<T>& values, TensorTable& table) {
+  table[name] = {{values.size()}, values};
+}
+
+template <class T>
+std::vector<T> take(const TensorTable& table, const std::string& name, size_t least, size_t most) {
+  const auto found = table.find(name);
+  const auto* values =
+      found == table.end() ? nullptr : std::get_if<std::vector<T>>(&found->second.values);
+  if (values == nullptr) fail(ErrorCode::kFormat, "the checkpoint has no tensor '" + name + "'");
+  if (values->size() < least || values->size() > most) {
+    fail(ErrorCode::kFormat, "the checkpoint's tensor '" + name + "' has " +
+                                 std::to_string(values->size()) + " numbers; " +
+                                 std::to_string(least) + " to " + std::to_string(most) +
+                                 " are needed: it is of a training with other settings");
+  }
+  for (const T& value : *values) {
+    if (std::isfinite(static_cast<double>(value))) continue;
+    fail(ErrorCode::kFormat,
+         "the checkpoint's tensor '" + name + "' has a number that is not finite");
+  }
+  return *values;
+}
+
+}  // namespace
+
+void validate(const AutoencoderSchedule& schedule) {
+  validate(schedule.optimiser);
+  requireCount(schedule.batch, 1, 4096, "objects in a step");
+  requireCount(schedule.most_tokens, 1, uint64_t{1} << 16, "tokens of a latent");
+  requireCount(schedule.token_halvings, 0, 8, "halvings of the tokens");
+  requireCount(schedule.most_tokens >> schedule.token_halvings, 1, uint64_t{1} << 16,
+               "tokens of a latent after all halvings");
+  requireCount(schedule.least_anchors, 1, uint64_t{1} << 20, "anchors at least");
+  requireCount(schedule.most_anchors, schedule.least_anchors, uint64_t{1} << 20, "anchors at most");
+  requireCount(schedule.views, 1, 4096, "views of an object");
+}
+
+AutoencoderTrainer::AutoencoderTrainer(const AutoencoderSizes& sizes,
+                                       std::vector<AutoencoderSchedule> parts, uint64_t seed,
+                                       std::shared_ptr<const ObjectSource> objects,
+                                       std::shared_ptr<const BackendFactory> backends)
+    : networks_(sizes),
+      parts_(std::move(parts)),
+      seed_(seed),
+      objects_(std::move(objects)),
+      backends_(std::move(backends)),
+      values_(networks_.startValues(seed)),
+      gradients_(values_.size()) {
+  if (parts_.empty()) refuse("a training has 0 parts; one or more are needed");
+  for (const AutoencoderSchedule& part : parts_) validate(part);
+  if (objects_->count() == 0) refuse("there are 0 objects to learn from; one or more are needed");
+  beginPart();
+}
+
+void AutoencoderTrainer::beginPart() {
+  in_part_ = 0;
+  if (isDone()) return;
+  optimiser_.emplace(parts_[part_].optimiser, values_);
+}
+
+std::vector<float> AutoencoderTrainer::meanValues() const {
+  const std::vector<double>& mean = optimiser_->state().mean;
+  return {mean.begin(), mean.end()};
+}
+
+/// Each round over all objects has an order of its own.
+size_t AutoencoderTrainer::objectAt(uint64_t position) const {
+  const uint64_t round = position / objects_->count();
+  std::vector<std::pair<uint64_t, size_t>> order;
+  for (size_t i = 0; i < objects_->count(); ++i) {
+    order.emplace_back(keyedBits(seed_ + round, RandomUse::kViewOrder, i), i);
+  }
+  const auto at = order.begin() + static_cast<ptrdiff_t>(position % objects_->count());
+  std::nth_element(order.begin(), at, order.end());
+  return at->second;
+}
+
+AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
+  const AutoencoderSchedule& part = parts_[part_];
+  const uint64_t key = keyedBits(seed_, RandomUse::kAnchorBudget, taken_);
+  AutoencoderExample example;
+  example.stage = part.stage;
+  example.tokens = part.most_tokens >> (key % (part.token_halvings + 1));
+  example.anchors =
+      part.least_anchors +
+      static_cast<uint64_t>(unitDouble(mixBits(key)) *
+                            static_cast<double>(part.most_anchors - part.least_anchors + 1));
+  example.views = part.views;
+  example.share = 1 / static_cast<double>(part.batch);
+  AutoencoderStep done;
+  done.step = taken_;
+  done.part = part_;
+  done.losses.ssim = 0;
+  std::fill(gradients_.begin(), gradients_.end(), 0.0f);
+  for (size_t b = 0; b < part.batch; ++b) {
+    const std::shared_ptr<const TrainingObject> object = objects_->object(objectAt(seen_ + b));
+    example.object = object.get();
+    example.seed = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
+    addLosses(
+        networks_.addExample(values_, example, part.weights, *backends_, gradients_, progress),
+        example.share, done.losses);
+  }
+  done.weights = optimiser_->step(gradients_, values_);
+  seen_ += part.batch;
+  ++taken_;
+  if (++in_part_ >= part.optimiser.total_steps) {
+    ++part_;
+    beginPart();
+  }
+  return done;
+}
+
+TensorTable AutoencoderTrainer::state() const {
+  const WeightOptimiser::State& state = optimiser_->state();
+  TensorTable table;
+  put("weights", values_, table);
+  put("optimiser.first", state.first, table);
+  put("optimiser.second", state.second, table);
+  put("optimiser.mean", state.mean, table);
+  put("optimiser.norms", state.norms, table);
+  put("optimiser.most_norm", std::vector<double>{state.most_norm}, table);
+  put("counts", std::vector<uint64_t>{state.steps, state.skipped, part_, taken_, in_part_, seen_},
+      table);
+  return table;
+}
+
+void AutoencoderTrainer::resume(const TensorTable& table) {
+  const size_t count = values_.size();
+  WeightOptimiser::State state;
+  std::vector<float> values = take<float>(table, "weights", count, count);
+  state.first = take<float>(table, "optimiser.first", count, count);
+  state.second = take<float>(table, "optimiser.second", count, count);
+  state.mean = take<double>(table, "optimiser.mean", count, count);
+  const std::vector<uint64_t> counts = take<uint64_t>(table, "counts", 6, 6);
+  if (counts[2] > parts_.size()) {
+    fail(ErrorCode::kFormat, "the checkpoint is in part " + std::to_string(counts[2]) +
+                                 " of a training that has " + std::to_string(parts_.size()));
+  }
+  const size_t part = std::min<size_t>(counts[2], parts_.size() - 1);
+  const uint64_t buffer = parts_[part].optimiser.clip_buffer;
+  state.norms = take<float>(table, "optimiser.norms", 0, buffer);
+  state.most_norm = take<double>(table, "optimiser.most_norm", 1, 1).front();
+  state.steps = counts[0];
+  state.skipped = counts[1];
+  optimiser_.emplace(parts_[part].optimiser, std::move(state));
+  values_ = std::move(values);
+  part_ = counts[2];
+  taken_ = counts[3];
+  in_part_ = counts[4];
+  seen_ = counts[5];
+}
+
+}  // namespace stipple

@@ -1,0 +1,158 @@
+#include "train/networks/autoencoder_trainer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "base/error.h"
+#include "train/trained_ball.h"
+
+namespace stipple {
+namespace {
+
+/// Balls of other colours, and which of them were asked for.
+class Balls final : public ObjectSource {
+ public:
+  explicit Balls(size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+      auto object = std::make_shared<TrainingObject>(ball());
+      for (ObjectView& view : object->views) {
+        for (float& value : view.image) value *= 1 - 0.2f * static_cast<float>(i);
+      }
+      objects_.push_back(object);
+    }
+  }
+  size_t count() const override { return objects_.size(); }
+  std::shared_ptr<const TrainingObject> object(size_t index) const override {
+    asked.push_back(index);
+    return objects_[index];
+  }
+  TrainingObject& at(size_t index) { return *objects_[index]; }
+
+  mutable std::vector<size_t> asked;
+
+ private:
+  std::vector<std::shared_ptr<TrainingObject>> objects_;
+};
+
+AutoencoderSchedule partOf(AutoencoderStage stage, uint64_t steps) {
+  AutoencoderSchedule part;
+  part.stage = stage;
+  part.batch = 2;
+  part.most_tokens = 24;
+  part.token_halvings = 1;
+  part.least_anchors = 16;
+  part.most_anchors = 64;
+  part.views = 1;
+  part.optimiser.learning_rate = 3e-3;
+  part.optimiser.warm_up = 2;
+  part.optimiser.total_steps = steps;
+  part.optimiser.clip_buffer = 4;
+  return part;
+}
+
+std::vector<AutoencoderSchedule> threeParts() {
+  return {partOf(AutoencoderStage::kStructure, 5), partOf(AutoencoderStage::kAttributes, 6),
+          partOf(AutoencoderStage::kJoint, 7)};
+}
+
+AutoencoderTrainer trainerOf(std::shared_ptr<const ObjectSource> objects,
+                             std::vector<AutoencoderSchedule> parts = threeParts()) {
+  return {smallSizes(), std::move(parts), 7, std::move(objects), cpuBackends()};
+}
+
+TEST(AutoencoderTrainer, GoesThroughAllPartsAndSeesEveryObjectInARound) {
+  const auto objects = std::make_shared<Balls>(3);
+  AutoencoderTrainer trainer = trainerOf(objects);
+  std::vector<size_t> steps_of_part(3);
+  while (!trainer.isDone()) {
+    const AutoencoderStep done = trainer.step();
+    ++steps_of_part[done.part];
+    EXPECT_TRUE(std::isfinite(done.losses.total));
+    EXPECT_FALSE(done.weights.is_skipped);
+  }
+  EXPECT_EQ(steps_of_part, (std::vector<size_t>{5, 6, 7}));
+  ASSERT_EQ(objects->asked.size(), 36u);
+  for (size_t round = 0; round < 12; ++round) {
+    std::vector<size_t> of_round(objects->asked.begin() + static_cast<long>(round * 3),
+                                 objects->asked.begin() + static_cast<long>(round * 3 + 3));
+    std::sort(of_round.begin(), of_round.end());
+    EXPECT_EQ(of_round, (std::vector<size_t>{0, 1, 2})) << round;
+  }
+}
+
+TEST(AutoencoderTrainer, GoesOnBitForBitFromWhereverItWasStopped) {
+  const auto objects = std::make_shared<Balls>(2);
+  AutoencoderTrainer whole = trainerOf(objects);
+  std::vector<TensorTable> states;
+  while (!whole.isDone()) {
+    states.push_back(whole.state());
+    whole.step();
+  }
+  for (const size_t at : {size_t{3}, size_t{5}, size_t{9}, size_t{17}}) {  // 5: between two parts
+    AutoencoderTrainer again = trainerOf(objects);
+    again.resume(states[at]);
+    while (!again.isDone()) again.step();
+    EXPECT_EQ(again.values(), whole.values()) << at;
+    EXPECT_EQ(again.meanValues(), whole.meanValues()) << at;
+  }
+}
+
+TEST(AutoencoderTrainer, ALossThatIsNotFiniteIsSkippedAndCounted) {
+  const auto objects = std::make_shared<Balls>(2);
+  objects->at(1).features[0][5] = std::numeric_limits<float>::quiet_NaN();
+  std::vector<AutoencoderSchedule> parts = {partOf(AutoencoderStage::kStructure, 8)};
+  parts[0].batch = 1;
+  AutoencoderTrainer trainer = trainerOf(objects, parts);
+  size_t skipped = 0;
+  while (!trainer.isDone()) skipped += trainer.step().weights.is_skipped;
+  EXPECT_EQ(skipped, 4u);
+  for (const float value : trainer.values()) ASSERT_TRUE(std::isfinite(value));
+}
+
+TEST(AutoencoderTrainer, StatesOfOtherTrainingsAreRefused) {
+  const auto objects = std::make_shared<Balls>(1);
+  AutoencoderTrainer trainer = trainerOf(objects);
+  const TensorTable state = trainer.state();
+  const std::vector<float> before = trainer.values();
+  const auto refuses = [&](auto&& change) {
+    TensorTable table = state;
+    change(table);
+    EXPECT_THROW(trainer.resume(table), Error);
+    EXPECT_EQ(trainer.values(), before);
+  };
+  refuses([](TensorTable& table) { table.erase("weights"); });
+  refuses([](TensorTable& table) { std::get<0>(table["weights"].values).pop_back(); });
+  refuses([](TensorTable& table) { std::get<0>(table["weights"].values)[3] = std::nanf(""); });
+  refuses([](TensorTable& table) { table["counts"] = {{1}, std::vector<uint64_t>{1}}; });
+  refuses([](TensorTable& table) {
+    table["counts"] = {{6}, std::vector<uint64_t>{0, 0, 9, 0, 0, 0}};
+  });
+  refuses([](TensorTable& table) {
+    table["optimiser.norms"] = {{9}, std::vector<float>(9, 1.0f)};
+  });
+}
+
+TEST(AutoencoderTrainer, WhatCannotBeTrainedIsRefused) {
+  EXPECT_THROW(trainerOf(std::make_shared<Balls>(0)), Error);
+  const auto objects = std::make_shared<Balls>(1);
+  EXPECT_THROW(trainerOf(objects, {}), Error);
+  const auto refuses = [&](auto&& change) {
+    std::vector<AutoencoderSchedule> parts = threeParts();
+    change(parts[1]);
+    EXPECT_THROW(trainerOf(objects, parts), Error);
+  };
+  refuses([](AutoencoderSchedule& part) { part.batch = 0; });
+  refuses([](AutoencoderSchedule& part) { part.most_tokens = 0; });
+  refuses([](AutoencoderSchedule& part) { part.token_halvings = 5; });
+  refuses([](AutoencoderSchedule& part) { part.least_anchors = 65; });
+  refuses([](AutoencoderSchedule& part) { part.views = 0; });
+  refuses([](AutoencoderSchedule& part) { part.optimiser.learning_rate = 0; });
+}
+
+}  // namespace
+}  // namespace stipple
