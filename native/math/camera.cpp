@@ -128,6 +128,20 @@ void requireImagePlane(const Camera& camera, const char* who) {
                                         model + ", which is drawn along rays only");
 }
 
+Camera enlarged(Camera camera, uint32_t factor) {
+  camera.width *= factor;
+  camera.height *= factor;
+  for (double* number : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *number *= factor;
+  return camera;
+}
+
+Camera reduced(Camera camera, uint32_t factor) {
+  camera.width /= factor;
+  camera.height /= factor;
+  for (double* number : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *number /= factor;
+  return camera;
+}
+
 Vec3d cameraCentre(const Camera& camera) {
   const Mat3d rotation = camera.world_to_camera.topLeftCorner<3, 3>();
   return -(rotation.transpose() * camera.world_to_camera.topRightCorner<3, 1>());

@@ -50,6 +50,11 @@ void requireImagePlane(const Camera& camera, const char* who);
 /// picture.
 void validate(const Camera& camera);
 
+/// The camera of the same picture with `factor` times the pixels along each side, and with a factor
+/// fewer of them; what is left of a block of pixels is cut off. In: factor >= 1.
+Camera enlarged(Camera camera, uint32_t factor);
+Camera reduced(Camera camera, uint32_t factor);
+
 /// Centre of the camera in the world (perspective), metres.
 Vec3d cameraCentre(const Camera& camera);
 

@@ -22,17 +22,6 @@ constexpr uint32_t kMostSamples = 16;
 constexpr size_t kTrianglesAtOnce = 1 << 11;
 constexpr uint64_t kNothing = UINT64_MAX;
 
-/// The camera of an image with as many times the pixels along each side.
-Camera finer(Camera camera, uint32_t samples) {
-  camera.width *= samples;
-  camera.height *= samples;
-  camera.fx *= samples;
-  camera.fy *= samples;
-  camera.cx *= samples;
-  camera.cy *= samples;
-  return camera;
-}
-
 /// Depth, then number of the nearest triangle of every ray: positive floats are ordered like their
 /// bits, and of two triangles at one depth the first is seen.
 uint64_t keyOf(double z, size_t triangle) {
@@ -126,7 +115,7 @@ void drawMeshImage(const TriMesh& mesh, const SurfaceColour& colour, const Camer
     fail(ErrorCode::kInvalidArgument, "the image has room for " + std::to_string(rgba.size() / 4) +
                                           " pixels; the camera has " + std::to_string(pixel_count));
   }
-  const Camera rays = finer(camera, samples);
+  const Camera rays = enlarged(camera, samples);
   MeshView view{mesh, colour, rays, {}};
   placeVertices(mesh, camera.world_to_camera, view.vertices);
   std::vector<uint64_t> nearest(size_t{rays.width} * rays.height, kNothing);

@@ -35,16 +35,6 @@ void requireSamples(const RenderAccuracy& accuracy, const Camera& camera) {
   }
 }
 
-Camera enlarged(Camera camera, uint32_t n) {
-  camera.width *= n;
-  camera.height *= n;
-  camera.fx *= n;
-  camera.fy *= n;
-  camera.cx *= n;
-  camera.cy *= n;
-  return camera;
-}
-
 /// A surface layer with every pixel as n x n.
 struct EnlargedSurface {
   std::vector<float> depth, colour, matte_opacity;

@@ -54,15 +54,9 @@ void reducePicture(uint32_t factor, TargetPicture& picture, Camera& camera) {
   means(picture.colour, 3, picture.weights);
   means(picture.alpha, 1, picture.weights);
   means(picture.weights, 1, {});
-  picture.width /= factor;
-  picture.height /= factor;
-  camera.width = picture.width;
-  camera.height = picture.height;
-  const auto scale = static_cast<double>(factor);
-  camera.fx /= scale;
-  camera.fy /= scale;
-  camera.cx /= scale;
-  camera.cy /= scale;
+  camera = reduced(camera, factor);
+  picture.width = camera.width;
+  picture.height = camera.height;
 }
 
 PictureStore::PictureStore(std::shared_ptr<const ViewSource> views, uint64_t byte_limit)
