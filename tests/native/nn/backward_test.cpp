@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <span>
 #include <vector>
 
+#include "activated_by_hand.h"
 #include "base/parallel.h"
 #include "nn/activations.h"
 #include "nn/kernels/layer_kernel.h"
@@ -55,24 +55,6 @@ void expectDerivative(const std::function<double(const Numbers&)>& loss, const N
   }
 }
 
-double activated(Activation activation, double x) {
-  switch (activation) {
-    case Activation::kSilu:
-      return x / (1 + std::exp(-x));
-    case Activation::kRelu:
-      return std::max(x, 0.0);
-    case Activation::kGeluTanh:
-      return 0.5 * x *
-             (1 + std::tanh(std::sqrt(2 / std::numbers::pi) * (x + 0.044715 * x * x * x)));
-    case Activation::kGeluErf:
-      return 0.5 * x * std::erfc(-x / std::sqrt(2.0));
-  }
-  return 0;
-}
-
-constexpr Activation kActivations[] = {Activation::kSilu, Activation::kRelu, Activation::kGeluTanh,
-                                       Activation::kGeluErf};
-
 TEST(Backward, SlopesOfActivationsByEveryKernel) {
   std::vector<float> x;
   for (int i = -50001; i <= 50001; i += 2) x.push_back(static_cast<float>(i) * 2.5e-4f);
@@ -83,7 +65,8 @@ TEST(Backward, SlopesOfActivationsByEveryKernel) {
       for (size_t i = 0; i < x.size(); ++i) {
         const auto at = static_cast<double>(x[i]);
         const double expected =
-            (activated(activation, at + kStep) - activated(activation, at - kStep)) / (2 * kStep);
+            (activatedByHand(activation, at + kStep) - activatedByHand(activation, at - kStep)) /
+            (2 * kStep);
         // What nn/activations.h says.
         ASSERT_NEAR(static_cast<double>(slope[i]), expected, 2e-6)
             << kernel.target << " " << static_cast<int>(activation) << " at " << x[i];

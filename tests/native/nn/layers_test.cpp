@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "activated_by_hand.h"
 #include "base/parallel.h"
 #include "nn/activations.h"
 #include "nn/kernels/layer_kernel.h"
@@ -14,24 +15,6 @@
 
 namespace stipple {
 namespace {
-
-double activatedByHand(Activation activation, double x) {
-  switch (activation) {
-    case Activation::kSilu:
-      return x / (1 + std::exp(-x));
-    case Activation::kRelu:
-      return std::max(x, 0.0);
-    case Activation::kGeluTanh:
-      return 0.5 * x *
-             (1 + std::tanh(std::sqrt(2 / std::numbers::pi) * (x + 0.044715 * x * x * x)));
-    case Activation::kGeluErf:
-      return 0.5 * x * std::erfc(-x / std::sqrt(2.0));
-  }
-  return 0;
-}
-
-constexpr Activation kActivations[] = {Activation::kSilu, Activation::kRelu, Activation::kGeluTanh,
-                                       Activation::kGeluErf};
 
 TEST(Activations, EveryKernelKeepsTheBoundOfItsError) {
   std::vector<float> x = {0.0f, -0.0f, 1e-30f, -1e-30f, 100.0f, -100.0f, 1e6f, -1e6f, 1e18f};
