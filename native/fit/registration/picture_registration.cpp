@@ -8,6 +8,7 @@
 #include "data/views/view_resample.h"
 #include "fit/registration/moving_template.h"
 #include "fit/registration/picture_loss.h"
+#include "mesh/adapt/unfold.h"
 #include "train/backend/backend_factory.h"
 
 namespace stipple {
@@ -87,8 +88,10 @@ RegisteredMesh registerToPictures(const TriMesh& given, const ViewSource& views,
       },
       progress, watch);
   report.step_count = adapter.stepCount();
-  report.picture_after = loss.at(inMetres(adapter.positions()));
-  made.mesh = moving.mesh(adapter.positions());
+  std::vector<Vec3d> places(adapter.positions().begin(), adapter.positions().end());
+  unfold(moving.links(), places);
+  report.picture_after = loss.at(inMetres(places));
+  made.mesh = moving.mesh(places);
   advance(progress, 1.0, kAdaptingStage);
   return made;
 }

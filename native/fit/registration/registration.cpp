@@ -19,6 +19,7 @@
 #include "fit/registration/registration_report.h"
 #include "fit/registration/sliding_surface.h"
 #include "mesh/adapt/point_rows.h"
+#include "mesh/adapt/unfold.h"
 
 namespace stipple {
 
@@ -276,6 +277,7 @@ RegisteredMesh registerMesh(const TriMesh& given, const RegistrationTarget& targ
       progress, watch);
   report.step_count = adapter.stepCount();
   std::vector<Vec3d> places(adapter.positions().begin(), adapter.positions().end());
+  unfold(moving.links(), places);
   if (options.lands_on_target) places = landed(target, moving.links(), places, ball);
   made.mesh = moving.mesh(places);
   measureRegistration(given, target, options, made, progress);
