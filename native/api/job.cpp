@@ -35,12 +35,14 @@ void run(StippleJob& job, JobWork work) {
 
 StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit,
                      std::shared_ptr<GenerateSession> generation,
-                     std::shared_ptr<RegistrationWatch> adaptation) {
+                     std::shared_ptr<RegistrationWatch> adaptation,
+                     std::shared_ptr<TrainingSession> training) {
   auto job = std::make_unique<StippleJob>();
   job->context = std::move(context);
   job->fit = std::move(fit);
   job->generation = std::move(generation);
   job->adaptation = std::move(adaptation);
+  job->training = std::move(training);
   StippleJob* address = job.get();
   job->thread =
       std::thread([address, work = std::move(work)]() mutable { run(*address, std::move(work)); });

@@ -20,6 +20,7 @@ namespace stipple {
 class FitSession;
 class GenerateSession;
 class RegistrationWatch;
+class TrainingSession;
 struct RegisteredMesh;
 
 }  // namespace stipple
@@ -41,10 +42,12 @@ using JobResult =
 using JobWork = std::function<JobResult(Progress&)>;
 
 /// In: fit, of a job of fitting, generation, of one that makes splats of an image, adaptation, of
-/// one that adapts a mesh: what can be asked while it runs and after any end of it.
+/// one that adapts a mesh, training, of one that trains networks: what can be asked while it runs
+/// and after any end of it.
 StippleJob* startJob(Context context, JobWork work, std::shared_ptr<FitSession> fit = nullptr,
                      std::shared_ptr<GenerateSession> generation = nullptr,
-                     std::shared_ptr<RegistrationWatch> adaptation = nullptr);
+                     std::shared_ptr<RegistrationWatch> adaptation = nullptr,
+                     std::shared_ptr<TrainingSession> training = nullptr);
 
 }  // namespace stipple::api
 
@@ -56,6 +59,7 @@ struct StippleJob {
   std::shared_ptr<stipple::FitSession> fit;                ///< null of other jobs
   std::shared_ptr<stipple::GenerateSession> generation;    ///< likewise
   std::shared_ptr<stipple::RegistrationWatch> adaptation;  ///< likewise
+  std::shared_ptr<stipple::TrainingSession> training;      ///< likewise
   std::thread thread;
   const stipple::Stopwatch watch;
 

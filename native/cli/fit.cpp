@@ -18,6 +18,7 @@
 #include "cli/fit_flags.h"
 #include "cli/formats.h"
 #include "cli/hierarchy.h"
+#include "cli/jobs/status_line.h"
 #include "cli/numbers.h"
 #include "cli/report.h"
 
@@ -25,7 +26,6 @@ namespace stipple::cli {
 
 namespace {
 
-constexpr int kBarWidth = 24;
 constexpr auto kPollInterval = std::chrono::milliseconds(50);
 
 struct Arguments {
@@ -61,17 +61,6 @@ void printStrategies() {
   throw CLI::Success();
 }
 
-std::string timeText(double seconds) {
-  const auto whole = static_cast<long>(std::max(0.0, seconds) + 0.5);
-  char text[48];
-  if (whole >= 3600) {
-    std::snprintf(text, sizeof(text), "%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
-  } else {
-    std::snprintf(text, sizeof(text), "%ld:%02ld", whole / 60, whole % 60);
-  }
-  return text;
-}
-
 /// "Joint  1200 / 2000  loss 0.0312  PSNR 23.41 dB  14700 splats  1:23 left"
 std::string lineOf(const StippleFitFigures& figures) {
   char text[200];
@@ -90,39 +79,6 @@ std::string lineOf(const StippleFitFigures& figures) {
   return line;
 }
 
-/// What the user sees of a fit that runs: a bar on a terminal, else now and then a line.
-class Watch {
- public:
-  void show(const StippleFitFigures& figures) {
-    const double done = figures.iterations == 0 ? 0
-                                                : static_cast<double>(figures.iteration) /
-                                                      static_cast<double>(figures.iterations);
-    if (is_terminal_) {
-      const auto full = static_cast<size_t>(done * kBarWidth);
-      std::fprintf(stderr, "\r[%s%s] %s\033[K", std::string(full, '#').c_str(),
-                   std::string(kBarWidth - full, ' ').c_str(), lineOf(figures).c_str());
-      std::fflush(stderr);
-      is_drawn_ = true;
-      return;
-    }
-    const int tenth = static_cast<int>(done * 10);
-    if (tenth == tenth_ && stage_ == figures.stage) return;
-    tenth_ = tenth;
-    stage_ = figures.stage;
-    std::fprintf(stderr, "%s\n", lineOf(figures).c_str());
-  }
-  void clear() {
-    if (is_drawn_) std::fprintf(stderr, "\r\033[K");
-    is_drawn_ = false;
-  }
-
- private:
-  bool is_terminal_ = isatty(STDERR_FILENO) != 0;
-  bool is_drawn_ = false;
-  int tenth_ = -1;
-  std::string stage_;
-};
-
 void printNotes(const Job& job, uint64_t& printed, uint64_t count) {
   for (; printed < count; ++printed) {
     const char* text = nullptr;
@@ -134,21 +90,24 @@ void printNotes(const Job& job, uint64_t& printed, uint64_t count) {
 /// Waits for the end. Ctrl-C, SIGTERM and SIGHUP end the fit with its best. Returns: whether all
 /// steps were taken. Errors: Interrupted where none was.
 bool watch(const Job& job) {
-  Watch watch;
+  StatusLine line;
   auto progress = sized<StippleJobProgress>();
   auto figures = sized<StippleFitFigures>();
   uint64_t printed = 0;
   for (;;) {
     check(stipple_job_poll(job.get(), &progress));
     check(stipple_fit_figures(job.get(), &figures));
-    if (figures.note_count > printed) watch.clear();
+    if (figures.note_count > printed) line.clear();
     printNotes(job, printed, figures.note_count);
     if (progress.state != STIPPLE_JOB_RUNNING) break;
     if (notedSignal() != 0) check(stipple_job_cancel(job.get()));
-    watch.show(figures);
+    const double done = figures.iterations == 0 ? 0
+                                                : static_cast<double>(figures.iteration) /
+                                                      static_cast<double>(figures.iterations);
+    line.show(done, figures.stage, lineOf(figures));
     std::this_thread::sleep_for(kPollInterval);
   }
-  watch.clear();
+  line.clear();
   const StippleStatus status = stipple_job_wait(job.get());
   if (status == STIPPLE_ERROR_CANCELLED) {
     if (figures.iteration > 0) return false;
@@ -311,7 +270,8 @@ void addFit(CLI::App& app, const Context& context) {
       ->required();
   to.flags.addTo(*command);
   to.series.addTo(*command);
-  // While the command line is read: newer releases of CLI11 ask for missing arguments before they call back.
+  // While the command line is read: newer releases of CLI11 ask for missing arguments before they
+  // call back.
   command->add_flag_callback("--strategies", printStrategies, "Print all strategies and parts.")
       ->trigger_on_parse();
   command->add_option("--downscale", to.downscale, "Images are made smaller by this factor.")

@@ -50,6 +50,7 @@ int run(int argc, char** argv) {
   addFit(app, context);
   addDensify(app, context);
   addGenerate(app, context);
+  addTrain(app, context);
   addCompare(app, context);
   addAccuracy(app, context);
   try {

@@ -43,8 +43,9 @@ double radicalInverse(uint32_t index, uint32_t base) {
   return inverse;
 }
 
-/// [K,3] what is added to raw centres, so that raw centres of 0 give a Hammersley lattice.
-std::vector<float> latticeOf(uint32_t gaussians) {
+}  // namespace
+
+std::vector<float> usualLattice(uint32_t gaussians) {
   std::vector<float> lattice;
   for (uint32_t k = 0; k < gaussians; ++k) {
     const std::array<double, 3> place = {static_cast<double>(k) / gaussians, radicalInverse(k, 2),
@@ -56,14 +57,16 @@ std::vector<float> latticeOf(uint32_t gaussians) {
   return lattice;
 }
 
-}  // namespace
+float usualSpread() {
+  return kSpreadBias;
+}
 
 void activateSplats(const SplatLayout& layout, const LayoutAnchors& anchors, const float* raw,
                     size_t stride, SplatCloud& cloud, const SplatBiases* biases) {
   const std::vector<float> own_lattice =
-      biases != nullptr ? std::vector<float>() : latticeOf(layout.gaussians);
+      biases != nullptr ? std::vector<float>() : usualLattice(layout.gaussians);
   const std::span<const float> lattice = biases != nullptr ? biases->lattice : own_lattice;
-  const float spread_bias = biases != nullptr ? biases->spread : kSpreadBias;
+  const float spread_bias = biases != nullptr ? biases->spread : usualSpread();
   const size_t higher = layout.higherCoefficients();
   cloud.sh_degree = layout.sh_degree;
   cloud.resize(anchors.units.size() * layout.gaussians);
@@ -106,7 +109,7 @@ void activateSplats(const SplatLayout& layout, const LayoutAnchors& anchors, con
 void activateSplatsBackward(const SplatLayout& layout, const LayoutAnchors& anchors,
                             const float* raw, size_t stride, const SplatCloud& cloud,
                             const SplatCloud& gradient, float* raw_gradient) {
-  const std::vector<float> lattice = latticeOf(layout.gaussians);
+  const std::vector<float> lattice = usualLattice(layout.gaussians);
   const size_t higher = layout.higherCoefficients();
   const size_t sh_stride = cloud.shStride();
   parallelFor(anchors.units.size(), kGrain, [&](size_t begin, size_t end) {

@@ -46,6 +46,11 @@ struct SplatBiases {
   float spread = 0;                ///< to raw spreads
 };
 
+/// Those of zeros, which networks that are trained here have: raw centres of 0 give a Hammersley
+/// lattice. In: K. Returns [K,3].
+std::vector<float> usualLattice(uint32_t gaussians);
+float usualSpread();
+
 /// Places and sizes in the unit cube, which decoders turn into the world.
 /// In: raw: P rows of `stride` floats, the outputs first. Out: cloud: P * K splats, anchor-major;
 /// frame and flags stay. In: biases: null for those of zeros that fill the lattice.

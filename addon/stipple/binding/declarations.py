@@ -311,6 +311,11 @@ FUNCTIONS = {
     'stipple_generate_figures': (_status, [_handle, _to(s.StippleGenerateFigures)]),
     'stipple_generate_stage': (_status, [_handle, c_uint32, _to(s.StippleGenerateStage)]),
     'stipple_generate_preview': (_status, [_handle, _out_handle]),
+    # networks that are trained
+    'stipple_train_start': (_status, [_handle, _path, c_uint32, _out_handle]),
+    'stipple_train_figures': (_status, [_handle, _to(s.StippleTrainFigures)]),
+    'stipple_train_note': (_status, [_handle, c_uint64, POINTER(c_char_p)]),
+    'stipple_train_budget': (_status, [_handle, c_uint64, _to(s.StippleTrainBudget)]),
 }
 
 

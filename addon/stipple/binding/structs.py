@@ -558,4 +558,17 @@ class StippleGenerateStage(_Sized):
                 ('name_utf8', c_char_p), ('operations', c_double)]
 
 
+class StippleTrainFigures(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('measured_on_training', c_uint32), ('step', c_uint64),
+                ('steps', c_uint64), ('resumed_step', c_uint64), ('skipped_steps', c_uint64),
+                ('object_count', c_uint64), ('held_out_count', c_uint64), ('best_step', c_uint64),
+                ('note_count', c_uint64), ('budget_count', c_uint64), ('loss', c_double), ('structure', c_double),
+                ('psnr', c_double), ('seconds', c_double), ('seconds_left', c_double), ('stage', c_char * 64)]
+
+
+class StippleTrainBudget(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('anchors', c_uint64), ('object_count', c_uint64),
+                ('psnr', c_double), ('ssim', c_double), ('training_psnr', c_double)]
+
+
 STRUCTS = {cls.__name__: cls for cls in _Sized.__subclasses__()}

@@ -2524,6 +2524,57 @@ StippleStatus stipple_generate_stage(const StippleJob* job, uint32_t index, Stip
 /* *cloud: the newest preview, which is given once; NULL where there is no newer one. Never waits. */
 StippleStatus stipple_generate_preview(StippleJob* job, StippleCloud** cloud);
 
+/* ---- networks that are trained ---- */
+
+/* How a training is doing. */
+typedef struct StippleTrainFigures {
+  uint32_t struct_size;
+  uint32_t measured_on_training; /* 1: too few objects to hold any out */
+  uint64_t step;             /* steps that are done, over all parts */
+  uint64_t steps;
+  uint64_t resumed_step;     /* where it went on from a checkpoint; 0: it began */
+  uint64_t skipped_steps;    /* whose derivatives were not finite: they changed nothing */
+  uint64_t object_count;     /* that are learned from */
+  uint64_t held_out_count;   /* objects that judge */
+  uint64_t best_step;        /* of the result if the training ended now; 0: not measured yet */
+  uint64_t note_count;       /* of stipple_train_note */
+  uint64_t budget_count;     /* of stipple_train_budget; 0 before the end */
+  double loss;               /* means of the last 50 steps */
+  double structure;          /* nats by which the density is away from the surface's, likewise */
+  double psnr;               /* dB on held-out objects, last; NaN: not measured yet */
+  double seconds;            /* since the first step of this job */
+  double seconds_left;       /* at the pace of the last 50 steps */
+  char stage[64];
+} StippleTrainFigures;
+
+/* What the networks of a training are worth at a budget. */
+typedef struct StippleTrainBudget {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t anchors;
+  uint64_t object_count;
+  double psnr;               /* dB over black, mean over views, then over objects */
+  double ssim;
+  double training_psnr;      /* the same of a few objects that were learned from */
+} StippleTrainBudget;
+
+/* Trains a density autoencoder on a collection of objects, as a job. In: config_path: a JSON file (docs/training.md);
+ * resume: 1: goes on from the checkpoint in the folder of results, 0: begins, and is refused where one is left.
+ * It writes weights.safetensors, report.json and report.svg into that folder when it ends, of the state that was best
+ * on some of the objects it learned from. A job that ends early, by a cancel or an error, leaves a checkpoint.
+ * Errors of the start: IO; FORMAT for a file that is no JSON; INVALID_ARGUMENT for a key that is not known (with the
+ * nearest one), a value out of range, a checkpoint that is left or missing, a file of another kind in the way;
+ * MEMORY_LIMIT. Of the job: INVALID_ARGUMENT for a collection without an object that can be learned from, and for a
+ * checkpoint of other settings or objects (says which); those of reading images and writing files.
+ * Threads and determinism: the same bits for any number of threads, and wherever it was stopped and resumed. */
+StippleStatus stipple_train_start(StippleContext* context, const char* config_path, uint32_t resume, StippleJob** job);
+/* Never waits. In: figures->struct_size set. */
+StippleStatus stipple_train_figures(const StippleJob* job, StippleTrainFigures* figures);
+/* Gives one sentence on something that the user should know (an object that was left out). The text lives as long as
+ * the job. */
+StippleStatus stipple_train_note(const StippleJob* job, uint64_t index, const char** text);
+StippleStatus stipple_train_budget(const StippleJob* job, uint64_t index, StippleTrainBudget* budget);
+
 #ifdef __cplusplus
 }
 #endif

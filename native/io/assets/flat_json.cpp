@@ -19,12 +19,34 @@ FlatJsonValue valueOf(const std::string& name, const Json& value) {
   fail(ErrorCode::kFormat, "'" + name + "' of a JSON object is neither a number nor a text");
 }
 
+using Entries = std::vector<std::pair<std::string, FlatJsonValue>>;
+
+void addValues(const std::string& way, const Json& json, Entries& entries) {
+  const std::string inside = way.empty() ? "" : way + ".";
+  if (json.is_object()) {
+    for (const auto& [name, value] : json.items()) addValues(inside + name, value, entries);
+  } else if (json.is_array()) {
+    for (size_t i = 0; i < json.size(); ++i)
+      addValues(inside + std::to_string(i), json[i], entries);
+  } else {
+    entries.emplace_back(way, valueOf(way, json));
+  }
+}
+
 }  // namespace
 
-std::vector<std::pair<std::string, FlatJsonValue>> readFlatJson(const std::string& text) {
+Entries readNestedJson(const std::string& text, const std::string& name) {
+  const Json json = parseOrderedJson(text, name);
+  if (!json.is_object()) fail(ErrorCode::kFormat, name + ": a JSON object is expected");
+  Entries entries;
+  addValues("", json, entries);
+  return entries;
+}
+
+Entries readFlatJson(const std::string& text) {
   const Json json = parseOrderedJson(text, "a text of settings");
   if (!json.is_object()) fail(ErrorCode::kFormat, "a JSON object is expected");
-  std::vector<std::pair<std::string, FlatJsonValue>> entries;
+  Entries entries;
   for (const auto& [name, value] : json.items()) entries.emplace_back(name, valueOf(name, value));
   return entries;
 }

@@ -15,4 +15,9 @@ using FlatJsonValue = std::variant<uint64_t, double, std::string>;
 /// Errors: kFormat.
 std::vector<std::pair<std::string, FlatJsonValue>> readFlatJson(const std::string& text);
 
+/// The same of an object with objects and lists inside: names are the way to a value, with points
+/// ("parts.0.steps"). In: name, what messages call the text. Errors: kFormat.
+std::vector<std::pair<std::string, FlatJsonValue>> readNestedJson(const std::string& text,
+                                                                  const std::string& name);
+
 }  // namespace stipple

@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "io/bytes/output_kind.h"
 #include "io/bytes/safetensors.h"
 
 namespace stipple {
@@ -28,6 +29,21 @@ WeightTable openWeightFile(const std::string& path, std::map<std::string, std::s
   }
   if (metadata != nullptr) *metadata = reader.metadata();
   return WeightTable(path, std::move(tensors), memory);
+}
+
+void requireTrainedWeightsPlace(const std::string& path) {
+  requireOutputKind(path, "trained weights", [](const std::string& file) {
+    return SafeTensorsReader(file).metadata().count(kTrainedKey) != 0;
+  });
+}
+
+void writeTrainedWeights(const TensorTable& tensors, const std::string& settings_json,
+                         const std::string& path) {
+  requireTrainedWeightsPlace(path);
+  SafeTensorsWriter file;
+  file.setMetadata(kTrainedKey, settings_json);
+  for (const auto& [name, tensor] : tensors) file.add(name, tensor);
+  file.write(path);
 }
 
 }  // namespace stipple

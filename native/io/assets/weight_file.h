@@ -3,6 +3,7 @@
 #include <map>
 #include <string>
 
+#include "data/tensor_table.h"
 #include "data/weight_table.h"
 
 namespace stipple {
@@ -12,5 +13,15 @@ namespace stipple {
 /// other. Out: metadata: the texts that the file carries, where they are wanted.
 WeightTable openWeightFile(const std::string& path,
                            std::map<std::string, std::string>* metadata = nullptr);
+
+/// What a file of weights that was trained here says in its metadata, by this key.
+constexpr char kTrainedKey[] = "stipple_training";
+
+/// Writes weights that were trained here, with metadata kTrainedKey: the settings of the training,
+/// as JSON. Errors: kIo; kInvalidArgument where the path has a file of another kind.
+void writeTrainedWeights(const TensorTable& tensors, const std::string& settings_json,
+                         const std::string& path);
+/// Refuses a place where that cannot be written. Errors: as it.
+void requireTrainedWeightsPlace(const std::string& path);
 
 }  // namespace stipple

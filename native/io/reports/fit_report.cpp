@@ -2,19 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/error.h"
-#include "base/number_text.h"
-#include "io/bytes/input_file.h"
 #include "io/bytes/json_text.h"
-#include "io/bytes/output_file.h"
-#include "io/bytes/output_kind.h"
-#include "plot/svg_plot.h"
+#include "io/reports/report_parts.h"
 
 namespace stipple {
 
@@ -22,24 +16,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Points of a curve: as many as a panel has pixels to show.
-constexpr size_t kCurvePoints = 300;
-/// What tells the kind of a file.
-constexpr size_t kHeadBytes = 256;
-
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);
-}
-
-/// Six digits of a float: what was measured has no more, and files stay small.
-Json number(float value) {
-  if (!std::isfinite(value)) return nullptr;
-  return Json(std::strtod(numberText(static_cast<double>(value)).c_str(), nullptr));
-}
+constexpr ReportKind kReport = {"stipple_fit_report", "the report of a fit"};
 
 Json column(const FitHistory& history, float FitRecord::*member) {
   Json values = Json::array();
-  for (const FitRecord& record : history.records) values.push_back(number(record.*member));
+  for (const FitRecord& record : history.records) values.push_back(reportNumber(record.*member));
   return values;
 }
 
@@ -47,36 +28,18 @@ Json row(const FitMeasure& measure) {
   return {{"iteration", measure.iteration},
           {"budget", measure.budget},
           {"gaussians", measure.splat_count},
-          {"psnr", number(measure.psnr)},
-          {"foreground_psnr", number(measure.foreground_psnr)},
-          {"ssim", number(measure.ssim)},
-          {"density_entropy", number(measure.density_entropy)},
-          {"training_psnr", number(measure.training_psnr)},
-          {"moving_psnr", number(measure.moving_psnr)}};
+          {"psnr", reportNumber(measure.psnr)},
+          {"foreground_psnr", reportNumber(measure.foreground_psnr)},
+          {"ssim", reportNumber(measure.ssim)},
+          {"density_entropy", reportNumber(measure.density_entropy)},
+          {"training_psnr", reportNumber(measure.training_psnr)},
+          {"moving_psnr", reportNumber(measure.moving_psnr)}};
 }
 
 Json rows(const std::vector<FitMeasure>& measures) {
   Json list = Json::array();
   for (const FitMeasure& measure : measures) list.push_back(row(measure));
   return list;
-}
-
-void requireReportPlace(const std::string& path) {
-  requireOutputKind(path, "the report of a fit", [](const std::string& file) {
-    return headOfFile(file, kHeadBytes).find("{\n \"stipple_fit_report\": ") == 0;
-  });
-}
-
-void requirePlotsPlace(const std::string& path) {
-  requireOutputKind(path, "the curves of a report", [](const std::string& file) {
-    return isHeadOfSvgPlot(headOfFile(file, kHeadBytes));
-  });
-}
-
-void writeText(const std::string& text, const std::string& path) {
-  OutputFile file(path);
-  file.write(text.data(), text.size());
-  file.commit();
 }
 
 constexpr std::pair<const char*, float FitRecord::*> kParts[] = {
@@ -87,18 +50,8 @@ constexpr std::pair<const char*, float FitRecord::*> kParts[] = {
 /// Means of a figure over equal pieces of the fit.
 PlotLine curveOf(const FitHistory& history, const char* label, double factor,
                  const std::function<double(const FitRecord&)>& value, size_t point_count) {
-  PlotLine line;
-  line.label = label;
-  const size_t count = history.records.size();
-  const size_t points = std::min(count, point_count);
-  for (size_t p = 0; p < points; ++p) {
-    const size_t begin = p * count / points, end = (p + 1) * count / points;
-    double sum = 0;
-    for (size_t i = begin; i < end; ++i) sum += value(history.records[i]);
-    line.x.push_back(0.5 * static_cast<double>(begin + 1 + end));
-    line.y.push_back(factor * sum / static_cast<double>(end - begin));
-  }
-  return line;
+  return meanCurve(label, history.records.size(), point_count,
+                   [&](size_t i) { return factor * value(history.records[i]); });
 }
 
 double lossOf(const FitRecord& record) {
@@ -120,23 +73,18 @@ PlotLine measuredCurve(const std::vector<FitMeasure>& measures, const char* labe
 }  // namespace
 
 std::string fitPlotsPath(const std::string& report_path) {
-  return std::filesystem::path(report_path).replace_extension(".svg").string();
+  return curvesPath(report_path);
 }
 
 void requireFitReportPlace(const std::string& path) {
-  if (lowerExtension(path) == ".svg") {
-    fail(ErrorCode::kInvalidArgument,
-         path + " ends in .svg, where the curves of a report go; .json is expected");
-  }
-  requireReportPlace(path);
-  requirePlotsPlace(fitPlotsPath(path));
+  requireReportPlaces(path, kReport);
 }
 
 void writeFitReport(const FitReportHead& head, const FitHistory& history, const std::string& path) {
   Json settings = parseOrderedJson(head.settings_json, "the text of the report's settings",
                                    ErrorCode::kInvalidArgument);
   Json report;
-  report["stipple_fit_report"] = 1;
+  report[kReport.key] = 1;
   report["model"] = head.model;
   if (!head.strategy.empty()) report["strategy"] = head.strategy;
   report["settings"] = std::move(settings);
@@ -151,11 +99,11 @@ void writeFitReport(const FitReportHead& head, const FitHistory& history, const 
   for (const auto& [name, member] : kParts) {
     double sum = 0;
     for (const FitRecord& record : history.records) sum += static_cast<double>(record.*member);
-    seconds[name] = number(sum);
+    seconds[name] = reportNumber(sum);
     each[name] = column(history, member);
     all += sum;
   }
-  seconds["all"] = number(all);
+  seconds["all"] = reportNumber(all);
   report["seconds"] = std::move(seconds);
   report["measures"] = rows(history.measures);
   Json counts = Json::array();
@@ -165,8 +113,7 @@ void writeFitReport(const FitReportHead& head, const FitHistory& history, const 
                             {"ssim", column(history, &FitRecord::ssim)},
                             {"gaussians", std::move(counts)},
                             {"seconds", std::move(each)}};
-  requireReportPlace(path);
-  writeText(report.dump(1) + "\n", path);
+  writeReport(report, kReport, path);
 }
 
 std::vector<PlotPanel> fitPlots(const FitHistory& history) {
@@ -222,8 +169,7 @@ std::vector<PlotPanel> fitPlots(const FitHistory& history) {
 }
 
 void writeFitPlots(const FitHistory& history, const std::string& path) {
-  requirePlotsPlace(path);
-  writeText(svgOf(sheetOf(fitPlots(history))), path);
+  writeCurves(fitPlots(history), path);
 }
 
 }  // namespace stipple

@@ -60,6 +60,7 @@ class AutoencoderTrainer {
   /// The mean of weights over steps, which is what a training is for.
   std::vector<float> meanValues() const;
   bool isDone() const { return part_ >= parts_.size(); }
+  size_t part() const { return part_; }  ///< of the next step; the number of parts where it is done
   /// One step. Errors: those of the source, kCancelled; then nothing has changed.
   AutoencoderStep step(Progress* progress = nullptr);
 

@@ -113,8 +113,41 @@ struct DensityAutoencoder::Splats {
   }
 };
 
+void validate(const AutoencoderSizes& sizes) {
+  const auto require = [](uint64_t value, uint64_t least, uint64_t most, const char* name) {
+    if (value >= least && value <= most) return;
+    fail(ErrorCode::kInvalidArgument, std::string(name) + " is " + std::to_string(value) + "; " +
+                                          std::to_string(least) + " to " + std::to_string(most) +
+                                          " is allowed");
+  };
+  require(sizes.heads, 1, 64, "the number of heads");
+  require(sizes.head_width, 8, 256, "the width of a head");
+  if (sizes.head_width % 4 != 0) {
+    fail(ErrorCode::kInvalidArgument, "the width of a head is " + std::to_string(sizes.head_width) +
+                                          "; a multiple of 4 is needed");
+  }
+  require(sizes.latent_width, 1, 1024, "the width of a latent");
+  require(sizes.mlp_ratio, 1, 16, "the ratio of an MLP");
+  require(sizes.encoder_blocks, 1, 64, "the number of the encoder's blocks");
+  require(sizes.octree_blocks, 1, 64, "the number of the density's blocks");
+  require(sizes.splat_blocks, 1, 64, "the number of the splats' blocks");
+  require(sizes.gaussians, 4, 32, "the number of Gaussians of an anchor");
+  require(static_cast<uint64_t>(std::max(0, sizes.leaf_level)), 1, kMaxLeafLevel, "the leaf level");
+}
+
+TensorTable DensityAutoencoder::tensors(std::span<const float> values) const {
+  TensorTable table;
+  for (const Parameter& parameter : layout_.parameters()) {
+    const float* const first = values.data() + parameter.first;
+    table[parameter.name] = {parameter.shape, std::vector<float>(first, first + parameter.count)};
+  }
+  table["gs.points_offset_perturbation"] = {{sizes_.gaussians, 3}, usualLattice(sizes_.gaussians)};
+  table["gs.base_offset_scale"] = {{1}, std::vector<float>{usualSpread()}};
+  return table;
+}
+
 DensityAutoencoder::DensityAutoencoder(const AutoencoderSizes& sizes)
-    : sizes_(sizes),
+    : sizes_((validate(sizes), sizes)),
       encoder_(layout_, "encoder.", shapeOf(sizes, sizes.encoder_blocks), sizes.feature_widths),
       octree_(layout_, "octree.", shapeOf(sizes, sizes.octree_blocks)),
       splats_(layout_, "gs.", shapeOf(sizes, sizes.splat_blocks), sizes.gaussians) {}

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "data/tensor_table.h"
 #include "math/camera.h"
 #include "train/backend/backend_factory.h"
 #include "train/networks/autoencoder_losses.h"
@@ -27,6 +28,9 @@ struct AutoencoderSizes {
   uint32_t gaussians = 8;                    ///< of each anchor, 4 to 32
   int leaf_level = 8;                        ///< 1 to kMaxLeafLevel
 };
+
+/// Errors: kInvalidArgument with the number, its value and what is allowed.
+void validate(const AutoencoderSizes& sizes);
 
 /// A view of an object, whose unit cube has its middle in the origin.
 struct ObjectView {
@@ -80,6 +84,7 @@ struct AutoencoderLosses {
 /// The density autoencoder as it is trained: encoder, density and splats.
 class DensityAutoencoder {
  public:
+  /// Errors: kInvalidArgument (validate()).
   explicit DensityAutoencoder(const AutoencoderSizes& sizes);
 
   const ParameterLayout& layout() const { return layout_; }
@@ -87,6 +92,10 @@ class DensityAutoencoder {
   /// Weights to begin with: Xavier-uniform, keyed by the seed; what the networks say is 0, so that
   /// the density begins even and splats fill their lattice.
   std::vector<float> startValues(uint64_t seed) const;
+
+  /// All tensors by their published names, with what networks that are only run read besides
+  /// (decode/latent).
+  TensorTable tensors(std::span<const float> values) const;
 
   /// Loss of an example, and its derivatives. Out: gradients of the layout, which this adds to.
   /// Errors: kInvalidArgument for an object that is empty or has other features; kCancelled.

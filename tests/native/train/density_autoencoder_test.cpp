@@ -10,6 +10,10 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "decode/latent/latent_decoder.h"
+#include "decode/latent/latent_density.h"
+#include "decode/latent/latent_networks.h"
+#include "density/anchor_sampling.h"
 #include "train/optimiser/weight_optimiser.h"
 #include "train/trained_ball.h"
 
@@ -135,6 +139,47 @@ TEST(DensityAutoencoder, ObjectsThatAreEmptyOrOfOtherFeaturesAreRefused) {
   refuses([](TrainingObject& object) { object.points[0].clear(); });
   refuses([](TrainingObject& object) { object.features[0].resize(600 * 2); });
   refuses([](TrainingObject& object) { object.views.clear(); });
+}
+
+/// What a file of these tensors is read as. In: tensors, which must outlive it.
+WeightTable tableOf(const TensorTable& tensors) {
+  std::map<std::string, WeightTensor> found;
+  for (const auto& [name, tensor] : tensors) {
+    const auto& values = std::get<std::vector<float>>(tensor.values);
+    found[name] = {WeightType::kFloat32, "F32", tensor.shape,
+                   reinterpret_cast<const uint8_t*>(values.data())};
+  }
+  return {"trained", std::move(found), nullptr};
+}
+
+TEST(DensityAutoencoder, ItsTensorsAreReadByTheNetworksThatDecodeLatents) {
+  const DensityAutoencoder networks(smallSizes());
+  std::vector<float> values = networks.startValues(4);
+  for (size_t i = 0; i < values.size(); ++i) {  // also what is silent at the start
+    values[i] += 0.05f * static_cast<float>(unitDouble(mixBits(i)) - 0.5);
+  }
+  const auto latent = std::make_shared<Latent>();
+  latent->width = 8;
+  latent->tokens = networks.encode(values, ball(), 24);
+  latent->token_count = 24;
+  const SplatCloud own = networks.decode(values, latent->tokens, 200, 3);
+
+  const TensorTable tensors = networks.tensors(values);
+  const LatentNetworks read = readLatentNetworks(tableOf(tensors));
+  const LatentDensity density(read.octree, latent, {}, smallSizes().leaf_level);
+  const AnchorSet anchors = sampleAnchors(density, {.count = 200, .seed = 3});
+  DecodeRequest request;
+  request.anchors = &anchors;
+  request.gaussians_per_anchor = 4;
+  const SplatCloud cloud = LatentDecoder(read.gaussians, latent).decode(request);
+  ASSERT_EQ(cloud.size(), own.size());
+  double most = 0;
+  for (size_t i = 0; i < cloud.positions.size(); ++i) {
+    most = std::max(most, static_cast<double>(std::abs(cloud.positions[i] - own.positions[i])));
+    most = std::max(most, static_cast<double>(std::abs(cloud.sh[i] - own.sh[i])));
+    most = std::max(most, static_cast<double>(std::abs(cloud.scales[i] - own.scales[i])));
+  }
+  EXPECT_LT(most, 2e-5);  // Sums have another order.
 }
 
 }  // namespace

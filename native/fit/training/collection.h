@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "fit/training/normalised_views.h"
+#include "train/networks/autoencoder_trainer.h"
+
+namespace stipple {
+
+struct CollectionOptions {
+  /// Points of an object that the encoder reads, 1 to kMostEncodedPoints, spread evenly over those
+  /// that there are. All are its surface.
+  uint64_t points = 4096;
+  /// Of images that stay in memory; others are read again.
+  uint64_t image_bytes = uint64_t{1} << 30;
+};
+
+constexpr uint64_t kMostEncodedPoints = 16384;
+
+/// An object as networks read it: points in the unit cube 0..1 with display colours from -1 to 1,
+/// and all images over black. In: views: with alpha, points with colours, of kNormalisedSide.
+/// Errors: kInvalidArgument where one of these is missing, or all views are empty; those of
+/// reading images.
+TrainingObject readTrainingObject(const NormalisedViews& views, uint64_t points);
+
+/// A folder of objects: each subfolder, at any depth, with a transforms.json has the views of one.
+/// What cannot be learned from is left out with a reason.
+class Collection {
+ public:
+  /// Looks at all objects and all images once. Errors: kIo for a folder that cannot be read;
+  /// kInvalidArgument for one without an object that can be learned from, with the first reason;
+  /// kCancelled.
+  Collection(const std::string& folder, const CollectionOptions& options,
+             Progress* progress = nullptr);
+
+  size_t count() const { return objects_.size(); }
+  /// The way from the collection's folder: "rocks/0017".
+  const std::string& name(size_t object) const { return objects_[object].name; }
+  const std::shared_ptr<const NormalisedViews>& views(size_t object) const {
+    return objects_[object].views;
+  }
+  /// Errors: those of reading images, with their path.
+  std::shared_ptr<const TrainingObject> object(size_t object) const;
+  /// One sentence on each object that was left out.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  struct Object {
+    std::string name;
+    std::shared_ptr<const NormalisedViews> views;
+  };
+
+  CollectionOptions options_;
+  std::vector<Object> objects_;
+  std::vector<std::string> notes_;
+};
+
+/// Some objects of a collection, for a trainer.
+class CollectionShare final : public ObjectSource {
+ public:
+  CollectionShare(std::shared_ptr<const Collection> collection, std::vector<size_t> objects)
+      : collection_(std::move(collection)), objects_(std::move(objects)) {}
+  size_t count() const override { return objects_.size(); }
+  std::shared_ptr<const TrainingObject> object(size_t index) const override {
+    return collection_->object(objects_[index]);
+  }
+
+ private:
+  std::shared_ptr<const Collection> collection_;
+  std::vector<size_t> objects_;
+};
+
+}  // namespace stipple

@@ -1,0 +1,332 @@
+#include "fit/training/training_config.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <type_traits>
+#include <utility>
+
+#include "base/error.h"
+#include "base/nearest_name.h"
+#include "base/number_text.h"
+#include "io/assets/flat_json.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr size_t kMostParts = 64;
+/// Whole numbers up to here are doubles, as JSON has them.
+constexpr double kLargestWhole = 9007199254740992.0;
+
+[[noreturn]] void refuse(const std::string& message) {
+  fail(ErrorCode::kInvalidArgument, message);
+}
+
+constexpr const char* kStageNames[] = {"structure", "attributes", "joint"};
+
+/// A place of a config that a key of its text sets.
+struct Setting {
+  std::string name;
+  std::function<void(const FlatJsonValue&)> set;
+  std::function<std::string()> json;  ///< its value as JSON; null: weights do not depend on it
+};
+
+std::string quoted(const std::string& text) {
+  std::string made(1, '"');
+  made.append(text);
+  made.push_back('"');
+  return made;
+}
+
+double numberOf(const FlatJsonValue& value, const std::string& name) {
+  if (const auto* whole = std::get_if<uint64_t>(&value)) return static_cast<double>(*whole);
+  if (const auto* number = std::get_if<double>(&value)) return *number;
+  refuse("'" + name + "' is '" + std::get<std::string>(value) + "'; a number is needed");
+}
+
+const std::string& textOf(const FlatJsonValue& value, const std::string& name) {
+  if (const auto* text = std::get_if<std::string>(&value)) return *text;
+  refuse("'" + name + "' is a number; a text is needed");
+}
+
+/// Ranges are those of validate() and of the constructors: here only the type has to hold it.
+template <class T>
+Setting number(const std::string& name, T& place) {
+  const auto set = [&place, name](const FlatJsonValue& given) {
+    const double value = numberOf(given, name);
+    if constexpr (std::is_integral_v<T>) {
+      const double most =
+          std::min(kLargestWhole, static_cast<double>(std::numeric_limits<T>::max()));
+      if (!(value >= 0 && value <= most) || value != std::floor(value)) {
+        refuse("'" + name + "' is " + numberText(value) + "; a whole number from 0 to " +
+               numberText(most, 17) + " is allowed");
+      }
+    }
+    place = static_cast<T>(value);
+  };
+  return {name, set, [&place] { return numberText(static_cast<double>(place), 17); }};
+}
+
+Setting unkept(Setting setting) {
+  setting.json = nullptr;
+  return setting;
+}
+
+Setting path(const std::string& name, std::string& place, const std::string& folder) {
+  const auto set = [&place, name, folder](const FlatJsonValue& given) {
+    const std::filesystem::path value = textOf(given, name);
+    if (value.empty()) refuse("'" + name + "' is empty; a folder is needed");
+    place = (std::filesystem::path(folder) / value).lexically_normal().string();
+  };
+  return {name, set, nullptr};
+}
+
+Setting stage(const std::string& name, AutoencoderStage& place) {
+  const auto set = [&place, name](const FlatJsonValue& given) {
+    const std::string& text = textOf(given, name);
+    const auto* const found = std::find(std::begin(kStageNames), std::end(kStageNames), text);
+    if (found == std::end(kStageNames)) {
+      refuse("'" + name + "' is '" + text + "'; structure, attributes or joint is allowed");
+    }
+    place = static_cast<AutoencoderStage>(found - std::begin(kStageNames));
+  };
+  return {name, set, [&place] { return quoted(stageName(place)); }};
+}
+
+void addNetwork(AutoencoderSizes& sizes, std::vector<Setting>& list) {
+  list.push_back(number("network.heads", sizes.heads));
+  list.push_back(number("network.head_width", sizes.head_width));
+  list.push_back(number("network.latent_width", sizes.latent_width));
+  list.push_back(number("network.mlp_ratio", sizes.mlp_ratio));
+  list.push_back(number("network.encoder_blocks", sizes.encoder_blocks));
+  list.push_back(number("network.octree_blocks", sizes.octree_blocks));
+  list.push_back(number("network.splat_blocks", sizes.splat_blocks));
+  list.push_back(number("network.gaussians", sizes.gaussians));
+  list.push_back(number("network.leaf_level", sizes.leaf_level));
+}
+
+void addPart(const std::string& at, AutoencoderSchedule& part, std::vector<Setting>& list) {
+  WeightOptimiserOptions& optimiser = part.optimiser;
+  AutoencoderLossWeights& weights = part.weights;
+  list.push_back(stage(at + "stage", part.stage));
+  list.push_back(number(at + "steps", optimiser.total_steps));
+  list.push_back(number(at + "batch", part.batch));
+  list.push_back(number(at + "tokens", part.most_tokens));
+  list.push_back(number(at + "token_halvings", part.token_halvings));
+  list.push_back(number(at + "least_anchors", part.least_anchors));
+  list.push_back(number(at + "most_anchors", part.most_anchors));
+  list.push_back(number(at + "views", part.views));
+  list.push_back(number(at + "learning_rate", optimiser.learning_rate));
+  list.push_back(number(at + "beta1", optimiser.beta1));
+  list.push_back(number(at + "beta2", optimiser.beta2));
+  list.push_back(number(at + "epsilon", optimiser.epsilon));
+  list.push_back(number(at + "weight_decay", optimiser.weight_decay));
+  list.push_back(number(at + "warm_up", optimiser.warm_up));
+  list.push_back(number(at + "least_share", optimiser.least_share));
+  list.push_back(number(at + "most_norm", optimiser.most_norm));
+  list.push_back(number(at + "clip_buffer", optimiser.clip_buffer));
+  list.push_back(number(at + "clip_percentile", optimiser.clip_percentile));
+  list.push_back(number(at + "mean_decay", optimiser.mean_decay));
+  list.push_back(number(at + "weights.structure", weights.structure));
+  list.push_back(number(at + "weights.divergence", weights.divergence));
+  list.push_back(number(at + "weights.ssim", weights.ssim));
+  list.push_back(number(at + "weights.density", weights.density));
+  list.push_back(number(at + "weights.volume", weights.splats.volume));
+  list.push_back(number(at + "weights.opacity", weights.splats.opacity));
+  list.push_back(number(at + "weights.cluster", weights.splats.cluster));
+}
+
+/// All places of a config. In: config, which must outlive them.
+std::vector<Setting> settingsOf(TrainingConfig& config, const std::string& folder) {
+  std::vector<Setting> list;
+  list.push_back(path("collection", config.collection, folder));
+  list.push_back(path("out", config.out, folder));
+  list.push_back(number("seed", config.seed));
+  list.push_back(number("held_out", config.held_out));
+  // What is measured, and when, chooses the state that is kept.
+  list.push_back(number("measured_objects", config.measured_objects));
+  list.push_back(number("measure_interval", config.measure_interval));
+  list.push_back(unkept(number("checkpoint_interval", config.checkpoint_interval)));
+  list.push_back(unkept(number("image_bytes", config.objects.image_bytes)));
+  list.push_back(number("points", config.objects.points));
+  addNetwork(config.sizes, list);
+  for (size_t i = 0; i < config.parts.size(); ++i) {
+    addPart("parts." + std::to_string(i) + ".", config.parts[i], list);
+  }
+  return list;
+}
+
+/// One more than the largest number behind "parts."; 0 where there are none.
+size_t partCount(const std::vector<std::pair<std::string, FlatJsonValue>>& entries) {
+  const std::string begin = "parts.";
+  size_t count = 0;
+  for (const auto& [name, value] : entries) {
+    if (name.rfind(begin, 0) != 0) continue;
+    size_t part = 0;
+    const char* const end = name.data() + name.size();
+    const auto [stop, error] = std::from_chars(name.data() + begin.size(), end, part);
+    if (error != std::errc() || stop == end || *stop != '.' || part >= kMostParts) {
+      refuse("'" + name + "' is not of a list; \"parts\" is a list of at most " +
+             std::to_string(kMostParts) + " objects");
+    }
+    count = std::max(count, part + 1);
+  }
+  return count;
+}
+
+/// A part that is only said in part is the usual one of its stage.
+AutoencoderSchedule usualPart(AutoencoderStage stage) {
+  AutoencoderSchedule part;
+  part.stage = stage;
+  part.batch = 2;
+  part.token_halvings = 1;
+  part.most_tokens = 128;
+  part.least_anchors = 64;
+  part.most_anchors = 1024;
+  part.views = 2;
+  part.weights.density = stage == AutoencoderStage::kJoint ? 1 : 0;
+  part.weights.structure = stage == AutoencoderStage::kStructure ? 1 : 0.1;
+  part.optimiser.learning_rate = stage == AutoencoderStage::kJoint ? 1e-4 : 5e-4;
+  part.optimiser.total_steps = stage == AutoencoderStage::kStructure ? 2000 : 8000;
+  part.optimiser.mean_decay = 0.999;
+  return part;
+}
+
+std::vector<AutoencoderSchedule> usualParts() {
+  return {usualPart(AutoencoderStage::kStructure), usualPart(AutoencoderStage::kAttributes),
+          usualPart(AutoencoderStage::kJoint)};
+}
+
+std::string lastWord(const std::string& name) {
+  return name.substr(name.rfind('.') + 1);
+}
+
+[[noreturn]] void refuseKey(const std::string& key, const std::string& text_name,
+                            const std::vector<Setting>& settings) {
+  std::vector<std::string> known;
+  const std::string begin = key.substr(0, key.rfind('.') + 1);
+  for (const Setting& setting : settings) {
+    if (setting.name.rfind(begin, 0) == 0) known.push_back(lastWord(setting.name));
+  }
+  std::string nearest = nearestName(lastWord(key), known);
+  if (nearest.empty()) {  // It may be the place that is wrong.
+    known.clear();
+    for (const Setting& setting : settings) known.push_back(setting.name);
+    nearest = nearestName(key, known);
+  } else {
+    nearest = begin + nearest;
+  }
+  refuse(text_name + ": '" + key + "' is not known" +
+         (nearest.empty() ? "" : "; '" + nearest + "' is the nearest that is"));
+}
+
+/// Stages go first, since what else a part has not said depends on them.
+void setParts(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
+              TrainingConfig& config) {
+  const size_t count = partCount(entries);
+  if (count == 0) return;
+  config.parts.assign(count, usualPart(AutoencoderStage::kStructure));
+  for (const auto& [name, value] : entries) {
+    for (size_t i = 0; i < count; ++i) {
+      if (name != "parts." + std::to_string(i) + ".stage") continue;
+      AutoencoderStage given = AutoencoderStage::kStructure;
+      stage(name, given).set(value);
+      config.parts[i] = usualPart(given);
+    }
+  }
+}
+
+void validate(const TrainingConfig& config, const std::string& name) {
+  if (config.collection.empty())
+    refuse(name + ": \"collection\", the folder of objects, is missing");
+  if (config.out.empty()) refuse(name + ": \"out\", the folder of results, is missing");
+  const auto requireSome = [&](uint64_t value, const char* key) {
+    if (value == 0) refuse(name + ": '" + key + "' is 0; 1 or more is allowed");
+  };
+  requireSome(config.measure_interval, "measure_interval");
+  requireSome(config.checkpoint_interval, "checkpoint_interval");
+  requireSome(config.measured_objects, "measured_objects");
+  if (config.held_out == 1) {
+    refuse(name +
+           ": 'held_out' is 1, which leaves no object to learn from; 0, or 2 and more, is "
+           "allowed");
+  }
+  for (size_t i = 0; i < config.parts.size(); ++i) {
+    try {
+      validate(config.parts[i]);
+    } catch (const Error& error) {
+      refuse(name + ": part " + std::to_string(i) + ": " + error.what());
+    }
+  }
+}
+
+}  // namespace
+
+const char* stageName(AutoencoderStage stage) {
+  return kStageNames[static_cast<size_t>(stage)];
+}
+
+TrainingConfig defaultTrainingConfig() {
+  TrainingConfig config;
+  config.sizes.leaf_level = 6;
+  config.parts = usualParts();
+  return config;
+}
+
+TrainingConfig parseTrainingConfig(const std::string& text, const std::string& name,
+                                   const std::string& folder) {
+  const std::vector<std::pair<std::string, FlatJsonValue>> entries = readNestedJson(text, name);
+  TrainingConfig config = defaultTrainingConfig();
+  setParts(entries, config);
+  const std::vector<Setting> settings = settingsOf(config, folder);
+  for (const auto& [key, value] : entries) {
+    const auto found =
+        std::find_if(settings.begin(), settings.end(),
+                     [&, &wanted = key](const Setting& s) { return s.name == wanted; });
+    if (found == settings.end()) refuseKey(key, name, settings);
+    try {
+      found->set(value);
+    } catch (const Error& error) {
+      fail(error.code(), name + ": " + error.what());
+    }
+  }
+  validate(config, name);
+  return config;
+}
+
+std::string settingsJson(const TrainingConfig& config) {
+  TrainingConfig copy = config;
+  std::string json;
+  for (const Setting& setting : settingsOf(copy, "")) {
+    if (setting.json == nullptr) continue;
+    json.push_back(json.empty() ? '{' : ',');
+    json.append(quoted(setting.name)).push_back(':');
+    json.append(setting.json());
+  }
+  return json + "}";
+}
+
+std::string firstDifference(const std::string& settings, const std::string& of_checkpoint) {
+  const auto textOfValue = [](const FlatJsonValue& value) {
+    const auto* text = std::get_if<std::string>(&value);
+    return text != nullptr ? *text : numberText(numberOf(value, ""), 17);
+  };
+  const auto ours = readFlatJson(settings), theirs = readFlatJson(of_checkpoint);
+  for (size_t i = 0; i < std::max(ours.size(), theirs.size()); ++i) {
+    if (i >= ours.size()) return "the checkpoint has '" + theirs[i].first + "'";
+    if (i >= theirs.size() || ours[i].first != theirs[i].first) {
+      return "the checkpoint has no '" + ours[i].first + "'";
+    }
+    const std::string mine = textOfValue(ours[i].second), other = textOfValue(theirs[i].second);
+    if (mine != other) {
+      return "'" + ours[i].first + "' is " + mine + ", the checkpoint has " + other;
+    }
+  }
+  return {};
+}
+
+}  // namespace stipple

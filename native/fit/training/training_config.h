@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "fit/training/collection.h"
+#include "train/networks/autoencoder_trainer.h"
+
+namespace stipple {
+
+/// What a training of the density autoencoder does.
+struct TrainingConfig {
+  std::string collection;  ///< folder
+  std::string out;         ///< folder of all that it writes; made where it is not there
+  uint64_t seed = 1;
+  uint64_t held_out = 8;  ///< every so-many-th object judges and is not learned from; 0: none
+  uint64_t measured_objects = 16;      ///< of those, at most, while it runs
+  uint64_t measure_interval = 500;     ///< steps
+  uint64_t checkpoint_interval = 250;  ///< steps
+  CollectionOptions objects;
+  AutoencoderSizes sizes;
+  std::vector<AutoencoderSchedule> parts;
+};
+
+/// What a config without "parts" and "network" says: the small networks, in three parts.
+TrainingConfig defaultTrainingConfig();
+
+/// Reads a JSON text. In: name: what messages call it; folder: that relative paths begin at.
+/// Errors: kFormat for a text that is no JSON object; kInvalidArgument for a key that is not known,
+/// with the nearest one that is, for a value of another type or out of range, with its key, and
+/// where "collection" or "out" is missing.
+TrainingConfig parseTrainingConfig(const std::string& text, const std::string& name,
+                                   const std::string& folder);
+
+/// All settings that the weights depend on, as a flat JSON object: what a checkpoint must agree in.
+std::string settingsJson(const TrainingConfig& config);
+
+/// The first of them that two trainings differ in, as "part.0.batch is 2, the checkpoint has 4";
+/// empty where there is none. In: both of settingsJson().
+std::string firstDifference(const std::string& settings, const std::string& of_checkpoint);
+
+/// "structure", "attributes", "joint".
+const char* stageName(AutoencoderStage stage);
+
+}  // namespace stipple

@@ -1,0 +1,366 @@
+// Based on: DeG, density-sampled Gaussians (arXiv 2605.16355), the stages of its training.
+#include "fit/training/training_session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <system_error>
+#include <utility>
+
+#include "base/error.h"
+#include "base/stopwatch.h"
+#include "fit/training/autoencoder_measure.h"
+#include "fit/training/history_tensors.h"
+#include "io/assets/checkpoint.h"
+#include "io/assets/weight_file.h"
+#include "io/bytes/input_file.h"
+#include "io/reports/training_report.h"
+
+namespace stipple {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint64_t kLongestConfig = uint64_t{1} << 20;  // bytes
+/// Objects that are learned from and choose the state that is kept.
+constexpr size_t kChoosingObjects = 4;
+constexpr size_t kPaceSteps = 50;
+/// Shares of the whole work.
+constexpr double kReadShare = 0.02, kStepsShare = 0.98;
+
+[[noreturn]] void refuse(const std::string& message) {
+  fail(ErrorCode::kInvalidArgument, message);
+}
+
+std::string inFolder(const std::string& folder, const char* name) {
+  return (fs::path(folder) / name).string();
+}
+
+TrainingConfig readConfig(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  return parseTrainingConfig(readTextFile(path, kLongestConfig), path, folder.string());
+}
+
+uint64_t stepCount(const TrainingConfig& config) {
+  uint64_t steps = 0;
+  for (const AutoencoderSchedule& part : config.parts) steps += part.optimiser.total_steps;
+  return steps;
+}
+
+/// `wanted` of them, evenly.
+std::vector<size_t> evenly(const std::vector<size_t>& of, size_t wanted) {
+  std::vector<size_t> chosen;
+  const size_t count = std::min(of.size(), wanted);
+  for (size_t i = 0; i < count; ++i) chosen.push_back(of[i * of.size() / count]);
+  return chosen;
+}
+
+/// "Structure" of "structure".
+std::string stageTitle(AutoencoderStage stage) {
+  std::string title = stageName(stage);
+  title[0] = static_cast<char>(title[0] - 'a' + 'A');
+  return title;
+}
+
+TrainingRecord recordOf(const AutoencoderStep& step, double seconds) {
+  TrainingRecord record;
+  record.part = static_cast<uint32_t>(step.part);
+  record.is_skipped = step.weights.is_skipped;
+  record.loss = static_cast<float>(step.losses.total);
+  record.structure = static_cast<float>(step.losses.structure);
+  record.divergence = static_cast<float>(step.losses.divergence);
+  record.l1 = static_cast<float>(step.losses.l1);
+  record.ssim = static_cast<float>(step.losses.ssim);
+  record.learning_rate = static_cast<float>(step.weights.learning_rate);
+  record.gradient_norm = static_cast<float>(step.weights.gradient_norm);
+  record.seconds = static_cast<float>(seconds);
+  return record;
+}
+
+void requireResults(const std::string& out, bool resumes) {
+  const std::string checkpoint = trainingCheckpointPath(out);
+  const bool is_left = fs::exists(checkpoint);
+  if (is_left && !resumes) {
+    refuse("'" + checkpoint +
+           "' is left from a training that was stopped; resume it, or remove the file");
+  }
+  if (!is_left && resumes) refuse("'" + checkpoint + "', to go on from, is not there");
+  std::error_code error;
+  fs::create_directories(out, error);
+  if (error) fail(ErrorCode::kIo, "the folder '" + out + "' cannot be made: " + error.message());
+  // What goes on reads its checkpoint, and says more of one that is damaged.
+  if (!resumes) requireCheckpointPlace(checkpoint);
+  requireTrainedWeightsPlace(trainedWeightsPath(out));
+  requireTrainingReportPlace(trainingReportPath(out));
+}
+
+}  // namespace
+
+std::string trainedWeightsPath(const std::string& out) {
+  return inFolder(out, "weights.safetensors");
+}
+std::string trainingCheckpointPath(const std::string& out) {
+  return inFolder(out, "checkpoint.stipple.safetensors");
+}
+std::string trainingReportPath(const std::string& out) {
+  return inFolder(out, "report.json");
+}
+
+/// What run() has.
+struct TrainingSession::Work {
+  Work(TrainingSession& owner, Progress& given) : session(owner), progress(given) {}
+
+  void read();
+  void restore();
+  void takeSteps();
+  void measure();
+  void save();
+  void finish();
+
+  const TrainingConfig& config() const { return session.config_; }
+  std::string settings() const { return settingsJson(config()); }
+  void show();
+  const AutoencoderSchedule& part() const { return config().parts[part_of_next]; }
+  bool hasImages() const { return part().stage != AutoencoderStage::kStructure; }
+
+  TrainingSession& session;
+  Progress& progress;
+  std::shared_ptr<const Collection> collection;
+  std::vector<size_t> learned_from, held_out;
+  std::unique_ptr<AutoencoderTrainer> trainer;
+  std::unique_ptr<AutoencoderMeasure> judge;
+  TrainingHistory history;
+  std::vector<float> best;  ///< weights; empty: nothing was measured yet
+  double best_psnr = -std::numeric_limits<double>::infinity();
+  size_t part_of_next = 0;  ///< part of the step that is taken, or was taken last
+  bool checkpoint_failed = false;
+  Stopwatch watch;
+};
+
+void TrainingSession::Work::read() {
+  session.enter("Reading the collection");
+  progress.enterPart(0, kReadShare);
+  collection = std::make_shared<const Collection>(config().collection, config().objects, &progress);
+  for (const std::string& text : collection->notes()) session.note(text);
+  const uint64_t every = config().held_out;
+  for (size_t i = 0; i < collection->count(); ++i) {
+    const bool is_held_out = every > 0 && i % every == every - 1;
+    (is_held_out ? held_out : learned_from).push_back(i);
+  }
+  if (held_out.empty() && every > 0) {
+    session.note("The collection has " + std::to_string(collection->count()) +
+                 " objects, too few to hold any out; quality is of objects that are learned from.");
+  }
+  trainer = std::make_unique<AutoencoderTrainer>(
+      config().sizes, config().parts, config().seed,
+      std::make_shared<const CollectionShare>(collection, learned_from), session.backends_);
+  judge = std::make_unique<AutoencoderMeasure>(*session.backends_, *collection);
+  history.measured_on_held_out = !held_out.empty();
+  for (const AutoencoderSchedule& each : config().parts) {
+    history.part_names.emplace_back(stageName(each.stage));
+  }
+  const std::lock_guard<std::mutex> lock(session.mutex_);
+  session.status_.objects = learned_from.size();
+  session.status_.held_out = held_out.size();
+}
+
+void TrainingSession::Work::restore() {
+  const std::string path = trainingCheckpointPath(config().out);
+  const Checkpoint checkpoint = readCheckpoint(path);
+  const std::string difference = firstDifference(settings(), checkpoint.settings_json);
+  if (!difference.empty()) refuse(path + " is of another training: " + difference);
+  TensorTable tensors = checkpoint.tensors;
+  try {
+    takeHistory(tensors, *collection, history, best, best_psnr);
+    trainer->resume(tensors);
+  } catch (const Error& error) {
+    fail(error.code(), path + ": " + error.what());
+  }
+  if (!history.records.empty()) part_of_next = history.records.back().part;
+  const std::lock_guard<std::mutex> lock(session.mutex_);
+  session.status_.resumed_step = history.records.size();
+}
+
+void TrainingSession::Work::show() {
+  const size_t count = history.records.size(), recent = std::min(count, kPaceSteps);
+  double loss = 0, structure = 0, seconds = 0;
+  for (size_t i = count - recent; i < count; ++i) {
+    const TrainingRecord& record = history.records[i];
+    loss += static_cast<double>(record.loss) / static_cast<double>(recent);
+    structure += static_cast<double>(record.structure) / static_cast<double>(recent);
+    seconds += static_cast<double>(record.seconds) / static_cast<double>(recent);
+  }
+  const std::lock_guard<std::mutex> lock(session.mutex_);
+  TrainingStatus& status = session.status_;
+  status.step = count;
+  status.loss = loss;
+  status.structure = structure;
+  status.seconds = watch.seconds();
+  status.seconds_left = seconds * static_cast<double>(status.steps - count);
+  status.skipped = static_cast<uint64_t>(
+      std::count_if(history.records.begin(), history.records.end(),
+                    [](const TrainingRecord& record) { return record.is_skipped; }));
+  status.best_step = history.best_step;
+  if (!history.measures.empty()) status.psnr = history.measures.back().psnr;
+}
+
+void TrainingSession::Work::measure() {
+  const AutoencoderSchedule& now = part();
+  const std::vector<float> values = trainer->meanValues();
+  const MeasuredAt at = {now.most_tokens, now.most_anchors, config().seed};
+  const std::vector<size_t>& judging = held_out.empty() ? learned_from : held_out;
+  TrainingMeasure made = judge->measure(trainer->networks(), values,
+                                        evenly(judging, config().measured_objects), at, &progress);
+  made.step = history.records.size();
+  made.training_psnr = judge
+                           ->measure(trainer->networks(), values,
+                                     evenly(learned_from, kChoosingObjects), at, &progress)
+                           .psnr;
+  history.measures.push_back(made);
+  if (made.training_psnr < best_psnr) return;
+  best_psnr = made.training_psnr;
+  best = values;
+  history.best_step = made.step;
+}
+
+void TrainingSession::Work::save() {
+  TensorTable tensors = trainer->state();
+  putHistory(history, *collection, best, best_psnr, tensors);
+  try {
+    writeCheckpoint(settings(), tensors, trainingCheckpointPath(config().out));
+    checkpoint_failed = false;
+  } catch (const Error& error) {
+    if (!checkpoint_failed) {
+      session.note(std::string("A checkpoint could not be written: ") + error.what() + ".");
+    }
+    checkpoint_failed = true;
+  }
+}
+
+void TrainingSession::Work::takeSteps() {
+  const uint64_t steps = stepCount(config());
+  while (!trainer->isDone()) {
+    const uint64_t taken = history.records.size();
+    progress.enterPart(kReadShare, kStepsShare);
+    const Stopwatch one;
+    const AutoencoderStep done = trainer->step(&progress);
+    if (taken == 0 || done.part != part_of_next) {
+      session.enter(stageTitle(config().parts[done.part].stage));
+    }
+    part_of_next = done.part;
+    history.records.push_back(recordOf(done, one.seconds()));
+    const uint64_t count = taken + 1;
+    progress.advance(static_cast<double>(count) / static_cast<double>(steps), "Learning");
+    const bool ends_part = trainer->isDone() || trainer->part() != done.part;
+    if (hasImages() && (count % config().measure_interval == 0 || ends_part)) measure();
+    show();
+    if (count % config().checkpoint_interval == 0) save();
+  }
+}
+
+void TrainingSession::Work::finish() {
+  session.enter("Measuring");
+  progress.enterPart(kStepsShare, 1);
+  const bool is_measured = !best.empty();
+  const std::vector<float>& values = is_measured ? best : trainer->meanValues();
+  const AutoencoderSchedule& last = config().parts.back();
+  const std::vector<size_t>& judging = held_out.empty() ? learned_from : held_out;
+  constexpr int kOctaves = 4;
+  for (int octave = kOctaves; octave >= 0 && is_measured; --octave) {
+    const uint64_t anchors = last.most_anchors >> octave;
+    if (anchors == 0) continue;
+    progress.advance(static_cast<double>(kOctaves - octave) / (kOctaves + 1), "Measuring");
+    const MeasuredAt at = {last.most_tokens, anchors, config().seed};
+    TrainingMeasure made = judge->measure(trainer->networks(), values, judging, at, &progress);
+    made.step = history.best_step;
+    made.training_psnr = judge
+                             ->measure(trainer->networks(), values,
+                                       evenly(learned_from, kChoosingObjects), at, &progress)
+                             .psnr;
+    history.by_budget.push_back(made);
+  }
+  writeTrainedWeights(trainer->networks().tensors(values), settings(),
+                      trainedWeightsPath(config().out));
+  writeTrainingReport(settings(), history, trainingReportPath(config().out));
+  const std::lock_guard<std::mutex> lock(session.mutex_);
+  session.by_budget_ = history.by_budget;
+  session.status_.budget_count = history.by_budget.size();
+}
+
+TrainingSession::TrainingSession(std::shared_ptr<const BackendFactory> backends,
+                                 const std::string& config_path, bool resumes)
+    : backends_(std::move(backends)), config_(readConfig(config_path)), resumes_(resumes) {
+  validate(config_.sizes);
+  requireResults(config_.out, resumes);
+  status_.steps = stepCount(config_);
+  status_.psnr = std::numeric_limits<double>::quiet_NaN();
+}
+
+uint64_t TrainingSession::memoryBound() const {
+  // Weights, derivatives, two moments, the best, a mean in double, and a checkpoint of most.
+  constexpr uint64_t kWeightBytes = 5 * 4 + 8 + 24;
+  // Rows of the widest tape, about: what all blocks of the three networks keep of a row.
+  uint64_t rows = 0;
+  for (const AutoencoderSchedule& part : config_.parts) {
+    rows = std::max<uint64_t>(rows, part.most_tokens + part.most_anchors + config_.objects.points);
+  }
+  const uint64_t width = config_.sizes.heads * config_.sizes.head_width;
+  const uint64_t blocks =
+      config_.sizes.encoder_blocks + config_.sizes.octree_blocks + config_.sizes.splat_blocks;
+  return DensityAutoencoder(config_.sizes).layout().size() * kWeightBytes +
+         rows * width * (blocks + 4 * config_.sizes.mlp_ratio + 16) * sizeof(float) +
+         config_.objects.image_bytes;
+}
+
+void TrainingSession::run(Progress& progress) {
+  Work work(*this, progress);
+  work.read();
+  if (resumes_) work.restore();
+  try {
+    work.takeSteps();
+  } catch (const Error&) {
+    if (!work.history.records.empty()) work.save();
+    throw;
+  }
+  work.finish();
+  std::error_code ignored;
+  fs::remove(trainingCheckpointPath(config_.out), ignored);
+}
+
+void TrainingSession::note(const std::string& text) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notes_.push_back(text);
+  status_.note_count = notes_.size();
+}
+
+void TrainingSession::enter(const std::string& stage) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  status_.stage = stage;
+}
+
+TrainingStatus TrainingSession::status() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return status_;
+}
+
+const char* TrainingSession::noteAt(size_t index) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (index >= notes_.size()) {
+    refuse("there are " + std::to_string(notes_.size()) + " notes, none of number " +
+           std::to_string(index));
+  }
+  return notes_[index].c_str();
+}
+
+TrainingMeasure TrainingSession::budgetAt(size_t index) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (index >= by_budget_.size()) {
+    refuse("there are " + std::to_string(by_budget_.size()) + " budgets, none of number " +
+           std::to_string(index));
+  }
+  return by_budget_[index];
+}
+
+}  // namespace stipple

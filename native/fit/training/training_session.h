@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "data/training_history.h"
+#include "fit/training/training_config.h"
+#include "train/backend/backend_factory.h"
+
+namespace stipple {
+
+/// How a training is doing.
+struct TrainingStatus {
+  std::string stage;  ///< "Reading the collection", "Structure", ...
+  uint64_t step = 0;  ///< that are done, over all parts
+  uint64_t steps = 0;
+  uint64_t resumed_step = 0;  ///< where it went on from a checkpoint; 0: it began
+  uint64_t skipped = 0;       ///< steps whose derivatives were not finite
+  uint64_t objects = 0;       ///< that are learned from
+  uint64_t held_out = 0;
+  uint64_t best_step = 0;  ///< of the result if the training ended now; 0: not measured yet
+  double loss = 0;         ///< means of the last 50 steps
+  double structure = 0;
+  double psnr = 0;  ///< dB, as measured last; NaN: not yet
+  double seconds = 0;
+  double seconds_left = 0;  ///< by the pace of the last 50 steps
+  size_t note_count = 0;
+  size_t budget_count = 0;  ///< of budgetAt(), once it has ended
+};
+
+/// Where a training writes, in the folder of its results.
+std::string trainedWeightsPath(const std::string& out);
+std::string trainingCheckpointPath(const std::string& out);
+std::string trainingReportPath(const std::string& out);
+
+/// One training of the density autoencoder, from its config to its weights: it reads the
+/// collection, holds objects out, goes on from a checkpoint or begins, measures, keeps the best.
+/// run() works on one thread; all else may be called by others at any time.
+class TrainingSession {
+ public:
+  /// Reads the config. Errors: kIo; those of parseTrainingConfig(); kInvalidArgument where a
+  /// checkpoint is left and `resumes` is false, or none is there and it is true, and where a file
+  /// of another kind stands where results go.
+  TrainingSession(std::shared_ptr<const BackendFactory> backends, const std::string& config_path,
+                  bool resumes);
+
+  /// About what run() allocates, bytes.
+  uint64_t memoryBound() const;
+
+  /// The whole work. Where it ends early, a checkpoint of the last step is written, and weights and
+  /// report are those of the best state so far. Errors: those of Collection; of a checkpoint that
+  /// cannot be read (kFormat), or is of a training with other settings or objects
+  /// (kInvalidArgument, with the first that differs); kCancelled; of an image that is gone; kIo
+  /// where weights or report cannot be written. A checkpoint that cannot be written is a note.
+  /// Threads and determinism: the same bits for any number of threads, and wherever it was stopped.
+  void run(Progress& progress);
+
+  const TrainingConfig& config() const { return config_; }
+  TrainingStatus status() const;
+  /// The text lives as long as the session. Errors: kInvalidArgument for an index out of range.
+  const char* noteAt(size_t index) const;
+  /// What the result is worth at a budget. Errors: as noteAt().
+  TrainingMeasure budgetAt(size_t index) const;
+
+ private:
+  struct Work;
+
+  void note(const std::string& text);
+  void enter(const std::string& stage);
+
+  std::shared_ptr<const BackendFactory> backends_;
+  TrainingConfig config_;
+  bool resumes_;
+
+  mutable std::mutex mutex_;  ///< of what follows
+  TrainingStatus status_;
+  std::deque<std::string> notes_;  ///< texts stay where they are
+  std::vector<TrainingMeasure> by_budget_;
+};
+
+}  // namespace stipple

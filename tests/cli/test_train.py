@@ -1,0 +1,185 @@
+"""`stipple train`: from a collection of objects to the weights of networks, stopped, resumed, refused."""
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+from ball_collection import config, write_ball, write_collection, write_png
+from fit_dataset import TOOL, error, run
+
+
+@pytest.fixture(scope='module')
+def objects(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('collection') / 'objects'
+    write_collection(folder)
+    return folder
+
+
+@pytest.fixture
+def given(objects, tmp_path):
+    """Writes a config beside the collection, and returns its path."""
+    (tmp_path / 'objects').symlink_to(objects)
+
+    def write(name='config.json', **changes):
+        path = tmp_path / name
+        path.write_text(json.dumps(config(**changes)))
+        return path
+
+    return write
+
+
+def parts(**steps):
+    """Those of config(), each with as many steps as are given for its stage; others are left out."""
+    return [dict(part, steps=steps[part['stage']]) for part in config()['parts'] if part['stage'] in steps]
+
+
+def test_learns_objects_that_it_has_never_seen(given, tmp_path):
+    seen = json.loads(run('train', given(), '--json').stdout)
+    assert seen['steps'] == 560 and seen['skipped_steps'] == 0
+    assert seen['objects'] == 4 and seen['held_out_objects'] == 2
+    # After the first 40 steps with images it has 13.7 dB, in the end 16.5: four balls say little of other tints.
+    assert seen['held_out_psnr_128_anchors'] > 15.5
+    assert seen['held_out_psnr_8_anchors'] < seen['held_out_psnr_128_anchors']
+    folder = tmp_path / 'result'
+    assert sorted(path.name for path in folder.iterdir()) == ['report.json', 'report.svg', 'weights.safetensors']
+    report = json.loads((folder / 'report.json').read_text())
+    assert [row['anchors'] for row in report['by_budget']] == [8, 16, 32, 64, 128]
+    structure = report['by_step']['structure']
+    assert sum(structure[50:60]) < 0.75 * sum(structure[:10])
+    assert report['measures'][-1]['psnr'] > report['measures'][0]['psnr'] + 1.5
+    # Of the balls that it learns from it knows more; and these choose what is kept.
+    assert report['by_budget'][-1]['training_psnr'] > 18
+    best = max(report['measures'], key=lambda row: row['training_psnr'])
+    assert report['best_step'] == best['step']
+    assert report['settings']['parts.1.steps'] == 480
+    assert '<svg' in (folder / 'report.svg').read_text()[:300]
+
+
+def test_goes_on_bit_for_bit_from_where_it_was_stopped(given, tmp_path):
+    short = dict(parts=parts(structure=40, attributes=160), checkpoint_interval=30)
+    run('train', given('whole.json', out='whole', **short))
+    stopped = given('stopped.json', out='stopped', **short)
+    process = subprocess.Popen([TOOL, 'train', stopped], stderr=subprocess.PIPE, text=True)
+    checkpoint = tmp_path / 'stopped/checkpoint.stipple.safetensors'
+    deadline = time.monotonic() + 60
+    while not checkpoint.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(60) == 128 + signal.SIGINT
+    assert f"'stipple train {stopped} --resume' goes on" in process.stderr.read()
+    assert not (tmp_path / 'stopped/weights.safetensors').exists()
+    assert 'left from a training that was stopped' in error('train', stopped)
+    run('train', stopped, '--resume')
+    same = [(tmp_path / folder / 'weights.safetensors').read_bytes() for folder in ('whole', 'stopped')]
+    assert same[0] == same[1]
+    first, second = (json.loads((tmp_path / folder / 'report.json').read_text()) for folder in ('whole', 'stopped'))
+    assert first['by_step']['loss'] == second['by_step']['loss']
+    assert first['measures'] == second['measures'] and first['by_budget'] == second['by_budget']
+    assert not checkpoint.exists()
+
+
+def test_a_killed_training_goes_on_from_its_last_checkpoint(given, tmp_path):
+    short = dict(parts=parts(structure=40, attributes=160), checkpoint_interval=30)
+    path = given(**short)
+    process = subprocess.Popen([TOOL, 'train', path], stderr=subprocess.DEVNULL)
+    checkpoint = tmp_path / 'result/checkpoint.stipple.safetensors'
+    deadline = time.monotonic() + 60
+    while not checkpoint.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.kill()
+    process.wait(60)
+    before = checkpoint.read_bytes()
+    # Of another training, or of other objects, nothing is taken.
+    other = given('other.json', seed=2, **short)
+    assert "'seed' is 2, the checkpoint has 1" in error('train', other, '--resume')
+    (tmp_path / 'fewer').mkdir()
+    for ball in sorted((tmp_path / 'objects/balls').iterdir())[:5]:
+        shutil.copytree(ball, tmp_path / 'fewer/balls' / ball.name)
+    assert 'other objects' in error('train', given('fewer.json', collection='fewer', **short), '--resume')
+    assert checkpoint.read_bytes() == before
+    run('train', path, '--resume')
+    assert (tmp_path / 'result/weights.safetensors').exists()
+
+
+@pytest.mark.parametrize('changes, message', [
+    ({'sed': 1}, "'sed' is not known; 'seed' is the nearest that is"),
+    ({'network': {'head': 2}}, "'network.head' is not known; 'network.heads' is the nearest that is"),
+    ({'parts': [{'stage': 'joint', 'learningrate': 1}]},
+     "'parts.0.learningrate' is not known; 'parts.0.learning_rate' is the nearest that is"),
+    ({'xyzzy': 1}, "'xyzzy' is not known"),
+    ({'seed': 'one'}, "'seed' is 'one'; a number is needed"),
+    ({'collection': 7}, "'collection' is a number; a text is needed"),
+    ({'points': 1.5}, "'points' is 1.5; a whole number"),
+    ({'points': 0}, 'the number of points of an object is 0; 1 to 16384 is allowed'),
+    ({'held_out': 1}, "'held_out' is 1"),
+    ({'measure_interval': 0}, "'measure_interval' is 0; 1 or more is allowed"),
+    ({'network': {'gaussians': 2}}, 'the number of Gaussians of an anchor is 2; 4 to 32 is allowed'),
+    ({'network': {'head_width': 18}}, 'the width of a head is 18; a multiple of 4 is needed'),
+    ({'parts': [{'stage': 'splats'}]}, "'parts.0.stage' is 'splats'; structure, attributes or joint is allowed"),
+    ({'parts': [{'stage': 'joint', 'batch': 0}]}, 'part 0: the number of objects in a step is 0'),
+    ({'collection': 'nowhere'}, "nowhere' cannot be read"),
+])
+def test_what_cannot_be_trained_is_refused(given, changes, message):
+    assert message in error('train', given(**changes))
+
+
+def test_a_config_that_is_none_is_refused(given, tmp_path):
+    path = tmp_path / 'bad.json'
+    path.write_text('{"seed": 1')
+    assert str(path) in error('train', path)
+    path.write_text('[1]')
+    assert 'a JSON object is expected' in error('train', path)
+    path.write_text('{}')
+    assert '"collection", the folder of objects, is missing' in error('train', path)
+    assert 'nothing.json' in error('train', tmp_path / 'nothing.json')
+
+
+def test_nothing_of_another_kind_is_written_over(given, tmp_path):
+    path = given()
+    (tmp_path / 'result').mkdir()
+    for name in ('weights.safetensors', 'report.json'):
+        (tmp_path / 'result' / name).write_text('mine')
+        assert name in error('train', path)
+        assert (tmp_path / 'result' / name).read_text() == 'mine'
+        (tmp_path / 'result' / name).unlink()
+
+
+def test_objects_that_teach_nothing_are_left_out_with_a_reason(given, tmp_path):
+    folder = tmp_path / 'mixed'
+    for name in ('good', 'empty', 'opaque', 'flat', 'lost', 'torn'):
+        write_ball(folder / name, (0.9, 0.3, 0.2), views=4)
+    for i in range(4):
+        write_png(folder / f'empty/images/{i:04}.png', np.zeros((32, 32, 4), np.uint8))
+        write_png(folder / f'opaque/images/{i:04}.png', np.full((32, 32, 4), 255, np.uint8))
+    (folder / 'flat/points.ply').write_text('ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n'
+                                            'property float y\nproperty float z\nend_header\n0 0 0\n')
+    (folder / 'lost/points.ply').unlink()
+    (folder / 'torn/transforms.json').write_text('{"frames": [')
+    path = given(collection='mixed', parts=parts(structure=20))
+    notes = run('train', path).stderr
+    for name, reason in (('empty', 'all of its 4 images are empty'), ('opaque', 'has no alpha'),
+                         ('flat', 'no extent'), ('lost', 'points.ply'), ('torn', 'transforms.json')):
+        line = next(line for line in notes.splitlines() if f"Object '{name}' is left out" in line)
+        assert reason in line, line
+    assert 'too few to hold any out' in notes
+    shutil.rmtree(folder / 'good')
+    assert 'has no object that can be learned from' in error('train', given(collection='mixed', out='none'))
+    (tmp_path / 'void').mkdir()
+    assert 'no folder in it has a transforms.json' in error('train', given(collection='void', out='none'))
+
+
+def test_a_full_disk_loses_no_checkpoint(given, tmp_path):
+    """What cannot be written is a note while it runs."""
+    path = given(parts=parts(structure=40), checkpoint_interval=10)
+    limit = 'ulimit -f 20; trap "" XFSZ; exec "$0" "$@"'  # 20 KiB a file: a checkpoint has more
+    result = subprocess.run(['bash', '-c', limit, str(TOOL), 'train', str(path)], capture_output=True, text=True,
+                            timeout=120)
+    assert result.returncode == 1
+    assert 'A checkpoint could not be written' in result.stderr
+    assert result.stderr.count('A checkpoint could not be written') == 1
+    assert 'weights.safetensors' in result.stderr.splitlines()[-1]
+    assert not any(name.startswith('weights') for name in os.listdir(tmp_path / 'result'))
