@@ -51,6 +51,7 @@ int run(int argc, char** argv) {
   addDensify(app, context);
   addGenerate(app, context);
   addTrain(app, context);
+  addEncode(app, context);
   addCompare(app, context);
   addAccuracy(app, context);
   try {

@@ -13,6 +13,13 @@ struct LatentPlacement {
   std::array<double, 3> offset = {0, 0, 0};  ///< metres
 };
 
+/// What networks learned with, which says where they may be trusted. The defaults are those of the
+/// published networks.
+struct LatentRange {
+  int leaf_level = 8;  ///< leaf cells along each side, as a power of two
+  uint64_t least_anchors = 1024, most_anchors = 8192, usual_anchors = 2048;
+};
+
 /// A code that the decoders of density-sampled Gaussians turn into splats at any budget, with the
 /// camera that the flow network saw the object by.
 struct Latent {

@@ -57,7 +57,7 @@ struct Networks {
         structure(open(WeightsRole::kStructureEncoder), {options.structure_head_width}),
         colour(open(WeightsRole::kColourEncoder)),
         flow(open(WeightsRole::kFlow)),
-        decoder(readLatentNetworks(open(WeightsRole::kDecoder))) {
+        decoder(openLatentNetworks(requireWeights(folder, WeightsRole::kDecoder).path)) {
     const FlowSizes& sizes = flow.sizes();
     if (sizes.structure_width != structure.width() || sizes.colour_width != colour.tokenWidth()) {
       fail(ErrorCode::kFormat,

@@ -1,5 +1,7 @@
 #include "model/latent_splats.h"
 
+#include <algorithm>
+#include <map>
 #include <utility>
 
 #include "base/error.h"
@@ -15,21 +17,18 @@ namespace {
 /// Splats that are of use: fewer show nothing, more only repeat what the network says.
 constexpr uint64_t kLeastSplats = 1000;
 constexpr uint64_t kMostSplats = 1000000;
-/// Anchors that the published networks learned with: 32,768 to 262,144 splats.
-constexpr uint64_t kLeastLearned = 1024;
-constexpr uint64_t kMostLearned = 8192;
-/// The time grows with the square of the budget.
-constexpr uint64_t kUsualBudget = 2048;
 
 class LatentSplats final : public SplatModel {
  public:
   LatentSplats(const LatentNetworks& networks, std::shared_ptr<const Latent> latent,
                WeightsReference weights, ModelNotes notes, const NetworkRun& run)
       : latent_(latent),
-        density_(std::make_shared<const LatentDensity>(networks.octree, latent, run)),
+        density_(std::make_shared<const LatentDensity>(networks.octree, latent, run,
+                                                       networks.range.leaf_level)),
         decoder_(networks.gaussians, latent, run),
         weights_(std::move(weights)),
-        notes_(std::move(notes)) {}
+        notes_(std::move(notes)),
+        range_(networks.range) {}
 
   const char* kind() const override { return kAssetLatent; }
 
@@ -60,11 +59,14 @@ class LatentSplats final : public SplatModel {
 
   void limit(ModelSettings& settings) const override {
     const uint32_t gaussians = decoder_.network().gaussians();
-    settings.minimum_budget = (kLeastSplats + gaussians - 1) / gaussians;
+    settings.minimum_budget =
+        std::min(range_.least_anchors, (kLeastSplats + gaussians - 1) / gaussians);
     settings.maximum_budget = kMostSplats / gaussians;
-    settings.default_budget = kUsualBudget;
-    settings.minimum_learned_budget = kLeastLearned;
-    settings.maximum_learned_budget = kMostLearned;
+    // The time grows with the square of the budget.
+    settings.default_budget =
+        std::clamp(range_.usual_anchors, settings.minimum_budget, settings.maximum_budget);
+    settings.minimum_learned_budget = range_.least_anchors;
+    settings.maximum_learned_budget = range_.most_anchors;
     settings.minimum_gaussians_per_anchor = gaussians;
     settings.maximum_gaussians_per_anchor = gaussians;
     settings.default_gaussians_per_anchor = gaussians;
@@ -76,9 +78,17 @@ class LatentSplats final : public SplatModel {
   LatentDecoder decoder_;
   WeightsReference weights_;
   ModelNotes notes_;
+  LatentRange range_;
 };
 
 }  // namespace
+
+LatentNetworks openLatentNetworks(const std::string& path) {
+  std::map<std::string, std::string> metadata;
+  LatentNetworks networks = readLatentNetworks(openWeightFile(path, &metadata));
+  networks.range = latentRangeOf(metadata, path);
+  return networks;
+}
 
 std::shared_ptr<const SplatModel> makeLatentSplats(const LatentNetworks& networks,
                                                    std::shared_ptr<const Latent> latent,
@@ -91,7 +101,7 @@ std::shared_ptr<const SplatModel> makeLatentSplats(const LatentNetworks& network
 std::shared_ptr<const SplatModel> readLatentSplats(const std::string& path, const ReadingAid& aid) {
   LatentAsset asset = readLatentAsset(path);
   const std::string weights = findReferenced(asset.weights, aid.weights_folder, path, aid.progress);
-  const LatentNetworks networks = readLatentNetworks(openWeightFile(weights));
+  const LatentNetworks networks = openLatentNetworks(weights);
   ModelNotes notes = {std::move(asset.settings_json), std::move(asset.extras)};
   try {
     return makeLatentSplats(networks, std::make_shared<const Latent>(std::move(asset.latent)),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "data/latent.h"
 #include "decode/latent/latent_networks.h"
@@ -8,6 +9,10 @@
 #include "model/splat_model.h"
 
 namespace stipple {
+
+/// The networks of a file, with the range that they learned with. Errors: those of
+/// openWeightFile(), readLatentNetworks() and latentRangeOf().
+LatentNetworks openLatentNetworks(const std::string& path);
 
 /// The kind "latent": a latent of density-sampled Gaussians, whose density and splats are the work
 /// of two networks. In: networks, latent: what they read; weights: the file that the networks are

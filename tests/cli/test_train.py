@@ -183,3 +183,35 @@ def test_a_full_disk_loses_no_checkpoint(given, tmp_path):
     assert result.stderr.count('A checkpoint could not be written') == 1
     assert 'weights.safetensors' in result.stderr.splitlines()[-1]
     assert not any(name.startswith('weights') for name in os.listdir(tmp_path / 'result'))
+
+
+def test_an_unseen_object_decodes_at_any_budget_where_it_was(given, tmp_path):
+    run('train', given())
+    weights = tmp_path / 'result/weights.safetensors'
+    model, splats = tmp_path / 'ball.stipple.safetensors', tmp_path / 'ball.ply'
+    ball = tmp_path / 'objects/balls/5'  # of 0.2 times the size, around (5, -2, 1), held out
+    run('encode', weights, ball, model)
+    info = json.loads(run('--weights', weights.parent, 'info', model, '--json').stdout)
+    assert info['least_anchors'] == 32
+    for anchors in (40, 120):
+        run('--weights', weights.parent, 'decode', model, splats, '--anchors', anchors)
+        seen = json.loads(run('info', splats, '--json').stdout)
+        assert seen['count'] == 4 * anchors
+        for axis, middle in enumerate((5, -1, -2)):  # as files have it: x right, y down, z forward
+            assert seen['bounds_min'][axis] == pytest.approx(middle - 0.08, abs=0.03)
+            assert seen['bounds_max'][axis] == pytest.approx(middle + 0.08, abs=0.03)
+    # Points alone are enough, and give the same.
+    run('encode', weights, ball / 'points.ply', tmp_path / 'points.ply', '--anchors', 120)
+    assert (tmp_path / 'points.ply').read_bytes() == splats.read_bytes()
+    # Against an image that was never learned from.
+    drawn, upright = tmp_path / 'view.png', tmp_path / 'upright.ply'
+    run('convert', splats, upright, '--frame', 'RFU')
+    run('render', upright, '--camera', ball / 'transforms.json', '--view', 0, '--colour', 'display', '-o', drawn)
+    compared = json.loads(run('compare', drawn, ball / 'images/0000.png', '--json').stdout)
+    assert compared['psnr'] > 13
+    assert 'was not written by a training' in error('encode', model, ball, splats)
+    assert '1 to 400, the number of points' in error('encode', weights, ball, splats, '--tokens', 401)
+    assert "'ball.txt' is neither splats nor a model" in error('encode', weights, ball, 'ball.txt')
+    (tmp_path / 'grey.ply').write_text('ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n'
+                                       'property float z\nend_header\n0 0 0\n')
+    assert 'no extent' in error('encode', weights, tmp_path / 'grey.ply', splats)

@@ -315,6 +315,7 @@ FUNCTIONS = {
     'stipple_train_start': (_status, [_handle, _path, c_uint32, _out_handle]),
     'stipple_train_figures': (_status, [_handle, _to(s.StippleTrainFigures)]),
     'stipple_train_note': (_status, [_handle, c_uint64, POINTER(c_char_p)]),
+    'stipple_encode_start': (_status, [_handle, _path, _path, c_uint32, _out_handle]),
     'stipple_train_budget': (_status, [_handle, c_uint64, _to(s.StippleTrainBudget)]),
 }
 

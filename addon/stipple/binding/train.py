@@ -8,6 +8,13 @@ from .job import Job
 from .structs import StippleTrainBudget, StippleTrainFigures
 
 
+def start_encoding(context, weights_path, object_path, token_count=0):
+    """Job: an object, by its folder in a collection or by a .ply of points with colours, becomes a Model;
+    Model.of_job(job) gives it."""
+    return Job(context.library, new_handle(context.library, 'stipple_encode_start', context.pointer,
+                                           path_bytes(weights_path), path_bytes(object_path), token_count))
+
+
 class Training(Job):
     """A training that runs; its results are files in the folder that its config names."""
 

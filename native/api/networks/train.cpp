@@ -4,6 +4,7 @@
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
+#include "fit/training/encode_object.h"
 #include "fit/training/training_session.h"
 
 using namespace stipple;
@@ -83,6 +84,22 @@ StippleStatus stipple_train_budget(const StippleJob* job, uint64_t index,
     out.ssim = measure.ssim;
     out.training_psnr = measure.training_psnr;
     deliver(budget, out, "budget");
+  });
+}
+
+StippleStatus stipple_encode_start(StippleContext* context, const char* weights_path,
+                                   const char* object_path, uint32_t token_count,
+                                   StippleJob** job) {
+  return guarded([&] {
+    require(context, "context");
+    require(weights_path, "weights_path");
+    require(object_path, "object_path");
+    require(job, "job");
+    const EncodeRequest request = {weights_path, object_path, token_count};
+    context->state->requireMemory(encodeMemoryBound(request), "encoding an object");
+    *job = startJob(context->state, [request](Progress& progress) -> JobResult {
+      return encodeObject(request, &progress);
+    });
   });
 }
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "cli/commands.h"
-#include "cli/formats.h"
+#include "cli/networks/save_model.h"
 #include "cli/networks/weights_report.h"
 #include "cli/numbers.h"
 #include "cli/report.h"
@@ -106,48 +106,12 @@ void addTimings(const Job& job, const std::string& prefix, double decode_seconds
   if (decode_seconds > 0) line("decoding", decode_seconds, 0);
 }
 
-/// Splats at a budget: the one that was asked for, or the model's own.
-Cloud decoded(const Model& model, const std::optional<int64_t>& anchors) {
-  auto settings = sized<StippleModelSettings>();
-  check(stipple_model_settings(model.get(), &settings));
-  StippleDecodeOptions options;
-  stipple_decode_options_init(&options);
-  options.anchor_count = anchors ? counted(*anchors, "--anchors") : settings.default_budget;
-  const auto job = make<Job>(stipple_model_decode_start, model.get(), &options);
-  finish(job);
-  return make<Cloud>(stipple_job_cloud, job.get());
-}
-
-void requireOut(const std::string& out) {
-  if (hasModelExtension(out) || hasSplatExtension(out)) return;
-  throw Failure("'" + out + "' is neither splats nor a model; " + splatExtensions(true) +
-                " or .stipple.safetensors is expected");
-}
-
 /// A path with the seed behind its name: "chair_43.ply" of "chair.ply".
 std::string withSeed(const std::string& path, uint64_t seed) {
   const size_t folder = path.find_last_of('/') + 1;  // 0 where there is none
   const size_t end = path.find('.', folder + 1);
   const size_t at = end == std::string::npos ? path.size() : end;
   return path.substr(0, at) + "_" + std::to_string(seed) + path.substr(at);
-}
-
-/// Writes what a job has made. Returns the seconds of decoding, 0 for a model.
-double save(const Job& job, const std::string& out, const std::optional<int64_t>& anchors,
-            const std::string& prefix, Report& report) {
-  const auto model = make<Model>(stipple_job_model, const_cast<const StippleJob*>(job.get()));
-  if (hasModelExtension(out)) {
-    check(stipple_model_save(model.get(), out.c_str()));
-    return 0;
-  }
-  const auto start = std::chrono::steady_clock::now();
-  const Cloud cloud = decoded(model, anchors);
-  const double seconds = secondsSince(start);
-  check(stipple_cloud_save(cloud.get(), out.c_str(), nullptr));
-  auto info = sized<StippleCloudInfo>();
-  check(stipple_cloud_info(cloud.get(), &info));
-  report.add(prefix + "gaussians", info.count);
-  return seconds;
 }
 
 struct Pictures {
@@ -170,7 +134,7 @@ Job generated(const Context& context, const Pictures& pictures, const Arguments&
                        const_cast<const StippleImage*>(pictures.image.get()),
                        const_cast<const StippleImage*>(pictures.mask.get()), &options);
   finish(job);
-  const double decode_seconds = save(job, out, arguments.anchors, prefix, report);
+  const double decode_seconds = saveModelOf(job, out, arguments.anchors, prefix, report);
   std::error_code ignored;
   if (!checkpoint.empty()) std::filesystem::remove(checkpoint, ignored);
   if (arguments.check) addStages(job, prefix, arguments.json, report);
@@ -189,7 +153,7 @@ void generate(const Context& context, const Arguments& arguments) {
   addEstimate(estimate, report);
   if (arguments.estimate) return report.print(arguments.json);
   if (arguments.out.empty()) throw Failure("out is missing; splats or a model is expected");
-  requireOut(arguments.out);
+  requireModelOrSplats(arguments.out);
   Pictures pictures;
   pictures.image = make<Image>(stipple_image_load, context.get(), arguments.image.c_str());
   if (!arguments.mask.empty()) {

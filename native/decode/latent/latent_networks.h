@@ -12,6 +12,7 @@ namespace stipple {
 struct LatentNetworks {
   std::shared_ptr<const OctreeNetwork> octree;
   std::shared_ptr<const GaussianNetwork> gaussians;
+  LatentRange range = {};  ///< for whoever knows another than the published one
 };
 
 /// Finds them in a file by the names of its tensors: "octree." and "gs.", as they are published, or

@@ -61,8 +61,7 @@ bool isBlack(const ObjectView& view) {
 
 }  // namespace
 
-TrainingObject readTrainingObject(const NormalisedViews& views, uint64_t points) {
-  const PointSet& surface = views.points();
+TrainingObject readTrainingPoints(const PointSet& surface, uint64_t points) {
   const size_t count = surface.positions.size() / 3;
   if (surface.colours.size() != surface.positions.size()) {
     refuse("the " + std::to_string(count) + " points of the surface have no colours");
@@ -80,6 +79,11 @@ TrainingObject readTrainingObject(const NormalisedViews& views, uint64_t points)
       object.features[0].push_back(2 * shown - 1);
     }
   }
+  return object;
+}
+
+TrainingObject readTrainingObject(const NormalisedViews& views, uint64_t points) {
+  TrainingObject object = readTrainingPoints(views.points(), points);
   bool is_empty = true, is_black = true;
   for (size_t view = 0; view < views.count(); ++view) {
     object.views.push_back(viewOf(views, view));

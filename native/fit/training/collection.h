@@ -28,6 +28,10 @@ constexpr uint64_t kMostEncodedPoints = 16384;
 /// reading images.
 TrainingObject readTrainingObject(const NormalisedViews& views, uint64_t points);
 
+/// Its points alone, which is what is encoded. In: surface, in the cube around the origin.
+/// Errors: kInvalidArgument for points without colours.
+TrainingObject readTrainingPoints(const PointSet& surface, uint64_t points);
+
 /// A folder of objects: each subfolder, at any depth, with a transforms.json has the views of one.
 /// What cannot be learned from is left out with a reason.
 class Collection {

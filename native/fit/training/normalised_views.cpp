@@ -10,8 +10,27 @@ namespace stipple {
 
 namespace {
 
-/// Where the cube of side kNormalisedSide around all points lies. Errors: kInvalidArgument.
-LatentPlacement placementOf(const PointSet& points) {
+/// The camera that sees in the cube what `camera` sees around it.
+Camera normalised(Camera camera, const LatentPlacement& placement) {
+  requireImagePlane(camera, "learning from views of an object");
+  const Vec3d offset(placement.offset[0], placement.offset[1], placement.offset[2]);
+  const Vec3d middle = camera.world_to_camera.block<3, 3>(0, 0) * offset;
+  for (int axis = 0; axis < 3; ++axis) {
+    double& moved = camera.world_to_camera(axis, 3);
+    moved = (moved + middle[axis]) / placement.scale;
+  }
+  camera.near_plane /= placement.scale;
+  camera.far_plane /= placement.scale;
+  if (camera.model == CameraModel::kOrthographic) {
+    camera.fx *= placement.scale;
+    camera.fy *= placement.scale;
+  }
+  return camera;
+}
+
+}  // namespace
+
+LatentPlacement placementAround(const PointSet& points) {
   constexpr float kFar = std::numeric_limits<float>::infinity();
   float low[3] = {kFar, kFar, kFar}, high[3] = {-kFar, -kFar, -kFar};
   for (size_t i = 0; i < points.positions.size(); ++i) {
@@ -35,40 +54,23 @@ LatentPlacement placementOf(const PointSet& points) {
   return placement;
 }
 
-/// The camera that sees in the cube what `camera` sees around it.
-Camera normalised(Camera camera, const LatentPlacement& placement) {
-  requireImagePlane(camera, "learning from views of an object");
-  const Vec3d offset(placement.offset[0], placement.offset[1], placement.offset[2]);
-  const Vec3d middle = camera.world_to_camera.block<3, 3>(0, 0) * offset;
-  for (int axis = 0; axis < 3; ++axis) {
-    double& moved = camera.world_to_camera(axis, 3);
-    moved = (moved + middle[axis]) / placement.scale;
+PointSet normalised(PointSet points, const LatentPlacement& placement) {
+  const auto scale = static_cast<float>(placement.scale);
+  for (size_t i = 0; i < points.positions.size(); ++i) {
+    const auto offset = static_cast<float>(placement.offset[i % 3]);
+    points.positions[i] = (points.positions[i] - offset) / scale;
   }
-  camera.near_plane /= placement.scale;
-  camera.far_plane /= placement.scale;
-  if (camera.model == CameraModel::kOrthographic) {
-    camera.fx *= placement.scale;
-    camera.fy *= placement.scale;
-  }
-  return camera;
+  points.areas.clear();  // They were in the world's metres, and nobody asks for them here.
+  return points;
 }
-
-}  // namespace
 
 NormalisedViews::NormalisedViews(std::shared_ptr<const ViewSource> views)
     : views_(std::move(views)),
-      placement_(placementOf(views_->points())),
-      points_(views_->points()) {
+      placement_(placementAround(views_->points())),
+      points_(normalised(views_->points(), placement_)) {
   for (size_t view = 0; view < views_->count(); ++view) {
     cameras_.push_back(normalised(views_->camera(view), placement_));
   }
-  const auto scale = static_cast<float>(placement_.scale);
-  for (size_t i = 0; i < points_.positions.size(); ++i) {
-    const auto offset = static_cast<float>(placement_.offset[i % 3]);
-    points_.positions[i] = (points_.positions[i] - offset) / scale;
-  }
-  // Meant for the world's metres: nobody asks for them here.
-  points_.areas.clear();
 }
 
 }  // namespace stipple

@@ -13,6 +13,12 @@ namespace stipple {
 /// whose side is 1: a little is left, since points of a surface do not reach its ends.
 constexpr double kNormalisedSide = 0.95;
 
+/// Where the networks' cube lies around points that shall fill kNormalisedSide of it.
+/// Errors: kInvalidArgument where they have no extent.
+LatentPlacement placementAround(const PointSet& points);
+/// The points in the cube around the origin.
+PointSet normalised(PointSet points, const LatentPlacement& placement);
+
 /// Views of one object, moved and scaled so that its points fill the networks' cube around the
 /// origin. The images stay what they are.
 class NormalisedViews final : public ViewSource {

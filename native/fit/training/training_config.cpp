@@ -240,6 +240,24 @@ void setParts(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
   }
 }
 
+/// In: entries: ways to keys, and values. Out: config, with the usual where nothing is said.
+void setAll(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
+            const std::string& name, const std::string& folder, TrainingConfig& config) {
+  setParts(entries, config);
+  const std::vector<Setting> settings = settingsOf(config, folder);
+  for (const auto& entry : entries) {
+    const auto found = std::find_if(settings.begin(), settings.end(), [&](const Setting& setting) {
+      return setting.name == entry.first;
+    });
+    if (found == settings.end()) refuseKey(entry.first, name, settings);
+    try {
+      found->set(entry.second);
+    } catch (const Error& error) {
+      fail(error.code(), name + ": " + error.what());
+    }
+  }
+}
+
 void validate(const TrainingConfig& config, const std::string& name) {
   if (config.collection.empty())
     refuse(name + ": \"collection\", the folder of objects, is missing");
@@ -279,22 +297,15 @@ TrainingConfig defaultTrainingConfig() {
 
 TrainingConfig parseTrainingConfig(const std::string& text, const std::string& name,
                                    const std::string& folder) {
-  const std::vector<std::pair<std::string, FlatJsonValue>> entries = readNestedJson(text, name);
   TrainingConfig config = defaultTrainingConfig();
-  setParts(entries, config);
-  const std::vector<Setting> settings = settingsOf(config, folder);
-  for (const auto& [key, value] : entries) {
-    const auto found =
-        std::find_if(settings.begin(), settings.end(),
-                     [&, &wanted = key](const Setting& s) { return s.name == wanted; });
-    if (found == settings.end()) refuseKey(key, name, settings);
-    try {
-      found->set(value);
-    } catch (const Error& error) {
-      fail(error.code(), name + ": " + error.what());
-    }
-  }
+  setAll(readNestedJson(text, name), name, folder, config);
   validate(config, name);
+  return config;
+}
+
+TrainingConfig readSettings(const std::string& settings, const std::string& name) {
+  TrainingConfig config = defaultTrainingConfig();
+  setAll(readFlatJson(settings), name, "", config);
   return config;
 }
 

@@ -36,6 +36,10 @@ TrainingConfig parseTrainingConfig(const std::string& text, const std::string& n
 /// All settings that the weights depend on, as a flat JSON object: what a checkpoint must agree in.
 std::string settingsJson(const TrainingConfig& config);
 
+/// The other way round: of the metadata of trained weights. Out: collection and out are empty.
+/// In: name, what messages call the text. Errors: as parseTrainingConfig().
+TrainingConfig readSettings(const std::string& settings, const std::string& name);
+
 /// The first of them that two trainings differ in, as "part.0.batch is 2, the checkpoint has 4";
 /// empty where there is none. In: both of settingsJson().
 std::string firstDifference(const std::string& settings, const std::string& of_checkpoint);

@@ -2575,6 +2575,15 @@ StippleStatus stipple_train_figures(const StippleJob* job, StippleTrainFigures* 
 StippleStatus stipple_train_note(const StippleJob* job, uint64_t index, const char** text);
 StippleStatus stipple_train_budget(const StippleJob* job, uint64_t index, StippleTrainBudget* budget);
 
+/* Makes a latent of an object by networks that were trained here, as a job (stipple_job_model): it decodes to splats
+ * at any budget, where the object was. In: weights_path: a file of stipple_train_start; object_path: the folder of an
+ * object as collections have them, of which the points are read, or a .ply of points with colours; token_count: of
+ * the latent; 0: as many as were learned. Errors: IO, FORMAT; INVALID_ARGUMENT for weights of others, points without
+ * colours or extent, tokens out of range; MEMORY_LIMIT.
+ * Threads and determinism: the same result for any number of threads. docs/training.md. */
+StippleStatus stipple_encode_start(StippleContext* context, const char* weights_path, const char* object_path,
+                                   uint32_t token_count, StippleJob** job);
+
 #ifdef __cplusplus
 }
 #endif

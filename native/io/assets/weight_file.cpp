@@ -1,8 +1,11 @@
 #include "io/assets/weight_file.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
+#include "base/error.h"
+#include "io/assets/flat_json.h"
 #include "io/bytes/output_kind.h"
 #include "io/bytes/safetensors.h"
 
@@ -29,6 +32,34 @@ WeightTable openWeightFile(const std::string& path, std::map<std::string, std::s
   }
   if (metadata != nullptr) *metadata = reader.metadata();
   return WeightTable(path, std::move(tensors), memory);
+}
+
+LatentRange latentRangeOf(const std::map<std::string, std::string>& metadata,
+                          const std::string& name) {
+  LatentRange range;
+  const auto found = metadata.find(kTrainedKey);
+  if (found == metadata.end()) return range;
+  constexpr uint64_t kMostAnchors = uint64_t{1} << 20;
+  uint64_t leaf_level = 0, least = kMostAnchors, most = 0;
+  for (const auto& [key, value] : readFlatJson(found->second)) {
+    const auto* whole = std::get_if<uint64_t>(&value);
+    if (whole == nullptr) continue;
+    if (key == "network.leaf_level") leaf_level = *whole;
+    if (key.ends_with(".least_anchors")) least = std::min(least, *whole);
+    if (key.ends_with(".most_anchors")) most = std::max(most, *whole);
+  }
+  constexpr uint64_t kMostLevels = 10;
+  if (leaf_level < 1 || leaf_level > kMostLevels || least < 1 || least > most ||
+      most > kMostAnchors) {
+    fail(ErrorCode::kFormat, name + ": its settings of training have the leaf level " +
+                                 std::to_string(leaf_level) + " and " + std::to_string(least) +
+                                 " to " + std::to_string(most) + " anchors, which cannot be");
+  }
+  range.leaf_level = static_cast<int>(leaf_level);
+  range.least_anchors = least;
+  range.most_anchors = most;
+  range.usual_anchors = most;
+  return range;
 }
 
 void requireTrainedWeightsPlace(const std::string& path) {

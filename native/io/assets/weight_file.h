@@ -3,6 +3,7 @@
 #include <map>
 #include <string>
 
+#include "data/latent.h"
 #include "data/tensor_table.h"
 #include "data/weight_table.h"
 
@@ -21,7 +22,12 @@ constexpr char kTrainedKey[] = "stipple_training";
 /// as JSON. Errors: kIo; kInvalidArgument where the path has a file of another kind.
 void writeTrainedWeights(const TensorTable& tensors, const std::string& settings_json,
                          const std::string& path);
-/// Refuses a place where that cannot be written. Errors: as it.
+/// What weights learned with that were trained here: by the metadata of their file; those of others
+/// have the published range. In: name, what messages call the file. Errors: kFormat for settings
+/// that cannot be read, or are out of range.
+LatentRange latentRangeOf(const std::map<std::string, std::string>& metadata,
+                          const std::string& name);
+/// Refuses a place where writeTrainedWeights() cannot write. Errors: as it.
 void requireTrainedWeightsPlace(const std::string& path);
 
 }  // namespace stipple
