@@ -120,6 +120,7 @@ void addPart(const std::string& at, AutoencoderSchedule& part, std::vector<Setti
   list.push_back(number(at + "least_anchors", part.least_anchors));
   list.push_back(number(at + "most_anchors", part.most_anchors));
   list.push_back(number(at + "views", part.views));
+  list.push_back(number(at + "surface", part.surface));
   list.push_back(number(at + "learning_rate", optimiser.learning_rate));
   list.push_back(number(at + "beta1", optimiser.beta1));
   list.push_back(number(at + "beta2", optimiser.beta2));
@@ -188,6 +189,7 @@ AutoencoderSchedule usualPart(AutoencoderStage stage) {
   part.least_anchors = 64;
   part.most_anchors = 1024;
   part.views = 2;
+  part.surface = 4096;
   part.weights.density = stage == AutoencoderStage::kJoint ? 1 : 0;
   part.weights.structure = stage == AutoencoderStage::kStructure ? 1 : 0.1;
   part.optimiser.learning_rate = stage == AutoencoderStage::kJoint ? 1e-4 : 5e-4;

@@ -184,7 +184,12 @@ void TrainingSession::Work::restore() {
 }
 
 void TrainingSession::Work::show() {
-  const size_t count = history.records.size(), recent = std::min(count, kPaceSteps);
+  const size_t count = history.records.size();
+  size_t recent = 0;  // of the present part, whose loss is of other things than the last one's
+  while (recent < std::min(count, kPaceSteps) &&
+         history.records[count - 1 - recent].part == history.records[count - 1].part) {
+    ++recent;
+  }
   double loss = 0, structure = 0, seconds = 0;
   for (size_t i = count - recent; i < count; ++i) {
     const TrainingRecord& record = history.records[i];
@@ -243,7 +248,11 @@ void TrainingSession::Work::takeSteps() {
   const uint64_t steps = stepCount(config());
   while (!trainer->isDone()) {
     const uint64_t taken = history.records.size();
-    progress.enterPart(kReadShare, kStepsShare);
+    // What a step tells of itself moves nothing: it would go back and forth.
+    const double now = kReadShare + (kStepsShare - kReadShare) * static_cast<double>(taken) /
+                                        static_cast<double>(steps);
+    progress.enterPart(now, now);
+    progress.advance(0, "Learning");
     const Stopwatch one;
     const AutoencoderStep done = trainer->step(&progress);
     if (taken == 0 || done.part != part_of_next) {
@@ -252,7 +261,6 @@ void TrainingSession::Work::takeSteps() {
     part_of_next = done.part;
     history.records.push_back(recordOf(done, one.seconds()));
     const uint64_t count = taken + 1;
-    progress.advance(static_cast<double>(count) / static_cast<double>(steps), "Learning");
     const bool ends_part = trainer->isDone() || trainer->part() != done.part;
     if (hasImages() && (count % config().measure_interval == 0 || ends_part)) measure();
     show();

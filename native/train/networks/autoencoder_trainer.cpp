@@ -74,6 +74,7 @@ void validate(const AutoencoderSchedule& schedule) {
   requireCount(schedule.least_anchors, 1, uint64_t{1} << 20, "anchors at least");
   requireCount(schedule.most_anchors, schedule.least_anchors, uint64_t{1} << 20, "anchors at most");
   requireCount(schedule.views, 1, 4096, "views of an object");
+  requireCount(schedule.surface, 1, uint64_t{1} << 24, "points of the surface");
 }
 
 AutoencoderTrainer::AutoencoderTrainer(const AutoencoderSizes& sizes,
@@ -127,6 +128,7 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
       static_cast<uint64_t>(unitDouble(mixBits(key)) *
                             static_cast<double>(part.most_anchors - part.least_anchors + 1));
   example.views = part.views;
+  example.surface = part.surface;
   example.share = 1 / static_cast<double>(part.batch);
   AutoencoderStep done;
   done.step = taken_;

@@ -30,6 +30,7 @@ struct AutoencoderSchedule {
   uint64_t least_anchors = 256;  ///< drawn evenly from here
   uint64_t most_anchors = 256;   ///< to here
   size_t views = 4;
+  size_t surface = 8192;  ///< points of an object that tell the density of its surface
   AutoencoderLossWeights weights;
   WeightOptimiserOptions optimiser;  ///< its total_steps are the steps of this part
 };

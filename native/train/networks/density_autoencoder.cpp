@@ -87,6 +87,19 @@ std::vector<size_t> drawn(size_t count, size_t wanted, uint64_t seed) {
   return made;
 }
 
+/// `wanted` of `count` things, one of each equal share of them; all where there are no more.
+std::vector<size_t> oneOfEachShare(size_t count, size_t wanted, uint64_t seed) {
+  const size_t shares = std::min(count, wanted);
+  std::vector<size_t> made;
+  for (size_t i = 0; i < shares; ++i) {
+    const size_t begin = i * count / shares, end = (i + 1) * count / shares;
+    const double u = unitDouble(keyedBits(seed, RandomUse::kSurfaceSample, i));
+    made.push_back(begin + std::min(static_cast<size_t>(u * static_cast<double>(end - begin)),
+                                    end - begin - 1));
+  }
+  return made;
+}
+
 std::vector<float> noiseOf(size_t count, uint64_t seed) {
   std::vector<float> noise(count);
   for (size_t i = 0; i < count; ++i) {
@@ -304,9 +317,11 @@ AutoencoderLosses DensityAutoencoder::addExample(std::span<const float> values,
 
   std::vector<uint64_t> leaves;
   const auto side = static_cast<float>(1 << sizes_.leaf_level);
-  for (size_t i = 0; i < object.surface.size(); i += 3) {
+  for (const size_t point :
+       oneOfEachShare(object.surface.size() / 3, example.surface, example.seed)) {
     const auto cell = [&](size_t axis) {
-      return static_cast<uint32_t>(std::clamp(object.surface[i + axis] * side, 0.0f, side - 1));
+      const float at = object.surface[point * 3 + axis] * side;
+      return static_cast<uint32_t>(std::clamp(at, 0.0f, side - 1));
     };
     leaves.push_back(mortonEncode(cell(0), cell(1), cell(2)));
   }

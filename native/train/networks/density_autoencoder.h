@@ -69,8 +69,10 @@ struct AutoencoderExample {
   size_t tokens = 256;     ///< of the latent, at most as many as points of the first kind
   uint64_t anchors = 256;  ///< that are drawn
   size_t views = 4;        ///< that are looked at, at most as many as there are
-  uint64_t seed = 0;       ///< of noise, anchors, views and backgrounds
-  double share = 1;        ///< of the step: one over its examples
+  size_t surface =
+      8192;           ///< points of the surface that tell the density, drawn where there are more
+  uint64_t seed = 0;  ///< of noise, anchors, views and backgrounds
+  double share = 1;   ///< of the step: one over its examples
 };
 
 /// What an example lost, without weights.
