@@ -51,6 +51,7 @@ enum class RandomUse : uint32_t {
   kColourNoise = 40,
   kTokenNoise = 41,
   kCameraNoise = 42,
+  kFlowTime = 43,
 };
 
 /// 64 random bits keyed by (seed, use, index): the same key gives the same bits in any order and

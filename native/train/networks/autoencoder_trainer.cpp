@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "train/networks/trainer_tensors.h"
 
 namespace stipple {
 
@@ -35,31 +36,6 @@ void addLosses(const AutoencoderLosses& from, double share, AutoencoderLosses& t
   to.splats.opacity += share * from.splats.opacity;
   to.splats.off_centre += share * from.splats.off_centre;
   to.splats.overlap += share * from.splats.overlap;
-}
-
-template <class T>
-void put(const std::string& name, const std::vector<T>& values, TensorTable& table) {
-  table[name] = {{values.size()}, values};
-}
-
-template <class T>
-std::vector<T> take(const TensorTable& table, const std::string& name, size_t least, size_t most) {
-  const auto found = table.find(name);
-  const auto* values =
-      found == table.end() ? nullptr : std::get_if<std::vector<T>>(&found->second.values);
-  if (values == nullptr) fail(ErrorCode::kFormat, "the checkpoint has no tensor '" + name + "'");
-  if (values->size() < least || values->size() > most) {
-    fail(ErrorCode::kFormat, "the checkpoint's tensor '" + name + "' has " +
-                                 std::to_string(values->size()) + " numbers; " +
-                                 std::to_string(least) + " to " + std::to_string(most) +
-                                 " are needed: it is of a training with other settings");
-  }
-  for (const T& value : *values) {
-    if (std::isfinite(static_cast<double>(value))) continue;
-    fail(ErrorCode::kFormat,
-         "the checkpoint's tensor '" + name + "' has a number that is not finite");
-  }
-  return *values;
 }
 
 }  // namespace
@@ -105,18 +81,6 @@ std::vector<float> AutoencoderTrainer::meanValues() const {
   return {mean.begin(), mean.end()};
 }
 
-/// Each round over all objects has an order of its own.
-size_t AutoencoderTrainer::objectAt(uint64_t position) const {
-  const uint64_t round = position / objects_->count();
-  std::vector<std::pair<uint64_t, size_t>> order;
-  for (size_t i = 0; i < objects_->count(); ++i) {
-    order.emplace_back(keyedBits(seed_ + round, RandomUse::kViewOrder, i), i);
-  }
-  const auto at = order.begin() + static_cast<ptrdiff_t>(position % objects_->count());
-  std::nth_element(order.begin(), at, order.end());
-  return at->second;
-}
-
 AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
   const AutoencoderSchedule& part = parts_[part_];
   const uint64_t key = keyedBits(seed_, RandomUse::kAnchorBudget, taken_);
@@ -136,7 +100,8 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
   done.losses.ssim = 0;
   std::fill(gradients_.begin(), gradients_.end(), 0.0f);
   for (size_t b = 0; b < part.batch; ++b) {
-    const std::shared_ptr<const TrainingObject> object = objects_->object(objectAt(seen_ + b));
+    const std::shared_ptr<const TrainingObject> object =
+        objects_->object(objectInRounds(seed_, seen_ + b, objects_->count()));
     example.object = object.get();
     example.seed = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
     addLosses(
@@ -156,36 +121,27 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
 TensorTable AutoencoderTrainer::state() const {
   const WeightOptimiser::State& state = optimiser_->state();
   TensorTable table;
-  put("weights", values_, table);
-  put("optimiser.first", state.first, table);
-  put("optimiser.second", state.second, table);
-  put("optimiser.mean", state.mean, table);
-  put("optimiser.norms", state.norms, table);
-  put("optimiser.most_norm", std::vector<double>{state.most_norm}, table);
-  put("counts", std::vector<uint64_t>{state.steps, state.skipped, part_, taken_, in_part_, seen_},
-      table);
+  putWeights("", values_, state, table);
+  putValues("counts",
+            std::vector<uint64_t>{state.steps, state.skipped, part_, taken_, in_part_, seen_},
+            table);
   return table;
 }
 
 void AutoencoderTrainer::resume(const TensorTable& table) {
-  const size_t count = values_.size();
-  WeightOptimiser::State state;
-  std::vector<float> values = take<float>(table, "weights", count, count);
-  state.first = take<float>(table, "optimiser.first", count, count);
-  state.second = take<float>(table, "optimiser.second", count, count);
-  state.mean = take<double>(table, "optimiser.mean", count, count);
-  const std::vector<uint64_t> counts = take<uint64_t>(table, "counts", 6, 6);
+  const std::vector<uint64_t> counts = takeValues<uint64_t>(table, "counts", 6, 6);
   if (counts[2] > parts_.size()) {
     fail(ErrorCode::kFormat, "the checkpoint is in part " + std::to_string(counts[2]) +
                                  " of a training that has " + std::to_string(parts_.size()));
   }
-  const size_t part = std::min<size_t>(counts[2], parts_.size() - 1);
-  const uint64_t buffer = parts_[part].optimiser.clip_buffer;
-  state.norms = take<float>(table, "optimiser.norms", 0, buffer);
-  state.most_norm = take<double>(table, "optimiser.most_norm", 1, 1).front();
+  const WeightOptimiserOptions& options =
+      parts_[std::min<size_t>(counts[2], parts_.size() - 1)].optimiser;
+  std::vector<float> values;
+  WeightOptimiser::State state =
+      takeWeights(table, "", values_.size(), options.clip_buffer, values);
   state.steps = counts[0];
   state.skipped = counts[1];
-  optimiser_.emplace(parts_[part].optimiser, std::move(state));
+  optimiser_.emplace(options, std::move(state));
   values_ = std::move(values);
   part_ = counts[2];
   taken_ = counts[3];

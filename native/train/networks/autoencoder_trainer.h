@@ -72,7 +72,6 @@ class AutoencoderTrainer {
   void resume(const TensorTable& state);
 
  private:
-  size_t objectAt(uint64_t position) const;
   void beginPart();
 
   DensityAutoencoder networks_;

@@ -14,6 +14,7 @@
 #include "density/anchor_sampling.h"
 #include "density/contribution_normalisation.h"
 #include "math/morton.h"
+#include "train/networks/start_weights.h"
 
 namespace stipple {
 
@@ -169,21 +170,7 @@ std::vector<float> DensityAutoencoder::startValues(uint64_t seed) const {
   const std::vector<std::string> silent = {"encoder.logvar_out.weight", "octree.out_proj.weight",
                                            "octree.adaLN_modulation.1.weight",
                                            "gs.out_proj.weight"};
-  std::vector<float> values(layout_.size(), 0.0f);
-  for (const Parameter& parameter : layout_.parameters()) {
-    const bool is_factor = parameter.name.ends_with("gamma") ||
-                           (parameter.shape.size() == 1 && parameter.name.ends_with(".weight"));
-    const bool is_silent = std::find(silent.begin(), silent.end(), parameter.name) != silent.end();
-    for (size_t i = 0; i < parameter.count; ++i) {
-      float& value = values[parameter.first + i];
-      if (is_factor) value = 1.0f;
-      if (is_factor || is_silent || parameter.shape.size() != 2) continue;
-      const auto sides = static_cast<double>(parameter.shape[0] + parameter.shape[1]);
-      const double u = unitDouble(keyedBits(seed, RandomUse::kNetworkStart, parameter.first + i));
-      value = static_cast<float>(std::sqrt(6 / sides) * (2 * u - 1));
-    }
-  }
-  return values;
+  return startWeights(layout_, seed, silent);
 }
 
 std::vector<FeaturePoints> DensityAutoencoder::pointsOf(const TrainingObject& object) const {

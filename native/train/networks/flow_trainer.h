@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/progress.h"
+#include "data/tensor_table.h"
+#include "train/networks/trained_flow.h"
+#include "train/optimiser/weight_optimiser.h"
+
+namespace stipple {
+
+/// An object as a flow network learns it: a latent whose tokens are in order, with the camera of
+/// the image, and what the image shows.
+struct FlowObject {
+  Latent latent;
+  ImageCondition condition;
+};
+
+/// Objects, each of which may be seen by several images.
+class FlowSource {
+ public:
+  virtual ~FlowSource() = default;
+  virtual size_t count() const = 0;
+  /// In: draw: which of its images, any number.
+  virtual FlowObject object(size_t index, uint64_t draw) const = 0;
+};
+
+struct FlowSchedule {
+  size_t batch = 8;            ///< objects of a step, >= 1
+  double image_dropout = 0.1;  ///< 0..1, share of examples without an image
+  double time_mean = 0;        ///< times are 1 / (1 + exp(-N(mean, 1)))
+  WeightOptimiserOptions optimiser;
+};
+
+/// Errors: kInvalidArgument with the option, its value and what is allowed.
+void validate(const FlowSchedule& schedule);
+void validate(const FlowSizes& sizes);
+
+struct FlowStep {
+  uint64_t step = 0;  ///< from 0 on
+  double loss = 0;    ///< mean squared error of the velocity, over its examples
+  WeightStep weights;
+};
+
+/// Trains a flow network. Everything that is drawn is keyed by seed and step, so that a training
+/// that was stopped goes on bit for bit.
+class FlowTrainer {
+ public:
+  /// Errors: kInvalidArgument: validate(); a source without objects.
+  FlowTrainer(const FlowSizes& sizes, const FlowSchedule& schedule, uint64_t seed,
+              std::shared_ptr<const FlowSource> objects);
+
+  const std::vector<float>& values() const { return values_; }
+  /// The mean of weights over steps.
+  std::vector<float> meanValues() const;
+  /// All tensors by their published names.
+  TensorTable tensors(std::span<const float> values) const;
+  bool isDone() const { return taken_ >= schedule_.optimiser.total_steps; }
+  /// One step. Errors: those of the source, kCancelled; then nothing has changed.
+  FlowStep step(Progress* progress = nullptr);
+  /// The mean squared error of weights at `draws` times, images and noises for each object that are
+  /// keyed by the seed: for comparing weights and sets of objects.
+  double loss(std::span<const float> values, const FlowSource& objects, size_t draws, uint64_t seed,
+              Progress* progress = nullptr) const;
+
+  /// All that it knows, for a checkpoint, "flow." before its names.
+  TensorTable state() const;
+  /// Errors: kFormat for tensors that are missing, of another size, or not finite; then nothing has
+  /// changed.
+  void resume(const TensorTable& state);
+
+ private:
+  struct Drawn;
+  Drawn drawn(FlowObject object, uint64_t key) const;
+
+  ParameterLayout layout_;
+  FlowSchedule schedule_;
+  uint64_t seed_;
+  std::shared_ptr<const FlowSource> objects_;
+  TrainedFlow flow_;
+  std::vector<float> values_, gradients_;
+  std::optional<WeightOptimiser> optimiser_;
+  uint64_t taken_ = 0;
+};
+
+}  // namespace stipple

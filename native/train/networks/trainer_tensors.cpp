@@ -1,0 +1,41 @@
+#include "train/networks/trainer_tensors.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace stipple {
+
+void putWeights(const std::string& prefix, const std::vector<float>& values,
+                const WeightOptimiser::State& state, TensorTable& table) {
+  putValues(prefix + "weights", values, table);
+  putValues(prefix + "optimiser.first", state.first, table);
+  putValues(prefix + "optimiser.second", state.second, table);
+  putValues(prefix + "optimiser.mean", state.mean, table);
+  putValues(prefix + "optimiser.norms", state.norms, table);
+  putValues(prefix + "optimiser.most_norm", std::vector<double>{state.most_norm}, table);
+}
+
+WeightOptimiser::State takeWeights(const TensorTable& table, const std::string& prefix,
+                                   size_t count, uint64_t clip_buffer, std::vector<float>& values) {
+  WeightOptimiser::State state;
+  state.first = takeValues<float>(table, prefix + "optimiser.first", count, count);
+  state.second = takeValues<float>(table, prefix + "optimiser.second", count, count);
+  state.mean = takeValues<double>(table, prefix + "optimiser.mean", count, count);
+  state.norms = takeValues<float>(table, prefix + "optimiser.norms", 0, clip_buffer);
+  state.most_norm = takeValues<double>(table, prefix + "optimiser.most_norm", 1, 1).front();
+  values = takeValues<float>(table, prefix + "weights", count, count);
+  return state;
+}
+
+size_t objectInRounds(uint64_t seed, uint64_t position, size_t count) {
+  const uint64_t round = position / count;
+  std::vector<std::pair<uint64_t, size_t>> order;
+  for (size_t i = 0; i < count; ++i) {
+    order.emplace_back(keyedBits(seed + round, RandomUse::kViewOrder, i), i);
+  }
+  const auto at = order.begin() + static_cast<ptrdiff_t>(position % count);
+  std::nth_element(order.begin(), at, order.end());
+  return at->second;
+}
+
+}  // namespace stipple
