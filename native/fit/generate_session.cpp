@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <span>
 #include <utility>
 #include <vector>
@@ -15,13 +16,13 @@
 #include "base/stopwatch.h"
 #include "decode/latent/latent_decoder.h"
 #include "decode/latent/latent_networks.h"
+#include "fit/image_encoders.h"
 #include "fit/machine_speed.h"
 #include "fit/object_placement.h"
-#include "generate/dino_encoder.h"
+#include "fit/training/training_config.h"
 #include "generate/flow_cost.h"
 #include "generate/flow_network.h"
 #include "generate/image_condition.h"
-#include "generate/vae_encoder.h"
 #include "io/assets/checkpoint.h"
 #include "io/assets/weight_file.h"
 #include "io/assets/weights_reference.h"
@@ -32,8 +33,6 @@ namespace stipple {
 
 namespace {
 
-// Channels of the colour encoder's first level, whose maps are the largest that there are.
-constexpr uint64_t kFirstColourChannels = 128;
 // What layers pack and threads work in, about (docs/methods/image_encoders.md has measurements).
 constexpr uint64_t kLayerBytes = uint64_t{96} << 20;
 constexpr double kLargestSize = 1e6;  // metres
@@ -44,36 +43,62 @@ FlowSettings flowSettings(const GenerateOptions& options) {
   return {options.steps, options.guidance, options.shift};
 }
 
+/// What the file of a flow network says of its training here; empty of the published one.
+std::string trainedSettings(const std::string& path) {
+  std::map<std::string, std::string> metadata;
+  openWeightFile(path, &metadata);
+  return metadata[kTrainedKey];
+}
+
 /// The networks up to the latent. What is large stays in their files.
 struct Networks {
   WeightsFolder folder;
-  DinoEncoder structure;
-  VaeEncoder colour;
   FlowNetwork flow;
   LatentNetworks decoder;
+  std::optional<TrainingConfig> trained;  ///< empty: as published
+  ImageEncoders encoders;
 
   explicit Networks(const GenerateOptions& options)
       : folder(findWeights(options.weights_folder)),
-        structure(open(WeightsRole::kStructureEncoder), {options.structure_head_width}),
-        colour(open(WeightsRole::kColourEncoder)),
-        flow(open(WeightsRole::kFlow)),
-        decoder(openLatentNetworks(requireWeights(folder, WeightsRole::kDecoder).path)) {
+        flow(openWeightFile(pathOf(WeightsRole::kFlow))),
+        decoder(openLatentNetworks(pathOf(WeightsRole::kDecoder))),
+        trained(trainedConfig()),
+        encoders(trained ? ImageEncoders(trained->flow.patches)
+                         : ImageEncoders(folder, options.structure_head_width)) {
     const FlowSizes& sizes = flow.sizes();
-    if (sizes.structure_width != structure.width() || sizes.colour_width != colour.tokenWidth()) {
+    if (sizes.structure_width != encoders.structureWidth() ||
+        sizes.colour_width != encoders.colourWidth()) {
       fail(ErrorCode::kFormat,
            "the files of weights do not fit together: the flow network takes features of " +
                std::to_string(sizes.structure_width) + " and " +
                std::to_string(sizes.colour_width) + " numbers, the encoders give " +
-               std::to_string(structure.width()) + " and " + std::to_string(colour.tokenWidth()));
+               std::to_string(encoders.structureWidth()) + " and " +
+               std::to_string(encoders.colourWidth()));
     }
   }
 
-  WeightTable open(WeightsRole role) const {
-    return openWeightFile(requireWeights(folder, role).path);
+  const std::string& pathOf(WeightsRole role) const { return requireWeights(folder, role).path; }
+  std::optional<TrainingConfig> trainedConfig() const {
+    const std::string& path = pathOf(WeightsRole::kFlow);
+    const std::string settings = trainedSettings(path);
+    if (settings != trainedSettings(pathOf(WeightsRole::kDecoder))) {
+      fail(ErrorCode::kFormat, "the files of weights do not fit together: " + path + " and " +
+                                   pathOf(WeightsRole::kDecoder) + " are of different trainings");
+    }
+    if (settings.empty()) return std::nullopt;
+    return readSettings(settings, path);
   }
-  double encoderWork(uint32_t size) const {
-    return structure.flops(size, size) + colour.flops(size, size);
+  /// Networks that were trained here see images as they saw them there, and say no more tokens than
+  /// they learned.
+  GenerateOptions adapted(GenerateOptions options) const {
+    if (!trained) return options;
+    options.preparation.canvas_size = trained->flow.patches.canvas;
+    options.token_count =
+        std::min<uint64_t>(options.token_count, trained->parts.back().most_tokens);
+    options.preview_anchors = std::min(options.preview_anchors, decoder.range.most_anchors);
+    return options;
   }
+  double encoderWork(uint32_t size) const { return encoders.flops(size); }
   StageCost samplingCost(const GenerateOptions& options) const {
     return flowSamplingCost(flow.sizes(), options.token_count, rows(options),
                             flowSettings(options));
@@ -86,8 +111,7 @@ struct Networks {
     return cost;
   }
   uint64_t rows(const GenerateOptions& options) const {
-    const uint32_t size = options.preparation.canvas_size;
-    return structure.rowsFor(size, size);
+    return encoders.rows(options.preparation.canvas_size);
   }
 };
 
@@ -110,14 +134,13 @@ void requireOptions(const GenerateOptions& options) {
 
 /// Encoders work one after the other, and their memory is free before the flow network begins.
 uint64_t workBytes(const Networks& networks, const GenerateOptions& options) {
-  const uint64_t side = options.preparation.canvas_size, rows = networks.rows(options);
-  const uint64_t width = networks.structure.width();
-  constexpr uint64_t kInner = 4;  // how much wider than tokens the MLPs of image encoders are
-  const uint64_t structure = rows * (2 + 2 * kInner) * width * sizeof(float);
-  const uint64_t colour = 2 * side * side * kFirstColourChannels * sizeof(float);
-  const uint64_t condition = rows * (width + networks.colour.tokenWidth()) * sizeof(float);
+  const uint64_t rows = networks.rows(options);
+  const ImageEncoders& encoders = networks.encoders;
+  const uint64_t condition =
+      rows * (encoders.structureWidth() + encoders.colourWidth()) * sizeof(float);
   const uint64_t flow = networks.flow.memoryBound(options.token_count, rows);
-  return condition + kLayerBytes + std::max({structure, colour, flow});
+  return condition + kLayerBytes +
+         std::max(encoders.memoryBound(options.preparation.canvas_size), flow);
 }
 
 /// What a checkpoint must agree in, as JSON.
@@ -147,7 +170,7 @@ std::string featuresKeyOf(const Networks& networks, const GenerateOptions& optio
   image.add(prepared.rgb.data(), prepared.rgb.size());
   std::string key = image.finish() + " " + std::to_string(prepared.size) + " " +
                     std::to_string(options.structure_head_width);
-  for (const WeightsRole role : {WeightsRole::kStructureEncoder, WeightsRole::kColourEncoder}) {
+  for (const WeightsRole role : networks.encoders.roles()) {
     const WeightsFile& file = networks.folder.of(role);
     key +=
         "\n" + file.path + " " + std::to_string(file.bytes) + " " + std::to_string(file.modified);
@@ -185,7 +208,10 @@ StageValues valuesOf(std::string name, std::span<const float> numbers) {
 
 struct GenerateSession::Work {
   Work(ByteImage shown, std::optional<ByteImage> covered, const GenerateOptions& given)
-      : options(given), image(std::move(shown)), mask(std::move(covered)), networks(given) {
+      : image(std::move(shown)),
+        mask(std::move(covered)),
+        networks(given),
+        options(networks.adapted(given)) {
     status.steps = options.steps;
   }
 
@@ -198,8 +224,9 @@ struct GenerateSession::Work {
                                                    const std::string& features_key, double end);
   /// Notes what passes by in the encoders: all of it, or their results alone.
   StageListener layerListener();
-  FlowContext contextOf(const NetworkRun& run, const ImageFeatures& image_features,
-                        std::span<const float> noise, double end);
+  FlowContext contextOf(const NetworkRun& run, const PreparedImage& prepared,
+                        const ImageFeatures& image_features, std::span<const float> noise,
+                        double end);
   void sample(const NetworkRun& run, const FlowContext& context, const std::string& key,
               SamplerState& state, const ProgressShare& share);
   void keep(const std::string& key, const SamplerState& state) const;
@@ -227,10 +254,10 @@ struct GenerateSession::Work {
     status.seconds_left = each * (status.steps - step);
   }
 
-  GenerateOptions options;
   ByteImage image;
   std::optional<ByteImage> mask;
   Networks networks;
+  GenerateOptions options;  ///< as the networks take them
   Stopwatch watch, step_watch;
   std::shared_ptr<const SplatModel> result;
 
@@ -265,9 +292,10 @@ uint64_t GenerateSession::memoryBound() const {
   return workBytes(work_->networks, work_->options);
 }
 
-GenerateEstimate GenerateSession::estimate(const GenerateOptions& options) {
-  requireOptions(options);
-  const Networks networks(options);
+GenerateEstimate GenerateSession::estimate(const GenerateOptions& given) {
+  requireOptions(given);
+  const Networks networks(given);
+  const GenerateOptions options = networks.adapted(given);
   const StageCost sampling = networks.samplingCost(options);
   const double encoding = networks.encoderWork(options.preparation.canvas_size);
   const MachineSpeed& speed = machineSpeed();
@@ -360,7 +388,7 @@ void GenerateSession::Work::run(Progress& progress) {
 
   NoiseSizes sizes;
   const uint32_t size = options.preparation.canvas_size;
-  sizes.colour = networks.colour.noiseCount(size, size);
+  sizes.colour = networks.encoders.noiseCount(size);
   sizes.tokens = options.token_count * networks.flow.sizes().token_width;
   GenerationNoise noise = drawNoise(sizes, options.noise);
   note("noise.colour", noise.colour);
@@ -376,7 +404,7 @@ void GenerateSession::Work::run(Progress& progress) {
       kPreparationShare + (kSampledShare - kPreparationShare) * encoding / (encoding + sampling);
   const std::shared_ptr<const KeyedFeatures> found =
       featuresFor(run, prepared, features_key, middle);
-  const FlowContext context = contextOf(run, found->features, noise.colour, middle);
+  const FlowContext context = contextOf(run, prepared, found->features, noise.colour, middle);
   sample(run, context, key, state, {middle, kSampledShare});
   finish(std::move(state.latent), key, progress);
 }
@@ -390,11 +418,11 @@ StageListener GenerateSession::Work::layerListener() {
       const float* row = numbers.values + i * numbers.stride;
       std::copy(row, row + numbers.width, rows.begin() + static_cast<ptrdiff_t>(i * numbers.width));
     }
-    const size_t size = options.preparation.canvas_size;
+    const uint32_t size = options.preparation.canvas_size;
     if (is_structure) {
-      note("structure.features", rows, networks.structure.flops(size, size));
+      note("structure.features", rows, networks.encoders.structureFlops(size));
     } else {
-      note(stage, rows, is_colour ? networks.colour.flops(size, size) : 0);
+      note(stage, rows, is_colour ? networks.encoders.colourFlops(size) : 0);
     }
   };
 }
@@ -407,20 +435,20 @@ std::shared_ptr<const KeyedFeatures> GenerateSession::Work::featuresFor(
     note("colour.moments", features->features.moments.values);
     return features;
   }
-  auto found = std::make_shared<const KeyedFeatures>(
-      KeyedFeatures{features_key, featuresOf(run, networks.structure, networks.colour, prepared,
-                                             {kPreparationShare, end}, layerListener())});
+  auto found = std::make_shared<const KeyedFeatures>(KeyedFeatures{
+      features_key,
+      networks.encoders.features(run, prepared, {kPreparationShare, end}, layerListener())});
   const std::lock_guard<std::mutex> lock(mutex);
   features = found;
   return found;
 }
 
-FlowContext GenerateSession::Work::contextOf(const NetworkRun& run,
+FlowContext GenerateSession::Work::contextOf(const NetworkRun& run, const PreparedImage& prepared,
                                              const ImageFeatures& image_features,
                                              std::span<const float> noise, double end) {
   const StageListener listener = options.watches_layers ? layerListener() : StageListener();
   const ImageCondition condition =
-      conditionOf(networks.structure, networks.colour, image_features, noise, listener);
+      networks.encoders.condition(prepared, image_features, noise, listener);
   note("colour.features", condition.colour);
   FlowContext context = networks.flow.context(run, condition, {end, end});
   note("image.context", context.values,

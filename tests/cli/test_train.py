@@ -215,3 +215,56 @@ def test_an_unseen_object_decodes_at_any_budget_where_it_was(given, tmp_path):
     (tmp_path / 'grey.ply').write_text('ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n'
                                        'property float z\nend_header\n0 0 0\n')
     assert 'no extent' in error('encode', weights, tmp_path / 'grey.ply', splats)
+
+
+FLOW = {'steps': 120, 'batch': 4, 'warm_up': 10, 'learning_rate': 2e-3, 'mean_decay': 0.97, 'heads': 2,
+        'head_width': 16, 'blocks': 2, 'noise_refiners': 1, 'context_refiners': 1, 'rotary_width': 8, 'canvas': 32,
+        'patch': 8}
+
+
+def test_an_image_becomes_splats_by_networks_of_ones_own(given, tmp_path):
+    folder, view = tmp_path / 'result', tmp_path / 'objects/balls/5/images/0001.png'
+    run('train', given(parts=parts(structure=60, attributes=300), flow=FLOW))
+    report = json.loads((folder / 'report.json').read_text())
+    loss = [value for value, part in zip(report['by_step']['loss'], report['by_step']['part']) if part == 2]
+    assert report['parts'] == ['structure', 'attributes', 'flow'] and len(loss) == 120
+    assert sum(loss[-20:]) < 0.8 * sum(loss[:20])
+    splats, again, other = (tmp_path / f'{name}.ply' for name in ('splats', 'again', 'other'))
+    seen = json.loads(run('generate', view, splats, '--weights', folder, '--steps', 10, '--json').stdout)
+    assert seen['gaussians'] == 4 * 128  # of the largest budget that was learned
+    run('generate', view, again, '--weights', folder, '--steps', 10)
+    run('generate', view, other, '--weights', folder, '--steps', 10, '--seed', 7)
+    assert splats.read_bytes() == again.read_bytes() != other.read_bytes()
+    # A metre tall or wide, upright on the origin, as those of the published networks.
+    info = json.loads(run('info', splats, '--json').stdout)
+    sides = [high - low for low, high in zip(info['bounds_min'], info['bounds_max'])]
+    assert 0.6 < max(sides) < 1.1
+    # The decoder of another training does not fit, and says so.
+    run('train', given('other.json', out='second', seed=3, parts=parts(structure=20)))
+    shutil.copy(tmp_path / 'second/weights.safetensors', folder / 'weights.safetensors')
+    assert 'are of different trainings' in error('generate', view, splats, '--weights', folder)
+
+
+def test_a_flow_goes_on_bit_for_bit(given, tmp_path):
+    short = dict(parts=parts(structure=20), flow=dict(FLOW, steps=400), checkpoint_interval=30)
+    run('train', given('whole.json', out='whole', **short))
+    path = given('stopped.json', out='stopped', **short)
+    process = subprocess.Popen([TOOL, 'train', path], stderr=subprocess.PIPE, text=True)
+    checkpoint = tmp_path / 'stopped/checkpoint.stipple.safetensors'
+    deadline = time.monotonic() + 60
+    while not checkpoint.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60) == 128 + signal.SIGTERM
+    run('train', path, '--resume')
+    for name in ('weights.safetensors', 'flow.safetensors'):
+        assert (tmp_path / 'whole' / name).read_bytes() == (tmp_path / 'stopped' / name).read_bytes()
+
+
+@pytest.mark.parametrize('changes, message', [
+    ({'canvas': 100}, '"flow": '), ({'patch': 5}, 'the side of a patch is 5 pixels'),
+    ({'batch': 0}, 'the number of objects in a step of the flow is 0'),
+    ({'head_width': 7}, 'the width of a head of the flow is 7'),
+    ({'step': 1}, "'flow.step' is not known; 'flow.steps' is the nearest that is")])
+def test_a_flow_that_cannot_be_trained_is_refused(given, changes, message):
+    assert message in error('train', given(flow={**FLOW, **changes}))

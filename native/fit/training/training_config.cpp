@@ -109,6 +109,39 @@ void addNetwork(AutoencoderSizes& sizes, std::vector<Setting>& list) {
   list.push_back(number("network.leaf_level", sizes.leaf_level));
 }
 
+void addOptimiser(const std::string& at, WeightOptimiserOptions& optimiser,
+                  std::vector<Setting>& list) {
+  list.push_back(number(at + "learning_rate", optimiser.learning_rate));
+  list.push_back(number(at + "beta1", optimiser.beta1));
+  list.push_back(number(at + "beta2", optimiser.beta2));
+  list.push_back(number(at + "epsilon", optimiser.epsilon));
+  list.push_back(number(at + "weight_decay", optimiser.weight_decay));
+  list.push_back(number(at + "warm_up", optimiser.warm_up));
+  list.push_back(number(at + "least_share", optimiser.least_share));
+  list.push_back(number(at + "most_norm", optimiser.most_norm));
+  list.push_back(number(at + "clip_buffer", optimiser.clip_buffer));
+  list.push_back(number(at + "clip_percentile", optimiser.clip_percentile));
+  list.push_back(number(at + "mean_decay", optimiser.mean_decay));
+}
+
+void addFlow(FlowConfig& flow, std::vector<Setting>& list) {
+  list.push_back(number("flow.steps", flow.schedule.optimiser.total_steps));
+  list.push_back(number("flow.batch", flow.schedule.batch));
+  list.push_back(number("flow.image_dropout", flow.schedule.image_dropout));
+  list.push_back(number("flow.time_mean", flow.schedule.time_mean));
+  addOptimiser("flow.", flow.schedule.optimiser, list);
+  list.push_back(number("flow.heads", flow.heads));
+  list.push_back(number("flow.head_width", flow.head_width));
+  list.push_back(number("flow.mlp_ratio", flow.mlp_ratio));
+  list.push_back(number("flow.rotary_width", flow.rotary_width));
+  list.push_back(number("flow.blocks", flow.blocks));
+  list.push_back(number("flow.noise_refiners", flow.noise_refiners));
+  list.push_back(number("flow.context_refiners", flow.context_refiners));
+  list.push_back(number("flow.canvas", flow.patches.canvas));
+  list.push_back(number("flow.patch", flow.patches.patch));
+  list.push_back(number("flow.in_order", flow.in_order));
+}
+
 void addPart(const std::string& at, AutoencoderSchedule& part, std::vector<Setting>& list) {
   WeightOptimiserOptions& optimiser = part.optimiser;
   AutoencoderLossWeights& weights = part.weights;
@@ -121,17 +154,7 @@ void addPart(const std::string& at, AutoencoderSchedule& part, std::vector<Setti
   list.push_back(number(at + "most_anchors", part.most_anchors));
   list.push_back(number(at + "views", part.views));
   list.push_back(number(at + "surface", part.surface));
-  list.push_back(number(at + "learning_rate", optimiser.learning_rate));
-  list.push_back(number(at + "beta1", optimiser.beta1));
-  list.push_back(number(at + "beta2", optimiser.beta2));
-  list.push_back(number(at + "epsilon", optimiser.epsilon));
-  list.push_back(number(at + "weight_decay", optimiser.weight_decay));
-  list.push_back(number(at + "warm_up", optimiser.warm_up));
-  list.push_back(number(at + "least_share", optimiser.least_share));
-  list.push_back(number(at + "most_norm", optimiser.most_norm));
-  list.push_back(number(at + "clip_buffer", optimiser.clip_buffer));
-  list.push_back(number(at + "clip_percentile", optimiser.clip_percentile));
-  list.push_back(number(at + "mean_decay", optimiser.mean_decay));
+  addOptimiser(at, optimiser, list);
   list.push_back(number(at + "weights.structure", weights.structure));
   list.push_back(number(at + "weights.divergence", weights.divergence));
   list.push_back(number(at + "weights.ssim", weights.ssim));
@@ -155,6 +178,7 @@ std::vector<Setting> settingsOf(TrainingConfig& config, const std::string& folde
   list.push_back(unkept(number("image_bytes", config.objects.image_bytes)));
   list.push_back(number("points", config.objects.points));
   addNetwork(config.sizes, list);
+  addFlow(config.flow, list);
   for (size_t i = 0; i < config.parts.size(); ++i) {
     addPart("parts." + std::to_string(i) + ".", config.parts[i], list);
   }
@@ -275,6 +299,15 @@ void validate(const TrainingConfig& config, const std::string& name) {
            ": 'held_out' is 1, which leaves no object to learn from; 0, or 2 and more, is "
            "allowed");
   }
+  if (config.flow.isWanted()) {
+    try {
+      validate(config.flow.schedule);
+      validate(config.flow.patches);
+      validate(flowSizes(config.flow, config.sizes.latent_width));
+    } catch (const Error& error) {
+      refuse(name + ": \"flow\": " + error.what());
+    }
+  }
   for (size_t i = 0; i < config.parts.size(); ++i) {
     try {
       validate(config.parts[i]);
@@ -290,10 +323,30 @@ const char* stageName(AutoencoderStage stage) {
   return kStageNames[static_cast<size_t>(stage)];
 }
 
+FlowSizes flowSizes(const FlowConfig& config, size_t latent_width) {
+  FlowSizes sizes;
+  sizes.block.heads = config.heads;
+  sizes.block.head_width = config.head_width;
+  sizes.block.channels = config.heads * config.head_width;
+  sizes.block.mlp_width = config.mlp_ratio * sizes.block.channels;
+  sizes.block.rotary_width = config.rotary_width;
+  sizes.block_count = config.blocks;
+  sizes.noise_refiner_count = config.noise_refiners;
+  sizes.context_refiner_count = config.context_refiners;
+  sizes.token_width = latent_width;
+  sizes.structure_width = config.patches.structureWidth();
+  sizes.colour_width = kPatchPlaceWidth;
+  sizes.time_width = 256;
+  return sizes;
+}
+
 TrainingConfig defaultTrainingConfig() {
   TrainingConfig config;
   config.sizes.leaf_level = 6;
   config.parts = usualParts();
+  config.flow.schedule.optimiser.total_steps = 0;
+  config.flow.schedule.optimiser.learning_rate = 3e-4;
+  config.flow.schedule.optimiser.mean_decay = 0.999;
   return config;
 }
 

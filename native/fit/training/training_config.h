@@ -5,9 +5,25 @@
 #include <vector>
 
 #include "fit/training/collection.h"
+#include "generate/patch_condition.h"
 #include "train/networks/autoencoder_trainer.h"
+#include "train/networks/flow_trainer.h"
 
 namespace stipple {
+
+/// What a training of the flow network does, once the autoencoder is done.
+struct FlowConfig {
+  size_t heads = 4, head_width = 32, mlp_ratio = 4, rotary_width = 16;
+  size_t blocks = 4, noise_refiners = 1, context_refiners = 2;
+  FlowSchedule schedule;  ///< its total_steps are 0 where no flow is learned
+  PatchSizes patches;
+  uint32_t in_order = 1;  ///< 0: tokens stay in the order in which they were found
+
+  bool isWanted() const { return schedule.optimiser.total_steps > 0; }
+};
+
+/// Sizes of the network that learns latents of that width. Errors: kInvalidArgument.
+FlowSizes flowSizes(const FlowConfig& config, size_t latent_width);
 
 /// What a training of the density autoencoder does.
 struct TrainingConfig {
@@ -21,6 +37,7 @@ struct TrainingConfig {
   CollectionOptions objects;
   AutoencoderSizes sizes;
   std::vector<AutoencoderSchedule> parts;
+  FlowConfig flow;
 };
 
 /// What a config without "parts" and "network" says: the small networks, in three parts.

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/stopwatch.h"
 #include "fit/training/autoencoder_measure.h"
+#include "fit/training/flow_objects.h"
 #include "fit/training/history_tensors.h"
 #include "io/assets/checkpoint.h"
 #include "io/assets/weight_file.h"
@@ -46,7 +47,7 @@ TrainingConfig readConfig(const std::string& path) {
 uint64_t stepCount(const TrainingConfig& config) {
   uint64_t steps = 0;
   for (const AutoencoderSchedule& part : config.parts) steps += part.optimiser.total_steps;
-  return steps;
+  return steps + config.flow.schedule.optimiser.total_steps;
 }
 
 /// `wanted` of them, evenly.
@@ -93,6 +94,7 @@ void requireResults(const std::string& out, bool resumes) {
   // What goes on reads its checkpoint, and says more of one that is damaged.
   if (!resumes) requireCheckpointPlace(checkpoint);
   requireTrainedWeightsPlace(trainedWeightsPath(out));
+  requireTrainedWeightsPlace(trainedFlowPath(out));
   requireTrainingReportPlace(trainingReportPath(out));
 }
 
@@ -100,6 +102,9 @@ void requireResults(const std::string& out, bool resumes) {
 
 std::string trainedWeightsPath(const std::string& out) {
   return inFolder(out, "weights.safetensors");
+}
+std::string trainedFlowPath(const std::string& out) {
+  return inFolder(out, "flow.safetensors");
 }
 std::string trainingCheckpointPath(const std::string& out) {
   return inFolder(out, "checkpoint.stipple.safetensors");
@@ -115,6 +120,8 @@ struct TrainingSession::Work {
   void read();
   void restore();
   void takeSteps();
+  void learnFlow();
+  void begin(uint64_t taken);
   void measure();
   void save();
   void finish();
@@ -131,6 +138,8 @@ struct TrainingSession::Work {
   std::vector<size_t> learned_from, held_out;
   std::unique_ptr<AutoencoderTrainer> trainer;
   std::unique_ptr<AutoencoderMeasure> judge;
+  std::unique_ptr<FlowTrainer> flow;  ///< once the autoencoder is done
+  TensorTable flow_state;             ///< of a checkpoint; empty: it had not begun
   TrainingHistory history;
   std::vector<float> best;  ///< weights; empty: nothing was measured yet
   double best_psnr = -std::numeric_limits<double>::infinity();
@@ -161,6 +170,7 @@ void TrainingSession::Work::read() {
   for (const AutoencoderSchedule& each : config().parts) {
     history.part_names.emplace_back(stageName(each.stage));
   }
+  if (config().flow.isWanted()) history.part_names.emplace_back("flow");
   const std::lock_guard<std::mutex> lock(session.mutex_);
   session.status_.objects = learned_from.size();
   session.status_.held_out = held_out.size();
@@ -175,10 +185,13 @@ void TrainingSession::Work::restore() {
   try {
     takeHistory(tensors, *collection, history, best, best_psnr);
     trainer->resume(tensors);
+    if (tensors.count("flow.weights") != 0) flow_state = std::move(tensors);
   } catch (const Error& error) {
     fail(error.code(), path + ": " + error.what());
   }
-  if (!history.records.empty()) part_of_next = history.records.back().part;
+  if (!history.records.empty()) {
+    part_of_next = std::min<size_t>(history.records.back().part, config().parts.size() - 1);
+  }
   const std::lock_guard<std::mutex> lock(session.mutex_);
   session.status_.resumed_step = history.records.size();
 }
@@ -232,6 +245,7 @@ void TrainingSession::Work::measure() {
 
 void TrainingSession::Work::save() {
   TensorTable tensors = trainer->state();
+  if (flow) tensors.merge(flow->state());
   putHistory(history, *collection, best, best_psnr, tensors);
   try {
     writeCheckpoint(settings(), tensors, trainingCheckpointPath(config().out));
@@ -244,15 +258,52 @@ void TrainingSession::Work::save() {
   }
 }
 
+/// What a step tells of itself moves nothing: it would go back and forth.
+void TrainingSession::Work::begin(uint64_t taken) {
+  const double now = kReadShare + (kStepsShare - kReadShare) * static_cast<double>(taken) /
+                                      static_cast<double>(stepCount(config()));
+  progress.enterPart(now, now);
+  progress.advance(0, "Learning");
+}
+
+void TrainingSession::Work::learnFlow() {
+  const FlowConfig& wanted = config().flow;
+  if (!wanted.isWanted()) return;
+  session.enter("Encoding objects");
+  const std::vector<float> values = best.empty() ? trainer->meanValues() : best;
+  FlowObjectOptions options;
+  options.tokens = config().parts.back().most_tokens;
+  options.patches = wanted.patches;
+  options.in_order = wanted.in_order != 0;
+  begin(history.records.size());
+  flow = std::make_unique<FlowTrainer>(
+      flowSizes(wanted, config().sizes.latent_width), wanted.schedule, config().seed,
+      std::make_shared<const FlowObjects>(collection, learned_from, trainer->networks(), values,
+                                          options, &progress));
+  if (!flow_state.empty()) flow->resume(flow_state);
+  flow_state.clear();
+  session.enter("Flow");
+  while (!flow->isDone()) {
+    begin(history.records.size());
+    const Stopwatch one;
+    const FlowStep done = flow->step(&progress);
+    TrainingRecord record;
+    record.part = static_cast<uint32_t>(config().parts.size());
+    record.is_skipped = done.weights.is_skipped;
+    record.loss = static_cast<float>(done.loss);
+    record.learning_rate = static_cast<float>(done.weights.learning_rate);
+    record.gradient_norm = static_cast<float>(done.weights.gradient_norm);
+    record.seconds = static_cast<float>(one.seconds());
+    history.records.push_back(record);
+    show();
+    if (history.records.size() % config().checkpoint_interval == 0) save();
+  }
+}
+
 void TrainingSession::Work::takeSteps() {
-  const uint64_t steps = stepCount(config());
   while (!trainer->isDone()) {
     const uint64_t taken = history.records.size();
-    // What a step tells of itself moves nothing: it would go back and forth.
-    const double now = kReadShare + (kStepsShare - kReadShare) * static_cast<double>(taken) /
-                                        static_cast<double>(steps);
-    progress.enterPart(now, now);
-    progress.advance(0, "Learning");
+    begin(taken);
     const Stopwatch one;
     const AutoencoderStep done = trainer->step(&progress);
     if (taken == 0 || done.part != part_of_next) {
@@ -291,6 +342,10 @@ void TrainingSession::Work::finish() {
   }
   writeTrainedWeights(trainer->networks().tensors(values), settings(),
                       trainedWeightsPath(config().out));
+  if (flow) {
+    writeTrainedWeights(flow->tensors(flow->meanValues()), settings(),
+                        trainedFlowPath(config().out));
+  }
   writeTrainingReport(settings(), history, trainingReportPath(config().out));
   const std::lock_guard<std::mutex> lock(session.mutex_);
   session.by_budget_ = history.by_budget;
@@ -328,6 +383,7 @@ void TrainingSession::run(Progress& progress) {
   if (resumes_) work.restore();
   try {
     work.takeSteps();
+    work.learnFlow();
   } catch (const Error&) {
     if (!work.history.records.empty()) work.save();
     throw;

@@ -36,6 +36,7 @@ struct TrainingStatus {
 
 /// Where a training writes, in the folder of its results.
 std::string trainedWeightsPath(const std::string& out);
+std::string trainedFlowPath(const std::string& out);
 std::string trainingCheckpointPath(const std::string& out);
 std::string trainingReportPath(const std::string& out);
 
