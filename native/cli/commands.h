@@ -20,6 +20,7 @@ void addAdapt(CLI::App& app, const Context& context);
 void addFit(CLI::App& app, const Context& context);
 void addDensify(CLI::App& app, const Context& context);
 void addGenerate(CLI::App& app, const Context& context);
+void addRandom(CLI::App& app, const Context& context);
 void addEncode(CLI::App& app, const Context& context);
 void addTrain(CLI::App& app, const Context& context);
 void addCompare(CLI::App& app, const Context& context);

@@ -50,6 +50,7 @@ int run(int argc, char** argv) {
   addFit(app, context);
   addDensify(app, context);
   addGenerate(app, context);
+  addRandom(app, context);
   addTrain(app, context);
   addEncode(app, context);
   addCompare(app, context);

@@ -207,11 +207,14 @@ StageValues valuesOf(std::string name, std::span<const float> numbers) {
 }  // namespace
 
 struct GenerateSession::Work {
-  Work(ByteImage shown, std::optional<ByteImage> covered, const GenerateOptions& given)
+  Work(std::optional<ByteImage> shown, std::optional<ByteImage> covered,
+       const GenerateOptions& given)
       : image(std::move(shown)),
         mask(std::move(covered)),
         networks(given),
         options(networks.adapted(given)) {
+    // Nothing is followed where there is no image, and one call of the network is enough.
+    if (!image) options.guidance = std::min(options.guidance, 1.0);
     status.steps = options.steps;
   }
 
@@ -254,7 +257,7 @@ struct GenerateSession::Work {
     status.seconds_left = each * (status.steps - step);
   }
 
-  ByteImage image;
+  std::optional<ByteImage> image;
   std::optional<ByteImage> mask;
   Networks networks;
   GenerateOptions options;  ///< as the networks take them
@@ -268,10 +271,10 @@ struct GenerateSession::Work {
   std::shared_ptr<const KeyedFeatures> features;
 };
 
-GenerateSession::GenerateSession(ByteImage image, std::optional<ByteImage> mask,
+GenerateSession::GenerateSession(std::optional<ByteImage> image, std::optional<ByteImage> mask,
                                  const GenerateOptions& options) {
   requireOptions(options);
-  requireByteImage(image, "The image");
+  if (image) requireByteImage(*image, "The image");
   if (!options.checkpoint_path.empty()) requireCheckpointPlace(options.checkpoint_path);
   work_ = std::make_unique<Work>(std::move(image), std::move(mask), options);
 }
@@ -381,7 +384,8 @@ void GenerateSession::run(Progress& progress) {
 void GenerateSession::Work::run(Progress& progress) {
   const NetworkRun run = {.progress = &progress};
   progress.advance(0, "Preparing the image");
-  const PreparedImage prepared = prepareImage(image, mask ? &*mask : nullptr, options.preparation);
+  const PreparedImage prepared =
+      image ? prepareImage(*image, mask ? &*mask : nullptr, options.preparation) : PreparedImage();
   const std::string key = keyOf(networks, options, prepared);
   const std::vector<float> bytes(prepared.rgb.begin(), prepared.rgb.end());
   note("prepared", bytes);
@@ -396,6 +400,11 @@ void GenerateSession::Work::run(Progress& progress) {
   if (options.uses_mean_colour) noise.colour.clear();
   SamplerState state = firstState(key, noise);
 
+  if (!image) {
+    sample(run, networks.flow.emptyContext(run, networks.rows(options)), key, state,
+           {kPreparationShare, kSampledShare});
+    return finish(std::move(state.latent), key, progress);
+  }
   const std::string features_key = featuresKeyOf(networks, options, prepared);
   if (features && features->key != features_key) features = nullptr;
   const double encoding = features ? 0 : networks.encoderWork(size);

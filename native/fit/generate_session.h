@@ -47,16 +47,17 @@ struct GenerateEstimate {
   uint64_t weight_bytes = 0;
 };
 
-/// One image on its way to splats. run() works on one thread; all else may be called by others at
-/// any time.
+/// One image on its way to splats, or noise alone. run() works on one thread; all else may be
+/// called by others at any time.
 class GenerateSession {
  public:
   /// Looks through the weights folder and reads what of the networks is small.
-  /// In: mask: null, or as prepareImage() takes it.
+  /// In: image: null: an object that no image tells of; mask: null, or as prepareImage() takes it.
   /// Errors: kInvalidArgument for options out of range; those of findWeights() and
   /// requireWeights(); kFormat for files whose networks do not fit together; those of
   /// requireCheckpointPlace().
-  GenerateSession(ByteImage image, std::optional<ByteImage> mask, const GenerateOptions& options);
+  GenerateSession(std::optional<ByteImage> image, std::optional<ByteImage> mask,
+                  const GenerateOptions& options);
   ~GenerateSession();
 
   /// What the image encoders said in another session is taken over, where it was of the same

@@ -235,10 +235,17 @@ def test_an_image_becomes_splats_by_networks_of_ones_own(given, tmp_path):
     run('generate', view, again, '--weights', folder, '--steps', 10)
     run('generate', view, other, '--weights', folder, '--steps', 10, '--seed', 7)
     assert splats.read_bytes() == again.read_bytes() != other.read_bytes()
+    # Without an image, the seed alone tells what comes.
+    first, second = tmp_path / 'first.ply', tmp_path / 'second.ply'
+    for path, seed in ((first, 1), (second, 2)):
+        run('random', path, '--weights', folder, '--steps', 10, '--seed', seed)
+    assert first.read_bytes() != second.read_bytes()
     # A metre tall or wide, upright on the origin, as those of the published networks.
     info = json.loads(run('info', splats, '--json').stdout)
     sides = [high - low for low, high in zip(info['bounds_min'], info['bounds_max'])]
     assert 0.6 < max(sides) < 1.1
+    check = run('generate', view, splats, '--weights', folder, '--check', '--steps', 1).stdout
+    assert check.count('trained by stipple') == 2 and check.count('not needed') == 2
     # The decoder of another training does not fit, and says so.
     run('train', given('other.json', out='second', seed=3, parts=parts(structure=20)))
     shutil.copy(tmp_path / 'second/weights.safetensors', folder / 'weights.safetensors')

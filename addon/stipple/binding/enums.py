@@ -242,6 +242,8 @@ class WeightsState(IntEnum):
     UNCHECKED = 2
     PUBLISHED = 3
     OTHER_CONTENT = 4
+    TRAINED = 5
+    NOT_NEEDED = 6
 
 
 class NoiseSource(IntEnum):

@@ -37,11 +37,11 @@ class Generation(Job):
 
     @classmethod
     def start(cls, context, image, mask, options, encoded_by=None):
-        """image, mask: Image; mask may be None. encoded_by: None, or another Generation: what the image encoders said in
+        """image, mask: Image, or None: without an image, an object that the seed alone tells. encoded_by: None, or another Generation: what the image encoders said in
         it is used where the image and their files are the same."""
         options.encoded_by = None if encoded_by is None else encoded_by.pointer
         return cls(context.library, new_handle(context.library, 'stipple_generate_start', context.pointer,
-                                               image.pointer, None if mask is None else mask.pointer, byref(options)))
+                                               None if image is None else image.pointer, None if mask is None else mask.pointer, byref(options)))
 
     def figures(self):
         """StippleGenerateFigures as they are now. Never waits."""

@@ -16,6 +16,7 @@ class STIPPLE_MT_add(bpy.types.Menu):
         self.layout.operator('stipple.splats_from_mesh', text="From Selected Meshes", icon='MESH_DATA')
         self.layout.operator('stipple.splats_import', text="From File", icon='FILE')
         self.layout.operator('stipple.splats_from_image', text="From Image", icon='IMAGE_DATA')
+        self.layout.operator('stipple.random_splats', text="Random from Model", icon='SHADERFX')
         self.layout.operator('stipple.splats_from_render', text="From Render of Selected", icon='RENDER_STILL')
 
 

@@ -5,7 +5,7 @@ from ..binding.structs import WeightsState
 from ..scene.generate import weights_table
 from .text import draw_text
 
-_ICONS = {WeightsState.MISSING: 'X', WeightsState.OTHER_SIZE: 'ERROR', WeightsState.UNCHECKED: 'QUESTION',
+_ICONS = {WeightsState.TRAINED: 'CHECKMARK', WeightsState.NOT_NEEDED: 'BLANK1', WeightsState.MISSING: 'X', WeightsState.OTHER_SIZE: 'ERROR', WeightsState.UNCHECKED: 'QUESTION',
           WeightsState.PUBLISHED: 'CHECKMARK', WeightsState.OTHER_CONTENT: 'ERROR'}
 
 
@@ -26,7 +26,7 @@ def draw(layout, context, chosen):
     line.operator('stipple.weights_check', icon='CHECKMARK')
     if weights_table.source():
         draw_text(box, context, weights_table.source(), 'INFO')
-    draw_text(box, context, weights_table.NOT_TRIED, 'INFO')
+    draw_text(box, context, weights_table.caution(), 'INFO')
     for row in rows:
         draw_text(box, context, f"{row['label']}: {row['licence']}", is_quiet=True)
 

@@ -90,11 +90,11 @@ StippleStatus stipple_generate_start(StippleContext* context, const StippleImage
                                      const StippleGenerateOptions* options, StippleJob** job) {
   return guarded([&] {
     require(context, "context");
-    require(image, "image");
     require(job, "job");
-    std::optional<ByteImage> shown;
+    std::optional<ByteImage> seen, shown;
+    if (image) seen = toByteImage(*image->image);
     if (mask) shown = toMask(toByteImage(*mask->image));
-    auto session = std::make_shared<GenerateSession>(toByteImage(*image->image), std::move(shown),
+    auto session = std::make_shared<GenerateSession>(std::move(seen), std::move(shown),
                                                      generateOptionsFrom(*context, options));
     if (const StippleJob* other = encodedBy(options)) session->takeFeatures(sessionOf(other));
     context->state->requireMemory(session->memoryBound(), "this generation");

@@ -10,10 +10,12 @@ using namespace stipple::api;
 
 namespace {
 
-StippleWeightsFile fileTo(const WeightsFile& file, const PublishedWeights& published) {
+StippleWeightsFile fileTo(const WeightsFolder& folder, WeightsRole role) {
+  const WeightsFile& file = folder.of(role);
+  const PublishedWeights& published = publishedWeights()[static_cast<size_t>(role)];
   StippleWeightsFile out = {};
   out.role = static_cast<uint32_t>(published.role);
-  out.state = static_cast<uint32_t>(stateOf(file, published));
+  out.state = static_cast<uint32_t>(stateOf(folder, role));
   out.bytes = file.bytes;
   out.published_bytes = published.bytes;
   out.modified_ns = file.modified;
@@ -76,7 +78,7 @@ StippleStatus stipple_weights_file(const StippleWeights* weights, uint32_t role,
   return guarded([&] {
     const WeightsFolder& folder = *require(weights, "weights").folder;
     const auto wanted = enumValue<WeightsRole>(role, kWeightsRoleCount - 1, "role");
-    deliver(file, fileTo(folder.of(wanted), publishedWeights()[role]), "file");
+    deliver(file, fileTo(folder, wanted), "file");
   });
 }
 

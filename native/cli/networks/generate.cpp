@@ -155,7 +155,9 @@ void generate(const Context& context, const Arguments& arguments) {
   if (arguments.out.empty()) throw Failure("out is missing; splats or a model is expected");
   requireModelOrSplats(arguments.out);
   Pictures pictures;
-  pictures.image = make<Image>(stipple_image_load, context.get(), arguments.image.c_str());
+  if (!arguments.image.empty()) {
+    pictures.image = make<Image>(stipple_image_load, context.get(), arguments.image.c_str());
+  }
   if (!arguments.mask.empty()) {
     pictures.mask = make<Image>(stipple_image_load, context.get(), arguments.mask.c_str());
   }
@@ -172,20 +174,10 @@ void generate(const Context& context, const Arguments& arguments) {
   report.print(arguments.json);
 }
 
-}  // namespace
-
-void addGenerate(CLI::App& app, const Context& context) {
-  auto arguments = std::make_shared<Arguments>();
-  Arguments& to = *arguments;
-  CLI::App* command = app.add_subcommand(
-      "generate",
-      "An image to splats, by networks whose weights you download (docs/images_to_splats.md)");
-  command->add_option("image", to.image, "Image with alpha, or any with --mask")->required();
-  command->add_option("out", to.out,
-                      "The latent as a model (.stipple.safetensors), or splats (.ply and others)");
+/// What images and seeds have in common. In: command, to, which must outlive it.
+void addSettings(CLI::App* command, Arguments& to) {
   command->add_option("--weights", to.weights,
                       "Folder with the files of weights; default: that of the tool's --weights");
-  command->add_option("--mask", to.mask, "Image that is white, or opaque, on the object");
   command->add_option("--seed", to.seed)->capture_default_str();
   command
       ->add_option("--seeds", to.seeds,
@@ -198,20 +190,13 @@ void addGenerate(CLI::App& app, const Context& context) {
       ->check(CLI::IsMember({"keyed", "torch-cpu"}))
       ->capture_default_str();
   command->add_option("--steps", to.steps, "From noise to the object")->capture_default_str();
-  command->add_option("--guidance", to.guidance, "How closely the image is followed")
-      ->capture_default_str();
   command->add_option("--shift", to.shift, "Above 1: more steps where there is much noise")
       ->capture_default_str();
   command->add_option("--tokens", to.tokens, "Size of the latent")->capture_default_str();
-  command->add_option("--canvas", to.canvas, "Pixels of the image that networks see")
-      ->capture_default_str();
-  command->add_option("--erode", to.erode, "Pixels that the mask shrinks by")
-      ->capture_default_str();
   command
       ->add_option("--size", to.size,
                    "Metres of the largest side; 0: as the networks have it, around the origin")
       ->capture_default_str();
-  command->add_flag("--mean-colour", to.mean_colour, "No noise on the colours of the image");
   command->add_option("--anchors", to.anchors, "Splats: anchors, each of which becomes several");
   command->add_option(
       "--checkpoint", to.checkpoint,
@@ -222,7 +207,45 @@ void addGenerate(CLI::App& app, const Context& context) {
   command->add_flag("--timings", to.timings, "Seconds and operations of each stage");
   command->add_flag("--estimate", to.estimate, "Only says what it would take");
   command->add_flag("--json", to.json, "Figures as JSON");
+}
+
+void addCommand(CLI::App* command, const std::shared_ptr<Arguments>& arguments,
+                const Context& context) {
   command->callback([arguments, &context] { generate(context, *arguments); });
+}
+
+}  // namespace
+
+void addGenerate(CLI::App& app, const Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  Arguments& to = *arguments;
+  CLI::App* command = app.add_subcommand("generate",
+                                         "An image to splats, by networks whose weights you "
+                                         "download (docs/images_to_splats.md) or train "
+                                         "(docs/training.md)");
+  command->add_option("image", to.image, "Image with alpha, or any with --mask")->required();
+  command->add_option("out", to.out,
+                      "The latent as a model (.stipple.safetensors), or splats (.ply and others)");
+  command->add_option("--mask", to.mask, "Image that is white, or opaque, on the object");
+  command->add_option("--guidance", to.guidance, "How closely the image is followed")
+      ->capture_default_str();
+  command->add_option("--canvas", to.canvas, "Pixels of the image that networks see")
+      ->capture_default_str();
+  command->add_option("--erode", to.erode, "Pixels that the mask shrinks by")
+      ->capture_default_str();
+  command->add_flag("--mean-colour", to.mean_colour, "No noise on the colours of the image");
+  addSettings(command, to);
+  addCommand(command, arguments, context);
+}
+
+void addRandom(CLI::App& app, const Context& context) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "random", "Splats of an object that only the seed tells of, by the networks of 'generate'");
+  command->add_option("out", arguments->out,
+                      "The latent as a model (.stipple.safetensors), or splats (.ply and others)");
+  addSettings(command, *arguments);
+  addCommand(command, arguments, context);
 }
 
 }  // namespace stipple::cli

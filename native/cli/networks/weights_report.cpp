@@ -16,6 +16,10 @@ const char* stateText(uint32_t state) {
       return "as published";
     case STIPPLE_WEIGHTS_OTHER_CONTENT:
       return "another content than the published file";
+    case STIPPLE_WEIGHTS_TRAINED:
+      return "trained by stipple";
+    case STIPPLE_WEIGHTS_NOT_NEEDED:
+      return "not needed";
     default:
       return "not checked";
   }

@@ -2394,7 +2394,9 @@ typedef enum StippleWeightsState {
   STIPPLE_WEIGHTS_OTHER_SIZE = 1,    /* the names of its tensors are right, its size is not the published one's */
   STIPPLE_WEIGHTS_UNCHECKED = 2,     /* of the published size; nobody has compared its content yet */
   STIPPLE_WEIGHTS_PUBLISHED = 3,     /* its SHA-256 is that of the published file */
-  STIPPLE_WEIGHTS_OTHER_CONTENT = 4  /* its SHA-256 is another one */
+  STIPPLE_WEIGHTS_OTHER_CONTENT = 4, /* its SHA-256 is another one */
+  STIPPLE_WEIGHTS_TRAINED = 5,       /* of a training of ours (stipple_train_start) */
+  STIPPLE_WEIGHTS_NOT_NEEDED = 6     /* an encoder of images, where the flow network was trained by us */
 } StippleWeightsState;
 
 /* Texts live as long as the handle that they were asked of. */
@@ -2505,7 +2507,7 @@ typedef struct StippleGenerateStage {
 } StippleGenerateStage;
 
 /* Turns the object in an image into a latent, which decodes to splats at any budget (stipple_job_model), as a job.
- * In: image: RGB or RGBA; mask: NULL, or an image of any size that is opaque or white on the object and is used in
+ * In: image: RGB or RGBA, or NULL: an object that no image tells of, another one for each seed; mask: NULL, or an image of any size that is opaque or white on the object and is used in
  * place of the image's alpha.
  * The object comes out upright (z up), its pictured side towards +x.
  * Errors: INVALID_ARGUMENT for files of weights that are missing, for an image that is opaque everywhere without a

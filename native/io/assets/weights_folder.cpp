@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "io/assets/weight_file.h"
 #include "io/bytes/input_file.h"
 #include "io/bytes/safetensors.h"
 #include "io/bytes/sha256.h"
@@ -104,9 +105,17 @@ const char* publishedWeightsSource() {
 
 WeightsState stateOf(const WeightsFile& file, const PublishedWeights& published) {
   if (file.path.empty()) return WeightsState::kMissing;
+  if (file.is_trained) return WeightsState::kTrained;
   if (file.bytes != published.bytes) return WeightsState::kOtherSize;
   if (file.sha256.empty()) return WeightsState::kUnchecked;
   return file.sha256 == published.sha256 ? WeightsState::kPublished : WeightsState::kOtherContent;
+}
+
+WeightsState stateOf(const WeightsFolder& folder, WeightsRole role) {
+  const bool is_encoder =
+      role == WeightsRole::kStructureEncoder || role == WeightsRole::kColourEncoder;
+  if (is_encoder && folder.of(WeightsRole::kFlow).is_trained) return WeightsState::kNotNeeded;
+  return stateOf(folder.of(role), publishedWeights()[static_cast<size_t>(role)]);
 }
 
 std::optional<WeightsRole> weightsRole(std::span<const std::string> tensor_names) {
@@ -151,8 +160,10 @@ WeightsFolder findWeights(const std::string& folder) {
   std::array<size_t, kWeightsRoleCount> counts = {};
   for (const std::string& path : weightFilesBelow(folder)) {
     std::vector<std::string> names;
+    bool is_trained = false;
     try {
       const SafeTensorsReader reader(path);
+      is_trained = reader.metadata().count(kTrainedKey) != 0;
       for (const auto& [name, tensor] : reader.tensors()) names.push_back(name);
     } catch (const Error& error) {
       found.notes.push_back(std::string(error.what()) + ".");
@@ -163,6 +174,7 @@ WeightsFolder findWeights(const std::string& folder) {
     const auto index = static_cast<size_t>(*role);
     ++counts[index];
     WeightsFile file = statusOf(path);
+    file.is_trained = is_trained;
     if (isBetter(file, found.files[index], publishedWeights()[index])) {
       found.files[index] = std::move(file);
     }

@@ -38,11 +38,19 @@ struct WeightsFile {
   int64_t modified = 0;  ///< nanoseconds since 1970
   /// Of the content, 64 hexadecimal digits, where hashWeights() has read it.
   std::string sha256;
+  bool is_trained = false;  ///< here (weight_file.h, kTrainedKey)
 };
 
 /// What a file is, compared with the published one of its role.
-enum class WeightsState : uint32_t { kMissing, kOtherSize, kUnchecked, kPublished, kOtherContent };
-WeightsState stateOf(const WeightsFile& file, const PublishedWeights& published);
+enum class WeightsState : uint32_t {
+  kMissing,
+  kOtherSize,
+  kUnchecked,
+  kPublished,
+  kOtherContent,
+  kTrained,    ///< of a training here
+  kNotNeeded,  ///< there is none, and the flow network, which was trained here, needs none
+};
 
 /// The files of a folder that turn images into splats.
 struct WeightsFolder {
@@ -53,6 +61,10 @@ struct WeightsFolder {
 
   const WeightsFile& of(WeightsRole role) const { return files[static_cast<size_t>(role)]; }
 };
+
+/// Of the file by itself, and among the others.
+WeightsState stateOf(const WeightsFile& file, const PublishedWeights& published);
+WeightsState stateOf(const WeightsFolder& folder, WeightsRole role);
 
 /// Which role the names of a file's tensors tell, whatever it is called and wherever it lies.
 std::optional<WeightsRole> weightsRole(std::span<const std::string> tensor_names);

@@ -22,6 +22,7 @@ CANVASES = (('1024', "1024", "What the networks were trained with last"),
 class GenerateOperator(JobOperator):
     """Mix-in. The operator gives start(context) → ImageTask, and places objects by _matrix(index)."""
 
+    shown_settings = 'steps', 'guidance', 'tokens', 'canvas', 'seed', 'seed_count', 'anchors', 'show_previews'
     escape_text = 'Esc stops; the same settings go on from there'
 
     steps: IntProperty(name="Steps", description="Steps from noise to the object. Time grows with them", default=20,
@@ -124,7 +125,7 @@ class GenerateOperator(JobOperator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
-        for name in ('steps', 'guidance', 'tokens', 'canvas', 'seed', 'seed_count', 'anchors', 'show_previews'):
+        for name in self.shown_settings:
             column.prop(self, name)
         box = layout.box()
         if not weights_table.is_complete():
@@ -139,4 +140,4 @@ class GenerateOperator(JobOperator):
         seconds = cost.image_seconds + self.seed_count * (cost.seconds - cost.image_seconds)
         draw_text(box, context, f'About {duration(seconds)} and {size(cost.bytes)} of memory here',
                   'TIME', width_px=width_px)
-        draw_text(box, context, weights_table.NOT_TRIED, 'INFO', width_px=width_px)
+        draw_text(box, context, weights_table.caution(), 'INFO', width_px=width_px)

@@ -31,7 +31,7 @@ class STIPPLE_OT_weights_check(JobOperator, bpy.types.Operator):
     def finish(self, _context, job):
         weights_table.keep_checked(job)
         found = [row for row in weights_table.rows() if row['path']]
-        others = [row['label'] for row in found if row['state'] != WeightsState.PUBLISHED]
+        others = [row['label'] for row in found if row['state'] not in (WeightsState.PUBLISHED, WeightsState.TRAINED, WeightsState.NOT_NEEDED)]
         if others:
             self.report({'WARNING'}, f"Not the published files: {', '.join(others)}")
         else:

@@ -15,7 +15,10 @@ _KEPT = ('label', 'path', 'size', 'published_size', 'modified', 'published_path'
 STATE_TEXTS = {WeightsState.MISSING: "Missing", WeightsState.OTHER_SIZE: "Another size than the published file",
                WeightsState.UNCHECKED: "Size as published, content not checked",
                WeightsState.PUBLISHED: "As published, SHA-256 checked",
-               WeightsState.OTHER_CONTENT: "SHA-256 differs from the published file's"}
+               WeightsState.OTHER_CONTENT: "SHA-256 differs from the published file's",
+               WeightsState.TRAINED: "Trained by Stipple", WeightsState.NOT_NEEDED: "Not needed"}
+_OWN = WeightsState.TRAINED, WeightsState.NOT_NEEDED
+OWN_NETWORKS = "These networks were trained by Stipple: they know the objects of their collection, and nothing else."
 NOT_TRIED = ("The structure of these networks was verified on small ones with random weights. We have never run the "
              "published weights.")
 
@@ -23,6 +26,11 @@ NOT_TRIED = ("The structure of these networks was verified on small ones with ra
 def folder():
     """The weights folder of Preferences, '' for none."""
     return preferences.weights_folder()
+
+
+def caution():
+    """What who uses the networks should know."""
+    return OWN_NETWORKS if is_trained() else NOT_TRIED
 
 
 def rows():
@@ -38,6 +46,11 @@ def notes():
 def source():
     """Where users get the files, '' where it is not known yet."""
     return _stored().get('source', '')
+
+
+def is_trained():
+    """Whether the networks were trained by Stipple, and know what was in its collection alone."""
+    return any(row['state'] == WeightsState.TRAINED for row in rows())
 
 
 def is_complete():
@@ -75,6 +88,7 @@ def _keep(found):
     for file in found.files():
         row = {name: getattr(file, name) for name in _KEPT}
         row['sha256'] = row['sha256'] or known.get(_key(row), '')
+        row['own'] = int(file.state) if file.state in _OWN else None
         files.append(row)
     chosen = preferences.get()
     chosen.weights_table = json.dumps({'folder': folder(), 'files': files, 'notes': found.notes(),
@@ -87,6 +101,8 @@ def _key(row):
 
 def _state_of(row):
     """As the library judges it; of what is kept."""
+    if row.get('own') is not None:
+        return WeightsState(row['own'])
     if not row['path']:
         return WeightsState.MISSING
     if row['size'] != row['published_size']:

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects that no image tells of: each seed gives another one."""
+
+import bpy
+from bpy.props import FloatProperty
+
+from ...scene.generate import image_task, placing
+from .generating import GenerateOperator
+
+
+class STIPPLE_OT_random_splats(GenerateOperator, bpy.types.Operator):
+    """Make splats of an object of the kind that the networks have learned, another one for each seed"""
+
+    bl_idname = 'stipple.random_splats'
+    bl_label = "Random Splats from Model"
+    bl_options = {'REGISTER', 'UNDO', 'PRESET'}
+
+    shown_settings = 'steps', 'tokens', 'seed', 'seed_count', 'anchors', 'show_previews'
+
+    size: FloatProperty(name="Size", description="Length of the object's largest side", default=1.0, min=0.001,
+                        soft_max=100.0, unit='LENGTH')
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT'
+
+    def execute(self, context):
+        if bpy.app.background or not self._asked:
+            return super().execute(context)
+        return self.run_in_window(context)
+
+    _asked = False
+
+    def invoke(self, context, _event):
+        self._asked = True
+        return context.window_manager.invoke_props_dialog(self, width=420)
+
+    def start(self, context):
+        self._location = tuple(context.scene.cursor.location)
+        return image_task.ImageTask(None, None, b'random', self._settings(self.size), self.seed_count, self.anchors)
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, 'size')
+        self._draw_settings(self.layout, context, width_px=420)
+
+    def _name(self):
+        return 'Random Splats'
+
+    def _matrix(self, index):
+        return placing.beside(self._location, self.size, index, self.seed_count)
+
+
+classes = (STIPPLE_OT_random_splats,)
