@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every difference between Blender versions (3.4 to 5.x), in one place."""
 
+import contextlib
 import ctypes
 import os
 
@@ -33,6 +34,10 @@ OBJECT_INDEX_PASS = 'Object Index' if VERSION >= (5, 0, 0) else 'IndexOB'
 # A Cycles without a denoiser leaves an image as it is that shall be denoised; before, it fails when it has drawn it.
 CYCLES_PASSES_OVER_DENOISING = VERSION >= (5, 0, 0)
 EEVEE_ENGINE = 'BLENDER_EEVEE_NEXT' if (4, 2, 0) <= VERSION < (5, 0, 0) else 'BLENDER_EEVEE'
+# Operators that read meshes of files: those for PLY and STL have become Blender's own.
+MESH_IMPORTERS = {'.glb': 'import_scene.gltf', '.gltf': 'import_scene.gltf', '.obj': 'wm.obj_import',
+                  '.ply': 'wm.ply_import' if VERSION >= (4, 0, 0) else 'import_mesh.ply',
+                  '.stl': 'wm.stl_import' if VERSION >= (4, 1, 0) else 'import_mesh.stl'}
 
 
 def panorama_settings(camera):
@@ -166,6 +171,19 @@ def pixel_border(border_minimum, border_maximum, size):
     low = int(np.float32(border_minimum) * np.float32(size))
     high = int(np.float32(border_maximum) * np.float32(size))
     return low, max(high, low + 1)
+
+
+@contextlib.contextmanager
+def importing():
+    """Importers of meshes work while this lasts: that of glTF in 3.4 asks numpy for a name that it has lost since."""
+    is_missing = 'bool' not in vars(np)
+    if is_missing:
+        np.bool = bool
+    try:
+        yield
+    finally:
+        if is_missing:
+            del np.bool
 
 
 def use_nodes(material):

@@ -21,17 +21,32 @@ class MatteTask:
         self.opacity = opacity  # [H,W] share of each pixel's samples that a mesh hides
 
 
+def start_depth(context, placed, camera):
+    """Starts measuring how far meshes [(mesh, 4x4 object to world)] are through the centre of each pixel; they must
+    outlive the start only. The task has no opacity."""
+    depth = np.empty((camera.height, camera.width), np.float32)
+    array = _instances(placed)
+    job = Job(context.library, new_handle(context.library, 'stipple_mesh_depth_start', context.pointer, array,
+                                          len(placed), byref(camera), pointer_to(depth)), keep=(depth, array))
+    return MatteTask(job, depth, None)
+
+
 def start_matte(context, placed, camera, side):
     """Starts drawing what meshes [(mesh, 4x4 object to world)] hide, with side x side samples for each pixel; they must
     outlive the start only."""
     depth, opacity = (np.empty((camera.height, camera.width), np.float32) for _ in range(2))
-    array = (StippleMeshInstance * max(len(placed), 1))()
-    for entry, (mesh, matrix) in zip(array, placed):
-        entry.__init__(mesh=mesh.pointer, matrix=matrix16(matrix))
+    array = _instances(placed)
     job = Job(context.library, new_handle(context.library, 'stipple_mesh_matte_start', context.pointer, array,
                                           len(placed), byref(camera), side, pointer_to(depth), pointer_to(opacity)),
               keep=(depth, opacity, array))
     return MatteTask(job, depth, opacity)
+
+
+def _instances(placed):
+    array = (StippleMeshInstance * max(len(placed), 1))()
+    for entry, (mesh, matrix) in zip(array, placed):
+        entry.__init__(mesh=mesh.pointer, matrix=matrix16(matrix))
+    return array
 
 
 class Mesh(Handle):
