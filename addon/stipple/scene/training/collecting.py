@@ -133,8 +133,8 @@ class CollectTask:
             surface = studio.surface()
             folder.begin({**asdict(settings), 'asset': asset.stamp()})
             poses = sphere.poses(settings.view_count, seed)
-            places, normals, faces = surface.points(settings.point_count, seed)
-            colours = PointColours(places, faces, surface.mesh())
+            places, normals, triangles = surface.points(settings.point_count, seed)
+            colours = PointColours(places, triangles, surface.faces[triangles], surface.mesh())
             brightest = opaquest = 0.0
             for view, pose in enumerate(poses):
                 yield view / settings.view_count, f'view {view + 1} of {settings.view_count}'

@@ -12,17 +12,23 @@ from . import sphere
 _COVERED = 0.5
 # Cosine of the flattest angle under which a point is seen: its plane says nothing of the pixel's depth beyond it.
 _FLATTEST = 0.02
+# Of a pixel's width: how far the depth that a point has there may be from the measured one.
+_AGREEMENT = 0.25
+# A triangle is turned where images see the back of its points so many times as much as their front. Along edges a pixel
+# now and then is of another face; of two sheets that lie together, each has its front.
+_TURNED = 4
 
 
 class PointColours:
-    """Adds up what images show of points. In: places [N,3], normals of their faces [N,3], a native mesh that hides
-    them.
+    """Adds up what images show of points. In: places [N,3], triangles that they lie on [N], normals of these [N,3], a
+    native mesh that hides them.
 
-    An image counts with the cosine between normal and view. Of a point that is seen from behind alone, since its face
-    is turned inwards, those images count.
+    An image counts with the cosine between normal and view. Of a triangle that is seen from behind, since it is turned
+    inwards, those images count.
     """
 
-    def __init__(self, places, normals, mesh):
+    def __init__(self, places, triangles, normals, mesh):
+        self._triangles = triangles
         self._places, self._normals, self._mesh = places, normals, mesh
         self._front, self._back = (np.zeros((len(places), 4)) for _ in range(2))  # r g b weight
 
@@ -42,16 +48,17 @@ class PointColours:
         steep = np.abs(cosines) > _FLATTEST
         slopes = (normals * rays).sum(1)
         depths = np.where(steep, (normals * local).sum(1) / np.where(steep, slopes, 1), np.inf)
-        agrees = np.abs(depths - self._depth(pose, size)[y, x]) < ahead / focal  # a pixel's width there
+        agrees = np.abs(depths - self._depth(pose, size)[y, x]) < _AGREEMENT * ahead / focal
         sees = inside & agrees & (image[y, x, 3] > _COVERED)
         for sums, weights in ((self._front, cosines), (self._back, -cosines)):
             weights = np.where(sees, np.maximum(weights, 0), 0)[:, None]
             sums += weights * np.concatenate([image[y, x, :3], np.ones((len(x), 1))], 1)
 
     def result(self):
-        """(display colours [N,3], turned [N]: True for points that are seen from behind alone), or None where no image
-        sees any point."""
-        turned = (self._front[:, 3] == 0) & (self._back[:, 3] > 0)
+        """(display colours [N,3], turned [N]: True where triangles are seen from behind), or None where no image sees
+        any point."""
+        front, back = (np.bincount(self._triangles, sums[:, 3]) for sums in (self._front, self._back))
+        turned = (back > _TURNED * front)[self._triangles]
         sums = np.where(turned[:, None], self._back, self._front)
         seen = sums[:, 3] > 0
         if not seen.any():

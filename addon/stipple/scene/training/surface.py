@@ -38,7 +38,7 @@ class Surface:
         return mesh
 
     def points(self, count, seed):
-        """(places [N,3], shading normals [N,3], normals of faces [N,3]), as many for each piece of area as for another.
+        """(places [N,3], shading normals [N,3], triangles [N]), as many for each piece of area as for another.
 
         Even steps of area are the first coordinate in a triangle and multiples of the golden ratio the second: a
         lattice in each triangle that has many.
@@ -52,7 +52,7 @@ class Surface:
         root = np.sqrt(along)
         weights = np.stack([1 - root, root * (1 - across), root * across], 1)[:, None]
         places = (weights @ self.corners[chosen])[:, 0]
-        return places, _unit((weights @ self.normals[chosen])[:, 0], self.faces[chosen]), self.faces[chosen]
+        return places, _unit((weights @ self.normals[chosen])[:, 0], self.faces[chosen]), chosen
 
 
 def read(scene):
