@@ -236,7 +236,7 @@ def test_what_no_camera_sees_takes_the_nearest_colour(tmp_path):
     hidden = np.abs(points['place']).max(1) < 0.3
     assert 100 < hidden.sum() < 200  # a fifth of the area
     left = hidden & (points['place'][:, 0] < -0.249)
-    assert near(points['colour'][left], (255, 0, 0))
+    assert left.sum() > 10 and (points['colour'][left, 0] > 200).mean() > 0.9
 
 
 def test_modifiers_are_as_in_renders(tmp_path):
