@@ -249,12 +249,15 @@ def test_modifiers_are_as_in_renders(tmp_path):
 
 
 def test_each_object_of_a_collection_with_its_children_is_an_asset(tmp_path):
-    first, second, child, hidden = (box(name) for name in ('First', 'Second', 'Child', 'Hidden'))
+    first, second, child, hidden, third, fourth = (box(name) for name in ('First', 'Second', 'Child', 'Hidden', 'Third',
+                                                                         'Fourth'))
+    pair = scenes.link(bpy.data.objects.new('Pair', None))
+    third.parent = fourth.parent = pair
     child.parent, child.location = second, (3, 0, 0)
     child.scale = (0.5, 0.5, 0.5)
     hidden.hide_render = True
-    collect(tmp_path, first, second, child, hidden)
-    assert sorted(os.listdir(tmp_path)) == ['First', 'Second']
+    collect(tmp_path, first, second, child, hidden, third, fourth, pair)
+    assert sorted(os.listdir(tmp_path)) == ['First', 'Pair', 'Second']
     width = np.ptp(points_of(tmp_path / 'Second')['place'], axis=0)
     np.testing.assert_allclose(width, (1, 2 / 4.5, 2 / 4.5), atol=0.01)
 

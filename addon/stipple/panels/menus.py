@@ -113,7 +113,7 @@ def _draw_external_data(self, _context):
 
 def _draw_export(self, _context):
     self.layout.operator('stipple.splats_export', text="Gaussian Splats")
-    self.layout.operator('stipple.collect_for_training', text="Views and Points of Objects, for Training")
+    self.layout.operator('stipple.collect_for_training', text="Images and Points for Training")
 
 
 _MENUS = (('VIEW3D_MT_add', _draw_add), ('VIEW3D_MT_object_convert', _draw_convert),

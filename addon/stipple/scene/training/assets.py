@@ -104,10 +104,10 @@ def of_folder(folder, left_out=''):
 def of_collection(collection):
     """The assets of a collection, by name: each object that hangs on no other of it, with what hangs on it. Errors:
     StippleError where it has none that can be rendered, or one in Edit Mode."""
-    shown = [obj for obj in _shown_of(collection) if obj.type not in _UNSEEN]
+    members, shown = set(collection.all_objects), _shown_of(collection)
     tops = {}
     for obj in shown:
-        tops.setdefault(_top(obj, set(shown)), []).append(obj)
+        tops.setdefault(_top(obj, members), []).append(obj)
     groups = [(top.name, tuple(group)) for top, group in tops.items() if any(map(adapting.can_render, group))]
     if not groups:
         raise invalid(f"Collection '{collection.name}' has nothing that can be rendered; meshes that are shown in "
