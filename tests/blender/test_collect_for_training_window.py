@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Collect for Training in a window on a virtual screen: Esc, once more, and that the window shows the file as before."""
+"""Collect for Training in a window on a virtual screen: Esc, once more, and that the window is as before."""
 
 from pathlib import Path
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Proves collect_array.sh with a real Slurm: one node, this machine, of a temporary folder, and an array of two tasks over
-# four small meshes. As root, with Debian's Slurm (apt-get install --no-install-recommends slurmctld slurmd slurm-client
-# munge), Blender and a built library. Installs nothing, needs no network, and ends what it has started.
+# Proves collect_array.sh with a real Slurm: one node, this machine, of a temporary folder, and an array of two tasks
+# over four small meshes. As root, with Debian's Slurm (apt-get install --no-install-recommends slurmctld slurmd
+# slurm-client munge), Blender and a built library. Installs nothing, needs no network, and ends what it has started.
 #   bash tests/farm/prove_slurm.sh
 # STIPPLE_BUILD_DIR: where the library is built, else build/release. Exit 77: something is missing, and which.
 set -euo pipefail
@@ -86,7 +86,8 @@ job=$(sbatch --parsable --array=0-1 --cpus-per-task=1 --export=ALL "$root/tests/
   "$work/assets" "$work/out" --views 8 --size 64 --samples 4 --points 1000)
 echo "Submitted array $job of two tasks over four meshes"
 for _ in $(seq 300); do
-  left=$(squeue --noheader --array --jobs="$job" --states=all --format=%T 2> /dev/null | grep -Evc 'COMPLETED|FAILED' || true)
+  left=$(squeue --noheader --array --jobs="$job" --states=all --format=%T 2> /dev/null |
+    grep -Evc 'COMPLETED|FAILED' || true)
   [[ $left == 0 ]] && break
   sleep 1
 done
