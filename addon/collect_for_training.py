@@ -9,10 +9,10 @@ The library is the one of the environment variable STIPPLE_LIBRARY, else the add
 with 0, with 1 where nothing could be collected, and with 2 where its arguments are not understood.
 """
 import argparse
-import contextlib
 import os
 import pathlib
 import sys
+import traceback
 
 HERE = pathlib.Path(__file__).resolve().parent
 BUILT = HERE.parent / 'build' / 'release' / 'lib' / 'libstipple.so'
@@ -25,19 +25,13 @@ from stipple.binding.errors import StippleError  # noqa: E402 (lies beside this 
 from stipple.scene.training import assets, collecting  # noqa: E402
 
 
-@contextlib.contextmanager
-def terminal():
-    """A function that prints a line, while Blender's own lines about every sample and file go nowhere."""
+def quiet_terminal():
+    """A function that prints a line, while all that Blender says from now on, of samples and files, goes nowhere."""
     sys.stdout.flush()
     kept, silence = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(silence, 1)
-    try:
-        yield lambda line: os.write(kept, f'{line}\n'.encode())
-    finally:
-        sys.stdout.flush()
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(silence)
+    os.close(silence)
+    return lambda line: os.write(kept, f'{line}\n'.encode())
 
 
 def read_arguments():
@@ -73,15 +67,20 @@ def main():
     try:
         found = assets.of_folder(os.path.abspath(arguments.assets), left_out=folder)
         mine = collecting.chosen(found, arguments.index, arguments.of)
-        with terminal() as say:
-            task = collecting.CollectTask(mine, folder, settings, say)
-            task.wait()
+        say = quiet_terminal()
+        task = collecting.CollectTask(mine, folder, settings, say)
+        task.wait()
     except StippleError as error:
         print(error, file=sys.stderr)
         return 1
     collected = task.result
-    print(f'{len(mine)} of {len(found)} assets: {collected.summary()}, in {folder}', flush=True)
+    say(f'{len(mine)} of {len(found)} assets: {collected.summary()}, in {folder}')
     return 1 if mine and not collected.done and not collected.kept else 0
 
 
-sys.exit(main())
+try:
+    CODE = main()
+except Exception:  # after which Blender itself would end with 0
+    traceback.print_exc()
+    CODE = 1
+sys.exit(CODE)

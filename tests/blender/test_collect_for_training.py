@@ -454,6 +454,22 @@ def test_black_and_empty_objects_are_left_out(stipple, tmp_path, capfd):
     assert os.listdir(tmp_path) == ['Fine']
 
 
+def test_an_object_that_fails_oddly_does_not_end_the_others(stipple, tmp_path, monkeypatch, capfd, caplog):
+    surface, first, second = module(stipple, 'surface'), box('First'), box('Second')
+    read, calls = surface.read, []
+
+    def fails_first(scene):
+        calls.append(scene)
+        return read(scene) if len(calls) > 1 else 1 // 0
+
+    monkeypatch.setattr(surface, 'read', fails_first)
+    before = len(bpy.data.scenes)
+    collect(tmp_path, first, second)
+    said = capfd.readouterr().out
+    assert 'First: left out: ZeroDivisionError: ' in said and 'fails_first' in caplog.text
+    assert os.listdir(tmp_path) == ['Second'] and len(bpy.data.scenes) == before
+
+
 def test_messages(stipple, tmp_path):
     operator = bpy.ops.stipple.collect_for_training
     out = str(tmp_path / 'out')

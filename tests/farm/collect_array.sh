@@ -18,5 +18,5 @@ if [[ -z ${SLURM_ARRAY_TASK_ID:-} || ${SLURM_ARRAY_TASK_MIN:-0} != 0 ]]; then
   exit 2
 fi
 # Blender sees the processors of the whole machine, and not those that Slurm has given it.
-exec "${STIPPLE_BLENDER:-blender}" -b --factory-startup -t "${SLURM_CPUS_PER_TASK:-1}" -P "$script" -- "$@" \
-  --index "$SLURM_ARRAY_TASK_ID" --of "$SLURM_ARRAY_TASK_COUNT"
+exec "${STIPPLE_BLENDER:-blender}" -b --factory-startup --python-exit-code 1 -t "${SLURM_CPUS_PER_TASK:-1}" \
+  -P "$script" -- "$@" --index "$SLURM_ARRAY_TASK_ID" --of "$SLURM_ARRAY_TASK_COUNT"

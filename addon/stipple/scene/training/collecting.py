@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Collects assets, one after the other: what is there already stays, and what cannot be collected is left out."""
 
+import logging
 import os
 import time
 import zlib
@@ -14,6 +15,8 @@ from .asset_folder import AssetFolder
 from .assets import LeftOutError
 from .point_colours import PointColours
 from .studio import Studio
+
+log = logging.getLogger('stipple')
 
 
 @dataclass(frozen=True)
@@ -118,12 +121,15 @@ class CollectTask:
     def _collect(self, asset, folder):
         try:
             yield from self._steps_of(asset, folder)
-        except CancelledError:
+        except (CancelledError, LeftOutError):
             raise
         except StippleError as error:
             raise LeftOutError(str(error).rstrip('.')) from None
         except OSError as error:
             raise LeftOutError(f'it cannot be written: {error.strerror or error}') from None
+        except Exception as error:  # one odd file of thousands must not end the work of a night
+            log.exception("'%s' could not be collected", asset.name)
+            raise LeftOutError(f'{type(error).__name__}: {error}') from None
 
     def _steps_of(self, asset, folder):
         settings = self._settings
