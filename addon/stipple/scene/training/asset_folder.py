@@ -70,9 +70,11 @@ class AssetFolder:
 
     def add_image(self, view, render):
         """render(path) writes it."""
-        path = self._image_path(view)
-        render(path + '.part')
-        os.replace(path + '.part', path)
+        name = f'{IMAGES}/{view:04}.png'
+        render(self._at(f'{name}.part'))
+        with open(self._at(f'{name}.part'), 'rb') as file:
+            content = file.read()
+        self._write(name, _without_notes(content))
 
     def finish(self, size, poses, points, asset):
         """points: (places [N,3], normals [N,3], display colours [N,3]). asset: the Surface."""
@@ -107,6 +109,7 @@ class AssetFolder:
                 os.remove(os.path.join(self._at(IMAGES), name))
 
     def _write(self, name, content):
+        """Under another name first."""
         path = self._at(name)
         with open(path + '.part', 'wb') as file:
             file.write(content)
@@ -117,3 +120,15 @@ class AssetFolder:
 
     def _at(self, name):
         return os.path.join(self._path, name)
+
+
+def _without_notes(png):
+    """A PNG file without the chunks that its pixels do not need: Blender notes there when, and in what time, it has
+    rendered, so that no two files were the same."""
+    kept, at = [png[:8]], 8
+    while at < len(png):
+        end = at + 12 + int.from_bytes(png[at:at + 4], 'big')
+        if png[at + 4:at + 5].isupper():
+            kept.append(png[at:end])
+        at = end
+    return b''.join(kept)

@@ -95,9 +95,6 @@ class Studio:
         render.film_transparent = render.use_persistent_data = True
         render.use_file_extension = render.use_compositing = render.use_sequencer = False
         render.dither_intensity = 0.0
-        for setting in render.bl_rna.properties.keys():
-            if setting.startswith('use_stamp'):
-                setattr(render, setting, False)  # files that say when they were written are never the same
         scene.display_settings.display_device = 'sRGB'
         scene.view_settings.view_transform, scene.view_settings.look = 'Standard', 'None'
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
