@@ -275,3 +275,31 @@ def test_a_flow_goes_on_bit_for_bit(given, tmp_path):
     ({'step': 1}, "'flow.step' is not known; 'flow.steps' is the nearest that is")])
 def test_a_flow_that_cannot_be_trained_is_refused(given, changes, message):
     assert message in error('train', given(flow={**FLOW, **changes}))
+
+
+def test_a_flow_begins_with_networks_that_are_there(given, tmp_path):
+    run('train', given('first.json', out='first', parts=parts(structure=30, attributes=120)))
+    first = tmp_path / 'first/weights.safetensors'
+    fields = {key: value for key, value in config(out='second', start='first/weights.safetensors', flow=FLOW).items()
+              if key not in ('network', 'parts')}
+    path = tmp_path / 'second.json'
+    path.write_text(json.dumps(fields))
+    seen = json.loads(run('train', path, '--json').stdout)
+    assert seen['steps'] == 120
+    report = json.loads((tmp_path / 'second/report.json').read_text())
+    before = json.loads((tmp_path / 'first/report.json').read_text())
+    # The autoencoder stays as it was.
+    assert [row['psnr'] for row in report['by_budget']] == [row['psnr'] for row in before['by_budget']]
+    run('generate', tmp_path / 'objects/balls/2/images/0000.png', tmp_path / 'x.ply', '--weights', tmp_path / 'second',
+        '--steps', 4)
+    # With parts, it is learned further.
+    path.write_text(json.dumps({**fields, 'out': 'third', 'parts': parts(attributes=60), 'flow': {}}))
+    seen = json.loads(run('train', path, '--json').stdout)
+    assert seen['steps'] == 60 and seen['held_out_psnr_128_anchors'] > before['by_budget'][-1]['psnr'] - 0.5
+    for changes, message in (({'flow': {}}, 'the flow alone is learned'),
+                             ({'network': {'heads': 2}}, '"network" and "start" are both given'),
+                             ({'start': 'nothing.safetensors'}, 'nothing.safetensors'),
+                             ({'start': 'objects/balls/0/points.ply'}, 'points.ply')):
+        path.write_text(json.dumps({**fields, 'out': 'none', **changes}))
+        assert message in error('train', path)
+    assert first.exists()

@@ -79,7 +79,7 @@ Setting unkept(Setting setting) {
 Setting path(const std::string& name, std::string& place, const std::string& folder) {
   const auto set = [&place, name, folder](const FlatJsonValue& given) {
     const std::filesystem::path value = textOf(given, name);
-    if (value.empty()) refuse("'" + name + "' is empty; a folder is needed");
+    if (value.empty()) refuse("'" + name + "' is empty; a path is needed");
     place = (std::filesystem::path(folder) / value).lexically_normal().string();
   };
   return {name, set, nullptr};
@@ -169,6 +169,7 @@ std::vector<Setting> settingsOf(TrainingConfig& config, const std::string& folde
   std::vector<Setting> list;
   list.push_back(path("collection", config.collection, folder));
   list.push_back(path("out", config.out, folder));
+  list.push_back(path("start", config.start, folder));
   list.push_back(number("seed", config.seed));
   list.push_back(number("held_out", config.held_out));
   // What is measured, and when, chooses the state that is kept.
@@ -270,6 +271,12 @@ void setParts(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
 void setAll(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
             const std::string& name, const std::string& folder, TrainingConfig& config) {
   setParts(entries, config);
+  const auto says = [&](const char* begin) {
+    return std::any_of(entries.begin(), entries.end(),
+                       [&](const auto& entry) { return entry.first.rfind(begin, 0) == 0; });
+  };
+  config.says_parts = says("parts.");
+  config.says_network = says("network.");
   const std::vector<Setting> settings = settingsOf(config, folder);
   for (const auto& entry : entries) {
     const auto found = std::find_if(settings.begin(), settings.end(), [&](const Setting& setting) {
@@ -362,6 +369,22 @@ TrainingConfig readSettings(const std::string& settings, const std::string& name
   TrainingConfig config = defaultTrainingConfig();
   setAll(readFlatJson(settings), name, "", config);
   return config;
+}
+
+void takeStart(const std::string& settings, TrainingConfig& config) {
+  if (config.says_network) {
+    refuse("\"network\" and \"start\" are both given; the networks are those of '" + config.start +
+           "'");
+  }
+  const TrainingConfig from = readSettings(settings, config.start);
+  config.sizes = from.sizes;
+  if (config.says_parts) return;
+  config.parts = from.parts;
+  config.objects.points = from.objects.points;
+  if (!config.flow.isWanted()) {
+    refuse(
+        "with \"start\" and without \"parts\" the flow alone is learned, but \"flow\" has 0 steps");
+  }
 }
 
 std::string settingsJson(const TrainingConfig& config) {

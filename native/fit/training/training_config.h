@@ -29,6 +29,8 @@ FlowSizes flowSizes(const FlowConfig& config, size_t latent_width);
 struct TrainingConfig {
   std::string collection;  ///< folder
   std::string out;         ///< folder of all that it writes; made where it is not there
+  std::string start;       ///< weights of another training that this one begins with; may be empty
+  bool says_parts = false, says_network = false;  ///< in its text
   uint64_t seed = 1;
   uint64_t held_out = 8;  ///< every so-many-th object judges and is not learned from; 0: none
   uint64_t measured_objects = 16;      ///< of those, at most, while it runs
@@ -49,6 +51,12 @@ TrainingConfig defaultTrainingConfig();
 /// where "collection" or "out" is missing.
 TrainingConfig parseTrainingConfig(const std::string& text, const std::string& name,
                                    const std::string& folder);
+
+/// Takes the networks of trained weights, and their parts where the config says none: then these
+/// are done, and the flow alone is learned. In: settings: of the metadata of config.start. Errors:
+/// kInvalidArgument where the config says other networks, or there is nothing left to learn; those
+/// of readSettings().
+void takeStart(const std::string& settings, TrainingConfig& config);
 
 /// All settings that the weights depend on, as a flat JSON object: what a checkpoint must agree in.
 std::string settingsJson(const TrainingConfig& config);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <system_error>
 #include <utility>
 
@@ -41,12 +42,27 @@ std::string inFolder(const std::string& folder, const char* name) {
 
 TrainingConfig readConfig(const std::string& path) {
   const fs::path folder = fs::path(path).parent_path();
-  return parseTrainingConfig(readTextFile(path, kLongestConfig), path, folder.string());
+  TrainingConfig config =
+      parseTrainingConfig(readTextFile(path, kLongestConfig), path, folder.string());
+  if (config.start.empty()) return config;
+  std::map<std::string, std::string> metadata;
+  openWeightFile(config.start, &metadata);
+  if (metadata.count(kTrainedKey) == 0) {
+    refuse(config.start + ", which the training is to start with, is not of a training of ours");
+  }
+  takeStart(metadata[kTrainedKey], config);
+  return config;
+}
+
+/// Whether the autoencoder is learned, not only the flow.
+bool learnsParts(const TrainingConfig& config) {
+  return config.start.empty() || config.says_parts;
 }
 
 uint64_t stepCount(const TrainingConfig& config) {
   uint64_t steps = 0;
   for (const AutoencoderSchedule& part : config.parts) steps += part.optimiser.total_steps;
+  if (!learnsParts(config)) steps = 0;
   return steps + config.flow.schedule.optimiser.total_steps;
 }
 
@@ -165,6 +181,9 @@ void TrainingSession::Work::read() {
   trainer = std::make_unique<AutoencoderTrainer>(
       config().sizes, config().parts, config().seed,
       std::make_shared<const CollectionShare>(collection, learned_from), session.backends_);
+  if (!config().start.empty()) {
+    trainer->start(trainer->networks().layout().read(openWeightFile(config().start)));
+  }
   judge = std::make_unique<AutoencoderMeasure>(*session.backends_, *collection);
   history.measured_on_held_out = !held_out.empty();
   for (const AutoencoderSchedule& each : config().parts) {
@@ -301,7 +320,7 @@ void TrainingSession::Work::learnFlow() {
 }
 
 void TrainingSession::Work::takeSteps() {
-  while (!trainer->isDone()) {
+  while (learnsParts(config()) && !trainer->isDone()) {
     const uint64_t taken = history.records.size();
     begin(taken);
     const Stopwatch one;
@@ -326,8 +345,9 @@ void TrainingSession::Work::finish() {
   const std::vector<float>& values = is_measured ? best : trainer->meanValues();
   const AutoencoderSchedule& last = config().parts.back();
   const std::vector<size_t>& judging = held_out.empty() ? learned_from : held_out;
+  const bool has_images = last.stage != AutoencoderStage::kStructure;
   constexpr int kOctaves = 4;
-  for (int octave = kOctaves; octave >= 0 && is_measured; --octave) {
+  for (int octave = kOctaves; octave >= 0 && has_images; --octave) {
     const uint64_t anchors = last.most_anchors >> octave;
     if (anchors == 0) continue;
     progress.advance(static_cast<double>(kOctaves - octave) / (kOctaves + 1), "Measuring");

@@ -76,6 +76,12 @@ void AutoencoderTrainer::beginPart() {
   optimiser_.emplace(parts_[part_].optimiser, values_);
 }
 
+void AutoencoderTrainer::start(std::vector<float> values) {
+  if (values.size() != values_.size()) refuse("weights to begin with are of other networks");
+  values_ = std::move(values);
+  beginPart();
+}
+
 std::vector<float> AutoencoderTrainer::meanValues() const {
   const std::vector<double>& mean = optimiser_->state().mean;
   return {mean.begin(), mean.end()};

@@ -56,6 +56,9 @@ class AutoencoderTrainer {
                      uint64_t seed, std::shared_ptr<const ObjectSource> objects,
                      std::shared_ptr<const BackendFactory> backends);
 
+  /// Begins with other weights, before the first step. In: values, of the networks' layout.
+  void start(std::vector<float> values);
+
   const DensityAutoencoder& networks() const { return networks_; }
   const std::vector<float>& values() const { return values_; }
   /// The mean of weights over steps, which is what a training is for.
