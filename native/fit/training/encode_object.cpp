@@ -19,6 +19,7 @@ namespace stipple {
 namespace {
 
 constexpr char kStage[] = "Encoding the object";
+constexpr double kEncodedShare = 0.8;  ///< of the whole work, before the file is identified
 
 [[noreturn]] void refuse(const std::string& message) {
   fail(ErrorCode::kInvalidArgument, message);
@@ -80,8 +81,9 @@ std::shared_ptr<const SplatModel> encodeObject(const EncodeRequest& request, Pro
   latent->token_count = std::min(wanted, most);
   latent->width = static_cast<uint32_t>(trained.config.sizes.latent_width);
   latent->tokens = networks.encode(values, object, latent->token_count);
-  advance(progress, 0.8, kStage);
+  if (progress != nullptr) progress->enterPart(kEncodedShare, 1);
   WeightsReference reference = referenceOf(request.weights_path, progress);
+  if (progress != nullptr) progress->enterPart(0, 1);
   advance(progress, 1.0, kStage);
   return makeLatentSplats(openLatentNetworks(request.weights_path), std::move(latent),
                           std::move(reference));
