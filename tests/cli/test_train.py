@@ -32,6 +32,16 @@ def given(objects, tmp_path):
     return write
 
 
+def stopped_after_a_checkpoint(config, checkpoint, number):
+    """A training that a signal ended when it had written a checkpoint: (exit status, what it said)."""
+    process = subprocess.Popen([TOOL, 'train', config], stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not checkpoint.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(number)
+    return process.wait(60), process.stderr.read()
+
+
 def parts(**steps):
     """Those of config(), each with as many steps as are given for its stage; others are left out."""
     return [dict(part, steps=steps[part['stage']]) for part in config()['parts'] if part['stage'] in steps]
@@ -63,14 +73,10 @@ def test_goes_on_bit_for_bit_from_where_it_was_stopped(given, tmp_path):
     short = dict(parts=parts(structure=40, attributes=160), checkpoint_interval=30)
     run('train', given('whole.json', out='whole', **short))
     stopped = given('stopped.json', out='stopped', **short)
-    process = subprocess.Popen([TOOL, 'train', stopped], stderr=subprocess.PIPE, text=True)
     checkpoint = tmp_path / 'stopped/checkpoint.stipple.safetensors'
-    deadline = time.monotonic() + 60
-    while not checkpoint.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
-    assert process.wait(60) == 128 + signal.SIGINT
-    assert f"'stipple train {stopped} --resume' goes on" in process.stderr.read()
+    status, said = stopped_after_a_checkpoint(stopped, checkpoint, signal.SIGINT)
+    assert status == 128 + signal.SIGINT
+    assert f"'stipple train {stopped} --resume' goes on" in said
     assert not (tmp_path / 'stopped/weights.safetensors').exists()
     assert 'left from a training that was stopped' in error('train', stopped)
     run('train', stopped, '--resume')
@@ -85,13 +91,8 @@ def test_goes_on_bit_for_bit_from_where_it_was_stopped(given, tmp_path):
 def test_a_killed_training_goes_on_from_its_last_checkpoint(given, tmp_path):
     short = dict(parts=parts(structure=40, attributes=160), checkpoint_interval=30)
     path = given(**short)
-    process = subprocess.Popen([TOOL, 'train', path], stderr=subprocess.DEVNULL)
     checkpoint = tmp_path / 'result/checkpoint.stipple.safetensors'
-    deadline = time.monotonic() + 60
-    while not checkpoint.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.kill()
-    process.wait(60)
+    assert stopped_after_a_checkpoint(path, checkpoint, signal.SIGKILL)[0] == -signal.SIGKILL
     before = checkpoint.read_bytes()
     # Of another training, or of other objects, nothing is taken.
     other = given('other.json', seed=2, **short)
@@ -256,13 +257,8 @@ def test_a_flow_goes_on_bit_for_bit(given, tmp_path):
     short = dict(parts=parts(structure=20), flow=dict(FLOW, steps=400), checkpoint_interval=30)
     run('train', given('whole.json', out='whole', **short))
     path = given('stopped.json', out='stopped', **short)
-    process = subprocess.Popen([TOOL, 'train', path], stderr=subprocess.PIPE, text=True)
     checkpoint = tmp_path / 'stopped/checkpoint.stipple.safetensors'
-    deadline = time.monotonic() + 60
-    while not checkpoint.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(60) == 128 + signal.SIGTERM
+    assert stopped_after_a_checkpoint(path, checkpoint, signal.SIGTERM)[0] == 128 + signal.SIGTERM
     run('train', path, '--resume')
     for name in ('weights.safetensors', 'flow.safetensors'):
         assert (tmp_path / 'whole' / name).read_bytes() == (tmp_path / 'stopped' / name).read_bytes()

@@ -10,7 +10,7 @@ from ...binding.errors import CancelledError, StippleError
 from ...jobs import JobOperator
 from ...panels.fit import duration, size
 from ...panels.text import draw_text
-from ...scene.generate import image_task, weights_table
+from ...scene.generate import image_task, placing, weights_table
 from ...scene.source import source_paths, sources, splat_data, sync
 
 _PREVIEW_SECONDS = 1.0
@@ -141,3 +141,25 @@ class GenerateOperator(JobOperator):
         draw_text(box, context, f'About {duration(seconds)} and {size(cost.bytes)} of memory here',
                   'TIME', width_px=width_px)
         draw_text(box, context, weights_table.caution(), 'INFO', width_px=width_px)
+
+
+class GenerateAtCursor(GenerateOperator):
+    """Mix-in for objects that stand at the 3D cursor, those of several seeds side by side. The operator sets _asked where
+    it asks for its settings first; then it works in the background of a window."""
+
+    size: FloatProperty(name="Size", description="Length of the object's largest side", default=1.0, min=0.001,
+                        soft_max=100.0, unit='LENGTH')
+
+    _asked = False
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == 'OBJECT'
+
+    def execute(self, context):
+        if bpy.app.background or not self._asked:
+            return super().execute(context)
+        return self.run_in_window(context)
+
+    def _matrix(self, index):
+        return placing.beside(self._location, self.size, index, self.seed_count)

@@ -2,13 +2,12 @@
 """Objects that no image tells of: each seed gives another one."""
 
 import bpy
-from bpy.props import FloatProperty
 
-from ...scene.generate import image_task, placing
-from .generating import GenerateOperator
+from ...scene.generate import image_task
+from .generating import GenerateAtCursor
 
 
-class STIPPLE_OT_random_splats(GenerateOperator, bpy.types.Operator):
+class STIPPLE_OT_random_splats(GenerateAtCursor, bpy.types.Operator):
     """Make splats of an object of the kind that the networks have learned, another one for each seed"""
 
     bl_idname = 'stipple.random_splats'
@@ -16,20 +15,6 @@ class STIPPLE_OT_random_splats(GenerateOperator, bpy.types.Operator):
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
     shown_settings = 'steps', 'tokens', 'seed', 'seed_count', 'anchors', 'show_previews'
-
-    size: FloatProperty(name="Size", description="Length of the object's largest side", default=1.0, min=0.001,
-                        soft_max=100.0, unit='LENGTH')
-
-    @classmethod
-    def poll(cls, context):
-        return context.mode == 'OBJECT'
-
-    def execute(self, context):
-        if bpy.app.background or not self._asked:
-            return super().execute(context)
-        return self.run_in_window(context)
-
-    _asked = False
 
     def invoke(self, context, _event):
         self._asked = True
@@ -46,9 +31,6 @@ class STIPPLE_OT_random_splats(GenerateOperator, bpy.types.Operator):
 
     def _name(self):
         return 'Random Splats'
-
-    def _matrix(self, index):
-        return placing.beside(self._location, self.size, index, self.seed_count)
 
 
 classes = (STIPPLE_OT_random_splats,)

@@ -4,16 +4,16 @@
 import os
 
 import bpy
-from bpy.props import FloatProperty, StringProperty
+from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ...binding.image import Image
-from ...scene.generate import image_task, placing
+from ...scene.generate import image_task
 from ...scene.source import sources
-from .generating import GenerateOperator
+from .generating import GenerateAtCursor
 
 
-class STIPPLE_OT_splats_from_image(GenerateOperator, bpy.types.Operator, ImportHelper):
+class STIPPLE_OT_splats_from_image(GenerateAtCursor, bpy.types.Operator, ImportHelper):
     """Make splats of the object in an image, by networks whose weights you download yourself"""
 
     bl_idname = 'stipple.splats_from_image'
@@ -25,20 +25,6 @@ class STIPPLE_OT_splats_from_image(GenerateOperator, bpy.types.Operator, ImportH
                                 options={'HIDDEN', 'SKIP_SAVE'})
     mask: StringProperty(name="Mask", description="Path of an image that is white, or opaque, on the object, for images "
                          "without transparency", options={'SKIP_SAVE'})
-    size: FloatProperty(name="Size", description="Length of the object's largest side", default=1.0, min=0.001,
-                        soft_max=100.0, unit='LENGTH')
-
-    @classmethod
-    def poll(cls, context):
-        return context.mode == 'OBJECT'
-
-    def execute(self, context):
-        if bpy.app.background or not self._asked:
-            return super().execute(context)
-        return self.run_in_window(context)
-
-    _asked = False
-
     def invoke(self, context, event):
         self._asked = True
         return ImportHelper.invoke(self, context, event)
@@ -62,9 +48,6 @@ class STIPPLE_OT_splats_from_image(GenerateOperator, bpy.types.Operator, ImportH
 
     def _name(self):
         return os.path.splitext(os.path.basename(self.filepath))[0] + ' Splats'
-
-    def _matrix(self, index):
-        return placing.beside(self._location, self.size, index, self.seed_count)
 
 
 def _identity(path):
