@@ -26,10 +26,14 @@ std::string lineOf(const StippleTrainFigures& figures) {
   char text[160];
   std::string line = figures.stage;
   if (figures.step == 0) return line;
-  std::snprintf(text, sizeof(text), "  %llu / %llu  loss %.4f  density %.3f nats",
+  std::snprintf(text, sizeof(text), "  %llu / %llu  loss %.4f",
                 static_cast<unsigned long long>(figures.step),
-                static_cast<unsigned long long>(figures.steps), figures.loss, figures.structure);
+                static_cast<unsigned long long>(figures.steps), figures.loss);
   line += text;
+  if (figures.structure > 0) {  // The flow has none.
+    std::snprintf(text, sizeof(text), "  density %.3f nats", figures.structure);
+    line += text;
+  }
   if (std::isfinite(figures.psnr)) {
     std::snprintf(text, sizeof(text), "  PSNR %.2f dB", figures.psnr);
     line += text;

@@ -217,7 +217,7 @@ AutoencoderSchedule usualPart(AutoencoderStage stage) {
   part.surface = 4096;
   part.weights.density = stage == AutoencoderStage::kJoint ? 1 : 0;
   part.weights.structure = stage == AutoencoderStage::kStructure ? 1 : 0.1;
-  part.optimiser.learning_rate = stage == AutoencoderStage::kJoint ? 1e-4 : 5e-4;
+  part.optimiser.learning_rate = stage == AutoencoderStage::kJoint ? 2e-5 : 5e-4;
   part.optimiser.total_steps = stage == AutoencoderStage::kStructure ? 2000 : 8000;
   part.optimiser.mean_decay = 0.999;
   return part;
