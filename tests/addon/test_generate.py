@@ -105,7 +105,7 @@ def test_what_is_wrong_is_said_before_it_starts(context, weights, image, tmp_pat
     refused('canvas', canvas_size=1000)
     refused('uses_mean_colour', uses_mean_colour=2)
     refused('size', size=-1.0)
-    refused('dino_v3_vit_h', weights_folder=tmp_path)
+    refused('TripoSplat flow network', weights_folder=tmp_path)
     assert context.library.stipple_generate_start(context.pointer, None, None, None, byref(c_void_p())) \
         == Status.ERROR_INVALID_ARGUMENT
 
