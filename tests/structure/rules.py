@@ -27,6 +27,7 @@ THIRD_PARTY = {
     'zlib': r'zlib\.h|zconf\.h',
     'zstd': r'(zstd|zdict)(_errors)?\.h',
     'CLI11': r'CLI/',
+    'MPI': r'mpi\.h',
     'stb': r'stb/',
     'oneDNN': r'(oneapi/)?dnnl/|dnnl\w*\.h|omp\.h',  # OpenMP runs its loops, and is held there
     'Google Benchmark': r'benchmark/',
@@ -311,10 +312,20 @@ def c99_violations(header, scratch):
     return compiler.stderr.splitlines() if compiler.returncode else []
 
 
-def needed_violations(library):
+def needed(library):
+    """Names of the libraries that a library or a program is linked with."""
     listing = subprocess.run(['readelf', '-d', '-W', str(library)], capture_output=True, text=True, check=True).stdout
-    needed = re.findall(r'\(NEEDED\).*\[(.+)\]', listing)
-    return [f'{library} needs {name}' for name in needed if not ALLOWED_NEEDED.fullmatch(name)]
+    return re.findall(r'\(NEEDED\).*\[(.+)\]', listing)
+
+
+def needed_violations(library):
+    return [f'{library} needs {name}' for name in needed(library) if not ALLOWED_NEEDED.fullmatch(name)]
+
+
+def mpi_violations(library):
+    """MPI is for a program of its own: what it needs of a machine would be asked of every Blender."""
+    return [f'{library} needs {name}' for name in needed(library) if re.match(r'lib(mpi|mpich|open-rte|open-pal)\b',
+                                                                              name)]
 
 
 def exported_symbols(library):

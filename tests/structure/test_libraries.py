@@ -39,6 +39,21 @@ def test_another_need_is_found(tmp_path):
     assert len(found) == 1 and 'needs libtinygltf.so' in found[0]
 
 
+@pytest.mark.parametrize('file', [LIBRARY, MEDIA_LIBRARY, NN_LIBRARY, BUILD / 'bin' / 'stipple'],
+                         ids=lambda path: path.name)
+def test_mpi_is_linked_by_a_program_of_its_own_alone(file):
+    if file == NN_LIBRARY and not file.exists():
+        pytest.skip('oneDNN is not on this machine, so libstipple_nn.so is not built')
+    assert rules.mpi_violations(file) == []
+
+
+def test_a_link_with_mpi_is_found(tmp_path):
+    (tmp_path / 'mpi').mkdir()
+    stand_in = build_library(tmp_path / 'mpi', 'int MPI_Init(void) { return 0; }', '-Wl,-soname,libmpi.so.40')
+    found = rules.mpi_violations(build_library(tmp_path, 'int stipple_x(void) { return 1; }', str(stand_in)))
+    assert len(found) == 1 and 'needs libmpi.so.40' in found[0]
+
+
 @needs_plain_build
 @pytest.mark.parametrize('library', [LIBRARY, MEDIA_LIBRARY, NN_LIBRARY], ids=lambda path: path.name)
 def test_the_libraries_export_only_their_own_names(library):

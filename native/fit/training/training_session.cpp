@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/random.h"
 #include "base/stopwatch.h"
 #include "fit/training/autoencoder_measure.h"
 #include "fit/training/flow_objects.h"
@@ -135,6 +136,7 @@ struct TrainingSession::Work {
 
   void read();
   void restore();
+  void requireAlike();
   void takeSteps();
   void learnFlow();
   void begin(uint64_t taken);
@@ -180,7 +182,8 @@ void TrainingSession::Work::read() {
   }
   trainer = std::make_unique<AutoencoderTrainer>(
       config().sizes, config().parts, config().seed,
-      std::make_shared<const CollectionShare>(collection, learned_from), session.backends_);
+      std::make_shared<const CollectionShare>(collection, learned_from), session.backends_,
+      session.exchange_);
   if (!config().start.empty()) {
     trainer->start(trainer->networks().layout().read(openWeightFile(config().start)));
   }
@@ -215,6 +218,21 @@ void TrainingSession::Work::restore() {
   session.status_.resumed_step = history.records.size();
 }
 
+/// What all processes must have the same of, or they would learn apart.
+void TrainingSession::Work::requireAlike() {
+  GradientExchange& exchange = *session.exchange_;
+  const auto of = [](const std::string& text) {
+    uint64_t bits = 0;
+    for (const char letter : text) bits = mixBits(bits ^ static_cast<unsigned char>(letter));
+    return bits;
+  };
+  std::string objects;
+  for (size_t i = 0; i < collection->count(); ++i) objects += collection->name(i) + '\n';
+  requireSame(exchange, of(settings()), "the settings");
+  requireSame(exchange, of(objects), "the objects");
+  requireSame(exchange, mixBits(history.records.size()), "the checkpoints");
+}
+
 void TrainingSession::Work::show() {
   const size_t count = history.records.size();
   size_t recent = 0;  // of the present part, whose loss is of other things than the last one's
@@ -244,6 +262,7 @@ void TrainingSession::Work::show() {
 }
 
 void TrainingSession::Work::measure() {
+  if (!session.leads()) return;
   const AutoencoderSchedule& now = part();
   const std::vector<float> values = trainer->meanValues();
   const MeasuredAt at = {now.most_tokens, now.most_anchors, config().seed};
@@ -263,6 +282,7 @@ void TrainingSession::Work::measure() {
 }
 
 void TrainingSession::Work::save() {
+  if (!session.leads()) return;
   TensorTable tensors = trainer->state();
   if (flow) tensors.merge(flow->state());
   putHistory(history, *collection, best, best_psnr, tensors);
@@ -289,7 +309,9 @@ void TrainingSession::Work::learnFlow() {
   const FlowConfig& wanted = config().flow;
   if (!wanted.isWanted()) return;
   session.enter("Encoding objects");
-  const std::vector<float> values = best.empty() ? trainer->meanValues() : best;
+  // Only who measures knows the best.
+  std::vector<float> values = best.empty() ? trainer->meanValues() : best;
+  session.exchange_->share(values);
   FlowObjectOptions options;
   options.tokens = config().parts.back().most_tokens;
   options.patches = wanted.patches;
@@ -298,7 +320,8 @@ void TrainingSession::Work::learnFlow() {
   flow = std::make_unique<FlowTrainer>(
       flowSizes(wanted, config().sizes.latent_width), wanted.schedule, config().seed,
       std::make_shared<const FlowObjects>(collection, learned_from, trainer->networks(), values,
-                                          options, &progress));
+                                          options, &progress),
+      session.exchange_);
   if (!flow_state.empty()) flow->resume(flow_state);
   flow_state.clear();
   session.enter("Flow");
@@ -373,10 +396,20 @@ void TrainingSession::Work::finish() {
 }
 
 TrainingSession::TrainingSession(std::shared_ptr<const BackendFactory> backends,
-                                 const std::string& config_path, bool resumes)
-    : backends_(std::move(backends)), config_(readConfig(config_path)), resumes_(resumes) {
+                                 const std::string& config_path, bool resumes,
+                                 std::shared_ptr<GradientExchange> exchange)
+    : backends_(std::move(backends)),
+      config_(readConfig(config_path)),
+      resumes_(resumes),
+      exchange_(exchange ? std::move(exchange) : noExchange()) {
   validate(config_.sizes);
-  requireResults(config_.out, resumes);
+  for (size_t i = 0; i < config_.parts.size(); ++i) {
+    requireExamples(*exchange_, config_.parts[i].batch, ("part " + std::to_string(i)).c_str());
+  }
+  if (config_.flow.isWanted()) {
+    requireExamples(*exchange_, config_.flow.schedule.batch, "the flow");
+  }
+  if (leads()) requireResults(config_.out, resumes);
   status_.steps = stepCount(config_);
   status_.psnr = std::numeric_limits<double>::quiet_NaN();
 }
@@ -401,6 +434,7 @@ void TrainingSession::run(Progress& progress) {
   Work work(*this, progress);
   work.read();
   if (resumes_) work.restore();
+  work.requireAlike();
   try {
     work.takeSteps();
     work.learnFlow();
@@ -408,6 +442,7 @@ void TrainingSession::run(Progress& progress) {
     if (!work.history.records.empty()) work.save();
     throw;
   }
+  if (!leads()) return;
   work.finish();
   std::error_code ignored;
   fs::remove(trainingCheckpointPath(config_.out), ignored);

@@ -12,6 +12,7 @@
 #include "data/training_history.h"
 #include "fit/training/training_config.h"
 #include "train/backend/backend_factory.h"
+#include "train/networks/gradient_exchange.h"
 
 namespace stipple {
 
@@ -42,14 +43,17 @@ std::string trainingReportPath(const std::string& out);
 
 /// One training of the density autoencoder, from its config to its weights: it reads the
 /// collection, holds objects out, goes on from a checkpoint or begins, measures, keeps the best.
-/// run() works on one thread; all else may be called by others at any time.
+/// run() works on one thread; all else may be called by others at any time. Of several processes
+/// that learn together the one of rank 0 measures and writes; to the folder of results the others
+/// look for a checkpoint to go on from, and else not at all.
 class TrainingSession {
  public:
   /// Reads the config. Errors: kIo; those of parseTrainingConfig(); kInvalidArgument where a
   /// checkpoint is left and `resumes` is false, or none is there and it is true, and where a file
-  /// of another kind stands where results go.
+  /// of another kind stands where results go. In: exchange: with the other processes; null: there
+  /// are none.
   TrainingSession(std::shared_ptr<const BackendFactory> backends, const std::string& config_path,
-                  bool resumes);
+                  bool resumes, std::shared_ptr<GradientExchange> exchange = nullptr);
 
   /// About what run() allocates, bytes.
   uint64_t memoryBound() const;
@@ -58,8 +62,10 @@ class TrainingSession {
   /// report are those of the best state so far. Errors: those of Collection; of a checkpoint that
   /// cannot be read (kFormat), or is of a training with other settings or objects
   /// (kInvalidArgument, with the first that differs); kCancelled; of an image that is gone; kIo
-  /// where weights or report cannot be written. A checkpoint that cannot be written is a note.
-  /// Threads and determinism: the same bits for any number of threads, and wherever it was stopped.
+  /// where weights or report cannot be written; of the exchange, and kInvalidArgument where the
+  /// processes have other settings, objects or checkpoints. A checkpoint that cannot be written is
+  /// a note. Threads and determinism: the same bits for any number of threads, and wherever it was
+  /// stopped.
   void run(Progress& progress);
 
   const TrainingConfig& config() const { return config_; }
@@ -74,10 +80,12 @@ class TrainingSession {
 
   void note(const std::string& text);
   void enter(const std::string& stage);
+  bool leads() const { return exchange_->rank() == 0; }
 
   std::shared_ptr<const BackendFactory> backends_;
   TrainingConfig config_;
   bool resumes_;
+  std::shared_ptr<GradientExchange> exchange_;
 
   mutable std::mutex mutex_;  ///< of what follows
   TrainingStatus status_;

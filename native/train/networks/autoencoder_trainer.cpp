@@ -3,6 +3,7 @@
 #include "train/networks/autoencoder_trainer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -23,6 +24,18 @@ void requireCount(uint64_t value, uint64_t least, uint64_t most, const char* nam
   if (value >= least && value <= most) return;
   refuse(std::string("the number of ") + name + " is " + std::to_string(value) + "; " +
          std::to_string(least) + " to " + std::to_string(most) + " is allowed");
+}
+
+using LossNumbers = std::array<double, 9>;
+
+LossNumbers numbersOf(const AutoencoderLosses& losses) {
+  const SplatLosses& splats = losses.splats;
+  return {losses.total,  losses.structure, losses.divergence, losses.l1,     losses.ssim,
+          splats.volume, splats.opacity,   splats.off_centre, splats.overlap};
+}
+
+AutoencoderLosses lossesOf(const LossNumbers& n) {
+  return {n[0], n[1], n[2], n[3], n[4], {n[5], n[6], n[7], n[8]}};
 }
 
 /// Adds a share of the losses of an example.
@@ -56,16 +69,21 @@ void validate(const AutoencoderSchedule& schedule) {
 AutoencoderTrainer::AutoencoderTrainer(const AutoencoderSizes& sizes,
                                        std::vector<AutoencoderSchedule> parts, uint64_t seed,
                                        std::shared_ptr<const ObjectSource> objects,
-                                       std::shared_ptr<const BackendFactory> backends)
+                                       std::shared_ptr<const BackendFactory> backends,
+                                       std::shared_ptr<GradientExchange> exchange)
     : networks_(sizes),
       parts_(std::move(parts)),
       seed_(seed),
       objects_(std::move(objects)),
       backends_(std::move(backends)),
+      exchange_(exchange ? std::move(exchange) : noExchange()),
       values_(networks_.startValues(seed)),
       gradients_(values_.size()) {
   if (parts_.empty()) refuse("a training has 0 parts; one or more are needed");
-  for (const AutoencoderSchedule& part : parts_) validate(part);
+  for (size_t i = 0; i < parts_.size(); ++i) {
+    validate(parts_[i]);
+    requireExamples(*exchange_, parts_[i].batch, ("part " + std::to_string(i)).c_str());
+  }
   if (objects_->count() == 0) refuse("there are 0 objects to learn from; one or more are needed");
   beginPart();
 }
@@ -105,7 +123,8 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
   done.part = part_;
   done.losses.ssim = 0;
   std::fill(gradients_.begin(), gradients_.end(), 0.0f);
-  for (size_t b = 0; b < part.batch; ++b) {
+  for (size_t b = exchange_->rank(); b < part.batch; b += exchange_->size()) {
+    if (progress != nullptr) progress->throwIfCancelled();
     const std::shared_ptr<const TrainingObject> object =
         objects_->object(objectInRounds(seed_, seen_ + b, objects_->count()));
     example.object = object.get();
@@ -114,6 +133,9 @@ AutoencoderStep AutoencoderTrainer::step(Progress* progress) {
         networks_.addExample(values_, example, part.weights, *backends_, gradients_, progress),
         example.share, done.losses);
   }
+  LossNumbers numbers = numbersOf(done.losses);
+  sumStep(*exchange_, values_, gradients_, numbers);
+  done.losses = lossesOf(numbers);
   done.weights = optimiser_->step(gradients_, values_);
   seen_ += part.batch;
   ++taken_;

@@ -9,6 +9,7 @@
 #include "base/progress.h"
 #include "data/tensor_table.h"
 #include "train/networks/density_autoencoder.h"
+#include "train/networks/gradient_exchange.h"
 #include "train/optimiser/weight_optimiser.h"
 
 namespace stipple {
@@ -49,12 +50,17 @@ struct AutoencoderStep {
 /// Trains a density autoencoder, part by part; each part begins with the weights of the last and an
 /// optimiser of its own. All objects are seen once before any is seen again. Everything that is
 /// drawn is keyed by seed and step, so that a training that was stopped goes on bit for bit.
+/// Several processes each take every so-many-th object of a step, with the keys that it has where
+/// one takes all, so that they learn the same but for the order of sums.
 class AutoencoderTrainer {
  public:
-  /// Errors: kInvalidArgument: validate(); a source without objects.
+  /// In: exchange: with the other processes; null: there are none. Errors: kInvalidArgument:
+  /// validate(); a source without objects; a part that has fewer objects in a step than there are
+  /// processes.
   AutoencoderTrainer(const AutoencoderSizes& sizes, std::vector<AutoencoderSchedule> parts,
                      uint64_t seed, std::shared_ptr<const ObjectSource> objects,
-                     std::shared_ptr<const BackendFactory> backends);
+                     std::shared_ptr<const BackendFactory> backends,
+                     std::shared_ptr<GradientExchange> exchange = nullptr);
 
   /// Begins with other weights, before the first step. In: values, of the networks' layout.
   void start(std::vector<float> values);
@@ -65,7 +71,8 @@ class AutoencoderTrainer {
   std::vector<float> meanValues() const;
   bool isDone() const { return part_ >= parts_.size(); }
   size_t part() const { return part_; }  ///< of the next step; the number of parts where it is done
-  /// One step. Errors: those of the source, kCancelled; then nothing has changed.
+  /// One step. Errors: those of the source and of the exchange, kCancelled; then nothing has
+  /// changed.
   AutoencoderStep step(Progress* progress = nullptr);
 
   /// All that it knows, for a checkpoint.
@@ -82,6 +89,7 @@ class AutoencoderTrainer {
   uint64_t seed_;
   std::shared_ptr<const ObjectSource> objects_;
   std::shared_ptr<const BackendFactory> backends_;
+  std::shared_ptr<GradientExchange> exchange_;
   std::vector<float> values_, gradients_;
   std::optional<WeightOptimiser> optimiser_;
   size_t part_ = 0;

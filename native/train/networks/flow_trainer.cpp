@@ -97,14 +97,17 @@ struct FlowTrainer::Drawn {
 };
 
 FlowTrainer::FlowTrainer(const FlowSizes& sizes, const FlowSchedule& schedule, uint64_t seed,
-                         std::shared_ptr<const FlowSource> objects)
+                         std::shared_ptr<const FlowSource> objects,
+                         std::shared_ptr<GradientExchange> exchange)
     : schedule_(schedule),
       seed_(seed),
       objects_(std::move(objects)),
+      exchange_(exchange ? std::move(exchange) : noExchange()),
       flow_((validate(sizes), layout_), sizes),
       values_(firstValues(layout_, sizes, seed)),
       gradients_(values_.size()) {
   validate(schedule);
+  requireExamples(*exchange_, schedule_.batch, "the flow");
   if (objects_->count() == 0) refuse("there are 0 objects to learn from; one or more are needed");
   optimiser_.emplace(schedule_.optimiser, values_);
 }
@@ -153,7 +156,7 @@ FlowStep FlowTrainer::step(Progress* progress) {
   FlowStep done;
   done.step = taken_;
   std::fill(gradients_.begin(), gradients_.end(), 0.0f);
-  for (size_t b = 0; b < schedule_.batch; ++b) {
+  for (size_t b = exchange_->rank(); b < schedule_.batch; b += exchange_->size()) {
     if (progress != nullptr) progress->throwIfCancelled();
     const uint64_t key = keyedBits(seed_ + taken_, RandomUse::kAnchorSeed, b);
     const size_t index = objectInRounds(seed_, taken_ * schedule_.batch + b, objects_->count());
@@ -165,6 +168,7 @@ FlowStep FlowTrainer::step(Progress* progress) {
         flowLoss(seen, at.example.velocity, at.count * static_cast<double>(schedule_.batch), by);
     flow_.backward(values_, at.example.state, at.condition, tape, by, gradients_);
   }
+  sumStep(*exchange_, values_, gradients_, {&done.loss, 1});
   done.weights = optimiser_->step(gradients_, values_);
   ++taken_;
   return done;

@@ -8,6 +8,7 @@
 
 #include "base/progress.h"
 #include "data/tensor_table.h"
+#include "train/networks/gradient_exchange.h"
 #include "train/networks/trained_flow.h"
 #include "train/optimiser/weight_optimiser.h"
 
@@ -50,9 +51,11 @@ struct FlowStep {
 /// that was stopped goes on bit for bit.
 class FlowTrainer {
  public:
-  /// Errors: kInvalidArgument: validate(); a source without objects.
+  /// In: exchange, as AutoencoderTrainer has it. Errors: kInvalidArgument: validate(); a source
+  /// without objects; fewer objects in a step than there are processes.
   FlowTrainer(const FlowSizes& sizes, const FlowSchedule& schedule, uint64_t seed,
-              std::shared_ptr<const FlowSource> objects);
+              std::shared_ptr<const FlowSource> objects,
+              std::shared_ptr<GradientExchange> exchange = nullptr);
 
   const std::vector<float>& values() const { return values_; }
   /// The mean of weights over steps.
@@ -60,7 +63,8 @@ class FlowTrainer {
   /// All tensors by their published names.
   TensorTable tensors(std::span<const float> values) const;
   bool isDone() const { return taken_ >= schedule_.optimiser.total_steps; }
-  /// One step. Errors: those of the source, kCancelled; then nothing has changed.
+  /// One step. Errors: those of the source and of the exchange, kCancelled; then nothing has
+  /// changed.
   FlowStep step(Progress* progress = nullptr);
   /// The mean squared error of weights at `draws` times, images and noises for each object that are
   /// keyed by the seed: for comparing weights and sets of objects.
@@ -81,6 +85,7 @@ class FlowTrainer {
   FlowSchedule schedule_;
   uint64_t seed_;
   std::shared_ptr<const FlowSource> objects_;
+  std::shared_ptr<GradientExchange> exchange_;
   TrainedFlow flow_;
   std::vector<float> values_, gradients_;
   std::optional<WeightOptimiser> optimiser_;
