@@ -131,6 +131,16 @@ def test_processes_learn_what_one_learns(given, tmp_path):
     assert together['by_budget'][-1]['psnr'] == pytest.approx(alone['by_budget'][-1]['psnr'], abs=1e-2)
 
 
+def test_processes_learn_a_flow_for_networks_that_were_learned_with_fewer_objects_a_step(given, tmp_path):
+    run('train', given('first', batch=2, structure=20))
+    fields = config(out='second', start='first/weights.safetensors', flow=dict(FLOW, steps=20))
+    path = tmp_path / 'second.json'
+    path.write_text(json.dumps({key: fields[key] for key in fields if key not in ('parts', 'network')}))
+    status, out, err = ended(started((4, path, '--json')))
+    assert status == 0 and json.loads(out)['steps'] == 20, err
+    assert (tmp_path / 'second/flow.safetensors').exists()
+
+
 @pytest.mark.parametrize('sent, rank, message', [
     (signal.SIGKILL, 2, 'exited on signal 9'),  # as mpirun says it
     (signal.SIGTERM, 1, 'process 1 of 4 cannot go on: stopped by SIGTERM'),

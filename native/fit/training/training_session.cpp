@@ -183,7 +183,7 @@ void TrainingSession::Work::read() {
   trainer = std::make_unique<AutoencoderTrainer>(
       config().sizes, config().parts, config().seed,
       std::make_shared<const CollectionShare>(collection, learned_from), session.backends_,
-      session.exchange_);
+      learnsParts(config()) ? session.exchange_ : nullptr);
   if (!config().start.empty()) {
     trainer->start(trainer->networks().layout().read(openWeightFile(config().start)));
   }
@@ -403,7 +403,7 @@ TrainingSession::TrainingSession(std::shared_ptr<const BackendFactory> backends,
       resumes_(resumes),
       exchange_(exchange ? std::move(exchange) : noExchange()) {
   validate(config_.sizes);
-  for (size_t i = 0; i < config_.parts.size(); ++i) {
+  for (size_t i = 0; i < config_.parts.size() && learnsParts(config_); ++i) {
     requireExamples(*exchange_, config_.parts[i].batch, ("part " + std::to_string(i)).c_str());
   }
   if (config_.flow.isWanted()) {
