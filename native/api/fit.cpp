@@ -18,9 +18,7 @@ using namespace stipple::api;
 namespace {
 
 FitSession& sessionOf(const StippleJob* job) {
-  const StippleJob& given = require(job, "job");
-  if (!given.fit) fail(ErrorCode::kInvalidArgument, "this job does not fit splats to views");
-  return *given.fit;
+  return keptSession(job, &StippleJob::fit, "does not fit splats to views");
 }
 
 StippleFitFigures figuresTo(const FitStatus& status) {

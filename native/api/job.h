@@ -74,6 +74,15 @@ struct StippleJob {
 
 namespace stipple::api {
 
+/// What can be asked of a job while it runs. In: kept: of StippleJob; what: the end of the message
+/// where it has none ("trains no networks").
+template <typename T>
+T& keptSession(const StippleJob* job, std::shared_ptr<T> StippleJob::*kept, const char* what) {
+  const std::shared_ptr<T>& session = require(job, "job").*kept;
+  if (!session) fail(ErrorCode::kInvalidArgument, std::string("this job ") + what);
+  return *session;
+}
+
 /// The result of the wanted kind, or an error that says what the job is or did.
 template <typename T>
 const T& jobResult(const StippleJob& job, const char* kind) {

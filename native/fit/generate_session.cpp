@@ -275,6 +275,9 @@ GenerateSession::GenerateSession(std::optional<ByteImage> image, std::optional<B
                                  const GenerateOptions& options) {
   requireOptions(options);
   if (image) requireByteImage(*image, "The image");
+  if (mask && !image) {
+    fail(ErrorCode::kInvalidArgument, "there is a mask and no image that it belongs to");
+  }
   if (!options.checkpoint_path.empty()) requireCheckpointPlace(options.checkpoint_path);
   work_ = std::make_unique<Work>(std::move(image), std::move(mask), options);
 }

@@ -11,7 +11,7 @@ namespace stipple {
 
 namespace {
 
-/// Of which buffers have a few, whatever the sizes of networks.
+/// Numbers in a message. Buffers hold a few of these, whatever the sizes of networks.
 constexpr size_t kChunk = size_t{1} << 20;
 constexpr size_t kLongestText = 1024;
 constexpr int kWordTag = 1;

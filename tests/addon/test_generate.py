@@ -2,7 +2,7 @@
 """Images to splats through the binding, with the small networks of a golden."""
 
 import sys
-from ctypes import byref, c_void_p
+from ctypes import byref
 from pathlib import Path
 
 import numpy as np
@@ -106,8 +106,8 @@ def test_what_is_wrong_is_said_before_it_starts(context, weights, image, tmp_pat
     refused('uses_mean_colour', uses_mean_colour=2)
     refused('size', size=-1.0)
     refused('TripoSplat flow network', weights_folder=tmp_path)
-    assert context.library.stipple_generate_start(context.pointer, None, None, None, byref(c_void_p())) \
-        == Status.ERROR_INVALID_ARGUMENT
+    with pytest.raises(StippleError, match='a mask and no image'):
+        Generation.start(context, None, image, generate_options(context.library, weights, **SMALL))
 
 
 def test_figures_of_another_job_are_refused(context, weights):

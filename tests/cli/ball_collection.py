@@ -5,6 +5,7 @@ import struct
 import zlib
 
 import numpy as np
+import pytest
 
 RADIUS = 0.4
 DISTANCE = 2.0
@@ -105,3 +106,10 @@ def config(**changes):
              dict(part, stage='joint', steps=20, learning_rate=1e-4)]
     return {'collection': 'objects', 'out': 'result', 'held_out': 3, 'measure_interval': 100, 'points': 400,
             'checkpoint_interval': 50, 'network': NETWORK, 'parts': parts, **changes}
+
+
+@pytest.fixture(scope='module')
+def objects(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('collection') / 'objects'
+    write_collection(folder)
+    return folder

@@ -8,15 +8,8 @@ import time
 
 import numpy as np
 import pytest
-from ball_collection import config, write_ball, write_collection, write_png
+from ball_collection import config, objects, write_ball, write_png  # noqa: F401
 from fit_dataset import TOOL, error, run
-
-
-@pytest.fixture(scope='module')
-def objects(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('collection') / 'objects'
-    write_collection(folder)
-    return folder
 
 
 @pytest.fixture

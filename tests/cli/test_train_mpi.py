@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ball_collection import config, write_collection
+from ball_collection import config, objects  # noqa: F401
 from fit_dataset import TOOL, run
 from test_train import FLOW
 
@@ -30,13 +30,6 @@ def why_not():
 
 
 pytestmark = pytest.mark.skipif(why_not() is not None, reason=str(why_not()))
-
-
-@pytest.fixture(scope='module')
-def objects(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('collection') / 'objects'
-    write_collection(folder)
-    return folder
 
 
 @pytest.fixture

@@ -16,9 +16,7 @@ using namespace stipple::api;
 namespace {
 
 GenerateSession& sessionOf(const StippleJob* job) {
-  const StippleJob& given = require(job, "job");
-  if (!given.generation) fail(ErrorCode::kInvalidArgument, "this job makes no splats of an image");
-  return *given.generation;
+  return keptSession(job, &StippleJob::generation, "makes no splats of an image");
 }
 
 GenerateOptions generateOptionsFrom(const StippleContext& context,

@@ -13,9 +13,7 @@ using namespace stipple::api;
 namespace {
 
 TrainingSession& sessionOf(const StippleJob* job) {
-  const StippleJob& given = require(job, "job");
-  if (!given.training) fail(ErrorCode::kInvalidArgument, "this job trains no networks");
-  return *given.training;
+  return keptSession(job, &StippleJob::training, "trains no networks");
 }
 
 }  // namespace

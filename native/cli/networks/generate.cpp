@@ -20,6 +20,7 @@ struct Arguments {
   int64_t steps = 20, tokens = 8192, canvas = 1024, erode = 1, seeds = 1;
   double guidance = 3.0, shift = 3.0, size = 1.0;
   std::optional<int64_t> anchors;
+  bool is_random = false;  ///< no image tells of the object
   bool mean_colour = false, check = false, timings = false, estimate = false, json = false;
 };
 
@@ -149,6 +150,10 @@ void generate(const Context& context, const Arguments& arguments) {
   Report report;
   auto estimate = sized<StippleGenerateEstimate>();
   check(stipple_generate_estimate(context.get(), &options, &estimate));
+  if (arguments.is_random) {
+    estimate.seconds -= estimate.image_seconds;
+    estimate.image_seconds = 0;
+  }
   if (arguments.check) addWeights(context, arguments.weights, arguments.json, report);
   addEstimate(estimate, report);
   if (arguments.estimate) return report.print(arguments.json);
@@ -240,6 +245,8 @@ void addGenerate(CLI::App& app, const Context& context) {
 
 void addRandom(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
+  arguments->is_random = true;
+  arguments->guidance = 1.0;  // There is nothing to follow, and each step is one call.
   CLI::App* command = app.add_subcommand(
       "random", "Splats of an object that only the seed tells of, by the networks of 'generate'");
   command->add_option("out", arguments->out,

@@ -42,21 +42,38 @@ std::vector<fs::path> objectFolders(const std::string& folder) {
   return {found.begin(), found.end()};
 }
 
-/// Unlike in fits, where images without alpha are of a whole scene.
-ObjectView viewOf(const NormalisedViews& views, size_t view) {
-  ViewPicture picture = views.packed(view)->unpacked();
-  if (picture.alpha.empty()) {
-    refuse("image " + views.name(view) + " has no alpha; objects are learned cut out");
+/// Over black.
+class ReadViews final : public ObjectViews {
+ public:
+  explicit ReadViews(std::shared_ptr<const NormalisedViews> views) : views_(std::move(views)) {}
+  size_t count() const override { return views_->count(); }
+  ObjectView view(size_t index) const override {
+    ViewPicture picture = views_->load(index);
+    // Unlike in fits, where images without alpha are of a whole scene.
+    if (picture.alpha.empty()) {
+      refuse("image " + views_->name(index) + " has no alpha; objects are learned cut out");
+    }
+    return {views_->camera(index), std::move(picture.colour), std::move(picture.alpha)};
   }
-  return {views.camera(view), std::move(picture.colour), std::move(picture.alpha)};
-}
 
-bool showsNothing(const ObjectView& view) {
-  return std::all_of(view.alpha.begin(), view.alpha.end(), [](float a) { return !(a > 0); });
-}
+ private:
+  std::shared_ptr<const NormalisedViews> views_;
+};
 
-bool isBlack(const ObjectView& view) {
-  return std::all_of(view.image.begin(), view.image.end(), [](float c) { return !(c > 0); });
+/// Refuses an object of which no image shows anything.
+void requireShown(const ObjectViews& views) {
+  const auto is_nothing = [](const std::vector<float>& values) {
+    return std::all_of(values.begin(), values.end(), [](float value) { return !(value > 0); });
+  };
+  bool is_empty = true, is_black = true;
+  for (size_t i = 0; i < views.count(); ++i) {
+    const ObjectView view = views.view(i);
+    is_empty = is_empty && is_nothing(view.alpha);
+    is_black = is_black && is_nothing(view.image);
+  }
+  const std::string all = "all of its " + std::to_string(views.count()) + " images are ";
+  if (is_empty) refuse(all + "empty");
+  if (is_black) refuse(all + "black");
 }
 
 }  // namespace
@@ -82,22 +99,8 @@ TrainingObject readTrainingPoints(const PointSet& surface, uint64_t points) {
   return object;
 }
 
-TrainingObject readTrainingObject(const NormalisedViews& views, uint64_t points) {
-  TrainingObject object = readTrainingPoints(views.points(), points);
-  bool is_empty = true, is_black = true;
-  for (size_t view = 0; view < views.count(); ++view) {
-    object.views.push_back(viewOf(views, view));
-    is_empty = is_empty && showsNothing(object.views.back());
-    is_black = is_black && isBlack(object.views.back());
-  }
-  if (is_empty) refuse("all of its " + std::to_string(views.count()) + " images are empty");
-  if (is_black) refuse("all of its " + std::to_string(views.count()) + " images are black");
-  return object;
-}
-
 Collection::Collection(const std::string& folder, const CollectionOptions& options,
-                       Progress* progress)
-    : options_(options) {
+                       Progress* progress) {
   if (options.points < 1 || options.points > kMostEncodedPoints) {
     refuse("the number of points of an object is " + std::to_string(options.points) + "; 1 to " +
            std::to_string(kMostEncodedPoints) + " is allowed");
@@ -115,8 +118,11 @@ Collection::Collection(const std::string& folder, const CollectionOptions& optio
         refuse("its images are of another colour space than those of '" + objects_.front().name +
                "': all have to be 8-bit images, or all float images");
       }
-      readTrainingObject(*views, options.points);
-      objects_.push_back({name, std::move(views)});
+      auto object =
+          std::make_shared<TrainingObject>(readTrainingPoints(views->points(), options.points));
+      object->views = std::make_shared<const ReadViews>(views);
+      requireShown(*object->views);
+      objects_.push_back({name, std::move(views), std::move(object)});
     } catch (const Error& error) {
       if (error.code() == ErrorCode::kCancelled) throw;
       notes_.push_back("Object '" + name + "' is left out: " + error.what() + ".");
@@ -126,11 +132,6 @@ Collection::Collection(const std::string& folder, const CollectionOptions& optio
   refuse("'" + folder + "' has no object that can be learned from" +
          (notes_.empty() ? std::string(": no folder in it has a ") + kCameraFile
                          : ". " + notes_.front()));
-}
-
-std::shared_ptr<const TrainingObject> Collection::object(size_t object) const {
-  return std::make_shared<const TrainingObject>(
-      readTrainingObject(*objects_[object].views, options_.points));
 }
 
 }  // namespace stipple

@@ -22,14 +22,9 @@ struct CollectionOptions {
 
 constexpr uint64_t kMostEncodedPoints = 16384;
 
-/// An object as networks read it: points in the unit cube 0..1 with display colours from -1 to 1,
-/// and all images over black. In: views: with alpha, points with colours, of kNormalisedSide.
-/// Errors: kInvalidArgument where one of these is missing, or all views are empty; those of
-/// reading images.
-TrainingObject readTrainingObject(const NormalisedViews& views, uint64_t points);
-
-/// Its points alone, which is what is encoded. In: surface, in the cube around the origin.
-/// Errors: kInvalidArgument for points without colours.
+/// The points of an object as networks read them, which is what is encoded: in the unit cube 0..1,
+/// with display colours from -1 to 1. In: surface, in the cube around the origin. Errors:
+/// kInvalidArgument for points without colours.
 TrainingObject readTrainingPoints(const PointSet& surface, uint64_t points);
 
 /// A folder of objects: each subfolder, at any depth, with a transforms.json has the views of one.
@@ -48,8 +43,10 @@ class Collection {
   const std::shared_ptr<const NormalisedViews>& views(size_t object) const {
     return objects_[object].views;
   }
-  /// Errors: those of reading images, with their path.
-  std::shared_ptr<const TrainingObject> object(size_t object) const;
+  /// Its views are read when they are looked at. Errors of that: those of reading images.
+  const std::shared_ptr<const TrainingObject>& object(size_t object) const {
+    return objects_[object].points;
+  }
   /// One sentence on each object that was left out.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -57,9 +54,9 @@ class Collection {
   struct Object {
     std::string name;
     std::shared_ptr<const NormalisedViews> views;
+    std::shared_ptr<const TrainingObject> points;
   };
 
-  CollectionOptions options_;
   std::vector<Object> objects_;
   std::vector<std::string> notes_;
 };

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/error.h"
-#include "data/views/packed_picture.h"
 #include "train/networks/token_order.h"
 
 namespace stipple {
@@ -51,7 +50,7 @@ ByteImage byteImage(const ViewPicture& picture) {
 PreparedImage preparedView(const NormalisedViews& views, size_t view, const PatchSizes& patches) {
   PreparationOptions options;
   options.canvas_size = patches.canvas;
-  return prepareImage(byteImage(views.packed(view)->unpacked()), nullptr, options);
+  return prepareImage(byteImage(views.load(view)), nullptr, options);
 }
 
 }  // namespace

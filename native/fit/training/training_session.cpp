@@ -438,12 +438,12 @@ void TrainingSession::run(Progress& progress) {
   try {
     work.takeSteps();
     work.learnFlow();
+    if (leads()) work.finish();
   } catch (const Error&) {
     if (!work.history.records.empty()) work.save();
     throw;
   }
   if (!leads()) return;
-  work.finish();
   std::error_code ignored;
   fs::remove(trainingCheckpointPath(config_.out), ignored);
 }

@@ -58,14 +58,13 @@ class TrainingSession {
   /// About what run() allocates, bytes.
   uint64_t memoryBound() const;
 
-  /// The whole work. Where it ends early, a checkpoint of the last step is written, and weights and
-  /// report are those of the best state so far. Errors: those of Collection; of a checkpoint that
-  /// cannot be read (kFormat), or is of a training with other settings or objects
-  /// (kInvalidArgument, with the first that differs); kCancelled; of an image that is gone; kIo
-  /// where weights or report cannot be written; of the exchange, and kInvalidArgument where the
-  /// processes have other settings, objects or checkpoints. A checkpoint that cannot be written is
-  /// a note. Threads and determinism: the same bits for any number of threads, and wherever it was
-  /// stopped.
+  /// The whole work. Where it ends early, also while the result is measured or written, a
+  /// checkpoint of the last step is left. Errors: those of Collection; of a checkpoint that cannot
+  /// be read (kFormat), or is of a training with other settings or objects (kInvalidArgument, with
+  /// the first that differs); kCancelled; of an image that is gone; kIo where weights or report
+  /// cannot be written; of the exchange, and kInvalidArgument where the processes have other
+  /// settings, objects or checkpoints. A checkpoint that cannot be written is a note. Threads and
+  /// determinism: the same bits for any number of threads, and wherever it was stopped.
   void run(Progress& progress);
 
   const TrainingConfig& config() const { return config_; }

@@ -229,8 +229,9 @@ void DensityAutoencoder::addImages(std::span<const float> values, const Autoenco
   const SplatCloud cloud = splats.aroundOrigin();
   SplatCloud by_cloud = zerosLike(cloud), by_view;
   std::vector<double> contributions(splats.anchors.size(), 0.0);
+  const ObjectViews* const all = example.object->views.get();
   const std::vector<size_t> views =
-      drawn(example.object->views.size(), example.views, example.seed);
+      drawn(all == nullptr ? 0 : all->count(), example.views, example.seed);
   if (views.empty()) fail(ErrorCode::kInvalidArgument, "an object to learn from has no views");
   const double view_share = 1 / static_cast<double>(views.size());
   StatisticRequest request;
@@ -239,7 +240,7 @@ void DensityAutoencoder::addImages(std::span<const float> values, const Autoenco
   const std::unique_ptr<ViewPass> pass = backends.makeViewPass();
   for (const size_t index : views) {
     if (progress != nullptr) progress->throwIfCancelled();
-    const ObjectView& view = example.object->views[index];
+    const ObjectView view = all->view(index);
     const bool is_white = keyedBits(example.seed, RandomUse::kBackground, index) & 1;
     std::vector<float> target = view.image;
     RenderOptions options;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/progress.h"
@@ -39,12 +40,32 @@ struct ObjectView {
   std::vector<float> alpha;  ///< [H,W], of the object
 };
 
+/// Views of an object, read when they are looked at: a step looks at a few of many.
+class ObjectViews {
+ public:
+  virtual ~ObjectViews() = default;
+  virtual size_t count() const = 0;
+  /// Errors: those of reading an image.
+  virtual ObjectView view(size_t index) const = 0;
+};
+
+/// Views that are in memory.
+class KeptViews final : public ObjectViews {
+ public:
+  explicit KeptViews(std::vector<ObjectView> views) : views_(std::move(views)) {}
+  size_t count() const override { return views_.size(); }
+  ObjectView view(size_t index) const override { return views_[index]; }
+
+ private:
+  std::vector<ObjectView> views_;
+};
+
 /// An object of a collection.
 struct TrainingObject {
   std::vector<std::vector<float>> points;    ///< of each kind [count,3], in the unit cube 0..1
   std::vector<std::vector<float>> features;  ///< of each kind [count, width]
   std::vector<float> surface;                ///< [count,3], in the unit cube
-  std::vector<ObjectView> views;             ///< images of the object before black
+  std::shared_ptr<const ObjectViews> views;  ///< images of the object before black; null: none
 };
 
 /// What is learned.

@@ -8,7 +8,7 @@ namespace stipple {
 namespace {
 
 TrainingConfig parsed(const char* text) {
-  static const std::string kName = "config.json", kFolder = "/work";
+  static const std::string kName = "config.json", kFolder = "/home/someone";
   return parseTrainingConfig(text, kName, kFolder);
 }
 
@@ -18,7 +18,7 @@ TEST(TrainingConfig, TakesWhatIsSaidAndTheUsualForTheRest) {
       parsed(R"({"collection": "props", "out": "/elsewhere/out", "seed": 7,
                  "network": {"heads": 2},
                  "parts": [{"stage": "joint", "batch": 3, "weights": {"ssim": 0.4}}]})");
-  EXPECT_EQ(config.collection, "/work/props");
+  EXPECT_EQ(config.collection, "/home/someone/props");
   EXPECT_EQ(config.out, "/elsewhere/out");
   EXPECT_EQ(config.seed, 7u);
   EXPECT_EQ(config.sizes.heads, 2u);

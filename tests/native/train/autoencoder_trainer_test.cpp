@@ -9,34 +9,21 @@
 #include <vector>
 
 #include "base/error.h"
-#include "train/trained_ball.h"
+#include "train/trained_balls.h"
 
 namespace stipple {
 namespace {
 
-/// Balls of other colours, and which of them were asked for.
-class Balls final : public ObjectSource {
+/// And which of them were asked for.
+class AskedBalls final : public Balls {
  public:
-  explicit Balls(size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-      auto object = std::make_shared<TrainingObject>(ball());
-      for (ObjectView& view : object->views) {
-        for (float& value : view.image) value *= 1 - 0.2f * static_cast<float>(i);
-      }
-      objects_.push_back(object);
-    }
-  }
-  size_t count() const override { return objects_.size(); }
+  using Balls::Balls;
   std::shared_ptr<const TrainingObject> object(size_t index) const override {
     asked.push_back(index);
-    return objects_[index];
+    return Balls::object(index);
   }
-  TrainingObject& at(size_t index) { return *objects_[index]; }
 
   mutable std::vector<size_t> asked;
-
- private:
-  std::vector<std::shared_ptr<TrainingObject>> objects_;
 };
 
 AutoencoderSchedule partOf(AutoencoderStage stage, uint64_t steps) {
@@ -66,7 +53,7 @@ AutoencoderTrainer trainerOf(std::shared_ptr<const ObjectSource> objects,
 }
 
 TEST(AutoencoderTrainer, GoesThroughAllPartsAndSeesEveryObjectInARound) {
-  const auto objects = std::make_shared<Balls>(3);
+  const auto objects = std::make_shared<AskedBalls>(3);
   AutoencoderTrainer trainer = trainerOf(objects);
   std::vector<size_t> steps_of_part(3);
   while (!trainer.isDone()) {
@@ -86,7 +73,7 @@ TEST(AutoencoderTrainer, GoesThroughAllPartsAndSeesEveryObjectInARound) {
 }
 
 TEST(AutoencoderTrainer, GoesOnBitForBitFromWhereverItWasStopped) {
-  const auto objects = std::make_shared<Balls>(2);
+  const auto objects = std::make_shared<AskedBalls>(2);
   AutoencoderTrainer whole = trainerOf(objects);
   std::vector<TensorTable> states;
   while (!whole.isDone()) {
@@ -103,7 +90,7 @@ TEST(AutoencoderTrainer, GoesOnBitForBitFromWhereverItWasStopped) {
 }
 
 TEST(AutoencoderTrainer, ALossThatIsNotFiniteIsSkippedAndCounted) {
-  const auto objects = std::make_shared<Balls>(2);
+  const auto objects = std::make_shared<AskedBalls>(2);
   objects->at(1).features[0][5] = std::numeric_limits<float>::quiet_NaN();
   std::vector<AutoencoderSchedule> parts = {partOf(AutoencoderStage::kStructure, 8)};
   parts[0].batch = 1;
@@ -115,7 +102,7 @@ TEST(AutoencoderTrainer, ALossThatIsNotFiniteIsSkippedAndCounted) {
 }
 
 TEST(AutoencoderTrainer, StatesOfOtherTrainingsAreRefused) {
-  const auto objects = std::make_shared<Balls>(1);
+  const auto objects = std::make_shared<AskedBalls>(1);
   AutoencoderTrainer trainer = trainerOf(objects);
   const TensorTable state = trainer.state();
   const std::vector<float> before = trainer.values();
@@ -138,8 +125,8 @@ TEST(AutoencoderTrainer, StatesOfOtherTrainingsAreRefused) {
 }
 
 TEST(AutoencoderTrainer, WhatCannotBeTrainedIsRefused) {
-  EXPECT_THROW(trainerOf(std::make_shared<Balls>(0)), Error);
-  const auto objects = std::make_shared<Balls>(1);
+  EXPECT_THROW(trainerOf(std::make_shared<AskedBalls>(0)), Error);
+  const auto objects = std::make_shared<AskedBalls>(1);
   EXPECT_THROW(trainerOf(objects, {}), Error);
   const auto refuses = [&](auto&& change) {
     std::vector<AutoencoderSchedule> parts = threeParts();

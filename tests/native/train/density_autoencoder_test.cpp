@@ -138,7 +138,10 @@ TEST(DensityAutoencoder, ObjectsThatAreEmptyOrOfOtherFeaturesAreRefused) {
   refuses([](TrainingObject& object) { object.surface.clear(); });
   refuses([](TrainingObject& object) { object.points[0].clear(); });
   refuses([](TrainingObject& object) { object.features[0].resize(600 * 2); });
-  refuses([](TrainingObject& object) { object.views.clear(); });
+  refuses([](TrainingObject& object) { object.views = nullptr; });
+  refuses([](TrainingObject& object) {
+    object.views = std::make_shared<const KeptViews>(std::vector<ObjectView>());
+  });
 }
 
 /// What a file of these tensors is read as. In: tensors, which must outlive it.

@@ -14,7 +14,7 @@
 
 #include "base/error.h"
 #include "train/networks/autoencoder_trainer.h"
-#include "train/trained_ball.h"
+#include "train/trained_balls.h"
 
 namespace stipple {
 namespace {
@@ -67,26 +67,6 @@ void together(size_t size, Body&& body) {
   for (std::thread& thread : threads) thread.join();
 }
 
-class TintedBalls final : public ObjectSource {
- public:
-  explicit TintedBalls(size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-      objects_.push_back(std::make_shared<TrainingObject>(ball()));
-      for (ObjectView& view : objects_[i]->views) {
-        for (float& value : view.image) value *= 1 - 0.2f * static_cast<float>(i);
-      }
-    }
-  }
-  size_t count() const override { return objects_.size(); }
-  std::shared_ptr<const TrainingObject> object(size_t index) const override {
-    return objects_[index];
-  }
-  TrainingObject& at(size_t index) { return *objects_[index]; }
-
- private:
-  std::vector<std::shared_ptr<TrainingObject>> objects_;
-};
-
 std::vector<AutoencoderSchedule> partsOf(size_t batch) {
   AutoencoderSchedule part;
   part.batch = batch;
@@ -119,7 +99,7 @@ double farthest(const std::vector<float>& a, const std::vector<float>& b) {
 }
 
 TEST(GradientExchange, ProcessesThatShareStepsLearnWhatOneLearns) {
-  const auto objects = std::make_shared<TintedBalls>(5);
+  const auto objects = std::make_shared<Balls>(5);
   AutoencoderTrainer alone = trainerOf(objects, 3);
   std::vector<double> losses;
   while (!alone.isDone()) losses.push_back(alone.step().losses.total);
@@ -144,7 +124,7 @@ TEST(GradientExchange, ProcessesThatShareStepsLearnWhatOneLearns) {
 }
 
 TEST(GradientExchange, AGradientThatIsNotFiniteIsSkippedByAll) {
-  const auto objects = std::make_shared<TintedBalls>(4);
+  const auto objects = std::make_shared<Balls>(4);
   objects->at(1).features[0][5] = std::numeric_limits<float>::quiet_NaN();
   std::vector<std::vector<float>> values(2);
   std::vector<std::vector<bool>> skipped(2);
@@ -164,7 +144,7 @@ TEST(GradientExchange, AGradientThatIsNotFiniteIsSkippedByAll) {
 }
 
 TEST(GradientExchange, GoesOnAloneFromAStateOfMany) {
-  const auto objects = std::make_shared<TintedBalls>(3);
+  const auto objects = std::make_shared<Balls>(3);
   TensorTable state;
   std::vector<float> whole;
   together(2, [&](const std::shared_ptr<GradientExchange>& exchange) {
@@ -182,7 +162,7 @@ TEST(GradientExchange, GoesOnAloneFromAStateOfMany) {
 }
 
 TEST(GradientExchange, WhatCannotBeSharedIsRefused) {
-  const auto objects = std::make_shared<TintedBalls>(2);
+  const auto objects = std::make_shared<Balls>(2);
   std::vector<std::string> messages(3);
   together(3, [&](const std::shared_ptr<GradientExchange>& exchange) {
     try {
@@ -200,7 +180,7 @@ TEST(GradientExchange, WhatCannotBeSharedIsRefused) {
 }
 
 TEST(GradientExchange, WeightsThatDriftApartAreRefused) {
-  const auto objects = std::make_shared<TintedBalls>(2);
+  const auto objects = std::make_shared<Balls>(2);
   std::vector<std::string> messages(2);
   together(2, [&](const std::shared_ptr<GradientExchange>& exchange) {
     AutoencoderTrainer trainer = trainerOf(objects, 2, exchange);

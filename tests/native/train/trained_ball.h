@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "train/networks/density_autoencoder.h"
 #include "train/sphere_views.h"
@@ -53,6 +55,7 @@ inline TrainingObject ball() {
     }
   }
   object.surface = object.points[0];
+  std::vector<ObjectView> views;
   for (size_t view = 0; view < 12; ++view) {
     ObjectView made;
     made.camera = around(view, 12, 32);
@@ -66,8 +69,9 @@ inline TrainingObject ball() {
         made.alpha.push_back(at > 0 ? 1.0f : 0.0f);
       }
     }
-    object.views.push_back(std::move(made));
+    views.push_back(std::move(made));
   }
+  object.views = std::make_shared<const KeptViews>(std::move(views));
   return object;
 }
 

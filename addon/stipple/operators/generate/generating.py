@@ -23,6 +23,7 @@ class GenerateOperator(JobOperator):
     """Mix-in. The operator gives start(context) → ImageTask, and places objects by _matrix(index)."""
 
     shown_settings = 'steps', 'guidance', 'tokens', 'canvas', 'seed', 'seed_count', 'anchors', 'show_previews'
+    has_image = True
     escape_text = 'Esc stops; the same settings go on from there'
 
     steps: IntProperty(name="Steps", description="Steps from noise to the object. Time grows with them", default=20,
@@ -137,7 +138,7 @@ class GenerateOperator(JobOperator):
         except StippleError as error:
             draw_text(box, context, str(error), 'ERROR', width_px=width_px)
             return
-        seconds = cost.image_seconds + self.seed_count * (cost.seconds - cost.image_seconds)
+        seconds = self.has_image * cost.image_seconds + self.seed_count * (cost.seconds - cost.image_seconds)
         draw_text(box, context, f'About {duration(seconds)} and {size(cost.bytes)} of memory here',
                   'TIME', width_px=width_px)
         draw_text(box, context, weights_table.caution(), 'INFO', width_px=width_px)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that no image tells of: each seed gives another one."""
 
+from dataclasses import replace
+
 import bpy
 
 from ...scene.generate import image_task
@@ -14,11 +16,15 @@ class STIPPLE_OT_random_splats(GenerateAtCursor, bpy.types.Operator):
     bl_label = "Random Splats from Model"
     bl_options = {'REGISTER', 'UNDO', 'PRESET'}
 
+    has_image = False
     shown_settings = 'steps', 'tokens', 'seed', 'seed_count', 'anchors', 'show_previews'
 
     def invoke(self, context, _event):
         self._asked = True
         return context.window_manager.invoke_props_dialog(self, width=420)
+
+    def _settings(self, wanted_size):
+        return replace(super()._settings(wanted_size), guidance=1.0)  # There is nothing to follow.
 
     def start(self, context):
         self._location = tuple(context.scene.cursor.location)
