@@ -81,9 +81,26 @@ def half_image(name='halves', left=(1.0, 0.0, 0.0), right=(0.0, 0.0, 1.0), side=
     return image
 
 
+def in_order(mesh):
+    """Sorts the faces of this mesh; Blender's UV sphere has them in another order each time that it is added."""
+    uvs = mesh.uv_layers.active
+    rows = []
+    for polygon in mesh.polygons:
+        corners = [(mesh.loops[i].vertex_index, *(uvs.data[i].uv if uvs else ())) for i in polygon.loop_indices]
+        first = corners.index(min(corners))
+        rows.append(corners[first:] + corners[:first])
+    rows.sort()
+    vertices = [vertex.co.copy() for vertex in mesh.vertices]
+    mesh.clear_geometry()
+    mesh.from_pydata(vertices, [], [[corner[0] for corner in row] for row in rows])
+    if uvs:
+        mesh.uv_layers.new(name='UVMap').data.foreach_set('uv', [x for row in rows for c in row for x in c[1:]])
+
+
 def sphere(name='Sphere', segments=32, rings=16, radius=1.0):
     bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=rings, radius=radius)
     obj = bpy.context.object
+    in_order(obj.data)
     obj.name = name
     return obj
 
