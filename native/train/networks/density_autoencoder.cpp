@@ -260,9 +260,11 @@ void DensityAutoencoder::addImages(std::span<const float> values, const Autoenco
     pass->swapGradients(by_view);
     if (!request.contributions) continue;
     const std::span<const float> of_view = pass->statistic(Statistic::kContributions);
+    // Statistics are sums over pixels and channels. What counts is the mean over pixels of the sum
+    // over channels, as published, where L1 is the mean over both.
+    const double pixels = double{1} * view.camera.width * view.camera.height;
     for (size_t n = 0; n < of_view.size(); ++n) {
-      // Of the sum over channels, as published, where L1 is their mean.
-      contributions[n / sizes_.gaussians] += 3 * view_share * static_cast<double>(of_view[n]);
+      contributions[n / sizes_.gaussians] += view_share / pixels * static_cast<double>(of_view[n]);
     }
   }
   losses.splats = addSplatLosses(weights.splats, example.share, splats.anchors.positions,

@@ -106,6 +106,37 @@ TEST(DensityAutoencoder, HasTheSameDerivativesForAnyNumberOfThreads) {
   EXPECT_EQ(together, alone);
 }
 
+/// What anchors do to images, as the derivative by the biases of the density's logits. In: side of
+/// the images. Out: their L1.
+std::vector<double> densityGradient(uint32_t side, double& l1) {
+  const DensityAutoencoder networks(smallSizes());
+  const std::vector<float> values = networks.startValues(2);
+  const TrainingObject object = ball(side);
+  AutoencoderLossWeights weights;
+  weights.structure = weights.divergence = 0;
+  const Parameter& bias = networks.layout().find("octree.out_proj.bias");
+  std::vector<float> gradients(values.size(), 0.0f);
+  AutoencoderExample example = exampleOf(object, AutoencoderStage::kJoint, 5);
+  example.views = 12;
+  l1 = networks.addExample(values, example, weights, *cpuBackends(), gradients).l1;
+  return {gradients.begin() + static_cast<std::ptrdiff_t>(bias.first),
+          gradients.begin() + static_cast<std::ptrdiff_t>(bias.first + bias.count)};
+}
+
+TEST(DensityAutoencoder, WhatAnchorsDoToImagesHasTheUnitOfTheirLoss) {
+  double l1 = 0, fine_l1 = 0;
+  const std::vector<double> coarse = densityGradient(32, l1), fine = densityGradient(64, fine_l1);
+  double sum = 0, fine_sum = 0;
+  for (const double value : coarse) sum += std::abs(value);
+  for (const double value : fine) fine_sum += std::abs(value);
+  // Four times as many pixels show the same image, with another outline. A sum over pixels would
+  // be four times as large.
+  EXPECT_NEAR(fine_sum / sum, 1, 0.5);
+  // What all anchors take off the loss, three channels of L1, is of the loss's size; it comes back
+  // at each of the four levels, twice at most.
+  EXPECT_LT(sum, 4 * 2 * 3 * l1);
+}
+
 TEST(DensityAutoencoder, ExamplesAddUp) {
   const DensityAutoencoder networks(smallSizes());
   const std::vector<float> values = networks.startValues(2);

@@ -38,8 +38,9 @@ inline Camera around(size_t i, size_t count, uint32_t side) {
   return camera;
 }
 
-/// A ball with a pattern: its surface with colours as features, and views of it.
-inline TrainingObject ball() {
+/// A ball with a pattern: its surface with colours as features, and views of it. In: side of their
+/// images, pixels.
+inline TrainingObject ball(uint32_t side = 32) {
   TrainingObject object;
   object.points.resize(1);
   object.features.resize(1);
@@ -58,9 +59,9 @@ inline TrainingObject ball() {
   std::vector<ObjectView> views;
   for (size_t view = 0; view < 12; ++view) {
     ObjectView made;
-    made.camera = around(view, 12, 32);
-    for (uint32_t y = 0; y < 32; ++y) {
-      for (uint32_t x = 0; x < 32; ++x) {
+    made.camera = around(view, 12, side);
+    for (uint32_t y = 0; y < side; ++y) {
+      for (uint32_t x = 0; x < side; ++x) {
         const Vec3d from = placeOf(made.camera);
         const Vec3d along = (unproject(made.camera, x + 0.5, y + 0.5, 1) - from).normalized();
         const double at = testing::crossing(from, along, kRadius);
