@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What belongs to the machine rather than to a file."""
 
+import functools
 import os
 
 import bpy
@@ -83,10 +84,22 @@ def get():
     return addon.preferences if addon else None
 
 
-def weights_folder():
-    """The folder of the files of networks' weights, '' for none."""
+def chosen_weights_folder():
+    """The folder of the files of networks' weights that the user has chosen, '' for none."""
     chosen = get()
     return os.path.normpath(chosen.weights_folder) if chosen is not None and chosen.weights_folder else ''
+
+
+@functools.cache
+def shipped_weights_folder():
+    """The folder of the networks that came with this add-on, '' where none did."""
+    folder = os.path.join(os.path.dirname(__file__), 'networks')
+    return folder if os.path.isfile(os.path.join(folder, 'flow.safetensors')) else ''
+
+
+def weights_folder():
+    """The folder of the files of networks' weights: the user's, else that of the networks that came with this add-on."""
+    return chosen_weights_folder() or shipped_weights_folder()
 
 
 def up_axis(format_name):

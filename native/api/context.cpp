@@ -41,6 +41,14 @@ StippleStatus stipple_context_set_weights_folder(StippleContext* context, const 
   });
 }
 
+StippleStatus stipple_context_set_shipped_weights_folder(StippleContext* context,
+                                                         const char* folder_utf8) {
+  return guarded([&] {
+    stipple::WeightsPlace& weights = *require(context, "context").state->weights;
+    weights.setShipped(folder_utf8 != nullptr ? folder_utf8 : "");
+  });
+}
+
 StippleStatus stipple_context_memory_limit(const StippleContext* context, uint64_t* bytes) {
   return guarded([&] {
     const uint64_t limit = require(context, "context").state->memory_limit_bytes;

@@ -102,7 +102,7 @@ StippleStatus stipple_model_load(StippleContext* context, const char* path_utf8,
     require(model, "model");
     const std::string path = &require(path_utf8, "path_utf8");
     withThreads(context->state->thread_count, [&] {
-      const ReadingAid aid = {context->state->weights->folder(), nullptr, context->state->backends};
+      const ReadingAid aid = {context->state->weights->folders(), nullptr, context->state->backends};
       *model = new StippleModel{context->state, loadModel(path, aid)};
     });
   });
@@ -114,7 +114,7 @@ StippleStatus stipple_model_load_start(StippleContext* context, const char* path
     const Context state = require(context, "context").state;
     const std::string path = &require(path_utf8, "path_utf8");
     require(job, "job") = startJob(state, [path, state](Progress& progress) -> JobResult {
-      return loadModel(path, {state->weights->folder(), &progress, state->backends});
+      return loadModel(path, {state->weights->folders(), &progress, state->backends});
     });
   });
 }

@@ -22,6 +22,7 @@ void addDensify(CLI::App& app, const Context& context);
 void addGenerate(CLI::App& app, const Context& context);
 void addRandom(CLI::App& app, const Context& context);
 void addEncode(CLI::App& app, const Context& context);
+void addShrink(CLI::App& app);
 void addTrain(CLI::App& app, const Context& context);
 void addCompare(CLI::App& app, const Context& context);
 void addAccuracy(CLI::App& app, const Context& context);

@@ -53,6 +53,7 @@ int run(int argc, char** argv) {
   addRandom(app, context);
   addTrain(app, context);
   addEncode(app, context);
+  addShrink(app);
   addCompare(app, context);
   addAccuracy(app, context);
   try {

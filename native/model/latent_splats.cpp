@@ -100,7 +100,7 @@ std::shared_ptr<const SplatModel> makeLatentSplats(const LatentNetworks& network
 
 std::shared_ptr<const SplatModel> readLatentSplats(const std::string& path, const ReadingAid& aid) {
   LatentAsset asset = readLatentAsset(path);
-  const std::string weights = findReferenced(asset.weights, aid.weights_folder, path, aid.progress);
+  const std::string weights = findReferenced(asset.weights, aid.weights_folders, path, aid.progress);
   const LatentNetworks networks = openLatentNetworks(weights);
   ModelNotes notes = {std::move(asset.settings_json), std::move(asset.extras)};
   try {

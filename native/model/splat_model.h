@@ -29,9 +29,9 @@ struct ModelNotes {
 
 /// What reading an asset may need beside its file.
 struct ReadingAid {
-  /// Folder of the user's files of networks' weights, which assets name and do not hold; empty:
-  /// nobody has said where it is.
-  std::string weights_folder;
+  /// Folders with files of networks' weights, which assets name and do not hold; empty: nobody has
+  /// said where they are.
+  std::vector<std::string> weights_folders;
   Progress* progress = nullptr;  ///< of reading; files of weights are hashed once
   /// What a model may look at its splats with later; null: it does without.
   std::shared_ptr<const BackendFactory> backends = nullptr;

@@ -112,8 +112,9 @@ def test_an_opaque_image_needs_a_mask(stipple, weights, picture, tmp_path):
     assert bpy.ops.stipple.splats_from_image(filepath=str(opaque), mask=str(mask_path), **SMALL) == {'FINISHED'}
 
 
-def test_without_weights_the_message_says_where_they_are_named(stipple, picture):
+def test_without_weights_the_message_says_where_they_are_named(stipple, picture, monkeypatch):
     stipple.preferences.get().weights_folder = ''
+    monkeypatch.setattr(stipple.preferences, 'shipped_weights_folder', lambda: '')
     with pytest.raises(RuntimeError, match='Preferences'):
         bpy.ops.stipple.splats_from_image(filepath=str(picture), **SMALL)
 

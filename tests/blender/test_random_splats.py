@@ -47,11 +47,12 @@ def test_each_seed_gives_another_object(weights):
     assert again.data.stipple.anchors == 40  # The budget can be moved, as of any model.
 
 
-def test_without_weights_it_says_where_they_are_told(stipple, tmp_path):
-    chosen = sys.modules[stipple.__name__ + '.preferences'].get()
-    before, chosen.weights_folder = chosen.weights_folder, ''
+def test_without_weights_it_says_where_they_are_told(stipple, monkeypatch):
+    preferences = sys.modules[stipple.__name__ + '.preferences']
+    monkeypatch.setattr(preferences, 'shipped_weights_folder', lambda: '')
+    before, preferences.get().weights_folder = preferences.get().weights_folder, ''
     try:
         with pytest.raises(RuntimeError, match='No weights folder is chosen'):
             bpy.ops.stipple.random_splats(**FEW)
     finally:
-        chosen.weights_folder = before
+        preferences.get().weights_folder = before

@@ -246,6 +246,26 @@ def test_an_image_becomes_splats_by_networks_of_ones_own(given, tmp_path):
     assert 'are of different trainings' in error('generate', view, splats, '--weights', folder)
 
 
+def test_weights_of_half_the_size_make_the_same_splats(given, tmp_path):
+    run('train', given(parts=parts(structure=30, attributes=60), flow=dict(FLOW, steps=20)))
+    large, small = tmp_path / 'result', tmp_path / 'small'
+    small.mkdir()
+    for name in ('weights.safetensors', 'flow.safetensors'):
+        run('shrink', large / name, small / name)
+        # The header, names and shapes, keeps its size.
+        assert (small / name).stat().st_size < 0.62 * (large / name).stat().st_size
+    places = []
+    for folder in (large, small):
+        run('random', tmp_path / 'made.ply', '--weights', folder, '--steps', 4, '--anchors', 40)
+        info = json.loads(run('info', tmp_path / 'made.ply', '--json').stdout)
+        places.append(info['bounds_min'] + info['bounds_max'])
+    assert places[0] == pytest.approx(places[1], abs=0.02)
+    ball = tmp_path / 'objects/balls/5'
+    assert 'points.ply' in error('shrink', ball / 'points.ply', small / 'weights.safetensors')
+    assert 'points.ply' in error('shrink', large / 'weights.safetensors', ball / 'points.ply')
+    assert (small / 'weights.safetensors').exists() and (ball / 'points.ply').stat().st_size > 1000
+
+
 def test_a_flow_goes_on_bit_for_bit(given, tmp_path):
     short = dict(parts=parts(structure=20), flow=dict(FLOW, steps=400), checkpoint_interval=30)
     run('train', given('whole.json', out='whole', **short))

@@ -20,7 +20,7 @@ class Context(Handle):
         options.thread_count = threads
         options.memory_limit_bytes = memory_limit_bytes
         super().__init__(library, new_handle(library, 'stipple_context_create', byref(options)))
-        self._weights_folder = ''
+        self._weights_folder, self._shipped_folder = '', ''
 
     def set_weights_folder(self, folder):
         """Says where models that name a file of weights find it; '' for where the environment says."""
@@ -28,6 +28,13 @@ class Context(Handle):
             self._check(self.library.stipple_context_set_weights_folder(self.pointer,
                                                                         path_bytes(folder) if folder else None))
             self._weights_folder = folder
+
+    def set_shipped_weights_folder(self, folder):
+        """Says where networks lie that came with the program, '' for none: what models name is looked for there, too."""
+        if folder != self._shipped_folder:
+            self._check(self.library.stipple_context_set_shipped_weights_folder(self.pointer,
+                                                                                path_bytes(folder) if folder else None))
+            self._shipped_folder = folder
 
     def memory_limit(self):
         """Bytes that native work may take."""

@@ -29,6 +29,7 @@ FUNCTIONS = {
     'stipple_context_options_init': (None, [_to(s.StippleContextOptions)]),
     'stipple_context_create': (_status, [_to(s.StippleContextOptions), _out_handle]),
     'stipple_context_set_weights_folder': (_status, [_handle, _path]),
+    'stipple_context_set_shipped_weights_folder': (_status, [_handle, _path]),
     'stipple_context_memory_limit': (_status, [_handle, _to(c_uint64)]),
     'stipple_context_free': (None, [_handle]),
     # jobs
@@ -299,6 +300,7 @@ FUNCTIONS = {
     'stipple_image_channels_read': (_status, [_handle, c_uint64, _floats, c_uint64]),
     # weights of networks
     'stipple_weights_find': (_status, [_handle, _path, _out_handle]),
+    'stipple_weights_save_half_sized': (_status, [_path, _path]),
     'stipple_weights_free': (None, [_handle]),
     'stipple_weights_info': (_status, [_handle, _to(s.StippleWeightsInfo)]),
     'stipple_weights_file': (_status, [_handle, c_uint32, _to(s.StippleWeightsFile)]),

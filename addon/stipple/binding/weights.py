@@ -4,6 +4,7 @@
 from ctypes import byref, c_char_p
 from dataclasses import dataclass
 
+from .errors import check
 from .handle import Handle, new_handle, path_bytes
 from .job import Job
 from .structs import StippleWeightsFile, StippleWeightsInfo, WeightsRole, WeightsState
@@ -24,6 +25,11 @@ class WeightsFile:
     published_sha256: str
     sha256: str            # '' until the file was read
     licence: str
+
+
+def save_half_sized(library, weights_path, out_path):
+    """Writes trained weights with 16 bits for each number. Errors: StippleError."""
+    check(library, library.stipple_weights_save_half_sized(path_bytes(weights_path), path_bytes(out_path)))
 
 
 class Weights(Handle):

@@ -5,8 +5,9 @@ from ..binding.structs import WeightsState
 from ..scene.generate import weights_table
 from .text import draw_text
 
-_ICONS = {WeightsState.TRAINED: 'CHECKMARK', WeightsState.NOT_NEEDED: 'BLANK1', WeightsState.MISSING: 'X', WeightsState.OTHER_SIZE: 'ERROR', WeightsState.UNCHECKED: 'QUESTION',
-          WeightsState.PUBLISHED: 'CHECKMARK', WeightsState.OTHER_CONTENT: 'ERROR'}
+_ICONS = {WeightsState.TRAINED: 'CHECKMARK', WeightsState.NOT_NEEDED: 'BLANK1', WeightsState.MISSING: 'X',
+          WeightsState.OTHER_SIZE: 'ERROR', WeightsState.UNCHECKED: 'QUESTION', WeightsState.PUBLISHED: 'CHECKMARK',
+          WeightsState.OTHER_CONTENT: 'ERROR'}
 
 
 def draw(layout, context, chosen):

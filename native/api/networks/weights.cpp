@@ -4,6 +4,7 @@
 #include "api/handles.h"
 #include "api/job.h"
 #include "api/networks/weights_folder_of.h"
+#include "io/assets/weight_file.h"
 
 using namespace stipple;
 using namespace stipple::api;
@@ -33,7 +34,8 @@ StippleWeightsFile fileTo(const WeightsFolder& folder, WeightsRole role) {
 namespace stipple::api {
 
 std::string weightsFolderOf(const StippleContext& context, const char* given, const char* name) {
-  const std::string folder = given != nullptr ? given : context.state->weights->folder();
+  std::string folder = given != nullptr ? given : context.state->weights->folder();
+  if (given == nullptr && folder.empty()) folder = context.state->weights->shipped();
   if (folder.empty()) {
     fail(ErrorCode::kInvalidArgument, std::string(name) +
                                           " names no weights folder, and the context has none; " +
@@ -54,6 +56,14 @@ StippleStatus stipple_weights_find(StippleContext* context, const char* folder_u
     const std::string folder = weightsFolderOf(*context, folder_utf8, "folder_utf8");
     *weights = new StippleWeights{context->state,
                                   std::make_shared<const WeightsFolder>(findWeights(folder))};
+  });
+}
+
+StippleStatus stipple_weights_save_half_sized(const char* weights_path, const char* out_path) {
+  return guarded([&] {
+    require(weights_path, "weights_path");
+    require(out_path, "out_path");
+    writeHalfSizedWeights(weights_path, out_path);
   });
 }
 

@@ -94,6 +94,9 @@ StippleStatus stipple_context_create(const StippleContextOptions* options, Stipp
  * It holds for what is loaded from then on. NULL: the folder that the environment variable STIPPLE_WEIGHTS names, as
  * it is in a context where this was never called. */
 StippleStatus stipple_context_set_weights_folder(StippleContext* context, const char* folder_utf8);
+/* Says where networks lie that came with the program: where no weights folder is set, theirs is used, and the weights
+ * that assets name are looked for in both. NULL: none came. */
+StippleStatus stipple_context_set_shipped_weights_folder(StippleContext* context, const char* folder_utf8);
 /* Bytes: what the options said, or 60 % of the machine's memory. */
 StippleStatus stipple_context_memory_limit(const StippleContext* context, uint64_t* bytes);
 void stipple_context_free(StippleContext* context);
@@ -2434,6 +2437,10 @@ StippleStatus stipple_weights_info(const StippleWeights* weights, StippleWeights
 StippleStatus stipple_weights_file(const StippleWeights* weights, uint32_t role, StippleWeightsFile* file);
 /* A sentence about files that cannot be read, or of which there are several. */
 StippleStatus stipple_weights_note(const StippleWeights* weights, uint64_t index, const char** text_utf8);
+/* Writes weights that were trained here with 16 bits for each number, the nearest to what it was: half the size. All
+ * that reads weights reads them. Errors: IO, FORMAT; INVALID_ARGUMENT for weights of others, numbers above 65,504, and
+ * where out_path has a file of another kind. */
+StippleStatus stipple_weights_save_half_sized(const char* weights_path, const char* out_path);
 /* Compares the files' SHA-256 with the published ones, as a job (stipple_job_weights). A file that this process has
  * read before, with the same path, size and time, is not read again. Cost: about 4 GB are read. */
 StippleStatus stipple_weights_check_start(const StippleWeights* weights, StippleJob** job);

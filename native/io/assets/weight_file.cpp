@@ -1,4 +1,5 @@
 #include "io/assets/weight_file.h"
+#include "math/half_float.h"
 
 #include <algorithm>
 #include <memory>
@@ -75,6 +76,38 @@ void writeTrainedWeights(const TensorTable& tensors, const std::string& settings
   file.setMetadata(kTrainedKey, settings_json);
   for (const auto& [name, tensor] : tensors) file.add(name, tensor);
   file.write(path);
+}
+
+void writeHalfSizedWeights(const std::string& from, const std::string& to) {
+  std::map<std::string, std::string> metadata;
+  const WeightTable weights = openWeightFile(from, &metadata);
+  const auto settings = metadata.find(kTrainedKey);
+  if (settings == metadata.end()) {
+    fail(ErrorCode::kInvalidArgument,
+         from + " was not written by a training of ours: its metadata has no '" +
+             std::string(kTrainedKey) + "'");
+  }
+  requireTrainedWeightsPlace(to);
+  std::map<std::string, CarriedTensor> halves;
+  for (const std::string& name : weights.names()) {
+    const WeightTensor& tensor = *weights.find(name);
+    CarriedTensor& half = halves[name];
+    half = {"F16", tensor.shape, {}};
+    half.bytes.reserve(2 * tensor.count());
+    for (const float value : weights.floats(name, tensor.shape)) {
+      const uint16_t bits = floatToHalf(value);
+      if ((bits & 0x7fff) == 0x7c00) {
+        fail(ErrorCode::kInvalidArgument, from + " has " + std::to_string(value) + " in '" + name +
+                                              "'; 16 bits hold no more than 65504");
+      }
+      half.bytes.push_back(static_cast<uint8_t>(bits));
+      half.bytes.push_back(static_cast<uint8_t>(bits >> 8));
+    }
+  }
+  SafeTensorsWriter file;
+  file.setMetadata(kTrainedKey, settings->second);
+  for (const auto& [name, half] : halves) file.carry(name, half);
+  file.write(to);
 }
 
 }  // namespace stipple

@@ -22,6 +22,11 @@ constexpr char kTrainedKey[] = "stipple_training";
 /// as JSON. Errors: kIo; kInvalidArgument where the path has a file of another kind.
 void writeTrainedWeights(const TensorTable& tensors, const std::string& settings_json,
                          const std::string& path);
+/// Writes trained weights with 16 bits for each number, each the nearest to what it was: half the
+/// size, read by all that reads the others. In: from: a file of writeTrainedWeights(). Errors:
+/// those of openWeightFile(); kInvalidArgument for weights that were not trained here, a number
+/// that is too large for 16 bits, and where `to` has a file of another kind; kIo.
+void writeHalfSizedWeights(const std::string& from, const std::string& to);
 /// What weights learned with that were trained here: by the metadata of their file; those of others
 /// have the published range. In: name, what messages call the file. Errors: kFormat for settings
 /// that cannot be read, or are out of range.

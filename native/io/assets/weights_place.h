@@ -2,6 +2,7 @@
 
 #include <mutex>
 #include <string>
+#include <vector>
 
 namespace stipple {
 
@@ -12,13 +13,18 @@ class WeightsPlace {
 
   /// "": nobody has said.
   std::string folder() const;
+  /// The folder of networks that came with the program; "": none did.
+  std::string shipped() const;
+  /// Where assets' weights are looked for, one after the other.
+  std::vector<std::string> folders() const;
   void set(const std::string& folder);
   /// The folder that the environment variable STIPPLE_WEIGHTS names, or "".
   void setByEnvironment();
+  void setShipped(const std::string& folder);
 
  private:
   mutable std::mutex mutex_;
-  std::string folder_;
+  std::string folder_, shipped_;
 };
 
 }  // namespace stipple

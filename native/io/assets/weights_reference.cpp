@@ -53,15 +53,21 @@ WeightsReference referenceOf(const std::string& path, Progress* progress) {
   return {nameOf(path), InputFile(path).size(), sha256OfFile(path, progress, kStage)};
 }
 
-std::string findReferenced(const WeightsReference& weights, const std::string& folder,
+std::string findReferenced(const WeightsReference& weights, std::span<const std::string> folders,
                            const std::string& what, Progress* progress) {
-  if (folder.empty()) {
+  if (folders.empty()) {
     fail(ErrorCode::kUnavailable,
          what + " needs the weights " + describe(weights) +
              ", and no folder of weights is set; set it in the add-on's preferences, or by the "
              "environment variable STIPPLE_WEIGHTS");
   }
-  std::vector<std::string> paths = weightFilesBelow(folder);
+  std::vector<std::string> paths;
+  std::string places;
+  for (const std::string& folder : folders) {
+    const std::vector<std::string> found = weightFilesBelow(folder);
+    paths.insert(paths.end(), found.begin(), found.end());
+    places += (places.empty() ? "'" : " and '") + folder + "'";
+  }
   // Hashing takes seconds: the likeliest one first.
   std::stable_partition(paths.begin(), paths.end(),
                         [&](const std::string& path) { return nameOf(path) == weights.name; });
@@ -77,8 +83,10 @@ std::string findReferenced(const WeightsReference& weights, const std::string& f
       namesake = "; " + path + " is another file (" + std::to_string(bytes) + " bytes)";
     }
   }
+  const bool is_one = folders.size() == 1;
   fail(ErrorCode::kUnavailable, what + " needs the weights " + describe(weights) +
-                                    ", which the folder '" + folder + "' does not have" + namesake);
+                                    ", which the folder" + (is_one ? " " : "s ") + places +
+                                    (is_one ? " does" : " do") + " not have" + namesake);
 }
 
 }  // namespace stipple

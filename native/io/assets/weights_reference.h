@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "base/error.h"
@@ -24,10 +25,10 @@ void validate(const WeightsReference& weights, const std::string& what, ErrorCod
 WeightsReference referenceOf(const std::string& path, Progress* progress = nullptr);
 
 /// The path of the file that is meant, which may have another name and lie in a subfolder.
-/// In: folder: of the user's files of weights, or empty; what: names what needs it in the message.
-/// Errors: kUnavailable, with one sentence that names file and folder, where it is not there; those
-/// of weightFilesBelow() and referenceOf().
-std::string findReferenced(const WeightsReference& weights, const std::string& folder,
+/// In: folders: of files of weights, looked through one after the other; what: names what needs it
+/// in the message. Errors: kUnavailable, with one sentence that names file and folders, where it is
+/// in none of them; those of weightFilesBelow() and referenceOf().
+std::string findReferenced(const WeightsReference& weights, std::span<const std::string> folders,
                            const std::string& what, Progress* progress = nullptr);
 
 }  // namespace stipple

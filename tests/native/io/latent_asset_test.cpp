@@ -106,12 +106,20 @@ TEST_F(WeightsReferences, AreFoundByContentAloneWhereNamesAndSizesDeceive) {
   EXPECT_EQ(weights.sha256, sha256OfFile(file));
   std::filesystem::rename(file, folder_ / "below" / "two.safetensors");
   store("one.safetensors", "the Weights");
-  EXPECT_EQ(findReferenced(weights, folder_.string(), "it"), path("below/two.safetensors"));
+  const std::vector<std::string> one = {folder_.string()};
+  EXPECT_EQ(findReferenced(weights, one, "it"), path("below/two.safetensors"));
+  std::filesystem::create_directories(folder_ / "empty");
+  const std::vector<std::string> two = {path("empty"), path("below")};
+  EXPECT_EQ(findReferenced(weights, two, "it"), path("below/two.safetensors"));
   std::filesystem::remove(folder_ / "below" / "two.safetensors");
   expectError(ErrorCode::kUnavailable,
               {"it needs the weights one.safetensors (11 bytes", "does not have",
                "one.safetensors is another file"},
-              [&] { findReferenced(weights, folder_.string(), "it"); });
+              [&] { findReferenced(weights, one, "it"); });
+  expectError(ErrorCode::kUnavailable, {"empty' and '", "do not have"},
+              [&] { findReferenced(weights, two, "it"); });
+  expectError(ErrorCode::kUnavailable, {"no folder of weights is set"},
+              [&] { findReferenced(weights, {}, "it"); });
 }
 
 }  // namespace

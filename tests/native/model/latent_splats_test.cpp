@@ -73,7 +73,7 @@ TEST_F(LatentSplats, AreStoredWithoutTheirWeights) {
 TEST_F(LatentSplats, FindTheirWeightsUnderAnyNameInAnySubfolder) {
   fs::create_directories(weights_ + "/deep/er");
   fs::rename(weights_ + "/decoder.safetensors", weights_ + "/deep/er/other.safetensors");
-  const auto again = loadModel(asset_, {weights_, nullptr});
+  const auto again = loadModel(asset_, {{weights_}, nullptr});
   ModelRequest request;
   request.budget = 64;
   EXPECT_EQ(again->decode(request).positions, model_->decode(request).positions);
@@ -88,15 +88,15 @@ TEST_F(LatentSplats, SayWhichWeightsAreMissingAndWhere) {
   expectError(
       ErrorCode::kUnavailable,
       {"thing.stipple.safetensors", "decoder.safetensors", weights_.c_str(), "does not have"}, [&] {
-        loadModel(asset_, {weights_, nullptr});
+        loadModel(asset_, {{weights_}, nullptr});
       });
   // Other weights of the same name.
   fs::copy_file(weights_ + "/flow.safetensors", weights_ + "/decoder.safetensors");
   expectError(ErrorCode::kUnavailable, {"does not have", "is another file"}, [&] {
-    loadModel(asset_, {weights_, nullptr});
+    loadModel(asset_, {{weights_}, nullptr});
   });
   expectError(ErrorCode::kIo, {"/no/such/folder"}, [&] {
-    loadModel(asset_, {"/no/such/folder", nullptr});
+    loadModel(asset_, {{"/no/such/folder"}, nullptr});
   });
 }
 
@@ -105,7 +105,7 @@ TEST_F(LatentSplats, RefuseWeightsWhoseContentDiffersByOneByte) {
   bytes.back() = static_cast<char>(bytes.back() ^ 1);
   std::ofstream(weights_ + "/decoder.safetensors", std::ios::binary) << bytes;
   expectError(ErrorCode::kUnavailable, {"is another file"}, [&] {
-    loadModel(asset_, {weights_, nullptr});
+    loadModel(asset_, {{weights_}, nullptr});
   });
 }
 
@@ -115,7 +115,7 @@ TEST_F(LatentSplats, StopReadingWhenCancelled) {
   fs::remove(weights_ + "/decoder.safetensors");
   Progress progress;
   progress.cancel();
-  expectError(ErrorCode::kCancelled, {}, [&] { loadModel(asset_, {weights_, &progress}); });
+  expectError(ErrorCode::kCancelled, {}, [&] { loadModel(asset_, {{weights_}, &progress}); });
 }
 
 TEST_F(LatentSplats, TellAsMuchProgressOfTheDensityAsOfTheSplats) {

@@ -143,7 +143,7 @@ TEST_F(MotionSplatsFile, LooksAtItsSplatsWhereTheReaderHasWhatDraws) {
     return hidden;
   };
   const size_t blind = hiddenIn(*loadModel(path("a")));
-  const size_t looked = hiddenIn(*loadModel(path("a"), {"", nullptr, cpuBackends()}));
+  const size_t looked = hiddenIn(*loadModel(path("a"), {{}, nullptr, cpuBackends()}));
   EXPECT_GT(blind, kEach / 5);
   EXPECT_LT(looked, blind / 2);
 }

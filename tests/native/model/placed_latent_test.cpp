@@ -26,7 +26,7 @@ class PlacedLatent : public ScratchFolder {
     writeLatentAsset(asset_, path("placed.stipple.safetensors"));
     ModelRequest request;
     request.budget = 40;
-    return loadModel(path("placed.stipple.safetensors"), {weights_, nullptr})->decode(request);
+    return loadModel(path("placed.stipple.safetensors"), {{weights_}, nullptr})->decode(request);
   }
 
   std::string weights_;
@@ -51,7 +51,7 @@ TEST_F(PlacedLatent, DecodesToTheSameSplatsElsewhere) {
 TEST_F(PlacedLatent, TellsWhereItsCubeIs) {
   asset_.latent.placement = {2.0, {1.0, -0.5, 0.25}};
   writeLatentAsset(asset_, path("placed.stipple.safetensors"));
-  const auto model = loadModel(path("placed.stipple.safetensors"), {weights_, nullptr});
+  const auto model = loadModel(path("placed.stipple.safetensors"), {{weights_}, nullptr});
   EXPECT_EQ(model->info().bounds_min, (std::array<float, 3>{0.0f, -1.5f, -0.75f}));
   EXPECT_EQ(model->info().bounds_max, (std::array<float, 3>{2.0f, 0.5f, 1.25f}));
   EXPECT_EQ(model->density()->root().side, 2.0);

@@ -175,7 +175,7 @@ TEST_F(SplatModelOfEveryKind, ComesBackThroughTheTableWithTheSameSplats) {
   for (const auto& model : allKinds()) {
     const std::string file = path(model->kind());
     model->save(file);
-    const auto again = loadModel(file, {weights(), nullptr});
+    const auto again = loadModel(file, {{weights()}, nullptr});
     EXPECT_STREQ(again->kind(), model->kind());
     expectSameSplats(again->decode(small()), model->decode(small()));
     again->save(file + " again");

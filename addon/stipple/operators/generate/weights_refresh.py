@@ -3,6 +3,7 @@
 
 import bpy
 
+from ... import preferences
 from ...jobs import JobOperator
 from ...scene.generate import weights_table
 
@@ -27,7 +28,7 @@ class STIPPLE_OT_weights_refresh(JobOperator, bpy.types.Operator):
 
 
 def _has_folder(cls):
-    if weights_table.folder():
+    if preferences.chosen_weights_folder():
         return True
     cls.poll_message_set('No weights folder is chosen')
     return False

@@ -19,17 +19,26 @@ STATE_TEXTS = {WeightsState.MISSING: "Missing", WeightsState.OTHER_SIZE: "Anothe
                WeightsState.TRAINED: "Trained by Stipple", WeightsState.NOT_NEEDED: "Not needed"}
 _OWN = WeightsState.TRAINED, WeightsState.NOT_NEEDED
 OWN_NETWORKS = "These networks were trained by Stipple: they know the objects of their collection, and nothing else."
+SHIPPED_NETWORKS = ("These small networks came with Stipple. They know rocks, plants in pots and bottles, and make "
+                    "everything into one of these. For anything else choose a Weights Folder in the preferences.")
 NOT_TRIED = ("The structure of these networks was verified on small ones with random weights. We have never run the "
              "published weights.")
 
 
 def folder():
-    """The weights folder of Preferences, '' for none."""
+    """The weights folder of Preferences, or that of the networks that came with the add-on."""
     return preferences.weights_folder()
+
+
+def is_shipped():
+    """Whether the networks are those that came with the add-on: then there is nothing to look for."""
+    return bool(preferences.shipped_weights_folder()) and not preferences.chosen_weights_folder()
 
 
 def caution():
     """What who uses the networks should know."""
+    if is_shipped():
+        return SHIPPED_NETWORKS
     return OWN_NETWORKS if is_trained() else NOT_TRIED
 
 
@@ -50,11 +59,11 @@ def source():
 
 def is_trained():
     """Whether the networks were trained by Stipple, and know what was in its collection alone."""
-    return any(row['state'] == WeightsState.TRAINED for row in rows())
+    return is_shipped() or any(row['state'] == WeightsState.TRAINED for row in rows())
 
 
 def is_complete():
-    return bool(rows()) and all(row['state'] != WeightsState.MISSING for row in rows())
+    return is_shipped() or bool(rows()) and all(row['state'] != WeightsState.MISSING for row in rows())
 
 
 def refresh():

@@ -63,7 +63,8 @@ def context():
     if key not in _contexts:
         _contexts.clear()
         _contexts[key] = Context(library.load(path), threads, limit)
-    _contexts[key].set_weights_folder(preferences.weights_folder())
+    _contexts[key].set_weights_folder(preferences.chosen_weights_folder())
+    _contexts[key].set_shipped_weights_folder(preferences.shipped_weights_folder())
     return _contexts[key]
 
 
