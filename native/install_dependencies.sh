@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that building, running and testing Stipple takes. This is the one list
 # of them; the names are the same in Debian 12, Debian 13 and sid. Does nothing when all are there.
+#   bash native/install_dependencies.sh            what building, running and testing takes
+#   bash native/install_dependencies.sh --package  also what making the add-on's zip takes (native/package)
 set -euo pipefail
 
 packages=(
@@ -25,6 +27,13 @@ packages=(
   # Blender, with what it needs to draw without a screen, and a virtual screen for its windows.
   blender libegl1 libegl-mesa0 libgl1-mesa-dri xvfb
 )
+# Making zips: the compiler that they are made with, and what unpacks sources.
+package_packages=(g++-12 dpkg-dev patch xz-utils ca-certificates)
+case ${1:-} in
+  '') ;;
+  --package) packages+=("${package_packages[@]}") ;;
+  *) echo "Dependencies: the option is '$1'; it must be --package." >&2; exit 1 ;;
+esac
 
 missing=()
 for package in "${packages[@]}"; do

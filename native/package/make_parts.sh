@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Makes what packages are linked with, in build/package: sources from a Debian mirror, static libraries of them, and stubs
-# of glibc 2.28. What is made stays for the next run.
+# Makes what packages are linked with, in build/package: sources from a Debian mirror, static libraries of them, and
+# stubs of glibc 2.28. What is made stays for the next run.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 parts=$PWD/build/package

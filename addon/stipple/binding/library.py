@@ -5,6 +5,7 @@ import os
 from ctypes import CDLL, c_uint32
 from pathlib import Path
 
+from . import contents
 from .declarations import declare
 from .errors import LibraryError
 from .structs import ABI_VERSION
@@ -29,8 +30,8 @@ def find(path=''):
 def load(path=''):
     """The library with its functions declared; loaded once per file.
 
-    Errors: LibraryError when the path is not absolute, the file is missing, cannot be loaded, or has another ABI
-    version.
+    Errors: LibraryError when the path is not absolute, the file is missing, is not the one that the add-on came with,
+    cannot be loaded, or has another ABI version.
     """
     file = find(path)
     if not file.is_absolute():
@@ -75,6 +76,7 @@ def _missing(file):
 
 
 def _load(file):
+    contents.check(file)
     try:
         library = CDLL(str(file))
     except OSError as error:

@@ -1,0 +1,96 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gathers the licences of all that lies inside the packages' libraries.
+
+    licences.py PARTS OUTPUT
+
+PARTS is the folder that make_parts.sh made. OUTPUT gets one file for each library of others, as Debian gives it, the
+texts that those refer to, and an index. A licence that cannot be found is an error.
+"""
+
+import argparse
+import re
+import shutil
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+DOCS = Path('/usr/share/doc')
+COMMON = Path('/usr/share/common-licenses')
+
+# Compiled from sources: the name in parts/CMakeLists.txt, the folder of the source, what it does here.
+COMPILED = {
+    'tbb': ('onetbb', 'oneTBB: parallel loops'),
+    'hwy': ('highway', 'Highway: vector instructions'),
+    'z': ('zlib', 'zlib: compression'),
+    'zstd': ('zstd', 'Zstandard: compression'),
+    'lz4': ('lz4', 'LZ4: compression'),
+    'dnnl': ('onednn', 'oneDNN: products of matrices'),
+}
+# Headers of this machine, and what the compiler adds: the name, the package whose licence it is, what it does here.
+FROM_PACKAGES = {
+    'eigen': ('libeigen3-dev', 'Eigen: linear algebra'),
+    'nanoflann': ('libnanoflann-dev', 'nanoflann: neighbour search'),
+    'nlohmann-json': ('nlohmann-json3-dev', 'JSON for Modern C++'),
+    'stb': ('libstb-dev', 'stb: outlines of letters'),
+    'gcc': ('libstdc++-12-dev', "GCC's libstdc++ and libgcc, under the GCC Runtime Library Exception"),
+}
+COMMON_TEXTS = ('Apache-2.0', 'LGPL-2.1', 'MPL-2.0', 'GPL-3')
+
+
+def compiled_parts(cmake):
+    """The names of the libraries that a CMakeLists.txt makes of sources."""
+    return re.findall(r'^part\((\w+) ', cmake, re.M)
+
+
+def licence_of_source(folder):
+    for name in ('debian/copyright', 'openvdb/openvdb/LICENSE', 'LICENSE'):
+        if (folder / name).is_file():
+            return folder / name
+    raise FileNotFoundError(f"The source '{folder}' has no file of its licence")
+
+
+def gather(parts, output):
+    """Writes the folder and returns {file: what it is about}."""
+    shutil.rmtree(output, ignore_errors=True)
+    output.mkdir(parents=True)
+    index = {}
+    for part, (folder, about) in COMPILED.items():
+        if part == 'dnnl' and not (parts / 'dnnl').is_dir():
+            continue
+        shutil.copyfile(licence_of_source(parts / 'source' / folder), output / f'{folder}.txt')
+        index[f'{folder}.txt'] = about
+    for name, (package, about) in FROM_PACKAGES.items():
+        shutil.copyfile(DOCS / package / 'copyright', output / f'{name}.txt')
+        index[f'{name}.txt'] = about
+    shutil.copyfile(parts / 'debs/libc6-dev/usr/share/doc/libc6-dev/copyright', output / 'glibc.txt')
+    index['glibc.txt'] = 'the few functions of the GNU C library that every program holds'
+    font = (HERE.parent / 'plot/font/sans_regular.cpp').read_text(encoding='utf-8')
+    comment = [line.removeprefix('//').removeprefix(' ') for line in font.splitlines() if line.startswith('//')]
+    (output / 'dejavu-sans.txt').write_text('\n'.join(comment) + '\n', encoding='utf-8')
+    index['dejavu-sans.txt'] = 'DejaVu Sans: the letters of plots'
+    for text in COMMON_TEXTS:
+        shutil.copyfile(COMMON / text, output / f'{text}.txt')
+        index[f'{text}.txt'] = f'the text of {text}, which others refer to'
+    lines = ['Stipple is under the GNU General Public License, version 3 or later (../LICENSE).',
+             'Its libraries hold:', '']
+    lines += [f'{name:20} {about}' for name, about in sorted(index.items())]
+    (output / 'README.txt').write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return index
+
+
+def main():
+    parser = argparse.ArgumentParser(description='Gather the licences of what the packages hold.')
+    parser.add_argument('parts', type=Path)
+    parser.add_argument('output', type=Path)
+    arguments = parser.parse_args()
+    try:
+        gather(arguments.parts, arguments.output)
+    except OSError as error:
+        print(f'licences.py: {error}', file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
