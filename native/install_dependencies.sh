@@ -28,7 +28,7 @@ packages=(
   blender libegl1 libegl-mesa0 libgl1-mesa-dri xvfb
 )
 # Making zips: the compiler that they are made with, and what unpacks sources.
-package_packages=(g++-12 dpkg-dev patch xz-utils ca-certificates)
+package_packages=(g++-12 dpkg-dev patch xz-utils ca-certificates nasm)
 case ${1:-} in
   '') ;;
   --package) packages+=("${package_packages[@]}") ;;

@@ -11,6 +11,14 @@ namespace stipple {
 
 namespace {
 
+#ifdef STIPPLE_MEDIA_INSIDE
+/// A package's library holds the calls itself.
+extern "C" const StippleMediaTable* stipple_media_table(uint32_t version);
+
+const StippleMediaTable* openLibrary() {
+  return stipple_media_table(kMediaTableVersion);
+}
+#else
 constexpr char kFileName[] = "libstipple_media.so";
 constexpr char kTableFunction[] = "stipple_media_table";
 
@@ -35,6 +43,7 @@ const StippleMediaTable* openLibrary() {
   }
   return table;
 }
+#endif
 
 }  // namespace
 

@@ -25,13 +25,22 @@ COMPILED = {
     'z': ('zlib', 'zlib: compression'),
     'zstd': ('zstd', 'Zstandard: compression'),
     'lz4': ('lz4', 'LZ4: compression'),
-    'dnnl': ('onednn', 'oneDNN: products of matrices'),
+    'blosc': ('c-blosc', 'Blosc: compression of volumes'),
+    'openvdb': ('openvdb', 'OpenVDB: volumes'),
+    'tinygltf': ('tinygltf', 'tinygltf: meshes'),
+    'webp': ('webp', 'libwebp: images'),
+    'png': ('png', 'libpng: images'),
+    'jpeg': ('jpeg', 'libjpeg-turbo: images. This software is based in part on the work of the Independent JPEG '
+                     'Group'),
+    'imath': ('imath', 'Imath: numbers of half precision'),
+    'openexr': ('openexr', 'OpenEXR: images'),
 }
 # Headers of this machine, and what the compiler adds: the name, the package whose licence it is, what it does here.
 FROM_PACKAGES = {
     'eigen': ('libeigen3-dev', 'Eigen: linear algebra'),
     'nanoflann': ('libnanoflann-dev', 'nanoflann: neighbour search'),
     'nlohmann-json': ('nlohmann-json3-dev', 'JSON for Modern C++'),
+    'boost': ('libboost1.74-dev', 'Boost: headers that OpenVDB uses'),
     'stb': ('libstb-dev', 'stb: outlines of letters'),
     'gcc': ('libstdc++-12-dev', "GCC's libstdc++ and libgcc, under the GCC Runtime Library Exception"),
 }
@@ -39,8 +48,8 @@ COMMON_TEXTS = ('Apache-2.0', 'LGPL-2.1', 'MPL-2.0', 'GPL-3')
 
 
 def compiled_parts(cmake):
-    """The names of the libraries that a CMakeLists.txt makes of sources."""
-    return re.findall(r'^part\((\w+) ', cmake, re.M)
+    """The names of the libraries that a CMakeLists.txt or make_parts.sh makes of sources."""
+    return re.findall(r'^(?:part\(|own_build )(\w+) ', cmake, re.M)
 
 
 def licence_of_source(folder):
@@ -55,9 +64,7 @@ def gather(parts, output):
     shutil.rmtree(output, ignore_errors=True)
     output.mkdir(parents=True)
     index = {}
-    for part, (folder, about) in COMPILED.items():
-        if part == 'dnnl' and not (parts / 'dnnl').is_dir():
-            continue
+    for folder, about in COMPILED.values():
         shutil.copyfile(licence_of_source(parts / 'source' / folder), output / f'{folder}.txt')
         index[f'{folder}.txt'] = about
     for name, (package, about) in FROM_PACKAGES.items():

@@ -13,3 +13,27 @@ $python native/package/glibc_stubs.py "$parts"
 cmake -S native/package/parts -B "$parts/parts" -G Ninja -DCMAKE_BUILD_TYPE=Release \
   -DSTIPPLE_SOURCES="$parts/source" >/dev/null
 cmake --build "$parts/parts" --parallel "$jobs"
+
+# own_build NAME OPTION...: libraries that only their own build can make.
+own_build() {
+  local name=$1
+  shift
+  if [ ! -e "$parts/$name/made" ]; then
+    cmake -S "$parts/source/$name" -B "$parts/$name" -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_SHARED_LIBS=OFF \
+      -DBUILD_TESTING=OFF -DCMAKE_POSITION_INDEPENDENT_CODE=ON -DCMAKE_INSTALL_PREFIX="$parts" \
+      -DCMAKE_INSTALL_LIBDIR="$parts/lib" -DCMAKE_PREFIX_PATH="$parts" -DZLIB_INCLUDE_DIR="$parts/source/zlib" \
+      -DZLIB_LIBRARY="$parts/lib/libz.a" "${launcher[@]}" \
+      "-DCMAKE_C_FLAGS=-fexceptions $maps" "-DCMAKE_CXX_FLAGS=$maps" "$@" >"$parts/$name.log"
+    cmake --build "$parts/$name" --parallel "$jobs" --target install >>"$parts/$name.log"
+    touch "$parts/$name/made"
+  fi
+}
+maps="-ffile-prefix-map=$parts=parts"
+launcher=()
+if command -v ccache >/dev/null; then
+  launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+fi
+own_build jpeg -DENABLE_SHARED=OFF -DWITH_TURBOJPEG=OFF -DREQUIRE_SIMD=ON
+own_build imath -DIMATH_INSTALL_PKG_CONFIG=OFF
+own_build openexr -DOPENEXR_BUILD_TOOLS=OFF -DOPENEXR_INSTALL_EXAMPLES=OFF -DOPENEXR_INSTALL_PKG_CONFIG=OFF \
+  -DOPENEXR_INSTALL_TOOLS=OFF

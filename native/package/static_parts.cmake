@@ -1,6 +1,6 @@
 # What a package is put together from instead of the machine's shared libraries: the static libraries and the stubs of
-# glibc 2.28 in STIPPLE_PACKAGE_PARTS, which native/package/make_parts.sh makes. Code is compiled as in every other build,
-# with this machine's headers; what is linked is other.
+# glibc 2.28 in STIPPLE_PACKAGE_PARTS, which native/package/make_parts.sh makes. Code is compiled as in every other
+# build; what is linked is other.
 foreach(file lib/libtbb.a lib/libhwy.a stubs/libc.so stubs/libgcc_eh.a)
   if(NOT EXISTS ${STIPPLE_PACKAGE_PARTS}/${file})
     message(FATAL_ERROR "${STIPPLE_PACKAGE_PARTS}/${file} is missing; run native/package/make_parts.sh")
@@ -12,8 +12,8 @@ if(NOT CMAKE_CXX_COMPILER_ID STREQUAL GNU OR NOT CMAKE_CXX_COMPILER_VERSION MATC
                       "${CMAKE_CXX_COMPILER_VERSION}")
 endif()
 
-# stipple_part(TARGET NAME HEADER TEXT...): a static library of the parts, under the name that the build knows it by. Its
-# headers are the machine's, which must be of the same version: each text stands in HEADER.
+# stipple_part(TARGET NAME HEADER TEXT...): a static library of the parts, under the name that the build knows it by.
+# Its headers are the machine's, which must be of the same version: each text stands in HEADER.
 function(stipple_part TARGET NAME HEADER)
   find_file(STIPPLE_HEADER_OF_${NAME} ${HEADER} REQUIRED)
   file(READ ${STIPPLE_HEADER_OF_${NAME}} content)
@@ -33,6 +33,19 @@ pkg_check_modules(STIPPLE_HWY REQUIRED libhwy=1.0.3)
 stipple_part(hwy::hwy hwy hwy/highway.h)
 # The same compiler's command as in other builds, so that nothing is compiled twice.
 set_target_properties(hwy::hwy PROPERTIES INTERFACE_COMPILE_DEFINITIONS HWY_SHARED_DEFINE)
+
+# stipple_media_parts(TARGET): the headers of what reads and writes files, before those of this machine.
+function(stipple_media_parts TARGET)
+  set(sources ${STIPPLE_PACKAGE_PARTS}/source)
+  target_include_directories(${TARGET} SYSTEM BEFORE PRIVATE
+    ${STIPPLE_PACKAGE_PARTS}/include ${STIPPLE_PACKAGE_PARTS}/include/openvdb ${STIPPLE_PACKAGE_PARTS}/include/Imath
+    ${STIPPLE_PACKAGE_PARTS}/include/OpenEXR
+    ${sources}/openvdb/openvdb ${sources}/tinygltf ${sources}/png ${sources}/webp/src ${sources}/zlib ${sources}/zstd/lib)
+endfunction()
+# The libraries behind them, each before those that it calls.
+set(STIPPLE_MEDIA_LIBRARIES openvdb blosc lz4 zstd tinygltf png jpeg webp
+  OpenEXR-3_1 Iex-3_1 IlmThread-3_1 OpenEXRCore-3_1 Imath-3_1 z)
+list(TRANSFORM STIPPLE_MEDIA_LIBRARIES REPLACE "^(.+)$" "${STIPPLE_PACKAGE_PARTS}/lib/lib\\1.a")
 
 # What libraries of others and of the compiler refer to and glibc 2.28 lacks.
 add_library(stipple_older_glibc OBJECT ${CMAKE_CURRENT_LIST_DIR}/older_glibc.c)

@@ -80,9 +80,7 @@ def test_every_licence_is_in_the_zip(release):
     named = re.findall(r'^([\w.-]+\.txt) ', (release / 'licences' / 'README.txt').read_text(), re.M)
     there = {file.name for file in (release / 'licences').iterdir()} - {'README.txt'}
     assert set(named) == there
-    needed = {f'{folder}.txt' for part, (folder, _) in licences.COMPILED.items() if part != 'dnnl'}
-    if (release / 'lib' / 'libstipple_nn.so').is_file():
-        needed.add('onednn.txt')
+    needed = {f'{folder}.txt' for folder, _ in licences.COMPILED.values()}
     assert needed <= there and {f'{name}.txt' for name in licences.FROM_PACKAGES} <= there
 
 

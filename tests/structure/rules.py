@@ -18,7 +18,10 @@ THIRD_PARTY = {
     'Eigen': r'Eigen/',
     'Highway': r'hwy/',
     'nanoflann': r'nanoflann\.hpp',
-    'OpenVDB': r'(openvdb|Imath|OpenEXR)/',
+    'OpenVDB': r'(openvdb|Imath)/|blosc\.h',
+    'OpenEXR': r'OpenEXR/',
+    'libpng': r'png\.h',
+    'libjpeg': r'jpeglib\.h',
     'tinygltf': r'tiny_gltf\.h',
     'OpenImageIO': r'OpenImageIO/',
     'libwebp': r'webp/',
@@ -33,9 +36,12 @@ THIRD_PARTY = {
     'Google Benchmark': r'benchmark/',
 }
 # A format's library is known to the files of that format only (benchmarks may measure against some).
-FORMAT_FILES = {'OpenVDB': r'native/(io/media/volume_|bench/)', 'tinygltf': r'native/io/media/gltf_',
+FORMAT_FILES = {'OpenVDB': r'native/(io/media/volume_|package/parts/volume_|bench/)',
+                'tinygltf': r'native/io/media/gltf_',
                 'OpenImageIO': r'native/(io/media/image_|bench/)', 'zlib': r'native/io/media/zlib_',
-                'zstd': r'native/io/media/zstd_', 'libwebp': r'native/io/media/webp_',
+                'zstd': r'native/io/media/zstd_', 'libwebp': r'native/io/media/(decoders/)?webp_',
+                'libpng': r'native/io/media/decoders/png_', 'libjpeg': r'native/io/media/decoders/jpeg_',
+                'OpenEXR': r'native/io/media/decoders/exr_',
                 'oneDNN': r'native/nn/onednn/'}
 
 # Headers of ours whose purpose is to hand a package's types to every folder.
@@ -44,7 +50,7 @@ CARRIERS = {'math/vec.h': {'Eigen'}}
 # C and POSIX headers with a '.h' or '/' in their name; C++'s own have neither.
 SYSTEM_HEADERS = re.compile(r'(stdint|stddef|strings|dlfcn|unistd|fcntl|pthread|errno|signal|locale|fenv|xmmintrin|'
                             r'execinfo)\.h'
-                            r'|sys/(file|stat|mman|types|resource|wait|statvfs|ioctl)\.h|[a-z_0-9]+')
+                            r'|sys/(file|random|stat|mman|types|resource|wait|statvfs|ioctl)\.h|[a-z_0-9]+')
 
 SOURCE_EXTENSIONS = ('.cpp', '.h', '.c', '.py', '.sh', '.cmake', 'CMakeLists.txt')
 LINE_LIMIT = 600
