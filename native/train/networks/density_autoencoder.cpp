@@ -14,6 +14,7 @@
 #include "density/anchor_sampling.h"
 #include "density/contribution_normalisation.h"
 #include "math/morton.h"
+#include "train/networks/example_views.h"
 #include "train/networks/start_weights.h"
 
 namespace stipple {
@@ -51,42 +52,6 @@ class SampledDensity final : public DensityModel {
   int leaf_level_;
   RootCube root_;
 };
-
-void addTo(std::span<const float> from, double factor, std::vector<float>& to) {
-  const auto by = static_cast<float>(factor);
-  for (size_t i = 0; i < from.size(); ++i) to[i] += by * from[i];
-}
-
-void addCloud(const SplatCloud& from, double factor, SplatCloud& to) {
-  addTo(from.positions, factor, to.positions);
-  addTo(from.scales, factor, to.scales);
-  addTo(from.rotations, factor, to.rotations);
-  addTo(from.opacities, factor, to.opacities);
-  addTo(from.sh, factor, to.sh);
-}
-
-SplatCloud zerosLike(const SplatCloud& cloud) {
-  SplatCloud made;
-  made.sh_degree = cloud.sh_degree;
-  made.positions.assign(cloud.positions.size(), 0.0f);
-  made.scales.assign(cloud.scales.size(), 0.0f);
-  made.rotations.assign(cloud.rotations.size(), 0.0f);
-  made.opacities.assign(cloud.opacities.size(), 0.0f);
-  made.sh.assign(cloud.sh.size(), 0.0f);
-  return made;
-}
-
-/// Of `count` things, `wanted` different ones.
-std::vector<size_t> drawn(size_t count, size_t wanted, uint64_t seed) {
-  std::vector<std::pair<uint64_t, size_t>> keys;
-  for (size_t i = 0; i < count; ++i) {
-    keys.emplace_back(keyedBits(seed, RandomUse::kViewOrder, i), i);
-  }
-  std::sort(keys.begin(), keys.end());
-  std::vector<size_t> made;
-  for (size_t i = 0; i < std::min(wanted, count); ++i) made.push_back(keys[i].second);
-  return made;
-}
 
 /// `wanted` of `count` things, one of each equal share of them; all where there are no more.
 std::vector<size_t> oneOfEachShare(size_t count, size_t wanted, uint64_t seed) {
@@ -231,7 +196,7 @@ void DensityAutoencoder::addImages(std::span<const float> values, const Autoenco
   std::vector<double> contributions(splats.anchors.size(), 0.0);
   const ObjectViews* const all = example.object->views.get();
   const std::vector<size_t> views =
-      drawn(all == nullptr ? 0 : all->count(), example.views, example.seed);
+      drawnViews(all == nullptr ? 0 : all->count(), example.views, example.seed);
   if (views.empty()) fail(ErrorCode::kInvalidArgument, "an object to learn from has no views");
   const double view_share = 1 / static_cast<double>(views.size());
   StatisticRequest request;
