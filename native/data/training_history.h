@@ -23,12 +23,16 @@ struct TrainingRecord {
 /// What some objects were like as the networks make them of their latents.
 struct TrainingMeasure {
   uint64_t step = 0;
-  uint64_t anchors = 0;
+  uint64_t anchors = 0;  ///< of detail: splats
   uint64_t objects = 0;
   double psnr = 0;  ///< dB, mean over views, then over objects, over black, display values
   double ssim = 0;
   /// The same psnr of a few objects that are learned from, by which the best state is chosen.
   double training_psnr = 0;
+  /// Of detail, dB: the coarse splats that finer ones were made of, and a cut of the fitted object
+  /// to as many splats as these are; 0: nothing was compared.
+  double coarse_psnr = 0, cut_psnr = 0;
+  uint64_t coarse_splats = 0;
 };
 
 /// The story of a training.

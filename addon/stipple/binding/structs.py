@@ -568,7 +568,8 @@ class StippleTrainFigures(_Sized):
 
 class StippleTrainBudget(_Sized):
     _fields_ = [('struct_size', c_uint32), ('reserved', c_uint32), ('anchors', c_uint64), ('object_count', c_uint64),
-                ('psnr', c_double), ('ssim', c_double), ('training_psnr', c_double)]
+                ('psnr', c_double), ('ssim', c_double), ('training_psnr', c_double),
+                ('coarse_psnr', c_double), ('cut_psnr', c_double), ('coarse_splats', c_uint64)]
 
 
 STRUCTS = {cls.__name__: cls for cls in _Sized.__subclasses__()}

@@ -81,6 +81,9 @@ StippleStatus stipple_train_budget(const StippleJob* job, uint64_t index,
     out.psnr = measure.psnr;
     out.ssim = measure.ssim;
     out.training_psnr = measure.training_psnr;
+    out.coarse_psnr = measure.coarse_psnr;
+    out.cut_psnr = measure.cut_psnr;
+    out.coarse_splats = measure.coarse_splats;
     deliver(budget, out, "budget");
   });
 }

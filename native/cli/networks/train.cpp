@@ -90,11 +90,15 @@ void train(const Context& context, const Arguments& arguments) {
   for (uint64_t i = 0; i < figures.budget_count; ++i) {
     auto budget = sized<StippleTrainBudget>();
     check(stipple_train_budget(job.get(), i, &budget));
-    const std::string at = std::to_string(budget.anchors) + "_anchors";
-    report.add((figures.measured_on_training ? "training_psnr_" : "held_out_psnr_") + at,
-               budget.psnr);
-    report.add((figures.measured_on_training ? "training_ssim_" : "held_out_ssim_") + at,
-               budget.ssim);
+    const bool is_detail = budget.coarse_splats > 0;
+    const std::string at = std::to_string(budget.anchors) + (is_detail ? "_splats" : "_anchors");
+    const std::string of = figures.measured_on_training ? "training_" : "held_out_";
+    report.add(of + "psnr_" + at, budget.psnr);
+    report.add(of + "ssim_" + at, budget.ssim);
+    if (!is_detail) continue;
+    report.add(of + "coarse_psnr_" + std::to_string(budget.coarse_splats) + "_splats",
+               budget.coarse_psnr);
+    report.add(of + "cut_psnr_" + at, budget.cut_psnr);
   }
   report.add("seconds", figures.seconds);
   report.print(arguments.json);
@@ -106,7 +110,8 @@ void addTrain(CLI::App& app, const Context& context) {
   auto arguments = std::make_shared<Arguments>();
   Arguments& to = *arguments;
   CLI::App* command = app.add_subcommand(
-      "train", "Learns a density autoencoder from a collection of objects (docs/training.md)");
+      "train",
+      "Learns a density autoencoder, or detail, from a collection of objects (docs/training.md)");
   command->add_option("config", to.config, "JSON file with the settings of the training")
       ->required();
   command->add_flag("--resume", to.resume, "Go on from the checkpoint in the folder of results");

@@ -99,6 +99,22 @@ TrainingObject readTrainingPoints(const PointSet& surface, uint64_t points) {
   return object;
 }
 
+ObjectSplit splitObjects(size_t count, uint64_t every) {
+  ObjectSplit split;
+  for (size_t i = 0; i < count; ++i) {
+    const bool is_held_out = every > 0 && i % every == every - 1;
+    (is_held_out ? split.held_out : split.learned_from).push_back(i);
+  }
+  return split;
+}
+
+std::vector<size_t> evenly(const std::vector<size_t>& of, size_t wanted) {
+  std::vector<size_t> chosen;
+  const size_t count = std::min(of.size(), wanted);
+  for (size_t i = 0; i < count; ++i) chosen.push_back(of[i * of.size() / count]);
+  return chosen;
+}
+
 Collection::Collection(const std::string& folder, const CollectionOptions& options,
                        Progress* progress) {
   if (options.points < 1 || options.points > kMostEncodedPoints) {

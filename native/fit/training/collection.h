@@ -61,6 +61,17 @@ class Collection {
   std::vector<std::string> notes_;
 };
 
+/// Objects that are learned from, and others that judge.
+struct ObjectSplit {
+  std::vector<size_t> learned_from, held_out;
+  /// Those that judge: the ones that are learned from where none is held out.
+  const std::vector<size_t>& judging() const { return held_out.empty() ? learned_from : held_out; }
+};
+/// Every `every`-th object is held out; 0: none.
+ObjectSplit splitObjects(size_t count, uint64_t every);
+/// `wanted` of them, evenly; all where there are no more.
+std::vector<size_t> evenly(const std::vector<size_t>& of, size_t wanted);
+
 /// Some objects of a collection, for a trainer.
 class CollectionShare final : public ObjectSource {
  public:

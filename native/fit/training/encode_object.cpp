@@ -39,6 +39,9 @@ struct TrainedNetworks {
              std::string(kTrainedKey) + "'");
     }
     config = readSettings(settings->second, path);
+    if (config.learns_detail) {
+      refuse(path + " holds a network that adds detail; weights of an autoencoder are needed");
+    }
   }
 
   uint64_t tokens() const {

@@ -142,6 +142,28 @@ void addFlow(FlowConfig& flow, std::vector<Setting>& list) {
   list.push_back(number("flow.in_order", flow.in_order));
 }
 
+void addDetail(DetailConfig& detail, std::vector<Setting>& list) {
+  list.push_back(number("detail.steps", detail.schedule.optimiser.total_steps));
+  list.push_back(number("detail.batch", detail.schedule.batch));
+  list.push_back(number("detail.least_splats", detail.schedule.least_splats));
+  list.push_back(number("detail.most_splats", detail.schedule.most_splats));
+  list.push_back(number("detail.least_share", detail.schedule.least_share));
+  list.push_back(number("detail.views", detail.schedule.views));
+  list.push_back(number("detail.seen", detail.schedule.seen));
+  list.push_back(number("detail.ssim", detail.schedule.ssim));
+  addOptimiser("detail.", detail.schedule.optimiser, list);
+  list.push_back(number("detail.heads", detail.sizes.heads));
+  list.push_back(number("detail.head_width", detail.sizes.head_width));
+  list.push_back(number("detail.layers", detail.sizes.layers));
+  list.push_back(number("detail.blocks", detail.sizes.blocks));
+  list.push_back(number("detail.mlp_ratio", detail.sizes.mlp_ratio));
+  list.push_back(number("detail.patch", detail.sizes.patch));
+  list.push_back(number("detail.children", detail.sizes.children));
+  list.push_back(number("detail.ratio", detail.sizes.ratio));
+  list.push_back(number("detail.fit_steps", detail.fit_steps));
+  list.push_back(number("detail.fit_splats", detail.fit_splats));
+}
+
 void addPart(const std::string& at, AutoencoderSchedule& part, std::vector<Setting>& list) {
   WeightOptimiserOptions& optimiser = part.optimiser;
   AutoencoderLossWeights& weights = part.weights;
@@ -178,6 +200,10 @@ std::vector<Setting> settingsOf(TrainingConfig& config, const std::string& folde
   list.push_back(unkept(number("checkpoint_interval", config.checkpoint_interval)));
   list.push_back(unkept(number("image_bytes", config.objects.image_bytes)));
   list.push_back(number("points", config.objects.points));
+  if (config.learns_detail) {
+    addDetail(config.detail, list);
+    return list;
+  }
   addNetwork(config.sizes, list);
   addFlow(config.flow, list);
   for (size_t i = 0; i < config.parts.size(); ++i) {
@@ -277,6 +303,17 @@ void setAll(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
   };
   config.says_parts = says("parts.");
   config.says_network = says("network.");
+  config.learns_detail = says("detail.");
+  if (config.learns_detail) {
+    for (const char* other : {"parts.", "network.", "flow.", "start"}) {
+      if (!says(other)) continue;
+      std::string key = other;
+      if (key.back() == '.') key.pop_back();
+      refuse(name + ": \"detail\" and \"" + key +
+             "\" are both given; detail is learned by a training of its own");
+    }
+    config.parts.clear();
+  }
   const std::vector<Setting> settings = settingsOf(config, folder);
   for (const auto& entry : entries) {
     const auto found = std::find_if(settings.begin(), settings.end(), [&](const Setting& setting) {
@@ -305,6 +342,17 @@ void validate(const TrainingConfig& config, const std::string& name) {
     refuse(name +
            ": 'held_out' is 1, which leaves no object to learn from; 0, or 2 and more, is "
            "allowed");
+  }
+  if (config.learns_detail) {
+    requireSome(config.detail.schedule.optimiser.total_steps, "detail.steps");
+    requireSome(config.detail.fit_steps, "detail.fit_steps");
+    requireSome(config.detail.fit_splats, "detail.fit_splats");
+    try {
+      validate(config.detail.schedule);
+      validate(config.detail.sizes);
+    } catch (const Error& error) {
+      refuse(name + ": \"detail\": " + error.what());
+    }
   }
   if (config.flow.isWanted()) {
     try {
@@ -354,6 +402,9 @@ TrainingConfig defaultTrainingConfig() {
   config.flow.schedule.optimiser.total_steps = 0;
   config.flow.schedule.optimiser.learning_rate = 3e-4;
   config.flow.schedule.optimiser.mean_decay = 0.999;
+  config.detail.schedule.optimiser.total_steps = 4000;
+  config.detail.schedule.optimiser.learning_rate = 1e-3;
+  config.detail.schedule.optimiser.mean_decay = 0.995;
   return config;
 }
 
@@ -377,6 +428,11 @@ void takeStart(const std::string& settings, TrainingConfig& config) {
            "'");
   }
   const TrainingConfig from = readSettings(settings, config.start);
+  if (from.learns_detail) {
+    refuse("'" + config.start +
+           "', which the training is to start with, holds a network that adds "
+           "detail; weights of an autoencoder are needed");
+  }
   config.sizes = from.sizes;
   if (config.says_parts) return;
   config.parts = from.parts;

@@ -6,6 +6,7 @@
 
 #include "fit/training/collection.h"
 #include "generate/patch_condition.h"
+#include "train/detail/detail_trainer.h"
 #include "train/networks/autoencoder_trainer.h"
 #include "train/networks/flow_trainer.h"
 
@@ -22,15 +23,24 @@ struct FlowConfig {
   bool isWanted() const { return schedule.optimiser.total_steps > 0; }
 };
 
+/// What a training of a network that adds detail to splats does. It is a training of its own.
+struct DetailConfig {
+  DetailModelSizes sizes;
+  DetailSchedule schedule;
+  uint64_t fit_steps = 400;    ///< of the splats that stand for an object without a coarse.ply
+  uint64_t fit_splats = 4096;  ///< of them, at most
+};
+
 /// Sizes of the network that learns latents of that width. Errors: kInvalidArgument.
 FlowSizes flowSizes(const FlowConfig& config, size_t latent_width);
 
-/// What a training of the density autoencoder does.
+/// What a training does: of the density autoencoder, and of a flow; or of detail.
 struct TrainingConfig {
   std::string collection;  ///< folder
   std::string out;         ///< folder of all that it writes; made where it is not there
   std::string start;       ///< weights of another training that this one begins with; may be empty
   bool says_parts = false, says_network = false;  ///< in its text
+  bool learns_detail = false;                     ///< the text has "detail", and neither of them
   uint64_t seed = 1;
   uint64_t held_out = 8;  ///< every so-many-th object judges and is not learned from; 0: none
   uint64_t measured_objects = 16;      ///< of those, at most, while it runs
@@ -38,8 +48,9 @@ struct TrainingConfig {
   uint64_t checkpoint_interval = 250;  ///< steps
   CollectionOptions objects;
   AutoencoderSizes sizes;
-  std::vector<AutoencoderSchedule> parts;
+  std::vector<AutoencoderSchedule> parts;  ///< none where detail is learned
   FlowConfig flow;
+  DetailConfig detail;
 };
 
 /// What a config without "parts" and "network" says: the small networks, in three parts.

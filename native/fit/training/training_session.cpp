@@ -13,6 +13,7 @@
 #include "base/random.h"
 #include "base/stopwatch.h"
 #include "fit/training/autoencoder_measure.h"
+#include "fit/training/detail_training.h"
 #include "fit/training/flow_objects.h"
 #include "fit/training/history_tensors.h"
 #include "io/assets/checkpoint.h"
@@ -29,7 +30,6 @@ namespace fs = std::filesystem;
 constexpr uint64_t kLongestConfig = uint64_t{1} << 20;  // bytes
 /// Objects that are learned from and choose the state that is kept.
 constexpr size_t kChoosingObjects = 4;
-constexpr size_t kPaceSteps = 50;
 /// Shares of the whole work.
 constexpr double kReadShare = 0.02, kStepsShare = 0.98;
 
@@ -64,15 +64,8 @@ uint64_t stepCount(const TrainingConfig& config) {
   uint64_t steps = 0;
   for (const AutoencoderSchedule& part : config.parts) steps += part.optimiser.total_steps;
   if (!learnsParts(config)) steps = 0;
+  if (config.learns_detail) steps += config.detail.schedule.optimiser.total_steps;
   return steps + config.flow.schedule.optimiser.total_steps;
-}
-
-/// `wanted` of them, evenly.
-std::vector<size_t> evenly(const std::vector<size_t>& of, size_t wanted) {
-  std::vector<size_t> chosen;
-  const size_t count = std::min(of.size(), wanted);
-  for (size_t i = 0; i < count; ++i) chosen.push_back(of[i * of.size() / count]);
-  return chosen;
 }
 
 /// "Structure" of "structure".
@@ -110,6 +103,7 @@ void requireResults(const std::string& out, bool resumes) {
   if (error) fail(ErrorCode::kIo, "the folder '" + out + "' cannot be made: " + error.message());
   // What goes on reads its checkpoint, and says more of one that is damaged.
   if (!resumes) requireCheckpointPlace(checkpoint);
+  requireTrainedWeightsPlace(trainedDetailPath(out));
   requireTrainedWeightsPlace(trainedWeightsPath(out));
   requireTrainedWeightsPlace(trainedFlowPath(out));
   requireTrainingReportPlace(trainingReportPath(out));
@@ -122,6 +116,9 @@ std::string trainedWeightsPath(const std::string& out) {
 }
 std::string trainedFlowPath(const std::string& out) {
   return inFolder(out, "flow.safetensors");
+}
+std::string trainedDetailPath(const std::string& out) {
+  return inFolder(out, "detail.safetensors");
 }
 std::string trainingCheckpointPath(const std::string& out) {
   return inFolder(out, "checkpoint.stipple.safetensors");
@@ -153,7 +150,7 @@ struct TrainingSession::Work {
   TrainingSession& session;
   Progress& progress;
   std::shared_ptr<const Collection> collection;
-  std::vector<size_t> learned_from, held_out;
+  ObjectSplit split;
   std::unique_ptr<AutoencoderTrainer> trainer;
   std::unique_ptr<AutoencoderMeasure> judge;
   std::unique_ptr<FlowTrainer> flow;  ///< once the autoencoder is done
@@ -171,31 +168,27 @@ void TrainingSession::Work::read() {
   progress.enterPart(0, kReadShare);
   collection = std::make_shared<const Collection>(config().collection, config().objects, &progress);
   for (const std::string& text : collection->notes()) session.note(text);
-  const uint64_t every = config().held_out;
-  for (size_t i = 0; i < collection->count(); ++i) {
-    const bool is_held_out = every > 0 && i % every == every - 1;
-    (is_held_out ? held_out : learned_from).push_back(i);
-  }
-  if (held_out.empty() && every > 0) {
+  split = splitObjects(collection->count(), config().held_out);
+  if (split.held_out.empty() && config().held_out > 0) {
     session.note("The collection has " + std::to_string(collection->count()) +
                  " objects, too few to hold any out; quality is of objects that are learned from.");
   }
   trainer = std::make_unique<AutoencoderTrainer>(
       config().sizes, config().parts, config().seed,
-      std::make_shared<const CollectionShare>(collection, learned_from), session.backends_,
+      std::make_shared<const CollectionShare>(collection, split.learned_from), session.backends_,
       learnsParts(config()) ? session.exchange_ : nullptr);
   if (!config().start.empty()) {
     trainer->start(trainer->networks().layout().read(openWeightFile(config().start)));
   }
   judge = std::make_unique<AutoencoderMeasure>(*session.backends_, *collection);
-  history.measured_on_held_out = !held_out.empty();
+  history.measured_on_held_out = !split.held_out.empty();
   for (const AutoencoderSchedule& each : config().parts) {
     history.part_names.emplace_back(stageName(each.stage));
   }
   if (config().flow.isWanted()) history.part_names.emplace_back("flow");
   const std::lock_guard<std::mutex> lock(session.mutex_);
-  session.status_.objects = learned_from.size();
-  session.status_.held_out = held_out.size();
+  session.status_.objects = split.learned_from.size();
+  session.status_.held_out = split.held_out.size();
 }
 
 void TrainingSession::Work::restore() {
@@ -234,31 +227,8 @@ void TrainingSession::Work::requireAlike() {
 }
 
 void TrainingSession::Work::show() {
-  const size_t count = history.records.size();
-  size_t recent = 0;  // of the present part, whose loss is of other things than the last one's
-  while (recent < std::min(count, kPaceSteps) &&
-         history.records[count - 1 - recent].part == history.records[count - 1].part) {
-    ++recent;
-  }
-  double loss = 0, structure = 0, seconds = 0;
-  for (size_t i = count - recent; i < count; ++i) {
-    const TrainingRecord& record = history.records[i];
-    loss += static_cast<double>(record.loss) / static_cast<double>(recent);
-    structure += static_cast<double>(record.structure) / static_cast<double>(recent);
-    seconds += static_cast<double>(record.seconds) / static_cast<double>(recent);
-  }
   const std::lock_guard<std::mutex> lock(session.mutex_);
-  TrainingStatus& status = session.status_;
-  status.step = count;
-  status.loss = loss;
-  status.structure = structure;
-  status.seconds = watch.seconds();
-  status.seconds_left = seconds * static_cast<double>(status.steps - count);
-  status.skipped = static_cast<uint64_t>(
-      std::count_if(history.records.begin(), history.records.end(),
-                    [](const TrainingRecord& record) { return record.is_skipped; }));
-  status.best_step = history.best_step;
-  if (!history.measures.empty()) status.psnr = history.measures.back().psnr;
+  tellOf(history, watch.seconds(), session.status_);
 }
 
 void TrainingSession::Work::measure() {
@@ -266,13 +236,13 @@ void TrainingSession::Work::measure() {
   const AutoencoderSchedule& now = part();
   const std::vector<float> values = trainer->meanValues();
   const MeasuredAt at = {now.most_tokens, now.most_anchors, config().seed};
-  const std::vector<size_t>& judging = held_out.empty() ? learned_from : held_out;
+  const std::vector<size_t>& judging = split.judging();
   TrainingMeasure made = judge->measure(trainer->networks(), values,
                                         evenly(judging, config().measured_objects), at, &progress);
   made.step = history.records.size();
   made.training_psnr = judge
                            ->measure(trainer->networks(), values,
-                                     evenly(learned_from, kChoosingObjects), at, &progress)
+                                     evenly(split.learned_from, kChoosingObjects), at, &progress)
                            .psnr;
   history.measures.push_back(made);
   if (made.training_psnr < best_psnr) return;
@@ -319,8 +289,8 @@ void TrainingSession::Work::learnFlow() {
   begin(history.records.size());
   flow = std::make_unique<FlowTrainer>(
       flowSizes(wanted, config().sizes.latent_width), wanted.schedule, config().seed,
-      std::make_shared<const FlowObjects>(collection, learned_from, trainer->networks(), values,
-                                          options, &progress),
+      std::make_shared<const FlowObjects>(collection, split.learned_from, trainer->networks(),
+                                          values, options, &progress),
       session.exchange_);
   if (!flow_state.empty()) flow->resume(flow_state);
   flow_state.clear();
@@ -367,7 +337,7 @@ void TrainingSession::Work::finish() {
   const bool is_measured = !best.empty();
   const std::vector<float>& values = is_measured ? best : trainer->meanValues();
   const AutoencoderSchedule& last = config().parts.back();
-  const std::vector<size_t>& judging = held_out.empty() ? learned_from : held_out;
+  const std::vector<size_t>& judging = split.judging();
   const bool has_images = last.stage != AutoencoderStage::kStructure;
   constexpr int kOctaves = 4;
   for (int octave = kOctaves; octave >= 0 && has_images; --octave) {
@@ -379,7 +349,7 @@ void TrainingSession::Work::finish() {
     made.step = history.best_step;
     made.training_psnr = judge
                              ->measure(trainer->networks(), values,
-                                       evenly(learned_from, kChoosingObjects), at, &progress)
+                                       evenly(split.learned_from, kChoosingObjects), at, &progress)
                              .psnr;
     history.by_budget.push_back(made);
   }
@@ -409,6 +379,9 @@ TrainingSession::TrainingSession(std::shared_ptr<const BackendFactory> backends,
   if (config_.flow.isWanted()) {
     requireExamples(*exchange_, config_.flow.schedule.batch, "the flow");
   }
+  if (config_.learns_detail) {
+    requireExamples(*exchange_, config_.detail.schedule.batch, "the detail network");
+  }
   if (leads()) requireResults(config_.out, resumes);
   status_.steps = stepCount(config_);
   status_.psnr = std::numeric_limits<double>::quiet_NaN();
@@ -417,6 +390,17 @@ TrainingSession::TrainingSession(std::shared_ptr<const BackendFactory> backends,
 uint64_t TrainingSession::memoryBound() const {
   // Weights, derivatives, two moments, the best, a mean in double, and a checkpoint of most.
   constexpr uint64_t kWeightBytes = 5 * 4 + 8 + 24;
+  if (config_.learns_detail) {
+    const DetailConfig& detail = config_.detail;
+    const DetailModel model(detail.sizes);
+    // Rows of one child: what up-sampling keeps of it is the widest. Trees are small beside images.
+    const uint64_t most = detail.schedule.most_splats;
+    const uint64_t rows = model.splatCount(most, most) + most * detail.schedule.views;
+    const uint64_t width = detail.sizes.heads * detail.sizes.head_width;
+    return model.layout().size() * kWeightBytes +
+           rows * (8 * width + 512) * (detail.sizes.blocks + 1) * sizeof(float) +
+           config_.objects.image_bytes;
+  }
   // Rows of the widest tape, about: what all blocks of the three networks keep of a row.
   uint64_t rows = 0;
   for (const AutoencoderSchedule& part : config_.parts) {
@@ -430,7 +414,27 @@ uint64_t TrainingSession::memoryBound() const {
          config_.objects.image_bytes;
 }
 
+void TrainingSession::runDetail(Progress& progress) {
+  const TrainingObserver observer = {[this](const std::string& text) { note(text); },
+                                     [this](const std::string& stage) { enter(stage); },
+                                     [this](const std::function<void(TrainingStatus&)>& change) {
+                                       const std::lock_guard<std::mutex> lock(mutex_);
+                                       change(status_);
+                                     }};
+  const DetailPaths paths = {trainedDetailPath(config_.out), trainingCheckpointPath(config_.out),
+                             trainingReportPath(config_.out)};
+  const std::vector<TrainingMeasure> by_budget =
+      trainDetail(backends_, config_, paths, resumes_, exchange_, observer, progress);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  by_budget_ = by_budget;
+  status_.budget_count = by_budget_.size();
+}
+
 void TrainingSession::run(Progress& progress) {
+  if (config_.learns_detail) {
+    runDetail(progress);
+    return;
+  }
   Work work(*this, progress);
   work.read();
   if (resumes_) work.restore();

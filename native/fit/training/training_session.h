@@ -11,41 +11,24 @@
 #include "base/progress.h"
 #include "data/training_history.h"
 #include "fit/training/training_config.h"
+#include "fit/training/training_status.h"
 #include "train/backend/backend_factory.h"
 #include "train/networks/gradient_exchange.h"
 
 namespace stipple {
 
-/// How a training is doing.
-struct TrainingStatus {
-  std::string stage;  ///< "Reading the collection", "Structure", ...
-  uint64_t step = 0;  ///< that are done, over all parts
-  uint64_t steps = 0;
-  uint64_t resumed_step = 0;  ///< where it went on from a checkpoint; 0: it began
-  uint64_t skipped = 0;       ///< steps whose derivatives were not finite
-  uint64_t objects = 0;       ///< that are learned from
-  uint64_t held_out = 0;
-  uint64_t best_step = 0;  ///< of the result if the training ended now; 0: not measured yet
-  double loss = 0;         ///< means of the last 50 steps
-  double structure = 0;
-  double psnr = 0;  ///< dB, as measured last; NaN: not yet
-  double seconds = 0;
-  double seconds_left = 0;  ///< by the pace of the last 50 steps
-  size_t note_count = 0;
-  size_t budget_count = 0;  ///< of budgetAt(), once it has ended
-};
-
 /// Where a training writes, in the folder of its results.
 std::string trainedWeightsPath(const std::string& out);
 std::string trainedFlowPath(const std::string& out);
+std::string trainedDetailPath(const std::string& out);
 std::string trainingCheckpointPath(const std::string& out);
 std::string trainingReportPath(const std::string& out);
 
-/// One training of the density autoencoder, from its config to its weights: it reads the
-/// collection, holds objects out, goes on from a checkpoint or begins, measures, keeps the best.
-/// run() works on one thread; all else may be called by others at any time. Of several processes
-/// that learn together the one of rank 0 measures and writes; to the folder of results the others
-/// look for a checkpoint to go on from, and else not at all.
+/// One training of the density autoencoder, or of detail, from its config to its weights: it reads
+/// the collection, holds objects out, goes on from a checkpoint or begins, measures, keeps the
+/// best. run() works on one thread; all else may be called by others at any time. Of several
+/// processes that learn together the one of rank 0 measures and writes; to the folder of results
+/// the others look for a checkpoint to go on from, and else not at all.
 class TrainingSession {
  public:
   /// Reads the config. Errors: kIo; those of parseTrainingConfig(); kInvalidArgument where a
@@ -77,6 +60,7 @@ class TrainingSession {
  private:
   struct Work;
 
+  void runDetail(Progress& progress);
   void note(const std::string& text);
   void enter(const std::string& stage);
   bool leads() const { return exchange_->rank() == 0; }

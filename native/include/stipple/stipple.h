@@ -2565,6 +2565,11 @@ typedef struct StippleTrainBudget {
   double psnr;               /* dB over black, mean over views, then over objects */
   double ssim;
   double training_psnr;      /* the same of a few objects that were learned from */
+  /* Of detail, of which anchors are splats: dB of the coarse splats that they were made of, and of a cut of the
+   * fitted object to as many splats as these are; 0: nothing was compared. */
+  double coarse_psnr;
+  double cut_psnr;
+  uint64_t coarse_splats;
 } StippleTrainBudget;
 
 /* Trains a density autoencoder on a collection of objects, as a job. In: config_path: a JSON file (docs/training.md);

@@ -32,12 +32,18 @@ constexpr std::pair<const char*, float TrainingRecord::*> kColumns[] = {
 Json rows(const std::vector<TrainingMeasure>& measures) {
   Json list = Json::array();
   for (const TrainingMeasure& measure : measures) {
-    list.push_back({{"step", measure.step},
-                    {"anchors", measure.anchors},
-                    {"objects", measure.objects},
-                    {"psnr", reportNumber(measure.psnr)},
-                    {"ssim", reportNumber(measure.ssim)},
-                    {"training_psnr", reportNumber(measure.training_psnr)}});
+    Json row = {{"step", measure.step},
+                {"anchors", measure.anchors},
+                {"objects", measure.objects},
+                {"psnr", reportNumber(measure.psnr)},
+                {"ssim", reportNumber(measure.ssim)},
+                {"training_psnr", reportNumber(measure.training_psnr)}};
+    if (measure.cut_psnr > 0) {
+      row["coarse_splats"] = measure.coarse_splats;
+      row["coarse_psnr"] = reportNumber(measure.coarse_psnr);
+      row["cut_psnr"] = reportNumber(measure.cut_psnr);
+    }
+    list.push_back(std::move(row));
   }
   return list;
 }
