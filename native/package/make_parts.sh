@@ -8,7 +8,9 @@ parts=$PWD/build/package
 jobs=${STIPPLE_JOBS:-$(bash native/build_jobs.sh)}
 python=/usr/bin/python3
 
-$python native/package/fetch.py "$parts"
+# The mirror that this machine's packages come from.
+mirror=$(sed -n 's/^URIs: *//p' /etc/apt/sources.list.d/debian.sources 2>/dev/null | head -1)
+$python native/package/fetch.py "$parts" --mirror "${mirror:-http://deb.debian.org/debian}"
 $python native/package/glibc_stubs.py "$parts"
 cmake -S native/package/parts -B "$parts/parts" -G Ninja -DCMAKE_BUILD_TYPE=Release \
   -DSTIPPLE_SOURCES="$parts/source" >/dev/null
