@@ -19,6 +19,7 @@ void addMesh(CLI::App& app, const Context& context);
 void addAdapt(CLI::App& app, const Context& context);
 void addFit(CLI::App& app, const Context& context);
 void addDensify(CLI::App& app, const Context& context);
+void addDetail(CLI::App& app, const Context& context);
 void addGenerate(CLI::App& app, const Context& context);
 void addRandom(CLI::App& app, const Context& context);
 void addEncode(CLI::App& app, const Context& context);

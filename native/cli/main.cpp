@@ -49,6 +49,7 @@ int run(int argc, char** argv) {
   addBind(app, context);
   addFit(app, context);
   addDensify(app, context);
+  addDetail(app, context);
   addGenerate(app, context);
   addRandom(app, context);
   addTrain(app, context);

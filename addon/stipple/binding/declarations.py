@@ -272,6 +272,8 @@ FUNCTIONS = {
     'stipple_strategy_check': (_status, [_path]),
     'stipple_densify_options_init': (None, [_to(s.StippleDensifyOptions)]),
     'stipple_densify_start': (_status, [_handle, _handle, _handle, _to(s.StippleDensifyOptions), _out_handle]),
+    'stipple_detail_options_init': (None, [_to(s.StippleDetailOptions)]),
+    'stipple_detail_start': (_status, [_handle, _handle, _handle, _path, _to(s.StippleDetailOptions), _out_handle]),
     # volumes
     'stipple_voxelize_options_init': (None, [_to(s.StippleVoxelizeOptions)]),
     'stipple_voxelize_start': (_status, [_handle, _to(s.StippleInstance), c_uint64, _to(s.StippleVoxelizeOptions),

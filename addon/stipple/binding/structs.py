@@ -489,6 +489,10 @@ class StippleDensifyOptions(_Sized):
                 ('reserved', c_uint32)]
 
 
+class StippleDetailOptions(_Sized):
+    _fields_ = [('struct_size', c_uint32), ('view_count', c_uint32), ('max_splats', c_uint64)]
+
+
 class StippleVoxelizeOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('resolution', c_uint32), ('voxel_size', c_double),
                 ('low_pass', c_double), ('cut_off_sigma', c_double), ('min_density', c_double)]

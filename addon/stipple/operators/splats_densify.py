@@ -6,7 +6,7 @@ from bpy.props import IntProperty, StringProperty
 
 from ..jobs import JobOperator, ViewsFirst
 from ..scene.fit import densifying, fitting, strategies
-from ..scene.source import bound, decoded, edits, masks, source_paths, sources, splat_data, sync
+from ..scene.source import decoded, edits, splat_data
 
 
 class STIPPLE_OT_splats_densify(ViewsFirst, JobOperator, bpy.types.Operator):
@@ -48,20 +48,8 @@ class STIPPLE_OT_splats_densify(ViewsFirst, JobOperator, bpy.types.Operator):
 
     def finish(self, _context, job):
         model, cloud = job.result
-        obj, count = self._object, cloud.info().count
-        path = sources.save_model(model, source_paths.place_for(obj.name))
-        sources.remember_model(path, model)
-        # A datablock of its own: the old one may have other users, and undo goes back to it.
-        data = obj.data.copy()
-        with sync.paused():
-            masks.clear(data)
-            sources.attach_tree(data, path, count)
-            if bound.follows(data):
-                bound.rebind(data)
-            data.stipple.ratio = data.stipple.ratio_render = 1.0
-        sync.write_decoded(data, cloud.read())
-        obj.data = data
-        self.report({'INFO'}, f"{count:,} splats in '{obj.name}', {self._count:,} before")
+        count = densifying.replace(self._object, model, cloud)
+        self.report({'INFO'}, f"{count:,} splats in '{self._object.name}', {self._count:,} before")
 
 
 classes = (STIPPLE_OT_splats_densify,)

@@ -95,6 +95,7 @@ class STIPPLE_PT_densify(_FitPanel, bpy.types.Panel):
                   f"Splits, copies and removes splats of '{context.object.name}' where the views above "
                   f"ask for it, as the strategy in Advanced says: {chosen}")
         layout.operator('stipple.splats_densify', icon='OUTLINER_DATA_POINTCLOUD')
+        layout.operator('stipple.add_detail', icon='MOD_MULTIRES')
 
 
 def _draw_strategy(layout, context, settings):

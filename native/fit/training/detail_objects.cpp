@@ -43,6 +43,8 @@ SplatCloud fitted(const std::shared_ptr<const BackendFactory>& backends,
   Progress own;
   if (progress == nullptr) progress = &own;
   session.run(*progress);
+  progress
+      ->throwIfCancelled();  // A fit that is cancelled ends with what it has, which is too little.
   return *session.decode(0).cloud;
 }
 

@@ -147,7 +147,7 @@ void addDetail(DetailConfig& detail, std::vector<Setting>& list) {
   list.push_back(number("detail.batch", detail.schedule.batch));
   list.push_back(number("detail.least_splats", detail.schedule.least_splats));
   list.push_back(number("detail.most_splats", detail.schedule.most_splats));
-  list.push_back(number("detail.least_share", detail.schedule.least_share));
+  list.push_back(number("detail.least_finer", detail.schedule.least_share));
   list.push_back(number("detail.views", detail.schedule.views));
   list.push_back(number("detail.seen", detail.schedule.seen));
   list.push_back(number("detail.ssim", detail.schedule.ssim));

@@ -2241,6 +2241,26 @@ void stipple_densify_options_init(StippleDensifyOptions* options);
 StippleStatus stipple_densify_start(StippleContext* context, const StippleCloud* cloud, const StippleViews* views,
                                     const StippleDensifyOptions* options, StippleJob** job);
 
+typedef struct StippleDetailOptions {
+  uint32_t struct_size;
+  uint32_t view_count;         /* images that are looked at, spread evenly, 1..64; 0, the default: as in training */
+  uint64_t max_splats;         /* of the result; 0, the default: every splat becomes finer */
+} StippleDetailOptions;
+void stipple_detail_options_init(StippleDetailOptions* options);
+
+/* Adds to a coarse cloud the detail that a few views show, as a job (stipple_job_cloud), in one pass of a network:
+ * the splats that matter most to the error of these views become finer ones, all others stay and come first. Views
+ * are of the cloud's colour space and frame, with images; transparent ones stand before black.
+ * In: weights_path: detail.safetensors of stipple_train_start. Errors of the start: IO; FORMAT for a file that is no
+ * safetensors, or with tensors that are missing or not finite; INVALID_ARGUMENT for weights of others or of another
+ * network, an empty cloud, views of another colour space or none, options out of range (max_splats says which numbers
+ * of splats this network makes of these); MEMORY_LIMIT. Of the job: INVALID_ARGUMENT where no view shows any splat;
+ * those of reading images.
+ * Threads and determinism: the same bits for any number of threads. Cost: for each view three drawings and a backward
+ * pass. docs/methods/generative_densification.md. */
+StippleStatus stipple_detail_start(StippleContext* context, const StippleCloud* cloud, const StippleViews* views,
+                                   const char* weights_path, const StippleDetailOptions* options, StippleJob** job);
+
 /* ---- volumes ----------------------------------------------------------------------------------- */
 
 typedef struct StippleVoxelizeOptions {
@@ -2572,9 +2592,9 @@ typedef struct StippleTrainBudget {
   uint64_t coarse_splats;
 } StippleTrainBudget;
 
-/* Trains a density autoencoder on a collection of objects, as a job. In: config_path: a JSON file (docs/training.md);
+/* Trains a density autoencoder, or detail, on a collection of objects, as a job. In: config_path: a JSON file (docs/training.md);
  * resume: 1: goes on from the checkpoint in the folder of results, 0: begins, and is refused where one is left.
- * It writes weights.safetensors, report.json and report.svg into that folder when it ends, of the state that was best
+ * It writes weights.safetensors (of detail detail.safetensors), report.json and report.svg into that folder when it ends, of the state that was best
  * on some of the objects it learned from. A job that ends early, by a cancel or an error, leaves a checkpoint.
  * Errors of the start: IO; FORMAT for a file that is no JSON; INVALID_ARGUMENT for a key that is not known (with the
  * nearest one), a value out of range, a checkpoint that is left or missing, a file of another kind in the way;

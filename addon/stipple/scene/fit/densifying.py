@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Density control of an object's splats with views of the scene or photographs."""
+"""Density control of an object's splats, and detail for them, with views of the scene or photographs."""
 
 import numpy as np
 
 from ...binding.cloud import Cloud
 from ...binding.densify import densify_start
+from ...binding.detail import detail_start
 from ...binding.errors import invalid
 from ...binding.model import Model
 from .. import meshes
-from ..source import placement
+from ..source import bound, masks, placement, source_paths, sources, sync
 from .view_task import ViewTask
 
 # Of a matrix that rotates, moves and scales alike: how far its axes may be from that, relative.
@@ -47,8 +48,12 @@ class DensifyTask(ViewTask):
         camera.far_plane /= self._scale
         return camera
 
+    def _begin(self, views):
+        """The job that makes the cloud."""
+        return densify_start(self._native, self._cloud, views, **self._chosen)
+
     def _use(self, views):
-        self.job = densify_start(self._native, self._cloud, views, **self._chosen)
+        self.job = self._begin(views)
         try:
             yield from self._until_done(self.job, 'use')
             made = Cloud.of_job(self.job)
@@ -57,6 +62,36 @@ class DensifyTask(ViewTask):
             self.result = Model.of_job(self.job), made
         finally:
             self.job = None
+
+
+class DetailTask(DensifyTask):
+    """The same for detail that a network adds."""
+
+    def __init__(self, context, objects, settings, obj, cloud, weights_path, chosen):
+        """chosen: options of detail_start by name."""
+        super().__init__(context, objects, settings, obj, cloud, {'seed': settings.seed})
+        self._weights_path, self._options = weights_path, chosen
+
+    def _begin(self, views):
+        return detail_start(self._native, self._cloud, views, self._weights_path, **self._options)
+
+
+def replace(obj, model, cloud):
+    """The object's splats become these. In: the result of a task."""
+    count = cloud.info().count
+    path = sources.save_model(model, source_paths.place_for(obj.name))
+    sources.remember_model(path, model)
+    # A datablock of its own: the old one may have other users, and undo goes back to it.
+    data = obj.data.copy()
+    with sync.paused():
+        masks.clear(data)
+        sources.attach_tree(data, path, count)
+        if bound.follows(data):
+            bound.rebind(data)
+        data.stipple.ratio = data.stipple.ratio_render = 1.0
+    sync.write_decoded(data, cloud.read())
+    obj.data = data
+    return count
 
 
 def _even_scale(matrix, name):
