@@ -13,7 +13,7 @@ import picture_steps  # noqa: E402
 import scenes  # noqa: E402
 import tour_steps  # noqa: E402
 
-SIDEBAR_PX, SHOWN_PX = 250, 640
+SIDEBAR_PX, SHOWN_PX = 250, 790
 
 
 def build(window):
