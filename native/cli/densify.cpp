@@ -3,9 +3,8 @@
 
 #include "cli/commands.h"
 #include "cli/dataset.h"
-#include "cli/formats.h"
+#include "cli/jobs/replaced_splats.h"
 #include "cli/numbers.h"
-#include "cli/report.h"
 
 namespace stipple::cli {
 
@@ -21,17 +20,8 @@ struct Arguments {
   double image_mib = 1024;
 };
 
-uint64_t countOf(const Cloud& cloud) {
-  auto info = sized<StippleCloudInfo>();
-  check(stipple_cloud_info(cloud.get(), &info));
-  return info.count;
-}
-
 void densify(const Context& context, const Arguments& arguments) {
-  if (!hasSplatExtension(arguments.out)) {
-    throw Failure("'" + arguments.out + "' is not a splat file; " + splatExtensions(true) +
-                  " is expected");
-  }
+  requireSplats(arguments.out);
   StippleDensifyOptions options;
   stipple_densify_options_init(&options);
   options.strategy_utf8 = arguments.strategy.c_str();
@@ -49,12 +39,7 @@ void densify(const Context& context, const Arguments& arguments) {
                 const_cast<const StippleViews*>(views.get()),
                 const_cast<const StippleDensifyOptions*>(&options));
   finish(job);
-  const auto made = make<Cloud>(stipple_job_cloud, job.get());
-  check(stipple_cloud_save(made.get(), arguments.out.c_str(), nullptr));
-  Report report;
-  report.add("gaussians_before", countOf(cloud));
-  report.add("gaussians", countOf(made));
-  report.print(false);
+  saveReplaced(job, cloud, arguments.out, false);
 }
 
 }  // namespace

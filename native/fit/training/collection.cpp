@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/random.h"
 #include "io/views/dataset.h"
 #include "math/colour.h"
 
@@ -148,6 +149,20 @@ Collection::Collection(const std::string& folder, const CollectionOptions& optio
   refuse("'" + folder + "' has no object that can be learned from" +
          (notes_.empty() ? std::string(": no folder in it has a ") + kCameraFile
                          : ". " + notes_.front()));
+}
+
+void requireSameTraining(GradientExchange& exchange, const std::string& settings,
+                         const Collection& collection, uint64_t taken) {
+  const auto of = [](const std::string& text) {
+    uint64_t bits = 0;
+    for (const char letter : text) bits = mixBits(bits ^ static_cast<unsigned char>(letter));
+    return bits;
+  };
+  std::string objects;
+  for (size_t i = 0; i < collection.count(); ++i) objects += collection.name(i) + '\n';
+  requireSame(exchange, of(settings), "the settings");
+  requireSame(exchange, of(objects), "the objects");
+  requireSame(exchange, mixBits(taken), "the checkpoints");
 }
 
 }  // namespace stipple

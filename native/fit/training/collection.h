@@ -87,4 +87,9 @@ class CollectionShare final : public ObjectSource {
   std::vector<size_t> objects_;
 };
 
+/// What all processes of a training must have the same of, or they would learn apart. Errors: those
+/// of requireSame().
+void requireSameTraining(GradientExchange& exchange, const std::string& settings,
+                         const Collection& collection, uint64_t taken);
+
 }  // namespace stipple

@@ -113,16 +113,7 @@ void DetailWork::restore() {
 }
 
 void DetailWork::requireAlike() {
-  const auto of = [](const std::string& text) {
-    uint64_t bits = 0;
-    for (const char letter : text) bits = mixBits(bits ^ static_cast<unsigned char>(letter));
-    return bits;
-  };
-  std::string objects;
-  for (size_t i = 0; i < collection_->count(); ++i) objects += collection_->name(i) + '\n';
-  requireSame(*exchange_, of(settings_), "the settings");
-  requireSame(*exchange_, of(objects), "the objects");
-  requireSame(*exchange_, mixBits(history_.records.size()), "the checkpoints");
+  requireSameTraining(*exchange_, settings_, *collection_, history_.records.size());
 }
 
 void DetailWork::measure() {

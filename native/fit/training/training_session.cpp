@@ -211,19 +211,8 @@ void TrainingSession::Work::restore() {
   session.status_.resumed_step = history.records.size();
 }
 
-/// What all processes must have the same of, or they would learn apart.
 void TrainingSession::Work::requireAlike() {
-  GradientExchange& exchange = *session.exchange_;
-  const auto of = [](const std::string& text) {
-    uint64_t bits = 0;
-    for (const char letter : text) bits = mixBits(bits ^ static_cast<unsigned char>(letter));
-    return bits;
-  };
-  std::string objects;
-  for (size_t i = 0; i < collection->count(); ++i) objects += collection->name(i) + '\n';
-  requireSame(exchange, of(settings()), "the settings");
-  requireSame(exchange, of(objects), "the objects");
-  requireSame(exchange, mixBits(history.records.size()), "the checkpoints");
+  requireSameTraining(*session.exchange_, settings(), *collection, history.records.size());
 }
 
 void TrainingSession::Work::show() {

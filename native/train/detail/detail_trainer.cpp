@@ -103,22 +103,11 @@ void DetailTrainer::addExample(size_t index, uint64_t key, double share, DetailS
     if (progress != nullptr) progress->throwIfCancelled();
     const ObjectView view = views.view(at);
     const bool is_white = keyedBits(key, RandomUse::kBackground, at) & 1;
-    std::vector<float> target = view.image;
-    RenderOptions options;
-    options.with_depth = false;
-    options.with_background = true;
-    std::fill_n(options.background, 3, is_white ? 1.0f : 0.0f);
-    for (size_t i = 0; i < target.size() && is_white; ++i) target[i] += 1 - view.alpha[i / 3];
-    pass->forward(fine, view.camera, options, progress);
-    const double whole = 1 + schedule_.ssim;
-    const ImageLossValue loss = pass->loss(target, {}, lossFor({}, schedule_.ssim / whole));
+    const ImageLossValue loss = addViewLoss(*pass, view, is_white, fine, {}, schedule_.ssim,
+                                            view_share, by_view, by_fine, progress);
     done.l1 += view_share * loss.l1;
     done.ssim += view_share * loss.ssim;
-    done.loss += view_share * whole * loss.loss;
-    pass->backward({}, 0.0, progress);
-    pass->swapGradients(by_view);
-    addCloud(by_view, view_share * whole, by_fine);
-    pass->swapGradients(by_view);
+    done.loss += view_share * (1 + schedule_.ssim) * loss.loss;
   }
   model_.backward(values_, coarse, evidence, tape, fine, by_fine, gradients_);
 }
@@ -143,23 +132,14 @@ DetailStep DetailTrainer::step(Progress* progress) {
 }
 
 TensorTable DetailTrainer::state() const {
-  const WeightOptimiser::State& state = optimiser_->state();
-  TensorTable table;
-  putWeights("detail.", values_, state, table);
-  putValues("detail.counts", std::vector<uint64_t>{state.steps, state.skipped, taken_}, table);
-  return table;
+  return trainerState("detail.", values_, optimiser_->state(), taken_);
 }
 
 void DetailTrainer::resume(const TensorTable& table) {
-  const std::vector<uint64_t> counts = takeValues<uint64_t>(table, "detail.counts", 3, 3);
-  std::vector<float> values;
-  WeightOptimiser::State state =
-      takeWeights(table, "detail.", values_.size(), schedule_.optimiser.clip_buffer, values);
-  state.steps = counts[0];
-  state.skipped = counts[1];
-  optimiser_.emplace(schedule_.optimiser, std::move(state));
-  values_ = std::move(values);
-  taken_ = counts[2];
+  TrainerState state = takeTrainerState(table, "detail.", values_.size(), schedule_.optimiser);
+  optimiser_.emplace(schedule_.optimiser, std::move(state.optimiser));
+  values_ = std::move(state.values);
+  taken_ = state.taken;
 }
 
 }  // namespace stipple

@@ -207,22 +207,11 @@ void DensityAutoencoder::addImages(std::span<const float> values, const Autoenco
     if (progress != nullptr) progress->throwIfCancelled();
     const ObjectView view = all->view(index);
     const bool is_white = keyedBits(example.seed, RandomUse::kBackground, index) & 1;
-    std::vector<float> target = view.image;
-    RenderOptions options;
-    options.with_depth = false;
-    options.with_background = true;
-    std::fill_n(options.background, 3, is_white ? 1.0f : 0.0f);
-    for (size_t i = 0; i < target.size() && is_white; ++i) target[i] += 1 - view.alpha[i / 3];
-    pass->forward(cloud, view.camera, options, progress);
-    // L1 and `ssim` times 1 - SSIM, as a multiple of the loss that shares one between them.
-    const double whole = 1 + weights.ssim;
-    const ImageLossValue loss = pass->loss(target, {}, lossFor(request, weights.ssim / whole));
+    const ImageLossValue loss =
+        addViewLoss(*pass, view, is_white, cloud, request, weights.ssim, view_share * example.share,
+                    by_view, by_cloud, progress);
     losses.l1 += view_share * loss.l1;
     losses.ssim += view_share * loss.ssim;
-    pass->backward(request, 0.0, progress);
-    pass->swapGradients(by_view);
-    addCloud(by_view, view_share * example.share * whole, by_cloud);
-    pass->swapGradients(by_view);
     if (!request.contributions) continue;
     const std::span<const float> of_view = pass->statistic(Statistic::kContributions);
     // Statistics are sums over pixels and channels. What counts is the mean over pixels of the sum

@@ -47,4 +47,25 @@ void addCloud(const SplatCloud& of_view, double factor, SplatCloud& sum) {
   addTo(of_view.sh, factor, sum.sh);
 }
 
+ImageLossValue addViewLoss(ViewPass& pass, const ObjectView& view, bool is_white,
+                           const SplatCloud& cloud, const StatisticRequest& request, double ssim,
+                           double factor, SplatCloud& by_view, SplatCloud& sum,
+                           Progress* progress) {
+  std::vector<float> target = view.image;
+  RenderOptions options;
+  options.with_depth = false;
+  options.with_background = true;
+  std::fill_n(options.background, 3, is_white ? 1.0f : 0.0f);
+  for (size_t i = 0; i < target.size() && is_white; ++i) target[i] += 1 - view.alpha[i / 3];
+  pass.forward(cloud, view.camera, options, progress);
+  // As a multiple of the loss that shares one between L1 and 1 - SSIM.
+  const double whole = 1 + ssim;
+  const ImageLossValue loss = pass.loss(target, {}, lossFor(request, ssim / whole));
+  pass.backward(request, 0.0, progress);
+  pass.swapGradients(by_view);
+  addCloud(by_view, factor * whole, sum);
+  pass.swapGradients(by_view);
+  return loss;
+}
+
 }  // namespace stipple

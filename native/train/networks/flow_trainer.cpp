@@ -193,23 +193,14 @@ double FlowTrainer::loss(std::span<const float> values, const FlowSource& object
 }
 
 TensorTable FlowTrainer::state() const {
-  const WeightOptimiser::State& state = optimiser_->state();
-  TensorTable table;
-  putWeights("flow.", values_, state, table);
-  putValues("flow.counts", std::vector<uint64_t>{state.steps, state.skipped, taken_}, table);
-  return table;
+  return trainerState("flow.", values_, optimiser_->state(), taken_);
 }
 
 void FlowTrainer::resume(const TensorTable& table) {
-  const std::vector<uint64_t> counts = takeValues<uint64_t>(table, "flow.counts", 3, 3);
-  std::vector<float> values;
-  WeightOptimiser::State state =
-      takeWeights(table, "flow.", values_.size(), schedule_.optimiser.clip_buffer, values);
-  state.steps = counts[0];
-  state.skipped = counts[1];
-  optimiser_.emplace(schedule_.optimiser, std::move(state));
-  values_ = std::move(values);
-  taken_ = counts[2];
+  TrainerState state = takeTrainerState(table, "flow.", values_.size(), schedule_.optimiser);
+  optimiser_.emplace(schedule_.optimiser, std::move(state.optimiser));
+  values_ = std::move(state.values);
+  taken_ = state.taken;
 }
 
 }  // namespace stipple

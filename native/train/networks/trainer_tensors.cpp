@@ -27,6 +27,26 @@ WeightOptimiser::State takeWeights(const TensorTable& table, const std::string& 
   return state;
 }
 
+TensorTable trainerState(const std::string& prefix, const std::vector<float>& values,
+                         const WeightOptimiser::State& optimiser, uint64_t taken) {
+  TensorTable table;
+  putWeights(prefix, values, optimiser, table);
+  putValues(prefix + "counts", std::vector<uint64_t>{optimiser.steps, optimiser.skipped, taken},
+            table);
+  return table;
+}
+
+TrainerState takeTrainerState(const TensorTable& table, const std::string& prefix, size_t count,
+                              const WeightOptimiserOptions& options) {
+  const std::vector<uint64_t> counts = takeValues<uint64_t>(table, prefix + "counts", 3, 3);
+  TrainerState state;
+  state.optimiser = takeWeights(table, prefix, count, options.clip_buffer, state.values);
+  state.optimiser.steps = counts[0];
+  state.optimiser.skipped = counts[1];
+  state.taken = counts[2];
+  return state;
+}
+
 size_t objectInRounds(uint64_t seed, uint64_t position, size_t count) {
   const uint64_t round = position / count;
   std::vector<std::pair<uint64_t, size_t>> order;

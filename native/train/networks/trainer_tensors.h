@@ -49,6 +49,19 @@ void putWeights(const std::string& prefix, const std::vector<float>& values,
 WeightOptimiser::State takeWeights(const TensorTable& table, const std::string& prefix,
                                    size_t count, uint64_t clip_buffer, std::vector<float>& values);
 
+/// A trainer of one part: its weights, its optimiser, and the steps that it has taken.
+struct TrainerState {
+  std::vector<float> values;
+  WeightOptimiser::State optimiser;
+  uint64_t taken = 0;  ///< skipped ones among them
+};
+/// Its tensors behind a prefix ("flow.").
+TensorTable trainerState(const std::string& prefix, const std::vector<float>& values,
+                         const WeightOptimiser::State& optimiser, uint64_t taken);
+/// The other way round. In: count of weights; options of the optimiser. Errors: kFormat.
+TrainerState takeTrainerState(const TensorTable& table, const std::string& prefix, size_t count,
+                              const WeightOptimiserOptions& options);
+
 /// Which of `count` objects comes at a position, where all are seen once before any is seen again:
 /// each round over them has an order of its own.
 size_t objectInRounds(uint64_t seed, uint64_t position, size_t count);

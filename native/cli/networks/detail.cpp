@@ -3,9 +3,8 @@
 
 #include "cli/commands.h"
 #include "cli/dataset.h"
-#include "cli/formats.h"
+#include "cli/jobs/replaced_splats.h"
 #include "cli/numbers.h"
-#include "cli/report.h"
 
 namespace stipple::cli {
 
@@ -18,17 +17,8 @@ struct Arguments {
   bool json = false;
 };
 
-uint64_t countOf(const Cloud& cloud) {
-  auto info = sized<StippleCloudInfo>();
-  check(stipple_cloud_info(cloud.get(), &info));
-  return info.count;
-}
-
 void addDetailTo(const Context& context, const Arguments& arguments) {
-  if (!hasSplatExtension(arguments.out)) {
-    throw Failure("'" + arguments.out + "' is not a splat file; " + splatExtensions(true) +
-                  " is expected");
-  }
+  requireSplats(arguments.out);
   StippleDetailOptions options;
   stipple_detail_options_init(&options);
   if (arguments.splats) options.max_splats = counted(*arguments.splats, "--splats");
@@ -40,12 +30,7 @@ void addDetailTo(const Context& context, const Arguments& arguments) {
                 const_cast<const StippleViews*>(views.get()), arguments.weights.c_str(),
                 const_cast<const StippleDetailOptions*>(&options));
   finish(job);
-  const auto made = make<Cloud>(stipple_job_cloud, job.get());
-  check(stipple_cloud_save(made.get(), arguments.out.c_str(), nullptr));
-  Report report;
-  report.add("gaussians_before", countOf(cloud));
-  report.add("gaussians", countOf(made));
-  report.print(arguments.json);
+  saveReplaced(job, cloud, arguments.out, arguments.json);
 }
 
 }  // namespace
