@@ -258,14 +258,23 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                                                                           "view, as those of shiny objects do. Each "
                                                                           "splat then has more numbers", default=False,
                                  options=set())
-    model: EnumProperty(name="Model", description="What the fit learns: splats, a density of anchors, or splats that "
-                                                  "move",
+    model: EnumProperty(name="Model", description="What the fit learns: splats, a density of anchors, splats that "
+                                                  "move, anchors with features, or such anchors at key frames",
                         items=(('EXPLICIT', "Splats", "The fit learns splats, each with numbers of its own"),
                                ('FIELD', "Density Field", "The fit learns a density of anchors, which decodes at any "
                                                           "budget"),
                                ('MOTION', "Moving Splats", "The fit learns splats that move, from views at several "
-                                                           "frames, which then play on the timeline")),
+                                                           "frames, which then play on the timeline"),
+                               ('SCAFFOLD', "Anchors", "The fit learns anchors with features, which small networks "
+                                                       "turn into splats. A budget keeps the anchors that matter "
+                                                       "most"),
+                               ('RELAY', "Long Shot", "The fit learns anchors at key frames of a long clip, what becomes "
+                                                      "of them until the next key frames, and how two of them blend")),
                         options=set())
+    key_frame_spacing: FloatProperty(name="Key-Frame Spacing", description="Seconds from one key frame of a long shot to "
+                                                                           "the next. Things that move fast want less",
+                                     default=1.0, min=0.01, soft_max=10.0, subtype='TIME_ABSOLUTE', unit='TIME_ABSOLUTE',
+                                     options=set())
     strategy: EnumProperty(name="Strategy", description="How splats are added and removed while they are fitted",
                            items=strategies.strategy_items, default=strategies.BY_QUALITY_NUMBER, options=set())
     parts: EnumProperty(name="Parts", description="Parts of other strategies that are added, or that take the place "

@@ -65,6 +65,9 @@ constexpr FieldPair kFields[] = {
     pairOf<&C::jitter, &O::jitter>("jitter"),
     pairOf<&C::shell, &O::shell>("shell"),
     pairOf<&C::coarse_to_fine, &O::coarse_to_fine>("coarse_to_fine"),
+    pairOf<&C::key_frame_spacing, &O::key_frame_spacing>("key_frame_spacing"),
+    pairOf<&C::key_frame_blend, &O::key_frame_blend>("key_frame_blend"),
+    pairOf<&C::growth_by_level, &O::growth_by_level>("growth_by_level"),
     pairOf<&C::holdout, &O::holdout>("holdout"),
     pairOf<&C::seed, &O::seed>("seed"),
     pairOf<&C::ssim_share, &O::ssim_share>("ssim_share"),
@@ -117,10 +120,15 @@ StippleFitOptionInfo infoOf(size_t index) {
   info.maximum = option.maximum;
   info.default_utf8 = defaultFitText(index);
   static_assert(sizeof(option.presets) ==
-                sizeof(info.presets_utf8) + sizeof(info.motion_presets_utf8));
+                sizeof(info.presets_utf8) + sizeof(info.motion_presets_utf8) +
+                    sizeof(info.scaffold_presets_utf8) + sizeof(info.relay_presets_utf8));
   std::memcpy(info.presets_utf8, option.presets, sizeof(info.presets_utf8));
   std::memcpy(info.motion_presets_utf8, option.presets[STIPPLE_FIT_MOTION],
               sizeof(info.motion_presets_utf8));
+  std::memcpy(info.scaffold_presets_utf8, option.presets[STIPPLE_FIT_SCAFFOLD],
+              sizeof(info.scaffold_presets_utf8));
+  std::memcpy(info.relay_presets_utf8, option.presets[STIPPLE_FIT_RELAY],
+              sizeof(info.relay_presets_utf8));
   static_assert(std::size(info.alias_units) == kFitAliasCount);
   for (size_t i = 0; i < kFitAliasCount; ++i) {
     info.aliases_utf8[i] = option.aliases[i].name;

@@ -136,7 +136,10 @@ void save(const Context& context, const Job& job, const Result& result) {
   auto info = sized<StippleCloudInfo>();
   check(stipple_cloud_info(cloud.get(), &info));
   const bool is_cut = result.budget > 0 && result.budget < info.count;
-  if (result.model != STIPPLE_FIT_FIELD && (is_asset || is_cut)) {
+  const bool is_of_anchors = result.model == STIPPLE_FIT_FIELD ||
+                             result.model == STIPPLE_FIT_SCAFFOLD ||
+                             result.model == STIPPLE_FIT_RELAY;
+  if (!is_of_anchors && (is_asset || is_cut)) {
     const Model tree = hierarchyOf(context, cloud, result.seed);
     if (is_asset) {
       check(stipple_model_save(tree.get(), result.out.c_str()));
@@ -231,8 +234,9 @@ void fit(const Context& context, const Arguments& arguments) {
   if (arguments.series.holdsOut() && options.holdout == 0) {
     throw Failure("--held-out-cameras and --holdout 0 say both what is held out");
   }
-  const Views views = openViews(context, arguments.dataset, arguments.downscale, &arguments.series,
-                                options.model == STIPPLE_FIT_MOTION);
+  const Views views =
+      openViews(context, arguments.dataset, arguments.downscale, &arguments.series,
+                options.model == STIPPLE_FIT_MOTION || options.model == STIPPLE_FIT_RELAY);
   printSeries(views);
   // From here on there is something to keep, also where a terminal or the other end of a pipe is
   // gone.
@@ -248,6 +252,8 @@ void fit(const Context& context, const Arguments& arguments) {
   }
   if (is_whole) {
     std::filesystem::remove(checkpoint);
+    std::error_code ignored;
+    std::filesystem::remove_all(checkpoint + ".frames", ignored);
   } else {
     std::fprintf(stderr, "stipple: stopped; the best so far is in '%s', --resume goes on\n",
                  arguments.out.c_str());

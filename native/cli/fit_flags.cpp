@@ -26,10 +26,15 @@ std::vector<std::string> wordsOf(const StippleFitOptionInfo& info) {
 }
 
 const char* groupOf(const StippleFitOptionInfo& info) {
-  if (info.models == (1u << STIPPLE_FIT_EXPLICIT | 1u << STIPPLE_FIT_MOTION)) {
+  constexpr uint32_t kSplats = 1u << STIPPLE_FIT_EXPLICIT | 1u << STIPPLE_FIT_MOTION;
+  constexpr uint32_t kScaffold = 1u << STIPPLE_FIT_SCAFFOLD | 1u << STIPPLE_FIT_RELAY;
+  if (info.models == kSplats || info.models == (kSplats | kScaffold)) {
     return "Options of explicit splats";
   }
   if (info.models == 1u << STIPPLE_FIT_FIELD) return "Options of fields";
+  if (info.models == 1u << STIPPLE_FIT_RELAY) return "Options of relays";
+  if (info.models == (1u << STIPPLE_FIT_FIELD | kScaffold))
+    return "Options of fields and scaffolds";
   return "Options";
 }
 
@@ -42,8 +47,10 @@ const char* typeOf(const StippleFitOptionInfo& info) {
 /// presets of the model have none.
 std::string presetText(const StippleFitOptionInfo& info, uint32_t model) {
   const size_t count = kQualities.size();
-  const char* const* texts =
-      model == STIPPLE_FIT_MOTION ? info.motion_presets_utf8 : info.presets_utf8 + model * count;
+  const char* const* texts = model == STIPPLE_FIT_MOTION     ? info.motion_presets_utf8
+                             : model == STIPPLE_FIT_SCAFFOLD ? info.scaffold_presets_utf8
+                             : model == STIPPLE_FIT_RELAY    ? info.relay_presets_utf8
+                                                             : info.presets_utf8 + model * count;
   if ((info.models & (1u << model)) == 0 || !texts[0] || !*texts[0]) return "";
   std::string all;
   bool is_one = true;
@@ -63,9 +70,18 @@ std::string helpOf(const StippleFitOptionInfo& info) {
     preset += "; of a field " + of_fields;
   }
   const std::string of_moving = presetText(info, STIPPLE_FIT_MOTION);
+  const std::string of_scaffolds = presetText(info, STIPPLE_FIT_SCAFFOLD);
   const bool is_alone = preset.empty();
   if (!is_alone && !of_moving.empty() && of_moving != of_splats) {
     preset += "; of motion " + of_moving;
+  }
+  if (!is_alone && !of_scaffolds.empty() && of_scaffolds != of_splats &&
+      of_scaffolds != of_fields) {
+    preset += "; of a scaffold " + of_scaffolds;
+  }
+  const std::string of_relays = presetText(info, STIPPLE_FIT_RELAY);
+  if (!is_alone && !of_relays.empty() && of_relays != of_scaffolds && of_relays != of_splats) {
+    preset += "; of a relay " + of_relays;
   }
   std::string help = info.help_utf8;
   if (!preset.empty()) help += " Default: " + preset + ".";

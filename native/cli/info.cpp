@@ -54,6 +54,10 @@ Report describeModel(const Context& context, const std::string& path) {
   Report report;
   report.add("kind", info.kind_label);
   if (settings.budget_unit == STIPPLE_BUDGET_SPLATS) report.add("count", info.leaf_count);
+  // Where anchors are drawn there may be any number.
+  const bool has_anchors = settings.budget_unit == STIPPLE_BUDGET_ANCHORS &&
+                           settings.maximum_budget < STIPPLE_MAX_ANCHORS;
+  if (has_anchors) report.add("anchors", settings.maximum_budget);
   if (settings.maximum_learned_budget != 0) {
     report.add("least_anchors", settings.minimum_learned_budget);
     report.add("most_anchors", settings.maximum_learned_budget);

@@ -46,9 +46,9 @@ uint64_t pictureMemoryBound(const ViewSource& views, uint64_t picture_bytes) {
 }
 
 uint64_t fitMemoryBound(const FitOptions& options, const ViewSource& views) {
-  const bool is_field = options.model == FitKind::kField;
-  const uint64_t count =
-      is_field ? options.most_anchors * options.gaussians_per_anchor : options.max_splats;
+  const uint64_t count = isOfAnchors(options.model)
+                             ? options.most_anchors * options.gaussians_per_anchor
+                             : options.max_splats;
   return pictureMemoryBound(views, options.picture_bytes) + count * bytesOfSplat(options);
 }
 
@@ -61,7 +61,7 @@ void holdToMemory(FitOptions& options, const ViewSource& views) {
                                       " and the images at work take about " +
                                       std::to_string(needed));
   };
-  if (options.model == FitKind::kField) {
+  if (isOfAnchors(options.model)) {
     const uint64_t needed = fitMemoryBound(options, views);
     if (needed > limit) refuse(needed, std::to_string(options.most_anchors) + " anchors");
     return;

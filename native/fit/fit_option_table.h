@@ -28,9 +28,15 @@ using FitValue = std::variant<uint64_t, double, std::string>;
 constexpr uint32_t kOfExplicit = 1u << static_cast<uint32_t>(FitKind::kExplicit);
 constexpr uint32_t kOfField = 1u << static_cast<uint32_t>(FitKind::kField);
 constexpr uint32_t kOfMotion = 1u << static_cast<uint32_t>(FitKind::kMotion);
+constexpr uint32_t kOfScaffold = 1u << static_cast<uint32_t>(FitKind::kScaffold);
+constexpr uint32_t kOfRelay = 1u << static_cast<uint32_t>(FitKind::kRelay);
+/// Whose anchors have features.
+constexpr uint32_t kOfScaffolds = kOfScaffold | kOfRelay;
+/// Whose anchors become splats.
+constexpr uint32_t kOfAnchors = kOfField | kOfScaffolds;
 /// Whose splats have parameters of their own.
 constexpr uint32_t kOfSplats = kOfExplicit | kOfMotion;
-constexpr uint32_t kOfEveryModel = kOfSplats | kOfField;
+constexpr uint32_t kOfEveryModel = kOfSplats | kOfAnchors;
 constexpr uint32_t kOfNoModel = 0;
 
 /// How an option lies in FitOptions.

@@ -66,6 +66,11 @@ void requireFitOptions(const FitOptions& options) {
          "options->resume is 1, but no checkpoint_path is given; it names what to go on from");
   }
   if (options.strategy.empty()) return;
+  if (options.model == FitKind::kScaffold || options.model == FitKind::kRelay) {
+    fail(ErrorCode::kInvalidArgument,
+         "strategy is '" + options.strategy +
+             "', but anchors with features have none: they grow by a rule of their own");
+  }
   if (options.model == FitKind::kField) {
     requireFieldStrategy(options.strategy);
   } else {
@@ -76,7 +81,7 @@ void requireFitOptions(const FitOptions& options) {
 FitOptions resolved(FitOptions options) {
   if (options.model == FitKind::kField) {
     options.density_gradient = options.density_gradient || !options.strategy.empty();
-  } else if (options.strategy.empty()) {
+  } else if (options.strategy.empty() && !isOfAnchors(options.model)) {
     options.strategy =
         options.model == FitKind::kMotion ? "temporal" : ExplicitModelOptions().strategy;
   }

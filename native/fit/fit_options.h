@@ -4,6 +4,8 @@
 #include <string>
 
 #include "data/clouds/splat_cloud.h"
+#include "decode/anchors/key_frame.h"
+#include "train/anchors/relay_model.h"
 #include "train/loop/field_model.h"
 #include "train/loop/trainer.h"
 #include "train/prior/scene_prior.h"
@@ -15,8 +17,20 @@ enum class FitKind : uint32_t {
   kExplicit = 0,  ///< splats with parameters of their own
   kField = 1,     ///< a learned density and a field of attributes
   kMotion = 2,    ///< splats with parameters of their own that move, to views with times
+  kScaffold = 3,  ///< anchors with features, and networks that make splats of them
+  kRelay = 4,     ///< the same at key frames of a long clip, to views with times
 };
-constexpr uint32_t kFitKindCount = 3;
+constexpr uint32_t kFitKindCount = 5;
+
+/// Whether anchors become the splats: strategies do not apply, and budgets count anchors.
+constexpr bool isOfAnchors(FitKind kind) {
+  return kind == FitKind::kField || kind == FitKind::kScaffold || kind == FitKind::kRelay;
+}
+
+/// Whether it learns from views of several times.
+constexpr bool moves(FitKind kind) {
+  return kind == FitKind::kMotion || kind == FitKind::kRelay;
+}
 
 /// A user's choice of quality, as presets have it.
 enum class FitQuality : uint32_t { kFast = 0, kBalanced = 1, kFineDetail = 2 };
@@ -40,6 +54,9 @@ struct FitOptions {
   bool density_gradient = FieldModelOptions().density_gradient;
   bool jitter = FieldModelOptions().jitter;
   ShellChoice shell = FieldModelOptions().shell;
+  double key_frame_spacing = 1;  ///< seconds
+  KeyFrameBlend key_frame_blend = KeyFrameBlend::kLearned;
+  bool growth_by_level = RelayModelOptions().grows_by_level;
   uint32_t holdout = 8;
   uint64_t seed = 0;
   double ssim_share = TrainerOptions().ssim_share;

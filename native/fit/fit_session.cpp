@@ -1,18 +1,26 @@
 #include "fit/fit_session.h"
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "data/views/view_check.h"
 #include "fit/fit_memory.h"
 #include "fit/fit_settings.h"
 #include "fit/fit_views.h"
+#include "fit/key_frame_folder.h"
 #include "io/assets/checkpoint.h"
 #include "io/reports/fit_report.h"
 #include "model/field_splats.h"
 #include "model/motion_splats.h"
 #include "model/moving_budgets.h"
+#include "model/relay_splats.h"
+#include "model/scaffold_splats.h"
+#include "train/anchors/relay_model.h"
+#include "train/anchors/scaffold_model.h"
 #include "train/loop/explicit_model.h"
 #include "train/loop/field_model.h"
 #include "train/loop/moving_splats.h"
@@ -26,7 +34,7 @@ TrainerOptions trainerOptions(const FitOptions& options) {
   trainer.iterations = options.iterations;
   trainer.background = options.background;
   trainer.seed = options.seed;
-  trainer.max_splats = options.model == FitKind::kField ? 0 : options.max_splats;
+  trainer.max_splats = isOfAnchors(options.model) ? 0 : options.max_splats;
   trainer.picture_bytes = options.picture_bytes;
   trainer.ssim_share = options.ssim_share;
   trainer.coarse_to_fine = options.model == FitKind::kExplicit && options.coarse_to_fine;
@@ -52,6 +60,47 @@ FieldModelOptions fieldOptions(const FitOptions& options) {
   return field;
 }
 
+ScaffoldModelOptions scaffoldOptions(const FitOptions& options) {
+  ScaffoldModelOptions scaffold;
+  scaffold.most_anchors = options.most_anchors;
+  scaffold.start_anchors = std::min(options.start_splats, options.most_anchors);
+  scaffold.gaussians_per_anchor = options.gaussians_per_anchor;
+  scaffold.sh_degree = static_cast<int>(options.sh_degree);
+  scaffold.antialias = options.antialias;
+  scaffold.ssim_share = options.ssim_share;
+  scaffold.seed = options.seed;
+  return scaffold;
+}
+
+/// One key frame every so many whole frames, at least one.
+KeyFrameClip keyFrameClip(const FitOptions& options, const ViewSource& views) {
+  const MotionClip clip = clipOfViews(views);
+  const double frames = std::round(options.key_frame_spacing * clip.frames_per_second);
+  KeyFrameClip keys;
+  keys.begin = clip.begin;
+  keys.frames_per_second = clip.frames_per_second;
+  keys.frame_count = clip.frame_count;
+  keys.spacing = static_cast<uint32_t>(std::clamp(frames, 1.0, double{1} * clip.frame_count));
+  keys.blend = options.key_frame_blend;
+  return keys;
+}
+
+std::unique_ptr<FitModel> relayModel(const BackendFactory& backends, const ViewSource& views,
+                                     const FitViews& split, const FitOptions& options,
+                                     Progress* progress) {
+  RelayModelOptions relay;
+  relay.anchors = scaffoldOptions(options);
+  relay.clip = keyFrameClip(options, views);
+  relay.grows_by_level = options.growth_by_level;
+  relay.iterations = options.iterations;
+  std::shared_ptr<KeyFrameStore> store = std::make_shared<MemoryKeyFrames>();
+  if (!options.checkpoint_path.empty()) {
+    store = std::make_shared<KeyFrameFolder>(options.checkpoint_path);
+  }
+  if (!options.resume) store->clear();
+  return makeRelayModel(backends, views, split.training, relay, std::move(store), progress);
+}
+
 ExplicitModelOptions explicitOptions(const FitOptions& options, const ViewSource& views) {
   ExplicitModelOptions model;
   model.strategy = options.strategy;
@@ -72,6 +121,12 @@ std::unique_ptr<FitModel> makeModel(const BackendFactory& backends, const ViewSo
   if (options.model == FitKind::kField) {
     return makeFieldModel(backends, views, split.training, fieldOptions(options), progress);
   }
+  if (options.model == FitKind::kScaffold) {
+    return makeScaffoldModel(backends, views, split.training, scaffoldOptions(options), progress);
+  }
+  if (options.model == FitKind::kRelay) {
+    return relayModel(backends, views, split, options, progress);
+  }
   return makeExplicitModel(backends, views, split.training, explicitOptions(options, views),
                            progress);
 }
@@ -79,7 +134,7 @@ std::unique_ptr<FitModel> makeModel(const BackendFactory& backends, const ViewSo
 FitOptions preparedOptions(const FitOptions& options, const ViewSource& views) {
   requireFitOptions(options);
   FitOptions held = resolved(options);
-  if (held.model == FitKind::kMotion) clipOfViews(views);  // says now what times are missing
+  if (moves(held.model)) clipOfViews(views);  // says now what times are missing
   holdToMemory(held, views);
   return held;
 }
@@ -217,12 +272,16 @@ std::shared_ptr<const SplatModel> FitSession::model() const {
   FitModel& model = ended().model();
   std::optional<FieldResult> learned;
   std::optional<MotionCloud> moving;
+  std::shared_ptr<const ScaffoldParameters> scaffold;
   {
     // The density is frozen by the first who asks for it, and a decode may be that one.
     std::lock_guard<std::mutex> lock(decode_mutex_);
     learned = fieldResult(model);
     moving = motionResult(model);
+    scaffold = scaffoldResult(model);
   }
+  if (options_.model == FitKind::kRelay) return relay();
+  if (scaffold) return makeScaffoldSplats(std::move(scaffold), {settings_json_, {}});
   if (moving)
     return makeMotionSplats(std::move(*moving), {settings_json_, {}}, tree_,
                             movingTreesByViews(backends_));
@@ -234,10 +293,20 @@ std::shared_ptr<const SplatModel> FitSession::model() const {
                          std::move(learned->field), learned->draws, {settings_json_, {}});
 }
 
+/// All key frames as they are now.
+std::shared_ptr<const SplatModel> FitSession::relay() const {
+  std::lock_guard<std::mutex> lock(decode_mutex_);
+  const KeyFrameSource source = relayResult(ended().model());
+  const KeyFrameClip clip = keyFrameClip(options_, *views_);
+  std::vector<std::shared_ptr<const KeyFrame>> frames;
+  for (uint32_t key = 0; key < clip.keyCount(); ++key) frames.push_back(source(key));
+  return makeRelaySplats(clip, std::move(frames), {settings_json_, {}});
+}
+
 void FitSession::saveReport(const std::string& path) const {
   FitReportHead head;
   head.model = ended().model().name();
-  if (options_.model != FitKind::kField) head.strategy = options_.strategy;
+  if (!isOfAnchors(options_.model)) head.strategy = options_.strategy;
   head.settings_json = settings_json_;
   requireFitReportPlace(path);
   writeFitReport(head, history(), path);

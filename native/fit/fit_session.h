@@ -85,6 +85,7 @@ class FitSession final : public FitObserver {
   std::unique_ptr<Trainer> prepared(Progress& progress);
   /// The tree of a finished fit of splats that move, so that their model has every budget at once.
   void mergeMoving(Progress& progress);
+  std::shared_ptr<const SplatModel> relay() const;
   Trainer& ended() const;
 
   std::shared_ptr<const BackendFactory> backends_;

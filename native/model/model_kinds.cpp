@@ -10,6 +10,8 @@ std::shared_ptr<const SplatModel> readHierarchySplats(const std::string& path, c
 std::shared_ptr<const SplatModel> readFieldSplats(const std::string& path, const ReadingAid&);
 std::shared_ptr<const SplatModel> readLatentSplats(const std::string& path, const ReadingAid&);
 std::shared_ptr<const SplatModel> readMotionSplats(const std::string& path, const ReadingAid&);
+std::shared_ptr<const SplatModel> readScaffoldSplats(const std::string& path, const ReadingAid&);
+std::shared_ptr<const SplatModel> readRelaySplats(const std::string& path, const ReadingAid&);
 
 std::span<const ModelKind> modelKinds() {
   static const std::array kinds = {
@@ -47,6 +49,16 @@ std::span<const ModelKind> modelKinds() {
                 4,
                 {.budget_unit = BudgetUnit::kSplats, .takes_mask = true},
                 readMotionSplats},
+      ModelKind{"scaffold",
+                "anchors with features",
+                5,
+                {.budget_unit = BudgetUnit::kAnchors},
+                readScaffoldSplats},
+      ModelKind{"relay",
+                "key frames of anchors",
+                6,
+                {.budget_unit = BudgetUnit::kAnchors},
+                readRelaySplats},
   };
   return kinds;
 }

@@ -42,16 +42,15 @@ FIGURES = {'psnr': ('{:.2f}', 'PSNR'), 'masked_psnr': ('{:.2f}', 'masked PSNR'),
            'splats': ('{:,.0f}', 'splats'), 'processor_seconds': ('{:,.0f}', 'processor seconds')}
 
 
-def fit(stipple, dataset, result, strategy, given, seed):
-    """Processor seconds and the peak of memory of one fit."""
-    command = [stipple, 'fit', dataset, result, '--model', 'motion', '--strategy', strategy, '--iterations',
-               given.iterations, '--max-splats', given.most, '--seed', seed]
+def fit(stipple, dataset, result, options, iterations, seed):
+    """Seconds, processor seconds and the peak of memory of one fit."""
+    command = [stipple, 'fit', dataset, result, '--iterations', iterations, '--seed', seed, *options]
     start = time.perf_counter()
     process = subprocess.Popen([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     message = process.stderr.read()
     _, status, usage = os.wait4(process.pid, 0)
     if status != 0:
-        raise RuntimeError(f'{strategy} on {dataset}: {message.decode()}')
+        raise RuntimeError(f'{options} on {dataset}: {message.decode()}')
     return {'seconds': time.perf_counter() - start, 'processor_seconds': usage.ru_utime + usage.ru_stime,
             'megabytes': usage.ru_maxrss / 1024}
 
@@ -74,15 +73,22 @@ class Judge:
             self._cameras[path.stem] = frames, np.load(path)
 
     def __call__(self, result, frame_rate):
+        """Figures of a file, with all of its splats."""
         model = Model.load(self._context, result)
         count = model.settings().maximum_budget
+        return self.of(lambda seconds: model.decode(DecodeSettings(count, time=seconds)), frame_rate)
+
+    def of(self, splats_at, frame_rate):
+        """Figures of what a function of seconds gives."""
+        most = 0
         options = self._renderer.options(output_colour=OutputColour.COMPOSITED, background=(0, 0, 0))
         values = {key: [] for key in ('psnr', 'ssim', 'masked_psnr', 'masked_ssim')}
         changes, truths = [], []
         for frames, masks in self._cameras.values():
             before = None
             for (frame, camera, truth), mask in zip(frames, masks):
-                cloud = model.decode(DecodeSettings(count, time=frame / frame_rate))
+                cloud = splats_at(frame / frame_rate)
+                most = max(most, cloud.info().count)
                 task = self._renderer.start([(cloud, np.eye(4))], camera, options, with_depth=False)
                 task.job.wait()
                 drawn = np.clip(task.colour[..., :3], 0, 1)
@@ -98,13 +104,14 @@ class Judge:
                 before = drawn, truth
         return {**{key: statistics.mean(found) for key, found in values.items()},
                 'flicker': float(statistics.mean(changes) / statistics.mean(truths)),
-                'splats': count}
+                'splats': most}
 
 
 def measure(stipple, judge, given, scene, arm, strategy, seed):
     """A row of results."""
     result = given.folder / f'{scene}.stipple.safetensors'
-    costs = fit(stipple, given.folder / scene, result, strategy, given, seed)
+    costs = fit(stipple, given.folder / scene, result,
+                ['--model', 'motion', '--strategy', strategy, '--max-splats', given.most], given.iterations, seed)
     return {'scene': scene, 'arm': arm, 'strategy': strategy, 'seed': seed, 'iterations': given.iterations,
             'most': given.most, **judge(result, 24), **costs, 'load': os.getloadavg()[0]}
 

@@ -32,6 +32,8 @@ SCENES = {'fine_texture': 'fine texture', 'thin_structures': 'thin structures', 
 MOST_SPLATS = 100000
 DOWNSCALE = 2                         # of the pictures of 464 x 256, so that three seeds fit in a night on two cores
 UNSCALED = ('adaptive', 'improved')   # also for 30,000 iterations, on the first scene
+SPLATS_PER_ANCHOR = 10                # of a scaffold
+OTHER_MODELS = 'learned_density', 'scaffold'
 THIRD = 3                             # of adaptive's count, which the best strategies get once more
 HALF = {'improved': 2}                # published as better with half of adaptive's count
 BEST = 5                              # so many of them, beside adaptive itself
@@ -40,9 +42,10 @@ COMBINED = ('absolute+long_axis_split',)  # and what parts make of them: the bes
 
 
 def strategies(stipple):
-    """Names that `stipple fit --strategies` lists, without the parts."""
+    """Names that `stipple fit --strategies` lists, without the parts, and the model whose anchors grow by a rule of
+    their own."""
     text = subprocess.run([stipple, 'fit', '--strategies'], check=True, capture_output=True, text=True).stdout
-    return [line.split()[0] for line in text.split('parts')[0].splitlines() if line.startswith('  ')]
+    return [line.split()[0] for line in text.split('parts')[0].splitlines() if line.startswith('  ')] + ['scaffold']
 
 
 def fit(stipple, dataset, folder, job):
@@ -52,6 +55,8 @@ def fit(stipple, dataset, folder, job):
                8, '--downscale', job['downscale'], '--report', report]
     if job['strategy'] == 'learned_density':
         command += ['--model', 'field']
+    elif job['strategy'] == 'scaffold':
+        command += ['--model', 'scaffold', '--max-anchors', job['most'] // SPLATS_PER_ANCHOR]
     else:
         command[3] = folder / 'result.ply'
         command += ['--strategy', job['strategy'], '--gaussians', job['most']]
@@ -95,7 +100,7 @@ def best(results, scene, iterations):
     """Strategies of explicit splats with the highest PSNR of training views on a scene, by the first seed, and
     adaptive."""
     rows = [row for row in results.find(scene=scene, seed=0, kind='full', iterations=iterations)
-            if row['strategy'] not in ('learned_density', 'adaptive') and 'training_psnr' in row]
+            if row['strategy'] not in (*OTHER_MODELS, 'adaptive') and 'training_psnr' in row]
     return ['adaptive', *(row['strategy'] for row in sorted(rows, key=lambda row: -row['training_psnr'])[:BEST])]
 
 

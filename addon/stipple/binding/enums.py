@@ -3,7 +3,7 @@
 
 from enum import IntEnum
 
-from .fit_enums import FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, SplatQuantity
+from .fit_enums import FitBackground, FitModel, FitOptionKind, FitQuality, FitShell, KeyFrameBlend, SplatQuantity
 
 
 class Status(IntEnum):
@@ -286,6 +286,7 @@ ENUMS = {
     'StippleRegionOperation': (RegionOperation, 'STIPPLE_REGION_'),
     'StippleTransfer': (Transfer, 'STIPPLE_TRANSFER_'),
     'StippleFitModel': (FitModel, 'STIPPLE_FIT_'),
+    'StippleKeyFrameBlend': (KeyFrameBlend, 'STIPPLE_BLEND_KEYS_'),
     'StippleFitQuality': (FitQuality, 'STIPPLE_FIT_'),
     'StippleSplatQuantity': (SplatQuantity, 'STIPPLE_QUANTITY_'),
     'StippleFitBackground': (FitBackground, 'STIPPLE_FIT_BACKGROUND_'),

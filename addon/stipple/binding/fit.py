@@ -66,7 +66,9 @@ def _fit_option(library, index):
     info = StippleFitOptionInfo()
     check(library, library.stipple_fit_option_info(index, byref(info)))
     choices = info.choices_utf8.decode()
-    presets = [None if text is None else text.decode() for text in (*info.presets_utf8, *info.motion_presets_utf8)]
+    presets = [None if text is None else text.decode()
+               for text in (*info.presets_utf8, *info.motion_presets_utf8, *info.scaffold_presets_utf8,
+                            *info.relay_presets_utf8)]
     qualities = len(FitQuality)
     return FitOption(info.name_utf8.decode(), FitOptionKind(info.kind), info.help_utf8.decode(),
                      _models_of(info.models), _models_of(info.fixed_models),

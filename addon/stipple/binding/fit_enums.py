@@ -8,6 +8,8 @@ class FitModel(IntEnum):
     EXPLICIT = 0
     FIELD = 1
     MOTION = 2
+    SCAFFOLD = 3
+    RELAY = 4
 
 
 class FitQuality(IntEnum):
@@ -20,6 +22,12 @@ class FitBackground(IntEnum):
     BLACK = 0
     WHITE = 1
     RANDOM = 2
+
+
+class KeyFrameBlend(IntEnum):
+    LEARNED = 0
+    LINEAR = 1
+    NONE = 2
 
 
 class FitShell(IntEnum):

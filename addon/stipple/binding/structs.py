@@ -443,7 +443,8 @@ class StippleFitOptions(_Sized):
                 ('holdout', c_uint32), ('resume', c_uint32), ('seed', c_uint64), ('ssim_share', c_double),
                 ('image_bytes', c_uint64), ('measure_interval', c_uint64), ('checkpoint_path_utf8', c_char_p),
                 ('checkpoint_interval', c_uint64), ('checkpoint_seconds', c_double), ('max_bytes', c_uint64),
-                ('shell', c_uint32), ('coarse_to_fine', c_uint32)]
+                ('shell', c_uint32), ('coarse_to_fine', c_uint32), ('key_frame_spacing', c_double),
+                ('key_frame_blend', c_uint32), ('growth_by_level', c_uint32)]
 
 
 class StippleRigSearchOptions(_Sized):
@@ -462,7 +463,8 @@ class StippleFitOptionInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('kind', c_uint32), ('models', c_uint32), ('fixed_models', c_uint32),
                 ('name_utf8', c_char_p), ('help_utf8', c_char_p), ('choices_utf8', c_char_p), ('minimum', c_double),
                 ('maximum', c_double), ('default_utf8', c_char_p), ('presets_utf8', c_char_p * 6),
-                ('aliases_utf8', c_char_p * 3), ('alias_units', c_double * 3), ('motion_presets_utf8', c_char_p * 3)]
+                ('aliases_utf8', c_char_p * 3), ('alias_units', c_double * 3), ('motion_presets_utf8', c_char_p * 3),
+                ('scaffold_presets_utf8', c_char_p * 3), ('relay_presets_utf8', c_char_p * 3)]
 
 
 class StippleFitFigures(_Sized):

@@ -84,6 +84,7 @@ class STIPPLE_OT_splats_fit(ViewsFirst, JobOperator, bpy.types.Operator):
             now = sources.model(result.path).decode(sources.decode_settings(stipple, scene=context.scene)).read()
             now.seen = result.splats.seen
             sync.write_decoded(obj.data, now)
+        fit_proposal.remember_key_frames(obj, result.key_frames)
         report = fit_reports.keep(obj.data, obj.name, result.report)
         if bpy.app.background:
             fit_proposal.accept(context, obj, hide_source=False)

@@ -167,6 +167,8 @@ def _draw_budget(self, context):
     if frame_budgets.is_animated(data):
         column.operator('stipple.decode_budgets', icon='RENDER_ANIMATION')
     _draw_decoding(column, data)
+    if known.most_budget:
+        column.label(text=f"{known.most_budget:,} at most", icon='BLANK1')
     if known.is_learned:
         chosen = (stipple.anchors, stipple.anchors_render or stipple.anchors)
         used = [sources.detailed(count, stipple) for count in chosen]

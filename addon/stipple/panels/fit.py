@@ -5,7 +5,7 @@ import bpy
 
 from ..binding.errors import StippleError
 from ..operators import show_report
-from ..scene.fit import fit_proposal, fitting, strategies, view_pace, view_task
+from ..scene.fit import fit_proposal, fitting, series, strategies, view_pace, view_task
 from ..scene.source import splat_data
 from .text import draw_text
 
@@ -68,7 +68,9 @@ class STIPPLE_PT_fit_advanced(_FitPanel, bpy.types.Panel):
         if settings.model == 'FIELD':
             _draw_switch(layout, settings, 'density_gradient')
             layout.prop(settings, 'shell')
-        else:
+        elif settings.model == 'RELAY':
+            layout.prop(settings, 'key_frame_spacing')
+        elif settings.model != 'SCAFFOLD':
             _draw_strategy(layout, context, settings)
         layout.prop(settings, 'seed')
         layout.prop(settings, 'report')
@@ -119,7 +121,7 @@ def _draw_views(layout, context, settings):
         layout.prop(settings, 'dataset')
         layout.prop(settings, 'up_axis')
         layout.prop(settings, 'downscale')
-        if settings.model == 'MOTION':
+        if settings.model in series.MOVING_MODELS:
             _draw_series(layout, settings)
         row = layout.row()
         row.enabled = bool(settings.dataset)
@@ -129,8 +131,8 @@ def _draw_views(layout, context, settings):
         return
     if settings.views_from == 'RIG':
         layout.prop(settings, 'rig')
-        layout.prop(settings, 'view_count', text="Cameras" if settings.model == 'MOTION' else "Count")
-    if settings.model == 'MOTION':
+        layout.prop(settings, 'view_count', text="Cameras" if settings.model in series.MOVING_MODELS else "Count")
+    if settings.model in series.MOVING_MODELS:
         _draw_times(layout, context, settings)
     layout.prop(settings, 'view_size')
     layout.prop(settings, 'engine')

@@ -37,7 +37,7 @@ void requireVisibility(std::span<const float> visibility, size_t leaf_count);
 std::vector<uint32_t> numberNodes(const std::vector<Merge>& merges,
                                   const std::vector<uint32_t>& order, TreeShape& shape);
 
-/// Rows of a column in another order: row i is what row from[i] was.
+/// Some rows of a column, in another order: row i is what row from[i] was.
 void gatherRows(std::vector<float>& values, size_t stride, const std::vector<uint32_t>& from);
 
 /// Ids of the nodes of a cut, ascending. In: budget 1..N. Errors: kInvalidArgument.

@@ -658,7 +658,9 @@ typedef enum StippleModelKind {
   STIPPLE_MODEL_HIERARCHY = 1, /* of a cloud: its merge tree; any budget up to its count */
   STIPPLE_MODEL_FIELD = 2,    /* learned from views: density and a field of attributes */
   STIPPLE_MODEL_LATENT = 3,   /* generated: a latent that two networks turn into a density and splats */
-  STIPPLE_MODEL_MOTION = 4    /* splats that move; always all of them, at any time of their clip */
+  STIPPLE_MODEL_MOTION = 4,   /* splats that move; always all of them, at any time of their clip */
+  STIPPLE_MODEL_SCAFFOLD = 5, /* anchors in the order of their worth, and networks that make splats of them */
+  STIPPLE_MODEL_RELAY = 6     /* such anchors at key frames of a long clip: any time of it */
 } StippleModelKind;
 
 typedef struct StippleModelInfo {
@@ -1975,7 +1977,9 @@ StippleStatus stipple_image_loss(StippleContext* context, uint32_t width, uint32
 typedef enum StippleFitModel {
   STIPPLE_FIT_EXPLICIT = 0, /* splats with parameters of their own; a strategy adds and removes them */
   STIPPLE_FIT_FIELD = 1,    /* a learned density and a field of attributes: decodes at any budget */
-  STIPPLE_FIT_MOTION = 2    /* explicit splats that move, of views with times: decodes at any time */
+  STIPPLE_FIT_MOTION = 2,   /* explicit splats that move, of views with times: decodes at any time */
+  STIPPLE_FIT_SCAFFOLD = 3, /* anchors with features that networks turn into splats: decodes at any budget */
+  STIPPLE_FIT_RELAY = 4     /* the same at key frames of a long clip, of views with times */
 } StippleFitModel;
 
 typedef enum StippleFitQuality {
@@ -2000,24 +2004,33 @@ typedef enum StippleFitShell {
   STIPPLE_FIT_SHELL_OFF = 2
 } StippleFitShell;
 
+/* How two key frames share the time between them. */
+typedef enum StippleKeyFrameBlend {
+  STIPPLE_BLEND_KEYS_LEARNED = 0, /* by what is learned of each anchor */
+  STIPPLE_BLEND_KEYS_LINEAR = 1,
+  STIPPLE_BLEND_KEYS_NONE = 2     /* the nearer one is shown alone */
+} StippleKeyFrameBlend;
+
 typedef struct StippleFitOptions {
   uint32_t struct_size;
   uint32_t model;              /* StippleFitModel, default explicit */
   const char* strategy_utf8;   /* how splats are added and removed: a strategy that stipple_strategy_info lists,
                                   with its settings, and parts beside or instead of its own:
                                   "adaptive(threshold=0.0003)+long_axis_split". NULL, the default:
-                                  "adaptive", of motion "temporal"; of a field, as density_gradient says. Presets of explicit splats set
-                                  it: "adaptive" where fast, else "improved" */
+                                  "adaptive", of motion "temporal"; of a field, as density_gradient says; a scaffold
+                                  and a relay have none. Presets of explicit splats set it: "adaptive" where fast, else
+                                  "improved" */
   uint64_t iterations;         /* 1..10,000,000; schedules scale with it */
   uint64_t max_splats;         /* explicit and motion: hard cap, 1..2^28 */
-  uint64_t start_splats;       /* explicit and motion; 0, the default: all known points and, of photographs,
-                                  at least 30,000 */
+  uint64_t start_splats;       /* explicit and motion, of a scaffold anchors; 0, the default: all known points and,
+                                  of photographs, at least 30,000 */
   uint64_t min_anchors;      /* field: the budgets of training, from min_anchors to max_anchors,
                                 1..STIPPLE_MAX_ANCHORS; default 1,024 to what the quality says: 8,192, 16,384 or
-                                32,768 */
+                                32,768; scaffold: there are never more than max_anchors: 5,000, 15,000 or
+                                50,000 */
   uint64_t max_anchors;
-  uint32_t gaussians_per_anchor; /* field: 4, the default, to 32. At an equal number of splats fewer per anchor
-                                  are better and cost more: anchors are what the network works for */
+  uint32_t gaussians_per_anchor; /* field: 4, the default, to 32; scaffold: 10, the default. At an equal number of splats
+                                  fewer per anchor are better and cost more: anchors are what the network works for */
   uint32_t sh_degree;          /* 0..4; 0: colour does not depend on the view */
   uint32_t antialias;          /* StippleAntialias that the splats are made for */
   uint32_t background;         /* StippleFitBackground, default random */
@@ -2039,6 +2052,9 @@ typedef struct StippleFitOptions {
                                   max_splats and image_bytes as far as needed */
   uint32_t shell;              /* field: StippleFitShell, default auto */
   uint32_t coarse_to_fine;     /* explicit: 1: the first steps look at large images with fewer pixels; presets set it */
+  double key_frame_spacing;    /* relay: seconds between key frames, default 1 */
+  uint32_t key_frame_blend;    /* relay: StippleKeyFrameBlend, default learned */
+  uint32_t growth_by_level;    /* relay: 1, the default: anchors grow late where their features are varied */
 } StippleFitOptions;
 void stipple_fit_options_init(StippleFitOptions* options);
 /* Sets model, iterations, counts, degree and antialias as a user's choice of quality asks for; the others stay.
@@ -2081,6 +2097,8 @@ typedef struct StippleFitOptionInfo {
   const char* aliases_utf8[3]; /* other names in settings and flags, former ones too; "" where there is none */
   double alias_units[3];       /* how much 1 is under each: 1048576 of "image_memory" */
   const char* motion_presets_utf8[3]; /* as presets_utf8, of STIPPLE_FIT_MOTION: [StippleFitQuality] */
+  const char* scaffold_presets_utf8[3]; /* the same of STIPPLE_FIT_SCAFFOLD */
+  const char* relay_presets_utf8[3];    /* and of STIPPLE_FIT_RELAY */
 } StippleFitOptionInfo;
 StippleStatus stipple_fit_option_count(uint64_t* count);
 /* index 0..count-1, in the order in which settings have them. */

@@ -14,6 +14,8 @@ constexpr char kAssetHierarchy[] = "hierarchy";
 constexpr char kAssetField[] = "field";
 constexpr char kAssetLatent[] = "latent";
 constexpr char kAssetMotion[] = "motion";
+constexpr char kAssetScaffold[] = "scaffold";
+constexpr char kAssetRelay[] = "relay";
 constexpr char kAssetCheckpoint[] = "checkpoint";
 
 /// Text of the metadata. Errors: kFormat where it is missing.

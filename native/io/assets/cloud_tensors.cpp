@@ -2,32 +2,19 @@
 
 #include "base/error.h"
 #include "io/assets/asset_header.h"
-#include "io/splats/ply/ply_file.h"
+#include "io/assets/network_tensors.h"
 
 namespace stipple {
 
-namespace {
-
-constexpr char kMip[] = "mip";
-constexpr char kClassic[] = "classic";
-
-}  // namespace
-
 void setCloudFlags(SafeTensorsWriter& file, const SplatCloud& cloud) {
-  const bool display = cloud.colour_space == ColourSpace::kDisplay;
-  file.setMetadata("colour_space", display ? kColourSpaceDisplay : kColourSpaceLinear);
-  file.setMetadata("antialias", cloud.antialias == Antialias::kMip ? kMip : kClassic);
+  setSplatFlags(file, cloud.colour_space, cloud.antialias);
   file.setMetadata("frame", frameName(cloud.frame));
   file.setMetadata("sh_degree", std::to_string(cloud.sh_degree));
 }
 
 SplatCloud readCloudFlags(const SafeTensorsReader& file) {
   SplatCloud flags;
-  flags.colour_space = isFirstText(file, "colour_space", kColourSpaceDisplay, kColourSpaceLinear)
-                           ? ColourSpace::kDisplay
-                           : ColourSpace::kLinear;
-  flags.antialias =
-      isFirstText(file, "antialias", kMip, kClassic) ? Antialias::kMip : Antialias::kClassic;
+  readSplatFlags(file, flags.colour_space, flags.antialias);
   const std::string& frame = requireText(file, "frame");
   const auto known = frameFromName(frame);
   if (!known) {

@@ -1,9 +1,7 @@
 #include "io/assets/field_asset.h"
 
-#include <cmath>
-
 #include "base/error.h"
-#include "io/splats/ply/ply_file.h"
+#include "io/assets/network_tensors.h"
 
 namespace stipple {
 
@@ -12,29 +10,13 @@ namespace {
 constexpr char kStem[] = "field.";
 constexpr uint64_t kMostAnchors = uint64_t{1} << 28;
 
-bool isFieldTensor(const std::string& name) {
-  return name.rfind(kStem, 0) == 0;
-}
-
 void validateAsset(const FieldAsset& asset, const std::string& name, ErrorCode code) {
   validateOctree(asset, name, code);
   if (asset.least_anchors < 1 || asset.least_anchors > asset.most_anchors) {
     fail(code, name + " has budgets " + std::to_string(asset.least_anchors) + " to " +
                    std::to_string(asset.most_anchors) + "; at least 1, ascending, is needed");
   }
-  if (asset.tensors.empty()) fail(code, name + " has no tensors of a field; they are needed");
-  for (const auto& [tensor_name, tensor] : asset.tensors) {
-    const auto* values = std::get_if<std::vector<float>>(&tensor.values);
-    if (!isFieldTensor(tensor_name) || values == nullptr) {
-      fail(code, name + ": tensor " + tensor_name +
-                     " is not one of a field; names begin with 'field.', values are float32");
-    }
-    for (const float value : *values) {
-      if (std::isfinite(value)) continue;
-      fail(code, name + ": tensor " + tensor_name + " holds " + std::to_string(value) +
-                     "; every value must be a finite number");
-    }
-  }
+  requireNetworkTensors(asset.tensors, kStem, name, code);
 }
 
 }  // namespace
@@ -43,9 +25,7 @@ void writeFieldAsset(const FieldAsset& asset, const std::string& path) {
   validateAsset(asset, "asset", ErrorCode::kInvalidArgument);
   SafeTensorsWriter file;
   setAssetKind(file, kAssetField);
-  const bool display = asset.colour_space == ColourSpace::kDisplay;
-  file.setMetadata("colour_space", display ? kColourSpaceDisplay : kColourSpaceLinear);
-  file.setMetadata("antialias", asset.antialias == Antialias::kMip ? "mip" : "classic");
+  setSplatFlags(file, asset.colour_space, asset.antialias);
   file.setMetadata("frame", "right-handed, z up, metres");
   file.setMetadata("field_level", std::to_string(asset.field_level));
   file.setMetadata("K", std::to_string(asset.gaussians));
@@ -70,11 +50,7 @@ FieldAsset readFieldAsset(const std::string& path) {
   requireAssetKind(file, kAssetField);
   FieldAsset asset;
   static_cast<OctreeTensors&>(asset) = readOctree(file);
-  asset.colour_space = isFirstText(file, "colour_space", kColourSpaceDisplay, kColourSpaceLinear)
-                           ? ColourSpace::kDisplay
-                           : ColourSpace::kLinear;
-  asset.antialias =
-      isFirstText(file, "antialias", "mip", "classic") ? Antialias::kMip : Antialias::kClassic;
+  readSplatFlags(file, asset.colour_space, asset.antialias);
   asset.jitter = isFirstText(file, "jitter", "leaf", "none");
   // Files of fields that learned with independent draws do not have it.
   asset.nested = file.metadata().contains("draws") && isFirstText(file, "draws", "nested", "any");
@@ -86,9 +62,7 @@ FieldAsset readFieldAsset(const std::string& path) {
   asset.sh_degree = static_cast<int>(requireWhole(file, "sh_degree", 0, kMaxShDegree));
   asset.least_anchors = requireWhole(file, "least_anchors", 1, kMostAnchors);
   asset.most_anchors = requireWhole(file, "most_anchors", asset.least_anchors, kMostAnchors);
-  for (const auto& [name, tensor] : file.tensors()) {
-    if (isFieldTensor(name)) asset.tensors[name] = file.readTensor(name);
-  }
+  asset.tensors = readNetworkTensors(file, kStem);
   asset.settings_json = requireText(file, "settings");
   asset.extras = readAssetExtras(file);
   validateAsset(asset, path, ErrorCode::kFormat);

@@ -18,6 +18,7 @@
 #include "density/contribution_normalisation.h"
 #include "density/learned_density.h"
 #include "train/loop/field_state.h"
+#include "train/loop/view_step.h"
 #include "train/optimiser/field_regularisers.h"
 #include "train/optimiser/sparse_adam.h"
 
@@ -222,28 +223,9 @@ class FieldModel final : public FitModel {
       anchors = drawAnchors(moment, learns_density, is_own);
       FieldDecoder(state_.field).forward(anchors, tape_, cloud_);
     }
-    report.splat_count = cloud_.size();
-    {
-      const TimedBlock watch(report.seconds.render);
-      RenderOptions options;
-      options.with_depth = false;
-      options.with_background = true;
-      std::copy_n(view.background, 3, options.background);
-      pass_->forward(cloud_, *view.camera, options, progress);
-    }
-    {
-      const TimedBlock watch(report.seconds.backward);
-      StatisticRequest request;
-      request.contributions = learns_density;
-      const size_t pixel_count = size_t{view.camera->width} * view.camera->height;
-      const ImageLossValue loss = pass_->loss(
-          {view.target, pixel_count * 3}, {view.weights, view.weights ? pixel_count : size_t{0}},
-          lossFor(request, options_.ssim_share));
-      report.loss = loss.loss;
-      report.l1 = loss.l1;
-      report.ssim = loss.ssim;
-      pass_->backward(request, 0.0, progress);
-    }
+    StatisticRequest request;
+    request.contributions = learns_density;
+    passOverView(*pass_, cloud_, view, request, options_.ssim_share, progress, report);
     {
       const TimedBlock watch(report.seconds.field);
       fieldGradients(anchors, report);
@@ -283,7 +265,7 @@ class FieldModel final : public FitModel {
     is_own = unitDouble(mixBits(bits)) < start_.own_draws;
     if (!is_own) sampling.seed = bits;
     return is_own || !learns_density ? drawSettled(state_.density, sampling, draws())
-                                  : drawLearned(state_.density, sampling, draws());
+                                     : drawLearned(state_.density, sampling, draws());
   }
 
   void fieldGradients(const AnchorSet& anchors, StepReport& report) {

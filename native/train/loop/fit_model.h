@@ -15,6 +15,8 @@
 
 namespace stipple {
 
+class FitViewEvaluator;
+
 /// Where the seconds of one iteration went.
 struct StepSeconds {
   double render = 0;
@@ -32,7 +34,8 @@ struct StepReport {
   double ssim = 1;
   uint64_t splat_count = 0;  ///< drawn in this step
   StepSeconds seconds;
-  const char* stage = "";  ///< for the progress bar: "Density", "Attributes", "Joint", "Splats"
+  const char* stage =
+      "";  ///< for the progress bar: "Density", "Attributes", "Joint", "Splats", "Anchors"
 };
 
 /// A view of the step: its picture is composited over the background already.
@@ -53,7 +56,7 @@ class FitModel {
  public:
   virtual ~FitModel() = default;
 
-  /// "explicit", "field" or "motion".
+  /// "explicit", "field", "motion", "scaffold" or "relay".
   virtual const char* name() const = 0;
 
   /// One iteration. views draws other views for strategies that sweep.
@@ -63,6 +66,12 @@ class FitModel {
   /// Whether the step of this moment ends with opacities lowered for what comes after: then the
   /// splats look like fog for some steps.
   virtual bool lowersOpacitiesAt(const FitMoment&) const { return false; }
+
+  /// The view of an iteration, as ViewEvaluator counts them, of a model that learns from some views
+  /// at a time; empty: the trainer's own order.
+  virtual std::optional<size_t> viewAt(uint64_t /*iteration*/) const { return {}; }
+  /// Whether the state after the last step is the result, whatever was measured in between.
+  virtual bool isWholeAtItsEndOnly() const { return false; }
 
   /// The splats at a budget (of a field: its anchors); 0: all that there are, or the largest budget
   /// that was trained. A model of one size gives that, whatever is asked. Of splats that move: as
@@ -77,6 +86,10 @@ class FitModel {
   virtual SplatQuantities seen() const { return {}; }
   /// Entropy of the density, nats; not of models without one.
   virtual std::optional<double> densityEntropy() const { return {}; }
+
+  /// Called once when all steps are taken, of the state that is the result, before its budgets are
+  /// measured. views: draws splats(0).
+  virtual void finish(FitViewEvaluator& /*views*/) {}
 
   /// Everything that goes on from here, bit for bit, needs. Errors of restore: kFormat.
   virtual TensorTable state() const = 0;

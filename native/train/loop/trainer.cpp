@@ -151,6 +151,7 @@ FitMoment Trainer::momentOf(uint64_t iteration) const {
 /// Where the step before lowered opacities, splats look like fog: they are measured before it.
 bool Trainer::measureIsDue() const {
   if (iteration_ == options_.iterations) return true;
+  if (model_->isWholeAtItsEndOnly()) return false;
   const uint64_t interval = measureInterval();
   const auto lowers = [this](uint64_t at) { return model_->lowersOpacitiesAt(momentOf(at)); };
   if (iteration_ % interval == 0) return !lowers(iteration_);
@@ -195,11 +196,16 @@ double Trainer::stepsLeft(uint64_t iteration) const {
   return iteration > 0 ? left / costAt(iteration) : left;
 }
 
+/// In: iterations that are done before it.
+size_t Trainer::viewOf(uint64_t iteration) {
+  return model_->viewAt(iteration).value_or(order_.at(iteration));
+}
+
 void Trainer::step(Pace& pace) {
   const Stopwatch watch;
   FitMoment moment = momentOf(iteration_ + 1);
   StepView view;
-  view.index = order_.at(iteration_);
+  view.index = viewOf(iteration_);
   const size_t source_view = split_.training[view.index];
   view.camera = &pictures_.views().camera(source_view);
   view.time = moment.time = pictures_.views().time(source_view);
@@ -207,7 +213,7 @@ void Trainer::step(Pace& pace) {
   pictures_.load(source_view, view.background, target_);
   if (target_.alpha.empty()) backgroundOf(0, view.background);
   if (moment.iteration < options_.iterations) {
-    pictures_.prefetch(split_.training[order_.at(moment.iteration)]);
+    pictures_.prefetch(split_.training[viewOf(moment.iteration)]);
   }
   Camera camera = *view.camera;
   reduction_ = reductionAt(moment.iteration, uint64_t{target_.width} * target_.height);
@@ -375,6 +381,7 @@ FitEnd Trainer::run(FitObserver& observer, Progress* progress) {
     }
     keepBest();
     if (!error && iteration_ > 0) {
+      model_->finish(*evaluator_);
       measureBudgets();
       seen_ = look(kContributionViews);
     }

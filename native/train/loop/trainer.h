@@ -123,6 +123,7 @@ class Trainer {
  private:
   struct Pace;
 
+  size_t viewOf(uint64_t iteration);
   void step(Pace& pace);
   FitMoment momentOf(uint64_t iteration) const;
   bool measureIsDue() const;

@@ -150,6 +150,23 @@ def motion(name, *more):
            'settings': '{"seed": 42, "time": {"begin": 0.5, "end": 2.5}}', 'provenance': 'written by hand'}, tensors)
 
 
+def scaffold():
+    anchors, gaussians, degree = 3, 2, 1
+    tensors = {'scaffold.positions': f32(numbers(anchors, 3, 1)), 'scaffold.features': f32(numbers(anchors, 32, 2)),
+               'scaffold.log_scales': f32(numbers(anchors, 6, 3)),
+               'scaffold.offsets': f32(numbers(anchors, 3 * gaussians, 4)),
+               'future.labels': ('I16', numpy.array([[1, -2], [300, 4]], '<i2'))}
+    for number, (name, outputs) in enumerate((('opacity', gaussians), ('covariance', 7 * gaussians),
+                                              ('colour', 3 * (degree + 1)**2 * gaussians))):
+        for layer, (inputs, width) in enumerate(((32, 32), (32, outputs))):
+            tensors[f'scaffold.{name}.layer{layer}.weights'] = f32(numbers(inputs, width, number - 48))
+            tensors[f'scaffold.{name}.layer{layer}.biases'] = f32(numbers(width, 1, layer)[:, 0])
+    write('scaffold_1.0.stipple.safetensors',
+          {'stipple_version': '1.0', 'kind': 'scaffold', 'colour_space': 'srgb_rec709_display', 'antialias': 'mip',
+           'frame': 'right-handed, z up, metres', 'K': str(gaussians), 'sh_degree': str(degree),
+           'settings': '{"seed": 42}', 'provenance': 'written by hand'}, tensors)
+
+
 if __name__ == '__main__':
     surface()
     hierarchy()
@@ -160,3 +177,4 @@ if __name__ == '__main__':
     motion('motion_tree', moving('motion', 3, 1, 1), moving('tree.nodes', 2, 1, 101),
            {'tree.parents': ('U32', numpy.array([2**32 - 1, 0, 0, 1, 1], '<u4')),
             'tree.errors': f32(numpy.array([0.75, 0.5], '<f4'))})
+    scaffold()

@@ -65,7 +65,8 @@ TEST(FitOptionTable, DefaultsAndPresetsAreInRange) {
     SCOPED_TRACE(option.name);
     requireInRange(option, option.member.get(defaultFitOptions()), option.name);
   }
-  for (const FitKind model : {FitKind::kExplicit, FitKind::kField, FitKind::kMotion}) {
+  for (const FitKind model : {FitKind::kExplicit, FitKind::kField, FitKind::kMotion,
+                              FitKind::kScaffold, FitKind::kRelay}) {
     for (const FitQuality quality :
          {FitQuality::kFast, FitQuality::kBalanced, FitQuality::kFineDetail}) {
       FitOptions options = defaultFitOptions();

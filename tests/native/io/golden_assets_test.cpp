@@ -9,6 +9,7 @@
 #include "io/assets/hierarchy_asset.h"
 #include "io/assets/latent_asset.h"
 #include "io/assets/motion_asset.h"
+#include "io/assets/scaffold_asset.h"
 #include "io/assets/surface_asset.h"
 #include "scratch_folder.h"
 
@@ -209,6 +210,28 @@ TEST_F(GoldenAssets, ReadsMovingSplatsWithATreeAndKeepsAllOfThem) {
     EXPECT_EQ(asset.errors, (std::vector<float>{0.75f, 0.5f}));
     writeMotionAsset(asset, path("again"));
     asset = readMotionAsset(path("again"));
+  }
+}
+
+TEST_F(GoldenAssets, ReadsAnchorsWithFeaturesOfVersion1AndKeepsAllOfThem) {
+  ScaffoldAsset asset = readScaffoldAsset(golden("scaffold_1.0"));
+  for (int time = 0; time < 2; ++time) {
+    EXPECT_EQ(asset.gaussians, 2u);
+    EXPECT_EQ(asset.sh_degree, 1);
+    EXPECT_EQ(asset.colour_space, ColourSpace::kDisplay);
+    EXPECT_EQ(asset.antialias, Antialias::kMip);
+    const auto valuesOf = [&](const char* name) {
+      return std::get<std::vector<float>>(asset.tensors.at(name).values);
+    };
+    EXPECT_EQ(valuesOf("scaffold.positions"), numbers(3, 3, 1));
+    EXPECT_EQ(valuesOf("scaffold.features"), numbers(3, 32, 2));
+    EXPECT_EQ(valuesOf("scaffold.log_scales"), numbers(3, 6, 3));
+    EXPECT_EQ(valuesOf("scaffold.offsets"), numbers(3, 6, 4));
+    EXPECT_EQ(valuesOf("scaffold.colour.layer1.weights"), numbers(32, 24, -46));
+    EXPECT_EQ(asset.tensors.size(), 4u + 3 * 4);
+    expectExtras(asset.extras);
+    writeScaffoldAsset(asset, path("again"));
+    asset = readScaffoldAsset(path("again"));
   }
 }
 

@@ -20,6 +20,8 @@ TEST_F(ModelKinds, HaveTheNumbersOfTheHeader) {
   EXPECT_EQ(modelKind("field").number, static_cast<uint32_t>(STIPPLE_MODEL_FIELD));
   EXPECT_EQ(modelKind("latent").number, static_cast<uint32_t>(STIPPLE_MODEL_LATENT));
   EXPECT_EQ(modelKind("motion").number, static_cast<uint32_t>(STIPPLE_MODEL_MOTION));
+  EXPECT_EQ(modelKind("scaffold").number, static_cast<uint32_t>(STIPPLE_MODEL_SCAFFOLD));
+  EXPECT_EQ(modelKind("relay").number, static_cast<uint32_t>(STIPPLE_MODEL_RELAY));
 }
 
 TEST_F(ModelKinds, HaveNamesAndNumbersOfTheirOwn) {
@@ -47,7 +49,7 @@ TEST_F(ModelKinds, ThatNobodyKnowsAreRefusedWithThoseThatCanBeRead) {
   setAssetKind(file, "later");
   file.write(path("later"));
   expectError(ErrorCode::kUnsupported,
-              {"'later'", "'surface', 'hierarchy', 'field', 'latent', 'motion'"},
+              {"'later'", "'surface', 'hierarchy', 'field', 'latent', 'motion', 'scaffold', 'relay'"},
               [&] { loadModel(path("later")); });
 }
 

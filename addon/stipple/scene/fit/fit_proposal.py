@@ -9,6 +9,8 @@ import bpy
 # Names of the objects that the splats were fitted to and that were visible then, one a line.
 SOURCES_KEY = 'stipple_fit_sources'
 PROPOSED_KEY = 'stipple_fit_proposed'
+# Frames of the scene at which the key frames of a long shot stand, until it is accepted.
+KEY_FRAMES_KEY = 'stipple_fit_key_frames'
 
 
 def new_object(context, obj, names, matrix):
@@ -26,6 +28,12 @@ def visible_names(objects):
 def propose(obj):
     """Lets a fit's object wait for a decision."""
     obj[PROPOSED_KEY] = 1 + max((_made_at(other) for other in bpy.data.objects if PROPOSED_KEY in other), default=0)
+
+
+def remember_key_frames(obj, frames):
+    """Of a long shot: they become markers of the timeline when it is accepted."""
+    if frames:
+        obj[KEY_FRAMES_KEY] = list(frames)
 
 
 def find(context):
@@ -66,7 +74,9 @@ def accept(context, obj, hide_source):
             source.select_set(False)
             source.hide_render = True
     obj.hide_set(False)
-    for key in (PROPOSED_KEY, SOURCES_KEY):
+    for number, frame in enumerate(obj.get(KEY_FRAMES_KEY, ()), 1):
+        context.scene.timeline_markers.new(f'{obj.name} {number}', frame=round(frame))
+    for key in (PROPOSED_KEY, SOURCES_KEY, KEY_FRAMES_KEY):
         if key in obj:
             del obj[key]
     obj.select_set(True)

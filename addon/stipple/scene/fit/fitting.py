@@ -15,14 +15,17 @@ from ...binding.fit import Fit, check_places, fit_options
 from ...binding.model import DecodeSettings, Model
 from ...binding.structs import FitModel, FitQuality, FitShell, JobState
 from .. import meshes
-from . import fit_proposal, fit_reports, strategies, view_task, view_times
+from . import fit_proposal, fit_reports, series, strategies, view_task, view_times
 from ..sequence import frames
 from ..source import setting_paths, source_paths, sources
 from ..view import photo_cameras
 
 # What a native stage is called.
 _STAGES = {'Splats': 'Fitting splats', 'Density': 'Learning where surfaces are', 'Attributes': 'Learning attributes',
-           'Joint': 'Learning density and attributes'}
+           'Joint': 'Learning density and attributes', 'Anchors': 'Learning anchors', 'Key frames': 'Learning key frames',
+           'Windows': 'Learning what moves', 'Blending': 'Blending key frames'}
+# Models whose budgets count anchors; strategies do not concern them.
+_OF_ANCHORS = 'FIELD', 'SCAFFOLD', 'RELAY'
 
 
 @dataclass
@@ -56,6 +59,7 @@ class Result:
     settings: object    # StippleModelSettings of the asset
     report: object      # image of the fit's curves, [H,W,4]
     clip_start: object = None  # frame of the scene at which splats that move begin; None: they stand still
+    key_frames: tuple = ()     # of a long shot, frames of the scene
 
 
 _CHECKPOINT_SUFFIX = '.safetensors'
@@ -95,7 +99,7 @@ class FitTask(view_task.ViewTask):
     """cancel() while it fits ends with the best so far."""
 
     def __init__(self, context, objects, settings, path):
-        if settings.model != 'FIELD':
+        if settings.model not in _OF_ANCHORS:
             strategies.require(strategies.text_of(settings))
         _require_checkpoint(settings)
         super().__init__(context, objects, settings)
@@ -103,7 +107,9 @@ class FitTask(view_task.ViewTask):
         self.plan = plan_of(context, settings)
         self._path = path
         self._clip_start, self._clip_begin = None, 0.0
-        if settings.model == 'MOTION':
+        self._key_frames = ()
+        if settings.model in series.MOVING_MODELS:
+            self._frame_rate = context.scene.render.fps / context.scene.render.fps_base
             self._clip_start = context.scene.frame_start if self.plan is None else math.floor(self.plan.frames[0])
         self._frame = self._frame_of_views()
         state.__init__(name=self._name(), stage='Preparing', is_running=True,
@@ -152,17 +158,23 @@ class FitTask(view_task.ViewTask):
         chosen = {'density_gradient': int(settings.density_gradient), 'seed': settings.seed}
         if settings.model == 'FIELD':
             chosen['shell'] = FitShell[settings.shell]
-        else:
+        elif settings.model == 'RELAY':
+            chosen['key_frame_spacing'] = settings.key_frame_spacing
+        elif settings.model != 'SCAFFOLD':
             chosen.update(max_splats=settings.max_splats, strategy=strategies.text_of(settings))
         if self._clip_start is not None:
-            self._clip_begin = min((views.view_info(i).time for i in range(len(views))), default=0.0)
+            times = sorted({views.view_info(i).time for i in range(len(views))})
+            self._clip_begin = times[0] if times else 0.0
+            if settings.model == 'RELAY':
+                seconds = view_times.key_frame_seconds(times, settings.key_frame_spacing)
+                self._key_frames = tuple(self._clip_start + s * self._frame_rate for s in seconds)
         if not settings.view_dependent:
             chosen['sh_degree'] = 0
         checkpoint = _checkpoint_path(settings)
         resumes = settings.resume and has_checkpoint(settings)
         options = fit_options(self._native.library, FitModel[settings.model], FitQuality[settings.quality], checkpoint,
                               resume=int(resumes), **chosen)
-        if settings.model == 'FIELD':
+        if settings.model in _OF_ANCHORS:
             most = max(1, settings.max_splats // options.gaussians_per_anchor)
             options.max_anchors = min(options.max_anchors, most)
             options.min_anchors = min(options.min_anchors, options.max_anchors)
@@ -184,8 +196,8 @@ class FitTask(view_task.ViewTask):
                 self.job.wait()  # says why
             is_model = settings.model != 'EXPLICIT'
             made = self.job.model() if is_model else self.job.result()
-            # Rows of a field are drawn anew; of all others they stay.
-            seen = {} if settings.model == 'FIELD' else (self.job.result() if is_model else made).seen()
+            # Rows of anchors' splats are made anew; of all others they stay.
+            seen = {} if settings.model in _OF_ANCHORS else (self.job.result() if is_model else made).seen()
             report = self.job.draw_report(fit_reports.SCALE)
             if settings.report:
                 self.job.save_report(setting_paths.absolute(settings, 'report'))
@@ -214,7 +226,7 @@ class FitTask(view_task.ViewTask):
         path = sources.save_model(model, self._path or source_paths.place_for(state.name), bool(self._path))
         sources.remember_model(path, model)
         self.result = Result(state.name, model.decode(decoding).read(), path, decoding, model.settings(), report,
-                             self._clip_start)
+                             self._clip_start, self._key_frames)
         self.result.splats.seen = seen or {}
         state.kept_count = self.result.splats.count
 
@@ -228,7 +240,7 @@ def _seconds_left(figures, begun):
 def plan_of(context, settings):
     """The view_times.Plan of a fit's views, None for views at one time and for photographs, which have times of their
     own. Errors: StippleError that says what to change."""
-    if settings.model != 'MOTION' or settings.views_from == 'DATASET':
+    if settings.model not in series.MOVING_MODELS or settings.views_from == 'DATASET':
         return None
     count = settings.view_count if settings.views_from == 'RIG' else len(view_task.scene_cameras(context.scene))
     return view_times.plan(settings, context.scene, count)

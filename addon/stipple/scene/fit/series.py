@@ -3,11 +3,14 @@
 
 from ...binding.errors import invalid
 
+# Models of a fit that learn from views at several times.
+MOVING_MODELS = 'MOTION', 'RELAY'
+
 
 def options_of(settings):
     """Fields of StippleViewsOpenOptions of a fit's settings; none of a fit that knows no time. Errors: StippleError that
     says what to change."""
-    if settings.model != 'MOTION':
+    if settings.model not in MOVING_MODELS:
         return {}
     found = {'with_frames': 1, 'frame_rate': settings.series_rate, 'frame_step': settings.series_step,
              'max_images': settings.image_count}

@@ -103,6 +103,16 @@ def seconds_at(scene, frame, start):
     return (frame - start) * scene.render.fps_base / scene.render.fps
 
 
+def key_frame_seconds(times, spacing):
+    """Seconds from the first of these times, ascending, at which the key frames of a long shot stand: every so many
+    whole times, and none at the last alone."""
+    if len(times) < 2:
+        return (0.0,)
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    every = min(max(1, math.floor(spacing / step + 0.5)), len(times))
+    return tuple(i * step for i in range(0, len(times) - 1, every))
+
+
 def evenly(items, most):
     """At most so many of them, the first and the last one among them."""
     count = min(most, len(items))

@@ -165,7 +165,8 @@ def _check(obj):
     data = obj.data
     known = source_settings.of(data.stipple)
     if not known.takes_mask and data.library is None and not data.stipple.is_sequence:
-        made = 'decoded from a learned field' if known.is_learned else 'made from meshes'
+        made = ('decoded from a learned field' if known.is_learned else
+                'made by anchors' if known.most_budget else 'made from meshes')
         raise invalid(f"'{obj.name}' is {made}, so there are no splats of a file to hide; choose Use as New Source "
                       f"first, "
                       'which keeps the present ones.')

@@ -9,7 +9,7 @@ import json
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 
-from ...binding.structs import BudgetUnit
+from ...binding.structs import MAX_ANCHORS, BudgetUnit
 
 KINDS = (('NONE', "None", "The splats have no source"),
          ('MODEL', "Model", "The source decodes to splats at any budget"),
@@ -41,6 +41,7 @@ class SourceSettings:
     time_begin: float = 0.0      # seconds: from when
     time_end: float = 0.0        # and to when; both stand still outside
     least_budget: int = 1        # that it takes
+    most_budget: int = 0         # of anchors that there are; 0: any number is drawn
     has_smooth: bool = False     # budgets that move can make no splat jump
 
     @property
@@ -64,12 +65,14 @@ _TREE = SourceSettings(has_source=True, has_budget=True, counts_splats=True, has
 
 def of_model(settings):
     """In: settings, StippleModelSettings."""
+    counts_kept_anchors = settings.budget_unit == BudgetUnit.ANCHORS and settings.maximum_budget < MAX_ANCHORS
     return SourceSettings(
         True, True, settings.budget_unit == BudgetUnit.SPLATS, bool(settings.takes_mask), settings.default_budget,
         settings.minimum_learned_budget, settings.maximum_learned_budget, settings.minimum_gaussians_per_anchor,
         settings.maximum_gaussians_per_anchor, settings.default_gaussians_per_anchor, bool(settings.has_order),
         bool(settings.has_seed), bool(settings.has_time), settings.time_begin, settings.time_end,
-        settings.minimum_budget, bool(settings.has_smooth))
+        settings.minimum_budget,
+        settings.maximum_budget if counts_kept_anchors else 0, bool(settings.has_smooth))
 
 
 def of(stipple):

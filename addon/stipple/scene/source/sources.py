@@ -304,6 +304,7 @@ def decode_settings(stipple, mode='VIEWPORT', scene=None):
         budget = max(_tree_budget(stipple, mode), min(known.least_budget, visible_count(stipple)))
     else:
         budget = detailed((mode == 'RENDER' and stipple.anchors_render) or stipple.anchors, stipple)
+        budget = min(budget, known.most_budget or budget)
     return DecodeSettings(budget, gaussians_per_anchor(stipple),
                           AnchorOrder[stipple.order] if known.has_order else AnchorOrder.SYSTEMATIC,
                           stipple.seed if known.has_seed else 0, seconds(stipple, scene) if known.has_time else 0.0,

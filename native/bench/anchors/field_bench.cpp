@@ -12,8 +12,8 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "bench/anchors/ball_views.h"
 #include "bench/comparison.h"
-#include "data/views/memory_view_source.h"
 #include "decode/anchor_spacing.h"
 #include "decode/field/field_decoder.h"
 #include "density/learned_draws.h"
@@ -35,66 +35,19 @@ constexpr FieldCase kCases[] = {{"4k_256x256", 4096, 256}, {"16k_512x512", 16384
 constexpr uint32_t kGaussians = 4;
 constexpr int kSteps = 10;
 
-/// Points of a ball, as many as make an octree of some size, and one picture of another colour.
-class BallViews {
- public:
-  BallViews(size_t points, uint32_t size) : views_(ColourSpace::kDisplay) {
-    PointSet set;
-    for (size_t i = 0; i < points; ++i) {
-      double p[3];
-      double length = 0;
-      for (size_t a = 0; a < 3; ++a) {
-        p[a] = unitDouble(keyedBits(1, RandomUse::kFieldStart, 3 * i + a)) - 0.5;
-        length += p[a] * p[a];
-      }
-      for (const double value : p) {
-        set.positions.push_back(static_cast<float>(value / std::sqrt(length)));
-      }
-      set.opacities.push_back(1.0f);
-      set.colours.insert(set.colours.end(), 3, 0.5f);
-    }
-    views_.setPoints(set);
-    Camera camera;
-    camera.width = camera.height = size;
-    camera.fx = camera.fy = size;
-    camera.cx = camera.cy = 0.5 * size;
-    camera.world_to_camera(2, 3) = 3.0;
-    picture_.width = picture_.height = size;
-    picture_.colour.assign(size_t{3} * size * size, 0.3f);
-    views_.add(camera, picture_);
-  }
-
-  std::unique_ptr<FitModel> model(const FieldCase& c, int leaf_level) const {
-    FieldModelOptions options;
-    options.least_anchors = options.most_anchors = c.anchors;
-    options.gaussians_per_anchor = kGaussians;
-    options.leaf_level = leaf_level;
-    options.shell = ShellChoice::kOff;
-    const std::vector<size_t> training = {0};
-    return makeFieldModel(*cpuBackends(), views_, training, options);
-  }
-
-  StepReport step(FitModel& model, uint64_t iteration) const {
-    FitMoment moment;
-    moment.iteration = iteration;
-    moment.iterations = 2 * iteration;  // so always in the stage that does most
-    StepView view;
-    view.camera = &views_.camera(0);
-    view.target = picture_.colour.data();
-    return model.step(moment, view, nullptr, nullptr);
-  }
-
-  const MemoryViewSource& views() const { return views_; }
-  const ViewPicture& picture() const { return picture_; }
-
- private:
-  MemoryViewSource views_;
-  ViewPicture picture_;
-};
+std::unique_ptr<FitModel> modelOf(const BallViews& ball, const FieldCase& c, int leaf_level) {
+  FieldModelOptions options;
+  options.least_anchors = options.most_anchors = c.anchors;
+  options.gaussians_per_anchor = kGaussians;
+  options.leaf_level = leaf_level;
+  options.shell = ShellChoice::kOff;
+  const std::vector<size_t> training = {0};
+  return makeFieldModel(*cpuBackends(), ball.views(), training, options);
+}
 
 void steps(benchmark::State& state, const FieldCase& c) {
   const BallViews few(20000, c.size), many(600000, c.size);
-  const auto small = few.model(c, 7), large = many.model(c, 9);
+  const auto small = modelOf(few, c, 7), large = modelOf(many, c, 9);
   // The passes of explicit splats that look the same.
   const auto backend = makeCpuBackend();
   backend->upload(small->splats(c.anchors));
@@ -166,7 +119,7 @@ void growth(benchmark::State& state) {
   passes.fill(1e300);
   uint64_t iteration = 1000;
   for (size_t b = 0; b < kBudgets.size(); ++b) {
-    models.push_back(ball.model({"", kBudgets[b], 512}, 8));
+    models.push_back(modelOf(ball, {"", kBudgets[b], 512}, 8));
     ball.step(*models[b], iteration);
     pairs[b] = pairsOf(models[b]->splats(kBudgets[b]), ball.views().camera(0));
   }
@@ -199,7 +152,7 @@ void growth(benchmark::State& state) {
 /// The spread of a field's Gaussians against all pairs of its anchors.
 void spread(benchmark::State& state, uint64_t anchor_count) {
   const BallViews ball(20000, 64);
-  const auto model = ball.model({"", anchor_count, 64}, 8);
+  const auto model = modelOf(ball, {"", anchor_count, 64}, 8);
   const FieldResult result = *fieldResult(*model);
   AnchorSamplingOptions sampling;
   sampling.count = anchor_count;

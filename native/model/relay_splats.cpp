@@ -1,0 +1,193 @@
+#include "model/relay_splats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "io/assets/relay_asset.h"
+
+namespace stipple {
+
+namespace {
+
+/// The two that show a time, and the one that comes next.
+constexpr size_t kKeptKeyFrames = 3;
+
+ScaffoldShape shapeOf(const RelayAssetHead& head) {
+  return {head.gaussians, head.sh_degree, head.colour_space, head.antialias, 0};
+}
+
+KeyFrameClip clipOf(const RelayAssetHead& head) {
+  return {head.begin, head.frames_per_second, head.frame_count, head.spacing,
+          static_cast<KeyFrameBlend>(head.blend)};
+}
+
+/// Key frames of a file, of which a few are at hand.
+class StoredKeyFrames {
+ public:
+  StoredKeyFrames(std::shared_ptr<const RelayAsset> asset, std::string path)
+      : asset_(std::move(asset)), path_(std::move(path)) {}
+
+  std::shared_ptr<const KeyFrame> frame(uint32_t key) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const auto& [known, frame] : kept_) {
+      if (known == key) return frame;
+    }
+    try {
+      auto frame = std::make_shared<const KeyFrame>(
+          keyFrameOfTensors(asset_->key(key), "", shapeOf(asset_->head())));
+      if (frame->scaffold.size() != asset_->head().anchor_counts[key]) {
+        fail(ErrorCode::kFormat,
+             "key frame " + std::to_string(key) + " has " + std::to_string(frame->scaffold.size()) +
+                 " anchors; " + std::to_string(asset_->head().anchor_counts[key]) + " are needed");
+      }
+      kept_.emplace_back(key, frame);
+      if (kept_.size() > kKeptKeyFrames) kept_.pop_front();
+      return frame;
+    } catch (const Error& error) {
+      fail(error.code(), path_ + ": " + error.what());
+    }
+  }
+
+ private:
+  std::shared_ptr<const RelayAsset> asset_;
+  std::string path_;
+  mutable std::mutex mutex_;
+  mutable std::deque<std::pair<uint32_t, std::shared_ptr<const KeyFrame>>> kept_;
+};
+
+class RelayDecoder final : public Decoder {
+ public:
+  RelayDecoder(const RelayAssetHead& head, KeyFrameSource frames)
+      : clip_(clipOf(head)),
+        most_(mostAnchors(clip_, head.anchor_counts)),
+        gaussians_(head.gaussians),
+        numbers_(11 + shCoefficientCount(head.sh_degree) * 3),
+        frames_(std::move(frames)) {}
+
+  SplatCloud decode(const DecodeRequest& request) const override {
+    if (request.gaussians_per_anchor != gaussians_) {
+      fail(ErrorCode::kInvalidArgument,
+           "gaussians per anchor is " + std::to_string(request.gaussians_per_anchor) +
+               "; these anchors were learned with " + std::to_string(gaussians_));
+    }
+    advance(request.progress, 0.0, "Decoding splats");
+    return splatsOfClip(clip_, frames_, request.time, request.budget);
+  }
+
+  uint64_t memoryBound(uint64_t anchor_count, uint32_t gaussians_per_anchor) const override {
+    // Splats twice while two key frames are joined; what networks make of an anchor.
+    constexpr uint64_t kOfNetworks = 1200;
+    const uint64_t splats = 2 * gaussians_per_anchor * (numbers_ + 8);
+    return anchor_count * (splats + kOfNetworks) * sizeof(float) + (uint64_t{64} << 20);
+  }
+
+  uint64_t most() const { return most_; }
+  const KeyFrameClip& clip() const { return clip_; }
+  const KeyFrameSource& frames() const { return frames_; }
+
+ private:
+  KeyFrameClip clip_;
+  uint64_t most_;
+  uint32_t gaussians_;
+  uint64_t numbers_;
+  KeyFrameSource frames_;
+};
+
+class RelaySplats final : public SplatModel {
+ public:
+  RelaySplats(RelayAssetHead head, KeyFrameSource frames)
+      : head_(std::move(head)), decoder_(head_, std::move(frames)) {}
+
+  const char* kind() const override { return kAssetRelay; }
+
+  /// Bounds are those of the anchors of all key frames.
+  ModelInfo info() const override {
+    ModelInfo info;
+    for (const uint64_t count : head_.anchor_counts) info.leaf_count += count;
+    info.sh_degree = head_.sh_degree;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      info.bounds_min[axis] = static_cast<float>(head_.bounds[axis]);
+      info.bounds_max[axis] = static_cast<float>(head_.bounds[3 + axis]);
+    }
+    return info;
+  }
+
+  void save(const std::string& path) const override {
+    std::vector<TensorTable> keys;
+    for (uint32_t key = 0; key < head_.anchor_counts.size(); ++key) {
+      keys.push_back(tensorsOfKeyFrame(*decoder_.frames()(key), ""));
+    }
+    writeRelayAsset(head_, keys, path);
+  }
+
+ protected:
+  const Decoder& decoder() const override { return decoder_; }
+
+  void limit(ModelSettings& settings) const override {
+    settings.maximum_budget = settings.default_budget = decoder_.most();
+    settings.minimum_gaussians_per_anchor = head_.gaussians;
+    settings.maximum_gaussians_per_anchor = head_.gaussians;
+    settings.default_gaussians_per_anchor = head_.gaussians;
+    settings.time = TimeRange{decoder_.clip().begin, decoder_.clip().end()};
+  }
+
+ private:
+  RelayAssetHead head_;
+  RelayDecoder decoder_;
+};
+
+}  // namespace
+
+std::shared_ptr<const SplatModel> makeRelaySplats(
+    const KeyFrameClip& clip, std::vector<std::shared_ptr<const KeyFrame>> frames,
+    ModelNotes notes) {
+  validate(clip);
+  if (frames.size() != clip.keyCount()) {
+    fail(ErrorCode::kInvalidArgument, "there are " + std::to_string(frames.size()) +
+                                          " key frames; the clip needs " +
+                                          std::to_string(clip.keyCount()));
+  }
+  RelayAssetHead head;
+  head.begin = clip.begin;
+  head.frames_per_second = clip.frames_per_second;
+  head.frame_count = clip.frame_count;
+  head.spacing = clip.spacing;
+  head.blend = static_cast<uint32_t>(clip.blend);
+  const ScaffoldParameters& first = frames.front()->scaffold;
+  head.gaussians = first.gaussians;
+  head.sh_degree = first.sh_degree;
+  head.colour_space = first.colour_space;
+  head.antialias = first.antialias;
+  head.settings_json = std::move(notes.settings_json);
+  head.extras = std::move(notes.extras);
+  std::fill_n(head.bounds.begin(), 3, INFINITY);
+  std::fill_n(head.bounds.begin() + 3, 3, -INFINITY);
+  for (const auto& frame : frames) {
+    head.anchor_counts.push_back(frame->scaffold.size());
+    if (frame->scaffold.size() == 0) {
+      fail(ErrorCode::kInvalidArgument, "a key frame has 0 anchors; at least 1 is needed");
+    }
+    for (size_t i = 0; i < frame->scaffold.positions.size(); ++i) {
+      const double value = static_cast<double>(frame->scaffold.positions[i]);
+      head.bounds[i % 3] = std::min(head.bounds[i % 3], value);
+      head.bounds[3 + i % 3] = std::max(head.bounds[3 + i % 3], value);
+    }
+  }
+  return std::make_shared<const RelaySplats>(
+      std::move(head), [frames = std::move(frames)](uint32_t key) { return frames[key]; });
+}
+
+std::shared_ptr<const SplatModel> readRelaySplats(const std::string& path, const ReadingAid&) {
+  auto asset = std::make_shared<const RelayAsset>(path);
+  auto stored = std::make_shared<const StoredKeyFrames>(asset, path);
+  stored->frame(0);  // says now what is wrong with it
+  return std::make_shared<const RelaySplats>(asset->head(),
+                                             [stored](uint32_t key) { return stored->frame(key); });
+}
+
+}  // namespace stipple

@@ -1,0 +1,109 @@
+// Based on: Kwak et al., MoRel, CVPR 2026 (arXiv 2512.09270): stages, windows, levels by variance.
+#include "train/anchors/relay_segments.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "decode/anchors/scaffold.h"
+
+namespace stipple {
+
+namespace {
+
+constexpr double kGlobalShare = 0.3;
+constexpr double kKeyFrameShare = 0.1;
+constexpr double kBlendShare = 0.1;
+/// Frames on either side of a key frame whose views it is made of.
+constexpr double kAboutKey = 1.5;
+
+constexpr double kLowQuantile = 0.5;
+constexpr double kHighQuantile = 0.8;
+
+}  // namespace
+
+FitMoment RelaySegment::local(const FitMoment& moment) const {
+  FitMoment own = moment;
+  own.iteration = moment.iteration - begin;
+  own.iterations = end - begin;
+  return own;
+}
+
+std::vector<RelaySegment> relaySegments(uint64_t iterations, const KeyFrameClip& clip) {
+  const uint32_t keys = clip.keyCount();
+  const bool blends = clip.blend == KeyFrameBlend::kLearned && keys > 1;
+  const double blend_share = blends ? kBlendShare : 0;
+  const double window_share = 1 - kGlobalShare - kKeyFrameShare - blend_share;
+  std::vector<RelaySegment> segments;
+  double done = 0;
+  uint64_t begin = 0;
+  const auto add = [&](RelayStage stage, uint32_t key, double share) {
+    done += share;
+    RelaySegment segment{stage, key, begin, begin};
+    const auto end = static_cast<uint64_t>(std::llround(done * static_cast<double>(iterations)));
+    segment.end = std::max(begin + 1, end);
+    begin = segment.end;
+    segments.push_back(segment);
+  };
+  add(RelayStage::kGlobal, 0, kGlobalShare);
+  for (uint32_t key = 0; key < keys; ++key) {
+    add(RelayStage::kKeyFrame, key, kKeyFrameShare / keys);
+  }
+  for (uint32_t key = 0; key < keys; ++key) add(RelayStage::kWindow, key, window_share / keys);
+  for (uint32_t key = 0; blends && key + 1 < keys; ++key) {
+    add(RelayStage::kBlend, key, blend_share / (keys - 1));
+  }
+  return segments;
+}
+
+std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameClip& clip,
+                                   std::span<const double> times) {
+  const double frame = 1 / clip.frames_per_second;
+  const double middle = clip.timeOf(segment.key);
+  double before = kAboutKey * frame, behind = before;
+  if (segment.stage == RelayStage::kGlobal) before = behind = INFINITY;
+  if (segment.stage == RelayStage::kWindow) before = behind = (clip.spacing + 0.5) * frame;
+  if (segment.stage == RelayStage::kBlend) {
+    before = 0.5 * frame;
+    behind = (clip.spacing + 0.5) * frame;
+  }
+  std::vector<size_t> views;
+  double nearest = INFINITY;
+  for (size_t v = 0; v < times.size(); ++v) {
+    const double apart = times[v] - middle;
+    if (apart >= -before && apart <= behind) views.push_back(v);
+    nearest = std::min(nearest, std::abs(apart));
+  }
+  for (size_t v = 0; views.empty() && v < times.size(); ++v) {
+    if (std::abs(times[v] - middle) <= nearest) views.push_back(v);
+  }
+  return views;
+}
+
+std::vector<uint8_t> levelsOfFeatures(std::span<const float> features) {
+  const size_t count = features.size() / kScaffoldFeatures;
+  if (count == 0) return {};
+  std::vector<double> variances(count);
+  for (size_t a = 0; a < count; ++a) {
+    const float* own = &features[a * kScaffoldFeatures];
+    double sum = 0, squares = 0;
+    for (size_t i = 0; i < kScaffoldFeatures; ++i) {
+      sum += static_cast<double>(own[i]);
+      squares += static_cast<double>(own[i]) * static_cast<double>(own[i]);
+    }
+    const double mean = sum / kScaffoldFeatures;
+    variances[a] = squares / kScaffoldFeatures - mean * mean;
+  }
+  std::vector<uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](uint32_t one, uint32_t other) { return variances[one] < variances[other]; });
+  std::vector<uint8_t> levels(count);
+  for (size_t rank = 0; rank < count; ++rank) {
+    const double share = static_cast<double>(rank) / static_cast<double>(count);
+    levels[order[rank]] = share < kLowQuantile ? 0 : share < kHighQuantile ? 1 : 2;
+  }
+  return levels;
+}
+
+}  // namespace stipple

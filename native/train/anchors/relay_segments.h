@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "decode/anchors/key_frame.h"
+#include "densify/strategy.h"
+
+namespace stipple {
+
+/// What a fit of a long clip does one after the other.
+enum class RelayStage : uint32_t {
+  kGlobal = 1,    ///< one set of anchors for all of the clip
+  kKeyFrame = 2,  ///< a copy for each key frame, of the views about it
+  kWindow = 3,    ///< its deformation from the key frame before to the one behind
+  kBlend = 4,     ///< how it and the next share the time between them
+};
+
+/// A run of steps of one stage with one key frame (or a pair that begins with it).
+struct RelaySegment {
+  RelayStage stage = RelayStage::kGlobal;
+  uint32_t key = 0;
+  uint64_t begin = 0;  ///< steps that are done before it
+  uint64_t end = 0;
+
+  /// Where an iteration of the fit stands in the segment. In: moment, of begin < iteration <= end.
+  FitMoment local(const FitMoment& moment) const;
+};
+
+/// Three tenths of the steps are global, one is of key frames, half of windows, one of blending;
+/// where nothing blends, windows have that too. Each segment has at least one step, in order.
+std::vector<RelaySegment> relaySegments(uint64_t iterations, const KeyFrameClip& clip);
+
+/// The views that a segment learns from, as places in `times`: those in its span of time; where
+/// there is none, the nearest. In: times of the views, seconds, at least one.
+std::vector<size_t> viewsOfSegment(const RelaySegment& segment, const KeyFrameClip& clip,
+                                   std::span<const double> times);
+
+/// Level of each anchor, by its rank in how much the numbers of its feature vary: of the lower half
+/// 0, of the upper fifth 2, else 1; ties go by the order of anchors. In: features
+/// [A,kScaffoldFeatures].
+std::vector<uint8_t> levelsOfFeatures(std::span<const float> features);
+
+}  // namespace stipple

@@ -1,0 +1,238 @@
+#include "decode/anchors/key_frame.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "base/random.h"
+
+namespace stipple {
+namespace {
+
+using testing::ElementsAre;
+
+float drawn(uint64_t number) {
+  return unitFloat(keyedBits(33, RandomUse::kFieldStart, number));
+}
+
+KeyFrameClip clipOf(uint32_t frames, uint32_t spacing) {
+  KeyFrameClip clip;
+  clip.begin = 2;
+  clip.frames_per_second = 10;
+  clip.frame_count = frames;
+  clip.spacing = spacing;
+  return clip;
+}
+
+/// `count` anchors that differ by the seed.
+KeyFrame someFrame(size_t count, uint64_t seed, bool deforms) {
+  KeyFrame frame;
+  frame.scaffold = makeScaffold({.gaussians = 3, .seed = seed});
+  for (size_t a = 0; a < count; ++a) {
+    const float place[] = {drawn(seed * 100 + 3 * a), drawn(seed * 100 + 3 * a + 1),
+                           drawn(seed * 100 + 3 * a + 2)};
+    addAnchor(frame.scaffold, place, nullptr, 0.3f);
+    frame.blend.insert(frame.blend.end(), {0, kStartingDecay, 0, kStartingDecay});
+  }
+  for (size_t i = 0; i < frame.scaffold.features.size(); ++i) {
+    frame.scaffold.features[i] = drawn(seed * 1000 + i) - 0.5f;
+  }
+  if (deforms) {
+    HexPlaneShape shape;
+    shape.texels = 4;
+    shape.moments = 4;
+    shape.channels = 2;
+    shape.seed = seed;
+    frame.deformation = makeDeformation(shape, 3);
+    for (float& weight : frame.deformation.heads.layers().back().weights) weight = 0.05f;
+  }
+  return frame;
+}
+
+TEST(KeyFrameClip, HasAKeyFrameAtItsBeginAndEverySpacing) {
+  EXPECT_EQ(clipOf(1, 5).keyCount(), 1u);
+  EXPECT_EQ(clipOf(5, 5).keyCount(), 1u) << "shorter than one spacing";
+  EXPECT_EQ(clipOf(6, 5).keyCount(), 1u) << "a key frame of the last frame alone shows nothing";
+  EXPECT_EQ(clipOf(7, 5).keyCount(), 2u) << "a ragged last window";
+  EXPECT_EQ(clipOf(480, 24).keyCount(), 20u);
+  EXPECT_DOUBLE_EQ(clipOf(480, 24).timeOf(3), 2 + 7.2);
+}
+
+TEST(KeyFrameClip, SaysWhichKeyFramesShowATime) {
+  const KeyFrameClip clip = clipOf(23, 10);  // at frames 0, 10, 20
+  const auto at = [&](double seconds) { return keyFramesAt(clip, seconds); };
+  EXPECT_EQ(at(-5).key, 0u);
+  EXPECT_EQ(at(-5).tau, 0);
+  EXPECT_EQ(at(2.4).key, 0u);
+  EXPECT_NEAR(at(2.4).tau, 0.4, 1e-12);
+  EXPECT_TRUE(at(2.4).has_next);
+  EXPECT_EQ(at(3.0).key, 1u);
+  EXPECT_NEAR(at(3.0).tau, 0, 1e-12);
+  EXPECT_EQ(at(4.15).key, 2u);
+  EXPECT_FALSE(at(4.15).has_next);
+  EXPECT_NEAR(at(100).tau, 0.2, 1e-12) << "held to the last frame";
+}
+
+TEST(KeyFrameBlending, FadesAsPublished) {
+  // lambda d = 1 of the published table: d is a quarter of our lambda of 4.
+  KeyFrame frame = someFrame(1, 1, false);
+  const float raw = std::log(std::exp(0.25f) - 1);
+  frame.blend = {0, raw, 0, raw};
+  const double forward[] = {1, 0.7788, 0.6065, 0.4724, 0.3679};
+  const double shares[] = {0.7311, 0.6225, 0.5, 0.3775, 0.2689};
+  for (int i = 0; i < 5; ++i) {
+    const double tau = 0.25 * i;
+    const std::vector<float> own = fadingOf(frame, 1, tau), other = fadingOf(frame, 1, tau - 1);
+    EXPECT_NEAR(own[0], forward[i], 5e-5) << tau;
+    EXPECT_NEAR(other[0], forward[4 - i], 5e-5) << tau;
+    EXPECT_NEAR(sharesOf(own, other)[0], shares[i], 5e-5) << tau;
+  }
+}
+
+TEST(KeyFrameBlending, GradientsAreThoseOfDifferences) {
+  KeyFrame before = someFrame(7, 1, false), behind = someFrame(5, 2, false);
+  for (KeyFrame* frame : {&before, &behind}) {
+    for (size_t i = 0; i < frame->blend.size(); ++i) frame->blend[i] += drawn(i + 50) - 0.5f;
+  }
+  const double tau = 0.35;
+  const auto loss = [&] {
+    const std::vector<float> w = fadingOf(before, 7, tau), v = fadingOf(behind, 5, tau - 1);
+    double sum = 0;
+    uint64_t number = 900;
+    for (const auto& shares : {sharesOf(w, v), sharesOf(v, w)}) {
+      for (const float share : shares) {
+        sum += static_cast<double>(share) * (static_cast<double>(drawn(number++)) - 0.5);
+      }
+    }
+    return sum;
+  };
+  const std::vector<float> w = fadingOf(before, 7, tau), v = fadingOf(behind, 5, tau - 1);
+  std::vector<float> by_before_shares, by_behind_shares;
+  uint64_t number = 900;
+  for (size_t a = 0; a < 7; ++a) by_before_shares.push_back(drawn(number++) - 0.5f);
+  for (size_t a = 0; a < 5; ++a) by_behind_shares.push_back(drawn(number++) - 0.5f);
+  std::vector<float> by_w(7, 0.0f), by_v(5, 0.0f);
+  sharesBackward(w, v, by_before_shares, by_w, by_v);
+  sharesBackward(v, w, by_behind_shares, by_v, by_w);
+  std::vector<float> by_before(before.blend.size(), 0.0f), by_behind(behind.blend.size(), 0.0f);
+  fadingBackward(before, tau, by_w, by_before);
+  fadingBackward(behind, tau - 1, by_v, by_behind);
+  const auto compare = [&](std::vector<float>& blend, const std::vector<float>& by) {
+    for (size_t i = 0; i < blend.size(); ++i) {
+      const float eps = 0x1.0p-7f;
+      const float kept = blend[i];
+      blend[i] = kept + eps;
+      const double high = loss();
+      blend[i] = kept - eps;
+      const double low = loss();
+      blend[i] = kept;
+      // A dozen float32 shares: rounding of 1e-7 / eps, and truncation.
+      EXPECT_NEAR(static_cast<double>(by[i]), (high - low) / (2 * static_cast<double>(eps)), 2e-4)
+          << i;
+    }
+  };
+  compare(before.blend, by_before);
+  compare(behind.blend, by_behind);
+}
+
+TEST(KeyFrameBlending, StaysFiniteWhereBothHaveFadedAway) {
+  KeyFrame frame = someFrame(2, 1, false);
+  for (float& number : frame.blend) number = 200;  // offset far away, decay of 200
+  const std::vector<float> own = fadingOf(frame, 2, 0.5), other = fadingOf(frame, 2, -0.5);
+  EXPECT_THAT(own, ElementsAre(0.0f, 0.0f));
+  EXPECT_THAT(sharesOf(own, other), ElementsAre(0.5f, 0.5f));
+  std::vector<float> by_own(2, 0.0f), by_other(2, 0.0f), by_blend(8, 0.0f);
+  sharesBackward(own, other, {1, 1}, by_own, by_other);
+  fadingBackward(frame, 0.5, by_own, by_blend);
+  for (const float value : by_blend) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(SplatsOfClip, AreTheUnionOfTwoKeyFramesAtTheirShares) {
+  const KeyFrameClip clip = clipOf(21, 10);
+  const std::vector<std::shared_ptr<const KeyFrame>> frames = {
+      std::make_shared<const KeyFrame>(someFrame(6, 1, true)),
+      std::make_shared<const KeyFrame>(someFrame(4, 2, true))};
+  const KeyFrameSource source = [&](uint32_t key) { return frames[key]; };
+  KeyFrameTape tapes[2];
+  SplatCloud own[2];
+  splatsOfKeyFrame(*frames[0], 6, 0.3, tapes[0], own[0]);
+  splatsOfKeyFrame(*frames[1], 4, -0.7, tapes[1], own[1]);
+  const SplatCloud cloud = splatsOfClip(clip, source, 2.3, 0);
+  ASSERT_EQ(cloud.size(), own[0].size() + own[1].size());
+  const double w = std::exp(-4 * 0.3), v = std::exp(-4 * 0.7);
+  EXPECT_NEAR(cloud.opacities[0], own[0].opacities[0] * static_cast<float>(w / (w + v)), 1e-5);
+  EXPECT_NEAR(cloud.opacities[own[0].size()], own[1].opacities[0] * static_cast<float>(v / (w + v)),
+              1e-5);
+  EXPECT_EQ(cloud.positions[0], own[0].positions[0]);
+  // A budget is shared evenly, and anchors come from the front.
+  const SplatCloud few = splatsOfClip(clip, source, 2.3, 4);
+  EXPECT_LE(few.size(), 4u * 3);
+  EXPECT_EQ(few.positions[0], own[0].positions[0]);
+  EXPECT_EQ(mostAnchors(clip, std::vector<uint64_t>{6, 4}), 12u);
+}
+
+TEST(SplatsOfClip, ShowOneKeyFrameWhereNothingBlends) {
+  KeyFrameClip clip = clipOf(21, 10);
+  const std::vector<std::shared_ptr<const KeyFrame>> frames = {
+      std::make_shared<const KeyFrame>(someFrame(6, 1, false)),
+      std::make_shared<const KeyFrame>(someFrame(4, 2, false))};
+  const KeyFrameSource source = [&](uint32_t key) { return frames[key]; };
+  KeyFrameTape tape;
+  SplatCloud first, second;
+  splatsOfKeyFrame(*frames[0], 6, 0, tape, first);
+  splatsOfKeyFrame(*frames[1], 4, 0, tape, second);
+  EXPECT_EQ(splatsOfClip(clip, source, 3.5, 0).opacities, second.opacities)
+      << "behind the last key frame there is nothing to blend with";
+  clip.blend = KeyFrameBlend::kNone;
+  EXPECT_EQ(splatsOfClip(clip, source, 2.4, 0).opacities, first.opacities);
+  EXPECT_EQ(splatsOfClip(clip, source, 2.6, 0).opacities, second.opacities);
+  clip.blend = KeyFrameBlend::kLinear;
+  EXPECT_NEAR(splatsOfClip(clip, source, 2.25, 0).opacities[0], 0.75f * first.opacities[0], 1e-6);
+}
+
+TEST(KeyFrame, ComesBackFromTensorsBitForBit) {
+  for (const bool deforms : {false, true}) {
+    const KeyFrame frame = someFrame(5, 4, deforms);
+    const TensorTable table = tensorsOfKeyFrame(frame, "key.7.");
+    const ScaffoldShape shape = {3, 0, frame.scaffold.colour_space, frame.scaffold.antialias, 0};
+    const KeyFrame seen = keyFrameOfTensors(table, "key.7.", shape);
+    EXPECT_EQ(seen.blend, frame.blend);
+    EXPECT_EQ(seen.deformation.isThere(), deforms);
+    KeyFrameTape tapes[2];
+    SplatCloud one, other;
+    splatsOfKeyFrame(frame, 5, -0.6, tapes[0], one);
+    splatsOfKeyFrame(seen, 5, -0.6, tapes[1], other);
+    EXPECT_EQ(one.positions, other.positions);
+    EXPECT_EQ(one.sh, other.sh);
+    EXPECT_EQ(one.scales, other.scales);
+  }
+}
+
+TEST(KeyFrame, RefusesTensorsThatDoNotFitTogether) {
+  const KeyFrame frame = someFrame(5, 4, true);
+  const ScaffoldShape shape = {3, 0, frame.scaffold.colour_space, frame.scaffold.antialias, 0};
+  const auto refuses = [&](const std::string& name, const Tensor& tensor) {
+    TensorTable table = tensorsOfKeyFrame(frame, "");
+    table[name] = tensor;
+    try {
+      keyFrameOfTensors(table, "", shape);
+      ADD_FAILURE() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kFormat) << name;
+    }
+  };
+  refuses("blend", {{3}, std::vector<float>(3)});
+  refuses("planes", {{2}, std::vector<uint32_t>{4, 4}});
+  refuses("planes", {{5}, std::vector<uint32_t>{4, 4, 2, 1, 4000000}});
+  refuses("planes.0", {{1}, std::vector<float>(1)});
+  refuses("box", {{7}, std::vector<double>{0, 0, 0, 0, 1, 1, 1}});
+  refuses("heads.layer2.biases", {{1}, std::vector<float>{NAN}});
+}
+
+}  // namespace
+}  // namespace stipple
