@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/number_text.h"
 #include "data/views/view_check.h"
+#include "fit/clip_cuts.h"
 #include "fit/fit_memory.h"
 #include "fit/fit_settings.h"
 #include "fit/fit_views.h"
@@ -182,6 +184,7 @@ std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
   for (const std::string& text : views_->notes()) note(text);
   const std::string held_out = heldOutCameras(*views_, split_);
   if (!held_out.empty()) note(held_out);
+  if (options_.model == FitKind::kRelay) noteCut();
   for (const std::string& warning : checkViews(*views_, {}, &progress)) note(warning);
   auto trainer = std::make_unique<Trainer>(
       *backends_, views_, split_, makeModel(*backends_, *views_, split_, options_, &progress),
@@ -193,6 +196,20 @@ std::unique_ptr<Trainer> FitSession::prepared(Progress& progress) {
     fail(error.code(), options_.checkpoint_path + ": " + error.what());
   }
   return trainer;
+}
+
+/// Anchors that are deformed over a cut show neither shot.
+void FitSession::noteCut() {
+  const std::optional<ClipCut> cut = findCut(*views_);
+  if (!cut) return;
+  const MotionClip clip = clipOfViews(*views_);
+  const auto frameAt = [&](double seconds) {
+    return std::to_string(std::llround((seconds - clip.begin) * clip.frames_per_second));
+  };
+  note(
+      "The images change at once between frame " + frameAt(cut->before) + " (" +
+      numberText(cut->before) + " s) and frame " + frameAt(cut->behind) +
+      ", as at a cut. Two clips, one up to it and one from it on, will look better than this one.");
 }
 
 void FitSession::run(Progress& progress) {

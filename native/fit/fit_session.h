@@ -83,6 +83,7 @@ class FitSession final : public FitObserver {
 
  private:
   std::unique_ptr<Trainer> prepared(Progress& progress);
+  void noteCut();
   /// The tree of a finished fit of splats that move, so that their model has every budget at once.
   void mergeMoving(Progress& progress);
   std::shared_ptr<const SplatModel> relay() const;

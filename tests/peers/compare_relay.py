@@ -75,7 +75,7 @@ def measure(context, judge, given, scene, arm, seed):
             last = frames_of(dataset) - 1 if number + 1 == len(starts) else start + every
             path = given.folder / f'{scene}.chunk{number}.stipple.safetensors'
             all_costs.append(fit(given.stipple, result=path, options=[
-                '--model', 'motion', *most, '--first-frame', start, '--last-frame', last],
+                '--model', 'motion', *most, '--frames', f'{start}:{last}'],
                 **{**shared, 'iterations': given.iterations // len(starts)}))
             paths.append(path)
         costs = {key: (max if key == 'megabytes' else sum)(row[key] for row in all_costs) for key in all_costs[0]}

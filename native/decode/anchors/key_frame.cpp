@@ -17,6 +17,11 @@ namespace {
 constexpr double kFading = 4;
 constexpr uint32_t kMostFrames = uint32_t{1} << 24;
 
+double logistic(double x) {
+  const double e = std::exp(-std::abs(x));
+  return x < 0 ? e / (1 + e) : 1 / (1 + e);
+}
+
 double softplus(double x) {
   return x > 30 ? x : std::log1p(std::exp(x));
 }
@@ -51,7 +56,8 @@ uint64_t mostAnchors(const KeyFrameClip& clip, std::span<const uint64_t> counts)
 
 KeyFramesAt keyFramesAt(const KeyFrameClip& clip, double seconds) {
   const double last = clip.frame_count - 1;
-  const double frame = std::clamp((seconds - clip.begin) * clip.frames_per_second, 0.0, last);
+  const double held = std::clamp(seconds, clip.begin, std::max(clip.begin, clip.end()));
+  const double frame = std::clamp((held - clip.begin) * clip.frames_per_second, 0.0, last);
   const uint32_t keys = clip.keyCount();
   KeyFramesAt at;
   at.key = std::min(static_cast<uint32_t>(frame / clip.spacing), keys - 1);
@@ -121,7 +127,7 @@ void fadingBackward(const KeyFrame& frame, double tau, const std::vector<float>&
     const double sign = apart > 0 ? 1 : apart < 0 ? -1 : 0;
     by_blend[a * kBlendNumbers + at] += static_cast<float>(by * softplus(raw) * sign);
     by_blend[a * kBlendNumbers + at + 1] -=
-        static_cast<float>(by * std::abs(apart) / (1 + std::exp(-raw)));
+        static_cast<float>(by * std::abs(apart) * logistic(raw));
   }
 }
 

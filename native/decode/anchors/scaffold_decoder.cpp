@@ -18,8 +18,40 @@ constexpr size_t kGrain = 256;
 /// Shorter quaternions count as no rotation: where they point is rounding alone.
 constexpr float kLeastTurn = 1e-6f;
 
+/// Logarithms of lengths are held to it, so that nothing overflows: 10^13 metres and 10^-13.
+constexpr float kMostLog = 30;
+
 float logistic(float x) {
-  return 1.0f / (1.0f + std::exp(-x));
+  const float e = std::exp(-std::abs(x));
+  return x < 0 ? e / (1.0f + e) : 1.0f / (1.0f + e);
+}
+
+float lengthOfLog(float x) {
+  return std::exp(std::clamp(x, -kMostLog, kMostLog));
+}
+
+/// Whether a change of the logarithm changes the length.
+bool isFree(float x) {
+  return std::abs(x) < kMostLog;
+}
+
+/// Numbers that no step can reach come from files alone. A splat of such is not seen.
+void hideUnlessFinite(SplatCloud& cloud, size_t n) {
+  const size_t stride = cloud.shStride();
+  const auto areFinite = [](const float* values, size_t count) {
+    return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
+  };
+  if (areFinite(&cloud.positions[n * 3], 3) && areFinite(&cloud.rotations[n * 4], 4) &&
+      areFinite(&cloud.scales[n * 3], 3) && areFinite(&cloud.sh[n * stride], stride) &&
+      std::isfinite(cloud.opacities[n])) {
+    return;
+  }
+  std::fill_n(&cloud.positions[n * 3], 3, 0.0f);
+  std::fill_n(&cloud.rotations[n * 4], 4, 0.0f);
+  cloud.rotations[n * 4] = 1.0f;
+  std::fill_n(&cloud.scales[n * 3], 3, 0.0f);
+  std::fill_n(&cloud.sh[n * stride], stride, 0.0f);
+  cloud.opacities[n] = 0.0f;
 }
 
 float lengthOf(const float* q) {
@@ -82,8 +114,8 @@ void ScaffoldDecoder::forward(const AnchorArrays& anchors, size_t count, Scaffol
       for (size_t axis = 0; axis < 3; ++axis) {
         cloud.positions[n * 3 + axis] =
             anchors.positions[anchor * 3 + axis] +
-            anchors.offsets[slot * 3 + axis] * std::exp(log_scales[axis]);
-        cloud.scales[n * 3 + axis] = std::exp(log_scales[3 + axis]) * logistic(covariance[axis]);
+            anchors.offsets[slot * 3 + axis] * lengthOfLog(log_scales[axis]);
+        cloud.scales[n * 3 + axis] = lengthOfLog(log_scales[3 + axis]) * logistic(covariance[axis]);
       }
       const float length = lengthOf(covariance + 3);
       for (size_t i = 0; i < 4; ++i) {
@@ -96,6 +128,7 @@ void ScaffoldDecoder::forward(const AnchorArrays& anchors, size_t count, Scaffol
       float* sh = &cloud.sh[n * cloud.shStride()];
       for (size_t c = 0; c < 3; ++c) sh[c] = (logistic(colour[c]) - 0.5f) / kShC0;
       std::copy_n(row + gaussians * 3 + (slot % gaussians) * higher, higher, sh + 3);
+      hideUnlessFinite(cloud, n);
     }
   });
 }
@@ -133,13 +166,14 @@ void ScaffoldDecoder::backward(const AnchorArrays& anchors, ScaffoldTape& tape,
       const float* covariance = &covariances[slot * 7];
       for (size_t axis = 0; axis < 3; ++axis) {
         const float by_place = cloud_gradient.positions[n * 3 + axis];
-        const float reach = std::exp(log_scales[axis]);
+        const float reach = lengthOfLog(log_scales[axis]);
         by_anchors.positions[anchor * 3 + axis] += by_place;
         by_anchors.offsets[slot * 3 + axis] = by_place * reach;
-        by_log_scales[axis] += by_place * reach * anchors.offsets[slot * 3 + axis];
+        if (isFree(log_scales[axis]))
+          by_log_scales[axis] += by_place * reach * anchors.offsets[slot * 3 + axis];
         const float by_scale =
             cloud_gradient.scales[n * 3 + axis] * cloud.scales[n * 3 + axis];  // by its logarithm
-        by_log_scales[3 + axis] += by_scale;
+        if (isFree(log_scales[3 + axis])) by_log_scales[3 + axis] += by_scale;
         by_covariance[slot * 7 + axis] = by_scale * (1 - logistic(covariance[axis]));
       }
       const float length = lengthOf(covariance + 3);

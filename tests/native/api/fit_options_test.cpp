@@ -30,10 +30,15 @@ TEST_F(FitTest, RefusesOptionsOutOfRange) {
   };
   options_.iterations = 0;
   refused("options->iterations is 0; 1 to 10000000 is allowed");
-  options_.model = 3;
-  refused("options->model is 3");
+  options_.model = 5;
+  refused("options->model is 5");
   options_.model = STIPPLE_FIT_MOTION;
   refused("all views have the same time");
+  options_.model = STIPPLE_FIT_RELAY;
+  refused("all views have the same time");
+  options_.model = STIPPLE_FIT_SCAFFOLD;
+  options_.strategy_utf8 = "adaptive";
+  refused("anchors with features have none");
   options_.max_splats = 0;
   refused("options->max_splats is 0");
   options_.sh_degree = 5;
@@ -91,12 +96,14 @@ TEST_F(FitTest, TellsEveryOption) {
   auto info = sized<StippleFitOptionInfo>();
   STIPPLE_ASSERT_OK(stipple_fit_option_info(0, &info));
   EXPECT_STREQ(info.name_utf8, "model");
-  EXPECT_STREQ(info.choices_utf8, "explicit,field,motion");
+  EXPECT_STREQ(info.choices_utf8, "explicit,field,motion,scaffold,relay");
   for (uint64_t i = 0; i < count; ++i) {
     STIPPLE_ASSERT_OK(stipple_fit_option_info(i, &info));
     if (std::string(info.name_utf8) != "iterations") continue;
     EXPECT_STREQ(info.presets_utf8[3 * STIPPLE_FIT_FIELD + STIPPLE_FIT_BALANCED], "2000");
     EXPECT_STREQ(info.motion_presets_utf8[STIPPLE_FIT_BALANCED], "4000");
+    EXPECT_STREQ(info.scaffold_presets_utf8[STIPPLE_FIT_BALANCED], "4000");
+    EXPECT_STREQ(info.relay_presets_utf8[STIPPLE_FIT_BALANCED], "15000");
   }
   STIPPLE_ASSERT_OK(stipple_fit_option_info(0, &info));
   EXPECT_EQ(info.kind, uint32_t{STIPPLE_FIT_OPTION_CHOICE});

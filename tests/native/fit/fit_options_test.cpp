@@ -154,8 +154,10 @@ TEST(FitOptions, AreRefusedWhereTheyDoNotGoTogether) {
             std::string::npos);
   options = defaultFitOptions();
   options.model = static_cast<FitKind>(77);
-  EXPECT_EQ(messageOf([&] { requireFitOptions(options); }),
-            "options->model is 77; explicit (0), field (1) or motion (2) is allowed");
+  EXPECT_EQ(
+      messageOf([&] { requireFitOptions(options); }),
+      "options->model is 77; explicit (0), field (1), motion (2), scaffold (3) or relay (4) is "
+      "allowed");
   options = defaultFitOptions();
   options.resume = true;
   EXPECT_NE(messageOf([&] { requireFitOptions(options); }).find("no checkpoint_path is given"),
