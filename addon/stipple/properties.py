@@ -273,8 +273,8 @@ class STIPPLE_PG_fit(bpy.types.PropertyGroup):
                         options=set())
     key_frame_spacing: FloatProperty(name="Key-Frame Spacing", description="Seconds from one key frame of a long shot to "
                                                                            "the next. Things that move fast want less",
-                                     default=1.0, min=0.01, soft_max=10.0, subtype='TIME_ABSOLUTE', unit='TIME_ABSOLUTE',
-                                     options=set())
+                                     default=1.0, min=0.01, max=3600.0, soft_max=10.0, subtype='TIME_ABSOLUTE',
+                                     unit='TIME_ABSOLUTE', options=set())
     strategy: EnumProperty(name="Strategy", description="How splats are added and removed while they are fitted",
                            items=strategies.strategy_items, default=strategies.BY_QUALITY_NUMBER, options=set())
     parts: EnumProperty(name="Parts", description="Parts of other strategies that are added, or that take the place "

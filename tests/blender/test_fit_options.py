@@ -19,12 +19,13 @@ def options(stipple):
 
 def test_the_shared_settings_are_those_that_the_panel_has(options):
     """Another one is compared from the day it has the library's name."""
-    assert sorted(options) == ['density_gradient', 'max_splats', 'model', 'resume', 'seed', 'shell', 'strategy']
+    assert sorted(options) == ['density_gradient', 'key_frame_spacing', 'max_splats', 'model', 'resume', 'seed',
+                               'shell', 'strategy']
 
 
 def test_numbers_stay_within_the_range_of_the_library(options):
-    numbers = [name for name, (_, shown) in options.items() if shown.type == 'INT']
-    assert numbers == ['max_splats', 'seed']
+    numbers = [name for name, (_, shown) in options.items() if shown.type in {'INT', 'FLOAT'}]
+    assert sorted(numbers) == ['key_frame_spacing', 'max_splats', 'seed']
     for name in numbers:
         option, shown = options[name]
         assert option.minimum <= shown.hard_min <= shown.default <= shown.hard_max <= option.maximum, name
@@ -41,8 +42,8 @@ def test_words_and_switches_are_those_of_the_library(options):
 
 def test_a_tooltip_is_one_sentence_about_the_same_setting(options):
     """The panel says in an artist's words what the library says in a caller's: both name the same thing."""
-    same = {'density_gradient': 'learn', 'max_splats': 'splats', 'model': 'splats', 'resume': 'checkpoint',
-            'seed': 'seed', 'shell': 'shell', 'strategy': 'splats are added and removed'}
+    same = {'density_gradient': 'learn', 'key_frame_spacing': 'seconds', 'max_splats': 'splats', 'model': 'splats',
+            'resume': 'checkpoint', 'seed': 'seed', 'shell': 'shell', 'strategy': 'splats are added and removed'}
     for name, (option, shown) in options.items():
         tooltip = shown.description + ' ' + shown.name
         assert same[name] in tooltip.lower() and same[name] in option.help.lower(), (name, tooltip, option.help)

@@ -65,14 +65,16 @@ def test_every_option_of_the_library_is_a_flag_with_a_help():
     for name in ('model', 'strategy', 'start-splats,--start', 'max-splats,--gaussians',
                  'min-anchors,--least-anchors', 'max-anchors,--most-anchors,--anchors',
                  'gaussians-per-anchor', 'sh-degree', 'antialias', 'density-gradient,--no-density-gradient',
-                 'jitter,--no-jitter', 'shell', 'iterations', 'background', 'holdout', 'seed', 'ssim-share',
+                 'jitter,--no-jitter', 'shell', 'key-frame-spacing', 'key-frame-blend',
+                 'growth-by-level,--no-growth-by-level', 'iterations', 'background', 'holdout', 'seed', 'ssim-share',
                  'measure-interval', 'image-bytes,--picture-bytes', 'max-bytes',
                  'checkpoint-interval,--checkpoint-every', 'checkpoint-seconds', 'resume'):
         assert f'  --{name}' in lines, name
     assert 'checkpoint-path' not in lines  # the tool says where it lies
     words = ' '.join(lines.split())  # newer releases of CLI11 break lines
-    assert ('Default: 500 (fast), 2000 (balanced), 4000 (fine); of motion 1000 (fast), 4000 (balanced), 15000 (fine). '
-            'Range: 1 to 10000000.') in words
+    assert ('Default: 500 (fast), 2000 (balanced), 4000 (fine); of motion 1000 (fast), 4000 (balanced), 15000 (fine); '
+            'of a scaffold 1000 (fast), 4000 (balanced), 10000 (fine); of a relay 6000 (fast), 15000 (balanced), '
+            '30000 (fine). Range: 1 to 10000000.') in words
 
 
 @pytest.mark.parametrize('former, present', [
