@@ -1,17 +1,23 @@
 #include "asset_readers.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
 #include <utility>
 
+#include "decode/anchors/key_frame.h"
+#include "decode/anchors/scaffold_decoder.h"
+#include "decode/anchors/scaffold_tensors.h"
 #include "decode/surface/surface_model.h"
 #include "decode/tree/hierarchy_decoder.h"
 #include "density/octree_density.h"
 #include "io/assets/hierarchy_asset.h"
 #include "io/assets/latent_asset.h"
 #include "io/assets/motion_asset.h"
+#include "io/assets/relay_asset.h"
 #include "io/assets/rest_mesh.h"
+#include "io/assets/scaffold_asset.h"
 #include "io/assets/surface_asset.h"
 #include "io/random_cloud.h"
 #include "reader_tools.h"
@@ -130,6 +136,74 @@ std::vector<std::string> latentSeeds(const fs::path& folder) {
   asset.weights = {"decoder.safetensors", 576148442, std::string(64, 'a')};
   writeLatentAsset(asset, (folder / "seed").string());
   return {load(folder / "seed")};
+}
+
+ScaffoldParameters fewAnchors() {
+  ScaffoldParameters scaffold = makeScaffold({.gaussians = 2, .sh_degree = 1});
+  const float place[] = {1, 2, 3};
+  for (int a = 0; a < 3; ++a) addAnchor(scaffold, place, nullptr, 0.5f);
+  return scaffold;
+}
+
+std::vector<std::string> scaffoldSeeds(const fs::path& folder) {
+  ScaffoldAsset asset;
+  asset.gaussians = 2;
+  asset.sh_degree = 1;
+  asset.tensors = tensorsOfScaffold(fewAnchors());
+  writeScaffoldAsset(asset, (folder / "seed").string());
+  return {load(folder / "seed")};
+}
+
+std::vector<std::string> relaySeeds(const fs::path& folder) {
+  RelayAssetHead head;
+  head.frame_count = 9;
+  head.spacing = 4;
+  head.gaussians = 2;
+  head.sh_degree = 1;
+  head.anchor_counts = {3, 3};
+  std::vector<TensorTable> keys;
+  for (int key = 0; key < 2; ++key) {
+    KeyFrame frame;
+    frame.scaffold = fewAnchors();
+    frame.blend.assign(3 * kBlendNumbers, 0.5f);
+    HexPlaneShape shape;
+    shape.texels = shape.moments = 2;
+    shape.channels = 1;
+    shape.multipliers = {1};
+    if (key == 1) frame.deformation = makeDeformation(shape, 2);
+    keys.push_back(tensorsOfKeyFrame(frame, ""));
+  }
+  writeRelayAsset(head, keys, (folder / "seed").string());
+  return {load(folder / "seed")};
+}
+
+void readScaffold(const fs::path& path) {
+  const ScaffoldAsset asset = readScaffoldAsset(path.string());
+  const auto scaffold = std::make_shared<const ScaffoldParameters>(scaffoldOfTensors(
+      asset.tensors, {asset.gaussians, asset.sh_degree, asset.colour_space, asset.antialias, 0}));
+  keepsPromises([&] {
+    DecodeRequest request;
+    request.budget = 1000;
+    request.gaussians_per_anchor = asset.gaussians;
+    validate(ScaffoldDecoder(scaffold).decode(request), "splats of a file");
+    writeScaffoldAsset(asset, (path.parent_path() / "again").string());
+  });
+}
+
+void readRelay(const fs::path& path) {
+  const RelayAsset asset(path.string());
+  const RelayAssetHead& head = asset.head();
+  const ScaffoldShape shape = {head.gaussians, head.sh_degree, head.colour_space, head.antialias,
+                               0};
+  for (uint32_t key = 0; key < std::min<size_t>(head.anchor_counts.size(), 3); ++key) {
+    const KeyFrame frame = keyFrameOfTensors(asset.key(key), "", shape);
+    keepsPromises([&] {
+      KeyFrameTape tape;
+      SplatCloud cloud;
+      splatsOfKeyFrame(frame, frame.scaffold.size(), -0.3, tape, cloud);
+      validate(cloud, "splats of a file");
+    });
+  }
 }
 
 void readMotion(const fs::path& path) {

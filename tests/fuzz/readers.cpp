@@ -423,6 +423,12 @@ std::vector<Reader> makeReaders() {
   all.push_back({"latent", nullptr, storeAs(asset),
                  [asset](const fs::path& folder) { readLatent(folder / asset); }, latentSeeds,
                  JsonPlace::kSafetensorsHeader});
+  all.push_back({"scaffold", nullptr, storeAs(asset),
+                 [asset](const fs::path& folder) { readScaffold(folder / asset); }, scaffoldSeeds,
+                 JsonPlace::kSafetensorsHeader});
+  all.push_back({"relay", nullptr, storeAs(asset),
+                 [asset](const fs::path& folder) { readRelay(folder / asset); }, relaySeeds,
+                 JsonPlace::kSafetensorsHeader});
   all.push_back({"transforms", nullptr, storeAs("transforms.json"),
                  [](const fs::path& folder) { readCameras(folder / "transforms.json"); },
                  transformsSeeds, JsonPlace::kWholeFile});

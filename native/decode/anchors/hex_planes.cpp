@@ -92,6 +92,18 @@ void requireShape(const HexPlaneShape& shape) {
 
 }  // namespace
 
+std::vector<uint64_t> planeSizes(const HexPlaneShape& shape) {
+  requireShape(shape);
+  std::vector<uint64_t> sizes;
+  for (const uint32_t multiplier : shape.multipliers) {
+    for (const auto& [first, second] : kAxes) {
+      const uint64_t side = uint64_t{shape.texels} * multiplier;
+      sizes.push_back(side * (second == kTime ? shape.moments : side) * shape.channels);
+    }
+  }
+  return sizes;
+}
+
 HexPlanes::HexPlanes(const HexPlaneShape& shape) : shape_(shape) {
   requireShape(shape);
   uint64_t number = 0;

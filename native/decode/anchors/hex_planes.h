@@ -19,6 +19,9 @@ struct HexPlaneShape {
   uint64_t seed = 0;
 };
 
+/// Numbers of each plane, six for each scale. Errors: kInvalidArgument for a shape out of range.
+std::vector<uint64_t> planeSizes(const HexPlaneShape& shape);
+
 /// One of the six pairs of x, y, z and time: the first is along rows.
 struct HexPlane {
   uint32_t first = 0, second = 1;  ///< axes; 3 is time

@@ -101,6 +101,13 @@ KeyFrame keyFrameOfTensors(const TensorTable& table, const std::string& prefix,
   shape.channels = sizes[2];
   shape.multipliers.assign(sizes.begin() + 3, sizes.end());
   try {
+    // Before anything is allocated: a file may say any size.
+    const std::vector<uint64_t> plane_sizes = planeSizes(shape);
+    for (size_t p = 0; p < plane_sizes.size(); ++p) {
+      const std::string name = "planes." + std::to_string(p);
+      if (valuesOf<float>(own, name).size() == plane_sizes[p]) continue;
+      fail(ErrorCode::kFormat, "tensor " + name + " of the key frame is not as large as it says");
+    }
     frame.deformation = makeDeformation(shape, like.gaussians);
   } catch (const Error& error) {
     fail(ErrorCode::kFormat, error.what());
