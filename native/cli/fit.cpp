@@ -226,6 +226,16 @@ void printFigures(const Job& job) {
   report.print(false);
 }
 
+/// Of a fit of key frames; what else lies in their folder stays, and the folder then, too.
+void removeKeyFrames(const std::string& folder) {
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
+    std::error_code ignored;
+    if (entry.path().extension() == ".safetensors") std::filesystem::remove(entry.path(), ignored);
+  }
+  std::filesystem::remove(folder, none);
+}
+
 void fit(const Context& context, const Arguments& arguments) {
   const std::string checkpoint = arguments.out + ".checkpoint.safetensors";
   const StippleFitOptions options = arguments.flags.options(checkpoint);
@@ -252,8 +262,7 @@ void fit(const Context& context, const Arguments& arguments) {
   }
   if (is_whole) {
     std::filesystem::remove(checkpoint);
-    std::error_code ignored;
-    std::filesystem::remove_all(checkpoint + ".frames", ignored);
+    removeKeyFrames(checkpoint + ".frames");
   } else {
     std::fprintf(stderr, "stipple: stopped; the best so far is in '%s', --resume goes on\n",
                  arguments.out.c_str());

@@ -49,7 +49,9 @@ uint64_t fitMemoryBound(const FitOptions& options, const ViewSource& views) {
   const uint64_t count = isOfAnchors(options.model)
                              ? options.most_anchors * options.gaussians_per_anchor
                              : options.max_splats;
-  return pictureMemoryBound(views, options.picture_bytes) + count * bytesOfSplat(options);
+  // Two key frames are drawn at once.
+  const uint64_t at_once = options.model == FitKind::kRelay ? 2 : 1;
+  return pictureMemoryBound(views, options.picture_bytes) + at_once * count * bytesOfSplat(options);
 }
 
 void holdToMemory(FitOptions& options, const ViewSource& views) {

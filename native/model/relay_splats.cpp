@@ -26,6 +26,13 @@ KeyFrameClip clipOf(const RelayAssetHead& head) {
           static_cast<KeyFrameBlend>(head.blend)};
 }
 
+void requireKeyFrames(const KeyFrameClip& clip, size_t count, const std::string& what,
+                      ErrorCode code) {
+  if (count == clip.keyCount()) return;
+  fail(code, what + " has " + std::to_string(count) + " key frames; of its frames it needs " +
+                 std::to_string(clip.keyCount()));
+}
+
 /// Key frames of a file, of which a few are at hand.
 class StoredKeyFrames {
  public:
@@ -147,11 +154,7 @@ std::shared_ptr<const SplatModel> makeRelaySplats(
     const KeyFrameClip& clip, std::vector<std::shared_ptr<const KeyFrame>> frames,
     ModelNotes notes) {
   validate(clip);
-  if (frames.size() != clip.keyCount()) {
-    fail(ErrorCode::kInvalidArgument, "there are " + std::to_string(frames.size()) +
-                                          " key frames; the clip needs " +
-                                          std::to_string(clip.keyCount()));
-  }
+  requireKeyFrames(clip, frames.size(), "the clip", ErrorCode::kInvalidArgument);
   RelayAssetHead head;
   head.begin = clip.begin;
   head.frames_per_second = clip.frames_per_second;
@@ -184,6 +187,8 @@ std::shared_ptr<const SplatModel> makeRelaySplats(
 
 std::shared_ptr<const SplatModel> readRelaySplats(const std::string& path, const ReadingAid&) {
   auto asset = std::make_shared<const RelayAsset>(path);
+  requireKeyFrames(clipOf(asset->head()), asset->head().anchor_counts.size(), path,
+                   ErrorCode::kFormat);
   auto stored = std::make_shared<const StoredKeyFrames>(asset, path);
   stored->frame(0);  // says now what is wrong with it
   return std::make_shared<const RelaySplats>(asset->head(),

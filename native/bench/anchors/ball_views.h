@@ -3,9 +3,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <utility>
 
 #include "base/random.h"
 #include "data/views/memory_view_source.h"
+#include "train/backend/render_backend.h"
 #include "train/loop/fit_model.h"
 
 namespace stipple::bench {
@@ -55,6 +58,30 @@ class BallViews {
  private:
   MemoryViewSource views_;
   ViewPicture picture_;
+};
+
+/// The passes of explicit splats that look at a ball, for a ratio: forward, loss, backward, step.
+class ExplicitPasses {
+ public:
+  ExplicitPasses(const BallViews& ball, const SplatCloud& splats, StatisticRequest request)
+      : ball_(ball), request_(std::move(request)), backend_(makeCpuBackend()) {
+    backend_->upload(splats);
+    options_.with_depth = false;
+    step_.learning_rates.fill(1e-9);
+  }
+  void operator()() const {
+    backend_->forward(ball_.views().camera(0), options_);
+    backend_->loss(ball_.picture().colour, {});
+    backend_->backward(request_);
+    backend_->step(step_);
+  }
+
+ private:
+  const BallViews& ball_;
+  StatisticRequest request_;
+  std::unique_ptr<RenderBackend> backend_;
+  RenderOptions options_;
+  StepOptions step_;
 };
 
 }  // namespace stipple::bench

@@ -49,20 +49,9 @@ void steps(benchmark::State& state, const FieldCase& c) {
   const BallViews few(20000, c.size), many(600000, c.size);
   const auto small = modelOf(few, c, 7), large = modelOf(many, c, 9);
   // The passes of explicit splats that look the same.
-  const auto backend = makeCpuBackend();
-  backend->upload(small->splats(c.anchors));
-  RenderOptions options;
-  options.with_depth = false;
-  const auto passes = [&] {
-    backend->forward(few.views().camera(0), options);
-    backend->loss(few.picture().colour, {});
-    StatisticRequest request;
-    request.contributions = true;
-    backend->backward(request);
-    StepOptions step;
-    step.learning_rates.fill(1e-9);
-    backend->step(step);
-  };
+  StatisticRequest request;
+  request.contributions = true;
+  const ExplicitPasses passes(few, small->splats(c.anchors), request);
   uint64_t iteration = 1000;
   StepSeconds least;
   double best = 1e300, best_large = 1e300, best_passes = 1e300;

@@ -30,20 +30,9 @@ void steps(benchmark::State& state, const ScaffoldCase& c) {
   fit.sh_degree = 2;
   const std::vector<size_t> training = {0};
   const auto model = makeScaffoldModel(*cpuBackends(), ball.views(), training, fit);
-  const auto backend = makeCpuBackend();
-  backend->upload(model->splats(0));
-  RenderOptions options;
-  options.with_depth = false;
-  const auto passes = [&] {
-    backend->forward(ball.views().camera(0), options);
-    backend->loss(ball.picture().colour, {});
-    StatisticRequest request;
-    request.screen_gradients = true;
-    backend->backward(request);
-    StepOptions step;
-    step.learning_rates.fill(1e-9);
-    backend->step(step);
-  };
+  StatisticRequest request;
+  request.screen_gradients = true;
+  const ExplicitPasses passes(ball, model->splats(0), request);
   // In the stage that gathers statistics, between two events.
   uint64_t iteration = 10001;
   StepSeconds least;

@@ -1,5 +1,6 @@
 #include "decode/anchors/scaffold.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -13,6 +14,7 @@ namespace stipple {
 namespace {
 
 constexpr size_t kHidden = 32;
+constexpr float kMostLog = 30;
 constexpr uint32_t kMostGaussians = 32;
 /// Splats differ little from each other at the start, and quaternions are near 1.
 constexpr float kLastLayerScale = 0.3f;
@@ -75,6 +77,14 @@ void addAnchor(ScaffoldParameters& scaffold, const float* position, const float*
   }
   scaffold.log_scales.resize(scaffold.log_scales.size() + kScaffoldScales, std::log(length));
   scaffold.offsets.resize(scaffold.offsets.size() + size_t{scaffold.gaussians} * 3, 0.0f);
+}
+
+float lengthOfLog(float value) {
+  return std::exp(std::clamp(value, -kMostLog, kMostLog));
+}
+
+bool isFreeLog(float value) {
+  return std::abs(value) < kMostLog;
 }
 
 void keepAnchors(ScaffoldParameters& scaffold, const std::vector<uint32_t>& rows) {

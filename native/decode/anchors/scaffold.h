@@ -56,6 +56,11 @@ ScaffoldParameters makeScaffold(const ScaffoldShape& shape);
 void addAnchor(ScaffoldParameters& scaffold, const float* position, const float* feature,
                float length);
 
+/// The length of a logarithm, which is held to +-30 (10^13 metres and 10^-13), so that nothing
+/// overflows; and whether a change of it changes the length.
+float lengthOfLog(float value);
+bool isFreeLog(float value);
+
 /// Keeps the rows of anchors that are listed, in that order.
 void keepAnchors(ScaffoldParameters& scaffold, const std::vector<uint32_t>& rows);
 

@@ -18,21 +18,9 @@ constexpr size_t kGrain = 256;
 /// Shorter quaternions count as no rotation: where they point is rounding alone.
 constexpr float kLeastTurn = 1e-6f;
 
-/// Logarithms of lengths are held to it, so that nothing overflows: 10^13 metres and 10^-13.
-constexpr float kMostLog = 30;
-
 float logistic(float x) {
   const float e = std::exp(-std::abs(x));
   return x < 0 ? e / (1.0f + e) : 1.0f / (1.0f + e);
-}
-
-float lengthOfLog(float x) {
-  return std::exp(std::clamp(x, -kMostLog, kMostLog));
-}
-
-/// Whether a change of the logarithm changes the length.
-bool isFree(float x) {
-  return std::abs(x) < kMostLog;
 }
 
 /// Numbers that no step can reach come from files alone. A splat of such is not seen.
@@ -169,11 +157,11 @@ void ScaffoldDecoder::backward(const AnchorArrays& anchors, ScaffoldTape& tape,
         const float reach = lengthOfLog(log_scales[axis]);
         by_anchors.positions[anchor * 3 + axis] += by_place;
         by_anchors.offsets[slot * 3 + axis] = by_place * reach;
-        if (isFree(log_scales[axis]))
+        if (isFreeLog(log_scales[axis]))
           by_log_scales[axis] += by_place * reach * anchors.offsets[slot * 3 + axis];
         const float by_scale =
             cloud_gradient.scales[n * 3 + axis] * cloud.scales[n * 3 + axis];  // by its logarithm
-        if (isFree(log_scales[3 + axis])) by_log_scales[3 + axis] += by_scale;
+        if (isFreeLog(log_scales[3 + axis])) by_log_scales[3 + axis] += by_scale;
         by_covariance[slot * 7 + axis] = by_scale * (1 - logistic(covariance[axis]));
       }
       const float length = lengthOf(covariance + 3);

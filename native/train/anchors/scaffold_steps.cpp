@@ -77,8 +77,7 @@ std::vector<float> centresOfSlots(const ScaffoldParameters& scaffold) {
     const size_t axis = i % 3;
     centres[i] =
         scaffold.positions[anchor * 3 + axis] +
-        scaffold.offsets[i] *
-            std::exp(std::min(scaffold.log_scales[anchor * kScaffoldScales + axis], 30.0f));
+        scaffold.offsets[i] * lengthOfLog(scaffold.log_scales[anchor * kScaffoldScales + axis]);
   }
   return centres;
 }

@@ -2,6 +2,7 @@
 """A fit from the scene's settings to splats: views, surface points, the native fit, the tree that makes a slider."""
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -220,6 +221,11 @@ class FitTask(view_task.ViewTask):
         """Of a fit whose result is kept; what is stopped early keeps it."""
         if checkpoint is not None:
             checkpoint.unlink(missing_ok=True)
+            frames_folder = checkpoint.with_name(checkpoint.name + '.frames')  # of a long shot
+            for file in frames_folder.glob('*.safetensors'):
+                file.unlink(missing_ok=True)
+            with suppress(OSError):  # what else lies there stays
+                frames_folder.rmdir()
 
     def _keep(self, model, decoding, report, seen=None):
         """seen: of the splats at these settings."""
