@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -72,6 +73,29 @@ TEST(AnchorStability, QuaternionsOfZeros) {
   SplatCloud cloud;
   decoder.forward(scaffold, 1, tape, cloud);
   validate(cloud, "splats of quaternions of zeros");
+  SplatCloud by_cloud = cloud;
+  ScaffoldGradients gradients;
+  decoder.backward(scaffold, tape, cloud, by_cloud, gradients);
+  expectFinite(gradients.covariance.back().biases);
+}
+
+TEST(AnchorStability, QuaternionsWhoseSquaresAreInfinite) {
+  ScaffoldParameters scaffold = makeScaffold({.gaussians = 2});
+  const float place[] = {1, 2, 3};
+  addAnchor(scaffold, place, nullptr, 1.0f);
+  std::vector<LinearLayer>& layers = scaffold.covariance.layers();
+  for (LinearLayer& layer : layers) layer.weights.assign(layer.weights.size(), 0.0f);
+  const float largest = std::numeric_limits<float>::max();
+  for (size_t i = 0; i < layers.back().biases.size(); ++i) {
+    layers.back().biases[i] = i % 7 < 3 ? 0.0f : (i % 2 ? largest : -largest);
+  }
+  const ScaffoldDecoder decoder(std::make_shared<const ScaffoldParameters>(scaffold));
+  ScaffoldTape tape;
+  SplatCloud cloud;
+  decoder.forward(scaffold, 1, tape, cloud);
+  ASSERT_GT(cloud.size(), 0u);
+  validate(cloud, "splats of long quaternions");
+  for (const float value : cloud.rotations) EXPECT_FLOAT_EQ(std::abs(value), 0.5f);
   SplatCloud by_cloud = cloud;
   ScaffoldGradients gradients;
   decoder.backward(scaffold, tape, cloud, by_cloud, gradients);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr size_t kGrain = 256;
 /// Shorter quaternions count as no rotation: where they point is rounding alone.
-constexpr float kLeastTurn = 1e-6f;
+constexpr double kLeastTurn = 1e-6;
 
 float logistic(float x) {
   const float e = std::exp(-std::abs(x));
@@ -42,8 +42,11 @@ void hideUnlessFinite(SplatCloud& cloud, size_t n) {
   cloud.opacities[n] = 0.0f;
 }
 
-float lengthOf(const float* q) {
-  return std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+/// In double precision: squares of large numbers, which files have, are infinite in single.
+double lengthOf(const float* q) {
+  double sum = 0;
+  for (size_t i = 0; i < 4; ++i) sum += static_cast<double>(q[i]) * static_cast<double>(q[i]);
+  return std::sqrt(sum);
 }
 
 }  // namespace
@@ -105,10 +108,12 @@ void ScaffoldDecoder::forward(const AnchorArrays& anchors, size_t count, Scaffol
             anchors.offsets[slot * 3 + axis] * lengthOfLog(log_scales[axis]);
         cloud.scales[n * 3 + axis] = lengthOfLog(log_scales[3 + axis]) * logistic(covariance[axis]);
       }
-      const float length = lengthOf(covariance + 3);
+      const double length = lengthOf(covariance + 3);
       for (size_t i = 0; i < 4; ++i) {
         cloud.rotations[n * 4 + i] =
-            length < kLeastTurn ? (i == 0 ? 1.0f : 0.0f) : covariance[3 + i] / length;
+            length < kLeastTurn
+                ? (i == 0 ? 1.0f : 0.0f)
+                : static_cast<float>(static_cast<double>(covariance[3 + i]) / length);
       }
       cloud.opacities[n] = std::tanh(opacities[slot]);
       const float* row = &colours[anchor * gaussians * (3 + higher)];
@@ -133,7 +138,9 @@ void ScaffoldDecoder::backward(const AnchorArrays& anchors, ScaffoldTape& tape,
   by_anchors.features.assign(anchors.features.size(), 0.0f);
   by_anchors.log_scales.assign(anchors.log_scales.size(), 0.0f);
   by_anchors.offsets.assign(anchors.offsets.size(), 0.0f);
-  auto& [by_opacity, by_covariance, by_colour] = tape.raw_gradients;
+  auto& by_opacity = tape.raw_gradients[0];
+  auto& by_covariance = tape.raw_gradients[1];
+  auto& by_colour = tape.raw_gradients[2];
   by_opacity.assign(tape.opacity.output().size(), 0.0f);
   by_covariance.assign(tape.covariance.output().size(), 0.0f);
   by_colour.assign(tape.colour.output().size(), 0.0f);
@@ -164,13 +171,14 @@ void ScaffoldDecoder::backward(const AnchorArrays& anchors, ScaffoldTape& tape,
         if (isFreeLog(log_scales[3 + axis])) by_log_scales[3 + axis] += by_scale;
         by_covariance[slot * 7 + axis] = by_scale * (1 - logistic(covariance[axis]));
       }
-      const float length = lengthOf(covariance + 3);
+      const double length = lengthOf(covariance + 3);
       if (length >= kLeastTurn) {
         const float* q = &cloud.rotations[n * 4];
         const float* by_q = &cloud_gradient.rotations[n * 4];
         const float along = q[0] * by_q[0] + q[1] * by_q[1] + q[2] * by_q[2] + q[3] * by_q[3];
         for (size_t i = 0; i < 4; ++i) {
-          by_covariance[slot * 7 + 3 + i] = (by_q[i] - along * q[i]) / length;
+          by_covariance[slot * 7 + 3 + i] =
+              static_cast<float>(static_cast<double>(by_q[i] - along * q[i]) / length);
         }
       }
       const float opacity = cloud.opacities[n];
