@@ -9,6 +9,7 @@ import pytest
 
 SPLAT_TRANSFORM = '@playcanvas/splat-transform@3.7.0'
 GLTF_VALIDATOR = 'gltf-validator@2.0.0-dev.3.10'
+TINYUSDZ = 'tinyusdz@0.9.0-rc10'
 
 _FOLDER = Path(os.environ['STIPPLE_BUILD_DIR']) / 'npm'
 
@@ -54,3 +55,24 @@ def gltf_issues(path):
     result = subprocess.run(['node', '-e', script], capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     return json.loads(result.stdout)
+
+
+def usd_layer(path):
+    """A USD layer or package as tinyusdz reads it, printed as text."""
+    package = node_package(TINYUSDZ)
+    # It is built for browsers, and takes its module from bytes where it believes to be in one.
+    script = f'''
+        const fs = require('fs');
+        process.type = 'renderer';
+        globalThis.window = globalThis;
+        import({str(package / 'tinyusdz.js')!r}).then(async module => {{
+            const native = await module.default({{wasmBinary: fs.readFileSync({str(package / 'tinyusdz.wasm')!r})}});
+            const loader = new native.TinyUSDZLoaderNative();
+            const is_read = loader.loadAsLayerFromBinary(fs.readFileSync({str(path)!r}), {path.name!r});
+            if (!is_read) throw new Error(loader.error());
+            fs.writeSync(1, loader.layerToString());
+        }});
+    '''
+    result = subprocess.run(['node', '-e', script], capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+    return result.stdout

@@ -1,4 +1,5 @@
 """Splat files that the tool writes, read by programs of others."""
+import json
 import os
 import re
 import struct
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import numpy
 import pytest
-from node_packages import gltf_issues, splat_transform
+from node_packages import gltf_issues, splat_transform, usd_layer
 
 TOOL = Path(os.environ['STIPPLE_BUILD_DIR']) / 'bin' / 'stipple'
 COUNT = 3000
@@ -186,3 +187,44 @@ def test_glb_is_splats_or_a_mesh_by_its_content(ply, tmp_path):
     assert 'splats' in run('info', tmp_path / 'cloud.glb')
     figures = run('compare', ply, tmp_path / 'cloud.glb')
     assert 'max' in figures or 'position' in figures
+
+
+def usd_array(layer, name):
+    """The numbers of an attribute in the text of a layer."""
+    text = re.search(rf'\]? {name} = \[(.*?)\]\n', layer, re.S).group(1)
+    return numpy.array(re.findall(r'-?[\d.]+(?:e[+-]?\d+)?', text), 'f4')
+
+
+@pytest.mark.parametrize('extension', ['.usda', '.usdz'])
+def test_tinyusdz_reads_our_usd_as_it_is(ply, tmp_path, extension):
+    run('convert', ply, tmp_path / f'cloud{extension}')
+    layer = usd_layer(tmp_path / f'cloud{extension}')
+    assert 'def ParticleField3DGaussianSplat "Splats"' in layer and 'upAxis = "Y"' in layer
+    assert 'metersPerUnit = 1\n' in layer and 'defaultPrim = "Splats"' in layer
+    assert 'uniform int radiance:sphericalHarmonicsDegree = 3' in layer
+    run('convert', ply, tmp_path / 'ours.ply', '--frame', 'RUB')
+    ours = read_ply(tmp_path / 'ours.ply')
+
+    def columns(*names):
+        return numpy.stack([ours[name] for name in names], axis=1)
+    expected = {
+        'positions': columns('x', 'y', 'z'), 'orientations': columns(*(f'rot_{i}' for i in range(4))),
+        'scales': numpy.exp(columns(*(f'scale_{i}' for i in range(3)))), 'opacities': 1 / (1 + numpy.exp(-ours['opacity'])),
+        # A PLY has channel by channel, the schema coefficient by coefficient.
+        'radiance:sphericalHarmonicsCoefficients': numpy.concatenate(
+            [columns(*(f'f_dc_{i}' for i in range(3)))[:, None],
+             columns(*(f'f_rest_{i}' for i in range(45))).reshape(-1, 3, 15).transpose(0, 2, 1)], axis=1)}
+    for name, values in expected.items():
+        numpy.testing.assert_allclose(usd_array(layer, name), values.ravel(), rtol=3e-6, atol=3e-6, err_msg=name)
+    low, high = usd_array(layer, 'extent').reshape(2, 3)
+    assert (low < expected['positions'].min(0)).all() and (high > expected['positions'].max(0)).all()
+
+
+def test_we_read_the_usd_that_tinyusdz_writes(ply, tmp_path):
+    run('convert', ply, tmp_path / 'ours.usda')
+    (tmp_path / 'theirs.usda').write_text(usd_layer(tmp_path / 'ours.usda'))
+    seen = json.loads(run('compare', tmp_path / 'ours.usda', tmp_path / 'theirs.usda', '--json'))
+    assert seen['same_order'] == 1
+    # It prints 6 digits or more.
+    for name in ('position', 'rotation', 'opacity', 'sh'):
+        assert seen[f'max_{name}'] < 1e-5, seen

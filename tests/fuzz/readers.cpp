@@ -65,6 +65,19 @@ std::vector<std::string> splatSeeds(const SplatFormat& format, const fs::path& f
     add({.ascii = extension == ".ply", .version = extension == ".spz" ? 3 : 0});
     add({.frame = Frame::kRFU});
   }
+  if (extension == ".usda") {
+    made.push_back(
+        "#usda 1.0\n(\n  upAxis = \"Z\"\n  metersPerUnit = 0.5\n)\n"
+        "class \"c\" { def ParticleField3DGaussianSplat \"s\" (customData = { string a = \"b\" }) "
+        "{\n"
+        "  point3h[] positionsh = [(1, 2, 3)]\n  quatf[] orientations = [(1, 0, 0, 0)]\n"
+        "  float3[] scales.timeSamples = { 1: [(1, 2, 3)], 2: None }\n  rel r = </c> } }\n"
+        "def Xform \"a\" (prepend inherits = </c>) {\n  double3 xformOp:translate = (1, 2, 3)\n"
+        "  matrix4d xformOp:transform = ((1,0,0,0),(0,2,0,0),(0,0,1,0),(0,0,0,1))\n"
+        "  token[] xformOpOrder = [\"xformOp:translate\", \"!invert!xformOp:transform\"]\n"
+        "  variantSet \"v\" = { \"x\" { } } }\n"
+        "def \"b\" (references = [</a/s>, </c/s>]) { quatd xformOp:orient = (1, 0, 1, 0) }\n");
+  }
   if (extension == ".glb") {
     writeSplatFile(randomCloud(5, 1, 1), (folder / "seed.spz").string(), {.version = 3});
     GlbBuilder file;

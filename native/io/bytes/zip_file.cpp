@@ -27,6 +27,9 @@ constexpr uint16_t kDeflated = 8;
 constexpr uint32_t kIn64Bits = 0xffffffff;
 // Deflate spends at least a bit on each run of 258 bytes.
 constexpr uint64_t kMaxDeflateRatio = 1032;
+// An extra field begins with its kind and its length; of this kind is padding, as of Pixar's USDZ.
+constexpr uint64_t kExtraHead = 4;
+constexpr uint32_t kPaddingField = 0x1986;
 // 1 January 1980, the format's first day.
 constexpr uint16_t kNoDate = 0x21;
 
@@ -165,6 +168,14 @@ const ZipReader::Entry& ZipReader::find(const std::string& name) const {
   return found->second;
 }
 
+const std::string& ZipReader::firstName() const {
+  if (entries_.empty()) failHere("has no file in its zip archive");
+  return std::min_element(
+             entries_.begin(), entries_.end(),
+             [](const auto& a, const auto& b) { return a.second.header < b.second.header; })
+      ->first;
+}
+
 uint64_t ZipReader::storedBytes(const std::string& name) const {
   return find(name).stored_bytes;
 }
@@ -203,7 +214,10 @@ std::vector<uint8_t> ZipReader::read(const std::string& name, uint64_t limit) co
 }
 
 void ZipWriter::add(const std::string& name, const std::vector<uint8_t>& bytes) {
-  const uint64_t end = offset_ + kEntryBytes + name.size() + bytes.size();
+  const uint64_t data = offset_ + kEntryBytes + name.size();
+  uint64_t padding = (alignment_ - data % alignment_) % alignment_;
+  if (padding > 0 && padding < kExtraHead) padding += alignment_;
+  const uint64_t end = data + padding + bytes.size();
   // The directory follows; 64 KiB are far more than the dozen entries of a splat file take.
   if (end + (1 << 16) >= kIn64Bits || count_ >= std::numeric_limits<uint16_t>::max()) {
     fail(ErrorCode::kUnsupported, "the zip archive would have " + std::to_string(end) +
@@ -219,17 +233,24 @@ void ZipWriter::add(const std::string& name, const std::vector<uint8_t>& bytes) 
   append(common, static_cast<uint32_t>(bytes.size()), 4);
   append(common, static_cast<uint32_t>(bytes.size()), 4);
   append(common, static_cast<uint32_t>(name.size()), 2);
-  append(common, 0, 2);  // no extra field
 
   std::string header;
   append(header, kEntrySignature, 4);
-  header += common + name;
+  header += common;
+  append(header, static_cast<uint32_t>(padding), 2);
+  header += name;
+  if (padding > 0) {
+    append(header, kPaddingField, 2);
+    append(header, static_cast<uint32_t>(padding - kExtraHead), 2);
+    header.append(static_cast<size_t>(padding - kExtraHead), '\0');
+  }
   file_.write(header.data(), header.size());
   file_.write(bytes.data(), bytes.size());
 
   append(directory_, kDirectorySignature, 4);
   append(directory_, 20, 2);
   directory_ += common;
+  append(directory_, 0, 2);  // no extra field
   append(directory_, 0, 2);  // no comment
   append(directory_, 0, 2);  // disk
   append(directory_, 0, 2);  // internal attributes

@@ -19,6 +19,8 @@ class ZipReader {
   explicit ZipReader(const InputFile& file);
 
   bool has(const std::string& name) const { return entries_.count(name) != 0; }
+  /// The entry that lies before all others. Errors: kFormat where there is none.
+  const std::string& firstName() const;
   /// Bytes of an entry in the archive. Errors: kFormat where it is missing.
   uint64_t storedBytes(const std::string& name) const;
   /// One whole entry, its checksum compared. In: limit, bytes; a larger entry is kFormat before
@@ -47,13 +49,16 @@ class ZipReader {
 /// give the same bytes: no dates.
 class ZipWriter {
  public:
-  explicit ZipWriter(OutputFile& file) : file_(file) {}
+  /// In: alignment, of the entries' bytes in the file.
+  explicit ZipWriter(OutputFile& file, uint64_t alignment = 1)
+      : file_(file), alignment_(alignment) {}
   void add(const std::string& name, const std::vector<uint8_t>& bytes);
   /// Writes the directory; the file is whole then.
   void finish();
 
  private:
   OutputFile& file_;
+  uint64_t alignment_;
   uint64_t offset_ = 0;
   uint32_t count_ = 0;
   std::string directory_;

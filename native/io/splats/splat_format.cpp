@@ -15,6 +15,8 @@
 #include "io/splats/sog_levels.h"
 #include "io/splats/splat32_file.h"
 #include "io/splats/spz_file.h"
+#include "io/usd/usd_names.h"
+#include "io/usd/usd_splats.h"
 
 namespace stipple {
 
@@ -123,6 +125,27 @@ const std::vector<SplatFormat>& splatFormats() {
        .write = writeGltfSplats,
        .estimate = estimateGltfSplats,
        .checks_values = true},
+      // Before SOG, which is a zip archive as packages of USD are.
+      {.name = "usd",
+       .title = "USD with ParticleField3DGaussianSplat",
+       .extensions = ".usda .usd",
+       .max_sh_degree = 4,
+       .frame = kUsdFrame,
+       .keeps = kAll,
+       .probe = startsAsUsd,
+       .read = readUsdSplats,
+       .write = writeUsdSplats,
+       .estimate = estimateUsdSplats},
+      {.name = "usdz",
+       .title = "USD package",
+       .extensions = ".usdz",
+       .max_sh_degree = 4,
+       .frame = kUsdFrame,
+       .keeps = kAll,
+       .probe = startsAsUsdz,
+       .read = readUsdSplats,
+       .write = writeUsdSplats,
+       .estimate = estimateUsdSplats},
       {.name = "sog_levels",
        .title = "streamed SOG",
        .extensions = "lod-meta.json",

@@ -17,7 +17,7 @@ namespace stipple {
 namespace {
 
 constexpr const char* kNames[] = {"a.ply", "a.compressed.ply", "a.spz", "a.splat", "a.glb",
-                                  "a.sog"};
+                                  "a.sog", "a.usda",           "a.usdz"};
 
 class SplatWriters : public ScratchFolder {};
 

@@ -8,7 +8,7 @@ from . import sources
 # Blender asks which files may be dropped into its windows while it registers, before any library is loaded; a test
 # compares these with the library's.
 DROPPED_EXTENSIONS = (
-    '.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.sog',
+    '.ply', '.compressed.ply', '.spz', '.splat', '.ksplat', '.glb', '.gltf', '.usda', '.usd', '.usdz', '.sog',
 )
 # Of dialogs, until a name is typed.
 USUAL_EXTENSION = '.ply'
