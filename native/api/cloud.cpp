@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "api/conversions.h"
 #include "api/guard.h"
 #include "api/handles.h"
 #include "api/job.h"
@@ -90,19 +91,6 @@ void requireCapacity(uint64_t capacity, size_t count) {
 
 void copyTo(const std::vector<float>& values, float* out) {
   if (out && !values.empty()) std::memcpy(out, values.data(), values.size() * sizeof(float));
-}
-
-SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options) {
-  StippleCloudSaveOptions defaults;
-  stipple_cloud_save_options_init(&defaults);
-  const StippleCloudSaveOptions given = completed(options, defaults, "options");
-  SplatWriteOptions write;
-  write.ascii = enumValue<uint32_t>(given.ascii, 1, "options->ascii") == 1;
-  write.sh_degree_limit = enumValue<int>(given.sh_degree_limit, static_cast<uint32_t>(kMaxShDegree),
-                                         "options->sh_degree_limit");
-  write.version = enumValue<int>(given.format_version, 255, "options->format_version");
-  write.frame = enumValue<Frame>(given.frame, kLastFrame, "options->frame");
-  return write;
 }
 
 const SplatFormat& requireFormat(uint64_t index) {
@@ -288,6 +276,7 @@ StippleStatus stipple_format_info(uint64_t index, StippleFormatInfo* info) {
     out.keeps_frame = format.keeps.frame ? 1 : 0;
     out.keeps_colour_space = format.keeps.colour_space ? 1 : 0;
     out.keeps_antialias = format.keeps.antialias ? 1 : 0;
+    out.holds_times = format.holds_times ? 1 : 0;
     deliver(info, out, "info");
   });
 }

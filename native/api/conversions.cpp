@@ -93,6 +93,19 @@ RenderOptions optionsFrom(const StippleRenderOptions& given) {
 
 }  // namespace
 
+SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options) {
+  StippleCloudSaveOptions defaults;
+  stipple_cloud_save_options_init(&defaults);
+  const StippleCloudSaveOptions given = completed(options, defaults, "options");
+  SplatWriteOptions write;
+  write.ascii = enumValue<uint32_t>(given.ascii, 1, "options->ascii") == 1;
+  write.sh_degree_limit = enumValue<int>(given.sh_degree_limit, static_cast<uint32_t>(kMaxShDegree),
+                                         "options->sh_degree_limit");
+  write.version = enumValue<int>(given.format_version, 255, "options->format_version");
+  write.frame = enumValue<Frame>(given.frame, kLastFrame, "options->frame");
+  return write;
+}
+
 ColourGrade gradeFrom(const StippleGrade& grade, const char* name) {
   const StippleGrade given = complete(&grade, name);
   ColourGrade made;

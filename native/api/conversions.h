@@ -9,6 +9,7 @@
 #include "api/handles.h"
 #include "data/views/view_source.h"
 #include "fit/fit_options.h"
+#include "io/splats/splat_format.h"
 #include "shot/passes.h"
 #include "shot/shot_settings.h"
 #include "splat/voxels/voxelize.h"
@@ -18,6 +19,9 @@
 // values mean together is for the rooms to refuse.
 
 namespace stipple::api {
+
+/// NULL: defaults.
+SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options);
 
 ColourGrade gradeFrom(const StippleGrade& grade, const char* name);
 

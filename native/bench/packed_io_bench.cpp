@@ -1,8 +1,11 @@
-// SOG and glTF splats against what their containers take alone: the same pictures through libwebp,
-// the same bytes through fread and fwrite. Files lie in memory (/dev/shm).
+// SOG, glTF and USD splats against what their containers take alone: the same pictures through
+// libwebp, the same bytes through fread and fwrite, the same numbers through the standard library.
+// Files lie in memory (/dev/shm).
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -21,6 +24,7 @@ namespace {
 constexpr uint64_t kMostPixels = uint64_t{1} << 28;
 constexpr size_t kSogSplats = 200000;
 constexpr size_t kGlbSplats = 1000000;
+constexpr size_t kUsdSplats = 200000;
 
 float uniform(uint64_t index) {
   return unitFloat(keyedBits(2, RandomUse::kDecoder, index));
@@ -97,9 +101,9 @@ void sogRead(benchmark::State& state) {
   };
   compareWithAll(state, [&] { benchmark::DoNotOptimize(readSog(path, nullptr)); },
                  {{"fread+libwebp", plain}, {"fread+libwebp+arrays", [&] {
-                                                    plain();
-                                                    copyArrays(decoded);
-                                                  }}});
+                                               plain();
+                                               copyArrays(decoded);
+                                             }}});
   ::unlink(path.c_str());
   state.SetItemsProcessed(static_cast<int64_t>(kSogSplats) * state.iterations());
 }
@@ -135,9 +139,9 @@ void glbRead(benchmark::State& state) {
   const auto plain = [&] { benchmark::DoNotOptimize(readPlainly(path)); };
   compareWithAll(state, [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
                  {{"fread", plain}, {"fread+arrays", [&] {
-                                            plain();
-                                            copyArrays(decoded);
-                                          }}});
+                                       plain();
+                                       copyArrays(decoded);
+                                     }}});
   ::unlink(path.c_str());
   state.SetItemsProcessed(static_cast<int64_t>(kGlbSplats) * state.iterations());
 }
@@ -157,6 +161,81 @@ void glbWrite(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(kGlbSplats) * state.iterations());
 }
 
+/// Every number of a text, one after the other.
+void parseNumbers(const PlainBytes& text, std::vector<float>& numbers) {
+  numbers.clear();
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (at < end) {
+    float number = 0;
+    const auto [next, error] = std::from_chars(at, end, number);
+    if (error == std::errc()) numbers.push_back(number);
+    at = next == at ? at + 1 : next;
+  }
+}
+
+/// Every number of a cloud as text, a separator behind each, by all threads.
+std::vector<std::string> printNumbers(const SplatCloud& cloud) {
+  constexpr size_t kPiece = 65536;
+  std::vector<std::string> pieces;
+  for (const std::vector<float>* values :
+       {&cloud.positions, &cloud.rotations, &cloud.scales, &cloud.opacities, &cloud.sh}) {
+    const size_t first = pieces.size();
+    pieces.resize(first + (values->size() + kPiece - 1) / kPiece);
+    parallelFor(pieces.size() - first, 1, [&](size_t piece, size_t) {
+      std::string& text = pieces[first + piece];
+      char digits[32];
+      const size_t begin = piece * kPiece;
+      for (size_t i = begin; i < std::min(begin + kPiece, values->size()); ++i) {
+        text.append(digits, std::to_chars(digits, digits + sizeof(digits), (*values)[i]).ptr);
+        text.append(", ");
+      }
+    });
+  }
+  return pieces;
+}
+
+void usdRead(benchmark::State& state) {
+  const std::string path = scratch(".usda");
+  SplatCloud cloud = makeCloud(kUsdSplats, 3);
+  cloud.frame = Frame::kRUB;
+  writeSplatFile(cloud, path, {});
+  std::vector<float> numbers;
+  compare(
+      state, "fread+from_chars", [&] { benchmark::DoNotOptimize(readSplatFile(path)); },
+      [&] { parseNumbers(readPlainly(path), numbers); });
+  ::unlink(path.c_str());
+  state.SetItemsProcessed(static_cast<int64_t>(kUsdSplats) * state.iterations());
+}
+
+void usdWrite(benchmark::State& state) {
+  SplatCloud cloud = makeCloud(kUsdSplats, 3);
+  cloud.frame = Frame::kRUB;
+  const std::string path = scratch(".usda");
+  writeSplatFile(cloud, path, {});
+  const PlainBytes bytes = readPlainly(path);
+  const std::string plain = scratch(".plain");
+  compare(
+      state, "to_chars+fwrite", [&] { writeSplatFile(cloud, path, {}); },
+      [&] {
+        benchmark::DoNotOptimize(printNumbers(cloud));
+        writePlainly(plain, bytes);
+      });
+  ::unlink(path.c_str());
+  ::unlink(plain.c_str());
+  state.SetItemsProcessed(static_cast<int64_t>(kUsdSplats) * state.iterations());
+}
+
+BENCHMARK(usdRead)
+    ->Name("io.usd_read.200k")
+    ->UseManualTime()
+    ->Iterations(3)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(usdWrite)
+    ->Name("io.usd_write.200k")
+    ->UseManualTime()
+    ->Iterations(3)
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(sogRead)
     ->Name("io.sog_read.200k")
     ->UseManualTime()

@@ -13,6 +13,7 @@ void addFormats(CLI::App& app);
 void addDecode(CLI::App& app, const Context& context);
 void addRender(CLI::App& app, const Context& context);
 void addVoxelize(CLI::App& app, const Context& context);
+void addSeries(CLI::App& app, const Context& context);
 void addCarry(CLI::App& app, const Context& context);
 void addBind(CLI::App& app, const Context& context);
 void addMesh(CLI::App& app, const Context& context);

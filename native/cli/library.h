@@ -38,10 +38,12 @@ using Renderer = Handle<StippleRenderer, stipple_renderer_free>;
 using Volume = Handle<StippleVolume, stipple_volume_free>;
 using Image = Handle<StippleImage, stipple_image_free>;
 using Weights = Handle<StippleWeights, stipple_weights_free>;
+using SeriesWriter = Handle<StippleSeriesWriter, stipple_series_writer_free>;
 using Binding = Handle<StippleBinding, stipple_binding_free>;
 using Job = Handle<StippleJob, stipple_job_free>;
 
-/// Calls f(..., &pointer), takes the handle, and checks, so that a signal that came meanwhile frees it.
+/// Calls f(..., &pointer), takes the handle, and checks, so that a signal that came meanwhile frees
+/// it.
 template <typename Result, typename Function, typename... Arguments>
 Result make(Function function, Arguments... arguments) {
   typename Result::pointer made = nullptr;

@@ -54,12 +54,13 @@ void printAsJson() {
     std::printf(
         "%s{\"name\": \"%s\", \"title\": \"%s\", \"extensions\": \"%s\", \"endings\": \"%s\", "
         "\"can_read\": %s, \"can_write\": %s, \"max_sh_degree\": %u, \"frame\": \"%s\", \"keeps\": "
-        "[%s], "
+        "[%s], \"holds_times\": %s, "
         "\"bytes_per_splat\": %.1f}",
         separator, format.name, format.title, format.extensions, format.extensions,
         format.can_read ? "true" : "false", format.can_write ? "true" : "false",
         static_cast<unsigned>(format.max_sh_degree), frameName(format.frame).c_str(),
-        keeps.empty() ? "" : ('"' + keeps + '"').c_str(), bytesOfSplat(i));
+        keeps.empty() ? "" : ('"' + keeps + '"').c_str(), format.holds_times ? "true" : "false",
+        bytesOfSplat(i));
     separator = ", ";
   }
   std::printf("]\n");
@@ -81,6 +82,7 @@ void addFormats(CLI::App& app) {
                   frameName(format.frame).c_str());
       const std::string keeps = joined(kept(format), ", ");
       if (!keeps.empty()) std::printf(", keeps %s", keeps.c_str());
+      if (format.holds_times != 0) std::printf(", holds series");
       if (format.can_write != 0)
         std::printf(", about %.0f bytes a splat of degree %u", bytesOfSplat(i),
                     static_cast<unsigned>(std::min(kUsualDegree, format.max_sh_degree)));

@@ -45,6 +45,7 @@ int run(int argc, char** argv) {
   addVoxelize(app, context);
   addMesh(app, context);
   addAdapt(app, context);
+  addSeries(app, context);
   addCarry(app, context);
   addBind(app, context);
   addFit(app, context);

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Series of splat files become volume sequences and series of files again."""
 
+import re
+
 import bpy
 import numpy as np
 import pytest
@@ -161,6 +163,52 @@ def test_export_again_in_any_format(stipple, swarm, tmp_path, name, frame_3):
     assert there.count == series.COUNT
     again = series.load(tmp_path, frame_3.replace('3', '1'))
     assert again.data.stipple.frame_duration == 4
+
+
+def samples(path, name):
+    """{frame: number of elements} of an attribute with time samples."""
+    text = path.read_text().split(f' {name}.timeSamples = {{', 1)[1].split('\n    }', 1)[0]
+    return {int(frame): rows.count('(') for frame, rows in re.findall(r'^        (\d+): \[(.*?)\],?$', text,
+                                                                     re.M | re.S)}
+
+
+def test_a_series_becomes_one_file_of_usd(stipple, swarm, tmp_path):
+    render = bpy.context.scene.render
+    render.fps, render.fps_base = 30, 1.001
+    out = tmp_path / 'out.usda'
+    assert bpy.ops.stipple.splats_export(filepath=str(out), frames='SERIES') == {'FINISHED'}
+    assert names(tmp_path) == ['out.usda', 'swarm']
+    assert samples(out, 'positions') == {frame: series.COUNT for frame in (1, 2, 3, 4)}
+    rate = re.search(r'timeCodesPerSecond = ([\d.]+)', out.read_text()).group(1)
+    assert abs(float(rate) - 30 / 1.001) < 1e-5  # Blender keeps the base in single precision
+    assert_close(load(stipple, out), load(stipple, tmp_path / 'swarm' / 'swarm_0001.ply'), positions=1e-5)
+    assert bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'each.usdz'), frames='SERIES', one_file=False) == {
+        'FINISHED'}
+    assert names(tmp_path) == [*(f'each_000{i}.usdz' for i in (1, 2, 3, 4)), 'out.usda', 'swarm']
+
+
+def test_one_file_has_frames_that_show_nothing(stipple, swarm, tmp_path):
+    for frame, scale in ((1, 1.0), (2, 0.0), (3, 1.0)):
+        swarm.scale = (scale,) * 3
+        swarm.keyframe_insert('scale', frame=frame)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 3
+    bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'out.usda'), frames='SCENE')
+    assert samples(tmp_path / 'out.usda', 'scales') == {1: series.COUNT, 2: 0, 3: series.COUNT}
+
+
+def test_cancel_leaves_no_part_of_one_file(stipple, swarm, tmp_path, monkeypatch):
+    advance = stipple.jobs.Task.advance
+
+    def cancel_at_frame_3(self, fraction, stage):
+        if stage == 'Frame 3 of 4':
+            self.cancel()
+        advance(self, fraction, stage)
+
+    (tmp_path / 'v.usda').write_text('old')
+    monkeypatch.setattr(stipple.jobs.Task, 'advance', cancel_at_frame_3)
+    assert bpy.ops.stipple.splats_export(filepath=str(tmp_path / 'v.usda'), frames='SERIES') == {'CANCELLED'}
+    assert names(tmp_path) == ['swarm', 'v.usda'] and (tmp_path / 'v.usda').read_text() == 'old'
 
 
 def test_export_writes_the_series_own_splats(stipple, swarm, tmp_path):

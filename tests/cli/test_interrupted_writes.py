@@ -48,7 +48,7 @@ def writers():
     ways += [('meta.json', ('convert',), ()), ('cloud.gltf', ('convert',), ()),
              ('text.ply', ('convert',), ('--ascii',)), ('tree.stipple.safetensors', ('decode',), ()),
              ('volume.vdb', ('voxelize',), ('--resolution', 32)), ('a.png', ('render',), ()),
-             ('a.exr', ('render',), ())]
+             ('a.exr', ('render',), ()), ('film.usda', ('series',), ())]
     return ways
 
 

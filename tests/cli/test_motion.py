@@ -163,3 +163,20 @@ def test_images_without_times_are_refused_with_what_is_missing(dataset, tmp_path
 def test_options_of_fields_are_refused(moving, tmp_path):
     assert error('fit', moving, tmp_path / 'm.stipple.safetensors', *FEW, '--anchors', 64).endswith(
         'belongs to --model field')
+
+
+def test_a_series_of_a_model_plays_from_its_first_time_to_its_last(model, tmp_path):
+    seen = json.loads(run('series', model, tmp_path / 'film.usda', '--frame-rate', 8, '--anchors', 20, '--json').stdout)
+    assert seen == {'frames': 9, 'splats': 9 * 20}
+    text = (tmp_path / 'film.usda').read_text()
+    assert 'startTimeCode = 1\n' in text and 'endTimeCode = 9\n' in text
+
+
+def test_a_series_says_what_it_cannot_take(model, tmp_path):
+    run('decode', model, tmp_path / 'a.ply', '--anchors', 20)
+    assert '--anchors is of models' in error('series', tmp_path / 'a.ply', tmp_path / 'a.usda', '--anchors', 5)
+    assert 'one model' in error('series', model, model, tmp_path / 'a.usda')
+    assert 'a file to write' in error('series', model)
+    assert '.usdz can' in error('series', model, tmp_path / 'a.ply')
+    assert 'frames per second' in error('series', model, tmp_path / 'a.usda', '--frame-rate', 0)
+    assert not (tmp_path / 'a.usda').exists()

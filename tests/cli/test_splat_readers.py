@@ -228,3 +228,19 @@ def test_we_read_the_usd_that_tinyusdz_writes(ply, tmp_path):
     # It prints 6 digits or more.
     for name in ('position', 'rotation', 'opacity', 'sh'):
         assert seen[f'max_{name}'] < 1e-5, seen
+
+
+def test_tinyusdz_reads_every_frame_of_our_series(ply, tmp_path):
+    run('decode', ply, tmp_path / 'few.ply', '--anchors', 500)
+    run('convert', tmp_path / 'few.ply', tmp_path / 'few.usda')
+    seen = json.loads(run('series', tmp_path / 'few.ply', ply, tmp_path / 'film.usdz', '--frame-rate', 29.97, '--first',
+                          7, '--json'))
+    assert seen == {'frames': 2, 'splats': COUNT + 500}
+    layer = usd_layer(tmp_path / 'film.usdz')
+    assert 'timeCodesPerSecond = 29.97\n' in layer and 'startTimeCode = 7\n' in layer
+    text = re.search(r'point3f\[\] positions.timeSamples = \{(.*?)\}', layer, re.S).group(1)
+    frames = dict(re.findall(r'(\d+): \[(.*?)\]', text, re.S))
+    assert {frame: rows.count('(') for frame, rows in frames.items()} == {'7': 500, '8': COUNT}
+    numbers = numpy.array(re.findall(r'-?[\d.]+(?:e[+-]?\d+)?', frames['7']), 'f4')
+    expected = usd_array(usd_layer(tmp_path / 'few.usda'), 'positions')
+    numpy.testing.assert_array_equal(numbers, expected)

@@ -35,8 +35,8 @@ STEPS = (
     'info volume.vdb',
     'mesh truth.ply proxy.glb --resolution 48 --threshold 0.05',
     'decode proxy.glb surface.ply --anchors 500',
-    *(f'convert truth.ply packed.{form}' for form in ('spz', 'sog', 'glb', 'splat')),
-    *(f'info packed.{form}' for form in ('spz', 'sog', 'glb', 'splat')),
+    *(f'convert truth.ply packed.{form}' for form in ('spz', 'sog', 'glb', 'splat', 'usda', 'usdz')),
+    *(f'info packed.{form}' for form in ('spz', 'sog', 'glb', 'splat', 'usda', 'usdz')),
 )
 
 

@@ -29,7 +29,7 @@ def in_memory(*names):
 
 def work():
     assert splats(300) == {'FINISHED'}
-    for form in ('ply', 'spz', 'sog', 'glb'):
+    for form in ('ply', 'spz', 'sog', 'glb', 'usdz'):
         assert bpy.ops.stipple.splats_export(filepath=file(f'out.{form}')) == {'FINISHED'}
     assert bpy.ops.stipple.splats_to_volume(filepath=file('out.vdb'), resolution=24) == {'FINISHED'}
     scene = bpy.context.scene

@@ -18,6 +18,7 @@ class SplatFormat:
     can_write: bool
     max_sh_degree: int  # that it holds
     frame: Frame        # that positions are written in
+    holds_times: bool   # one file may hold a series (series_writer.py)
     keeps: frozenset    # of 'frame', 'colour_space' and 'antialias': what its files say of their splats
 
 
@@ -32,7 +33,7 @@ def splat_formats(library):
         check(library, library.stipple_format_info(index, byref(info)))
         formats.append(SplatFormat(info.name.decode(), info.title.decode(), tuple(info.extensions.decode().split()),
                                    bool(info.can_read), bool(info.can_write), info.max_sh_degree, Frame(info.frame),
-                                   frozenset(what for what in kept if getattr(info, f'keeps_{what}'))))
+                                   bool(info.holds_times), frozenset(what for what in kept if getattr(info, f'keeps_{what}'))))
     return formats
 
 

@@ -79,7 +79,7 @@ class StippleFormatInfo(_Sized):
     _fields_ = [('struct_size', c_uint32), ('can_read', c_uint32), ('can_write', c_uint32),
                 ('max_sh_degree', c_uint32), ('frame', c_uint32), ('reserved', c_uint32),
                 ('name', c_char_p), ('title', c_char_p), ('extensions', c_char_p), ('keeps_frame', c_uint32),
-                ('keeps_colour_space', c_uint32), ('keeps_antialias', c_uint32), ('reserved_keeps', c_uint32)]
+                ('keeps_colour_space', c_uint32), ('keeps_antialias', c_uint32), ('holds_times', c_uint32)]
 
 
 class StippleCloudComparison(_Sized):

@@ -1,18 +1,68 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Splat objects become a file, or one for each frame."""
+"""Splat objects become a file, one for each frame, or one that plays."""
 
 import os
+from contextlib import closing
 
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ..binding.cloud import Cloud, SplatArrays
 from ..binding.errors import invalid
+from ..binding.series_writer import SeriesWriter
 from ..jobs import JobOperator, Task
 from ..preferences import UP_AXES
 from ..scene.sequence import frames, frames_out, numbered
 from ..scene.source import exporting, formats, sources
+
+
+class FileEach:
+    """Frames as files with their numbers."""
+
+    def __init__(self, path, options):
+        self._path, self._options = path, options
+
+    def add_nothing(self, _number):
+        pass
+
+    def add(self, cloud, number):
+        to = numbered.frame_path(self._path, number)
+        if os.path.dirname(to) != os.path.dirname(self._path):
+            exporting.make_folder(to)
+        cloud.save(to, **self._options)
+
+    def finish(self):
+        pass
+
+    def close(self):
+        pass
+
+
+class OneFile:
+    """Frames as time samples of one file."""
+
+    def __init__(self, context, path, options):
+        render = context.scene.render
+        self._native = sources.context()
+        self._writer = SeriesWriter.create(self._native, path, render.fps / render.fps_base, **options)
+
+    def add_nothing(self, number):
+        nothing = SplatArrays(*(np.empty((0, width), np.float32) for width in (3, 4, 3)), np.empty(0, np.float32),
+                              np.empty((0, 1, 3), np.float32))
+        self._writer.add(Cloud.create(self._native, nothing), number)
+
+    def add(self, cloud, number):
+        self._writer.add(cloud, number)
+
+    def finish(self):
+        self._writer.finish()
+
+    def close(self):
+        """Leaves nothing of a file that is not finished."""
+        self._writer.close()
+
 
 class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     """Export splats to a file"""
@@ -42,8 +92,10 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
     max_degree: IntProperty(name="Harmonics",
                             description="Highest degree of the colors' harmonics that is written, 0 for "
                                         "colors that do not change with the view", default=4, min=0, max=4)
-    frames: EnumProperty(name="Frames", description="Which frames are written, each to a file of its own",
-                         items=frames_out.FRAMES, options={'SKIP_SAVE'})
+    frames: EnumProperty(name="Frames", description="Which frames are written, each to a file of its own, or all to "
+                         "one file of USD", items=frames_out.FRAMES, options={'SKIP_SAVE'})
+    one_file: BoolProperty(name="One File", description="Write all frames into one file that plays, as time samples, "
+                           "and not each to a file of its own (.usda, .usd, .usdz)", default=True)
     ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger (.ply)", default=False)
 
     @classmethod
@@ -72,8 +124,10 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         options = {'ascii': self.ascii, 'sh_degree_limit': self.max_degree}
         if self.apply_transform and self.up_axis != 'AUTO':
             options['frame'] = frames.UP_AXES[self.up_axis]
+        if self.frames != 'CURRENT' and form.holds_times and self.one_file:
+            return self._start_series(context, objects, OneFile(context, path, options))
         if self.frames != 'CURRENT':
-            return self._start_series(context, objects, path, options)
+            return self._start_series(context, objects, FileEach(path, options))
         clouds = exporting.placed_clouds(context, objects, self.budget, self.apply_transform,
                                          self.apply_grade)
 
@@ -85,25 +139,25 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
             return cloud.info().count
         return Task(work)
 
-    def _start_series(self, context, objects, path, options):
+    def _start_series(self, context, objects, out):
         found = frames_out.gather(context, objects, self.frames, self.budget, self.apply_grade)
         native, apply_transform = sources.context(), self.apply_transform
 
         def work(task):
             total = 0
-            for i, frame in enumerate(found):
-                task.advance(i / len(found), f'Frame {i + 1} of {len(found)}')
-                clouds = frame.clouds(native)
-                if not clouds:
-                    continue
-                cloud = exporting.joined(exporting.in_frame(clouds, apply_transform))
-                to = numbered.frame_path(path, frame.number)
-                if os.path.dirname(to) != os.path.dirname(path):
-                    exporting.make_folder(to)
-                cloud.save(to, **options)
-                total += cloud.info().count
-            if total == 0:
-                raise invalid('No frame shows a splat; there is nothing to write.')
+            with closing(out):
+                for i, frame in enumerate(found):
+                    task.advance(i / len(found), f'Frame {i + 1} of {len(found)}')
+                    clouds = frame.clouds(native)
+                    if not clouds:
+                        out.add_nothing(frame.number)
+                        continue
+                    cloud = exporting.joined(exporting.in_frame(clouds, apply_transform))
+                    out.add(cloud, frame.number)
+                    total += cloud.info().count
+                if total == 0:
+                    raise invalid('No frame shows a splat; there is nothing to write.')
+                out.finish()
             return total
         return Task(work)
 
@@ -118,6 +172,9 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
             layout.prop(self, 'use_selection')
         layout.prop(self, 'budget')
         layout.prop(self, 'frames')
+        form = formats.of_path(self.filepath)
+        if self.frames != 'CURRENT' and form is not None and form.holds_times:
+            layout.prop(self, 'one_file')
         layout.prop(self, 'apply_transform')
         row = layout.row()
         row.enabled = self.apply_transform

@@ -281,6 +281,21 @@ StippleStatus stipple_cloud_save_levels(const StippleCloud* const* levels, uint6
                                         const StippleCloud* environment, const char* path_utf8,
                                         const StippleCloudSaveOptions* options);
 
+/* Writes splats at times into one file of a format that holds them (StippleFormatInfo.holds_times: USD, as time
+ * samples). One cloud is in memory at a time, of a .usdz the text of all. The file has a temporary name until
+ * stipple_series_writer_finish; a writer that is freed before that leaves nothing. Threads: all, in each call. */
+typedef struct StippleSeriesWriter StippleSeriesWriter;
+/* In: frames_per_second > 0; options as of stipple_cloud_save, for every cloud, or NULL.
+ * Errors: INVALID_ARGUMENT, UNSUPPORTED for paths of other formats, IO. */
+StippleStatus stipple_series_writer_create(StippleContext* context, const char* path_utf8, double frames_per_second,
+                                           const StippleCloudSaveOptions* options, StippleSeriesWriter** writer);
+void stipple_series_writer_free(StippleSeriesWriter* writer);
+/* In: cloud, of the degree, colour space and filter of those before, or empty; frame, above that of the cloud before.
+ * Errors: INVALID_ARGUMENT, IO. */
+StippleStatus stipple_series_writer_add(StippleSeriesWriter* writer, const StippleCloud* cloud, double frame);
+/* Errors: INVALID_ARGUMENT where no cloud had a splat, or where it was called before; IO. */
+StippleStatus stipple_series_writer_finish(StippleSeriesWriter* writer);
+
 /* One format of splat files. The texts live as long as the library. */
 typedef struct StippleFormatInfo {
   uint32_t struct_size;
@@ -296,7 +311,7 @@ typedef struct StippleFormatInfo {
   uint32_t keeps_frame;         /* which way the axes point, also where that is another than *frame* */
   uint32_t keeps_colour_space;  /* else linear colours are written as display colours */
   uint32_t keeps_antialias;     /* the low-pass filter that the splats were made for */
-  uint32_t reserved_keeps;
+  uint32_t holds_times;         /* 1: one file may hold a series (stipple_series_writer_create) */
 } StippleFormatInfo;
 StippleStatus stipple_format_count(uint64_t* count);
 /* index 0..count-1. */

@@ -131,6 +131,12 @@ void writeSplatFile(const SplatCloud& cloud, const std::string& path,
   format->write(changed ? *changed : cloud, path, options, progress);
 }
 
+std::optional<SplatCloud> asWritten(const SplatCloud& cloud, const SplatFormat& format,
+                                    const SplatWriteOptions& options) {
+  checkDegreeLimit(options);
+  return prepared(cloud, changesFor(cloud, format, options));
+}
+
 void writeSplatLevels(const std::vector<const SplatCloud*>& levels, const SplatCloud* environment,
                       const std::string& path, const SplatWriteOptions& options,
                       Progress* progress) {
@@ -146,7 +152,7 @@ void writeSplatLevels(const std::vector<const SplatCloud*>& levels, const SplatC
   for (const SplatCloud*& cloud : clouds) {
     if (cloud == nullptr) continue;
     validate(*cloud, cloud == environment ? "environment" : "level");
-    if (auto copy = prepared(*cloud, changesFor(*cloud, *format, options))) {
+    if (auto copy = asWritten(*cloud, *format, options)) {
       cloud = &changed.emplace_back(std::move(*copy));
     }
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,12 @@ SplatCloud readSplatFile(const std::string& path, Progress* progress = nullptr);
 /// or the options.
 void writeSplatFile(const SplatCloud& cloud, const std::string& path,
                     const SplatWriteOptions& options, Progress* progress = nullptr);
+
+/// The cloud as a format takes it, turned and cut off as writeSplatFile does it; nothing where it
+/// is that already. In: a valid cloud. Errors: kInvalidArgument for a limit of the degree out of
+/// range.
+std::optional<SplatCloud> asWritten(const SplatCloud& cloud, const SplatFormat& format,
+                                    const SplatWriteOptions& options);
 
 /// Writes the levels of a streamed SOG scene (sog_levels.h), each turned and cut off as
 /// writeSplatFile does it.

@@ -64,6 +64,7 @@ struct SplatFormat {
   /// the harmonics that are written, at most max_sh_degree. Null where the format is not written.
   double (*estimate)(uint64_t count, int degree, const SplatWriteOptions& options) = nullptr;
   bool checks_values = false;     ///< with a RowCheck, which saves a pass through memory
+  bool holds_times = false;       ///< one file may hold a series (UsdSeriesWriter)
   bool takes_any_degree = false;  ///< passes over higher harmonics itself, without a copy
 };
 

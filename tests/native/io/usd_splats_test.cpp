@@ -10,6 +10,8 @@
 #include "base/parallel.h"
 #include "io/bytes/zip_file.h"
 #include "io/splats/splat_file.h"
+#include "io/usd/usd_series_writer.h"
+#include "io/usd/usd_text.h"
 #include "random_cloud.h"
 #include "scratch_folder.h"
 
@@ -258,6 +260,82 @@ TEST_F(UsdSplats, AreRefusedWithTheLineOrThePrim) {
   });
   expectError(ErrorCode::kUnsupported, {"empty"},
               [&] { writeSplatFile(SplatCloud(), path("c.usda"), {}); });
+}
+
+class UsdSeries : public ScratchFolder {};
+
+TEST_F(UsdSeries, HasEveryFrameAtItsTime) {
+  const size_t counts[] = {7, 0, 9000};
+  UsdSeriesWriter writer(path("a.usda"), 23.976, {});
+  std::vector<SplatCloud> clouds;
+  for (size_t i = 0; i < 3; ++i) {
+    clouds.push_back(randomCloud(counts[i], 1, static_cast<unsigned>(i)));
+    if (i == 1) clouds.back() = SplatCloud();
+    clouds.back().frame = Frame::kRUB;
+    writer.add(clouds.back(), 10 + static_cast<double>(i));
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("a.usda")));
+  writer.finish();
+  EXPECT_EQ(fileCount(), 1u);
+  const std::string text = load(path("a.usda"));
+  for (const char* line :
+       {"timeCodesPerSecond = 23.976\n", "startTimeCode = 10\n", "endTimeCode = 12\n"}) {
+    EXPECT_NE(text.find(line), std::string::npos) << line;
+  }
+  const UsdLayer layer = parseUsdText(text, "a.usda");
+  const UsdPrim& prim = *layer.root.children.at(0);
+  const std::pair<const char*, std::vector<float> SplatCloud::*> arrays[] = {
+      {"positions", &SplatCloud::positions},
+      {"orientations", &SplatCloud::rotations},
+      {"scales", &SplatCloud::scales},
+      {"opacities", &SplatCloud::opacities},
+      {"radiance:sphericalHarmonicsCoefficients", &SplatCloud::sh}};
+  for (const auto& [name, values] : arrays) {
+    const auto& samples = prim.attributes.at(name).samples;
+    ASSERT_EQ(samples.size(), 3u) << name;
+    for (size_t i = 0; i < 3; ++i) {
+      EXPECT_TRUE(samples.at(10 + static_cast<double>(i)).floats == clouds[i].*values) << name;
+    }
+  }
+  EXPECT_EQ(prim.attributes.at("extent").samples.at(12).floats.size(), 6u);
+  // As a file of splats it shows its first frame.
+  EXPECT_TRUE(readSplatFile(path("a.usda")).positions == clouds[0].positions);
+}
+
+TEST_F(UsdSeries, LiesInPackagesToo) {
+  SplatCloud cloud = randomCloud(40, 2, 1);
+  UsdSeriesWriter writer(path("a.usdz"), 24, {.sh_degree_limit = 1, .frame = Frame::kRFU});
+  writer.add(cloud, 1);
+  writer.add(cloud, 2.5);
+  writer.finish();
+  const SplatCloud back = readSplatFile(path("a.usdz"));
+  EXPECT_EQ(back.size(), 40u);
+  EXPECT_EQ(back.sh_degree, 1);
+  EXPECT_EQ(back.frame, Frame::kRFU);
+}
+
+TEST_F(UsdSeries, RefusesWhatDoesNotFitAndLeavesNothing) {
+  expectError(ErrorCode::kUnsupported, {"a.ply", ".usdz"},
+              [&] { UsdSeriesWriter(path("a.ply"), 24, {}); });
+  expectError(ErrorCode::kInvalidArgument, {"frames per second", "0"},
+              [&] { UsdSeriesWriter(path("a.usda"), 0, {}); });
+  expectError(ErrorCode::kIo, {"missing"},
+              [&] { UsdSeriesWriter(path("missing/a.usda"), 24, {}); });
+  store("a.usda", "old");
+  {
+    UsdSeriesWriter writer(path("a.usda"), 24, {});
+    expectError(ErrorCode::kInvalidArgument, {"none of its frames"}, [&] { writer.finish(); });
+    writer.add(randomCloud(5, 1, 1), 3);
+    expectError(ErrorCode::kInvalidArgument, {"frame 3", "ascend"},
+                [&] { writer.add(randomCloud(5, 1, 1), 3); });
+    expectError(ErrorCode::kInvalidArgument, {"frame 4", "degree 0", "degree 1"},
+                [&] { writer.add(randomCloud(5, 0, 1), 4); });
+    SplatCloud bad = randomCloud(5, 1, 1);
+    bad.opacities[2] = 2;
+    expectError(ErrorCode::kInvalidArgument, {"opacity"}, [&] { writer.add(bad, 5); });
+  }
+  EXPECT_EQ(load(path("a.usda")), "old");
+  EXPECT_EQ(fileCount(), 1u);
 }
 
 }  // namespace
