@@ -1,5 +1,6 @@
 #include "model/scaffold_splats.h"
 
+#include <cmath>
 #include <utility>
 
 #include "base/error.h"
@@ -35,6 +36,7 @@ class ScaffoldSplats final : public SplatModel {
     asset.sh_degree = scaffold.sh_degree;
     asset.colour_space = scaffold.colour_space;
     asset.antialias = scaffold.antialias;
+    asset.coarsening_percent = static_cast<uint32_t>(std::lround(100 * scaffold.coarsening));
     asset.tensors = tensorsOfScaffold(scaffold);
     asset.settings_json = notes_.settings_json;
     asset.extras = notes_.extras;
@@ -70,8 +72,12 @@ std::shared_ptr<const SplatModel> makeScaffoldSplats(
 std::shared_ptr<const SplatModel> readScaffoldSplats(const std::string& path, const ReadingAid&) {
   ScaffoldAsset asset = readScaffoldAsset(path);
   ModelNotes notes = {std::move(asset.settings_json), std::move(asset.extras)};
-  const ScaffoldShape shape = {asset.gaussians, asset.sh_degree, asset.colour_space,
-                               asset.antialias, 0};
+  const ScaffoldShape shape = {asset.gaussians,
+                               asset.sh_degree,
+                               asset.colour_space,
+                               asset.antialias,
+                               0,
+                               asset.coarsening_percent / 100.0};
   try {
     return makeScaffoldSplats(
         std::make_shared<const ScaffoldParameters>(scaffoldOfTensors(asset.tensors, shape)),

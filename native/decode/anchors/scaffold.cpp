@@ -55,6 +55,7 @@ ScaffoldParameters makeScaffold(const ScaffoldShape& shape) {
   scaffold.sh_degree = shape.sh_degree;
   scaffold.colour_space = shape.colour_space;
   scaffold.antialias = shape.antialias;
+  scaffold.coarsening = shape.coarsening;
   const size_t gaussians = shape.gaussians;
   scaffold.opacity = networkTo(gaussians, shape.seed);
   scaffold.covariance = networkTo(7 * gaussians, shape.seed + 1);

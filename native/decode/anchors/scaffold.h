@@ -30,6 +30,9 @@ struct ScaffoldParameters : AnchorArrays {
   int sh_degree = 0;        ///< 0..kMaxShDegree
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kClassic;
+  /// Splats of P of A anchors are (A / P)^coarsening as large, so that fewer cover as much. 0 where
+  /// no smaller budget was learned.
+  double coarsening = 0;
 
   Mlp opacity;     ///< to [K]: tanh; splats that are not above 0 are not there
   Mlp covariance;  ///< to [K,7]: shares of the last three scales by a logistic, a quaternion
@@ -46,6 +49,7 @@ struct ScaffoldShape {
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kClassic;
   uint64_t seed = 0;  ///< of the networks' weights
+  double coarsening = 0;
 };
 
 /// Without anchors. Errors: kInvalidArgument for a shape out of range.

@@ -93,6 +93,8 @@ void ScaffoldDecoder::forward(const AnchorArrays& anchors, size_t count, Scaffol
   cloud.antialias = scaffold.antialias;
   cloud.resize(tape.slots.size());
   const size_t higher = scaffold.higherCoefficients();
+  const double share = static_cast<double>(anchors.size()) / static_cast<double>(count);
+  const auto growth = static_cast<float>(std::pow(share, scaffold.coarsening));
   const float* opacities = tape.opacity.output().data();
   const float* covariances = tape.covariance.output().data();
   const float* colours = tape.colour.output().data();
@@ -106,7 +108,8 @@ void ScaffoldDecoder::forward(const AnchorArrays& anchors, size_t count, Scaffol
         cloud.positions[n * 3 + axis] =
             anchors.positions[anchor * 3 + axis] +
             anchors.offsets[slot * 3 + axis] * lengthOfLog(log_scales[axis]);
-        cloud.scales[n * 3 + axis] = lengthOfLog(log_scales[3 + axis]) * logistic(covariance[axis]);
+        cloud.scales[n * 3 + axis] =
+            growth * (lengthOfLog(log_scales[3 + axis]) * logistic(covariance[axis]));
       }
       const double length = lengthOf(covariance + 3);
       for (size_t i = 0; i < 4; ++i) {

@@ -51,13 +51,15 @@ class ScaffoldModel final : public FitModel {
 
   StepReport step(const FitMoment& moment, const StepView& view, ViewEvaluator*,
                   Progress* progress) override {
+    if (beginsBudgets(moment)) beginBudgets();
     const bool watches = watchesAnchors(moment);
     StepReport report;
     report.stage = "Anchors";
     {
       const TimedBlock watch(report.seconds.field);
       ScaffoldDecoder(state_.scaffold)
-          .forward(*state_.scaffold, state_.scaffold->size(), tape_, cloud_);
+          .forward(*state_.scaffold, budgetOfStep(moment, options_.seed, state_.scaffold->size()),
+                   tape_, cloud_);
     }
     StatisticRequest request;
     request.screen_gradients = watches;
@@ -88,6 +90,9 @@ class ScaffoldModel final : public FitModel {
     return report;
   }
 
+  /// Budgets are learned until then.
+  bool isWholeAtItsEndOnly() const override { return true; }
+
   SplatCloud splats(uint64_t budget) override {
     const uint64_t all = state_.scaffold->size();
     const uint64_t wanted = budget == 0 ? drawn_anchors_.value_or(all) : budget;
@@ -107,9 +112,11 @@ class ScaffoldModel final : public FitModel {
     return budgets;
   }
 
-  /// Half of the anchors after half, those that cost least to remove: what each of the others is
-  /// worth is asked again each time, since it depends on which others are there.
+  /// Where no budgets were learned: half of the anchors after half, those that cost least to
+  /// remove. What each of the others is worth is asked again each time, since it depends on which
+  /// others are there.
   void finish(FitViewEvaluator& views) override {
+    if (state_.scaffold->coarsening > 0) return;
     const size_t all = state_.scaffold->size();
     for (size_t left = all; left > 0;) {
       drawn_anchors_ = left;
@@ -140,6 +147,18 @@ class ScaffoldModel final : public FitModel {
   }
 
  private:
+  /// Anchors in an order whose first are spread over all, by how much they are seen.
+  void beginBudgets() {
+    std::vector<double> worth;
+    for (size_t a = 0; a < state_.scaffold->size(); ++a) {
+      worth.push_back(static_cast<double>(state_.statistics.opacity_sums[a]) /
+                      std::max(1.0, static_cast<double>(state_.statistics.seen[a])));
+    }
+    state_.keep(nestedOrder(state_.scaffold->positions, worth));
+    state_.scaffold->coarsening = kCoarsening;
+    gradients_ = {};
+  }
+
   /// What the loss of the views would rise by without each of the first anchors, summed over its
   /// splats.
   std::vector<double> worthOf(FitViewEvaluator& views, size_t anchors) {

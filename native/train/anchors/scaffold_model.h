@@ -33,15 +33,15 @@ ScaffoldStart startOfScaffold(const ViewSource& views, std::span<const size_t> t
                               const ScaffoldModelOptions& options, Progress* progress = nullptr);
 
 /// Anchors that carry features, and networks that make K splats of each: anchors grow where splats
-/// are pulled at, and go where splats are faint. When it ends, anchors are put in the order of what
-/// removing them costs, so that the first P are a budget. See docs/methods/anchors.md.
+/// are pulled at, and go where splats are faint. When that is over, anchors are nested, and steps
+/// draw the first of them, too, so that the first P are a budget. See docs/methods/anchors.md.
 /// Errors: kInvalidArgument for no views, options out of range.
 std::unique_ptr<FitModel> makeScaffoldModel(const BackendFactory& backends, const ViewSource& views,
                                             std::span<const size_t> training,
                                             const ScaffoldModelOptions& options,
                                             Progress* progress = nullptr);
 
-/// What such a fit has learned, in the order of worth; empty for any other model.
+/// What such a fit has learned, the first P anchors a budget; empty for any other model.
 std::shared_ptr<const ScaffoldParameters> scaffoldResult(const FitModel& model);
 
 }  // namespace stipple

@@ -76,6 +76,7 @@ TensorTable tensorsOf(const ScaffoldState& state) {
   putValues("window.opacity_sums", state.statistics.opacity_sums, table);
   putValues("window.seen", state.statistics.seen, table);
   if (!state.levels.empty()) putValues("window.levels", state.levels, table);
+  putValues("window.coarsening", std::vector<double>{state.scaffold->coarsening}, table);
   putValues("scaffold.steps", std::vector<uint64_t>{state.steps}, table);
   return table;
 }
@@ -104,6 +105,13 @@ ScaffoldState scaffoldStateOf(const TensorTable& table, const ScaffoldState& lik
     for (const uint8_t level : state.levels) {
       if (level > 2) fail(ErrorCode::kFormat, "the checkpoint has an anchor of level above 2");
     }
+  }
+  if (table.contains("window.coarsening")) {
+    const double value = takeValues<double>(table, "window.coarsening", 1, 1).front();
+    if (!(value >= 0 && value <= 1)) {
+      fail(ErrorCode::kFormat, "the checkpoint has a coarsening outside 0 to 1");
+    }
+    state.scaffold->coarsening = value;
   }
   state.steps = takeValues<uint64_t>(table, "scaffold.steps", 1, 1).front();
   return state;

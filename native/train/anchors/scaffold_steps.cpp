@@ -6,8 +6,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/random.h"
 #include "decode/tree/merge_neighbours.h"
 #include "densify/published_unit.h"
+#include "math/morton.h"
 #include "train/optimiser/adam.h"
 
 namespace stipple {
@@ -21,6 +23,9 @@ constexpr uint64_t kGrowUntil = 15000;
 constexpr uint64_t kGrowEvery = 100;
 /// In short fits, too: fewer views say little about an anchor.
 constexpr uint64_t kLeastWindow = 20;
+
+/// Of budgets that are learned, below all anchors.
+constexpr double kBudgetOctaves = 5;
 
 /// Weight of the mean product of a splat's scales, in cubed published units.
 constexpr double kVolumeWeight = 0.01;
@@ -273,6 +278,75 @@ void addStartingAnchors(std::span<const float> places, double voxel, uint64_t mo
 
 double voxelOf(std::span<const float> places) {
   return medianAboveZero(spacingOf(places), 1e-3) / kVoxelsPerSpacing;
+}
+
+bool beginsBudgets(const FitMoment& moment) {
+  return moment.iteration == std::max<uint64_t>(1, scaleSchedule(kGrowUntil, moment.iterations));
+}
+
+uint64_t budgetOfStep(const FitMoment& moment, uint64_t seed, uint64_t anchors) {
+  if (moment.iteration < std::max<uint64_t>(1, scaleSchedule(kGrowUntil, moment.iterations))) {
+    return anchors;
+  }
+  const double dice =
+      static_cast<double>(unitFloat(keyedBits(seed, RandomUse::kAnchorBudget, moment.iteration)));
+  const double octaves = kBudgetOctaves * std::max(0.0, 2.0 * dice - 1.0);
+  const double budget = static_cast<double>(anchors) * std::exp2(-octaves);
+  return std::max<uint64_t>(1, static_cast<uint64_t>(std::llround(budget)));
+}
+
+std::vector<uint32_t> nestedOrder(std::span<const float> positions, std::span<const double> worth) {
+  const size_t count = worth.size();
+  std::array<double, 3> low = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
+  double side = 0;
+  for (size_t i = 0; i < positions.size(); ++i) {
+    low[i % 3] = std::min(low[i % 3], static_cast<double>(positions[i]));
+  }
+  for (size_t i = 0; i < positions.size(); ++i) {
+    side = std::max(side, static_cast<double>(positions[i]) - low[i % 3]);
+  }
+  std::vector<uint64_t> codes(count);
+  for (size_t a = 0; a < count; ++a) {
+    std::array<uint32_t, 3> cell = {0, 0, 0};
+    for (size_t axis = 0; side > 0 && axis < 3; ++axis) {
+      const double share = (static_cast<double>(positions[a * 3 + axis]) - low[axis]) / side;
+      cell[axis] = static_cast<uint32_t>(std::min(share * 0x1p21, 0x1p21 - 1));
+    }
+    codes[a] = mortonEncode(cell[0], cell[1], cell[2]);
+  }
+  std::vector<uint32_t> left(count);
+  std::iota(left.begin(), left.end(), 0u);
+  std::stable_sort(left.begin(), left.end(),
+                   [&](uint32_t a, uint32_t b) { return codes[a] < codes[b]; });
+  // From the end: those that lose in the first round come last.
+  std::vector<uint32_t> order;
+  while (left.size() > 1) {
+    std::vector<uint32_t> winners, losers;
+    for (size_t i = 0; i < left.size(); i += 2) {
+      if (i + 1 == left.size()) {
+        winners.push_back(left[i]);
+        continue;
+      }
+      const bool first_wins = worth[left[i]] >= worth[left[i + 1]];
+      winners.push_back(left[first_wins ? i : i + 1]);
+      losers.push_back(left[first_wins ? i + 1 : i]);
+    }
+    // Between octaves, too, the first are spread over all: by reversed bits of their places.
+    std::vector<uint32_t> places(losers.size());
+    std::iota(places.begin(), places.end(), 0u);
+    const auto reversed = [](uint32_t value) {
+      uint32_t bits = 0;
+      for (int b = 0; b < 32; ++b) bits |= ((value >> b) & 1u) << (31 - b);
+      return bits;
+    };
+    std::sort(places.begin(), places.end(),
+              [&](uint32_t a, uint32_t b) { return reversed(a) > reversed(b); });
+    for (const uint32_t place : places) order.push_back(losers[place]);
+    left.swap(winners);
+  }
+  order.insert(order.end(), left.begin(), left.end());
+  std::reverse(order.begin(), order.end());
+  return order;
 }
 
 std::vector<uint32_t> orderOfWorth(std::span<const double> worth) {

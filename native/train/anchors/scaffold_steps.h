@@ -61,6 +61,18 @@ void addStartingAnchors(std::span<const float> places, double voxel, uint64_t mo
 /// A voxel for anchors that begin there: what grows does not depend on the unit of the scene.
 double voxelOf(std::span<const float> places);
 
+/// When growth is over: from then on steps learn budgets below all anchors, too, in nestedOrder().
+bool beginsBudgets(const FitMoment& moment);
+/// Anchors that a step draws: all in every second step, else at most five octaves fewer.
+uint64_t budgetOfStep(const FitMoment& moment, uint64_t seed, uint64_t anchors);
+/// Splats of half of the anchors are this power of 2 as large: those of a surface cover as much.
+constexpr double kCoarsening = 0.5;
+
+/// An order of which the first of any number are spread over all: of two neighbours along the
+/// Morton curve the one that is worth less goes to the end, and so on among those that are left.
+/// In: worth [A].
+std::vector<uint32_t> nestedOrder(std::span<const float> positions, std::span<const double> worth);
+
 /// Anchors by falling worth. In: worth [A].
 std::vector<uint32_t> orderOfWorth(std::span<const double> worth);
 

@@ -312,6 +312,8 @@ void Trainer::report(FitObserver& observer, const Pace& pace) const {
     }
     figures.splat_count = history_.records.back().splat_count;
   }
+  // Steps may draw fewer than there are; what is done is counted at its largest budget.
+  if (!history_.by_budget.empty()) figures.splat_count = history_.by_budget.back().splat_count;
   for (const FitMeasure& measure : history_.measures) {
     figures.psnr = measure.psnr;
     if (measure.iteration != history_.best_iteration) continue;

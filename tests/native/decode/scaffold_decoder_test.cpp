@@ -173,6 +173,40 @@ TEST(ScaffoldDecoder, RefusesAnotherCountOfGaussians) {
   EXPECT_THROW(ScaffoldDecoder(viewOf(scaffold)).decode(request), Error);
 }
 
+TEST(ScaffoldDecoder, MakesSplatsOfFewerAnchorsLarger) {
+  ScaffoldParameters scaffold = livelyScaffold(8, 2, 0);
+  const auto decoded = [&](double coarsening, size_t count, ScaffoldTape& tape) {
+    scaffold.coarsening = coarsening;
+    SplatCloud cloud;
+    ScaffoldDecoder(viewOf(scaffold)).forward(scaffold, count, tape, cloud);
+    return cloud;
+  };
+  ScaffoldTape tape;
+  EXPECT_EQ(decoded(0.5, 8, tape).scales, decoded(0, 8, tape).scales);
+  const SplatCloud plain = decoded(0, 2, tape), grown = decoded(0.5, 2, tape);
+  ASSERT_GT(grown.size(), 0u);
+  EXPECT_EQ(grown.positions, plain.positions);
+  for (size_t i = 0; i < grown.scales.size(); ++i) {
+    EXPECT_FLOAT_EQ(grown.scales[i], 2 * plain.scales[i]);  // the root of a quarter of the anchors
+  }
+  // A logarithm that rises by d lengthens them by e^d, whatever they are multiplied by.
+  SplatCloud by_cloud = grown;
+  for (auto values : {&SplatCloud::positions, &SplatCloud::rotations, &SplatCloud::scales,
+                      &SplatCloud::opacities, &SplatCloud::sh}) {
+    std::fill((by_cloud.*values).begin(), (by_cloud.*values).end(), 0.0f);
+  }
+  std::fill(by_cloud.scales.begin(), by_cloud.scales.end(), 1.0f);
+  ScaffoldGradients gradients;
+  ScaffoldDecoder(viewOf(scaffold)).backward(scaffold, tape, grown, by_cloud, gradients);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    double sum = 0;
+    for (size_t n = 0; n < grown.size(); ++n) {
+      if (tape.slots[n] < 2) sum += static_cast<double>(grown.scales[n * 3 + axis]);
+    }
+    EXPECT_NEAR(gradients.anchors.log_scales[3 + axis], sum, 1e-5 * sum);
+  }
+}
+
 TEST(Scaffold, ComesBackFromTensorsBitForBit) {
   const ScaffoldParameters scaffold = livelyScaffold(9, 3, 2);
   const TensorTable table = tensorsOfScaffold(scaffold);

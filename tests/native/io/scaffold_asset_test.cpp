@@ -21,6 +21,7 @@ ScaffoldAsset smallAsset() {
   asset.colour_space = ColourSpace::kLinear;
   asset.antialias = Antialias::kMip;
   asset.tensors["scaffold.positions"] = {{2, 3}, std::vector<float>{1, 2, 3, 4, 5, 6}};
+  asset.coarsening_percent = 50;
   asset.settings_json = "{\"iterations\":700}";
   return asset;
 }
@@ -34,6 +35,7 @@ TEST_F(ScaffoldAssetFile, GivesEverythingBackBitForBit) {
   EXPECT_EQ(seen.sh_degree, asset.sh_degree);
   EXPECT_EQ(seen.colour_space, asset.colour_space);
   EXPECT_EQ(seen.antialias, asset.antialias);
+  EXPECT_EQ(seen.coarsening_percent, asset.coarsening_percent);
   EXPECT_EQ(seen.settings_json, asset.settings_json);
   ASSERT_EQ(seen.tensors.size(), 1u);
   EXPECT_EQ(seen.tensors.at("scaffold.positions").values,

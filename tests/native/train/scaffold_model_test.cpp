@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "base/error.h"
 #include "decode/anchors/scaffold_decoder.h"
+#include "train/anchors/scaffold_steps.h"
 #include "train/loop/trainer.h"
 #include "train/toy_views.h"
 
@@ -108,22 +110,93 @@ TEST(ScaffoldModel, LearnsABallFromAFewAnchorsAndGrows) {
   }
 }
 
-TEST(ScaffoldModel, PutsTheAnchorsFirstThatCostMostToRemove) {
-  Fit fit(300);
-  fit.run();
+TEST(ScaffoldModel, LearnsBudgetsBelowAllAnchors) {
+  Fit fit(600);
+  const FitHistory& history = fit.run();
   const auto result = scaffoldResult(*fit.model);
+  EXPECT_EQ(result->coarsening, 0.5);
+  const std::vector<FitMeasure>& measured = history.by_budget;
+  const double whole = measured.back().psnr;
+  // Without that half of them lack 10 dB and more: holes in what they show.
+  EXPECT_GT(measured[measured.size() - 2].psnr, whole - 4);
+  EXPECT_GT(measured[measured.size() - 3].psnr, whole - 6);
+  // Anchors that were learned for it are better than the others.
   ScaffoldParameters last = *result;
   std::vector<uint32_t> rows;
   for (size_t a = result->size(); a-- > 0;) rows.push_back(static_cast<uint32_t>(a));
   keepAnchors(last, rows);
   DecodeRequest request;
   request.gaussians_per_anchor = result->gaussians;
-  request.budget = result->size() / 2;
-  const SplatCloud first_half = ScaffoldDecoder(result).decode(request);
-  const SplatCloud last_half =
+  request.budget = result->size() / 4;
+  const SplatCloud first_part = ScaffoldDecoder(result).decode(request);
+  const SplatCloud last_part =
       ScaffoldDecoder(std::make_shared<const ScaffoldParameters>(last)).decode(request);
-  EXPECT_GT(psnrOf(first_half, *fit.views), psnrOf(last_half, *fit.views) + 2);
-  EXPECT_EQ(first_half.positions, fit.model->splats(request.budget).positions);
+  EXPECT_GT(psnrOf(first_part, *fit.views), psnrOf(last_part, *fit.views) + 1);
+  EXPECT_EQ(first_part.positions, fit.model->splats(request.budget).positions);
+}
+
+TEST(ScaffoldModel, PutsAnchorsInTheOrderOfWorthWhereItIsStoppedBeforeItLearnsBudgets) {
+  struct Stops final : Quiet {
+    void figures(const FitFigures& figures) override {
+      if (figures.iteration == 250) progress.cancel();
+    }
+    Progress progress;
+  } stops;
+  Fit fit(600);
+  fit.trainer->run(stops, &stops.progress);
+  ASSERT_EQ(fit.trainer->iteration(), 250u);
+  const auto result = scaffoldResult(*fit.model);
+  EXPECT_EQ(result->coarsening, 0);
+  DecodeRequest request;
+  request.gaussians_per_anchor = result->gaussians;
+  request.budget = result->size() / 2;
+  ScaffoldParameters last = *result;
+  std::vector<uint32_t> rows;
+  for (size_t a = result->size(); a-- > 0;) rows.push_back(static_cast<uint32_t>(a));
+  keepAnchors(last, rows);
+  EXPECT_GT(
+      psnrOf(ScaffoldDecoder(result).decode(request), *fit.views),
+      psnrOf(ScaffoldDecoder(std::make_shared<const ScaffoldParameters>(last)).decode(request),
+             *fit.views) +
+          1);
+}
+
+TEST(ScaffoldSteps, NestAnchorsSoThatTheFirstAreSpreadOverAll) {
+  // Along a line: of each two neighbours the one that is worth more, and of those again.
+  std::vector<float> positions;
+  std::vector<double> worth;
+  for (int a = 0; a < 16; ++a) {
+    positions.insert(positions.end(), {static_cast<float>(a), 0, 0});
+    worth.push_back(a % 4 == 3 ? 2 : a % 2);
+  }
+  const std::vector<uint32_t> order = nestedOrder(positions, worth);
+  std::vector<uint32_t> sorted = order;
+  std::sort(sorted.begin(), sorted.end());
+  for (uint32_t a = 0; a < 16; ++a) ASSERT_EQ(sorted[a], a);
+  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(order[i] % 4, 3u) << i;
+  for (size_t i = 0; i < 8; ++i) EXPECT_EQ(order[i] % 2, 1u) << i;
+  EXPECT_NE(order[0] / 8, order[1] / 8);  // two of them: one in each half
+  EXPECT_EQ(nestedOrder({}, {}).size(), 0u);
+  EXPECT_EQ(nestedOrder(std::vector<float>(9, 1.0f), std::vector<double>(3, 1.0)).size(), 3u);
+}
+
+TEST(ScaffoldSteps, DrawAllAnchorsInHalfOfTheStepsThatLearnBudgets) {
+  FitMoment moment;
+  moment.iterations = 2000;
+  size_t whole = 0;
+  for (moment.iteration = 1; moment.iteration < 1000; ++moment.iteration) {
+    ASSERT_EQ(budgetOfStep(moment, 1, 640), 640u);
+    ASSERT_FALSE(beginsBudgets(moment));
+  }
+  ASSERT_TRUE(beginsBudgets(moment));
+  for (; moment.iteration < 2000; ++moment.iteration) {
+    const uint64_t budget = budgetOfStep(moment, 1, 640);
+    ASSERT_GE(budget, 20u);
+    ASSERT_LE(budget, 640u);
+    whole += budget == 640;
+  }
+  EXPECT_NEAR(static_cast<double>(whole), 500, 60);  // four standard deviations
+  EXPECT_EQ(budgetOfStep(moment, 1, 1), 1u);
 }
 
 TEST(ScaffoldModel, GoesOnBitForBitFromItsCheckpoint) {
