@@ -99,6 +99,7 @@ SplatWriteOptions writeOptions(const StippleCloudSaveOptions* options) {
   const StippleCloudSaveOptions given = completed(options, defaults, "options");
   SplatWriteOptions write;
   write.ascii = enumValue<uint32_t>(given.ascii, 1, "options->ascii") == 1;
+  write.half = enumValue<uint32_t>(given.half, 1, "options->half") == 1;
   write.sh_degree_limit = enumValue<int>(given.sh_degree_limit, static_cast<uint32_t>(kMaxShDegree),
                                          "options->sh_degree_limit");
   write.version = enumValue<int>(given.format_version, 255, "options->format_version");

@@ -20,7 +20,7 @@ constexpr uint64_t kDefaultLevels = 4;
 
 struct Arguments {
   std::string in, out, frame;
-  bool ascii = false;
+  bool ascii = false, half = false;
   uint32_t degree = 4;
   uint32_t version = 0;
   int64_t levels = 0;
@@ -113,6 +113,7 @@ void convert(const Context& context, const Arguments& arguments) {
   StippleCloudSaveOptions options;
   stipple_cloud_save_options_init(&options);
   options.ascii = arguments.ascii ? 1 : 0;
+  options.half = arguments.half ? 1 : 0;
   options.sh_degree_limit = arguments.degree;
   options.format_version = arguments.version;
   if (!arguments.frame.empty()) options.frame = frameOfName(arguments.frame);
@@ -137,6 +138,8 @@ void addConvert(CLI::App& app, const Context& context) {
       ->required();
   command->add_option("out", arguments->out, "Splat file to write")->required();
   command->add_flag("--ascii", arguments->ascii, "Write a PLY as text");
+  command->add_flag("--half", arguments->half,
+                    "Write USD with all but positions in half precision");
   command
       ->add_option("--degree", arguments->degree, "Leave out harmonics above this degree, 0 to 4")
       ->capture_default_str();

@@ -224,7 +224,8 @@ def test_the_size_is_estimated_well(stipple, tmp_path):
                                            sh_degree_limit=degree) - size) < 0.01 * size
 
     class Settings:
-        collection, use_selection, budget, max_degree, filepath, ascii = '', True, 'VIEWPORT', 3, 'x.ply', False
+        collection, use_selection, budget, max_degree, filepath = '', True, 'VIEWPORT', 3, 'x.ply'
+        ascii = half = False
     assert exporting.size_label(bpy.context, Settings) == '20,000 splats, about 5.0 MB'
     Settings.filepath = 'x.compressed.ply'
     assert exporting.size_label(bpy.context, Settings) == '20,000 splats, about 1.2 MB'

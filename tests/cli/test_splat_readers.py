@@ -220,6 +220,17 @@ def test_tinyusdz_reads_our_usd_as_it_is(ply, tmp_path, extension):
     assert (low < expected['positions'].min(0)).all() and (high > expected['positions'].max(0)).all()
 
 
+def test_tinyusdz_reads_our_halves(ply, tmp_path):
+    run('convert', ply, tmp_path / 'single.usda')
+    run('convert', ply, tmp_path / 'half.usda', '--half')
+    single, half = (usd_layer(tmp_path / f'{name}.usda') for name in ('single', 'half'))
+    for kind, name in (('quath', 'orientations'), ('half3', 'scales'), ('half', 'opacities'),
+                       ('half3', 'radiance:sphericalHarmonicsCoefficients')):
+        assert f'{kind}[] {name}h = [' in half
+        numpy.testing.assert_allclose(usd_array(half, f'{name}h'), usd_array(single, name), rtol=2 ** -10, atol=1e-7)
+    numpy.testing.assert_array_equal(usd_array(half, 'positions'), usd_array(single, 'positions'))
+
+
 def test_we_read_the_usd_that_tinyusdz_writes(ply, tmp_path):
     run('convert', ply, tmp_path / 'ours.usda')
     (tmp_path / 'theirs.usda').write_text(usd_layer(tmp_path / 'ours.usda'))

@@ -18,7 +18,7 @@ from .structs import (Antialias, ColourSpace, Frame, SplatQuantity, StippleCloud
 COLUMN_WIDTHS = {'positions': 3, 'rotations': 4, 'scales': 3, 'base': 4}
 _REST_WIDTH = 3
 
-SAVE_OPTIONS = ('ascii', 'sh_degree_limit', 'format_version', 'frame')
+SAVE_OPTIONS = ('ascii', 'sh_degree_limit', 'format_version', 'frame', 'half')
 
 
 def save_options(library, **options_given):

@@ -72,7 +72,7 @@ class StippleCloudColumnBuffers(_Sized):
 
 class StippleCloudSaveOptions(_Sized):
     _fields_ = [('struct_size', c_uint32), ('ascii', c_uint32), ('sh_degree_limit', c_uint32),
-                ('format_version', c_uint32), ('frame', c_uint32), ('reserved', c_uint32)]
+                ('format_version', c_uint32), ('frame', c_uint32), ('half', c_uint32)]
 
 
 class StippleFormatInfo(_Sized):

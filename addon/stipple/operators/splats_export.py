@@ -98,6 +98,9 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
                            "and not each to a file of its own (.usda, .usd, .usdz)", default=True)
     ascii: BoolProperty(name="Text", description="Write numbers as text, several times larger (.ply)", default=False)
 
+    half: BoolProperty(name="Half Precision", description="Write all but the positions in half precision, about a quarter "
+                       "smaller (.usda, .usd, .usdz)", default=False)
+
     @classmethod
     def poll(cls, context):
         return exporting.any_splats(context)
@@ -121,7 +124,7 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
             raise invalid(f"'{path}' has an extension that is no splat format to write; allowed are "
                           f"{', '.join(formats.write_extensions())}.")
         objects = exporting.chosen(context, self.collection, self.use_selection)
-        options = {'ascii': self.ascii, 'sh_degree_limit': self.max_degree}
+        options = {'ascii': self.ascii, 'half': self.half, 'sh_degree_limit': self.max_degree}
         if self.apply_transform and self.up_axis != 'AUTO':
             options['frame'] = frames.UP_AXES[self.up_axis]
         if self.frames != 'CURRENT' and form.holds_times and self.one_file:
@@ -173,7 +176,8 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         layout.prop(self, 'budget')
         layout.prop(self, 'frames')
         form = formats.of_path(self.filepath)
-        if self.frames != 'CURRENT' and form is not None and form.holds_times:
+        is_usd = form is not None and form.holds_times
+        if self.frames != 'CURRENT' and is_usd:
             layout.prop(self, 'one_file')
         layout.prop(self, 'apply_transform')
         row = layout.row()
@@ -183,6 +187,8 @@ class STIPPLE_OT_splats_export(JobOperator, bpy.types.Operator, ExportHelper):
         layout.prop(self, 'max_degree')
         if self.filepath.lower().endswith('.ply'):
             layout.prop(self, 'ascii')
+        if is_usd:
+            layout.prop(self, 'half')
         layout.label(text=exporting.size_label(context, self))
 
 

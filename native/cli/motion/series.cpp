@@ -20,6 +20,7 @@ struct Arguments {
   int64_t first = 1;
   int64_t anchors = 0;
   uint32_t degree = 4;
+  bool half = false;
   bool json = false;
 };
 
@@ -75,6 +76,7 @@ void writeSeries(const Context& context, const Arguments& arguments) {
   StippleCloudSaveOptions options;
   stipple_cloud_save_options_init(&options);
   options.sh_degree_limit = arguments.degree;
+  options.half = arguments.half ? 1 : 0;
   if (!arguments.frame.empty()) options.frame = frameOfName(arguments.frame);
   const auto writer = make<SeriesWriter>(stipple_series_writer_create, context.get(), out.c_str(),
                                          arguments.rate, &options);
@@ -122,6 +124,7 @@ void addSeries(CLI::App& app, const Context& context) {
       ->capture_default_str();
   command->add_option("--frame", arguments->frame,
                       "Frame that positions are written in, RUB (Y up) or RFU (Z up)");
+  command->add_flag("--half", arguments->half, "All but positions in half precision");
   command->add_flag("--json", arguments->json, "Figures as JSON");
   command->callback([arguments, &context] { writeSeries(context, *arguments); });
 }

@@ -264,7 +264,7 @@ typedef struct StippleCloudSaveOptions {
   uint32_t sh_degree_limit; /* 0..4, default 4: harmonics above it are left out */
   uint32_t format_version;  /* SPZ: 3 or 4; 0, the default: the newest */
   uint32_t frame;           /* StippleFrame that positions are written in; 0: the format's own */
-  uint32_t reserved;
+  uint32_t half;            /* 1: USD with all but positions in half precision, smaller by a quarter */
 } StippleCloudSaveOptions;
 void stipple_cloud_save_options_init(StippleCloudSaveOptions* options);
 /* Writes the format that the extension of the path says (stipple_format_info). The file has a temporary name

@@ -14,6 +14,7 @@ namespace stipple {
 /// over.
 struct SplatWriteOptions {
   bool ascii = false;                  ///< PLY: text instead of little-endian binary
+  bool half = false;                   ///< USD: all but positions in half precision
   int sh_degree_limit = kMaxShDegree;  ///< harmonics above this degree are left out
   int version = 0;                ///< of the format (SPZ: 3 or 4); 0: the newest that is written
   Frame frame = Frame::kUnknown;  ///< positions are written in this frame; unknown: the format's

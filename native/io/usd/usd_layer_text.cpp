@@ -5,8 +5,11 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/error.h"
+#include "base/number_text.h"
 #include "base/parallel.h"
 #include "io/usd/usd_names.h"
+#include "math/half_float.h"
 
 namespace stipple {
 
@@ -16,18 +19,23 @@ constexpr size_t kBlockRows = 4096;
 constexpr size_t kBlocksAtOnce = 32;
 constexpr double kReach = 3.0;  ///< standard deviations that the extent holds
 
-void putNumber(float value, std::string& text) {
-  // The shortest decimal that reads back as the same number.
+void putNumber(float value, bool is_half, std::string& text) {
+  constexpr int kDigitsOfHalf = 5;  // tell any two numbers of half precision apart
   char digits[32];
-  text.append(digits, std::to_chars(digits, digits + sizeof(digits), value).ptr);
+  char* const end = digits + sizeof(digits);
+  // In single precision the shortest decimal that reads back as the same number.
+  const auto written = is_half ? std::to_chars(digits, end, halfToFloat(floatToHalf(value)),
+                                               std::chars_format::general, kDigitsOfHalf)
+                               : std::to_chars(digits, end, value);
+  text.append(digits, written.ptr);
 }
 
 /// "(a, b, c)", or "a" alone.
-void putTuple(const float* values, size_t width, std::string& text) {
+void putTuple(const float* values, size_t width, bool is_half, std::string& text) {
   if (width > 1) text += '(';
   for (size_t k = 0; k < width; ++k) {
     if (k > 0) text += ", ";
-    putNumber(values[k], text);
+    putNumber(values[k], is_half, text);
   }
   if (width > 1) text += ')';
 }
@@ -38,12 +46,32 @@ void addCustom(const std::string& key, const std::string& value, std::string& cu
 
 }  // namespace
 
-std::array<UsdArray, 5> usdArrays(int sh_degree) {
-  return {{{"point3f[]", kUsdPositions, &SplatCloud::positions, 3, 3},
-           {"quatf[]", kUsdOrientations, &SplatCloud::rotations, 4, 4},
-           {"float3[]", kUsdScales, &SplatCloud::scales, 3, 3},
-           {"float[]", kUsdOpacities, &SplatCloud::opacities, 1, 1},
-           {"float3[]", kUsdCoefficients, &SplatCloud::sh, 3, shCoefficientCount(sh_degree) * 3}}};
+std::array<UsdArray, 5> usdArrays(int sh_degree, bool halves) {
+  const size_t harmonics = shCoefficientCount(sh_degree) * 3;
+  if (halves) {
+    return {{{"point3f[]", kUsdPositions, &SplatCloud::positions, 3, 3, false},
+             {"quath[]", kUsdOrientationsHalf, &SplatCloud::rotations, 4, 4, true},
+             {"half3[]", kUsdScalesHalf, &SplatCloud::scales, 3, 3, true},
+             {"half[]", kUsdOpacitiesHalf, &SplatCloud::opacities, 1, 1, true},
+             {"half3[]", kUsdCoefficientsHalf, &SplatCloud::sh, 3, harmonics, true}}};
+  }
+  return {{{"point3f[]", kUsdPositions, &SplatCloud::positions, 3, 3, false},
+           {"quatf[]", kUsdOrientations, &SplatCloud::rotations, 4, 4, false},
+           {"float3[]", kUsdScales, &SplatCloud::scales, 3, 3, false},
+           {"float[]", kUsdOpacities, &SplatCloud::opacities, 1, 1, false},
+           {"float3[]", kUsdCoefficients, &SplatCloud::sh, 3, harmonics, false}}};
+}
+
+void requireHalves(const SplatCloud& cloud, const std::string& path) {
+  constexpr float kLargestHalf = 65504.0f;
+  for (const std::vector<float>* values : {&cloud.scales, &cloud.sh}) {
+    const auto found = std::find_if(values->begin(), values->end(),
+                                    [](float value) { return std::abs(value) > kLargestHalf; });
+    if (found == values->end()) continue;
+    fail(ErrorCode::kUnsupported, path + " cannot be written in half precision: a splat has " +
+                                      numberText(static_cast<double>(*found)) +
+                                      ", and half precision reaches 65504");
+  }
 }
 
 std::string usdLayerHead(const SplatCloud& like, const std::string& times) {
@@ -98,7 +126,7 @@ std::string usdExtent(const SplatCloud& cloud) {
       values[axis] = static_cast<float>(std::clamp(corner[axis], -kLargest, kLargest));
     }
     text += text.size() > 1 ? ", " : "";
-    putTuple(values.data(), 3, text);
+    putTuple(values.data(), 3, false, text);
   }
   return text + "]";
 }
@@ -119,7 +147,7 @@ void putUsdRows(const UsdArray& array, const SplatCloud& cloud, const UsdSink& s
         for (size_t i = from; i < std::min(from + kBlockRows, count); ++i) {
           for (size_t k = 0; k < array.row; k += array.width) {
             if (k > 0) text += ", ";
-            putTuple(&values[i * array.row + k], array.width, text);
+            putTuple(&values[i * array.row + k], array.width, array.is_half, text);
           }
           text += i + 1 == count ? "\n" : ",\n";
         }

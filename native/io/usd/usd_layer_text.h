@@ -20,10 +20,16 @@ struct UsdArray {
   std::vector<float> SplatCloud::*values;
   size_t width;  ///< numbers of an element
   size_t row;    ///< numbers of a splat
+  bool is_half;  ///< rounded to half precision
 };
 
-/// The arrays of splats of a degree, in the order in which they are written.
-std::array<UsdArray, 5> usdArrays(int sh_degree);
+/// The arrays of splats of a degree, in the order in which they are written. In: halves, for all
+/// but positions in half precision.
+std::array<UsdArray, 5> usdArrays(int sh_degree, bool halves);
+
+/// Refuses a cloud with numbers that half precision does not reach. In: path, in the message.
+/// Errors: kUnsupported.
+void requireHalves(const SplatCloud& cloud, const std::string& path);
 
 /// The layer up to the attributes with values for each splat. In: like, whose frame, colour space,
 /// filter and degree the layer has; times, lines of the layer's metadata.

@@ -12,6 +12,12 @@ constexpr char kUsdScales[] = "scales";
 constexpr char kUsdOpacities[] = "opacities";
 constexpr char kUsdDegree[] = "radiance:sphericalHarmonicsDegree";
 constexpr char kUsdCoefficients[] = "radiance:sphericalHarmonicsCoefficients";
+/// The same in half precision, which are read where those in single precision are missing.
+constexpr char kUsdPositionsHalf[] = "positionsh";
+constexpr char kUsdOrientationsHalf[] = "orientationsh";
+constexpr char kUsdScalesHalf[] = "scalesh";
+constexpr char kUsdOpacitiesHalf[] = "opacitiesh";
+constexpr char kUsdCoefficientsHalf[] = "radiance:sphericalHarmonicsCoefficientsh";
 /// Of the schema ColorSpaceAPI. Splats without it are of display colours, as trained ones are.
 constexpr char kUsdColourSpace[] = "colorSpace:name";
 constexpr char kUsdLinear[] = "lin_rec709_scene";

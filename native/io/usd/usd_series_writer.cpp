@@ -47,7 +47,7 @@ UsdSeriesWriter::UsdSeriesWriter(const std::string& path, double frames_per_seco
     fail(ErrorCode::kInvalidArgument,
          "frames per second are " + numberText(frames_per_second) + "; a number above 0 is needed");
   }
-  for (size_t i = 0; i < 1 + usdArrays(0).size(); ++i) {
+  for (size_t i = 0; i < 1 + usdArrays(0, false).size(); ++i) {
     samples_.push_back(std::make_unique<OutputFile>(path));
   }
 }
@@ -84,7 +84,8 @@ void UsdSeriesWriter::add(const SplatCloud& cloud, double frame) {
   }
   const std::string time = "        " + exactText(frame) + ": ";
   put(0, time + usdExtent(written) + ",\n");
-  const std::array<UsdArray, 5> arrays = usdArrays(written.sh_degree);
+  if (options_.half) requireHalves(written, path_);
+  const std::array<UsdArray, 5> arrays = usdArrays(written.sh_degree, options_.half);
   for (size_t i = 0; i < arrays.size(); ++i) {
     put(i + 1, time + "[\n");
     putUsdRows(
@@ -103,7 +104,7 @@ void UsdSeriesWriter::finish() {
   file_.put(usdLayerHead(*like_, "    framesPerSecond = " + rate + "\n    timeCodesPerSecond = " +
                                      rate + "\n    startTimeCode = " + exactText(*first_) +
                                      "\n    endTimeCode = " + exactText(*last_) + "\n"));
-  const std::array<UsdArray, 5> arrays = usdArrays(like_->sh_degree);
+  const std::array<UsdArray, 5> arrays = usdArrays(like_->sh_degree, options_.half);
   std::string piece;
   for (size_t i = 0; i < samples_.size(); ++i) {
     file_.put(i == 0 ? std::string("    float3[] extent.timeSamples = {\n")

@@ -40,13 +40,23 @@ void requireText(std::string_view start, const std::string& name) {
            "'usdcat' and Blender's own USD export make of it");
 }
 
+/// Of an attribute in single precision and in half.
+struct Names {
+  const char *single, *half;
+};
+constexpr Names kPositions = {kUsdPositions, kUsdPositionsHalf};
+constexpr Names kOrientations = {kUsdOrientations, kUsdOrientationsHalf};
+constexpr Names kScales = {kUsdScales, kUsdScalesHalf};
+constexpr Names kOpacities = {kUsdOpacities, kUsdOpacitiesHalf};
+constexpr Names kCoefficients = {kUsdCoefficients, kUsdCoefficientsHalf};
+
 /// The splats of one prim, in its own space.
 class Part {
  public:
   Part(const UsdNode& node, std::string what) : node_(node), what_(std::move(what)) {}
 
   SplatCloud cloud(Frame frame, size_t already, uint64_t file_bytes) {
-    const std::vector<float>* positions = array(kUsdPositions);
+    const std::vector<float>* positions = array(kPositions);
     if (positions == nullptr) return {};
     count_ = positions->size() / 3;
     SplatCloud cloud;
@@ -54,11 +64,11 @@ class Part {
     requireAllowed(cloudBytes(already + count_, cloud.sh_degree), kSplatAllowance, file_bytes,
                    what_, "the splats of the file");
     cloud.resize(count_);
-    take(kUsdPositions, 3, 0.0f, cloud.positions);
-    take(kUsdScales, 3, 1.0f, cloud.scales);
-    take(kUsdOpacities, 1, 1.0f, cloud.opacities);
-    take(kUsdOrientations, 4, 0.0f, cloud.rotations);
-    take(kUsdCoefficients, cloud.shStride(), 0.0f, cloud.sh);
+    take(kPositions, 3, 0.0f, cloud.positions);
+    take(kScales, 3, 1.0f, cloud.scales);
+    take(kOpacities, 1, 1.0f, cloud.opacities);
+    take(kOrientations, 4, 0.0f, cloud.rotations);
+    take(kCoefficients, cloud.shStride(), 0.0f, cloud.sh);
     parallelFor(count_, kGrain, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) normaliseRotation(&cloud.rotations[i * 4]);
     });
@@ -83,8 +93,8 @@ class Part {
   }
 
   /// In single precision or half; null where it is not there.
-  const std::vector<float>* array(const std::string& name) const {
-    for (const std::string& one : {name, name + "h"}) {
+  const std::vector<float>* array(const Names& names) const {
+    for (const char* one : {names.single, names.half}) {
       const UsdValue* value = node_.value(one);
       if (value != nullptr && !value->floats.empty()) return &value->floats;
     }
@@ -92,7 +102,7 @@ class Part {
   }
 
   int degree() const {
-    if (array(kUsdCoefficients) == nullptr) return 0;
+    if (array(kCoefficients) == nullptr) return 0;
     const UsdValue* value = node_.value(kUsdDegree);
     if (value == nullptr || value->numbers.empty()) return 3;
     const double degree = value->numbers.front();
@@ -103,14 +113,14 @@ class Part {
   }
 
   /// In: width, numbers of a splat; otherwise, what they are where the array is missing.
-  void take(const char* name, size_t width, float otherwise, std::vector<float>& values) const {
-    const std::vector<float>* stored = array(name);
+  void take(const Names& names, size_t width, float otherwise, std::vector<float>& values) const {
+    const std::vector<float>* stored = array(names);
     if (stored == nullptr) {
       std::fill(values.begin(), values.end(), otherwise);
       return;
     }
     if (stored->size() < count_ * width) {
-      failHere("has " + std::to_string(stored->size()) + " numbers of " + name + "; its " +
+      failHere("has " + std::to_string(stored->size()) + " numbers of " + names.single + "; its " +
                std::to_string(count_) + " splats need " + std::to_string(count_ * width));
     }
     std::copy_n(stored->begin(), count_ * width, values.begin());

@@ -125,6 +125,7 @@ TEST_F(SplatWriters, AreAsLargeAsTheirFormatsEstimate) {
         name == "ply" || name == "compressed-ply" || name == "splat" || name == "gltf";
     std::vector<SplatWriteOptions> ways = {{}, {.sh_degree_limit = 1}, {.sh_degree_limit = 0}};
     if (name == "ply") ways.push_back({.ascii = true});
+    if (name == "usd") ways.push_back({.half = true});
     if (name == "spz") ways.push_back({.version = 3});
     for (const SplatWriteOptions& way : ways) {
       for (const int degree : {0, 2, 3}) {

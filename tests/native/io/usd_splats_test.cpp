@@ -262,6 +262,37 @@ TEST_F(UsdSplats, AreRefusedWithTheLineOrThePrim) {
               [&] { writeSplatFile(SplatCloud(), path("c.usda"), {}); });
 }
 
+TEST_F(UsdSplats, HaveHalfPrecisionWhereItIsAskedFor) {
+  SplatCloud cloud = randomCloud(5000, 2, 6);
+  cloud.frame = Frame::kRUB;
+  writeSplatFile(cloud, path("a.usda"), {});
+  writeSplatFile(cloud, path("h.usda"), {.half = true});
+  const SplatCloud back = readSplatFile(path("h.usda"));
+  EXPECT_TRUE(back.positions == cloud.positions);
+  const std::pair<std::vector<float> SplatCloud::*, float> arrays[] = {
+      {&SplatCloud::scales, 0},
+      {&SplatCloud::opacities, 0},
+      {&SplatCloud::sh, 0},
+      // Normalised again when they are read.
+      {&SplatCloud::rotations, 1e-3f}};
+  for (const auto& [values, slack] : arrays) {
+    for (size_t i = 0; i < (cloud.*values).size(); ++i) {
+      const float value = (cloud.*values)[i];
+      // Half a step: of 11 bits, or of 2^-24 below 2^-14.
+      const float step = std::max(std::abs(value) * 0x1p-11f, 0x1p-25f);
+      ASSERT_NEAR((back.*values)[i], value, step + slack) << i;
+    }
+  }
+  EXPECT_FALSE(back.sh == cloud.sh);
+  const auto bytes = [&](const char* name) {
+    return static_cast<double>(std::filesystem::file_size(path(name)));
+  };
+  EXPECT_LT(bytes("h.usda"), 0.8 * bytes("a.usda"));
+  cloud.scales[7] = 7e4f;
+  expectError(ErrorCode::kUnsupported, {"h.usda", "70000", "65504"},
+              [&] { writeSplatFile(cloud, path("h.usda"), {.half = true}); });
+}
+
 class UsdSeries : public ScratchFolder {};
 
 TEST_F(UsdSeries, HasEveryFrameAtItsTime) {
@@ -304,7 +335,8 @@ TEST_F(UsdSeries, HasEveryFrameAtItsTime) {
 
 TEST_F(UsdSeries, LiesInPackagesToo) {
   SplatCloud cloud = randomCloud(40, 2, 1);
-  UsdSeriesWriter writer(path("a.usdz"), 24, {.sh_degree_limit = 1, .frame = Frame::kRFU});
+  UsdSeriesWriter writer(path("a.usdz"), 24,
+                         {.half = true, .sh_degree_limit = 1, .frame = Frame::kRFU});
   writer.add(cloud, 1);
   writer.add(cloud, 2.5);
   writer.finish();

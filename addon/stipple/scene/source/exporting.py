@@ -120,7 +120,7 @@ def size_label(context, operator):
         total += count
         if form is not None:
             size += formats.estimated_bytes(form, count, splat_data.degree(obj.data), ascii=operator.ascii,
-                                            sh_degree_limit=operator.max_degree)
+                                            half=operator.half, sh_degree_limit=operator.max_degree)
     return f'{total:,} splats, about {megabytes(size)}'
 
 
