@@ -19,6 +19,7 @@ constexpr int kMaxArcs = 100;          ///< of references in references
 constexpr int kMaxDepth = 200;         ///< of prims in each other
 constexpr size_t kMaxPrims = 100000;   ///< that are visited, each as often as it is referred to
 constexpr size_t kMaxOpinions = 1000;  ///< of one prim
+constexpr char kPointInstancer[] = "PointInstancer";
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 /// The matrix of one operation. In: kind, as "rotateXYZ"; numbers, as many as it needs.
@@ -119,9 +120,12 @@ bool UsdNode::isDrawn() const {
   const auto defined =
       strongest([](const UsdPrim& prim) { return prim.is_defined || prim.is_class; });
   if (defined == opinions_.end() || defined->prim->is_class) return false;
-  const UsdValue* visibility = value("visibility");
-  return visibility == nullptr || visibility->words.empty() ||
-         visibility->words.front() != "invisible";
+  const auto word = [&](const char* attribute) -> std::string_view {
+    const UsdValue* said = value(attribute);
+    return said == nullptr || said->words.empty() ? "" : std::string_view(said->words.front());
+  };
+  return word("visibility") != "invisible" && word("purpose") != "proxy" &&
+         word("purpose") != "guide";
 }
 
 bool UsdNode::leavesParent() const {
@@ -249,6 +253,8 @@ void UsdStage::walk(
                                  " prims, or prims in each other without end");
   }
   if (!path.empty()) visit_one(node, path, matrix);
+  // What it has are prototypes, which are drawn at its points alone.
+  if (node.type() == kPointInstancer) return;
   std::set<std::string> seen;
   for (const UsdNode::Opinion& opinion : node.opinions_) {
     for (const auto& prim : opinion.prim->children) {

@@ -22,7 +22,7 @@ class UsdNode {
   const UsdValue* value(const std::string& attribute) const;
   /// A string of customData, or empty.
   std::string custom(const std::string& key) const;
-  bool isDrawn() const;  ///< defined, active, no class, not invisible
+  bool isDrawn() const;  ///< defined, active, no class, not invisible, no proxy and no guide
   /// Where the prim's transformation leads, columns as in all of Stipple. In: path, in messages.
   /// Errors: kFormat for operations without a value.
   Mat4d matrix(const std::string& path) const;

@@ -192,6 +192,8 @@ TEST_F(UsdSplats, AreDrawnOncePerReference) {
       "  over \"s\" { float[] opacities = [0.5] }\n}\n"
       "def \"Off\" (active = false\n references = </Scan>) {}\n"
       "def \"Unseen\" (references = [</Scan>]) { token visibility = \"invisible\" }\n"
+      "def \"StandIn\" (references = </Scan>) { uniform token purpose = \"proxy\" }\n"
+      "def PointInstancer \"Many\" { def \"p\" (references = </Scan>) {} }\n"
       "over \"Nothing\" { def \"s\" (references = </Scan>) {} }\n"
       "over \"Abstract\" (inherits = </Shape>) {}\n"
       "class \"Shape\" (references = </Scan>) {}\n"
