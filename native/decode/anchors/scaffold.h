@@ -12,7 +12,7 @@ namespace stipple {
 constexpr size_t kScaffoldFeatures = 32;  ///< numbers that an anchor keeps for the networks
 constexpr size_t kScaffoldScales = 6;     ///< of the offsets (3), then of the splats (3)
 
-/// What is known of each of A anchors. Rows are in the order of worth, where there is one.
+/// What is known of each of A anchors. The first P rows are a budget, where one was learned.
 struct AnchorArrays {
   std::vector<float> positions;   ///< [A,3] metres
   std::vector<float> features;    ///< [A,kScaffoldFeatures]

@@ -16,7 +16,7 @@ struct ScaffoldAsset {
   ColourSpace colour_space = ColourSpace::kDisplay;
   Antialias antialias = Antialias::kClassic;
   uint32_t coarsening_percent = 0;   ///< how splats of fewer anchors grow: 0 to 100
-  TensorTable tensors;               ///< "scaffold.*", rows in the order of worth
+  TensorTable tensors;               ///< "scaffold.*", the first P rows a budget
   std::string settings_json = "{}";  ///< free for the caller (how it was made)
   AssetExtras extras;                ///< of the file that it was read from
 };
