@@ -67,8 +67,7 @@ bool beginsBudgets(const FitMoment& moment);
 /// on.
 void beginBudgets(ScaffoldState& state);
 /// Anchors that a step draws: fewer in this share of the steps, by at most five octaves, else all.
-uint64_t budgetOfStep(const FitMoment& moment, uint64_t seed, uint64_t anchors,
-                      double share = 0.5);
+uint64_t budgetOfStep(const FitMoment& moment, uint64_t seed, uint64_t anchors, double share = 0.5);
 /// Splats of half of the anchors are this power of 2 as large: those of a surface cover as much.
 constexpr double kCoarsening = 0.5;
 
