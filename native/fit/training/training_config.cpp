@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -27,12 +28,15 @@ constexpr double kLargestWhole = 9007199254740992.0;
 }
 
 constexpr const char* kStageNames[] = {"structure", "attributes", "joint"};
+constexpr const char* kLossScalingNames[] = {"none", "dynamic"};
 
 /// A place of a config that a key of its text sets.
 struct Setting {
   std::string name;
   std::function<void(const FlatJsonValue&)> set;
-  std::function<std::string()> json;  ///< its value as JSON; null: weights do not depend on it
+  /// Its value as JSON; null: weights do not depend on it. Empty: they do not as other settings
+  /// are.
+  std::function<std::string()> json;
 };
 
 std::string quoted(const std::string& text) {
@@ -85,16 +89,31 @@ Setting path(const std::string& name, std::string& place, const std::string& fol
   return {name, set, nullptr};
 }
 
-Setting stage(const std::string& name, AutoencoderStage& place) {
-  const auto set = [&place, name](const FlatJsonValue& given) {
+/// One of some names, in the order of the values that they stand for.
+template <class T>
+Setting choice(const std::string& name, T& place, std::span<const char* const> names) {
+  const auto set = [&place, name, names](const FlatJsonValue& given) {
     const std::string& text = textOf(given, name);
-    const auto* const found = std::find(std::begin(kStageNames), std::end(kStageNames), text);
-    if (found == std::end(kStageNames)) {
-      refuse("'" + name + "' is '" + text + "'; structure, attributes or joint is allowed");
+    const auto found = std::find(names.begin(), names.end(), text);
+    if (found == names.end()) {
+      std::string allowed;
+      for (size_t i = 0; i < names.size(); ++i) {
+        if (i > 0) allowed += i + 1 < names.size() ? ", " : " or ";
+        allowed += names[i];
+      }
+      refuse("'" + name + "' is '" + text + "'; " + allowed + " is allowed");
     }
-    place = static_cast<AutoencoderStage>(found - std::begin(kStageNames));
+    place = static_cast<T>(found - names.begin());
   };
-  return {name, set, [&place] { return quoted(stageName(place)); }};
+  return {name, set, [&place, names] { return quoted(names[static_cast<size_t>(place)]); }};
+}
+
+/// A setting that came later than others and that weights depend on where `matters` says so: what
+/// earlier versions wrote and what this one writes are the same elsewhere.
+Setting keptWhere(std::function<bool()> matters, Setting setting) {
+  const auto json = std::move(setting.json);
+  setting.json = [matters = std::move(matters), json] { return matters() ? json() : ""; };
+  return setting;
 }
 
 void addNetwork(AutoencoderSizes& sizes, std::vector<Setting>& list) {
@@ -122,6 +141,12 @@ void addOptimiser(const std::string& at, WeightOptimiserOptions& optimiser,
   list.push_back(number(at + "clip_buffer", optimiser.clip_buffer));
   list.push_back(number(at + "clip_percentile", optimiser.clip_percentile));
   list.push_back(number(at + "mean_decay", optimiser.mean_decay));
+  const auto is_scaled = [&optimiser] { return optimiser.loss_scaling != LossScaling::kNone; };
+  list.push_back(
+      keptWhere(is_scaled, choice(at + "loss_scale", optimiser.loss_scaling, kLossScalingNames)));
+  list.push_back(keptWhere(is_scaled, number(at + "loss_scale_start", optimiser.loss_scale_start)));
+  list.push_back(
+      keptWhere(is_scaled, number(at + "loss_scale_growth", optimiser.loss_scale_growth)));
 }
 
 void addFlow(FlowConfig& flow, std::vector<Setting>& list) {
@@ -167,7 +192,7 @@ void addDetail(DetailConfig& detail, std::vector<Setting>& list) {
 void addPart(const std::string& at, AutoencoderSchedule& part, std::vector<Setting>& list) {
   WeightOptimiserOptions& optimiser = part.optimiser;
   AutoencoderLossWeights& weights = part.weights;
-  list.push_back(stage(at + "stage", part.stage));
+  list.push_back(choice(at + "stage", part.stage, kStageNames));
   list.push_back(number(at + "steps", optimiser.total_steps));
   list.push_back(number(at + "batch", part.batch));
   list.push_back(number(at + "tokens", part.most_tokens));
@@ -287,7 +312,7 @@ void setParts(const std::vector<std::pair<std::string, FlatJsonValue>>& entries,
     for (size_t i = 0; i < count; ++i) {
       if (name != "parts." + std::to_string(i) + ".stage") continue;
       AutoencoderStage given = AutoencoderStage::kStructure;
-      stage(name, given).set(value);
+      choice(name, given, kStageNames).set(value);
       config.parts[i] = usualPart(given);
     }
   }
@@ -447,10 +472,11 @@ std::string settingsJson(const TrainingConfig& config) {
   TrainingConfig copy = config;
   std::string json;
   for (const Setting& setting : settingsOf(copy, "")) {
-    if (setting.json == nullptr) continue;
+    const std::string value = setting.json == nullptr ? "" : setting.json();
+    if (value.empty()) continue;
     json.push_back(json.empty() ? '{' : ',');
     json.append(quoted(setting.name)).push_back(':');
-    json.append(setting.json());
+    json.append(value);
   }
   return json + "}";
 }

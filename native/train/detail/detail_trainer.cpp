@@ -99,12 +99,13 @@ void DetailTrainer::addExample(size_t index, uint64_t key, double share, DetailS
   const std::vector<size_t> seen = drawnViews(views.count(), schedule_.seen, mixBits(key));
   const std::unique_ptr<ViewPass> pass = backends_->makeViewPass();
   const double view_share = share / static_cast<double>(seen.size());
+  const double scaled_share = view_share * optimiser_->lossScale();
   for (const size_t at : seen) {
     if (progress != nullptr) progress->throwIfCancelled();
     const ObjectView view = views.view(at);
     const bool is_white = keyedBits(key, RandomUse::kBackground, at) & 1;
     const ImageLossValue loss = addViewLoss(*pass, view, is_white, fine, {}, schedule_.ssim,
-                                            view_share, by_view, by_fine, progress);
+                                            scaled_share, by_view, by_fine, progress);
     done.l1 += view_share * loss.l1;
     done.ssim += view_share * loss.ssim;
     done.loss += view_share * (1 + schedule_.ssim) * loss.loss;

@@ -93,7 +93,7 @@ struct AutoencoderExample {
   size_t surface =
       8192;           ///< points of the surface that tell the density, drawn where there are more
   uint64_t seed = 0;  ///< of noise, anchors, views and backgrounds
-  double share = 1;   ///< of the step: one over its examples
+  double share = 1;   ///< of the step: one over its examples, times the scale of its loss
 };
 
 /// What an example lost, without weights.

@@ -101,6 +101,64 @@ TEST(AutoencoderTrainer, ALossThatIsNotFiniteIsSkippedAndCounted) {
   for (const float value : trainer.values()) ASSERT_TRUE(std::isfinite(value));
 }
 
+std::vector<AutoencoderSchedule> scaledParts(double start) {
+  std::vector<AutoencoderSchedule> parts = threeParts();
+  for (AutoencoderSchedule& part : parts) {
+    part.optimiser.loss_scaling = LossScaling::kDynamic;
+    part.optimiser.loss_scale_start = start;
+    part.optimiser.loss_scale_growth = 0.4;  // so that it changes within these few steps
+  }
+  return parts;
+}
+
+TEST(AutoencoderTrainer, AScaleOfLossesChangesNoBit) {
+  const auto objects = std::make_shared<AskedBalls>(2);
+  AutoencoderTrainer plain = trainerOf(objects), scaled = trainerOf(objects, scaledParts(20));
+  std::vector<double> scales;
+  while (!scaled.isDone()) {
+    const AutoencoderStep one = plain.step(), other = scaled.step();
+    scales.push_back(other.weights.loss_scale);
+    EXPECT_EQ(one.losses.total, other.losses.total);
+    EXPECT_EQ(one.weights.gradient_norm, other.weights.gradient_norm);
+  }
+  // Powers of two round nothing, whatever comes between the loss and a derivative.
+  EXPECT_EQ(scaled.values(), plain.values());
+  EXPECT_EQ(scales[0], std::exp2(20));
+  EXPECT_EQ(scales[4], std::exp2(21));
+  EXPECT_EQ(scales[5], std::exp2(20)) << "each part begins anew";
+}
+
+TEST(AutoencoderTrainer, AScaleOfLossesThatOverflowsFallsAndGoesOnFromACheckpoint) {
+  const auto objects = std::make_shared<AskedBalls>(2);
+  std::vector<AutoencoderSchedule> parts = {scaledParts(100)[0]};
+  parts[0].optimiser.loss_scale_growth = 1;
+  parts[0].optimiser.total_steps = 60;
+  AutoencoderTrainer whole = trainerOf(objects, parts);
+  std::vector<TensorTable> states;
+  uint64_t skipped = 0;
+  while (!whole.isDone()) {
+    states.push_back(whole.state());
+    const std::vector<float> values = whole.values();
+    const double scale = std::exp2(100.0 + static_cast<double>(states.size() - 1 - 2 * skipped));
+    const WeightStep done = whole.step().weights;
+    EXPECT_EQ(done.loss_scale, scale);
+    EXPECT_EQ(done.is_skipped || states.size() == 1, whole.values() == values) << "rate 0 at first";
+    skipped += done.is_skipped;
+  }
+  // About 28 steps until derivatives, which are below 1, pass 2^128; then it goes up and down.
+  EXPECT_GT(skipped, 5u);
+  EXPECT_LT(skipped, 17u);
+  AutoencoderTrainer again = trainerOf(objects, parts);
+  again.resume(states[41]);
+  while (!again.isDone()) again.step();
+  EXPECT_EQ(again.values(), whole.values());
+  EXPECT_EQ(std::get<std::vector<double>>(again.state()["optimiser.loss_scale"].values),
+            std::get<std::vector<double>>(whole.state()["optimiser.loss_scale"].values));
+  TensorTable none = states[41];
+  none.erase("optimiser.loss_scale");
+  EXPECT_THROW(again.resume(none), Error);
+}
+
 TEST(AutoencoderTrainer, StatesOfOtherTrainingsAreRefused) {
   const auto objects = std::make_shared<AskedBalls>(1);
   AutoencoderTrainer trainer = trainerOf(objects);

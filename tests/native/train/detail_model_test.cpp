@@ -318,7 +318,8 @@ class GreyBall final : public DetailSource {
   TrainingObject object_ = ball();
 };
 
-DetailTrainer trainerOf(uint64_t steps, std::shared_ptr<const DetailSource> source) {
+DetailTrainer trainerOf(uint64_t steps, std::shared_ptr<const DetailSource> source,
+                        LossScaling scaling = LossScaling::kNone) {
   DetailSchedule schedule;
   schedule.least_splats = 60;
   schedule.most_splats = 120;
@@ -328,6 +329,7 @@ DetailTrainer trainerOf(uint64_t steps, std::shared_ptr<const DetailSource> sour
   schedule.optimiser.warm_up = 5;
   schedule.optimiser.learning_rate = 3e-3;
   schedule.optimiser.mean_decay = 0.9;
+  schedule.optimiser.loss_scaling = scaling;
   DetailModelSizes sizes = smallSizes(1, 4);
   sizes.head_width = 8;
   return {sizes, schedule, 3, std::move(source), cpuBackends()};
@@ -358,6 +360,17 @@ TEST(DetailTrainer, GoesOnBitForBit) {
   TensorTable broken = first.state();
   broken.erase("detail.weights");
   EXPECT_THROW(second.resume(broken), Error);
+}
+
+TEST(DetailTrainer, AScaleOfLossesChangesNoBit) {
+  const auto source = std::make_shared<GreyBall>();
+  DetailTrainer plain = trainerOf(8, source), scaled = trainerOf(8, source, LossScaling::kDynamic);
+  while (!plain.isDone()) {
+    const DetailStep one = plain.step(), other = scaled.step();
+    EXPECT_EQ(one.l1, other.l1);
+    EXPECT_EQ(other.weights.loss_scale, std::exp2(20));
+  }
+  EXPECT_EQ(scaled.values(), plain.values());
 }
 
 }  // namespace

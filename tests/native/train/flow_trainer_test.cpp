@@ -129,6 +129,20 @@ TEST(FlowTrainer, GoesOnBitForBitWhateverTheThreads) {
   EXPECT_EQ(other.values(), before);
 }
 
+TEST(FlowTrainer, AScaleOfLossesChangesNoBit) {
+  const auto objects = std::make_shared<TwoObjects>();
+  FlowSchedule with = scheduleOf(20);
+  with.optimiser.loss_scaling = LossScaling::kDynamic;
+  FlowTrainer plain(smallSizes(), scheduleOf(20), 3, objects);
+  FlowTrainer scaled(smallSizes(), with, 3, objects);
+  while (!plain.isDone()) {
+    const FlowStep one = plain.step(), other = scaled.step();
+    EXPECT_EQ(one.loss, other.loss);
+    EXPECT_EQ(other.weights.loss_scale, std::exp2(20));
+  }
+  EXPECT_EQ(scaled.values(), plain.values());
+}
+
 TEST(FlowTrainer, WhatIsNotFiniteIsSkippedAndWhatCannotBeIsRefused) {
   const auto objects = std::make_shared<TwoObjects>();
   objects->is_broken = true;
