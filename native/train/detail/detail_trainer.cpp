@@ -56,14 +56,13 @@ std::vector<DetailView> detailViews(const ObjectViews& views, const std::vector<
 
 DetailTrainer::DetailTrainer(const DetailModelSizes& sizes, const DetailSchedule& schedule,
                              uint64_t seed, std::shared_ptr<const DetailSource> objects,
-                             std::shared_ptr<const BackendFactory> backends,
-                             std::shared_ptr<GradientExchange> exchange)
-    : model_(sizes),
+                             std::shared_ptr<const BackendFactory> backends, TrainerRun run)
+    : model_(sizes, run.precision),
       schedule_(schedule),
       seed_(seed),
       objects_(std::move(objects)),
       backends_(std::move(backends)),
-      exchange_(exchange ? std::move(exchange) : noExchange()),
+      exchange_(run.exchange ? std::move(run.exchange) : noExchange()),
       values_(model_.startValues(seed)),
       gradients_(values_.size()) {
   validate(schedule);

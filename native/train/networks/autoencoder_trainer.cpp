@@ -70,13 +70,13 @@ AutoencoderTrainer::AutoencoderTrainer(const AutoencoderSizes& sizes,
                                        std::vector<AutoencoderSchedule> parts, uint64_t seed,
                                        std::shared_ptr<const ObjectSource> objects,
                                        std::shared_ptr<const BackendFactory> backends,
-                                       std::shared_ptr<GradientExchange> exchange)
-    : networks_(sizes),
+                                       TrainerRun run)
+    : networks_(sizes, run.precision),
       parts_(std::move(parts)),
       seed_(seed),
       objects_(std::move(objects)),
       backends_(std::move(backends)),
-      exchange_(exchange ? std::move(exchange) : noExchange()),
+      exchange_(run.exchange ? std::move(run.exchange) : noExchange()),
       values_(networks_.startValues(seed)),
       gradients_(values_.size()) {
   if (parts_.empty()) refuse("a training has 0 parts; one or more are needed");

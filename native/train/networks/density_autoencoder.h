@@ -107,8 +107,10 @@ struct AutoencoderLosses {
 /// The density autoencoder as it is trained: encoder, density and splats.
 class DensityAutoencoder {
  public:
-  /// Errors: kInvalidArgument (validate()).
-  explicit DensityAutoencoder(const AutoencoderSizes& sizes);
+  /// In: precision, of the factors of products in blocks. Errors: kInvalidArgument (validate());
+  /// kUnavailable (requirePrecision()).
+  explicit DensityAutoencoder(const AutoencoderSizes& sizes,
+                              FactorPrecision precision = FactorPrecision::kFloat32);
 
   const ParameterLayout& layout() const { return layout_; }
   const AutoencoderSizes& sizes() const { return sizes_; }

@@ -97,12 +97,12 @@ struct FlowTrainer::Drawn {
 };
 
 FlowTrainer::FlowTrainer(const FlowSizes& sizes, const FlowSchedule& schedule, uint64_t seed,
-                         std::shared_ptr<const FlowSource> objects,
-                         std::shared_ptr<GradientExchange> exchange)
-    : schedule_(schedule),
+                         std::shared_ptr<const FlowSource> objects, TrainerRun run)
+    : layout_(run.precision),
+      schedule_(schedule),
       seed_(seed),
       objects_(std::move(objects)),
-      exchange_(exchange ? std::move(exchange) : noExchange()),
+      exchange_(run.exchange ? std::move(run.exchange) : noExchange()),
       flow_((validate(sizes), layout_), sizes),
       values_(firstValues(layout_, sizes, seed)),
       gradients_(values_.size()) {

@@ -78,6 +78,27 @@ TEST(TrainingConfig, ScalesLossesWhereThatIsSaid) {
   }
 }
 
+TEST(TrainingConfig, ScalesLossesWhereProductsAreInBfloat16) {
+  const TrainingConfig config =
+      parsed(R"({"collection": "a", "out": "b", "precision": "bfloat16", "flow": {"steps": 900},
+                 "parts": [{"stage": "joint"}, {"loss_scale": "none"}]})");
+  EXPECT_EQ(config.precision, FactorPrecision::kBfloat16);
+  EXPECT_EQ(config.parts[0].optimiser.loss_scaling, LossScaling::kDynamic);
+  EXPECT_EQ(config.parts[1].optimiser.loss_scaling, LossScaling::kNone) << "as it says";
+  EXPECT_EQ(config.flow.schedule.optimiser.loss_scaling, LossScaling::kDynamic);
+  const TrainingConfig read = readSettings(settingsJson(config), "settings");
+  EXPECT_EQ(read.precision, FactorPrecision::kBfloat16);
+  EXPECT_EQ(settingsJson(read), settingsJson(config));
+  const TrainingConfig usual = parsed(R"({"collection": "a", "out": "b"})");
+  EXPECT_EQ(usual.precision, FactorPrecision::kFloat32);
+  EXPECT_EQ(settingsJson(usual).find("precision"), std::string::npos);
+  const TrainingConfig detail = parsed(
+      R"({"collection": "a", "out": "b", "detail": {"steps": 500}, "precision": "bfloat16"})");
+  EXPECT_EQ(detail.detail.schedule.optimiser.loss_scaling, LossScaling::kDynamic);
+  EXPECT_THROW(parsed(R"({"collection": "a", "out": "b", "precision": "float16"})"), Error);
+  EXPECT_THROW(parsed(R"({"collection": "a", "out": "b", "precision": 16})"), Error);
+}
+
 TEST(TrainingConfig, RefusesListsThatAreNone) {
   EXPECT_THROW(parsed(R"({"collection": "a", "out": "b", "parts": {"stage": "joint"}})"), Error);
   EXPECT_THROW(parsed(R"({"collection": "a", "out": "b", "parts": [1]})"), Error);
