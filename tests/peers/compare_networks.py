@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What networks that 'stipple train' has learned make of objects that they have never seen.
 
-    compare_networks.py LIBRARY NETWORKS COLLECTION [--held-out 12] [--anchors 256] [--steps 20] [--image 12]
-        [--objects 1000] [--picture FILE]
+    compare_networks.py LIBRARY NETWORKS COLLECTION [--held-out 12] [--anchors 256] [--steps 20] [--guidance 3]
+        [--image 12] [--objects 1000] [--picture FILE]
 
 NETWORKS holds weights.safetensors and flow.safetensors, COLLECTION is the folder that they were learned from, of which
 every --held-out-th object by name was kept from them. For each of those, over all its images but one:
@@ -78,7 +78,8 @@ class Judge:
         return self._decoded(Model.of_job(job), seed)
 
     def generated(self, image):
-        options = generate_options(self._context.library, self._given.networks, seed=1, steps=self._given.steps, size=0)
+        options = generate_options(self._context.library, self._given.networks, seed=1, steps=self._given.steps,
+                                   guidance=self._given.guidance, size=0)
         job = Generation.start(self._context, Image.create(self._context, image), None, options)
         job.wait()
         return self._decoded(Model.of_job(job), 1)
@@ -110,11 +111,12 @@ def main():
     parser.add_argument('--held-out', type=int, default=12)
     parser.add_argument('--anchors', type=int, default=256)
     parser.add_argument('--steps', type=int, default=20)
+    parser.add_argument('--guidance', type=float, default=3)
     parser.add_argument('--image', type=int, default=12, help='the one that is told')
     parser.add_argument('--objects', type=int, default=1000)
     parser.add_argument('--picture', type=Path, help='a PNG of some objects: truth, encoded, generated, nearest')
     given = parser.parse_args()
-    context = Context(library.load(given.library))
+    context = Context(library.load(given.library.resolve()))
     judge = Judge(context, given)
     folders = sorted(path.parent for path in given.collection.glob('*/transforms.json'))
     kept = [folder for i, folder in enumerate(folders) if i % given.held_out == given.held_out - 1]
