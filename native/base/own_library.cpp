@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path findLibrary(const char* file_name) {
+fs::path findLibrary(const std::string& file_name) {
   const fs::path folder = platform::ownFile().parent_path();
   std::error_code ignored;
   for (const char* place : {".", "../lib", "../../lib"}) {
@@ -23,8 +23,8 @@ fs::path findLibrary(const char* file_name) {
 
 }  // namespace
 
-void* openOwnLibrary(const char* file_name, std::string& path, std::string& why) {
-  path = findLibrary(file_name).string();
+void* openOwnLibrary(const char* name, std::string& path, std::string& why) {
+  path = findLibrary(platform::libraryFile(name)).string();
   return platform::openLibrary(path, why);
 }
 

@@ -16,7 +16,7 @@ enum class PathKind { kMissing, kFile, kFolder, kOther };
 struct PathStatus {
   PathKind kind = PathKind::kMissing;
   uint64_t bytes = 0;
-  int64_t modified = 0;      ///< nanoseconds since a time of the system's own
+  int64_t modified = 0;      ///< nanoseconds since the year 1970
   unsigned permissions = 0;  ///< those of POSIX
 };
 

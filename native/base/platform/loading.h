@@ -9,6 +9,9 @@ namespace stipple::platform {
 /// where the system does not tell.
 std::filesystem::path ownFile();
 
+/// What the file of a shared library is called: "libstipple_media.so", "stipple_media.dll".
+std::string libraryFile(const std::string& name);
+
 /// Opens a shared library. Returns: null, with the loader's reason in `why`, where it cannot be.
 void* openLibrary(const std::string& path, std::string& why);
 /// The address of a function, or null.

@@ -21,6 +21,10 @@ fs::path ownFile() {
   return fs::weakly_canonical(file, error);
 }
 
+std::string libraryFile(const std::string& name) {
+  return "lib" + name + ".so";
+}
+
 void* openLibrary(const std::string& path, std::string& why) {
   void* library = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library != nullptr) return library;

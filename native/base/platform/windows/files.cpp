@@ -22,6 +22,10 @@ constexpr size_t kMostAtOnce = size_t{1} << 30;
 /// A byte far behind the end of any file: on Windows a lock forbids what it covers to all others.
 constexpr DWORD kLockPlace = 0x7fffffff;
 
+/// Windows counts steps of 100 nanoseconds from the year 1601; 64 bits of nanoseconds reach from
+/// 1970 to 2262.
+constexpr int64_t kEpochSteps = 116444736000000000;
+
 HANDLE handleOf(int descriptor) {
   return reinterpret_cast<HANDLE>(::_get_osfhandle(descriptor));
 }
@@ -43,9 +47,9 @@ bool statusOfHandle(HANDLE handle, PathStatus& status) {
   const bool is_folder = (found.dwFileAttributes & FILE_ATTRIBUTE_DIRECTORY) != 0;
   status.kind = is_folder ? PathKind::kFolder : PathKind::kFile;
   status.bytes = static_cast<uint64_t>(number64(found.nFileSizeHigh, found.nFileSizeLow));
-  // Windows counts in steps of 100 nanoseconds.
-  status.modified =
-      number64(found.ftLastWriteTime.dwHighDateTime, found.ftLastWriteTime.dwLowDateTime) * 100;
+  const int64_t steps =
+      number64(found.ftLastWriteTime.dwHighDateTime, found.ftLastWriteTime.dwLowDateTime);
+  status.modified = (steps - kEpochSteps) * 100;
   status.permissions = 0666;
   return true;
 }
@@ -173,11 +177,21 @@ bool syncFile(const std::string& path) {
 }
 
 bool replaceFile(const std::string& from, const std::string& to) {
-  if (::MoveFileExW(systemName(from).c_str(), systemName(to).c_str(),
-                    MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH) != 0) {
+  const std::wstring source = systemName(from), target = systemName(to);
+  constexpr DWORD kReplace = MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH;
+  if (::MoveFileExW(source.c_str(), target.c_str(), kReplace) != 0) return true;
+  setErrnoFromSystem();
+  // A file that is open cannot be replaced on systems before Windows 10, but what is open here can
+  // be renamed: it gets a name that nobody looks at, and is gone when it is closed. For a moment
+  // there is neither.
+  const std::wstring aside = source + L".old";
+  if (errno != EACCES || ::MoveFileExW(target.c_str(), aside.c_str(), 0) == 0) return false;
+  if (::MoveFileExW(source.c_str(), target.c_str(), kReplace) != 0) {
+    ::DeleteFileW(aside.c_str());
     return true;
   }
   setErrnoFromSystem();
+  ::MoveFileExW(aside.c_str(), target.c_str(), 0);
   return false;
 }
 

@@ -37,6 +37,10 @@ fs::path ownFile() {
   return fs::path();
 }
 
+std::string libraryFile(const std::string& name) {
+  return name + ".dll";
+}
+
 void* openLibrary(const std::string& path, std::string& why) {
   // What the library needs is looked for beside it, and not in the folder that somebody works in.
   HMODULE library =

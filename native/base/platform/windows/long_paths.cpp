@@ -24,8 +24,6 @@ using stipple::platform::PathStatus;
 using stipple::platform::setErrnoFromSystem;
 using stipple::platform::systemName;
 
-// From the year 1601 to 1970, and how many of Windows' steps a second has.
-constexpr int64_t kEpochSeconds = 11644473600;
 constexpr int64_t kSecond = 1000000000;
 
 template <typename Function>
@@ -43,7 +41,7 @@ int statPath(const wchar_t* path, struct _stat64* out) {
                                                   : S_IFCHR | 0666;
   out->st_nlink = 1;
   out->st_size = static_cast<int64_t>(status.bytes);
-  out->st_mtime = status.modified / kSecond - kEpochSeconds;
+  out->st_mtime = status.modified / kSecond;
   return 0;
 }
 
